@@ -1,0 +1,1 @@
+#include "formats/files/files.hpp"

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lib/base/job.hpp"
+
+namespace stx {
+
+using Bytes = std::vector<std::byte>;
+using ByteSpan = std::span<const std::byte>;
+
+/// A whole file. "-" reads stdin. Errors (io): missing, a folder, not a regular file (FIFOs and
+/// devices are refused), unreadable; (invalidInput) larger than the memory limit.
+[[nodiscard]] Result<Bytes> readFile(const std::filesystem::path& path, const Limits& limits);
+
+/// A file that is written whole or not at all: bytes go to a temporary name beside the target,
+/// commit() flushes and renames. Destroyed without commit(): nothing stays. "-" is stdout.
+class OutputFile {
+  public:
+    struct Options {
+        bool noClobber = false;  ///< error when the target exists
+    };
+    [[nodiscard]] static Result<OutputFile> create(const std::filesystem::path& target, Options options);
+    [[nodiscard]] static Result<OutputFile> create(const std::filesystem::path& target) {
+        return create(target, Options());
+    }
+    OutputFile(OutputFile&&) noexcept;
+    OutputFile& operator=(OutputFile&&) noexcept;
+    ~OutputFile();
+
+    [[nodiscard]] Result<void> write(ByteSpan bytes);
+    [[nodiscard]] Result<void> write(std::string_view text);
+    /// Where the bytes are until commit(), for libraries that write by name.
+    [[nodiscard]] const std::filesystem::path& temporaryPath() const;
+    [[nodiscard]] Result<void> commit();
+
+  private:
+    struct Impl;
+    explicit OutputFile(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Writes one file whole or not at all.
+[[nodiscard]] Result<void> writeFile(const std::filesystem::path& target, ByteSpan bytes,
+                                     OutputFile::Options options = {});
+
+/// A folder of files that appears whole or not at all: files are written into a temporary folder
+/// beside the target; commit() swaps it in. An existing target folder is replaced only when it holds
+/// nothing but files that this kind of output writes (a marker or a known index file), else an error.
+class OutputFolder {
+  public:
+    [[nodiscard]] static Result<OutputFolder> create(const std::filesystem::path& target,
+                                                     OutputFile::Options options);
+    OutputFolder(OutputFolder&&) noexcept;
+    OutputFolder& operator=(OutputFolder&&) noexcept;
+    ~OutputFolder();
+    /// Where to put the files until commit().
+    [[nodiscard]] const std::filesystem::path& temporaryPath() const;
+    [[nodiscard]] Result<void> commit();
+
+  private:
+    struct Impl;
+    explicit OutputFolder(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+/// The file that `name`, found inside a bundle, set or model in `folder`, stands for. Errors
+/// (invalidInput) when it is absolute, has a URL scheme, leaves the folder by `..` or a link, or is
+/// no regular file, unless limits.allowOutside; (io) when it does not exist.
+[[nodiscard]] Result<std::filesystem::path> resolveInside(const std::filesystem::path& folder,
+                                                          std::string_view name, const Limits& limits);
+
+}  // namespace stx

@@ -1,0 +1,1 @@
+#include "formats/images/images.hpp"

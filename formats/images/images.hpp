@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "formats/files/files.hpp"
+#include "lib/base/image.hpp"
+#include "lib/base/job.hpp"
+
+namespace stx {
+
+/// What an image file's header says, read without any codec.
+struct ImageInfo {
+    std::string format;  ///< "png", "jpeg", "exr", "other"
+    int width = 0, height = 0;
+    int channels = 0;  ///< 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA
+    int bits = 0;      ///< per channel
+};
+
+/// Header of a PNG or JPEG (others: error unsupported). Loads no library; a few microseconds.
+[[nodiscard]] Result<ImageInfo> probeImage(ByteSpan bytes);
+
+/// A decoded picture: interleaved channels, row 0 on top, values exactly as the file has them (no
+/// colour conversion, alpha straight as stored).
+struct DecodedImage {
+    int width = 0, height = 0, channels = 0;
+    std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> values;
+    std::vector<std::string> channelNames;  ///< "R", "G", "B", "A", "Y", "Z", …
+    bool linear = false;                    ///< float formats (EXR, HDR): linear light
+    [[nodiscard]] int bits() const {
+        return values.index() == 0 ? 8 : values.index() == 1 ? 16 : 32;
+    }
+};
+
+/// Decodes any format OpenImageIO reads, from memory. Header sizes are checked against the limits
+/// and against what the file can hold before pixels are allocated. `name` is for messages and for
+/// formats that are told by their ending.
+[[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,
+                                               const Limits& limits);
+
+/// 8-bit sRGB RGBA of any decoded image (grey is spread, missing alpha is 255, 16 bits are rounded,
+/// linear floats are coded as sRGB).
+[[nodiscard]] Image<glm::u8vec4> rgba8From(const DecodedImage& image);
+
+/// PNG bytes of 1..4 channels with 8 or 16 bits (values in host order), tagged sRGB when `srgb`.
+/// The same input gives the same bytes. `level` 0..9 is zlib's.
+[[nodiscard]] Result<Bytes> encodePng(int width, int height, int channels, int bits,
+                                      const void* values, bool srgb, int level = 6);
+/// JPEG bytes of 1 or 3 channels of 8 bits; quality 1..100, no chroma subsampling at 90 and above.
+[[nodiscard]] Result<Bytes> encodeJpeg(int width, int height, int channels, const std::uint8_t* values,
+                                       int quality);
+
+/// Starts loading the codecs' libraries on another thread, while the caller does something else.
+void preloadCodecs();
+
+}  // namespace stx

@@ -1,0 +1,1 @@
+#include <OpenImageIO/imageio.h>

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+namespace stx {
+
+/// A plain raster: width x height values, row 0 on top, rows stored one after the other.
+template <class T>
+class Image {
+  public:
+    using Pixel = T;
+
+    Image() = default;
+    /// Errors of allocation are std::bad_alloc; sizes from files are checked against Limits before.
+    Image(int width, int height, T fill = {})
+        : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * height, fill) {}
+
+    [[nodiscard]] int width() const { return width_; }
+    [[nodiscard]] int height() const { return height_; }
+    [[nodiscard]] glm::ivec2 size() const { return {width_, height_}; }
+    [[nodiscard]] bool empty() const { return pixels_.empty(); }
+    [[nodiscard]] std::size_t count() const { return pixels_.size(); }
+
+    [[nodiscard]] T& at(int x, int y) {
+        assert(contains(x, y));
+        return pixels_[static_cast<std::size_t>(y) * width_ + x];
+    }
+    [[nodiscard]] const T& at(int x, int y) const {
+        assert(contains(x, y));
+        return pixels_[static_cast<std::size_t>(y) * width_ + x];
+    }
+    [[nodiscard]] bool contains(int x, int y) const {
+        return x >= 0 && y >= 0 && x < width_ && y < height_;
+    }
+
+    [[nodiscard]] std::span<T> row(int y) {
+        return {pixels_.data() + static_cast<std::size_t>(y) * width_, static_cast<std::size_t>(width_)};
+    }
+    [[nodiscard]] std::span<const T> row(int y) const {
+        return {pixels_.data() + static_cast<std::size_t>(y) * width_, static_cast<std::size_t>(width_)};
+    }
+    [[nodiscard]] std::span<T> pixels() { return pixels_; }
+    [[nodiscard]] std::span<const T> pixels() const { return pixels_; }
+    [[nodiscard]] T* data() { return pixels_.data(); }
+    [[nodiscard]] const T* data() const { return pixels_.data(); }
+
+    bool operator==(const Image&) const = default;
+
+  private:
+    int width_ = 0;
+    int height_ = 0;
+    std::vector<T> pixels_;
+};
+
+}  // namespace stx

@@ -1,0 +1,41 @@
+#include "lib/base/job.hpp"
+
+namespace stx {
+
+Result<void> Limits::checkAllocation(std::uint64_t count, std::uint64_t bytesEach,
+                                     std::string_view what) const {
+    if (bytesEach != 0 && count > maxMemoryBytes / bytesEach) {
+        return fail(ErrorCode::invalidInput,
+                    "{} would need {} x {} bytes, more than the memory limit of {} MiB; "
+                    "raise it with --max-memory if the file is to be trusted",
+                    what, count, bytesEach, maxMemoryBytes >> 20);
+    }
+    return {};
+}
+
+void Job::note(std::string text) {
+    const std::lock_guard lock(mutex_);
+    for (auto& known : notes_) {
+        if (known.text == text) {
+            ++known.count;
+            return;
+        }
+    }
+    notes_.push_back({std::move(text)});
+}
+
+std::vector<std::string> Job::takeNotes() {
+    const std::lock_guard lock(mutex_);
+    std::vector<std::string> lines;
+    for (auto& n : notes_)
+        lines.push_back(n.count > 1 ? fmt::format("{} ({} times)", n.text, n.count) : n.text);
+    notes_.clear();
+    return lines;
+}
+
+Result<void> Job::checkCancelled() const {
+    if (cancelled.load(std::memory_order_relaxed)) return fail(ErrorCode::failed, "stopped");
+    return {};
+}
+
+}  // namespace stx

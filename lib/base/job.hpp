@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lib/base/result.hpp"
+
+namespace stx {
+
+/// What a request may cost. Each number from a file is held against these before memory is taken.
+struct Limits {
+    std::uint64_t maxMemoryBytes = 4ull << 30;  ///< `--max-memory`
+    int maxImageSide = 65535;                   ///< pixels
+    int maxViews = 65536;
+    int maxNesting = 256;                       ///< nodes, boxes, groups
+    /// Image and buffer names may leave the folder of the file that names them (`--allow-outside`).
+    bool allowOutside = false;
+
+    /// Errors with the claim, the size and the limit when `count * bytesEach` is more than allowed.
+    /// Never overflows.
+    [[nodiscard]] Result<void> checkAllocation(std::uint64_t count, std::uint64_t bytesEach,
+                                               std::string_view what) const;
+};
+
+/// What a caller gives to every longer operation: limits, a place for remarks, progress, cancelling.
+/// Safe to use from several threads.
+class Job {
+  public:
+    Limits limits;
+
+    /// Something a person should know: lossy, dropped, clamped. Said once each, in order.
+    void note(std::string text);
+    /// The notes so far, sorted by first mention; duplicates counted as `text (3 times)`.
+    [[nodiscard]] std::vector<std::string> takeNotes();
+
+    /// Called with (done, total, what) from any thread; may be empty.
+    std::function<void(std::int64_t done, std::int64_t total, std::string_view what)> onProgress;
+    void progress(std::int64_t done, std::int64_t total, std::string_view what) const {
+        if (onProgress) onProgress(done, total, what);
+    }
+
+    /// Set (by a signal handler) to stop soon; loops over views or tiles look at it.
+    std::atomic<bool> cancelled = false;
+    /// Errors when cancelled.
+    [[nodiscard]] Result<void> checkCancelled() const;
+
+  private:
+    struct Note {
+        std::string text;
+        int count = 1;
+    };
+    std::mutex mutex_;
+    std::vector<Note> notes_;
+};
+
+}  // namespace stx

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/image.hpp"
+#include "lib/model/bundle.hpp"
+
+namespace stx {
+
+/// A rectangle of a reference view and where it lies in the atlas. Pixel (x, y) of the rectangle,
+/// 0 <= x < width, 0 <= y < height, is pixel (viewX + x, viewY + y) of the view and pixel
+/// (atlasX + x, atlasY + y) of the page, or, when turned, (atlasX + height - 1 - y, atlasY + x).
+struct AtlasRectangle {
+    int view = 0;
+    int page = 0;
+    int viewX = 0, viewY = 0;    ///< pixels, in the view
+    int width = 0, height = 0;   ///< pixels, in the view
+    int atlasX = 0, atlasY = 0;  ///< pixels, in the page; of the rectangle without its padding
+    bool turned = false;         ///< a quarter clockwise
+
+    /// Page pixel of a view pixel inside the rectangle.
+    [[nodiscard]] glm::ivec2 atlasFromView(int x, int y) const {
+        const int dx = x - viewX, dy = y - viewY;
+        if (turned) return {atlasX + height - 1 - dy, atlasY + dx};
+        return {atlasX + dx, atlasY + dy};
+    }
+    [[nodiscard]] int atlasWidth() const { return turned ? height : width; }
+    [[nodiscard]] int atlasHeight() const { return turned ? width : height; }
+
+    bool operator==(const AtlasRectangle&) const = default;
+};
+
+/// One page of an atlas: its textures all have the same size.
+struct AtlasPage {
+    Texture texture;
+    Image<float> depth;           ///< distances in scene units, kNoDepth outside
+    Image<glm::vec3> normal;      ///< empty when absent
+    Image<glm::vec3> splatU;      ///< empty when absent
+    Image<glm::vec3> splatV;
+};
+
+/// The reference views of a bundle merged into at most four textures: colour, depth, normal and
+/// splat (Lee & Park, section 3.1). A page of an atlas has up to four textures; an atlas with
+/// several pages keeps pages x textures-per-page at most four.
+struct Atlas {
+    /// Cameras, planes and names of the views; their images are empty.
+    std::vector<ReferenceView> views;
+    std::vector<AtlasRectangle> rectangles;
+    std::vector<AtlasPage> pages;
+    std::string layout = "grid";  ///< "grid" or "tight"
+    int padding = 2;              ///< pixels around each rectangle, filled from its edge
+    std::optional<Bounds> bounds;
+    std::string title;
+    /// Object pixels before and after pruning.
+    std::int64_t sourcePixels = 0;
+    std::int64_t keptPixels = 0;
+
+    [[nodiscard]] int width() const { return pages.empty() ? 0 : pages[0].depth.width(); }
+    [[nodiscard]] int height() const { return pages.empty() ? 0 : pages[0].depth.height(); }
+    /// Textures in all pages together, at most 4.
+    [[nodiscard]] int textureCount() const;
+    /// Share of the page area that rectangles cover, without padding, 0..1.
+    [[nodiscard]] double used() const;
+    /// Errors when a rectangle leaves its view or page, two overlap, or sizes disagree.
+    [[nodiscard]] Result<void> check() const;
+};
+
+}  // namespace stx

@@ -1,0 +1,85 @@
+#include "lib/model/bundle.hpp"
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+
+std::int64_t ReferenceView::pointCount() const {
+    std::int64_t n = 0;
+    for (const float d : depth.pixels()) n += hasPoint(d) ? 1 : 0;
+    return n;
+}
+
+Result<void> ReferenceView::check() const {
+    STX_CHECK(camera.check());
+    const auto sizeOf = [](const auto& image) { return fmt::format("{}x{}", image.width(), image.height()); };
+    const auto fits = [&](const auto& image) {
+        return image.width() == camera.width && image.height() == camera.height;
+    };
+    if (!fits(depth) || !fits(texture))
+        return fail(ErrorCode::invalidInput, "depth is {} but texture is {} and the camera {}x{}; all must match",
+                    sizeOf(depth), sizeOf(texture), camera.width, camera.height);
+    if ((!normal.empty() && !fits(normal)) || (!splatU.empty() && !fits(splatU)) ||
+        (!splatV.empty() && !fits(splatV)))
+        return fail(ErrorCode::invalidInput,
+                    "normal is {}, splatU {} and splatV {} but depth is {}; all must match",
+                    sizeOf(normal), sizeOf(splatU), sizeOf(splatV), sizeOf(depth));
+    if (!std::isfinite(nearPlane) || !std::isfinite(farPlane) || nearPlane < 0 || !(nearPlane < farPlane))
+        return fail(ErrorCode::invalidInput,
+                    "nearPlane is {:g} and farPlane {:g}; 0 <= nearPlane < farPlane must hold",
+                    nearPlane, farPlane);
+    if (depthBits != 8 && depthBits != 16 && depthBits != 32)
+        return fail(ErrorCode::invalidInput, "depth has {} bits; 8, 16 or 32 (float) is possible", depthBits);
+    for (const float d : depth.pixels()) {
+        if (!(d >= 0)) return fail(ErrorCode::invalidInput, "depth holds {}; distances are 0 or more", d);
+    }
+    return {};
+}
+
+const char* Bundle::nodeKind() const {
+    for (const auto& v : views) {
+        if (v.hasNormals() || v.hasSplats()) return "SimpleTextureV2";
+    }
+    return "SimpleTexture";
+}
+
+std::int64_t Bundle::pointCount() const {
+    std::int64_t n = 0;
+    for (const auto& v : views) n += v.pointCount();
+    return n;
+}
+
+Bounds Bundle::computeBounds() const {
+    std::vector<Bounds> each(views.size());
+    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+        const auto& v = views[i];
+        for (int y = 0; y < v.depth.height(); ++y) {
+            for (int x = 0; x < v.depth.width(); ++x) {
+                if (hasPoint(v.depth.at(x, y))) each[i].add(v.worldPoint(x, y));
+            }
+        }
+    });
+    Bounds all;
+    for (const auto& b : each) {
+        if (b.empty()) continue;
+        all.add(b.min);
+        all.add(b.max);
+    }
+    return all;
+}
+
+Result<void> Bundle::check() const {
+    if (views.empty()) return fail(ErrorCode::invalidInput, "the bundle has no reference view");
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        if (auto ok = views[i].check(); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("view {}", i)));
+        if (views[i].texture.isLinear() != views[0].texture.isLinear())
+            return fail(ErrorCode::invalidInput,
+                        "view {} is {} but view 0 is {}; a bundle has one colour space", i,
+                        views[i].texture.isLinear() ? "linear" : "sRGB",
+                        views[0].texture.isLinear() ? "linear" : "sRGB");
+    }
+    return {};
+}
+
+}  // namespace stx

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/image.hpp"
+#include "lib/base/result.hpp"
+#include "lib/geometry/bounds.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx {
+
+/// A picture on a mesh: 8-bit RGBA, straight alpha.
+struct MeshTexture {
+    enum class Wrap { repeat, mirror, clamp };
+    Rgba8Image pixels;  ///< row 0 is v = 0 (glTF's convention: v runs down)
+    Wrap wrapU = Wrap::repeat;
+    Wrap wrapV = Wrap::repeat;
+    bool nearest = false;  ///< magnification without interpolation
+};
+
+/// How a triangle looks, unlit (glTF 2.0 metallic-roughness: base colour only).
+struct Material {
+    enum class Alpha { opaque, mask, blend };
+    std::string name;
+    glm::vec4 baseColour{1.0f};   ///< linear factor, multiplies texture and vertex colour
+    int baseColourTexture = -1;   ///< index into Mesh::textures, -1 = none; sRGB-coded
+    int normalTexture = -1;       ///< tangent-space normal map, -1 = none; linear
+    float normalScale = 1.0f;
+    Alpha alpha = Alpha::opaque;
+    float alphaCutoff = 0.5f;     ///< for Alpha::mask
+    bool doubleSided = true;      ///< false: back faces are not drawn
+};
+
+/// Triangles (and loose points) in the world, all node transforms and instances applied.
+/// Per-vertex arrays are empty or as long as `positions`.
+struct Mesh {
+    std::vector<glm::vec3> positions;    ///< scene units, +Y up
+    std::vector<glm::vec3> normals;      ///< unit
+    std::vector<glm::vec4> tangents;     ///< xyz unit, w = handedness (only with normal maps)
+    std::vector<glm::vec4> colours;      ///< linear RGBA, multiplies the base colour
+    std::vector<glm::vec2> uvs;          ///< of the base colour texture, its transform applied; v down
+    std::vector<glm::vec2> normalUvs;    ///< of the normal texture, when they differ from uvs
+
+    std::vector<glm::uvec3> triangles;       ///< indices into the vertex arrays
+    std::vector<std::uint32_t> triangleMaterial;  ///< one per triangle, index into materials
+    std::vector<std::uint32_t> points;       ///< vertices drawn as points (point clouds)
+
+    std::vector<Material> materials;  ///< at least one when there are triangles
+    std::vector<MeshTexture> textures;
+
+    [[nodiscard]] Bounds bounds() const;
+    /// Errors on indices out of range, arrays of unlike length, NaN or infinite positions, and on a
+    /// mesh with neither triangles nor points.
+    [[nodiscard]] Result<void> check() const;
+};
+
+}  // namespace stx

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/image.hpp"
+#include "lib/base/result.hpp"
+#include "lib/geometry/bounds.hpp"
+#include "lib/geometry/camera.hpp"
+#include "lib/geometry/depth_code.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx {
+
+/// One reference image of an object: a DepthImage with its SimpleTexture or SimpleTextureV2
+/// (ISO/IEC 14496-16, 4.5.4). All images of a view have the camera's width and height.
+struct ReferenceView {
+    std::string name;  ///< unique in its bundle; becomes part and file names
+    Camera camera;
+
+    double nearPlane = 10.0;  ///< scene units from the viewpoint; bounds the object
+    double farPlane = 100.0;
+    /// How the depth is coded in MPEG-4 files: 8 or 16 bits; 32 = float distances, only in .exr.
+    int depthBits = 16;
+
+    Texture texture;     ///< colour with coverage in alpha
+    Image<float> depth;  ///< planar distance in scene units; kNoDepth where there is no point
+
+    /// SimpleTextureV2. Empty when absent; else one value per pixel, zero where there is no point.
+    Image<glm::vec3> normal;  ///< unit, in the world, towards the camera
+    Image<glm::vec3> splatU;  ///< tangent vectors in the world, scene units: half axes of the splat
+    Image<glm::vec3> splatV;
+
+    [[nodiscard]] bool hasNormals() const { return !normal.empty(); }
+    [[nodiscard]] bool hasSplats() const { return !splatU.empty() && !splatV.empty(); }
+
+    [[nodiscard]] DepthCode depthCode() const {
+        return {nearPlane, farPlane, depthBits == 8 ? 255u : 65535u};
+    }
+    /// Pixels that are points of the object.
+    [[nodiscard]] std::int64_t pointCount() const;
+    /// World position of the point of pixel (x, y), whose depth must be one.
+    [[nodiscard]] glm::dvec3 worldPoint(int x, int y) const {
+        return camera.position +
+               camera.orientation * camera.unproject(x + 0.5, y + 0.5, depth.at(x, y));
+    }
+    /// Errors when sizes disagree, the camera or the planes make no sense, or values are NaN.
+    [[nodiscard]] Result<void> check() const;
+};
+
+}  // namespace stx

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <variant>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/image.hpp"
+
+namespace stx {
+
+/// 8-bit sRGB colour with straight (not premultiplied) alpha, 255 = fully covered.
+using Rgba8Image = Image<glm::u8vec4>;
+/// Linear light, Rec. 709 primaries, straight alpha in 0..1; colours may exceed 1.
+using RgbaFloatImage = Image<glm::vec4>;
+
+/// Colour of a reference view: display-referred 8-bit sRGB or scene-referred linear float.
+/// Alpha is coverage: 0 = background, between = a silhouette's pixel. Colours under alpha 0 are bled
+/// from the object (see bleedColour()), so filters never mix in background.
+class Texture {
+  public:
+    Texture() = default;
+    Texture(Rgba8Image image) : image_(std::move(image)) {}          // NOLINT: a texture is either
+    Texture(RgbaFloatImage image) : image_(std::move(image)) {}      // NOLINT
+
+    [[nodiscard]] bool isLinear() const { return std::holds_alternative<RgbaFloatImage>(image_); }
+    [[nodiscard]] const Rgba8Image* rgba8() const { return std::get_if<Rgba8Image>(&image_); }
+    [[nodiscard]] const RgbaFloatImage* rgbaFloat() const { return std::get_if<RgbaFloatImage>(&image_); }
+    [[nodiscard]] Rgba8Image* rgba8() { return std::get_if<Rgba8Image>(&image_); }
+    [[nodiscard]] RgbaFloatImage* rgbaFloat() { return std::get_if<RgbaFloatImage>(&image_); }
+
+    [[nodiscard]] int width() const {
+        return std::visit([](const auto& i) { return i.width(); }, image_);
+    }
+    [[nodiscard]] int height() const {
+        return std::visit([](const auto& i) { return i.height(); }, image_);
+    }
+    [[nodiscard]] bool empty() const { return width() == 0; }
+
+    /// Straight RGBA as floats in the image's own space: 8-bit values / 255 (still sRGB-coded), or
+    /// the linear floats as they are.
+    [[nodiscard]] glm::vec4 at(int x, int y) const {
+        if (const auto* i = rgba8()) return glm::vec4(i->at(x, y)) * (1.0f / 255.0f);
+        return rgbaFloat()->at(x, y);
+    }
+
+    bool operator==(const Texture&) const = default;
+
+  private:
+    std::variant<Rgba8Image, RgbaFloatImage> image_;
+};
+
+/// sRGB transfer function (IEC 61966-2-1), one value.
+[[nodiscard]] float srgbFromLinear(float linear);
+[[nodiscard]] float linearFromSrgb(float coded);
+
+/// Gives each pixel of alpha 0 the colour of the nearest covered ones, outward from the silhouette,
+/// so that bilinear and wider filters never mix in background. Alpha is left as it is. Pixels
+/// further than the object's reach get its mean colour, which keeps PNG and JPEG small.
+void bleedColour(Texture& texture);
+
+}  // namespace stx

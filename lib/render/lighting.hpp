@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include <glm/glm.hpp>
+
+namespace stx {
+
+/// A light of the Phong model (Lee & Park, section 3.2).
+struct Light {
+    enum class Kind { directional, point };
+    Kind kind = Kind::directional;
+    /// Directional: the way the light travels. Point: where it stands, scene units.
+    glm::vec3 vector{0, 0, -1};
+    glm::vec3 colour{1, 1, 1};
+    bool inCameraSpace = false;  ///< moves with the camera (a headlight)
+};
+
+/// Phong lighting; off while there is no light.
+struct Lighting {
+    std::vector<Light> lights;
+    glm::vec3 ambient{0.2f};
+    glm::vec3 specular{0.0f};
+    float shininess = 32.0f;  ///< exponent, > 0
+
+    [[nodiscard]] bool on() const { return !lights.empty(); }
+};
+
+/// Phong: albedo * (ambient + sum of diffuse) + sum of specular. All vectors in one space;
+/// `toEye` and `normal` unit, `position` the lit point. lib/render/lighting.cpp; the shader
+/// phong.glsl is its twin.
+[[nodiscard]] glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
+                                   glm::vec3 normal, glm::vec3 toEye);
+
+/// The lights with camera-space ones turned into the world of a camera.
+[[nodiscard]] Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera);
+
+}  // namespace stx

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+#include "lib/render/frame.hpp"
+#include "lib/render/lighting.hpp"
+
+namespace stx {
+
+enum class Backend { automatic, gpu, gl, cpu };
+enum class RenderMode { splat, surface };
+enum class Quality { draft, normal, best };
+/// Splat mode's rule of size and shape.
+enum class SplatRule {
+    data,   ///< ellipses from splatU/splatV, normals or neighbours: nothing by hand
+    paper,  ///< round, diameter in pixels = splatCoefficient / distance (Lee & Park, section 3)
+    point,  ///< one pixel, nearest wins
+};
+/// What surface mode does with pixels of a full scene that no reference saw.
+enum class Fill { background, none };
+
+struct RenderSettings {
+    RenderMode mode = RenderMode::surface;
+    Quality quality = Quality::normal;
+    SplatRule splat = SplatRule::data;
+    double splatCoefficient = 0.0;  ///< for SplatRule::paper; 0 = fitted to the nearest view
+    Fill fill = Fill::background;
+    Lighting lighting;
+};
+
+/// Draws novel views of one bundle. Made once (uploads, per-view preparation), then asked for frames.
+class Renderer {
+  public:
+    virtual ~Renderer() = default;
+    /// One frame of camera.width x camera.height. A camera that sees nothing gives an empty frame.
+    /// Errors: a camera that fails check(), a lost device, memory.
+    [[nodiscard]] virtual Result<Frame> render(const Camera& camera) = 0;
+    /// "cpu", "gpu" or "gl".
+    [[nodiscard]] virtual std::string backend() const = 0;
+    /// GL_RENDERER, or the processor's name and the SIMD target in use.
+    [[nodiscard]] virtual std::string device() const = 0;
+};
+
+/// Makes the renderer of a backend. Backend::automatic takes a hardware GPU when there is one, else
+/// cpu: a software GL driver is no reason to be slow. The bundle must outlive the renderer.
+/// `device` chooses among listDevices() (-1 = the best). Errors: unsupported, with what was tried.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
+                                                             const RenderSettings& settings,
+                                                             int device, Job& job);
+
+/// A device that Backend::gpu and gl can use.
+struct Device {
+    int index = 0;
+    std::string name;       ///< GL_RENDERER
+    std::string platform;   ///< "EGL_EXT_platform_device" or "EGL_MESA_platform_surfaceless"
+    std::string version;    ///< GL_VERSION
+    bool software = false;  ///< llvmpipe, softpipe, swrast
+    int maxTextureSize = 0;
+};
+
+/// All devices; empty with a note of what was tried, when there is no EGL.
+[[nodiscard]] std::vector<Device> listDevices(Job& job);
+
+}  // namespace stx
