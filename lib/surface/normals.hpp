@@ -8,20 +8,34 @@ namespace stx {
 struct BakeSettings {
     enum class Method {
         paper,   ///< differences to the 4 neighbours (Lee & Park, section 3.2)
-        robust,  ///< local plane fit that respects edges and the depth code's step
+        robust,  ///< respects creases, depth edges and the depth code's step: stairs are fitted
+                 ///< away
     };
     Method method = Method::robust;
     /// Neighbours whose distances differ by more than this share of the nearer one, beyond what the
-    /// slope explains, lie across a depth discontinuity.
+    /// slope explains, lie across a depth discontinuity. 0 < discontinuity <= 1.
     double discontinuity = 0.01;
+    /// Leave normals that a view already has (captured from a mesh); splat axes are made in any
+    /// case.
+    bool keepNormals = false;
 };
 
-/// Adds normals (world, unit, towards the camera) and splat axes splatU, splatV (world, scene units,
-/// half axes of an ellipse that just closes the gaps to the neighbouring samples) to each view of a
-/// bundle: SimpleTexture becomes SimpleTextureV2. Points with no usable neighbour face the camera.
+/// Adds normals (world, unit, towards the camera) and splat axes splatU, splatV (world, scene
+/// units) to each view of a bundle: SimpleTexture becomes SimpleTextureV2. Points with no usable
+/// neighbour face the camera.
+///
+/// The splat is the ellipse { P + u U + v V : u^2 + v^2 <= 1 } in the tangent plane: U and V follow
+/// the image's x and y axes on the surface (conjugate half axes), each half a sample step times
+/// sqrt(2), so that the ellipse passes through the corners of its pixel's footprint and just closes
+/// the lattice (paper.md, "Splat size and shape"). Where the surface is nearly edge-on they are
+/// held to kMaxSplatTilt times their length on a surface that faces the camera.
+///
+/// Errors: a bundle that fails check(), settings out of range, cancelled, memory over the limit.
 [[nodiscard]] Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job);
 
-/// Normal <-> RGB: n = 2 * c / max - 1 per component; (0,0,0) is "no normal".
+inline constexpr double kMaxSplatTilt = 6.0;
+
+/// Normal <-> RGB: n = 2 * c / max - 1 per component, made unit again; (0,0,0) is "no normal".
 [[nodiscard]] glm::u8vec3 rgbFromNormal(glm::vec3 normal);
 [[nodiscard]] glm::vec3 normalFromRgb(glm::u8vec3 rgb);
 

@@ -1,0 +1,298 @@
+#include "lib/surface/depth_gradient.hpp"
+
+#include <array>
+#include <limits>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr std::int64_t kRowsPerTask = 16;
+
+/// The step of the depth code when nearly all distances lie on it; 0 when the image was never
+/// coded.
+double codedStep(const ReferenceView& view) {
+    if (view.depthBits == 32) return 0;
+    const DepthCode code = view.depthCode();
+    std::int64_t points = 0, onStep = 0;
+    for (const float z : view.depth.pixels()) {
+        if (!hasPoint(z)) continue;
+        ++points;
+        const double off = std::abs(z - code.decode(code.encode(z)));
+        onStep += off <= 0.02 * code.step() + 1.2e-7 * z ? 1 : 0;
+    }
+    return points > 0 && onStep * 20 >= points * 19 ? code.step() : 0;
+}
+
+/// One pixel of a fitting window and the pixels through which it hangs together with the centre.
+struct Tap {
+    int dx, dy;
+    float weight;
+    int towardsX, towardsY;  ///< indices of the taps one nearer to the centre; -1 = none
+};
+
+/// Taps of a disc, each after those nearer to the centre.
+std::vector<Tap> makeWindow(int radius) {
+    std::vector<Tap> taps;
+    std::vector<int> index((2 * radius + 1) * (2 * radius + 1), -1);
+    const auto slot = [&](int dx, int dy) -> int& {
+        return index[(dy + radius) * (2 * radius + 1) + dx + radius];
+    };
+    const double sigma = 0.6 * radius + 0.3;
+    for (int ring = 0; ring <= 2 * radius; ++ring) {
+        for (int dy = -radius; dy <= radius; ++dy) {
+            for (int dx = -radius; dx <= radius; ++dx) {
+                if (std::abs(dx) + std::abs(dy) != ring) continue;
+                if (dx * dx + dy * dy > (radius + 0.5) * (radius + 0.5)) continue;
+                const int sx = dx > 0 ? 1 : -1, sy = dy > 0 ? 1 : -1;
+                slot(dx, dy) = static_cast<int>(taps.size());
+                taps.push_back(
+                    {dx, dy,
+                     static_cast<float>(std::exp(-0.5 * (dx * dx + dy * dy) / (sigma * sigma))),
+                     dx != 0 ? slot(dx - sx, dy) : -1, dy != 0 ? slot(dx, dy - sy) : -1});
+            }
+        }
+    }
+    return taps;
+}
+
+struct Plane {
+    double w = 0, gx = 0, gy = 0;
+};
+
+/// Weighted plane through the pixels of the window that hang together with its centre by links.
+/// False when they do not span a plane.
+bool fitPlane(const Image<float>& w, const Image<std::uint8_t>& links,
+              const std::vector<Tap>& window, int x, int y, Plane& plane) {
+    std::array<bool, 512> reached{};
+    const float centre = w.at(x, y);
+    double s = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sv = 0, sxv = 0, syv = 0;
+    for (std::size_t i = 0; i < window.size(); ++i) {
+        const Tap& tap = window[i];
+        const int px = x + tap.dx, py = y + tap.dy;
+        if (!w.contains(px, py)) continue;
+        bool joined = i == 0;
+        if (!joined && tap.towardsX >= 0 && reached[tap.towardsX])
+            joined = links.at(tap.dx > 0 ? px - 1 : px, py) & DepthSurface::kRight;
+        if (!joined && tap.towardsY >= 0 && reached[tap.towardsY])
+            joined = links.at(px, tap.dy > 0 ? py - 1 : py) & DepthSurface::kDown;
+        if (!joined) continue;
+        reached[i] = true;
+        const double k = tap.weight, v = static_cast<double>(w.at(px, py)) - centre;
+        s += k;
+        sx += k * tap.dx;
+        sy += k * tap.dy;
+        sxx += k * tap.dx * tap.dx;
+        sxy += k * tap.dx * tap.dy;
+        syy += k * tap.dy * tap.dy;
+        sv += k * v;
+        sxv += k * tap.dx * v;
+        syv += k * tap.dy * v;
+    }
+    const double cxx = sxx - sx * sx / s, cxy = sxy - sx * sy / s, cyy = syy - sy * sy / s;
+    const double cxv = sxv - sx * sv / s, cyv = syv - sy * sv / s;
+    const double det = cxx * cyy - cxy * cxy;
+    if (!(det > 1e-3 * s * s)) return false;
+    plane.gx = (cxv * cyy - cyv * cxy) / det;
+    plane.gy = (cyv * cxx - cxv * cxy) / det;
+    plane.w = centre + (sv - plane.gx * sx - plane.gy * sy) / s;
+    return true;
+}
+
+/// Slope of a surface that faces the viewpoint, for pixels that know nothing better.
+glm::dvec2 facingGradient(const Camera& camera, int x, int y, double w) {
+    if (camera.orthographic) return glm::dvec2(0);
+    const double X = (x + 0.5 - camera.cx) / camera.fx, Y = (y + 0.5 - camera.cy) / camera.fy;
+    const double k = w / (X * X + Y * Y + 1);
+    return {X * k / camera.fx, Y * k / camera.fy};
+}
+
+/// The five values of w around a pixel along one axis, as far as links reach.
+struct Line {
+    double w[5];
+    bool linked[4];  ///< between w[i] and w[i + 1]
+};
+
+Line lineAt(const DepthSurface& surface, int x, int y, bool alongY) {
+    Line line;
+    const int dx = alongY ? 0 : 1, dy = alongY ? 1 : 0;
+    const std::uint8_t bit = alongY ? DepthSurface::kDown : DepthSurface::kRight;
+    for (int i = 0; i < 5; ++i) {
+        const int px = x + (i - 2) * dx, py = y + (i - 2) * dy;
+        const bool inside = surface.w.contains(px, py);
+        line.w[i] = inside ? surface.w.at(px, py) : kNone;
+        if (i < 4) line.linked[i] = inside && (surface.links.at(px, py) & bit);
+    }
+    return line;
+}
+
+/// Mean of the one-sided differences that no discontinuity forbids.
+double paperSlope(const Line& l, double without) {
+    const bool before = l.linked[1], after = l.linked[2];
+    if (before && after) return 0.5 * (l.w[3] - l.w[1]);
+    if (before) return l.w[2] - l.w[1];
+    if (after) return l.w[3] - l.w[2];
+    return without;
+}
+
+/// The same, but at a crease the slope of the side whose surface goes on straight.
+double creaseSlope(const Line& l, double noise, double without) {
+    const bool before = l.linked[1], after = l.linked[2];
+    const bool twoBefore = before && l.linked[0], twoAfter = after && l.linked[3];
+    const double bendBefore = twoBefore ? std::abs(l.w[2] - 2 * l.w[1] + l.w[0]) : 1e300;
+    const double bendAfter = twoAfter ? std::abs(l.w[2] - 2 * l.w[3] + l.w[4]) : 1e300;
+    if (before && after) {
+        const double bend = std::abs(l.w[1] - 2 * l.w[2] + l.w[3]);
+        const double least = std::min(bendBefore, bendAfter);
+        if (bend <= 3 * least + 4 * noise) return 0.5 * (l.w[3] - l.w[1]);
+        return bendBefore < bendAfter ? 1.5 * l.w[2] - 2 * l.w[1] + 0.5 * l.w[0]
+                                      : -1.5 * l.w[2] + 2 * l.w[3] - 0.5 * l.w[4];
+    }
+    // A one-sided slope lags half a pixel behind a curved surface; the next difference mends that.
+    if (twoBefore) return 1.5 * l.w[2] - 2 * l.w[1] + 0.5 * l.w[0];
+    if (twoAfter) return -1.5 * l.w[2] + 2 * l.w[3] - 0.5 * l.w[4];
+    return paperSlope(l, without);
+}
+
+void link(const ReferenceView& view, double discontinuity, DepthSurface& surface) {
+    const auto& w = surface.w;
+    const int width = w.width(), height = w.height();
+    surface.links = Image<std::uint8_t>(width, height, 0);
+    const bool ortho = view.camera.orthographic;
+    const auto linked = [&](int x, int y, int dx, int dy) {
+        const int qx = x + dx, qy = y + dy;
+        if (!w.contains(qx, qy)) return false;
+        const double a = w.at(x, y), b = w.at(qx, qy);
+        if (std::isnan(a) || std::isnan(b)) return false;
+        const double stepW = ortho ? surface.step : surface.step * a * b;
+        double limit = discontinuity * (ortho ? std::min(a, b) : std::max(a, b)) + 1.01 * stepW;
+        // Parallel rays have no distance that could give a scale, so an orthographic viewpoint near
+        // the object must not cut surfaces of ordinary tilt apart.
+        if (ortho) limit = std::max(limit, 4.0 * view.camera.sampleSpacing(1.0)[dx ? 0 : 1]);
+        const double d = b - a;
+        if (std::abs(d) <= limit) return true;
+        if (std::abs(d) > 4 * limit) return false;
+        const auto explains = [&](int fx, int fy, int tx, int ty) {
+            return w.contains(fx, fy) && w.contains(tx, ty) &&
+                   std::abs(d - (static_cast<double>(w.at(tx, ty)) - w.at(fx, fy))) <= limit;
+        };
+        return explains(x - dx, y - dy, x, y) || explains(qx, qy, qx + dx, qy + dy);
+    };
+    parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            for (int x = 0; x < width; ++x) {
+                std::uint8_t bits = 0;
+                if (linked(x, y, 1, 0)) bits |= DepthSurface::kRight;
+                if (linked(x, y, 0, 1)) bits |= DepthSurface::kDown;
+                surface.links.at(x, y) = bits;
+            }
+        }
+    });
+}
+
+/// Takes the stairs of a coarse depth code away: plane fits, each result held to the distances that
+/// the code could have meant.
+void smoothWithinSteps(const ReferenceView& view, int radius, int rounds, DepthSurface& surface) {
+    const auto window = makeWindow(radius);
+    const int width = surface.w.width(), height = surface.w.height();
+    const double half = 0.5 * surface.step;
+    Image<float> next = surface.w;
+    for (int round = 0; round < rounds; ++round) {
+        parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
+            for (int y = static_cast<int>(from); y < to; ++y) {
+                for (int x = 0; x < width; ++x) {
+                    Plane plane;
+                    if (std::isnan(surface.w.at(x, y)) ||
+                        !fitPlane(surface.w, surface.links, window, x, y, plane))
+                        continue;
+                    const double z = view.depth.at(x, y);
+                    const double a = affineDepth(view.camera, z + half);
+                    const double b = affineDepth(view.camera, std::max(z - half, 0.5 * z));
+                    next.at(x, y) =
+                        static_cast<float>(std::clamp(plane.w, std::min(a, b), std::max(a, b)));
+                }
+            }
+        });
+        std::swap(surface.w, next);
+    }
+}
+
+}  // namespace
+
+DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& settings) {
+    const Camera& camera = view.camera;
+    const int width = view.depth.width(), height = view.depth.height();
+    DepthSurface surface;
+    surface.w = Image<float>(width, height, kNone);
+    surface.gradient = Image<glm::vec2>(width, height, glm::vec2(0));
+    double sumZ = 0;
+    std::int64_t points = 0;
+    for (std::size_t i = 0; i < view.depth.count(); ++i) {
+        const float z = view.depth.pixels()[i];
+        if (!hasPoint(z) || (!camera.orthographic && !(z > 0))) continue;
+        surface.w.pixels()[i] = static_cast<float>(affineDepth(camera, z));
+        sumZ += z;
+        ++points;
+    }
+    if (points == 0) {
+        surface.links = Image<std::uint8_t>(width, height, 0);
+        return surface;
+    }
+    const double meanZ = sumZ / static_cast<double>(points);
+    surface.step = std::max(codedStep(view), 1.2e-7 * meanZ);
+    link(view, settings.discontinuity, surface);
+
+    const glm::dvec2 spacing = camera.sampleSpacing(meanZ);
+    const double stairs = surface.step / std::max(spacing.x, spacing.y);
+    const bool robust = settings.method == BakeSettings::Method::robust;
+    const bool coarse = robust && stairs > 0.05;
+    if (coarse)
+        smoothWithinSteps(view, std::clamp(static_cast<int>(std::lround(2 + stairs)), 2, 8),
+                          stairs > 0.3 ? 4 : 2, surface);
+    const auto window = makeWindow(stairs > 3 ? 3 : 2);
+    parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            for (int x = 0; x < width; ++x) {
+                const double w = surface.w.at(x, y);
+                if (std::isnan(w)) continue;
+                Plane plane;
+                if (coarse && fitPlane(surface.w, surface.links, window, x, y, plane)) {
+                    surface.gradient.at(x, y) = {plane.gx, plane.gy};
+                    continue;
+                }
+                const glm::dvec2 facing = facingGradient(camera, x, y, w);
+                const Line alongX = lineAt(surface, x, y, false),
+                           alongY = lineAt(surface, x, y, true);
+                const double noise = camera.orthographic ? surface.step : surface.step * w * w;
+                surface.gradient.at(x, y) =
+                    robust && !coarse
+                        ? glm::dvec2(creaseSlope(alongX, noise, facing.x),
+                                     creaseSlope(alongY, noise, facing.y))
+                        : glm::dvec2(paperSlope(alongX, facing.x), paperSlope(alongY, facing.y));
+            }
+        }
+    });
+    return surface;
+}
+
+glm::dvec3 planeNormal(const Camera& camera, int x, int y, double w, glm::dvec2 gradient) {
+    const double a = gradient.x * camera.fx, b = gradient.y * camera.fy;
+    if (camera.orthographic) return glm::normalize(glm::dvec3(a, -b, 1.0));
+    // w = a X + b Y + c along the rays (X, -Y, -1), so (-a, b, c) points back along each of them.
+    const double c = w - gradient.x * (x + 0.5 - camera.cx) - gradient.y * (y + 0.5 - camera.cy);
+    return glm::normalize(glm::dvec3(-a, b, c));
+}
+
+PixelSteps planeSteps(const Camera& camera, int x, int y, double w, glm::dvec2 gradient) {
+    if (camera.orthographic)
+        return {{1 / camera.fx, 0, -gradient.x}, {0, -1 / camera.fy, -gradient.y}};
+    const double z = 1 / w;
+    const glm::dvec2 dz = -gradient * z * z;
+    const double X = (x + 0.5 - camera.cx) / camera.fx, Y = (y + 0.5 - camera.cy) / camera.fy;
+    return {{z / camera.fx + X * dz.x, -Y * dz.x, -dz.x},
+            {X * dz.y, -z / camera.fy - Y * dz.y, -dz.y}};
+}
+
+}  // namespace stx

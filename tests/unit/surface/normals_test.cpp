@@ -1,0 +1,187 @@
+#include "lib/surface/normals.hpp"
+
+#include <gtest/gtest.h>
+
+#include "lib/base/parallel.hpp"
+#include "tests/unit/surface/analytic.hpp"
+
+namespace stx {
+namespace {
+
+/// Mean angle in degrees between a baked view's normals and the truth.
+double meanError(const ReferenceView& view, const Image<glm::vec3>& truth) {
+    double sum = 0;
+    std::int64_t points = 0;
+    for (std::size_t i = 0; i < view.depth.count(); ++i) {
+        if (!hasPoint(view.depth.pixels()[i])) continue;
+        const double c = glm::dot(view.normal.pixels()[i], truth.pixels()[i]);
+        sum += glm::degrees(std::acos(std::clamp(c, -1.0, 1.0)));
+        ++points;
+    }
+    return sum / static_cast<double>(points);
+}
+
+double errorOf(const analytic::Solid& solid, const Camera& camera, int bits,
+               BakeSettings::Method method, double looserRange = 1) {
+    Image<glm::vec3> truth;
+    Bundle bundle;
+    bundle.views.push_back(analytic::capture(solid, camera, 32, &truth));
+    auto& view = bundle.views[0];
+    view.depthBits = bits;
+    view.farPlane = view.nearPlane + (view.farPlane - view.nearPlane) * looserRange;
+    for (float& z : view.depth.pixels())
+        z = static_cast<float>(view.depthCode().decode(view.depthCode().encode(z)));
+    Job job;
+    BakeSettings settings;
+    settings.method = method;
+    EXPECT_TRUE(bake(bundle, settings, job));
+    return meanError(bundle.views[0], truth);
+}
+
+constexpr auto kPaper = BakeSettings::Method::paper;
+constexpr auto kRobust = BakeSettings::Method::robust;
+const Camera kCamera = analytic::lookingAt({1.5, 1.2, 2.5}, 512);
+const Camera kOrtho = analytic::lookingAt({1.5, 1.2, 2.5}, 512, true);
+
+TEST(Normals, SixteenBitsAreExactToAFifthOfADegree) {
+    for (const auto& solid :
+         {analytic::sphere, analytic::torus, analytic::bumpy, analytic::boxes}) {
+        for (const auto& camera : {kCamera, kOrtho}) {
+            EXPECT_LT(errorOf(solid, camera, 16, kRobust), 0.2);
+            EXPECT_LT(errorOf(solid, camera, 16, kPaper), 0.8);
+        }
+    }
+}
+
+TEST(Normals, EightBitStairsAreFittedAway) {
+    for (const auto& solid :
+         {analytic::sphere, analytic::torus, analytic::bumpy, analytic::boxes}) {
+        for (const auto& camera : {kCamera, kOrtho}) {
+            EXPECT_LT(errorOf(solid, camera, 8, kRobust), 2.0);
+            EXPECT_GT(errorOf(solid, camera, 8, kPaper), 5.0)
+                << "stairs should spoil plain differences";
+        }
+    }
+}
+
+TEST(Normals, LoosePlanesWidenTheWindow) {
+    EXPECT_LT(errorOf(analytic::sphere, kCamera, 8, kRobust, 5), 3.0);
+    EXPECT_LT(errorOf(analytic::torus, kCamera, 8, kRobust, 5), 5.0);
+    EXPECT_LT(errorOf(analytic::boxes, kCamera, 8, kRobust, 5), 6.0);
+}
+
+TEST(Normals, NeverAcrossADiscontinuity) {
+    // Two planes that face the camera, far apart: each pixel beside the gap faces it too.
+    Bundle bundle;
+    ReferenceView view;
+    view.camera = Camera::fromFieldOfView({0, 0, 0}, {1, 0, 0, 0}, {1, 1}, false, 32, 32);
+    view.nearPlane = 1;
+    view.farPlane = 4;
+    view.depth = Image<float>(32, 32, 2.0f);
+    for (int y = 0; y < 32; ++y) {
+        for (int x = 16; x < 32; ++x) view.depth.at(x, y) = 3.0f;
+    }
+    view.texture = Rgba8Image(32, 32, glm::u8vec4(255));
+    for (const auto method : {kPaper, kRobust}) {
+        for (const int bits : {8, 16, 32}) {
+            view.depthBits = bits;
+            bundle.views = {view};
+            BakeSettings settings;
+            settings.method = method;
+            Job job;
+            ASSERT_TRUE(bake(bundle, settings, job));
+            for (const auto& n : bundle.views[0].normal.pixels()) EXPECT_GT(n.z, 0.99999f);
+        }
+    }
+}
+
+TEST(Normals, LonelyPointsFaceTheViewpoint) {
+    Bundle bundle;
+    ReferenceView view;
+    view.camera =
+        Camera::fromFieldOfView({1, 2, 3}, quatFromAxisAngle({0, 1, 0, 0.5}), {1, 1}, false, 9, 9);
+    view.depth = Image<float>(9, 9, kNoDepth);
+    view.depth.at(1, 7) = 20.0f;
+    view.texture = Rgba8Image(9, 9, glm::u8vec4(255));
+    bundle.views = {view};
+    Job job;
+    ASSERT_TRUE(bake(bundle, {}, job));
+    const auto& v = bundle.views[0];
+    EXPECT_GT(glm::dot(v.normal.at(1, 7), -glm::vec3(v.camera.viewDirection(1.5, 7.5))), 0.99999f);
+    EXPECT_EQ(v.normal.at(0, 0), glm::vec3(0));
+    EXPECT_GT(glm::length(v.splatU.at(1, 7)), 0.5f * v.camera.sampleSpacing(20).x);
+}
+
+TEST(Splats, AreTangentAndCloseTheLattice) {
+    for (const auto& camera : {kCamera, kOrtho}) {
+        Bundle bundle;
+        bundle.views.push_back(analytic::capture(analytic::sphere, camera, 32));
+        Job job;
+        ASSERT_TRUE(bake(bundle, {}, job));
+        const auto& v = bundle.views[0];
+        int looked = 0;
+        for (int y = 1; y + 1 < 512; y += 3) {
+            for (int x = 1; x + 1 < 512; x += 3) {
+                if (!hasPoint(v.depth.at(x, y)) || !hasPoint(v.depth.at(x + 1, y + 1))) continue;
+                const glm::vec3 u = v.splatU.at(x, y), w = v.splatV.at(x, y), n = v.normal.at(x, y);
+                const glm::dvec3 p = v.worldPoint(x, y);
+                // The sphere's own normal: silhouettes are for other tests.
+                if (glm::dot(p, glm::normalize(camera.position - p)) < 0.3) continue;
+                EXPECT_LT(std::abs(glm::dot(glm::normalize(u), n)), 0.02f);
+                EXPECT_LT(std::abs(glm::dot(glm::normalize(w), n)), 0.02f);
+                // Half way to the diagonal neighbour is where the ellipse ends: u = v = 1/sqrt 2.
+                const glm::dvec3 corner = 0.5 * (v.worldPoint(x + 1, y + 1) - p);
+                const glm::dvec3 edge = std::sqrt(0.5) * glm::dvec3(u + w);
+                EXPECT_LT(glm::length(corner - edge), 0.15 * glm::length(corner));
+                ++looked;
+            }
+        }
+        EXPECT_GT(looked, 5000);
+    }
+}
+
+TEST(Normals, RgbRoundTrip) {
+    EXPECT_EQ(rgbFromNormal(glm::vec3(0)), glm::u8vec3(0));
+    EXPECT_EQ(normalFromRgb(glm::u8vec3(0)), glm::vec3(0));
+    EXPECT_EQ(rgbFromNormal({0, 0, 1}), glm::u8vec3(128, 128, 255));
+    EXPECT_EQ(rgbFromNormal({-1, 0, 0}).x, 0);
+    for (int i = 0; i < 1000; ++i) {
+        const double z = -1 + 2 * (i + 0.5) / 1000, a = i * 2.399963;
+        const double r = std::sqrt(1 - z * z);
+        const glm::vec3 n(r * std::cos(a), r * std::sin(a), z);
+        EXPECT_NE(rgbFromNormal(n), glm::u8vec3(0));
+        EXPECT_GT(glm::dot(n, normalFromRgb(rgbFromNormal(n))), std::cos(glm::radians(0.4)));
+    }
+}
+
+TEST(Normals, SameOnAnyNumberOfThreads) {
+    Bundle one, many;
+    one.views.push_back(analytic::capture(analytic::bumpy, analytic::lookingAt({1, 1, 3}, 128), 8));
+    many = one;
+    Job job;
+    {
+        const ThreadLimit limit(1);
+        ASSERT_TRUE(bake(one, {}, job));
+    }
+    const ThreadLimit limit(7);
+    ASSERT_TRUE(bake(many, {}, job));
+    EXPECT_EQ(one.views[0].normal, many.views[0].normal);
+    EXPECT_EQ(one.views[0].splatU, many.views[0].splatU);
+    EXPECT_EQ(one.views[0].splatV, many.views[0].splatV);
+}
+
+TEST(Normals, RefusesNonsense) {
+    Bundle bundle;
+    Job job;
+    EXPECT_FALSE(bake(bundle, {}, job));
+    bundle.views.push_back(
+        analytic::capture(analytic::sphere, analytic::lookingAt({0, 0, 3}, 8), 16));
+    BakeSettings settings;
+    settings.discontinuity = std::nan("");
+    EXPECT_FALSE(bake(bundle, settings, job));
+    job.limits.maxMemoryBytes = 100;
+    EXPECT_FALSE(bake(bundle, {}, job));
+}
+
+}  // namespace
+}  // namespace stx
