@@ -12,7 +12,7 @@ inline std::filesystem::path sharedDir() {
 }
 
 /// Skips the test with a clear line when a shared file or folder is missing.
-#define REQUIRE_SHARED(var, relative)                                                  \
-    const std::filesystem::path var = sharedDir() / (relative);                        \
-    if (!std::filesystem::exists(var))                                                 \
+#define REQUIRE_SHARED(var, relative)                           \
+    const std::filesystem::path var = sharedDir() / (relative); \
+    if (!std::filesystem::exists(var))                          \
     GTEST_SKIP() << "needs " << var.string() << ", which is not here"

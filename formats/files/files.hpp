@@ -26,7 +26,8 @@ class OutputFile {
     struct Options {
         bool noClobber = false;  ///< error when the target exists
     };
-    [[nodiscard]] static Result<OutputFile> create(const std::filesystem::path& target, Options options);
+    [[nodiscard]] static Result<OutputFile> create(const std::filesystem::path& target,
+                                                   Options options);
     [[nodiscard]] static Result<OutputFile> create(const std::filesystem::path& target) {
         return create(target, Options());
     }
@@ -51,8 +52,9 @@ class OutputFile {
                                      OutputFile::Options options = {});
 
 /// A folder of files that appears whole or not at all: files are written into a temporary folder
-/// beside the target; commit() swaps it in. An existing target folder is replaced only when it holds
-/// nothing but files that this kind of output writes (a marker or a known index file), else an error.
+/// beside the target; commit() swaps it in. An existing target folder is replaced only when it
+/// holds nothing but files that this kind of output writes (a marker or a known index file), else
+/// an error.
 class OutputFolder {
   public:
     [[nodiscard]] static Result<OutputFolder> create(const std::filesystem::path& target,
@@ -74,6 +76,7 @@ class OutputFolder {
 /// (invalidInput) when it is absolute, has a URL scheme, leaves the folder by `..` or a link, or is
 /// no regular file, unless limits.allowOutside; (io) when it does not exist.
 [[nodiscard]] Result<std::filesystem::path> resolveInside(const std::filesystem::path& folder,
-                                                          std::string_view name, const Limits& limits);
+                                                          std::string_view name,
+                                                          const Limits& limits);
 
 }  // namespace stx

@@ -50,8 +50,8 @@ struct DecodedImage {
 [[nodiscard]] Result<Bytes> encodePng(int width, int height, int channels, int bits,
                                       const void* values, bool srgb, int level = 6);
 /// JPEG bytes of 1 or 3 channels of 8 bits; quality 1..100, no chroma subsampling at 90 and above.
-[[nodiscard]] Result<Bytes> encodeJpeg(int width, int height, int channels, const std::uint8_t* values,
-                                       int quality);
+[[nodiscard]] Result<Bytes> encodeJpeg(int width, int height, int channels,
+                                       const std::uint8_t* values, int quality);
 
 /// Starts loading the codecs' libraries on another thread, while the caller does something else.
 void preloadCodecs();

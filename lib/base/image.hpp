@@ -39,10 +39,12 @@ class Image {
     }
 
     [[nodiscard]] std::span<T> row(int y) {
-        return {pixels_.data() + static_cast<std::size_t>(y) * width_, static_cast<std::size_t>(width_)};
+        return {pixels_.data() + static_cast<std::size_t>(y) * width_,
+                static_cast<std::size_t>(width_)};
     }
     [[nodiscard]] std::span<const T> row(int y) const {
-        return {pixels_.data() + static_cast<std::size_t>(y) * width_, static_cast<std::size_t>(width_)};
+        return {pixels_.data() + static_cast<std::size_t>(y) * width_,
+                static_cast<std::size_t>(width_)};
     }
     [[nodiscard]] std::span<T> pixels() { return pixels_; }
     [[nodiscard]] std::span<const T> pixels() const { return pixels_; }

@@ -17,7 +17,7 @@ struct Limits {
     std::uint64_t maxMemoryBytes = 4ull << 30;  ///< `--max-memory`
     int maxImageSide = 65535;                   ///< pixels
     int maxViews = 65536;
-    int maxNesting = 256;                       ///< nodes, boxes, groups
+    int maxNesting = 256;  ///< nodes, boxes, groups
     /// Image and buffer names may leave the folder of the file that names them (`--allow-outside`).
     bool allowOutside = false;
 
@@ -27,8 +27,8 @@ struct Limits {
                                                std::string_view what) const;
 };
 
-/// What a caller gives to every longer operation: limits, a place for remarks, progress, cancelling.
-/// Safe to use from several threads.
+/// What a caller gives to every longer operation: limits, a place for remarks, progress,
+/// cancelling. Safe to use from several threads.
 class Job {
   public:
     Limits limits;

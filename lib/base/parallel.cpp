@@ -8,7 +8,8 @@
 
 namespace stx {
 
-void parallelFor(std::int64_t begin, std::int64_t end, const std::function<void(std::int64_t)>& body) {
+void parallelFor(std::int64_t begin, std::int64_t end,
+                 const std::function<void(std::int64_t)>& body) {
     parallelForBlocks(begin, end, 1, [&](std::int64_t from, std::int64_t to) {
         for (auto i = from; i < to; ++i) body(i);
     });
@@ -28,8 +29,8 @@ struct ThreadLimit::Impl {
 
 ThreadLimit::ThreadLimit(int threads) {
     const int count = threads > 0 ? threads : tbb::info::default_concurrency();
-    impl_.reset(new Impl{
-        {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count)}});
+    impl_.reset(
+        new Impl{{tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count)}});
 }
 
 ThreadLimit::~ThreadLimit() = default;

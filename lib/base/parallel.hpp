@@ -8,7 +8,8 @@ namespace stx {
 
 /// Runs body(i) for each i in [begin, end) on the threads allowed by ThreadLimit, in no particular
 /// order. Results must not depend on that order: each i writes only what is its own.
-void parallelFor(std::int64_t begin, std::int64_t end, const std::function<void(std::int64_t)>& body);
+void parallelFor(std::int64_t begin, std::int64_t end,
+                 const std::function<void(std::int64_t)>& body);
 
 /// The same in pieces: body(from, to) with to - from <= grain.
 void parallelForBlocks(std::int64_t begin, std::int64_t end, std::int64_t grain,

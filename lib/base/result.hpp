@@ -27,7 +27,9 @@ struct Error {
     std::string where;
 
     /// `where: message`, or only the message.
-    [[nodiscard]] std::string text() const { return where.empty() ? message : where + ": " + message; }
+    [[nodiscard]] std::string text() const {
+        return where.empty() ? message : where + ": " + message;
+    }
 
     /// The same error, reported from further out: `outer: where`.
     [[nodiscard]] Error at(const std::string& outer) const {
@@ -66,14 +68,14 @@ template <class T>
 
 /// `STX_TRY(auto x, f());` declares x, or returns f()'s error.
 #define STX_TRY(decl, expression) STX_TRY_IMPL(STX_CONCAT(stxTry, __LINE__), decl, expression)
-#define STX_TRY_IMPL(tmp, decl, expression)                                        \
-    auto tmp = (expression);                                                       \
-    if (!tmp) return tl::unexpected<::stx::Error>(std::move(tmp.error()));         \
+#define STX_TRY_IMPL(tmp, decl, expression)                                \
+    auto tmp = (expression);                                               \
+    if (!tmp) return tl::unexpected<::stx::Error>(std::move(tmp.error())); \
     decl = std::move(*tmp)
 
 /// Returns the error of a Result<void> expression, if it has one.
-#define STX_CHECK(expression)                                                               \
-    do {                                                                                    \
-        if (auto stxChecked = (expression); !stxChecked)                                    \
-            return tl::unexpected<::stx::Error>(std::move(stxChecked.error()));             \
+#define STX_CHECK(expression)                                                   \
+    do {                                                                        \
+        if (auto stxChecked = (expression); !stxChecked)                        \
+            return tl::unexpected<::stx::Error>(std::move(stxChecked.error())); \
     } while (false)

@@ -68,7 +68,8 @@ Result<void> Camera::check() const {
     for (const double v : {position.x, position.y, position.z, orientation.w, orientation.x,
                            orientation.y, orientation.z, fx, fy, cx, cy}) {
         if (!std::isfinite(v))
-            return fail(ErrorCode::invalidInput, "the camera has a value that is not finite ({})", v);
+            return fail(ErrorCode::invalidInput, "the camera has a value that is not finite ({})",
+                        v);
     }
     if (width <= 0 || height <= 0)
         return fail(ErrorCode::invalidInput, "the camera's image is {}x{}; both must be at least 1",
@@ -88,8 +89,8 @@ Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
     const double distance = glm::length(toEye);
     if (!(distance > 0) || !std::isfinite(distance))
         return fail(ErrorCode::usage,
-                    "the camera's eye and target are the same point ({:g},{:g},{:g}); move one", eye.x,
-                    eye.y, eye.z);
+                    "the camera's eye and target are the same point ({:g},{:g},{:g}); move one",
+                    eye.x, eye.y, eye.z);
     const glm::dvec3 z = toEye / distance;
     glm::dvec3 x = glm::cross(up, z);
     if (!(glm::length(x) > 1e-9 * glm::length(up))) {

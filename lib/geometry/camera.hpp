@@ -10,9 +10,9 @@ namespace stx {
 /// A camera: where it stands and how it maps the scene to pixels.
 ///
 /// Axes (ISO/IEC 14496-11 Viewpoint, VRML, OpenGL): +X right, +Y up, the camera looks along -Z.
-/// Pixels: (0,0) is the top-left corner of the top-left pixel, its centre is (0.5, 0.5), y runs down.
-/// Depth ("dist") is planar: the distance to the plane through the viewpoint parallel to the image,
-/// in scene units, in both projections.
+/// Pixels: (0,0) is the top-left corner of the top-left pixel, its centre is (0.5, 0.5), y runs
+/// down. Depth ("dist") is planar: the distance to the plane through the viewpoint parallel to the
+/// image, in scene units, in both projections.
 ///
 /// The intrinsics are general (a principal point anywhere), more than DepthImage can say; see
 /// fieldOfView() for what of it fits.
@@ -32,8 +32,8 @@ struct Camera {
     /// The camera of a DepthImage: `fieldOfView` is the full horizontal and vertical angle in
     /// radians, or, when orthographic, the width and height of the window in scene units.
     [[nodiscard]] static Camera fromFieldOfView(glm::dvec3 position, glm::dquat orientation,
-                                                glm::dvec2 fieldOfView, bool orthographic, int width,
-                                                int height);
+                                                glm::dvec2 fieldOfView, bool orthographic,
+                                                int width, int height);
     /// DepthImage.fieldOfView of this camera. Exact only when centred().
     [[nodiscard]] glm::dvec2 fieldOfView() const;
     /// The principal point is the image's centre to within `tolerance` pixels.
@@ -59,7 +59,8 @@ struct Camera {
         const double scale = orthographic ? 1.0 : dist;
         return {scale / fx, scale / fy};
     }
-    /// Unit vector from the viewpoint through a pixel position, in the world. Orthographic: the axis.
+    /// Unit vector from the viewpoint through a pixel position, in the world. Orthographic: the
+    /// axis.
     [[nodiscard]] glm::dvec3 viewDirection(double x, double y) const;
     /// The direction the camera looks in, in the world (-Z of the camera).
     [[nodiscard]] glm::dvec3 forward() const { return orientation * glm::dvec3(0, 0, -1); }
@@ -73,9 +74,10 @@ struct Camera {
     bool operator==(const Camera&) const = default;
 };
 
-/// Orientation of a camera at `eye` that looks at `target`; `up` need not be orthogonal. Errors when
-/// eye and target coincide; an `up` along the line of sight is replaced by another axis.
-[[nodiscard]] Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up = {0, 1, 0});
+/// Orientation of a camera at `eye` that looks at `target`; `up` need not be orthogonal. Errors
+/// when eye and target coincide; an `up` along the line of sight is replaced by another axis.
+[[nodiscard]] Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target,
+                                        glm::dvec3 up = {0, 1, 0});
 
 /// SFRotation (unit axis x y z, angle in radians) of a unit quaternion; the angle is in [0, pi].
 /// No rotation is 0 0 1 0, the default of the standard.

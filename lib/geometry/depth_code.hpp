@@ -9,10 +9,12 @@ namespace stx {
 /// "No point of the object here", in depth images held as float distances.
 inline constexpr float kNoDepth = std::numeric_limits<float>::infinity();
 
-[[nodiscard]] inline bool hasPoint(float dist) { return dist < kNoDepth; }
+[[nodiscard]] inline bool hasPoint(float dist) {
+    return dist < kNoDepth;
+}
 
-/// The depth code of DepthImage (ISO/IEC 14496-16, 4.5.4): d = dmax is nearPlane, d = 1 is farPlane,
-/// d = 0 is no point of the object.
+/// The depth code of DepthImage (ISO/IEC 14496-16, 4.5.4): d = dmax is nearPlane, d = 1 is
+/// farPlane, d = 0 is no point of the object.
 struct DepthCode {
     double nearPlane = 10.0;   ///< scene units
     double farPlane = 100.0;   ///< scene units, > nearPlane
@@ -27,7 +29,8 @@ struct DepthCode {
     /// 0 for kNoDepth (and NaN).
     [[nodiscard]] std::uint32_t encode(double dist) const {
         if (!(dist < kNoDepth)) return 0;
-        const double d = std::round(1.0 + (dmax - 1.0) * (farPlane - dist) / (farPlane - nearPlane));
+        const double d =
+            std::round(1.0 + (dmax - 1.0) * (farPlane - dist) / (farPlane - nearPlane));
         if (d < 1.0) return 1;
         if (d > dmax) return dmax;
         return static_cast<std::uint32_t>(d);

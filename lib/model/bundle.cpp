@@ -12,26 +12,32 @@ std::int64_t ReferenceView::pointCount() const {
 
 Result<void> ReferenceView::check() const {
     STX_CHECK(camera.check());
-    const auto sizeOf = [](const auto& image) { return fmt::format("{}x{}", image.width(), image.height()); };
+    const auto sizeOf = [](const auto& image) {
+        return fmt::format("{}x{}", image.width(), image.height());
+    };
     const auto fits = [&](const auto& image) {
         return image.width() == camera.width && image.height() == camera.height;
     };
     if (!fits(depth) || !fits(texture))
-        return fail(ErrorCode::invalidInput, "depth is {} but texture is {} and the camera {}x{}; all must match",
+        return fail(ErrorCode::invalidInput,
+                    "depth is {} but texture is {} and the camera {}x{}; all must match",
                     sizeOf(depth), sizeOf(texture), camera.width, camera.height);
     if ((!normal.empty() && !fits(normal)) || (!splatU.empty() && !fits(splatU)) ||
         (!splatV.empty() && !fits(splatV)))
         return fail(ErrorCode::invalidInput,
                     "normal is {}, splatU {} and splatV {} but depth is {}; all must match",
                     sizeOf(normal), sizeOf(splatU), sizeOf(splatV), sizeOf(depth));
-    if (!std::isfinite(nearPlane) || !std::isfinite(farPlane) || nearPlane < 0 || !(nearPlane < farPlane))
+    if (!std::isfinite(nearPlane) || !std::isfinite(farPlane) || nearPlane < 0 ||
+        !(nearPlane < farPlane))
         return fail(ErrorCode::invalidInput,
                     "nearPlane is {:g} and farPlane {:g}; 0 <= nearPlane < farPlane must hold",
                     nearPlane, farPlane);
     if (depthBits != 8 && depthBits != 16 && depthBits != 32)
-        return fail(ErrorCode::invalidInput, "depth has {} bits; 8, 16 or 32 (float) is possible", depthBits);
+        return fail(ErrorCode::invalidInput, "depth has {} bits; 8, 16 or 32 (float) is possible",
+                    depthBits);
     for (const float d : depth.pixels()) {
-        if (!(d >= 0)) return fail(ErrorCode::invalidInput, "depth holds {}; distances are 0 or more", d);
+        if (!(d >= 0))
+            return fail(ErrorCode::invalidInput, "depth holds {}; distances are 0 or more", d);
     }
     return {};
 }

@@ -18,11 +18,12 @@ Result<void> Mesh::check() const {
         return fail(ErrorCode::invalidInput, "the mesh has neither triangles nor points");
     const auto n = positions.size();
     const auto fits = [&](std::size_t size) { return size == 0 || size == n; };
-    if (!fits(normals.size()) || !fits(tangents.size()) || !fits(colours.size()) || !fits(uvs.size()) ||
-        !fits(normalUvs.size()))
-        return fail(ErrorCode::invalidInput,
-                    "the mesh has {} positions, {} normals, {} colours, {} uvs; all must be as many", n,
-                    normals.size(), colours.size(), uvs.size());
+    if (!fits(normals.size()) || !fits(tangents.size()) || !fits(colours.size()) ||
+        !fits(uvs.size()) || !fits(normalUvs.size()))
+        return fail(
+            ErrorCode::invalidInput,
+            "the mesh has {} positions, {} normals, {} colours, {} uvs; all must be as many", n,
+            normals.size(), colours.size(), uvs.size());
     if (triangleMaterial.size() != triangles.size())
         return fail(ErrorCode::invalidInput, "the mesh has {} triangles but {} materials for them",
                     triangles.size(), triangleMaterial.size());
@@ -33,7 +34,8 @@ Result<void> Mesh::check() const {
                         "triangle {} uses vertex {}, but there are only {} vertices", i,
                         std::max({t.x, t.y, t.z}), n);
         if (triangleMaterial[i] >= materials.size())
-            return fail(ErrorCode::invalidInput, "triangle {} uses material {}, but there are only {}", i,
+            return fail(ErrorCode::invalidInput,
+                        "triangle {} uses material {}, but there are only {}", i,
                         triangleMaterial[i], materials.size());
     }
     for (const auto p : points) {
@@ -42,15 +44,17 @@ Result<void> Mesh::check() const {
     for (std::size_t i = 0; i < n; ++i) {
         const auto& p = positions[i];
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-            return fail(ErrorCode::invalidInput, "vertex {} is at ({}, {}, {}); positions must be finite", i,
-                        p.x, p.y, p.z);
+            return fail(ErrorCode::invalidInput,
+                        "vertex {} is at ({}, {}, {}); positions must be finite", i, p.x, p.y, p.z);
     }
     const auto textureExists = [&](int t) { return t < static_cast<int>(textures.size()); };
     for (const auto& m : materials) {
         if (!textureExists(m.baseColourTexture) || !textureExists(m.normalTexture))
-            return fail(ErrorCode::invalidInput, "material '{}' uses a texture that does not exist", m.name);
+            return fail(ErrorCode::invalidInput, "material '{}' uses a texture that does not exist",
+                        m.name);
         if (m.baseColourTexture >= 0 && uvs.empty())
-            return fail(ErrorCode::invalidInput, "material '{}' has a texture but the mesh has no uvs", m.name);
+            return fail(ErrorCode::invalidInput,
+                        "material '{}' has a texture but the mesh has no uvs", m.name);
     }
     return {};
 }

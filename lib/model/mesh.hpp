@@ -25,28 +25,28 @@ struct MeshTexture {
 struct Material {
     enum class Alpha { opaque, mask, blend };
     std::string name;
-    glm::vec4 baseColour{1.0f};   ///< linear factor, multiplies texture and vertex colour
-    int baseColourTexture = -1;   ///< index into Mesh::textures, -1 = none; sRGB-coded
-    int normalTexture = -1;       ///< tangent-space normal map, -1 = none; linear
+    glm::vec4 baseColour{1.0f};  ///< linear factor, multiplies texture and vertex colour
+    int baseColourTexture = -1;  ///< index into Mesh::textures, -1 = none; sRGB-coded
+    int normalTexture = -1;      ///< tangent-space normal map, -1 = none; linear
     float normalScale = 1.0f;
     Alpha alpha = Alpha::opaque;
-    float alphaCutoff = 0.5f;     ///< for Alpha::mask
-    bool doubleSided = true;      ///< false: back faces are not drawn
+    float alphaCutoff = 0.5f;  ///< for Alpha::mask
+    bool doubleSided = true;   ///< false: back faces are not drawn
 };
 
 /// Triangles (and loose points) in the world, all node transforms and instances applied.
 /// Per-vertex arrays are empty or as long as `positions`.
 struct Mesh {
-    std::vector<glm::vec3> positions;    ///< scene units, +Y up
-    std::vector<glm::vec3> normals;      ///< unit
-    std::vector<glm::vec4> tangents;     ///< xyz unit, w = handedness (only with normal maps)
-    std::vector<glm::vec4> colours;      ///< linear RGBA, multiplies the base colour
-    std::vector<glm::vec2> uvs;          ///< of the base colour texture, its transform applied; v down
-    std::vector<glm::vec2> normalUvs;    ///< of the normal texture, when they differ from uvs
+    std::vector<glm::vec3> positions;  ///< scene units, +Y up
+    std::vector<glm::vec3> normals;    ///< unit
+    std::vector<glm::vec4> tangents;   ///< xyz unit, w = handedness (only with normal maps)
+    std::vector<glm::vec4> colours;    ///< linear RGBA, multiplies the base colour
+    std::vector<glm::vec2> uvs;  ///< of the base colour texture, its transform applied; v down
+    std::vector<glm::vec2> normalUvs;  ///< of the normal texture, when they differ from uvs
 
-    std::vector<glm::uvec3> triangles;       ///< indices into the vertex arrays
+    std::vector<glm::uvec3> triangles;            ///< indices into the vertex arrays
     std::vector<std::uint32_t> triangleMaterial;  ///< one per triangle, index into materials
-    std::vector<std::uint32_t> points;       ///< vertices drawn as points (point clouds)
+    std::vector<std::uint32_t> points;            ///< vertices drawn as points (point clouds)
 
     std::vector<Material> materials;  ///< at least one when there are triangles
     std::vector<MeshTexture> textures;

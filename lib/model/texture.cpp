@@ -44,7 +44,8 @@ void fillHoles(Image<glm::vec4>& premultiplied) {
             const int x0 = static_cast<int>(std::floor(fx)), y0 = static_cast<int>(std::floor(fy));
             glm::vec4 sum(0.0f);
             for (int k = 0; k < 4; ++k) {
-                const int sx = std::clamp(x0 + (k & 1), 0, w - 1), sy = std::clamp(y0 + (k >> 1), 0, h - 1);
+                const int sx = std::clamp(x0 + (k & 1), 0, w - 1),
+                          sy = std::clamp(y0 + (k >> 1), 0, h - 1);
                 const float wx = (k & 1) ? fx - x0 : 1.0f - (fx - x0);
                 const float wy = (k >> 1) ? fy - y0 : 1.0f - (fy - y0);
                 sum += half.at(sx, sy) * (wx * wy);
@@ -72,10 +73,12 @@ void bleedColour(Texture& texture) {
             if (auto* image = texture.rgba8()) {
                 auto& p = image->at(x, y);
                 if (p.a == 0 && filled.a > 0.0f)
-                    p = glm::u8vec4(glm::clamp(glm::vec3(filled) / filled.a, 0.0f, 1.0f) * 255.0f + 0.5f, 0);
+                    p = glm::u8vec4(
+                        glm::clamp(glm::vec3(filled) / filled.a, 0.0f, 1.0f) * 255.0f + 0.5f, 0);
             } else {
                 auto& p = texture.rgbaFloat()->at(x, y);
-                if (!(p.a > 0.0f) && filled.a > 0.0f) p = glm::vec4(glm::vec3(filled) / filled.a, 0.0f);
+                if (!(p.a > 0.0f) && filled.a > 0.0f)
+                    p = glm::vec4(glm::vec3(filled) / filled.a, 0.0f);
             }
         }
     }

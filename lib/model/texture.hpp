@@ -15,17 +15,19 @@ using Rgba8Image = Image<glm::u8vec4>;
 using RgbaFloatImage = Image<glm::vec4>;
 
 /// Colour of a reference view: display-referred 8-bit sRGB or scene-referred linear float.
-/// Alpha is coverage: 0 = background, between = a silhouette's pixel. Colours under alpha 0 are bled
-/// from the object (see bleedColour()), so filters never mix in background.
+/// Alpha is coverage: 0 = background, between = a silhouette's pixel. Colours under alpha 0 are
+/// bled from the object (see bleedColour()), so filters never mix in background.
 class Texture {
   public:
     Texture() = default;
-    Texture(Rgba8Image image) : image_(std::move(image)) {}          // NOLINT: a texture is either
-    Texture(RgbaFloatImage image) : image_(std::move(image)) {}      // NOLINT
+    Texture(Rgba8Image image) : image_(std::move(image)) {}      // NOLINT: a texture is either
+    Texture(RgbaFloatImage image) : image_(std::move(image)) {}  // NOLINT
 
     [[nodiscard]] bool isLinear() const { return std::holds_alternative<RgbaFloatImage>(image_); }
     [[nodiscard]] const Rgba8Image* rgba8() const { return std::get_if<Rgba8Image>(&image_); }
-    [[nodiscard]] const RgbaFloatImage* rgbaFloat() const { return std::get_if<RgbaFloatImage>(&image_); }
+    [[nodiscard]] const RgbaFloatImage* rgbaFloat() const {
+        return std::get_if<RgbaFloatImage>(&image_);
+    }
     [[nodiscard]] Rgba8Image* rgba8() { return std::get_if<Rgba8Image>(&image_); }
     [[nodiscard]] RgbaFloatImage* rgbaFloat() { return std::get_if<RgbaFloatImage>(&image_); }
 

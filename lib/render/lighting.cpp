@@ -4,13 +4,13 @@
 
 namespace stx {
 
-glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position, glm::vec3 normal,
-                     glm::vec3 toEye) {
+glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
+                     glm::vec3 normal, glm::vec3 toEye) {
     glm::vec3 diffuse = lighting.ambient;
     glm::vec3 specular(0.0f);
     for (const auto& light : lighting.lights) {
-        const glm::vec3 toLight = light.kind == Light::Kind::directional ? -light.vector
-                                                                         : light.vector - position;
+        const glm::vec3 toLight =
+            light.kind == Light::Kind::directional ? -light.vector : light.vector - position;
         const float length = glm::length(toLight);
         if (!(length > 0.0f)) continue;
         const glm::vec3 l = toLight / length;

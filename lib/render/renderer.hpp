@@ -32,7 +32,8 @@ struct RenderSettings {
     Lighting lighting;
 };
 
-/// Draws novel views of one bundle. Made once (uploads, per-view preparation), then asked for frames.
+/// Draws novel views of one bundle. Made once (uploads, per-view preparation), then asked for
+/// frames.
 class Renderer {
   public:
     virtual ~Renderer() = default;

@@ -8,8 +8,10 @@ namespace stx {
 namespace {
 
 TEST(Camera, ProjectsToTheStandardsPixelCentres) {
-    // mpeg4-dibr: u = (i+1/2)/W*2-1, v = 1-(j+1/2)/H*2; point = R(u z tan(fx/2), v z tan(fy/2), -z)+p.
-    const auto c = Camera::fromFieldOfView({1, 2, 3}, quatFromAxisAngle({0, 1, 0, 0.3}), {0.8, 0.6}, false, 64, 48);
+    // mpeg4-dibr: u = (i+1/2)/W*2-1, v = 1-(j+1/2)/H*2; point = R(u z tan(fx/2), v z tan(fy/2),
+    // -z)+p.
+    const auto c = Camera::fromFieldOfView({1, 2, 3}, quatFromAxisAngle({0, 1, 0, 0.3}), {0.8, 0.6},
+                                           false, 64, 48);
     const int i = 5, j = 7;
     const double dist = 4.0;
     const double u = (i + 0.5) / 64 * 2 - 1, v = 1 - (j + 0.5) / 48 * 2;
@@ -31,7 +33,8 @@ TEST(Camera, OrthographicFieldOfViewIsTheWindow) {
 }
 
 TEST(Camera, LookAtPointsTheAxisAtTheTarget) {
-    for (const glm::dvec3 eye : {glm::dvec3(0, 0, 5), glm::dvec3(3, -2, 1), glm::dvec3(0, 4, 0), glm::dvec3(0, -4, 0)}) {
+    for (const glm::dvec3 eye :
+         {glm::dvec3(0, 0, 5), glm::dvec3(3, -2, 1), glm::dvec3(0, 4, 0), glm::dvec3(0, -4, 0)}) {
         const auto q = lookAt(eye, {0, 0, 0});
         ASSERT_TRUE(q);
         EXPECT_LT(glm::length(*q * glm::dvec3(0, 0, -1) - glm::normalize(-eye)), 1e-12);
@@ -40,7 +43,8 @@ TEST(Camera, LookAtPointsTheAxisAtTheTarget) {
 }
 
 TEST(Camera, AxisAngleRoundTrips) {
-    for (const glm::dvec4 r : {glm::dvec4(0, 0, 1, 0), glm::dvec4(0.6, 0, 0.8, 1.2), glm::dvec4(0, 1, 0, 3.1)}) {
+    for (const glm::dvec4 r :
+         {glm::dvec4(0, 0, 1, 0), glm::dvec4(0.6, 0, 0.8, 1.2), glm::dvec4(0, 1, 0, 3.1)}) {
         const auto back = axisAngleFromQuat(quatFromAxisAngle(r));
         EXPECT_LT(glm::length(back - r), 1e-12);
     }
@@ -54,9 +58,11 @@ TEST(DepthCode, FollowsTheStandard) {
     EXPECT_EQ(code.encode(1e9), 1u) << "a valid far point never becomes 'none'";
     EXPECT_EQ(code.encode(kNoDepth), 0u);
     EXPECT_NEAR(code.step() / 2, 0.177, 5e-4);
-    for (std::uint32_t d = 1; d <= 255; ++d) EXPECT_EQ(code.encode(static_cast<float>(code.decode(d))), d);
+    for (std::uint32_t d = 1; d <= 255; ++d)
+        EXPECT_EQ(code.encode(static_cast<float>(code.decode(d))), d);
     const DepthCode fine{0.7, 3.3, 65535};
-    for (std::uint32_t d = 1; d <= 65535; ++d) EXPECT_EQ(fine.encode(static_cast<float>(fine.decode(d))), d);
+    for (std::uint32_t d = 1; d <= 65535; ++d)
+        EXPECT_EQ(fine.encode(static_cast<float>(fine.decode(d))), d);
 }
 
 }  // namespace

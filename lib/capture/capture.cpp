@@ -1,0 +1,143 @@
+#include "lib/capture/capture.hpp"
+
+#include <cmath>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+Texture straightTexture(const Image<glm::vec4>& premultiplied) {
+    Rgba8Image image(premultiplied.width(), premultiplied.height());
+    for (std::size_t i = 0; i < image.count(); ++i) {
+        const glm::vec4 c = premultiplied.pixels()[i];
+        if (!(c.w > 0.0f)) continue;
+        const glm::vec3 straight = glm::clamp(glm::vec3(c) / c.w, 0.0f, 1.0f);
+        // Any coverage at all stays above 0, which means background.
+        const float alpha = std::max(1.0f, std::round(std::min(c.w, 1.0f) * 255.0f));
+        image.pixels()[i] =
+            glm::u8vec4(glm::u8vec3(straight * 255.0f + 0.5f), static_cast<std::uint8_t>(alpha));
+    }
+    Texture texture(std::move(image));
+    bleedColour(texture);
+    return texture;
+}
+
+}  // namespace
+
+void fitDepthRange(ReferenceView& view) {
+    float nearest = kNoDepth, farthest = 0.0f;
+    for (const float d : view.depth.pixels()) {
+        if (!hasPoint(d)) continue;
+        nearest = std::min(nearest, d);
+        farthest = std::max(farthest, d);
+    }
+    if (!hasPoint(nearest)) return;
+    // A flat object facing the camera still needs a range.
+    if (nearest == farthest) {
+        const float slack = std::max(farthest * 1e-4f, 1e-6f);
+        nearest = std::max(0.0f, nearest - slack);
+        farthest += slack;
+    }
+    view.nearPlane = nearest;
+    view.farPlane = farthest;
+    if (view.depthBits == 32) return;
+    const auto code = view.depthCode();
+    for (float& d : view.depth.pixels()) {
+        if (hasPoint(d)) d = static_cast<float>(code.decode(code.encode(d)));
+    }
+}
+
+Result<ReferenceView> captureView(const Mesh& mesh, const Camera& camera, std::string name,
+                                  const CaptureSettings& settings, Job& job) {
+    RasterSettings raster;
+    raster.supersampling = settings.supersampling;
+    raster.normals = settings.meshNormals;
+    STX_TRY(auto image, rasterise(mesh, camera, raster, job));
+    ReferenceView view;
+    view.name = std::move(name);
+    view.camera = camera;
+    view.depthBits = settings.depthBits;
+    view.texture = straightTexture(image.colour);
+    view.depth = std::move(image.depth);
+    view.normal = std::move(image.normal);
+    fitDepthRange(view);
+    return view;
+}
+
+Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& cameras,
+                             const CaptureSettings& settings, Job& job) {
+    STX_CHECK(mesh.check());
+    std::uint64_t pixels = 0;
+    for (const auto& c : cameras) {
+        STX_CHECK(c.check());
+        pixels += static_cast<std::uint64_t>(c.width) * c.height;
+    }
+    STX_CHECK(
+        job.limits.checkAllocation(pixels, settings.meshNormals ? 20 : 8, "the reference views"));
+
+    const auto n = static_cast<std::int64_t>(cameras.size());
+    std::vector<Result<ReferenceView>> views(n, ReferenceView());
+    std::atomic<std::int64_t> done = 0;
+    parallelFor(0, n, [&](std::int64_t i) {
+        views[i] = captureView(mesh, cameras[i], fmt::format("view{:03}", i), settings, job);
+        job.progress(++done, n, "capturing views");
+    });
+    Bundle bundle;
+    for (std::int64_t i = 0; i < n; ++i) {
+        if (!views[i]) return tl::unexpected(views[i].error().at(fmt::format("view {}", i)));
+        if (views[i]->pointCount() == 0) {
+            job.note(fmt::format("view {} sees nothing of the model and was left out", i));
+            continue;
+        }
+        bundle.views.push_back(std::move(*views[i]));
+    }
+    if (bundle.views.empty())
+        return fail(ErrorCode::invalidInput,
+                    "none of the {} cameras sees the model; check their poses and units", n);
+    bundle.bounds = mesh.bounds();
+    return bundle;
+}
+
+namespace {
+
+class MeshRenderer : public Renderer {
+  public:
+    MeshRenderer(const Mesh& mesh, const RenderSettings& settings, Job& job)
+        : mesh_(mesh), settings_(settings), job_(job) {}
+
+    Result<Frame> render(const Camera& camera) override;
+    [[nodiscard]] std::string backend() const override { return "cpu"; }
+    [[nodiscard]] std::string device() const override { return "rasteriser"; }
+
+  private:
+    const Mesh& mesh_;
+    RenderSettings settings_;
+    Job& job_;
+};
+
+Result<Frame> MeshRenderer::render(const Camera& camera) {
+    RasterSettings raster;
+    raster.supersampling = settings_.quality == Quality::draft ? 2 : 4;
+    raster.normals = true;
+    raster.lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
+    STX_TRY(auto image, rasterise(mesh_, camera, raster, job_));
+    Frame frame;
+    frame.colour = std::move(image.colour);
+    frame.depth = std::move(image.depth);
+    frame.normal = std::move(image.normal);
+    if (raster.lighting.on()) {
+        frame.albedo = std::move(frame.colour);
+        frame.colour = std::move(image.lit);
+    }
+    return frame;
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> makeMeshRenderer(const Mesh& mesh, const RenderSettings& settings,
+                                           Job& job) {
+    return std::make_unique<MeshRenderer>(mesh, settings, job);
+}
+
+}  // namespace stx

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/capture/rasterizer.hpp"
+#include "lib/model/bundle.hpp"
+#include "lib/model/mesh.hpp"
+#include "lib/render/renderer.hpp"
+
+namespace stx {
+
+struct CaptureSettings {
+    int supersampling = 4;     ///< colour and coverage samples per pixel and axis
+    int depthBits = 16;        ///< 8, 16 or 32 (float, only .exr holds it)
+    bool meshNormals = false;  ///< the mesh's own normals become the view's (SimpleTextureV2)
+};
+
+/// One reference view of a mesh: colour and coverage supersampled, depth at the pixel centres,
+/// nearPlane and farPlane fitted tightly to it, depth rounded to its code (so that the bundle is
+/// what a reader of the file will see), straight colour bled past the silhouette.
+/// A camera that sees nothing of the mesh gives a view without points.
+[[nodiscard]] Result<ReferenceView> captureView(const Mesh& mesh, const Camera& camera,
+                                                std::string name, const CaptureSettings& settings,
+                                                Job& job);
+
+/// All views of a bundle, several at a time. Views without points are dropped with a note; errors
+/// when none is left.
+[[nodiscard]] Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& cameras,
+                                           const CaptureSettings& settings, Job& job);
+
+/// Sets nearPlane and farPlane to the least and greatest distance of a view's points, as floats
+/// (the format's precision) that enclose them, and rounds the distances to their codes. Does
+/// nothing to a view without points. `depthBits` 32 keeps the distances.
+void fitDepthRange(ReferenceView& view);
+
+/// A renderer that rasterises the mesh itself: the truth to compare novel views with. Lighting is
+/// as in the other renderers. The mesh must outlive it.
+[[nodiscard]] std::unique_ptr<Renderer> makeMeshRenderer(const Mesh& mesh,
+                                                         const RenderSettings& settings, Job& job);
+
+}  // namespace stx

@@ -1,0 +1,150 @@
+#include "lib/capture/material_sampler.hpp"
+
+#include <array>
+#include <cmath>
+
+namespace stx {
+namespace {
+
+int wrapped(int i, int n, MeshTexture::Wrap wrap) {
+    // Nearly always inside or one step out; the divisions are for the rest.
+    if (i >= 0 && i < n) return i;
+    switch (wrap) {
+        case MeshTexture::Wrap::clamp:
+            return std::clamp(i, 0, n - 1);
+        case MeshTexture::Wrap::mirror: {
+            const int m = ((i % (2 * n)) + 2 * n) % (2 * n);
+            return m < n ? m : 2 * n - 1 - m;
+        }
+        case MeshTexture::Wrap::repeat:
+            break;
+    }
+    return ((i % n) + n) % n;
+}
+
+/// sRGB coding by table: interpolation between 4096 steps is far below an 8-bit step beyond the
+/// toe.
+float srgbFast(float linear) {
+    static const auto table = [] {
+        std::array<float, 4097> t{};
+        for (int i = 0; i <= 4096; ++i) t[i] = srgbFromLinear(i / 4096.0f);
+        return t;
+    }();
+    if (!(linear > 0.0f)) return 0.0f;
+    if (linear >= 1.0f) return 1.0f;
+    if (linear < 0.01f) return srgbFromLinear(linear);
+    const float s = linear * 4096.0f;
+    const int i = static_cast<int>(s);
+    return table[i] + (table[i + 1] - table[i]) * (s - i);
+}
+
+float linearFast(float coded) {
+    static const auto table = [] {
+        std::array<float, 1025> t{};
+        for (int i = 0; i <= 1024; ++i) t[i] = linearFromSrgb(i / 1024.0f);
+        return t;
+    }();
+    const float s = std::clamp(coded, 0.0f, 1.0f) * 1024.0f;
+    const int i = std::min(static_cast<int>(s), 1023);
+    return table[i] + (table[i + 1] - table[i]) * (s - i);
+}
+
+template <class T>
+T mix3(const std::vector<T>& values, const glm::uvec3& t, glm::vec3 b) {
+    return values[t.x] * b.x + values[t.y] * b.y + values[t.z] * b.z;
+}
+
+/// Far-out coordinates wrap before they are scaled, so that ints hold them.
+float reduced(float v, MeshTexture::Wrap wrap) {
+    if (!std::isfinite(v)) return 0.0f;
+    if (wrap == MeshTexture::Wrap::clamp) return std::clamp(v, 0.0f, 1.0f);
+    return std::abs(v) < 2.0f ? v : v - 2.0f * std::floor(v * 0.5f);
+}
+
+}  // namespace
+
+glm::vec4 sampleTexture(const MeshTexture& texture, glm::vec2 uv) {
+    const auto& image = texture.pixels;
+    const int w = image.width(), h = image.height();
+    const float x = reduced(uv.x, texture.wrapU) * w - 0.5f;
+    const float y = reduced(uv.y, texture.wrapV) * h - 0.5f;
+    if (texture.nearest) {
+        const int ix = wrapped(static_cast<int>(std::floor(x + 0.5f)), w, texture.wrapU);
+        const int iy = wrapped(static_cast<int>(std::floor(y + 0.5f)), h, texture.wrapV);
+        return glm::vec4(image.at(ix, iy)) * (1.0f / 255.0f);
+    }
+    const float bx = std::floor(x), by = std::floor(y);
+    const float fx = x - bx, fy = y - by;
+    const int x0 = wrapped(static_cast<int>(bx), w, texture.wrapU);
+    const int x1 = wrapped(static_cast<int>(bx) + 1, w, texture.wrapU);
+    const int y0 = wrapped(static_cast<int>(by), h, texture.wrapV);
+    const int y1 = wrapped(static_cast<int>(by) + 1, h, texture.wrapV);
+    const glm::vec4 top = glm::vec4(image.at(x0, y0)) * (1 - fx) + glm::vec4(image.at(x1, y0)) * fx;
+    const glm::vec4 bottom =
+        glm::vec4(image.at(x0, y1)) * (1 - fx) + glm::vec4(image.at(x1, y1)) * fx;
+    return (top * (1 - fy) + bottom * fy) * (1.0f / 255.0f);
+}
+
+MaterialSampler::MaterialSampler(const Mesh& mesh) : mesh_(mesh) {
+    for (const auto& m : mesh.materials) {
+        seeThrough_.push_back(m.alpha != Material::Alpha::opaque);
+        plainTexture_.push_back(mesh.colours.empty() && m.baseColour == glm::vec4(1.0f));
+    }
+}
+
+glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b) const {
+    const auto material = mesh_.triangleMaterial[triangle];
+    const auto& m = mesh_.materials[material];
+    const auto& t = mesh_.triangles[triangle];
+    glm::vec4 texel(1.0f);
+    if (m.baseColourTexture >= 0)
+        texel = sampleTexture(mesh_.textures[m.baseColourTexture], mix3(mesh_.uvs, t, b));
+    if (plainTexture_[material]) return texel;
+    glm::vec4 factor = m.baseColour;
+    if (!mesh_.colours.empty()) factor *= mix3(mesh_.colours, t, b);
+    glm::vec4 out;
+    for (int k = 0; k < 3; ++k) {
+        const float light = (m.baseColourTexture >= 0 ? linearFast(texel[k]) : 1.0f) * factor[k];
+        out[k] = srgbFast(light);
+    }
+    out.w = texel.w * factor.w;
+    return out;
+}
+
+bool MaterialSampler::opaqueAt(std::uint32_t triangle, glm::vec3 b) const {
+    const auto& m = mesh_.materials[mesh_.triangleMaterial[triangle]];
+    if (m.alpha == Material::Alpha::opaque) return true;
+    const float cutoff = m.alpha == Material::Alpha::mask ? m.alphaCutoff : 0.5f;
+    return colour(triangle, b).w >= cutoff;
+}
+
+glm::vec3 MaterialSampler::normal(std::uint32_t triangle, glm::vec3 b) const {
+    const auto& t = mesh_.triangles[triangle];
+    glm::vec3 n = glm::cross(mesh_.positions[t.y] - mesh_.positions[t.x],
+                             mesh_.positions[t.z] - mesh_.positions[t.x]);
+    if (!mesh_.normals.empty()) {
+        const glm::vec3 smooth = mix3(mesh_.normals, t, b);
+        if (glm::dot(smooth, smooth) > 1e-12f) n = smooth;
+    }
+    const float length = glm::length(n);
+    if (!(length > 0.0f)) return glm::vec3(0.0f);
+    n /= length;
+
+    const auto& m = mesh_.materials[mesh_.triangleMaterial[triangle]];
+    if (m.normalTexture < 0 || mesh_.tangents.empty()) return n;
+    const glm::vec4 tangent4 = mix3(mesh_.tangents, t, b);
+    glm::vec3 tangent(tangent4);
+    tangent -= n * glm::dot(n, tangent);
+    const float tangentLength = glm::length(tangent);
+    if (!(tangentLength > 1e-6f)) return n;
+    tangent /= tangentLength;
+    const glm::vec3 bitangent = glm::cross(n, tangent) * (tangent4.w < 0 ? -1.0f : 1.0f);
+    const auto& uvs = mesh_.normalUvs.empty() ? mesh_.uvs : mesh_.normalUvs;
+    glm::vec3 bump =
+        glm::vec3(sampleTexture(mesh_.textures[m.normalTexture], mix3(uvs, t, b))) * 2.0f - 1.0f;
+    bump.x *= m.normalScale;
+    bump.y *= m.normalScale;
+    return glm::normalize(tangent * bump.x + bitangent * bump.y + n * std::max(bump.z, 1e-3f));
+}
+
+}  // namespace stx

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "lib/model/mesh.hpp"
+
+namespace stx {
+
+/// Evaluates a mesh's base colour and normal at points of its triangles.
+class MaterialSampler {
+  public:
+    /// The mesh must pass check() and outlive the sampler.
+    explicit MaterialSampler(const Mesh& mesh);
+
+    /// Straight sRGB-coded RGBA, 0..1, at barycentric coordinates of a triangle.
+    [[nodiscard]] glm::vec4 colour(std::uint32_t triangle, glm::vec3 barycentric) const;
+    /// Whether the surface is there at all (alpha mask, and alpha of blended materials at 1/2).
+    [[nodiscard]] bool opaqueAt(std::uint32_t triangle, glm::vec3 barycentric) const;
+    /// This triangle can have see-through points, so opaqueAt() must be asked.
+    [[nodiscard]] bool seeThrough(std::uint32_t triangle) const {
+        return seeThrough_[mesh_.triangleMaterial[triangle]];
+    }
+    /// Unit world normal: interpolated, normal-mapped where the material says so; the geometric one
+    /// where the mesh has no normals; zero on triangles without area.
+    [[nodiscard]] glm::vec3 normal(std::uint32_t triangle, glm::vec3 barycentric) const;
+
+  private:
+    const Mesh& mesh_;
+    std::vector<bool> seeThrough_;    ///< per material
+    std::vector<bool> plainTexture_;  ///< per material: the texture alone decides, no conversion
+};
+
+/// Bilinear (or nearest) texel value at uv, straight RGBA 0..1 as stored.
+[[nodiscard]] glm::vec4 sampleTexture(const MeshTexture& texture, glm::vec2 uv);
+
+}  // namespace stx

@@ -1,0 +1,120 @@
+#include <cmath>
+#include <numbers>
+#include <unordered_map>
+
+#include "lib/capture/rasterizer.hpp"
+
+namespace stx {
+namespace {
+
+/// Points sorted into a cubic grid.
+class PointGrid {
+  public:
+    PointGrid(const Mesh& mesh, double cell) : mesh_(mesh), cell_(cell) {
+        for (const auto p : mesh.points) cells_[key(cellOf(mesh.positions[p]))].push_back(p);
+    }
+    [[nodiscard]] double nearest(std::uint32_t point) const {
+        const auto centre = cellOf(mesh_.positions[point]);
+        double best = std::numeric_limits<double>::infinity();
+        for (int ring = 0; ring <= 3; ++ring) {
+            for (int dz = -ring; dz <= ring; ++dz) {
+                for (int dy = -ring; dy <= ring; ++dy) {
+                    for (int dx = -ring; dx <= ring; ++dx) {
+                        if (std::max({std::abs(dx), std::abs(dy), std::abs(dz)}) != ring) continue;
+                        visit(centre + glm::i64vec3(dx, dy, dz), point, best);
+                    }
+                }
+            }
+            // Cells further out cannot hold anything nearer.
+            if (best <= (ring * cell_) * (ring * cell_)) break;
+        }
+        return std::sqrt(best);
+    }
+
+  private:
+    [[nodiscard]] glm::i64vec3 cellOf(glm::vec3 p) const {
+        return glm::i64vec3(glm::floor(glm::dvec3(p) / cell_));
+    }
+    static std::uint64_t key(glm::i64vec3 c) {
+        return (static_cast<std::uint64_t>(c.x) * 73856093u) ^
+               (static_cast<std::uint64_t>(c.y) * 19349663u) ^
+               (static_cast<std::uint64_t>(c.z) * 83492791u);
+    }
+    void visit(glm::i64vec3 cell, std::uint32_t point, double& best) const {
+        const auto found = cells_.find(key(cell));
+        if (found == cells_.end()) return;
+        for (const auto other : found->second) {
+            const glm::dvec3 d =
+                glm::dvec3(mesh_.positions[other]) - glm::dvec3(mesh_.positions[point]);
+            const double square = glm::dot(d, d);
+            if (square > 0) best = std::min(best, square);
+        }
+    }
+
+    const Mesh& mesh_;
+    double cell_;
+    std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+};
+
+}  // namespace
+
+float pointRadius(const Mesh& mesh) {
+    if (mesh.points.empty()) return 0.0f;
+    Bounds bounds;
+    for (const auto p : mesh.points) bounds.add(mesh.positions[p]);
+    const double size = bounds.radius() * 2.0;
+    if (!(size > 0)) return 0.01f;  // one point, or all in one place: any radius shows it
+    // Points lie on surfaces: n of them on a size x size area are size / sqrt(n) apart.
+    const double guess = size / std::sqrt(static_cast<double>(mesh.points.size()));
+    const PointGrid grid(mesh, guess);
+    std::vector<double> distances;
+    const std::size_t step = std::max<std::size_t>(1, mesh.points.size() / 4096);
+    for (std::size_t i = 0; i < mesh.points.size(); i += step) {
+        const double d = grid.nearest(mesh.points[i]);
+        if (std::isfinite(d)) distances.push_back(d);
+    }
+    if (distances.empty()) return static_cast<float>(guess * 0.5);
+    // Irregular scans: most gaps are closed by the distance that nine in ten points stay under.
+    const auto at = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
+    std::nth_element(distances.begin(), at, distances.end());
+    return static_cast<float>(*at * std::numbers::sqrt2 * 0.75);
+}
+
+Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius) {
+    Mesh out = mesh;
+    out.points.clear();
+    const auto material = static_cast<std::uint32_t>(out.materials.size());
+    out.materials.emplace_back();
+    out.materials.back().name = "points";
+    constexpr int kCorners = 6;
+    const auto vertices = mesh.points.size() * kCorners;
+    out.positions.reserve(out.positions.size() + vertices);
+    const glm::vec3 forward(camera.forward());
+    const glm::vec3 eye(camera.position);
+    for (const auto p : mesh.points) {
+        const glm::vec3 centre = mesh.positions[p];
+        glm::vec3 axis = camera.orthographic ? -forward : eye - centre;
+        const float length = glm::length(axis);
+        if (!(length > 0.0f)) continue;
+        axis /= length;
+        const glm::vec3 other = std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
+        const glm::vec3 u = glm::normalize(glm::cross(other, axis)), v = glm::cross(axis, u);
+        const auto first = static_cast<std::uint32_t>(out.positions.size());
+        for (int k = 0; k < kCorners; ++k) {
+            const float a = 2.0f * std::numbers::pi_v<float> * k / kCorners;
+            out.positions.push_back(centre + (u * std::cos(a) + v * std::sin(a)) * radius);
+            if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[p]);
+            if (!mesh.colours.empty()) out.colours.push_back(mesh.colours[p]);
+            if (!mesh.uvs.empty()) out.uvs.push_back(mesh.uvs[p]);
+            if (!mesh.normalUvs.empty()) out.normalUvs.push_back(mesh.normalUvs[p]);
+            if (!mesh.tangents.empty()) out.tangents.push_back(mesh.tangents[p]);
+        }
+        for (std::uint32_t k = 2; k < kCorners; ++k) {
+            out.triangles.emplace_back(first, first + k - 1, first + k);
+            out.triangleMaterial.push_back(material);
+        }
+    }
+    return out;
+}
+
+}  // namespace stx

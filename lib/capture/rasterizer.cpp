@@ -1,0 +1,315 @@
+#include "lib/capture/rasterizer.hpp"
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "lib/base/parallel.hpp"
+#include "lib/capture/material_sampler.hpp"
+#include "lib/geometry/depth_code.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kTile =
+    32;  // pixels; with 4x4 samples a tile's buffers stay in the second-level cache
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+/// a x + b y + c over pixel positions.
+struct Affine {
+    double a = 0, b = 0, c = 0;
+    [[nodiscard]] double at(double x, double y) const { return a * x + (b * y + c); }
+};
+
+/// A triangle set up for one camera, by 2D homogeneous coordinates (Olano & Greer 1997): edge
+/// functions need no division by depth, so triangles that reach behind the viewpoint need no
+/// clipping. Shared edges get exactly opposite functions in both triangles (a cross product with
+/// its factors swapped is exactly negated), so there are no cracks.
+struct SetUp {
+    Affine edge[3];   ///< >= 0 inside; proportional to the perspective-correct barycentrics
+    Affine nearness;  ///< perspective: 1/dist; orthographic: -dist
+    std::uint32_t triangle = 0;
+    int x0 = 0, y0 = 0, x1 = -1, y1 = -1;  ///< pixels touched, inclusive
+};
+
+class Rasterizer {
+  public:
+    Rasterizer(const Mesh& mesh, const Camera& camera)
+        : mesh_(mesh),
+          camera_(camera),
+          cameraFromWorld_(camera.cameraFromWorld()),
+          sampler_(mesh) {}
+
+    Result<RasterImage> run(const RasterSettings& settings, Job& job);
+
+  private:
+    bool setUp(std::uint32_t triangle, SetUp& out) const;
+    void drawSpan(const SetUp& s, double y, int from, int to, double step, double origin,
+                  float* depth, std::uint32_t* ids) const;
+    void drawTile(const std::vector<std::uint32_t>& list, int tileX, int tileY, int samples,
+                  std::vector<float>& depth, std::vector<std::uint32_t>& ids) const;
+    void shadeTile(int tileX, int tileY, const RasterSettings& settings,
+                   const std::vector<std::uint32_t>& ids, RasterImage& out) const;
+    [[nodiscard]] glm::vec3 lit(const Lighting& lighting, const SetUp& s, glm::vec3 albedo,
+                                double x, double y) const;
+    void resolveCentres(int tileX, int tileY, const std::vector<std::uint32_t>& ids,
+                        RasterImage& out) const;
+    [[nodiscard]] glm::vec3 barycentric(const SetUp& s, double x, double y) const {
+        const double e0 = s.edge[0].at(x, y), e1 = s.edge[1].at(x, y), e2 = s.edge[2].at(x, y);
+        const double scale = 1.0 / (e0 + e1 + e2);
+        return glm::vec3(static_cast<float>(e0 * scale), static_cast<float>(e1 * scale),
+                         static_cast<float>(e2 * scale));
+    }
+
+    const Mesh& mesh_;
+    const Camera& camera_;
+    const glm::dmat4 cameraFromWorld_;
+    MaterialSampler sampler_;
+    std::vector<SetUp> setUps_;
+};
+
+bool Rasterizer::setUp(std::uint32_t triangle, SetUp& out) const {
+    const auto& t = mesh_.triangles[triangle];
+    glm::dvec3 v[3];  // (x * w, y * w, w) in pixels
+    double dist[3];
+    bool allInFront = true, anyInFront = false;
+    for (int k = 0; k < 3; ++k) {
+        const glm::dvec3 p(cameraFromWorld_ * glm::dvec4(glm::dvec3(mesh_.positions[t[k]]), 1.0));
+        dist[k] = -p.z;
+        const double w = camera_.orthographic ? 1.0 : dist[k];
+        v[k] = {camera_.fx * p.x + camera_.cx * w, -camera_.fy * p.y + camera_.cy * w, w};
+        (dist[k] > 0 ? anyInFront : allInFront) = dist[k] > 0;
+    }
+    if (!anyInFront) return false;
+
+    glm::dvec3 e[3] = {glm::cross(v[1], v[2]), glm::cross(v[2], v[0]), glm::cross(v[0], v[1])};
+    const double det = glm::dot(v[0], e[0]);
+    if (!(det != 0) || !std::isfinite(det)) return false;
+    // In pixels y runs down, so counter-clockwise front faces have a negative determinant.
+    if (det > 0 && !mesh_.materials[mesh_.triangleMaterial[triangle]].doubleSided) return false;
+    const double sign = det > 0 ? 1.0 : -1.0;
+    for (int k = 0; k < 3; ++k) out.edge[k] = {sign * e[k].x, sign * e[k].y, sign * e[k].z};
+    const double inverse = 1.0 / std::abs(det);
+    glm::dvec3 n(0.0);
+    for (int k = 0; k < 3; ++k)
+        n += sign * e[k] * ((camera_.orthographic ? -dist[k] : 1.0) * inverse);
+    out.nearness = {n.x, n.y, n.z};
+    out.triangle = triangle;
+
+    out.x0 = out.y0 = 0;
+    out.x1 = camera_.width - 1;
+    out.y1 = camera_.height - 1;
+    if (allInFront) {
+        glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-low);
+        for (int k = 0; k < 3; ++k) {
+            const glm::dvec2 p(v[k].x / v[k].z, v[k].y / v[k].z);
+            low = glm::min(low, p);
+            high = glm::max(high, p);
+        }
+        if (!(high.x >= 0 && high.y >= 0 && low.x < camera_.width && low.y < camera_.height))
+            return false;
+        out.x0 = static_cast<int>(std::max(0.0, std::floor(low.x)));
+        out.y0 = static_cast<int>(std::max(0.0, std::floor(low.y)));
+        out.x1 = static_cast<int>(std::min(camera_.width - 1.0, std::floor(high.x)));
+        out.y1 = static_cast<int>(std::min(camera_.height - 1.0, std::floor(high.y)));
+    }
+    return out.x0 <= out.x1 && out.y0 <= out.y1;
+}
+
+void Rasterizer::drawSpan(const SetUp& s, double y, int from, int to, double step, double origin,
+                          float* depth, std::uint32_t* ids) const {
+    // Shrink [from, to] by each edge; the exact predicate decides at the ends, and being monotone
+    // in x it holds in between.
+    for (const auto& e : s.edge) {
+        const double rest = e.b * y + e.c;
+        const auto inside = [&](int i) { return e.a * (origin + i * step) + rest >= 0; };
+        if (e.a == 0) {
+            if (rest < 0) return;
+            continue;
+        }
+        const double zero = (-rest / e.a - origin) / step;
+        if (e.a > 0) {
+            int i = static_cast<int>(std::clamp(std::ceil(zero), from - 1.0, to + 2.0));
+            i = std::max(i, from);
+            while (i > from && inside(i - 1)) --i;
+            while (i <= to && !inside(i)) ++i;
+            from = i;
+        } else {
+            int i = static_cast<int>(std::clamp(std::floor(zero), from - 2.0, to + 1.0));
+            i = std::min(i, to);
+            while (i < to && inside(i + 1)) ++i;
+            while (i >= from && !inside(i)) --i;
+            to = i;
+        }
+        if (from > to) return;
+    }
+    const double base = s.nearness.b * y + s.nearness.c;
+    const bool perspective = !camera_.orthographic;
+    const auto slot = static_cast<std::uint32_t>(&s - setUps_.data());
+    const bool holes = sampler_.seeThrough(s.triangle);
+    for (int i = from; i <= to; ++i) {
+        const double x = origin + i * step;
+        const auto nearness = static_cast<float>(s.nearness.a * x + base);
+        if (perspective ? nearness <= 0.0f : nearness > 0.0f) continue;  // behind the viewpoint
+        if (!(nearness > depth[i])) continue;
+        if (holes && !sampler_.opaqueAt(s.triangle, barycentric(s, x, y))) continue;
+        depth[i] = nearness;
+        ids[i] = slot;
+    }
+}
+
+void Rasterizer::drawTile(const std::vector<std::uint32_t>& list, int tileX, int tileY, int samples,
+                          std::vector<float>& depth, std::vector<std::uint32_t>& ids) const {
+    const int side = kTile * samples;
+    depth.assign(static_cast<std::size_t>(side) * side, -std::numeric_limits<float>::infinity());
+    ids.assign(depth.size(), kNone);
+    const double step = 1.0 / samples;
+    const double originX = tileX * kTile + 0.5 * step, originY = tileY * kTile + 0.5 * step;
+    for (const auto index : list) {
+        const auto& s = setUps_[index];
+        const int px0 = std::max(s.x0 - tileX * kTile, 0),
+                  px1 = std::min(s.x1 - tileX * kTile, kTile - 1);
+        const int py0 = std::max(s.y0 - tileY * kTile, 0),
+                  py1 = std::min(s.y1 - tileY * kTile, kTile - 1);
+        for (int row = py0 * samples; row < (py1 + 1) * samples; ++row) {
+            const auto at = static_cast<std::size_t>(row) * side;
+            drawSpan(s, originY + row * step, px0 * samples, (px1 + 1) * samples - 1, step, originX,
+                     depth.data() + at, ids.data() + at);
+        }
+    }
+}
+
+glm::vec3 Rasterizer::lit(const Lighting& lighting, const SetUp& s, glm::vec3 albedo, double x,
+                          double y) const {
+    const double nearness = s.nearness.at(x, y);
+    const double dist = camera_.orthographic ? -nearness : 1.0 / nearness;
+    const glm::vec3 position(camera_.position +
+                             camera_.orientation * camera_.unproject(x, y, dist));
+    const glm::vec3 toEye = -glm::vec3(camera_.viewDirection(x, y));
+    glm::vec3 n = sampler_.normal(s.triangle, barycentric(s, x, y));
+    if (glm::dot(n, toEye) < 0.0f) n = -n;
+    return glm::clamp(shadePhong(lighting, albedo, position, n, toEye), 0.0f, 1.0f);
+}
+
+void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
+                           const std::vector<std::uint32_t>& ids, RasterImage& out) const {
+    const int samples = settings.supersampling;
+    const int side = kTile * samples;
+    const double step = 1.0 / samples;
+    const float share = 1.0f / static_cast<float>(samples * samples);
+    const int x1 = std::min(kTile, camera_.width - tileX * kTile);
+    const int y1 = std::min(kTile, camera_.height - tileY * kTile);
+    for (int py = 0; py < y1; ++py) {
+        for (int px = 0; px < x1; ++px) {
+            glm::vec4 sum(0.0f), litSum(0.0f);
+            for (int k = 0; k < samples * samples; ++k) {
+                const int sx = px * samples + k % samples, sy = py * samples + k / samples;
+                const auto id = ids[static_cast<std::size_t>(sy) * side + sx];
+                if (id == kNone) continue;
+                const auto& s = setUps_[id];
+                const double x = tileX * kTile + (sx + 0.5) * step;
+                const double y = tileY * kTile + (sy + 0.5) * step;
+                const glm::vec3 colour(sampler_.colour(s.triangle, barycentric(s, x, y)));
+                sum += glm::vec4(colour, 1.0f);
+                if (settings.lighting.on())
+                    litSum += glm::vec4(lit(settings.lighting, s, colour, x, y), 1.0f);
+            }
+            const int x = tileX * kTile + px, y = tileY * kTile + py;
+            out.colour.at(x, y) = sum * share;
+            if (settings.lighting.on()) out.lit.at(x, y) = litSum * share;
+        }
+    }
+}
+
+void Rasterizer::resolveCentres(int tileX, int tileY, const std::vector<std::uint32_t>& ids,
+                                RasterImage& out) const {
+    const int x1 = std::min(kTile, camera_.width - tileX * kTile);
+    const int y1 = std::min(kTile, camera_.height - tileY * kTile);
+    for (int py = 0; py < y1; ++py) {
+        for (int px = 0; px < x1; ++px) {
+            const auto id = ids[static_cast<std::size_t>(py) * kTile + px];
+            if (id == kNone) continue;
+            const int x = tileX * kTile + px, y = tileY * kTile + py;
+            const auto& s = setUps_[id];
+            const double nearness = s.nearness.at(x + 0.5, y + 0.5);
+            out.depth.at(x, y) =
+                static_cast<float>(camera_.orthographic ? -nearness : 1.0 / nearness);
+            const auto b = barycentric(s, x + 0.5, y + 0.5);
+            auto& colour = out.colour.at(x, y);
+            // A sliver through the centre that no colour sample met is still a point of the object.
+            if (colour.w == 0.0f) {
+                colour =
+                    glm::vec4(glm::vec3(sampler_.colour(s.triangle, b)), 1.0f) * (1.0f / 16.0f);
+                if (!out.lit.empty()) out.lit.at(x, y) = colour;
+            }
+            if (out.normal.empty()) continue;
+            glm::vec3 n = sampler_.normal(s.triangle, b);
+            const glm::vec3 view(camera_.viewDirection(x + 0.5, y + 0.5));
+            out.normal.at(x, y) = glm::dot(n, view) > 0.0f ? -n : n;
+        }
+    }
+}
+
+Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
+    const int w = camera_.width, h = camera_.height;
+    RasterImage out;
+    out.colour = Image<glm::vec4>(w, h, glm::vec4(0.0f));
+    out.depth = Image<float>(w, h, kNoDepth);
+    if (settings.lighting.on()) out.lit = out.colour;
+    if (settings.normals) out.normal = Image<glm::vec3>(w, h, glm::vec3(0.0f));
+
+    setUps_.reserve(mesh_.triangles.size());
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+        SetUp s;
+        if (setUp(t, s)) setUps_.push_back(s);
+    }
+    const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
+    std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
+    for (std::uint32_t i = 0; i < setUps_.size(); ++i) {
+        const auto& s = setUps_[i];
+        for (int ty = s.y0 / kTile; ty <= s.y1 / kTile; ++ty) {
+            for (int tx = s.x0 / kTile; tx <= s.x1 / kTile; ++tx)
+                bins[static_cast<std::size_t>(ty) * tilesX + tx].push_back(i);
+        }
+    }
+    std::atomic<bool> stopped = false;
+    parallelForBlocks(
+        0, static_cast<std::int64_t>(bins.size()), 8, [&](std::int64_t from, std::int64_t to) {
+            std::vector<float> depth;
+            std::vector<std::uint32_t> ids;
+            for (auto i = from; i < to; ++i) {
+                if (bins[i].empty()) continue;
+                if (job.cancelled.load(std::memory_order_relaxed)) {
+                    stopped = true;
+                    return;
+                }
+                const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
+                drawTile(bins[i], tx, ty, settings.supersampling, depth, ids);
+                shadeTile(tx, ty, settings, ids, out);
+                if (settings.supersampling > 1) drawTile(bins[i], tx, ty, 1, depth, ids);
+                resolveCentres(tx, ty, ids, out);
+            }
+        });
+    if (stopped) STX_CHECK(job.checkCancelled());
+    return out;
+}
+
+}  // namespace
+
+Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
+                              const RasterSettings& settings, Job& job) {
+    STX_CHECK(camera.check());
+    if (settings.supersampling < 1 || settings.supersampling > 8)
+        return fail(ErrorCode::usage, "supersampling is {}; 1 to 8 is possible",
+                    settings.supersampling);
+    STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
+                                         32, "the picture"));
+    STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
+    if (!mesh.points.empty()) {
+        const Mesh discs = pointsAsDiscs(mesh, camera, pointRadius(mesh));
+        return Rasterizer(discs, camera).run(settings, job);
+    }
+    return Rasterizer(mesh, camera).run(settings, job);
+}
+
+}  // namespace stx

@@ -1,0 +1,151 @@
+#include "lib/geometry/view_layout.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <numbers>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+
+Result<ViewLayout> parseViewLayout(std::string_view text) {
+    ViewLayout layout;
+    const auto colon = text.find(':');
+    const auto word = text.substr(0, colon);
+    if (word == "cube" && colon == std::string_view::npos) {
+        layout.kind = ViewLayout::Kind::cube;
+        layout.count = 6;
+        return layout;
+    }
+    if (word == "ring")
+        layout.kind = ViewLayout::Kind::ring;
+    else if (word == "sphere")
+        layout.kind = ViewLayout::Kind::sphere;
+    else if (word == "octahedral")
+        layout.kind = ViewLayout::Kind::octahedral;
+    else
+        return fail(
+            ErrorCode::usage,
+            "'{}' is no view layout; use cube, ring:N, sphere:N, octahedral:N or a camera file",
+            text);
+    const auto digits =
+        colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
+    const auto parsed = std::from_chars(digits.data(), digits.data() + digits.size(), layout.count);
+    if (digits.empty() || parsed.ec != std::errc() || parsed.ptr != digits.data() + digits.size())
+        return fail(ErrorCode::usage, "'{}' needs a number of views, as in {}:16", text, word);
+    const int most = layout.kind == ViewLayout::Kind::octahedral ? 64 : 4096;
+    const int least = layout.kind == ViewLayout::Kind::octahedral ? 2 : 1;
+    if (layout.count < least || layout.count > most)
+        return fail(ErrorCode::usage, "'{}' asks for {} views; {} to {} are possible", text,
+                    layout.count, least, most);
+    return layout;
+}
+
+glm::dvec3 octahedralDirection(int i, int j, int n) {
+    double x = 2.0 * i / (n - 1) - 1.0, z = 2.0 * j / (n - 1) - 1.0;
+    const double y = 1.0 - std::abs(x) - std::abs(z);
+    if (y < 0) {
+        const double fx = (1.0 - std::abs(z)) * (x < 0 ? -1.0 : 1.0);
+        const double fz = (1.0 - std::abs(x)) * (z < 0 ? -1.0 : 1.0);
+        x = fx;
+        z = fz;
+    }
+    return glm::normalize(glm::dvec3(x, y, z));
+}
+
+std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout) {
+    std::vector<glm::dvec3> out;
+    const int n = layout.count;
+    switch (layout.kind) {
+        case ViewLayout::Kind::cube:
+            return {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+        case ViewLayout::Kind::ring:
+            for (int i = 0; i < n; ++i) {
+                const double a = 2.0 * std::numbers::pi * i / n, e = layout.elevationRad;
+                out.emplace_back(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e));
+            }
+            break;
+        case ViewLayout::Kind::sphere: {
+            const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
+            for (int i = 0; i < n; ++i) {
+                const double y = 1.0 - 2.0 * (i + 0.5) / n, r = std::sqrt(1.0 - y * y),
+                             a = golden * i;
+                out.emplace_back(r * std::sin(a), y, r * std::cos(a));
+            }
+            break;
+        }
+        case ViewLayout::Kind::octahedral:
+            for (int j = 0; j < n; ++j) {
+                for (int i = 0; i < n; ++i) out.push_back(octahedralDirection(i, j, n));
+            }
+            break;
+    }
+    return out;
+}
+
+BoundingSphere boundingSphere(const std::vector<glm::vec3>& points) {
+    Bounds bounds;
+    for (const auto& p : points) bounds.add(p);
+    if (bounds.empty()) return {};
+    BoundingSphere sphere{bounds.centre(), 0.0};
+    for (const auto& p : points)
+        sphere.radius = std::max(sphere.radius, glm::length(glm::dvec3(p) - sphere.centre));
+    return sphere;
+}
+
+Result<Camera> frameCamera(glm::dvec3 direction, const ViewFraming& framing,
+                           const std::vector<glm::vec3>& points, const BoundingSphere& sphere,
+                           bool tight) {
+    const double radius = std::max(sphere.radius, 1e-6 * (1.0 + glm::length(sphere.centre)));
+    const double distance = radius / std::sin(framing.fovRad * 0.5);
+    const glm::dvec3 eye = sphere.centre + direction * distance;
+    STX_TRY(const auto orientation, lookAt(eye, sphere.centre));
+    const glm::dmat3 cameraFromWorld = glm::transpose(glm::mat3_cast(orientation));
+
+    // Half extents of the object in the image plane (at dist 1, or in scene units).
+    glm::dvec2 half(0.0);
+    if (tight) {
+        for (const auto& p : points) {
+            const glm::dvec3 q = cameraFromWorld * (glm::dvec3(p) - eye);
+            const double scale = framing.orthographic ? 1.0 : -1.0 / q.z;
+            half = glm::max(half, glm::abs(glm::dvec2(q)) * scale);
+        }
+    } else {
+        half = glm::dvec2(framing.orthographic ? radius : std::tan(framing.fovRad * 0.5));
+    }
+    const double innerX = std::max(1.0, framing.width - 2.0 * framing.marginPixels);
+    const double innerY = std::max(1.0, framing.height - 2.0 * framing.marginPixels);
+    // Square pixels: the narrower fit decides. Flat objects seen edge-on keep a usable scale.
+    const double floor = 1e-3 * radius / (framing.orthographic ? 1.0 : distance);
+    const double unitsPerPixel = std::max(
+        {2.0 * half.x / innerX, 2.0 * half.y / innerY, 2.0 * floor / std::max(innerX, innerY)});
+    Camera c;
+    c.position = eye;
+    c.orientation = orientation;
+    c.width = framing.width;
+    c.height = framing.height;
+    c.orthographic = framing.orthographic;
+    c.fx = c.fy = 1.0 / unitsPerPixel;
+    c.cx = framing.width * 0.5;
+    c.cy = framing.height * 0.5;
+    return c;
+}
+
+Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout, const ViewFraming& framing,
+                                          const std::vector<glm::vec3>& points) {
+    if (points.empty()) return fail(ErrorCode::invalidInput, "the object has no points to look at");
+    const auto sphere = boundingSphere(points);
+    const auto directions = layoutDirections(layout);
+    const bool tight = layout.kind != ViewLayout::Kind::octahedral;
+    std::vector<Camera> cameras(directions.size());
+    std::vector<Result<Camera>> results(directions.size(), Camera());
+    parallelFor(0, static_cast<std::int64_t>(directions.size()), [&](std::int64_t i) {
+        results[i] = frameCamera(directions[i], framing, points, sphere, tight);
+    });
+    for (std::size_t i = 0; i < results.size(); ++i) {
+        STX_TRY(cameras[i], std::move(results[i]));
+    }
+    return cameras;
+}
+
+}  // namespace stx

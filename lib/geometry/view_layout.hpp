@@ -1,0 +1,68 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lib/base/result.hpp"
+#include "lib/geometry/bounds.hpp"
+#include "lib/geometry/camera.hpp"
+
+namespace stx {
+
+/// A named arrangement of cameras around an object (`--views`).
+struct ViewLayout {
+    enum class Kind {
+        cube,    ///< the six faces: +X -X +Y -Y +Z -Z, always 6
+        ring,    ///< `count` around +Y at one elevation, the first on +Z, counter-clockwise from
+                 ///< above
+        sphere,  ///< `count` on a Fibonacci sphere: even in all directions
+        octahedral,  ///< `count` x `count`, octahedral map row by row: the impostor grid
+    };
+    Kind kind = Kind::sphere;
+    int count = 16;
+    double elevationRad = 0.0;  ///< of a ring, above the horizon
+};
+
+/// How the cameras of a layout look at the object.
+struct ViewFraming {
+    int width = 512, height = 512;  ///< pixels of each view
+    bool orthographic = false;
+    double fovRad =
+        0.6;  ///< perspective: angle that the object's bounding sphere fills; sets the distance
+    int marginPixels = 2;  ///< kept free around the object
+};
+
+/// Parses `cube`, `ring:N`, `sphere:N`, `octahedral:N`. Errors (usage) name the possible forms.
+[[nodiscard]] Result<ViewLayout> parseViewLayout(std::string_view text);
+
+/// Unit vectors from the object towards the cameras, in order.
+[[nodiscard]] std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout);
+
+/// Direction of cell (i, j) of an N x N octahedral map, 0 <= i, j < n: the corners and edges of the
+/// grid are the lower pole's. As in impostor shaders: p = 2 (i, j)/(n-1) - 1, folded where
+/// |p.x| + |p.y| > 1; +Y is the pole in the middle.
+[[nodiscard]] glm::dvec3 octahedralDirection(int i, int j, int n);
+
+/// Cameras of a layout around points (the object's vertices, or the corners of its box). Each looks
+/// at the centre of the bounds; +Y is up. The frame is drawn in until the object fills it, with
+/// square pixels, except in octahedral layouts, where all views have the same window (impostor
+/// shaders rely on it). Errors when there are no points.
+[[nodiscard]] Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout,
+                                                        const ViewFraming& framing,
+                                                        const std::vector<glm::vec3>& points);
+
+/// A sphere around points: the centre of their box and the distance of the farthest.
+struct BoundingSphere {
+    glm::dvec3 centre{0.0};
+    double radius = 0.0;
+};
+[[nodiscard]] BoundingSphere boundingSphere(const std::vector<glm::vec3>& points);
+
+/// One camera on a direction from the sphere's centre, framed as layoutCameras() does: `tight`
+/// draws the frame in to the points, else the whole sphere stays in it.
+[[nodiscard]] Result<Camera> frameCamera(glm::dvec3 direction, const ViewFraming& framing,
+                                         const std::vector<glm::vec3>& points,
+                                         const BoundingSphere& sphere, bool tight);
+
+}  // namespace stx

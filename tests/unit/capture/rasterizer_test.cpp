@@ -1,0 +1,251 @@
+#include "lib/capture/rasterizer.hpp"
+
+#include <gtest/gtest.h>
+
+#include "lib/base/parallel.hpp"
+#include "lib/capture/capture.hpp"
+#include "lib/geometry/view_layout.hpp"
+
+namespace stx {
+namespace {
+
+/// A unit sphere of latitude and longitude quads: many shared edges and slivers at the poles.
+Mesh sphereMesh(int n, glm::vec3 centre = {}, float radius = 1.0f) {
+    Mesh m;
+    m.materials.emplace_back();
+    for (int j = 0; j <= n; ++j) {
+        for (int i = 0; i <= 2 * n; ++i) {
+            const float t = 3.14159265f * j / n, p = 3.14159265f * i / n;
+            const glm::vec3 d(std::sin(t) * std::sin(p), std::cos(t), std::sin(t) * std::cos(p));
+            m.positions.push_back(centre + d * radius);
+            m.normals.push_back(d);
+        }
+    }
+    const auto at = [&](int i, int j) { return static_cast<std::uint32_t>(j * (2 * n + 1) + i); };
+    for (int j = 0; j < n; ++j) {
+        for (int i = 0; i < 2 * n; ++i) {
+            m.triangles.emplace_back(at(i, j), at(i, j + 1), at(i + 1, j));
+            m.triangles.emplace_back(at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+        }
+    }
+    m.triangleMaterial.assign(m.triangles.size(), 0);
+    return m;
+}
+
+Camera lookingAt(glm::dvec3 eye, int size, double fov = 0.8, bool orthographic = false) {
+    return Camera::fromFieldOfView(eye, *lookAt(eye, {0, 0, 0}),
+                                   glm::dvec2(orthographic ? 3.0 : fov), orthographic, size, size);
+}
+
+TEST(Rasterise, SphereHasItsAnalyticDepthAndNoCracks) {
+    Job job;
+    for (const bool orthographic : {false, true}) {
+        const auto camera = lookingAt({1, 2, 3}, 128, 0.8, orthographic);
+        RasterSettings settings;
+        settings.normals = true;
+        const auto image = rasterise(sphereMesh(96), camera, settings, job);
+        ASSERT_TRUE(image) << image.error().text();
+        int inside = 0;
+        for (int y = 0; y < 128; ++y) {
+            for (int x = 0; x < 128; ++x) {
+                // Ray against the sphere, in camera space.
+                const glm::dvec3 a = camera.unproject(x + 0.5, y + 0.5, orthographic ? 0.0 : 1.0);
+                const glm::dvec3 origin = orthographic ? a : glm::dvec3(0),
+                                 direction = orthographic ? glm::dvec3(0, 0, -1) : a;
+                const glm::dvec3 c(camera.cameraFromWorld() * glm::dvec4(0, 0, 0, 1));
+                const double b = glm::dot(direction, origin - c),
+                             aa = glm::dot(direction, direction);
+                const double disc = b * b - aa * (glm::dot(origin - c, origin - c) - 0.98);
+                if (disc <= 0.05) continue;
+                const double full = b * b - aa * (glm::dot(origin - c, origin - c) - 1.0);
+                const double t = (-b - std::sqrt(full)) / aa;
+                ++inside;
+                EXPECT_NEAR(image->depth.at(x, y), t, 4e-3) << x << ' ' << y;
+                EXPECT_FLOAT_EQ(image->colour.at(x, y).w, 1.0f) << "a crack at " << x << ' ' << y;
+                const glm::dvec3 p =
+                    camera.position + camera.orientation * (origin + direction * t);
+                EXPECT_GT(glm::dot(glm::vec3(p), image->normal.at(x, y)), 0.999f);
+            }
+        }
+        EXPECT_GT(inside, 3000);
+    }
+}
+
+TEST(Rasterise, CoverageIsTheAreaShare) {
+    // A half plane whose edge crosses pixels at x = 8.25 pixels: coverage 1/4 in that column.
+    Mesh m;
+    m.materials.emplace_back();
+    m.positions = {{-10, -10, 0}, {0.25f, -10, 0}, {0.25f, 10, 0}, {-10, 10, 0}};
+    m.triangles = {{0, 1, 2}, {0, 2, 3}};
+    m.triangleMaterial = {0, 0};
+    const auto camera = Camera::fromFieldOfView({0, 0, 5}, {1, 0, 0, 0}, {16, 16}, true, 16, 16);
+    Job job;
+    const auto image = rasterise(m, camera, {}, job);
+    ASSERT_TRUE(image);
+    EXPECT_FLOAT_EQ(image->colour.at(7, 4).w, 1.0f);
+    EXPECT_FLOAT_EQ(image->colour.at(8, 4).w, 0.25f);
+    EXPECT_FLOAT_EQ(image->colour.at(9, 4).w, 0.0f);
+    EXPECT_FALSE(hasPoint(image->depth.at(8, 4))) << "the centre misses: coverage without depth";
+    EXPECT_FLOAT_EQ(image->depth.at(7, 4), 5.0f);
+}
+
+TEST(Rasterise, TrianglesThatReachBehindTheCameraNeedNoClipping) {
+    // A ground plane from far in front to far behind the viewpoint.
+    Mesh m;
+    m.materials.emplace_back();
+    m.positions = {{-100, -1, -100}, {100, -1, -100}, {100, -1, 100}, {-100, -1, 100}};
+    m.triangles = {{0, 1, 2}, {0, 2, 3}};
+    m.triangleMaterial = {0, 0};
+    const auto camera = Camera::fromFieldOfView({0, 0, 0}, {1, 0, 0, 0}, {1.2, 1.2}, false, 64, 64);
+    Job job;
+    const auto image = rasterise(m, camera, {}, job);
+    ASSERT_TRUE(image);
+    for (int x = 0; x < 64; ++x) {
+        EXPECT_FALSE(hasPoint(image->depth.at(x, 20))) << "sky";
+        const double dist = 1.0 / ((63.5 - camera.cy) / camera.fy);
+        EXPECT_NEAR(image->depth.at(x, 63), dist, 1e-4);
+    }
+}
+
+TEST(Rasterise, BackFacesOfSingleSidedMaterialsAreOpen) {
+    Mesh m = sphereMesh(16);
+    m.materials[0].doubleSided = false;
+    Job job;
+    const auto outside = rasterise(m, lookingAt({0, 0, 4}, 32), {}, job);
+    ASSERT_TRUE(outside);
+    EXPECT_TRUE(hasPoint(outside->depth.at(16, 16))) << "front faces are drawn";
+    EXPECT_NEAR(outside->depth.at(16, 16), 3.0, 0.02);
+    for (auto& t : m.triangles) std::swap(t.y, t.z);
+    const auto inverted = rasterise(m, lookingAt({0, 0, 4}, 32), {}, job);
+    EXPECT_NEAR(inverted->depth.at(16, 16), 5.0, 0.02) << "turned inside out, the far wall shows";
+}
+
+TEST(Rasterise, AlphaMaskCutsHoles) {
+    Mesh m;
+    Material cut;
+    cut.baseColourTexture = 0;
+    cut.alpha = Material::Alpha::mask;
+    m.materials = {cut};
+    MeshTexture texture;
+    texture.nearest = true;
+    texture.pixels = Rgba8Image(2, 1);
+    texture.pixels.at(0, 0) = {255, 0, 0, 255};
+    texture.pixels.at(1, 0) = {0, 255, 0, 0};
+    m.textures = {texture};
+    m.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+    m.uvs = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
+    m.triangles = {{0, 1, 2}, {0, 2, 3}};
+    m.triangleMaterial = {0, 0};
+    Job job;
+    const auto image = rasterise(m, lookingAt({0, 0, 4}, 64), {}, job);
+    ASSERT_TRUE(image);
+    EXPECT_TRUE(hasPoint(image->depth.at(25, 32)));
+    EXPECT_FLOAT_EQ(image->colour.at(25, 32).x, 1.0f);
+    EXPECT_FALSE(hasPoint(image->depth.at(39, 32)));
+    EXPECT_EQ(image->colour.at(39, 32).w, 0.0f);
+}
+
+TEST(Rasterise, TheSameBytesOnAnyNumberOfThreads) {
+    Job job;
+    const auto camera = lookingAt({2, 1, 3}, 200);
+    Image<glm::vec4> first;
+    for (const int threads : {1, 2, 7}) {
+        const ThreadLimit limit(threads);
+        const auto image = rasterise(sphereMesh(40), camera, {}, job);
+        ASSERT_TRUE(image);
+        if (first.empty()) first = image->colour;
+        EXPECT_TRUE(first == image->colour);
+    }
+}
+
+TEST(Capture, FitsThePlanesAndRoundsToTheCode) {
+    Job job;
+    CaptureSettings settings;
+    for (const int bits : {8, 16}) {
+        settings.depthBits = bits;
+        const auto view =
+            captureView(sphereMesh(64), lookingAt({0, 0, 4}, 128), "v", settings, job);
+        ASSERT_TRUE(view);
+        ASSERT_TRUE(view->check()) << view->check().error().text();
+        EXPECT_NEAR(view->nearPlane, 3.0, 2e-3);
+        EXPECT_NEAR(view->farPlane, 4.0, 0.3);
+        const auto code = view->depthCode();
+        std::uint32_t least = 1 << 20, most = 0;
+        for (const float d : view->depth.pixels()) {
+            if (!hasPoint(d)) continue;
+            const auto c = code.encode(d);
+            least = std::min(least, c);
+            most = std::max(most, c);
+            EXPECT_EQ(static_cast<float>(code.decode(c)), d);
+        }
+        EXPECT_EQ(least, 1u);
+        EXPECT_EQ(most, code.dmax);
+    }
+}
+
+TEST(Capture, BleedsColourPastTheSilhouette) {
+    Job job;
+    Mesh m = sphereMesh(32);
+    m.materials[0].baseColour = {1, 0, 0, 1};
+    const auto view = captureView(m, lookingAt({0, 0, 4}, 64), "v", {}, job);
+    ASSERT_TRUE(view);
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+            EXPECT_EQ(view->texture.rgba8()->at(x, y).x, 255) << x << ' ' << y;
+            EXPECT_EQ(view->texture.rgba8()->at(x, y).y, 0);
+        }
+    }
+}
+
+TEST(Capture, PointCloudsBecomeClosedSurfaces) {
+    Mesh sphere = sphereMesh(48);
+    Mesh cloud;
+    cloud.positions = sphere.positions;
+    for (std::uint32_t i = 0; i < cloud.positions.size(); ++i) cloud.points.push_back(i);
+    Job job;
+    const auto image = rasterise(cloud, lookingAt({0, 0, 4}, 96), {}, job);
+    ASSERT_TRUE(image);
+    for (int y = 40; y < 56; ++y) {
+        for (int x = 40; x < 56; ++x) EXPECT_NEAR(image->depth.at(x, y), 3.0, 0.1);
+    }
+}
+
+TEST(ViewLayout, ParsesAndRefuses) {
+    EXPECT_EQ(parseViewLayout("cube")->count, 6);
+    EXPECT_EQ(parseViewLayout("ring:12")->count, 12);
+    EXPECT_EQ(layoutDirections(*parseViewLayout("octahedral:4")).size(), 16u);
+    for (const char* bad : {"", "ring", "ring:", "ring:x", "ring:0", "ring:-4", "sphere:9999999999",
+                            "cone:3", "cube:6"})
+        EXPECT_FALSE(parseViewLayout(bad)) << bad;
+}
+
+TEST(ViewLayout, EveryLayoutSeesTheWholeObjectInsideTheFrame) {
+    const auto mesh = sphereMesh(12, {5, -3, 2}, 0.7f);
+    for (const char* text : {"cube", "ring:5", "sphere:9", "octahedral:3"}) {
+        for (const bool orthographic : {false, true}) {
+            ViewFraming framing;
+            framing.orthographic = orthographic;
+            framing.width = 96;
+            framing.height = 64;
+            const auto cameras = layoutCameras(*parseViewLayout(text), framing, mesh.positions);
+            ASSERT_TRUE(cameras);
+            for (const auto& c : *cameras) {
+                EXPECT_TRUE(c.check());
+                double reach = 0;
+                for (const auto& p : mesh.positions) {
+                    const auto q = c.project(glm::dvec3(c.cameraFromWorld() * glm::dvec4(p, 1)));
+                    EXPECT_GT(q.z, 0);
+                    EXPECT_GE(q.x, 1.0);
+                    EXPECT_LE(q.x, 95.0);
+                    EXPECT_GE(q.y, 1.0);
+                    EXPECT_LE(q.y, 63.0);
+                    reach = std::max(reach, std::abs(q.y - 32));
+                }
+                EXPECT_GT(reach, 24) << "the object fills the frame";
+            }
+        }
+    }
+}
+
+}  // namespace
+}  // namespace stx
