@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <charconv>
-#include <cstring>
 #include <unordered_map>
-#include <unordered_set>
 
 namespace stx::mpeg4 {
 namespace {
@@ -124,6 +122,27 @@ std::size_t itemCount(const FieldValue& value) {
         value);
 }
 
+Node::~Node() {
+    // Children are handed to a list of the outermost destructor, which lets them go one by one.
+    thread_local std::vector<NodePtr>* pending = nullptr;
+    std::vector<NodePtr> mine;
+    const bool outermost = pending == nullptr;
+    if (outermost) pending = &mine;
+    for (SetField& field : setFields) {
+        if (NodePtr* child = std::get_if<NodePtr>(&field.value); child && *child)
+            pending->push_back(std::move(*child));
+        if (NodeList* list = std::get_if<NodeList>(&field.value))
+            for (NodePtr& child : *list)
+                if (child) pending->push_back(std::move(child));
+    }
+    if (!outermost) return;
+    while (!mine.empty()) {
+        const NodePtr next = std::move(mine.back());
+        mine.pop_back();
+    }
+    pending = nullptr;
+}
+
 const Node::SetField* Node::findSet(int fieldIndex) const {
     const auto at = std::lower_bound(setFields.begin(), setFields.end(), fieldIndex,
                                      [](const SetField& s, int i) { return s.index < i; });
@@ -171,57 +190,6 @@ NodePtr makeNode(std::string_view typeName) {
 
 bool mayStandIn(const Node* node, Ndt expected) {
     return node == nullptr || node->info->codeIn(expected) != nullptr;
-}
-
-namespace {
-
-using Visit = std::function<void(const NodePtr&)>;
-using Seen = std::unordered_set<const Node*>;
-
-void visitNode(const NodePtr& node, Seen& seen, const Visit& visit);
-
-void visitValue(const FieldValue& value, Seen& seen, const Visit& visit) {
-    if (const NodePtr* node = std::get_if<NodePtr>(&value)) visitNode(*node, seen, visit);
-    if (const NodeList* list = std::get_if<NodeList>(&value))
-        for (const NodePtr& node : *list) visitNode(node, seen, visit);
-}
-
-void visitNode(const NodePtr& node, Seen& seen, const Visit& visit) {
-    if (!node || !seen.insert(node.get()).second) return;
-    visit(node);
-    for (const Node::SetField& field : node->setFields) visitValue(field.value, seen, visit);
-}
-
-void visitCommand(const Command& command, Seen& seen, const Visit& visit) {
-    const auto route = [&](const Route& r) {
-        visitNode(r.from, seen, visit);
-        visitNode(r.to, seen, visit);
-    };
-    std::visit(
-        [&](const auto& c) {
-            if constexpr (requires { c.root; }) {
-                visitNode(c.root, seen, visit);
-                for (const Route& r : c.routes) route(r);
-            }
-            if constexpr (requires { c.target; }) visitNode(c.target, seen, visit);
-            if constexpr (requires { c.replacement; }) visitNode(c.replacement, seen, visit);
-            if constexpr (requires { c.node; }) visitNode(c.node, seen, visit);
-            if constexpr (requires { c.value; }) visitValue(c.value, seen, visit);
-            if constexpr (requires { c.route; }) route(c.route);
-        },
-        command);
-}
-
-}  // namespace
-
-void forEachNode(const NodePtr& root, const Visit& visit) {
-    Seen seen;
-    visitNode(root, seen, visit);
-}
-
-void forEachNode(const Command& command, const Visit& visit) {
-    Seen seen;
-    visitCommand(command, seen, visit);
 }
 
 }  // namespace stx::mpeg4

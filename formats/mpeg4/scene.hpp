@@ -84,6 +84,9 @@ using FieldValue =
 /// A node of the scene. Only fields that were set are stored; the others have their defaults.
 struct Node {
     explicit Node(const NodeInfo& type) : info(&type) {}
+    Node(const Node&) = default;
+    Node& operator=(const Node&) = default;
+    ~Node();  ///< takes no stack for deep graphs
 
     const NodeInfo* info;
     /// DEF: the id in BIFS, 1-based; 0 where none was coded. Writers give free ids to nodes that
@@ -229,18 +232,26 @@ struct Scene {
 };
 
 /// Calls `visit` for each node reachable from `root` once, parents before children, in field order.
-/// Depth is bounded by the readers' limit on nesting.
 void forEachNode(const NodePtr& root, const std::function<void(const NodePtr&)>& visit);
 /// The same for every node in a command: targets, values, both ends of routes.
 void forEachNode(const Command& command, const std::function<void(const NodePtr&)>& visit);
 
-/// Whether two graphs are the same: types, ids, names, sharing, and values bit for bit (a field set
-/// to its default is the same as one not set).
-[[nodiscard]] bool sameNode(const NodePtr& a, const NodePtr& b);
-[[nodiscard]] bool sameCommands(const std::vector<CommandFrame>& a,
-                                const std::vector<CommandFrame>& b);
+/// What else than types, sharing and values counts in a comparison.
+struct SameOptions {
+    bool ids = true;    ///< DEF ids of nodes and routes
+    bool names = true;  ///< DEF names of nodes and routes
+};
+/// Whether two graphs are the same. Values are compared bit for bit; a field set to its default is
+/// the same as one not set.
+[[nodiscard]] bool sameNode(const NodePtr& a, const NodePtr& b, SameOptions options = {});
+[[nodiscard]] bool sameFrames(const std::vector<CommandFrame>& a,
+                              const std::vector<CommandFrame>& b, SameOptions options = {});
 /// Compares everything but node-valued fields bit for bit.
 [[nodiscard]] bool sameValue(const FieldValue& a, const FieldValue& b);
+
+/// The longest way down from `root` in nodes, 0 for null. Errors (invalidInput) when a node
+/// contains itself.
+[[nodiscard]] Result<int> nestingDepth(const NodePtr& root);
 
 /// A deep copy that shares where the original shares.
 [[nodiscard]] NodePtr cloneNode(const NodePtr& node);
