@@ -1,1 +1,454 @@
 #include "formats/files/files.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <set>
+#include <system_error>
+
+#include "formats/files/temporaries.hpp"
+
+namespace stx {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string systemText(int error) {
+    return std::generic_category().message(error);
+}
+
+tl::unexpected<Error> failIo(std::string_view doing, const fs::path& path, int error) {
+    return fail(ErrorCode::io, "cannot {} '{}': {}", doing, path.string(), systemText(error));
+}
+
+Result<void> writeAll(int fd, ByteSpan bytes, const fs::path& path) {
+    while (!bytes.empty()) {
+        const auto n = ::write(fd, bytes.data(), bytes.size());
+        if (n < 0) {
+            if (errno == EINTR) continue;
+            return failIo("write", path, errno);
+        }
+        bytes = bytes.subspan(static_cast<std::size_t>(n));
+    }
+    return {};
+}
+
+/// Reads to the end, whatever size was announced; files of /proc announce none.
+Result<Bytes> readToEnd(int fd, const fs::path& path, std::uint64_t announced,
+                        const Limits& limits) {
+    const auto tooLarge = [&](std::uint64_t size) {
+        return fail(ErrorCode::invalidInput,
+                    "'{}' has {} bytes or more, more than the memory limit of {} MiB; raise it "
+                    "with --max-memory if the file is to be trusted",
+                    path.string(), size, limits.maxMemoryBytes >> 20);
+    };
+    if (announced > limits.maxMemoryBytes) return tooLarge(announced);
+    Bytes bytes(std::max<std::uint64_t>(announced + 1, 4096));
+    std::size_t filled = 0;
+    for (;;) {
+        if (filled == bytes.size()) bytes.resize(bytes.size() * 2);
+        const auto n = ::read(fd, bytes.data() + filled, bytes.size() - filled);
+        if (n < 0) {
+            if (errno == EINTR) continue;
+            return failIo("read", path, errno);
+        }
+        if (n == 0) break;
+        filled += static_cast<std::size_t>(n);
+        if (filled > limits.maxMemoryBytes) return tooLarge(filled);
+    }
+    bytes.resize(filled);
+    return bytes;
+}
+
+/// Gives `from` the name `to`, and fails when there is one already.
+int renameNoReplace(const fs::path& from, const fs::path& to) {
+    if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+    if (errno != EINVAL && errno != ENOSYS) return errno;
+    // File systems that know no such flag (NFS): a hard link fails when the name is taken.
+    if (::link(from.c_str(), to.c_str()) != 0) return errno;
+    ::unlink(from.c_str());
+    return 0;
+}
+
+tl::unexpected<Error> failExists(const fs::path& target) {
+    return fail(ErrorCode::io, "'{}' exists already and --no-clobber forbids to replace it",
+                target.string());
+}
+
+/// What a target's name stands for; a link is written through, not replaced.
+Result<fs::path> throughLinks(const fs::path& target) {
+    std::error_code ec;
+    if (!fs::is_symlink(fs::symlink_status(target, ec))) return target;
+    fs::path real = fs::weakly_canonical(target, ec);
+    if (ec) return failIo("follow", target, ec.value());
+    return real;
+}
+
+fs::path folderOf(const fs::path& target) {
+    return target.has_parent_path() ? target.parent_path() : fs::path(".");
+}
+
+}  // namespace
+
+Result<Bytes> readFile(const fs::path& path, const Limits& limits) {
+    if (path == "-") return readToEnd(STDIN_FILENO, "standard input", 0, limits);
+    // Without O_NONBLOCK the opening of a FIFO that nobody writes to would never return.
+    const int fd = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0) return failIo("open", path, errno);
+    const Descriptor closer(fd);
+    struct stat info = {};
+    if (::fstat(fd, &info) != 0) return failIo("read", path, errno);
+    if (S_ISDIR(info.st_mode))
+        return fail(ErrorCode::io, "cannot read '{}': it is a folder, not a file", path.string());
+    if (!S_ISREG(info.st_mode))
+        return fail(ErrorCode::io,
+                    "cannot read '{}': it is a device or a pipe, not a file; use - for standard "
+                    "input",
+                    path.string());
+    return readToEnd(fd, path, static_cast<std::uint64_t>(info.st_size), limits);
+}
+
+struct OutputFile::Impl {
+    fs::path target;  ///< as the user named it, for messages
+    fs::path real;    ///< behind links
+    Options options;
+    Descriptor fd;
+    fs::path temporary;   ///< empty when bytes go straight to `fd`
+    bool direct = false;  ///< stdout or a device
+    bool committed = false;
+    std::uint64_t written = 0;
+
+    ~Impl() {
+        if (!committed && !temporary.empty()) ::unlink(temporary.c_str());
+    }
+};
+
+OutputFile::OutputFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+OutputFile::OutputFile(OutputFile&&) noexcept = default;
+OutputFile& OutputFile::operator=(OutputFile&&) noexcept = default;
+OutputFile::~OutputFile() = default;
+
+Result<OutputFile> OutputFile::create(const fs::path& target, Options options) {
+    auto impl = std::make_unique<Impl>();
+    impl->target = target;
+    impl->options = options;
+    if (target == "-") {
+        impl->direct = true;
+        impl->target = "standard output";
+        impl->fd = Descriptor(::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3));
+        if (impl->fd.get() < 0) return failIo("write", impl->target, errno);
+        return OutputFile(std::move(impl));
+    }
+    if (target.empty() || !target.has_filename())
+        return fail(ErrorCode::io, "cannot write '{}': it names no file", target.string());
+
+    struct stat info = {};
+    const bool exists = ::stat(target.c_str(), &info) == 0;
+    if (exists && S_ISDIR(info.st_mode))
+        return fail(ErrorCode::io, "cannot write '{}': it is a folder", target.string());
+    if (exists && !S_ISREG(info.st_mode)) {
+        // A device such as /dev/null, or a pipe that somebody reads: there is nothing to rename.
+        impl->direct = true;
+        impl->fd = Descriptor(::open(target.c_str(), O_WRONLY | O_CLOEXEC));
+        if (impl->fd.get() < 0) return failIo("write", target, errno);
+        return OutputFile(std::move(impl));
+    }
+    if (exists && options.noClobber) return failExists(target);
+    STX_TRY(impl->real, throughLinks(target));
+    if (exists && ::access(impl->real.c_str(), W_OK) != 0) return failIo("write", target, errno);
+
+    const fs::path folder = folderOf(impl->real);
+    removeStaleTemporaries(folder);
+    auto temporary = createTemporaryFile(folder);
+    if (!temporary) return failIo("write", target, temporary.error());
+    impl->fd = std::move(temporary->fd);
+    impl->temporary = std::move(temporary->path);
+    if (exists) (void)!::fchmod(impl->fd.get(), info.st_mode & 07777);
+    return OutputFile(std::move(impl));
+}
+
+Result<void> OutputFile::write(ByteSpan bytes) {
+    STX_CHECK(writeAll(impl_->fd.get(), bytes, impl_->target));
+    impl_->written += bytes.size();
+    return {};
+}
+
+Result<void> OutputFile::write(std::string_view text) {
+    return write(std::as_bytes(std::span(text.data(), text.size())));
+}
+
+const fs::path& OutputFile::temporaryPath() const {
+    if (impl_->temporary.empty()) {
+        // Bytes for stdout or a device that a library writes by name: gathered in a file, and
+        // copied by commit().
+        std::error_code ec;
+        fs::path folder = fs::temp_directory_path(ec);
+        if (ec) folder = "/tmp";
+        removeStaleTemporaries(folder);
+        if (auto file = createTemporaryFile(folder)) {
+            impl_->temporary = std::move(file->path);
+        } else {
+            impl_->temporary = folder / "stx-no-temporary-file";
+        }
+    }
+    return impl_->temporary;
+}
+
+Result<void> OutputFile::commit() {
+    Impl& f = *impl_;
+    if (f.direct) {
+        if (!f.temporary.empty()) {
+            const Descriptor in(::open(f.temporary.c_str(), O_RDONLY | O_CLOEXEC));
+            if (in.get() < 0) return failIo("read", f.temporary, errno);
+            std::vector<std::byte> block(1 << 20);
+            for (;;) {
+                const auto n = ::read(in.get(), block.data(), block.size());
+                if (n < 0 && errno == EINTR) continue;
+                if (n < 0) return failIo("read", f.temporary, errno);
+                if (n == 0) break;
+                STX_CHECK(writeAll(f.fd.get(), ByteSpan(block).first(static_cast<std::size_t>(n)),
+                                   f.target));
+            }
+            ::unlink(f.temporary.c_str());
+            f.temporary.clear();
+        }
+        f.committed = true;
+        if (const int error = f.fd.close()) return failIo("write", f.target, error);
+        return {};
+    }
+    // A full disk may only be told here, not by write().
+    if (::fsync(f.fd.get()) != 0 && errno != EINVAL && errno != ENOTSUP)
+        return failIo("write", f.target, errno);
+    if (f.options.noClobber) {
+        if (const int error = renameNoReplace(f.temporary, f.real)) {
+            if (error == EEXIST) return failExists(f.target);
+            return failIo("write", f.target, error);
+        }
+    } else if (::rename(f.temporary.c_str(), f.real.c_str()) != 0) {
+        return failIo("write", f.target, errno);
+    }
+    f.committed = true;
+    if (const int error = f.fd.close()) return failIo("write", f.target, error);
+    return {};
+}
+
+Result<void> writeFile(const fs::path& target, ByteSpan bytes, OutputFile::Options options) {
+    STX_TRY(auto file, OutputFile::create(target, options));
+    STX_CHECK(file.write(bytes));
+    return file.commit();
+}
+
+struct OutputFolder::Impl {
+    fs::path target;
+    fs::path real;
+    OutputFile::Options options;
+    std::vector<std::string> ownNames;
+    fs::path temporary;
+    Descriptor lock;  ///< tells other runs that the temporary folder is in use
+    bool committed = false;
+
+    ~Impl() {
+        std::error_code ec;
+        if (!committed && !temporary.empty()) fs::remove_all(temporary, ec);
+    }
+};
+
+OutputFolder::OutputFolder(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+OutputFolder::OutputFolder(OutputFolder&&) noexcept = default;
+OutputFolder& OutputFolder::operator=(OutputFolder&&) noexcept = default;
+OutputFolder::~OutputFolder() = default;
+
+Result<OutputFolder> OutputFolder::create(const fs::path& target, OutputFile::Options options,
+                                          std::vector<std::string> ownNames) {
+    auto impl = std::make_unique<Impl>();
+    impl->target = target;
+    impl->options = options;
+    impl->ownNames = std::move(ownNames);
+    // "set/" and "set" are the same folder.
+    fs::path named = target.has_filename() ? target : target.parent_path();
+    if (named.empty())
+        return fail(ErrorCode::io, "cannot write '{}': it names no folder", target.string());
+    if (named.filename() == "." || named.filename() == "..")
+        return fail(ErrorCode::io, "cannot write '{}': name a folder that can be made or replaced",
+                    target.string());
+    std::error_code ec;
+    const auto status = fs::status(named, ec);
+    if (fs::exists(status) && !fs::is_directory(status))
+        return fail(ErrorCode::io, "cannot write '{}': it is a file, not a folder",
+                    target.string());
+    if (fs::exists(status) && options.noClobber) return failExists(target);
+    STX_TRY(impl->real, throughLinks(named));
+
+    const fs::path folder = folderOf(impl->real);
+    removeStaleTemporaries(folder);
+    auto temporary = createTemporaryFolder(folder);
+    if (!temporary) return failIo("write", target, temporary.error());
+    impl->lock = std::move(temporary->fd);
+    impl->temporary = std::move(temporary->path);
+    return OutputFolder(std::move(impl));
+}
+
+const fs::path& OutputFolder::temporaryPath() const {
+    return impl_->temporary;
+}
+
+namespace {
+
+/// A name with each run of digits as one '#'.
+std::string withoutNumbers(const std::string& name) {
+    std::string pattern;
+    for (const char c : name) {
+        const bool digit = c >= '0' && c <= '9';
+        if (!digit) pattern += c;
+        if (digit && !pattern.ends_with('#')) pattern += '#';
+    }
+    return pattern;
+}
+
+Result<std::set<std::string>> namesIn(const fs::path& folder, const fs::path& target) {
+    std::set<std::string> names;
+    std::error_code ec;
+    for (auto it = fs::recursive_directory_iterator(folder, ec);
+         !ec && it != fs::recursive_directory_iterator(); it.increment(ec)) {
+        names.insert(it->path().lexically_relative(folder).string());
+    }
+    if (ec) return failIo("read", target, ec.value());
+    return names;
+}
+
+/// Errors when the existing folder `old` holds something that is not this output's.
+Result<void> checkReplaceable(const fs::path& old, const fs::path& fresh,
+                              const std::vector<std::string>& ownNames, const fs::path& target) {
+    STX_TRY(const auto written, namesIn(fresh, target));
+    std::set<std::string> patterns;
+    for (const auto& name : written) patterns.insert(withoutNumbers(name));
+    for (const auto& name : ownNames) patterns.insert(withoutNumbers(name));
+    STX_TRY(const auto present, namesIn(old, target));
+    for (const auto& name : present) {
+        if (patterns.contains(withoutNumbers(name))) continue;
+        return fail(ErrorCode::io,
+                    "cannot replace the folder '{}': it holds '{}', which this output does not "
+                    "write; name another folder or remove that file",
+                    target.string(), name);
+    }
+    return {};
+}
+
+Result<void> syncFiles(const fs::path& folder, const fs::path& target) {
+    std::error_code ec;
+    for (auto it = fs::recursive_directory_iterator(folder, ec);
+         !ec && it != fs::recursive_directory_iterator(); it.increment(ec)) {
+        if (!it->is_regular_file()) continue;
+        Descriptor fd(::open(it->path().c_str(), O_RDONLY | O_CLOEXEC));
+        if (fd.get() < 0 || (::fsync(fd.get()) != 0 && errno != EINVAL && errno != ENOTSUP))
+            return failIo("write", target / it->path().lexically_relative(folder), errno);
+    }
+    if (ec) return failIo("write", target, ec.value());
+    return {};
+}
+
+}  // namespace
+
+Result<void> OutputFolder::commit() {
+    Impl& f = *impl_;
+    STX_CHECK(syncFiles(f.temporary, f.target));
+    int error = renameNoReplace(f.temporary, f.real);
+    if (error == EPERM) {
+        // Folders cannot be hard-linked where RENAME_NOREPLACE is unknown.
+        std::error_code ec;
+        error = fs::exists(f.real, ec)                               ? EEXIST
+                : ::rename(f.temporary.c_str(), f.real.c_str()) == 0 ? 0
+                                                                     : errno;
+    }
+    if (error == EEXIST) {
+        if (f.options.noClobber) return failExists(f.target);
+        STX_CHECK(checkReplaceable(f.real, f.temporary, f.ownNames, f.target));
+        if (::renameat2(AT_FDCWD, f.temporary.c_str(), AT_FDCWD, f.real.c_str(), RENAME_EXCHANGE) !=
+            0) {
+            if (errno != EINVAL && errno != ENOSYS) return failIo("replace", f.target, errno);
+            // No exchange here: a moment without the folder cannot be helped.
+            const fs::path aside = f.temporary.string() + "-old";
+            if (::rename(f.real.c_str(), aside.c_str()) != 0)
+                return failIo("replace", f.target, errno);
+            if (::rename(f.temporary.c_str(), f.real.c_str()) != 0) {
+                const int why = errno;
+                ::rename(aside.c_str(), f.real.c_str());
+                return failIo("replace", f.target, why);
+            }
+            f.temporary = aside;
+        }
+        std::error_code ec;
+        fs::remove_all(f.temporary, ec);
+        error = 0;
+    }
+    if (error) return failIo("write", f.target, error);
+    f.committed = true;
+    return {};
+}
+
+namespace {
+
+bool hasScheme(std::string_view name) {
+    const auto colon = name.find(':');
+    if (colon == std::string_view::npos || colon == 0) return false;
+    for (std::size_t i = 0; i < colon; ++i) {
+        const char c = name[i];
+        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+        const bool other = (c >= '0' && c <= '9') || c == '+' || c == '.' || c == '-';
+        if (!letter && (i == 0 || !other)) return false;
+    }
+    return true;
+}
+
+bool isInside(const fs::path& path, const fs::path& folder) {
+    auto p = path.begin();
+    for (auto f = folder.begin(); f != folder.end(); ++f, ++p) {
+        if (f->empty()) continue;
+        if (p == path.end() || *p != *f) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+Result<fs::path> resolveInside(const fs::path& folder, std::string_view name,
+                               const Limits& limits) {
+    const auto refuse = [&](std::string_view why) {
+        return fail(ErrorCode::invalidInput,
+                    "the name '{}' {}; only files in the folder of the file that names them are "
+                    "opened",
+                    name.substr(0, 200), why);
+    };
+    if (name.empty()) return fail(ErrorCode::invalidInput, "a file name is empty");
+    if (name.find('\0') != std::string_view::npos) return refuse("holds a zero byte");
+    if (hasScheme(name)) return refuse("is a URL or has a drive letter");
+
+    std::error_code ec;
+    const fs::path base = folder.empty() ? fs::path(".") : folder;
+    std::string spelled(name);
+    // Backslashes are separators in files written on Windows, and seldom part of a name here.
+    if (spelled.find('\\') != std::string::npos && !fs::exists(base / spelled, ec))
+        std::replace(spelled.begin(), spelled.end(), '\\', '/');
+    const fs::path relative(spelled);
+    if (!limits.allowOutside) {
+        if (relative.is_absolute()) return refuse("is an absolute path");
+        const fs::path normal = relative.lexically_normal();
+        if (!normal.empty() && *normal.begin() == "..") return refuse("leaves its folder by '..'");
+    }
+    const fs::path joined = base / relative;
+    const fs::path realBase = fs::canonical(base, ec);
+    if (ec) return failIo("open", base, ec.value());
+    const fs::path real = fs::canonical(joined, ec);
+    if (ec) return failIo("open", joined, ec.value());
+    if (!limits.allowOutside && !isInside(real, realBase))
+        return refuse("leads out of its folder by a link");
+    if (!fs::is_regular_file(real, ec)) return refuse("is no regular file");
+    return joined;
+}
+
+}  // namespace stx

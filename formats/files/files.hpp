@@ -52,13 +52,15 @@ class OutputFile {
                                      OutputFile::Options options = {});
 
 /// A folder of files that appears whole or not at all: files are written into a temporary folder
-/// beside the target; commit() swaps it in. An existing target folder is replaced only when it
-/// holds nothing but files that this kind of output writes (a marker or a known index file), else
-/// an error.
+/// beside the target; commit() swaps it in. An existing target folder is replaced only when each of
+/// its files is one that this output writes too, but for the digits in its name (`view_17.png`), or
+/// one of `ownNames`; else commit() is an error (io) that names the file, and nothing changes.
 class OutputFolder {
   public:
+    /// `ownNames`: what outputs of this kind may hold, relative to the folder ("atlas.json").
     [[nodiscard]] static Result<OutputFolder> create(const std::filesystem::path& target,
-                                                     OutputFile::Options options);
+                                                     OutputFile::Options options,
+                                                     std::vector<std::string> ownNames = {});
     OutputFolder(OutputFolder&&) noexcept;
     OutputFolder& operator=(OutputFolder&&) noexcept;
     ~OutputFolder();

@@ -16,8 +16,8 @@ namespace stx {
 struct ImageInfo {
     std::string format;  ///< "png", "jpeg", "exr", "other"
     int width = 0, height = 0;
-    int channels = 0;  ///< 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA
-    int bits = 0;      ///< per channel
+    int channels = 0;  ///< as decoded: 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA; palettes are spread
+    int bits = 0;      ///< per channel as decoded: 8 or 16 (JPEG: 8 or 12)
 };
 
 /// Header of a PNG or JPEG (others: error unsupported). Loads no library; a few microseconds.
@@ -30,6 +30,11 @@ struct DecodedImage {
     std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> values;
     std::vector<std::string> channelNames;  ///< "R", "G", "B", "A", "Y", "Z", …
     bool linear = false;                    ///< float formats (EXR, HDR): linear light
+    bool premultiplied = false;             ///< there is alpha, and colours hold it (EXR)
+    /// Where the stored pixels (EXR: the data window) lie in the picture (the display window), and
+    /// the size of that; other formats: 0, 0 and the image's own size.
+    int originX = 0, originY = 0;
+    int displayWidth = 0, displayHeight = 0;
     [[nodiscard]] int bits() const {
         return values.index() == 0 ? 8 : values.index() == 1 ? 16 : 32;
     }
@@ -41,8 +46,9 @@ struct DecodedImage {
 [[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,
                                                const Limits& limits);
 
-/// 8-bit sRGB RGBA of any decoded image (grey is spread, missing alpha is 255, 16 bits are rounded,
-/// linear floats are coded as sRGB).
+/// 8-bit sRGB RGBA with straight alpha of any decoded image (grey is spread, missing alpha is 255,
+/// 16 bits are rounded, linear floats are coded as sRGB, premultiplied floats divided). The size is
+/// that of the stored pixels.
 [[nodiscard]] Image<glm::u8vec4> rgba8From(const DecodedImage& image);
 
 /// PNG bytes of 1..4 channels with 8 or 16 bits (values in host order), tagged sRGB when `srgb`.
@@ -53,7 +59,8 @@ struct DecodedImage {
 [[nodiscard]] Result<Bytes> encodeJpeg(int width, int height, int channels,
                                        const std::uint8_t* values, int quality);
 
-/// Starts loading the codecs' libraries on another thread, while the caller does something else.
+/// Starts loading the codecs' libraries (190 ms) on another thread, while the caller does something
+/// else. More calls do nothing; errors show at the first image.
 void preloadCodecs();
 
 }  // namespace stx

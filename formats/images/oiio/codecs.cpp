@@ -1,1 +1,243 @@
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/images/codec_table.hpp"
+#include "lib/base/result.hpp"
+
+/// The only file that knows OpenImageIO. Its exceptions and geterror() end here, in `adapt`.
+namespace stx::codecs {
+
+namespace {
+
+/// Stands for every way in which the library can fail.
+struct Failed {
+    ErrorCode code;
+    std::string message;
+};
+
+template <class Work>
+bool adapt(Failure& failure, const Work& work) {
+    const auto report = [&](ErrorCode code, std::string_view message) {
+        std::string line(message.substr(0, sizeof(failure.message) - 1));
+        for (char& c : line) {
+            if (c == '\n' || c == '\r') c = ' ';
+        }
+        while (!line.empty() && (line.back() == ' ' || line.back() == '.')) line.pop_back();
+        failure.code = static_cast<int>(code);
+        std::memcpy(failure.message, line.c_str(), line.size() + 1);
+        return false;
+    };
+    try {
+        work();
+        return true;
+    } catch (const Failed& failed) {
+        return report(failed.code, failed.message);
+    } catch (const std::bad_alloc&) {
+        return report(ErrorCode::failed, "there is not enough memory for the image");
+    } catch (const std::exception& e) {
+        return report(ErrorCode::invalidInput, e.what());
+    } catch (...) {
+        return report(ErrorCode::failed, "the image library failed without a reason");
+    }
+}
+
+/// Our callers run many images at once; the library's own threads would only be in their way.
+void setUpOnce() {
+    static std::once_flag once;
+    std::call_once(once, [] {
+        OIIO::attribute("threads", 1);
+        OIIO::attribute("exr_threads", -1);
+        OIIO::attribute("use_tbb", 0);
+    });
+}
+
+/// The format by its first bytes, since names lie; "" when these say nothing.
+const char* formatByContent(std::string_view head) {
+    using namespace std::string_view_literals;
+    struct Magic {
+        std::string_view start;
+        const char* format;
+    };
+    static constexpr Magic kMagics[] = {
+        {"\x89PNG\r\n"sv, "png"},
+        {"\xff\xd8\xff"sv, "jpeg"},
+        {"\x76\x2f\x31\x01"sv, "openexr"},
+        {"II*\0"sv, "tiff"},
+        {"MM\0*"sv, "tiff"},
+        {"BM"sv, "bmp"},
+        {"GIF8"sv, "gif"},
+        {"#?"sv, "hdr"},
+        {"8BPS"sv, "psd"},
+        {"DDS "sv, "dds"},
+        {"SDPX"sv, "dpx"},
+        {"XPDS"sv, "dpx"},
+    };
+    for (const auto& magic : kMagics) {
+        if (head.starts_with(magic.start)) return magic.format;
+    }
+    if (head.starts_with("RIFF") && head.size() >= 12 && head.substr(8, 4) == "WEBP") return "webp";
+    return "";
+}
+
+/// A file without a name, for formats that the library reads by name only.
+class MemoryFile {
+  public:
+    MemoryFile(const void* bytes, std::size_t size) : fd_(::memfd_create("stx", MFD_CLOEXEC)) {
+        const auto* from = static_cast<const char*>(bytes);
+        while (fd_ >= 0 && size > 0) {
+            const auto n = ::write(fd_, from, size);
+            if (n <= 0) throw Failed{ErrorCode::failed, "there is not enough memory for the image"};
+            from += n;
+            size -= static_cast<std::size_t>(n);
+        }
+    }
+    ~MemoryFile() {
+        if (fd_ >= 0) ::close(fd_);
+    }
+    MemoryFile(const MemoryFile&) = delete;
+    MemoryFile& operator=(const MemoryFile&) = delete;
+    [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", fd_); }
+
+  private:
+    int fd_;
+};
+
+[[noreturn]] void failWith(const std::string& reason, const char* otherwise) {
+    throw Failed{ErrorCode::invalidInput, reason.empty() ? otherwise : reason};
+}
+
+void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
+    setUpOnce();
+    const std::string_view head(static_cast<const char*>(request.bytes),
+                                std::min<std::size_t>(request.size, 16));
+    std::string format = formatByContent(head);
+    if (format.empty()) {
+        const std::string_view name = request.name;
+        const auto dot = name.rfind('.');
+        if (dot == std::string_view::npos)
+            throw Failed{ErrorCode::invalidInput,
+                         "it is no image of a known kind (neither its first bytes nor its name "
+                         "tell one)"};
+        format = name.substr(dot + 1);
+    }
+
+    OIIO::ImageSpec config;
+    // Alpha and colour as the file stores them: no multiplying, no dividing.
+    config.attribute("oiio:UnassociatedAlpha", 1);
+    auto input = OIIO::ImageInput::create(format, false, &config);
+    if (!input) {
+        (void)OIIO::geterror();
+        throw Failed{ErrorCode::invalidInput,
+                     fmt::format("it is no image of a known kind ('{}')", format)};
+    }
+    OIIO::Filesystem::IOMemReader reader(const_cast<void*>(request.bytes), request.size);
+    std::unique_ptr<MemoryFile> file;
+    OIIO::ImageSpec spec;
+    bool opened = false;
+    if (input->supports("ioproxy")) {
+        void* proxy = &reader;
+        config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+        opened = input->open("image." + format, spec, config);
+    } else {
+        file = std::make_unique<MemoryFile>(request.bytes, request.size);
+        opened = input->open(file->path(), spec, config);
+    }
+    if (!opened) failWith(input->geterror(), "the image cannot be opened");
+    if (spec.deep) throw Failed{ErrorCode::unsupported, "deep images are not supported"};
+
+    std::vector<const char*> names;
+    for (const auto& name : spec.channelnames) names.push_back(name.c_str());
+    names.resize(static_cast<std::size_t>(std::max(spec.nchannels, 0)), "");
+
+    OIIO::TypeDesc type = OIIO::TypeDesc::FLOAT;
+    Header header;
+    header.bits = 32;
+    if (spec.format == OIIO::TypeDesc::UINT8) {
+        type = OIIO::TypeDesc::UINT8;
+        header.bits = 8;
+    } else if (spec.format == OIIO::TypeDesc::UINT16) {
+        type = OIIO::TypeDesc::UINT16;
+        header.bits = 16;
+    }
+    for (const auto& channel : spec.channelformats) {
+        if (channel == spec.format) continue;
+        type = OIIO::TypeDesc::FLOAT;
+        header.bits = 32;
+    }
+    header.width = spec.width;
+    header.height = spec.height;
+    header.channels = spec.nchannels;
+    header.originX = spec.x - spec.full_x;
+    header.originY = spec.y - spec.full_y;
+    header.displayWidth = spec.full_width;
+    header.displayHeight = spec.full_height;
+    header.linear = header.bits == 32;
+    header.premultiplied =
+        spec.alpha_channel >= 0 && spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+    header.channelNames = names.data();
+    if (spec.depth > 1) throw Failed{ErrorCode::unsupported, "volume images are not supported"};
+
+    void* values = request.allocate(request.context, header, failure);
+    if (!values) throw Failed{static_cast<ErrorCode>(failure.code), failure.message};
+    if (!input->read_image(0, 0, 0, spec.nchannels, type, values))
+        failWith(input->geterror(), "the pixels cannot be decoded");
+    input->close();
+}
+
+void encodeOrThrow(const EncodeRequest& request) {
+    setUpOnce();
+    auto output = OIIO::ImageOutput::create(request.format);
+    if (!output) failWith(OIIO::geterror(), "the image format cannot be written");
+    OIIO::ImageSpec spec(request.width, request.height, request.channels,
+                         request.bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8);
+    const bool png = std::string_view(request.format) == "png";
+    if (request.srgb) spec.attribute("oiio:ColorSpace", "sRGB");
+    if (request.channels == 2 || request.channels == 4) {
+        spec.alpha_channel = request.channels - 1;
+        spec.attribute("oiio:UnassociatedAlpha", 1);
+    }
+    if (png) {
+        spec.attribute("png:compressionLevel", request.level);
+    } else {
+        spec.attribute("Compression", fmt::format("jpeg:{}", request.quality));
+        spec.attribute("jpeg:subsampling", request.quality >= 90 ? "4:4:4" : "4:2:0");
+    }
+    std::vector<unsigned char> bytes;
+    OIIO::Filesystem::IOVecOutput writer(bytes);
+    void* proxy = &writer;
+    spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+    if (!output->open(png ? "image.png" : "image.jpg", spec))
+        failWith(output->geterror(), "the image cannot be encoded");
+    if (!output->write_image(spec.format, request.values) || !output->close())
+        failWith(output->geterror(), "the image cannot be encoded");
+    request.emit(request.context, bytes.data(), bytes.size());
+}
+
+}  // namespace
+
+}  // namespace stx::codecs
+
+extern "C" __attribute__((visibility("default"))) const stx::codecs::Table* stxCodecs() {
+    using namespace stx::codecs;
+    static const Table table = {
+        kTableVersion,
+        [](const DecodeRequest& request, Failure& failure) {
+            return adapt(failure, [&] { decodeOrThrow(request, failure); });
+        },
+        [](const EncodeRequest& request, Failure& failure) {
+            return adapt(failure, [&] { encodeOrThrow(request); });
+        },
+    };
+    return &table;
+}

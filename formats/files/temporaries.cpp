@@ -1,0 +1,92 @@
+#include "formats/files/temporaries.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+
+#include <atomic>
+#include <mutex>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace stx {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+fs::path nextName(const fs::path& folder) {
+    static std::atomic<unsigned> counter = 0;
+    return folder / fmt::format("{}{}-{}", kTemporaryPrefix, ::getpid(), counter++);
+}
+
+/// True when `fd` is locked now and still is what `path` names: another run may have taken it for
+/// a stale one in the moment before the lock.
+bool lockAndKeep(int fd, const fs::path& path) {
+    if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) return false;
+    struct stat opened = {}, named = {};
+    return ::fstat(fd, &opened) == 0 && ::stat(path.c_str(), &named) == 0 &&
+           opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+}
+
+constexpr int kAttempts = 1000;
+
+}  // namespace
+
+tl::expected<Temporary, int> createTemporaryFile(const fs::path& folder) {
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+        const fs::path path = nextName(folder);
+        Descriptor fd(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+        if (fd.get() < 0) {
+            if (errno == EEXIST) continue;
+            return tl::unexpected(errno);
+        }
+        if (lockAndKeep(fd.get(), path)) return Temporary{path, std::move(fd)};
+    }
+    return tl::unexpected(EEXIST);
+}
+
+tl::expected<Temporary, int> createTemporaryFolder(const fs::path& folder) {
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+        const fs::path path = nextName(folder);
+        if (::mkdir(path.c_str(), 0777) != 0) {
+            if (errno == EEXIST) continue;
+            return tl::unexpected(errno);
+        }
+        Descriptor fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+        if (fd.get() >= 0 && lockAndKeep(fd.get(), path)) return Temporary{path, std::move(fd)};
+    }
+    return tl::unexpected(EEXIST);
+}
+
+void removeStaleTemporaries(const fs::path& folder) {
+    static std::mutex mutex;
+    static std::set<fs::path> known;
+    std::error_code ec;
+    const fs::path real = fs::weakly_canonical(folder, ec);
+    {
+        const std::lock_guard lock(mutex);
+        if (ec || !known.insert(real).second) return;
+    }
+    removeStaleTemporariesNow(folder);
+}
+
+void removeStaleTemporariesNow(const fs::path& folder) {
+    std::error_code ec;
+    for (auto it = fs::directory_iterator(folder, ec); !ec && it != fs::directory_iterator();
+         it.increment(ec)) {
+        if (!it->path().filename().string().starts_with(kTemporaryPrefix)) continue;
+        // O_NOFOLLOW and O_NONBLOCK: a link or a FIFO of that name is not ours.
+        const Descriptor fd(
+            ::open(it->path().c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+        if (fd.get() < 0 || ::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) continue;
+        struct stat info = {};
+        if (::fstat(fd.get(), &info) != 0) continue;
+        std::error_code ignored;
+        if (S_ISDIR(info.st_mode)) fs::remove_all(it->path(), ignored);
+        if (S_ISREG(info.st_mode)) fs::remove(it->path(), ignored);
+    }
+}
+
+}  // namespace stx

@@ -1,0 +1,84 @@
+#include "formats/images/codec_module.hpp"
+
+#include <dlfcn.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "formats/images/images.hpp"
+
+namespace stx {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> placesOfModule() {
+    std::vector<std::string> places;
+    // Somebody who names a module wants that one and no other.
+    if (const char* named = std::getenv("STX_CODECS"); named && *named) return {named};
+    std::error_code ec;
+    const fs::path program = fs::read_symlink("/proc/self/exe", ec);
+    if (!ec) {
+        const fs::path prefix = program.parent_path().parent_path();
+        places.push_back(prefix / "lib/stx/stx_codecs.so");
+        places.push_back(prefix / STX_CODECS_LIBDIR / "stx/stx_codecs.so");
+    }
+    places.push_back(STX_CODECS_INSTALL_PATH);
+    places.push_back(STX_CODECS_BUILD_PATH);
+    return places;
+}
+
+Result<const codecs::Table*> load() {
+    std::string tried;
+    std::error_code ec;
+    for (const auto& place : placesOfModule()) {
+        tried += tried.empty() ? "" : "; ";
+        if (!fs::exists(place, ec)) {
+            tried += fmt::format("'{}' does not exist", place);
+            continue;
+        }
+        void* module = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+        if (!module) {
+            const char* why = ::dlerror();
+            tried += fmt::format("'{}': {}", place, why ? why : "cannot be loaded");
+            continue;
+        }
+        using Entry = const codecs::Table* (*)();
+        const auto entry = reinterpret_cast<Entry>(::dlsym(module, codecs::kTableSymbol));
+        const codecs::Table* table = entry ? entry() : nullptr;
+        if (table && table->version == codecs::kTableVersion) return table;
+        tried += fmt::format("'{}' is of another version", place);
+        ::dlclose(module);
+    }
+    return fail(ErrorCode::unsupported,
+                "the image codecs (stx_codecs.so, with OpenImageIO) cannot be loaded: {}; install "
+                "the stx package whole, or name the module in STX_CODECS",
+                tried);
+}
+
+/// Waits for the loading at the process's end: unloading while loading crashes.
+class Preloader {
+  public:
+    Preloader() : thread_([] { (void)loadCodecs(); }) {}
+    ~Preloader() { thread_.join(); }
+
+  private:
+    std::thread thread_;
+};
+
+}  // namespace
+
+Result<const codecs::Table*> loadCodecs() {
+    static const Result<const codecs::Table*> loaded = load();
+    return loaded;
+}
+
+void preloadCodecs() {
+    static const Preloader preloader;
+}
+
+}  // namespace stx

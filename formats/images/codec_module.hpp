@@ -1,0 +1,13 @@
+#pragma once
+
+#include "formats/images/codec_table.hpp"
+#include "lib/base/result.hpp"
+
+namespace stx {
+
+/// The codecs' functions; the first call loads the module and the eighty libraries behind it (about
+/// 190 ms). Looked for at $STX_CODECS, in ../lib/stx beside the running program, then where it was
+/// installed and built. Error (unsupported) with every place that was tried.
+[[nodiscard]] Result<const codecs::Table*> loadCodecs();
+
+}  // namespace stx

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// What crosses the border to the module `stx_codecs`, in which OpenImageIO lives: plain structs
+/// and functions, so that nothing of that library is needed on our side. Both sides come from one
+/// build.
+namespace stx::codecs {
+
+inline constexpr std::uint32_t kTableVersion = 1;
+/// The one symbol of the module: `const Table* stxCodecs();`
+inline constexpr const char* kTableSymbol = "stxCodecs";
+
+/// Why a call failed; `code` is an ErrorCode.
+struct Failure {
+    int code = 0;
+    char message[1024] = {};
+};
+
+/// What a file holds, told before its pixels are decoded.
+struct Header {
+    int width = 0, height = 0, channels = 0;
+    int bits = 0;                  ///< how the values come: 8 and 16 unsigned, 32 float
+    int originX = 0, originY = 0;  ///< the data window in the display window
+    int displayWidth = 0, displayHeight = 0;
+    bool linear = false;
+    bool premultiplied = false;
+    const char* const* channelNames = nullptr;  ///< `channels` of them, valid during the callback
+};
+
+struct DecodeRequest {
+    const void* bytes = nullptr;
+    std::size_t size = 0;
+    /// A name with the ending of the format, for formats that cannot be told by their first bytes.
+    const char* name = nullptr;
+    void* context = nullptr;
+    /// Checks the header, gives room for width * height * channels values, or null (with
+    /// `failure`).
+    void* (*allocate)(void* context, const Header& header, Failure& failure) = nullptr;
+};
+
+struct EncodeRequest {
+    const char* format = nullptr;  ///< "png" or "jpeg"
+    int width = 0, height = 0, channels = 0, bits = 8;
+    const void* values = nullptr;  ///< interleaved, host order
+    bool srgb = false;
+    int level = 6;     ///< png: zlib's
+    int quality = 92;  ///< jpeg
+    void* context = nullptr;
+    void (*emit)(void* context, const void* bytes, std::size_t size) = nullptr;
+};
+
+struct Table {
+    std::uint32_t version = kTableVersion;
+    /// Both give true, or false with a failure. Safe to call from several threads.
+    bool (*decode)(const DecodeRequest& request, Failure& failure) = nullptr;
+    bool (*encode)(const EncodeRequest& request, Failure& failure) = nullptr;
+};
+
+}  // namespace stx::codecs
