@@ -7,19 +7,34 @@
 namespace stx {
 
 struct PackSettings {
-    enum class Layout { grid, tight };
+    enum class Layout {
+        /// Whole views in equal cells, in view order, row by row from the top left: view i lies in
+        /// column i % columns and row i / columns of its page (i counted from the page's first);
+        /// columns is the least number whose square holds the views of a page (N x N views: N),
+        /// unless maxSize forbids it. A cell is the largest view and `padding` on each side; a
+        /// view's pixel (0,0) is at (padding, padding) of its cell.
+        grid,
+        /// Views trimmed to their content, cut into patches where that saves room, and fitted
+        /// closely.
+        tight,
+    };
     Layout layout = Layout::grid;
     int padding = 2;      ///< pixels around each rectangle, 0..64
-    int maxSize = 16384;  ///< largest width and height of a texture: what a GPU takes
+    int maxSize = 16384;  ///< largest width and height of a texture: what a GPU takes; 1..65535
 };
 
-/// Merges the views of a bundle into one atlas of at most four textures. Padding repeats each
-/// rectangle's edge so that filters stay inside. Errors when the views cannot fit, with the size
-/// that would be needed and what to change.
+/// Merges the views of a bundle into one atlas of at most four textures: one page, or two when
+/// there are neither normals nor splats and one is not enough. Padding repeats what surrounds a
+/// rectangle in its view, and the view's edge beyond that, so that filters see the neighbours that
+/// they would see in the view.
+///
+/// Errors: settings out of range; a bundle that fails check(); views that cannot fit, with the size
+/// that would be needed and what to change; cancelled; memory over the limit.
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view; pixels in no rectangle
-/// are background. unpack(pack(b)) == b for the pixels that are points or have coverage.
+/// are background, coloured from the nearest covered ones. unpack(pack(b)) == b for the pixels that
+/// are points or have coverage (alpha). Errors: an atlas that fails check(), memory over the limit.
 [[nodiscard]] Result<Bundle> unpack(const Atlas& atlas, Job& job);
 
 }  // namespace stx

@@ -1,0 +1,199 @@
+#include "lib/packing/packing.hpp"
+
+#include "lib/base/parallel.hpp"
+#include "lib/packing/layout.hpp"
+
+namespace stx {
+namespace {
+
+struct Contents {
+    bool linear = false, normals = false, splats = false;
+
+    [[nodiscard]] int texturesPerPage() const { return 2 + (normals ? 1 : 0) + (splats ? 1 : 0); }
+    [[nodiscard]] std::uint64_t bytesPerPixel() const {
+        return (linear ? 16 : 4) + 4 + (normals ? 12 : 0) + (splats ? 24 : 0);
+    }
+};
+
+Contents contentsOf(const Bundle& bundle) {
+    Contents c;
+    c.linear = !bundle.views.empty() && bundle.views[0].texture.isLinear();
+    for (const auto& v : bundle.views) {
+        c.normals = c.normals || v.hasNormals();
+        c.splats = c.splats || v.hasSplats();
+    }
+    return c;
+}
+
+Texture emptyTexture(int width, int height, bool linear) {
+    if (linear) return RgbaFloatImage(width, height, glm::vec4(0));
+    return Rgba8Image(width, height, glm::u8vec4(0));
+}
+
+/// Calls copy(page pixel, view pixel) for a rectangle with `around` pixels more on each side; the
+/// view pixel is held inside the view.
+template <class Copy>
+void forEachPixel(const AtlasRectangle& r, glm::ivec2 viewSize, int around, const Copy& copy) {
+    for (int y = r.viewY - around; y < r.viewY + r.height + around; ++y) {
+        for (int x = r.viewX - around; x < r.viewX + r.width + around; ++x) {
+            copy(r.atlasFromView(x, y),
+                 glm::ivec2(std::clamp(x, 0, viewSize.x - 1), std::clamp(y, 0, viewSize.y - 1)));
+        }
+    }
+}
+
+void fillPage(const ReferenceView& view, const AtlasRectangle& r, int padding, AtlasPage& page) {
+    const auto copy = [&](const auto& from, auto& to) {
+        forEachPixel(r, view.depth.size(), padding,
+                     [&](glm::ivec2 p, glm::ivec2 v) { to.at(p.x, p.y) = from.at(v.x, v.y); });
+    };
+    if (const auto* colour = view.texture.rgba8()) copy(*colour, *page.texture.rgba8());
+    if (const auto* colour = view.texture.rgbaFloat()) copy(*colour, *page.texture.rgbaFloat());
+    copy(view.depth, page.depth);
+    if (view.hasNormals()) copy(view.normal, page.normal);
+    if (view.hasSplats()) {
+        copy(view.splatU, page.splatU);
+        copy(view.splatV, page.splatV);
+    }
+}
+
+/// A view without its images: what an atlas keeps of it.
+ReferenceView withoutImages(const ReferenceView& view) {
+    ReferenceView v;
+    v.name = view.name;
+    v.camera = view.camera;
+    v.nearPlane = view.nearPlane;
+    v.farPlane = view.farPlane;
+    v.depthBits = view.depthBits;
+    return v;
+}
+
+/// Colours what no rectangle covers from what is covered, so that filters find nothing black.
+void bleedUncovered(const Image<std::uint8_t>& covered, ReferenceView& view) {
+    Texture bled = view.texture;
+    bleedColour(bled);
+    for (int y = 0; y < covered.height(); ++y) {
+        for (int x = 0; x < covered.width(); ++x) {
+            if (covered.at(x, y)) continue;
+            if (auto* image = view.texture.rgba8()) image->at(x, y) = bled.rgba8()->at(x, y);
+            if (auto* image = view.texture.rgbaFloat())
+                image->at(x, y) = bled.rgbaFloat()->at(x, y);
+        }
+    }
+}
+
+template <class T>
+void dropIfZero(Image<T>& image) {
+    for (const auto& p : image.pixels()) {
+        if (p != T(0)) return;
+    }
+    image = {};
+}
+
+}  // namespace
+
+Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job) {
+    if (settings.padding < 0 || settings.padding > 64)
+        return fail(ErrorCode::usage, "the padding is {} pixels; 0 to 64 is possible",
+                    settings.padding);
+    if (settings.maxSize < 1 || settings.maxSize > 65535)
+        return fail(ErrorCode::usage, "the largest texture size is {}; 1 to 65535 is possible",
+                    settings.maxSize);
+    STX_CHECK(bundle.check());
+    const Contents contents = contentsOf(bundle);
+    const int maxPages = 4 / contents.texturesPerPage();
+    STX_TRY(const AtlasLayout layout, gridLayout(bundle, settings, maxPages));
+    STX_CHECK(job.limits.checkAllocation(
+        static_cast<std::uint64_t>(layout.width) * layout.height * layout.pages,
+        contents.bytesPerPixel(), "the atlas"));
+
+    Atlas atlas;
+    atlas.layout = "grid";
+    atlas.padding = settings.padding;
+    atlas.bounds = bundle.bounds;
+    atlas.title = bundle.title;
+    atlas.rectangles = layout.rectangles;
+    for (const auto& view : bundle.views) atlas.views.push_back(withoutImages(view));
+    for (int i = 0; i < layout.pages; ++i) {
+        AtlasPage page;
+        page.texture = emptyTexture(layout.width, layout.height, contents.linear);
+        page.depth = Image<float>(layout.width, layout.height, kNoDepth);
+        if (contents.normals)
+            page.normal = Image<glm::vec3>(layout.width, layout.height, glm::vec3(0));
+        if (contents.splats) {
+            page.splatU = Image<glm::vec3>(layout.width, layout.height, glm::vec3(0));
+            page.splatV = page.splatU;
+        }
+        atlas.pages.push_back(std::move(page));
+    }
+    STX_CHECK(job.checkCancelled());
+    parallelFor(0, static_cast<std::int64_t>(atlas.rectangles.size()), [&](std::int64_t i) {
+        const auto& r = atlas.rectangles[i];
+        fillPage(bundle.views[r.view], r, settings.padding, atlas.pages[r.page]);
+    });
+    atlas.sourcePixels = bundle.pointCount();
+    atlas.keptPixels = atlas.sourcePixels;
+    return atlas;
+}
+
+Result<Bundle> unpack(const Atlas& atlas, Job& job) {
+    STX_CHECK(atlas.check());
+    const AtlasPage& first = atlas.pages[0];
+    const Contents contents{first.texture.isLinear(), !first.normal.empty(), !first.splatU.empty()};
+    std::uint64_t pixels = 0;
+    for (const auto& view : atlas.views)
+        pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
+    STX_CHECK(
+        job.limits.checkAllocation(pixels, contents.bytesPerPixel() + 1, "the views of the atlas"));
+
+    std::vector<std::vector<const AtlasRectangle*>> ofView(atlas.views.size());
+    for (const auto& r : atlas.rectangles) ofView[r.view].push_back(&r);
+    Bundle bundle;
+    bundle.title = atlas.title;
+    bundle.bounds = atlas.bounds;
+    bundle.views.resize(atlas.views.size());
+    parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {
+        ReferenceView& view = bundle.views[i];
+        view = withoutImages(atlas.views[i]);
+        const int width = view.camera.width, height = view.camera.height;
+        view.texture = emptyTexture(width, height, contents.linear);
+        view.depth = Image<float>(width, height, kNoDepth);
+        if (contents.normals) view.normal = Image<glm::vec3>(width, height, glm::vec3(0));
+        if (contents.splats) {
+            view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
+            view.splatV = view.splatU;
+        }
+        Image<std::uint8_t> covered(width, height, 0);
+        std::int64_t area = 0;
+        for (const AtlasRectangle* r : ofView[i]) {
+            const AtlasPage& page = atlas.pages[r->page];
+            const auto copy = [&](const auto& from, auto& to) {
+                forEachPixel(*r, view.depth.size(), 0, [&](glm::ivec2 p, glm::ivec2 v) {
+                    to.at(v.x, v.y) = from.at(p.x, p.y);
+                });
+            };
+            if (const auto* colour = page.texture.rgba8()) copy(*colour, *view.texture.rgba8());
+            if (const auto* colour = page.texture.rgbaFloat())
+                copy(*colour, *view.texture.rgbaFloat());
+            copy(page.depth, view.depth);
+            if (contents.normals) copy(page.normal, view.normal);
+            if (contents.splats) {
+                copy(page.splatU, view.splatU);
+                copy(page.splatV, view.splatV);
+            }
+            forEachPixel(*r, view.depth.size(), 0, [&](glm::ivec2, glm::ivec2 v) {
+                area += covered.at(v.x, v.y) ? 0 : 1;
+                covered.at(v.x, v.y) = 1;
+            });
+        }
+        if (area < static_cast<std::int64_t>(covered.count())) bleedUncovered(covered, view);
+        // An atlas keeps room for normals when any view has them; give them back only to those.
+        dropIfZero(view.normal);
+        dropIfZero(view.splatU);
+        dropIfZero(view.splatV);
+    });
+    STX_CHECK(job.checkCancelled());
+    return bundle;
+}
+
+}  // namespace stx
