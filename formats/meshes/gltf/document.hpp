@@ -1,0 +1,75 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "formats/meshes/gltf/json.hpp"
+#include "formats/meshes/mesh_builder.hpp"
+#include "formats/meshes/model_files.hpp"
+
+namespace stx::gltf {
+
+/// A bufferView's bytes.
+struct BufferView {
+    ByteSpan bytes;
+    std::uint64_t stride = 0;  ///< 0 = tightly packed
+};
+
+/// An accessor's elements as floats: normalised integers become 0..1 or -1..1, others keep their
+/// value.
+struct AccessorValues {
+    std::size_t count = 0;
+    int components = 0;
+    std::vector<float> values;
+
+    [[nodiscard]] float at(std::size_t element, int component) const {
+        return values[element * static_cast<std::size_t>(components) + static_cast<std::size_t>(component)];
+    }
+};
+
+/// A glTF 2.0 or GLB file: its JSON, its buffers (loaded when first used), its accessors.
+class Document {
+  public:
+    /// Errors: no glTF, another version, a required extension that is not known.
+    [[nodiscard]] static Result<Document> open(ByteSpan bytes, ModelFiles& files, MeshBuilder& builder);
+
+    [[nodiscard]] const Json& root() const { return root_; }
+    [[nodiscard]] ModelFiles& files() const { return *files_; }
+    [[nodiscard]] Job& job() const { return files_->job(); }
+
+    [[nodiscard]] Result<BufferView> bufferView(std::uint64_t index, const std::string& user);
+    /// `types`: what is allowed, e.g. {"VEC3", "VEC4"}.
+    [[nodiscard]] Result<AccessorValues> accessor(std::uint64_t index, const std::string& user,
+                                                  std::initializer_list<std::string_view> types);
+    /// Unsigned SCALARs.
+    [[nodiscard]] Result<std::vector<std::uint32_t>> indices(std::uint64_t index, const std::string& user);
+    /// Bytes of a data: URI or of a file beside the model.
+    [[nodiscard]] Result<Bytes> uri(const std::string& uri, const std::string& user);
+
+  private:
+    struct Layout;
+    Document() = default;
+    [[nodiscard]] Result<void> parse(ByteSpan bytes);
+    [[nodiscard]] Result<void> checkAsset();
+    [[nodiscard]] Result<ByteSpan> buffer(std::uint64_t index, const std::string& user);
+    [[nodiscard]] Result<Layout> layout(std::uint64_t index, const std::string& user,
+                                        std::initializer_list<std::string_view> types);
+    /// All elements' components as doubles would lose nothing; Component is float or uint32.
+    template <class Component>
+    [[nodiscard]] Result<std::vector<Component>> elements(const Layout& layout);
+
+    Json root_;
+    ByteSpan binaryChunk_;
+    bool hasBinaryChunk_ = false;
+    std::vector<std::optional<ByteSpan>> buffers_;
+    std::vector<std::unique_ptr<Bytes>> owned_;
+    ModelFiles* files_ = nullptr;
+    MeshBuilder* builder_ = nullptr;
+};
+
+/// Bytes of base64 text; nothing when it is not base64.
+[[nodiscard]] std::optional<Bytes> decodeBase64(std::string_view text);
+
+}  // namespace stx::gltf

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <map>
+
+#include "formats/meshes/gltf/document.hpp"
+
+namespace stx::gltf {
+
+/// Which texture coordinates a texture uses, and KHR_texture_transform on them.
+struct UvSource {
+    bool used = false;
+    int set = 0;  ///< n of TEXCOORD_n
+    glm::dvec2 offset{0.0};
+    glm::dvec2 scale{1.0};
+    double rotation = 0;  ///< radians, counter-clockwise as seen with v running down
+
+    [[nodiscard]] glm::vec2 apply(glm::vec2 uv) const;
+    bool operator==(const UvSource&) const = default;
+};
+
+/// A material of the file as the mesh's material `index`.
+struct MaterialUse {
+    std::uint32_t index = 0;
+    UvSource baseColour;
+    UvSource normal;
+};
+
+/// Makes the mesh's materials from the file's, each when it is first used.
+class Materials {
+  public:
+    Materials(Document& document, MeshBuilder& builder) : document_(document), builder_(builder) {}
+
+    /// `index` of `materials`, or nothing for glTF's default material.
+    [[nodiscard]] Result<MaterialUse> use(std::optional<std::uint64_t> index, const std::string& user);
+    /// The same material without its textures, for a primitive without texture coordinates.
+    [[nodiscard]] MaterialUse withoutTextures(const MaterialUse& use, bool keepBase, bool keepNormal);
+
+    /// What materials had that a base colour does not show: name -> count.
+    std::map<std::string, int> dropped;
+
+  private:
+    [[nodiscard]] Result<MaterialUse> read(std::uint64_t index, const std::string& user);
+    [[nodiscard]] Result<int> texture(const Json& info, const std::string& where, UvSource& uv);
+
+    Document& document_;
+    MeshBuilder& builder_;
+    std::map<std::int64_t, MaterialUse> known_;
+    std::map<std::tuple<std::uint32_t, bool, bool>, std::uint32_t> plain_;
+};
+
+}  // namespace stx::gltf

@@ -1,0 +1,273 @@
+#include "formats/meshes/gltf/primitive.hpp"
+
+#include <optional>
+
+#include "formats/meshes/draco_geometry.hpp"
+
+namespace stx::gltf {
+namespace {
+
+/// Attributes of one primitive, from accessors or from its Draco stream.
+class Attributes {
+  public:
+    Attributes(Document& document, MeshBuilder& builder, const Json& primitive, const std::string& where)
+        : document_(document), builder_(builder), primitive_(primitive), where_(where) {}
+
+    Result<void> open() {
+        STX_TRY(attributes_, getObject(primitive_, "attributes", where_));
+        if (!attributes_) return fail(ErrorCode::invalidInput, "{} has no attributes", where_);
+        STX_TRY(const Json* extension, getExtension(primitive_, "KHR_draco_mesh_compression", where_));
+        if (!extension) return {};
+        const auto at = where_ + ".extensions.KHR_draco_mesh_compression";
+        STX_TRY(const auto view, getUint(*extension, "bufferView", at));
+        if (!view) return fail(ErrorCode::invalidInput, "{} names no bufferView", at);
+        STX_TRY(dracoIds_, getObject(*extension, "attributes", at));
+        if (!dracoIds_) return fail(ErrorCode::invalidInput, "{} has no attributes", at);
+        STX_TRY(const auto bytes, document_.bufferView(*view, at));
+        auto geometry = DracoGeometry::decode(bytes.bytes, [&](std::uint64_t n, std::uint64_t each) {
+            return builder_.charge(n, each, at);
+        });
+        if (!geometry) return tl::unexpected(geometry.error().at(at));
+        if (!geometry->isMesh())
+            return fail(ErrorCode::invalidInput, "{} holds a point cloud, expected a mesh", at);
+        draco_ = std::move(*geometry);
+        return {};
+    }
+
+    [[nodiscard]] bool has(const std::string& name) const { return attributes_->contains(name); }
+    [[nodiscard]] const std::optional<DracoGeometry>& draco() const { return draco_; }
+
+    /// Values of an attribute, or none when the primitive lacks it.
+    Result<std::optional<AccessorValues>> get(const std::string& name,
+                                              std::initializer_list<std::string_view> types) {
+        STX_TRY(const auto index, getUint(*attributes_, name.c_str(), where_ + ".attributes"));
+        if (!index) return std::nullopt;
+        if (draco_) {
+            STX_TRY(const auto id, getUint(*dracoIds_, name.c_str(), where_ + ".extensions"));
+            if (id) {
+                STX_TRY(auto values, fromDraco(name, *id, *index));
+                return values;
+            }
+        }
+        STX_TRY(auto values, document_.accessor(*index, where_ + " " + name, types));
+        return values;
+    }
+
+  private:
+    Result<AccessorValues> fromDraco(const std::string& name, std::uint64_t id, std::uint64_t accessor) {
+        for (const auto& a : draco_->attributes()) {
+            if (a.uniqueId != id) continue;
+            // The accessor still says whether integers are normalised.
+            STX_TRY(const Json* object, element(document_.root(), "accessors", accessor, where_));
+            STX_TRY(const auto normalised,
+                    getBool(*object, "normalized", fmt::format("accessors[{}]", accessor)));
+            STX_CHECK(builder_.charge(draco_->pointCount(),
+                                      static_cast<std::uint64_t>(a.components) * sizeof(float), where_));
+            AccessorValues values;
+            values.count = draco_->pointCount();
+            values.components = a.components;
+            STX_TRY(values.values, draco_->values(a, normalised.value_or(false)));
+            return values;
+        }
+        return fail(ErrorCode::invalidInput, "{}: the Draco stream has no attribute {} for {}", where_, id,
+                    name);
+    }
+
+    Document& document_;
+    MeshBuilder& builder_;
+    const Json& primitive_;
+    const std::string& where_;
+    const Json* attributes_ = nullptr;
+    const Json* dracoIds_ = nullptr;
+    std::optional<DracoGeometry> draco_;
+};
+
+template <class Vec>
+std::vector<Vec> vectors(const AccessorValues& a) {
+    std::vector<Vec> out(a.count, Vec(0));
+    const int n = std::min(a.components, static_cast<int>(Vec::length()));
+    for (std::size_t i = 0; i < a.count; ++i) {
+        for (int c = 0; c < n; ++c) out[i][c] = a.at(i, c);
+    }
+    return out;
+}
+
+Result<void> checkCount(const std::optional<AccessorValues>& values, std::size_t expected, int components,
+                        const std::string& where, std::string_view name) {
+    if (!values) return {};
+    if (values->count != expected)
+        return fail(ErrorCode::invalidInput, "{}: {} has {} elements, POSITION has {}; they must match",
+                    where, name, values->count, expected);
+    if (values->components < components)
+        return fail(ErrorCode::invalidInput, "{}: {} has {} components, expected {}", where, name,
+                    values->components, components);
+    return {};
+}
+
+/// Triangles of a list (mode 4), strip (5) or fan (6).
+std::vector<glm::uvec3> assemble(std::uint64_t mode, std::size_t count, const auto& vertexAt) {
+    std::vector<glm::uvec3> triangles;
+    if (count < 3) return triangles;
+    if (mode == 4) {
+        for (std::size_t i = 0; i + 2 < count; i += 3)
+            triangles.emplace_back(vertexAt(i), vertexAt(i + 1), vertexAt(i + 2));
+    } else {
+        for (std::size_t i = 0; i + 2 < count; ++i) {
+            if (mode == 5)
+                triangles.emplace_back(vertexAt(i), vertexAt(i + 1 + i % 2), vertexAt(i + 2 - i % 2));
+            else
+                triangles.emplace_back(vertexAt(i + 1), vertexAt(i + 2), vertexAt(0));
+        }
+    }
+    return triangles;
+}
+
+Result<void> applyMorph(Document& document, const Json& primitive, const std::string& where,
+                        const std::vector<double>& weights, MeshPart& part) {
+    STX_TRY(const Json* targets, getArray(primitive, "targets", where));
+    if (!targets) return {};
+    if (!weights.empty() && weights.size() != targets->size())
+        return fail(ErrorCode::invalidInput, "{} has {} morph targets, but there are {} weights", where,
+                    targets->size(), weights.size());
+    for (std::size_t t = 0; t < weights.size(); ++t) {
+        if (weights[t] == 0) continue;
+        const auto at = fmt::format("{}.targets[{}]", where, t);
+        if (!(*targets)[t].is_object()) return fail(ErrorCode::invalidInput, "{} is no object", at);
+        const auto add = [&](const char* name, auto& values) -> Result<void> {
+            STX_TRY(const auto index, getUint((*targets)[t], name, at));
+            if (!index || values.empty()) return {};
+            STX_TRY(const auto deltas, document.accessor(*index, at + " " + name, {"VEC3"}));
+            if (deltas.count != values.size())
+                return fail(ErrorCode::invalidInput, "{}: {} has {} elements, the mesh has {}", at, name,
+                            deltas.count, values.size());
+            for (std::size_t i = 0; i < values.size(); ++i) {
+                for (int c = 0; c < 3; ++c)
+                    values[i][c] += static_cast<float>(weights[t] * deltas.at(i, c));
+            }
+            return {};
+        };
+        STX_CHECK(add("POSITION", part.positions));
+        STX_CHECK(add("NORMAL", part.normals));
+        STX_CHECK(add("TANGENT", part.tangents));
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materials& materials,
+                                const Json& primitive, const std::string& where,
+                                const std::vector<double>& morphWeights,
+                                std::map<std::string, int>& dropped) {
+    Primitive result;
+    auto& part = result.part;
+    part.where = where;
+    STX_TRY(const auto modeValue, getUint(primitive, "mode", where));
+    const auto mode = modeValue.value_or(4);
+    if (mode > 6) return fail(ErrorCode::invalidInput, "{}.mode is {}, expected 0 to 6", where, mode);
+    if (mode >= 1 && mode <= 3) {
+        ++dropped["line primitives"];
+        result.drawn = false;
+        return result;
+    }
+    Attributes attributes(document, builder, primitive, where);
+    STX_CHECK(attributes.open());
+
+    STX_TRY(const auto position, attributes.get("POSITION", {"VEC3"}));
+    if (!position) {
+        ++dropped["primitives without positions"];
+        result.drawn = false;
+        return result;
+    }
+    const auto count = position->count;
+    STX_CHECK(checkCount(position, count, 3, where, "POSITION"));
+    part.positions = vectors<glm::vec3>(*position);
+    STX_TRY(const auto normal, attributes.get("NORMAL", {"VEC3"}));
+    STX_CHECK(checkCount(normal, count, 3, where, "NORMAL"));
+    if (normal) part.normals = vectors<glm::vec3>(*normal);
+    STX_TRY(const auto tangent, attributes.get("TANGENT", {"VEC4"}));
+    STX_CHECK(checkCount(tangent, count, 4, where, "TANGENT"));
+    if (tangent) part.tangents = vectors<glm::vec4>(*tangent);
+    STX_TRY(const auto colour, attributes.get("COLOR_0", {"VEC3", "VEC4"}));
+    STX_CHECK(checkCount(colour, count, 3, where, "COLOR_0"));
+    if (colour) {
+        part.colours = vectors<glm::vec4>(*colour);
+        if (colour->components == 3) {
+            for (auto& c : part.colours) c.a = 1.0f;
+        }
+    }
+    if (attributes.has("COLOR_1")) ++dropped["further vertex colours"];
+
+    STX_TRY(const auto materialIndex, getUint(primitive, "material", where));
+    STX_TRY(auto material, materials.use(materialIndex, where));
+    const auto readUvs = [&](const UvSource& source) -> Result<std::vector<glm::vec2>> {
+        const auto name = fmt::format("TEXCOORD_{}", source.set);
+        STX_TRY(const auto values, attributes.get(name, {"VEC2"}));
+        STX_CHECK(checkCount(values, count, 2, where, name));
+        std::vector<glm::vec2> uvs;
+        if (!values) return uvs;
+        uvs = vectors<glm::vec2>(*values);
+        for (auto& uv : uvs) uv = source.apply(uv);
+        return uvs;
+    };
+    STX_TRY(part.uvs, readUvs(material.baseColour));
+    if (material.normal.used) {
+        auto source = material.normal;
+        if (!material.baseColour.used) {
+            // Then uvs serve the normal map alone.
+            STX_TRY(part.uvs, readUvs(source));
+            part.normalUvs = {};
+        } else if (source.set != material.baseColour.set || source.offset != material.baseColour.offset ||
+                   source.scale != material.baseColour.scale ||
+                   source.rotation != material.baseColour.rotation) {
+            STX_TRY(part.normalUvs, readUvs(source));
+        }
+    }
+    const bool baseWorks = !material.baseColour.used || !part.uvs.empty();
+    const bool normalWorks =
+        !material.normal.used || !(part.normalUvs.empty() && part.uvs.empty()) || position->count == 0;
+    if (!baseWorks || !normalWorks) {
+        document.job().note(fmt::format("{} has a textured material but no texture coordinates for it; the "
+                                        "plain colour is used",
+                                        where));
+        material = materials.withoutTextures(material, baseWorks, normalWorks);
+    }
+    part.material = material.index;
+
+    for (int set = 0; set < 4; ++set) {
+        STX_TRY(auto joints, attributes.get(fmt::format("JOINTS_{}", set), {"VEC4"}));
+        STX_TRY(auto weights, attributes.get(fmt::format("WEIGHTS_{}", set), {"VEC4"}));
+        if (!joints || !weights) break;
+        STX_CHECK(checkCount(joints, count, 4, where, "JOINTS"));
+        STX_CHECK(checkCount(weights, count, 4, where, "WEIGHTS"));
+        result.influences.push_back({std::move(*joints), std::move(*weights)});
+    }
+    STX_CHECK(applyMorph(document, primitive, where, morphWeights, part));
+
+    if (mode == 0) {
+        part.points = true;
+        return result;
+    }
+    if (attributes.draco()) {
+        part.triangles = attributes.draco()->triangles();
+        return result;
+    }
+    STX_TRY(const auto indexAccessor, getUint(primitive, "indices", where));
+    if (!indexAccessor) {
+        STX_CHECK(builder.charge(count, sizeof(glm::uvec3), where));
+        part.triangles = assemble(mode, count, [](std::size_t i) { return static_cast<std::uint32_t>(i); });
+        return result;
+    }
+    STX_TRY(const auto indices, document.indices(*indexAccessor, where + " indices"));
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+        if (indices[i] >= count)
+            return fail(ErrorCode::invalidInput,
+                        "accessors[{}] ({} indices): index {} is vertex {}, but there are only {} vertices",
+                        *indexAccessor, where, i, indices[i], count);
+    }
+    STX_CHECK(builder.charge(indices.size(), sizeof(glm::uvec3), where));
+    part.triangles = assemble(mode, indices.size(), [&](std::size_t i) { return indices[i]; });
+    return result;
+}
+
+}  // namespace stx::gltf

@@ -1,0 +1,313 @@
+#include "formats/meshes/mesh_builder.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <unordered_map>
+
+namespace stx {
+namespace {
+
+bool finite(glm::vec2 v) { return std::isfinite(v.x) && std::isfinite(v.y); }
+bool finite(glm::vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(glm::vec4 v) { return finite(glm::vec3(v)) && std::isfinite(v.w); }
+
+glm::dvec3 areaNormal(const std::vector<glm::vec3>& positions, glm::uvec3 t) {
+    const glm::dvec3 a(positions[t.x]), b(positions[t.y]), c(positions[t.z]);
+    return glm::cross(b - a, c - a);
+}
+
+/// Appends `from` to `to`, which is as long as `before`, or empty when no part had it so far.
+template <class T>
+void append(std::vector<T>& to, std::size_t before, const std::vector<T>& from, std::size_t count,
+            T missing) {
+    if (from.empty() && to.empty()) return;
+    to.resize(before, missing);
+    if (from.empty())
+        to.resize(before + count, missing);
+    else
+        to.insert(to.end(), from.begin(), from.end());
+}
+
+template <class T>
+void copyVertex(std::vector<T>& values, std::uint32_t from) {
+    if (!values.empty()) values.push_back(T(values[from]));
+}
+
+constexpr glm::vec3 kNoNormal{0.0f};
+
+}  // namespace
+
+Result<void> MeshBuilder::charge(std::uint64_t count, std::uint64_t bytesEach, std::string_view what) {
+    STX_CHECK(job_.limits.checkAllocation(count, bytesEach, what));
+    charged_ += count * bytesEach;
+    if (charged_ > job_.limits.maxMemoryBytes)
+        return fail(ErrorCode::invalidInput,
+                    "{} brings the model past the memory limit of {} MiB; raise it with --max-memory "
+                    "if the file is to be trusted",
+                    what, job_.limits.maxMemoryBytes >> 20);
+    return {};
+}
+
+Result<void> MeshBuilder::add(MeshPart part) {
+    STX_CHECK(job_.checkCancelled());
+    const auto count = part.positions.size();
+    if (count == 0) return {};
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto p = part.positions[i];
+        if (!finite(p))
+            return fail(ErrorCode::invalidInput,
+                        "{}: vertex {} is at ({}, {}, {}); positions must be finite numbers", part.where,
+                        i, p.x, p.y, p.z);
+    }
+    for (std::size_t i = 0; i < part.triangles.size(); ++i) {
+        const auto t = part.triangles[i];
+        const auto largest = std::max({t.x, t.y, t.z});
+        if (largest >= count)
+            return fail(ErrorCode::invalidInput,
+                        "{}: triangle {} uses vertex {}, but there are only {} vertices", part.where, i,
+                        largest, count);
+    }
+    const auto before = mesh_.positions.size();
+    STX_CHECK(charge(count, sizeof(glm::vec3) * 2 + sizeof(glm::vec4) * 2 + sizeof(glm::vec2) * 2,
+                     part.where));
+    STX_CHECK(charge(part.triangles.size(), sizeof(glm::uvec3) + 4, part.where));
+    if (before + count > std::numeric_limits<std::uint32_t>::max())
+        return fail(ErrorCode::invalidInput, "{}: the model has more than 2^32 vertices", part.where);
+    repair(part);
+
+    const auto added = part.positions.size();
+    append(mesh_.normals, before, part.normals, added, kNoNormal);
+    append(mesh_.tangents, before, part.tangents, added, glm::vec4(1, 0, 0, 1));
+    append(mesh_.colours, before, part.colours, added, glm::vec4(1));
+    if (!part.normalUvs.empty() && mesh_.normalUvs.empty()) mesh_.normalUvs = mesh_.uvs;
+    const auto& normalUvs = part.normalUvs.empty() ? part.uvs : part.normalUvs;
+    if (!part.normalUvs.empty() || !mesh_.normalUvs.empty())
+        append(mesh_.normalUvs, before, normalUvs, added, glm::vec2(0));
+    append(mesh_.uvs, before, part.uvs, added, glm::vec2(0));
+    mesh_.positions.insert(mesh_.positions.end(), part.positions.begin(), part.positions.end());
+
+    const auto base = static_cast<std::uint32_t>(before);
+    for (const auto& t : part.triangles) mesh_.triangles.push_back(t + base);
+    mesh_.triangleMaterial.resize(mesh_.triangles.size(), part.material);
+    if (part.points) {
+        for (std::size_t i = 0; i < added; ++i)
+            mesh_.points.push_back(base + static_cast<std::uint32_t>(i));
+    }
+    return {};
+}
+
+void MeshBuilder::repair(MeshPart& part) {
+    const auto withoutArea = [&](glm::uvec3 t) {
+        return t.x == t.y || t.y == t.z || t.x == t.z ||
+               areaNormal(part.positions, t) == glm::dvec3(0.0);
+    };
+    flatTriangles_ += std::erase_if(part.triangles, withoutArea);
+
+    bool broken = false;
+    for (auto& uv : part.uvs) {
+        if (!finite(uv)) uv = glm::vec2(0), broken = true;
+    }
+    for (auto& uv : part.normalUvs) {
+        if (!finite(uv)) uv = glm::vec2(0), broken = true;
+    }
+    if (broken) job_.note(fmt::format("{}: texture coordinates that are not finite are taken as 0", part.where));
+    broken = false;
+    for (auto& c : part.colours) {
+        if (!finite(c)) c = glm::vec4(0, 0, 0, 1), broken = true;
+    }
+    if (broken) job_.note(fmt::format("{}: vertex colours that are not finite are taken as black", part.where));
+
+    std::size_t brokenNormals = 0;
+    for (auto& n : part.normals) {
+        const float length = glm::length(n);
+        if (std::isfinite(length) && length > 0) {
+            n /= length;
+        } else {
+            n = kNoNormal;
+            ++brokenNormals;
+        }
+    }
+    if (brokenNormals == part.normals.size()) {
+        part.normals.clear();
+    } else if (brokenNormals > 0) {
+        for (const auto& t : part.triangles) {
+            const auto face = glm::normalize(areaNormal(part.positions, t));
+            for (int k = 0; k < 3; ++k) {
+                if (part.normals[t[k]] == kNoNormal) part.normals[t[k]] = glm::vec3(face);
+            }
+        }
+        for (auto& n : part.normals) {
+            if (n == kNoNormal) n = glm::vec3(0, 0, 1);
+        }
+    }
+    if (brokenNormals > 0 && !part.triangles.empty())
+        job_.note(fmt::format("{}: {} normals are no directions; those of the triangles are used",
+                              part.where, brokenNormals));
+
+    for (auto& t : part.tangents) {
+        const float length = glm::length(glm::vec3(t));
+        t = std::isfinite(length) && length > 0
+                ? glm::vec4(glm::vec3(t) / length, t.w < 0 ? -1.0f : 1.0f)
+                : glm::vec4(1, 0, 0, 1);
+    }
+    const bool hasNormalMap = !part.triangles.empty() && part.material < mesh_.materials.size() &&
+                              mesh_.materials[part.material].normalTexture >= 0;
+    if (!hasNormalMap) {
+        part.tangents.clear();
+        part.normalUvs.clear();
+    } else {
+        if (part.normals.empty()) addFlatNormals(part);
+        if (part.tangents.empty()) addTangents(part);
+    }
+}
+
+void MeshBuilder::fillNormals() {
+    if (mesh_.normals.empty()) return;
+    std::vector<bool> given(mesh_.positions.size());
+    for (std::size_t i = 0; i < given.size(); ++i) given[i] = mesh_.normals[i] != kNoNormal;
+    for (auto& t : mesh_.triangles) {
+        if (given[t.x] && given[t.y] && given[t.z]) continue;
+        const glm::vec3 face(glm::normalize(areaNormal(mesh_.positions, t)));
+        for (int k = 0; k < 3; ++k) {
+            const auto v = t[k];
+            if (v < given.size() && given[v]) continue;
+            if (mesh_.normals[v] != kNoNormal && mesh_.normals[v] != face) {
+                t[k] = static_cast<std::uint32_t>(mesh_.positions.size());
+                copyVertex(mesh_.positions, v);
+                copyVertex(mesh_.normals, v);
+                copyVertex(mesh_.tangents, v);
+                copyVertex(mesh_.colours, v);
+                copyVertex(mesh_.uvs, v);
+                copyVertex(mesh_.normalUvs, v);
+            }
+            mesh_.normals[t[k]] = face;
+        }
+    }
+    for (auto& n : mesh_.normals) {
+        if (n == kNoNormal) n = glm::vec3(0, 0, 1);
+    }
+}
+
+Result<Mesh> MeshBuilder::finish() {
+    if (flatTriangles_ > 0)
+        job_.note(fmt::format("{} triangles have no area and are left out", flatTriangles_));
+    if (mesh_.triangles.empty() && mesh_.points.empty()) {
+        if (flatTriangles_ > 0)
+            return fail(ErrorCode::invalidInput,
+                        "the model has {} triangles, but none with an area, and no points", flatTriangles_);
+        return fail(ErrorCode::invalidInput,
+                    "the model has neither triangles nor points; there is nothing to see");
+    }
+    fillNormals();
+    STX_CHECK(mesh_.check());
+    return std::move(mesh_);
+}
+
+void addFlatNormals(MeshPart& part) {
+    part.normals.assign(part.positions.size(), kNoNormal);
+    for (auto& t : part.triangles) {
+        const auto area = areaNormal(part.positions, t);
+        if (area == glm::dvec3(0.0)) continue;
+        const glm::vec3 face(glm::normalize(area));
+        for (int k = 0; k < 3; ++k) {
+            const auto v = t[k];
+            if (part.normals[v] != kNoNormal && part.normals[v] != face) {
+                t[k] = static_cast<std::uint32_t>(part.positions.size());
+                copyVertex(part.positions, v);
+                copyVertex(part.normals, v);
+                copyVertex(part.tangents, v);
+                copyVertex(part.colours, v);
+                copyVertex(part.uvs, v);
+                copyVertex(part.normalUvs, v);
+            }
+            part.normals[t[k]] = face;
+        }
+    }
+    for (auto& n : part.normals) {
+        if (n == kNoNormal) n = glm::vec3(0, 0, 1);
+    }
+}
+
+void addTangents(MeshPart& part) {
+    const auto& uvs = part.normalUvs.empty() ? part.uvs : part.normalUvs;
+    if (uvs.empty() || part.normals.empty()) return;
+    std::vector<glm::dvec3> along(part.positions.size(), glm::dvec3(0)), across = along;
+    for (const auto& t : part.triangles) {
+        const glm::dvec3 p0(part.positions[t.x]);
+        const auto e1 = glm::dvec3(part.positions[t.y]) - p0, e2 = glm::dvec3(part.positions[t.z]) - p0;
+        const auto d1 = glm::dvec2(uvs[t.y]) - glm::dvec2(uvs[t.x]);
+        const auto d2 = glm::dvec2(uvs[t.z]) - glm::dvec2(uvs[t.x]);
+        const double det = d1.x * d2.y - d2.x * d1.y;
+        if (det == 0) continue;
+        const auto du = (e1 * d2.y - e2 * d1.y) / det, dv = (e2 * d1.x - e1 * d2.x) / det;
+        for (int k = 0; k < 3; ++k) {
+            along[t[k]] += du;
+            across[t[k]] += dv;
+        }
+    }
+    part.tangents.resize(part.positions.size());
+    for (std::size_t i = 0; i < part.tangents.size(); ++i) {
+        const glm::dvec3 n(part.normals[i]);
+        auto tangent = along[i] - n * glm::dot(n, along[i]);
+        if (!(glm::length(tangent) > 0)) {
+            // No direction in the uvs: any one across the normal will do.
+            tangent = glm::cross(std::abs(n.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0), n);
+        }
+        tangent = glm::normalize(tangent);
+        // v runs down in Mesh, so the bitangent (the direction of green) is the opposite of dP/dv.
+        const double handedness = glm::dot(glm::cross(n, tangent), -across[i]) < 0 ? -1.0 : 1.0;
+        part.tangents[i] = glm::vec4(glm::vec3(tangent), static_cast<float>(handedness));
+    }
+}
+
+void weldVertices(MeshPart& part) {
+    struct Key {
+        float values[3 + 3 + 4 + 2];
+        bool operator==(const Key& other) const {
+            return std::memcmp(values, other.values, sizeof values) == 0;
+        }
+    };
+    struct Hash {
+        std::size_t operator()(const Key& key) const {
+            std::uint64_t h = 1469598103934665603ull;
+            for (const float f : key.values) {
+                std::uint32_t bits;
+                std::memcpy(&bits, &f, sizeof bits);
+                h = (h ^ bits) * 1099511628211ull;
+                h ^= h >> 29;
+            }
+            return h;
+        }
+    };
+    if (part.points || part.triangles.empty()) return;
+    std::unordered_map<Key, std::uint32_t, Hash> known;
+    known.reserve(part.positions.size());
+    MeshPart out;
+    std::vector<std::uint32_t> target(part.positions.size(), ~0u);
+    const auto place = [&](std::uint32_t v) {
+        if (target[v] != ~0u) return target[v];
+        Key key{};
+        std::memcpy(key.values, &part.positions[v], 12);
+        if (!part.normals.empty()) std::memcpy(key.values + 3, &part.normals[v], 12);
+        if (!part.colours.empty()) std::memcpy(key.values + 6, &part.colours[v], 16);
+        if (!part.uvs.empty()) std::memcpy(key.values + 10, &part.uvs[v], 8);
+        const auto [it, isNew] = known.try_emplace(key, static_cast<std::uint32_t>(out.positions.size()));
+        if (isNew) {
+            out.positions.push_back(part.positions[v]);
+            if (!part.normals.empty()) out.normals.push_back(part.normals[v]);
+            if (!part.colours.empty()) out.colours.push_back(part.colours[v]);
+            if (!part.uvs.empty()) out.uvs.push_back(part.uvs[v]);
+        }
+        return target[v] = it->second;
+    };
+    for (auto& t : part.triangles) {
+        for (int k = 0; k < 3; ++k) t[k] = place(t[k]);
+    }
+    part.positions = std::move(out.positions);
+    part.normals = std::move(out.normals);
+    part.colours = std::move(out.colours);
+    part.uvs = std::move(out.uvs);
+}
+
+}  // namespace stx

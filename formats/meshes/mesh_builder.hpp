@@ -1,0 +1,66 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/model/mesh.hpp"
+
+namespace stx {
+
+/// One primitive of a model in world space; arrays are empty or as long as `positions`.
+struct MeshPart {
+    std::string where;  ///< for messages: `meshes[2].primitives[0]`
+    std::vector<glm::vec3> positions;
+    std::vector<glm::vec3> normals;
+    std::vector<glm::vec4> tangents;
+    std::vector<glm::vec4> colours;
+    std::vector<glm::vec2> uvs;
+    std::vector<glm::vec2> normalUvs;
+    std::vector<glm::uvec3> triangles;
+    bool points = false;  ///< the vertices are drawn as points
+    std::uint32_t material = 0;
+};
+
+/// Collects parts with unlike sets of attributes into one Mesh.
+class MeshBuilder {
+  public:
+    explicit MeshBuilder(Job& job) : job_(job) {}
+
+    /// The mesh's materials and textures, for the reader to fill.
+    std::vector<Material>& materials() { return mesh_.materials; }
+    std::vector<MeshTexture>& textures() { return mesh_.textures; }
+
+    /// Counts memory that reading this model takes; errors when the sum passes the limit.
+    [[nodiscard]] Result<void> charge(std::uint64_t count, std::uint64_t bytesEach,
+                                      std::string_view what);
+
+    /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite, an
+    /// index out of range. Triangles without area are left out and counted; normals that are no
+    /// directions are replaced by those of the triangles; uvs and colours that are not finite
+    /// become 0.
+    [[nodiscard]] Result<void> add(MeshPart part);
+
+    /// The mesh, checked. Attributes that only some parts have are filled in for the others.
+    [[nodiscard]] Result<Mesh> finish();
+
+  private:
+    void repair(MeshPart& part);
+    void fillNormals();
+
+    Job& job_;
+    Mesh mesh_;
+    std::uint64_t charged_ = 0;
+    std::uint64_t flatTriangles_ = 0;
+};
+
+/// Gives each vertex the normal of its triangle; a vertex of several unlike triangles is doubled.
+void addFlatNormals(MeshPart& part);
+
+/// Tangents from the uvs of the normal map (Lengyel's method); needs normals.
+void addTangents(MeshPart& part);
+
+/// Merges vertices that are alike in every bit, in order of first use.
+void weldVertices(MeshPart& part);
+
+}  // namespace stx

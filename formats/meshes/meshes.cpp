@@ -1,0 +1,155 @@
+#include "formats/meshes/meshes.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+
+#include "formats/images/images.hpp"
+#include "formats/meshes/readers.hpp"
+
+namespace stx {
+namespace {
+
+enum class Format { none, gltf, glb, obj, ply, stl, draco };
+
+std::string lowerCase(std::string text) {
+    for (auto& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    return text;
+}
+
+std::string_view textOf(ByteSpan bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// What the first bytes say for sure.
+Format formatOfBytes(ByteSpan head) {
+    auto text = textOf(head);
+    if (text.starts_with("glTF")) return Format::glb;
+    if (text.starts_with("DRACO")) return Format::draco;
+    if (text.starts_with("ply") && text.size() > 3 && (text[3] == '\n' || text[3] == '\r' || text[3] == ' '))
+        return Format::ply;
+    return Format::none;
+}
+
+Format formatOfEnding(const std::filesystem::path& path) {
+    const auto ending = lowerCase(path.extension().string());
+    if (ending == ".gltf") return Format::gltf;
+    if (ending == ".glb") return Format::glb;
+    if (ending == ".obj") return Format::obj;
+    if (ending == ".ply") return Format::ply;
+    if (ending == ".stl") return Format::stl;
+    if (ending == ".drc") return Format::draco;
+    return Format::none;
+}
+
+/// For files without a telling ending: JSON with an asset, ASCII STL.
+Format formatOfText(ByteSpan head) {
+    const auto text = textOf(head);
+    const auto first = text.find_first_not_of(" \t\r\n");
+    if (first != std::string_view::npos && text[first] == '{' &&
+        text.find("\"asset\"") != std::string_view::npos)
+        return Format::gltf;
+    if (text.starts_with("solid ") && text.find("facet") != std::string_view::npos) return Format::stl;
+    return Format::none;
+}
+
+Format formatOf(const std::filesystem::path& path, ByteSpan head) {
+    if (const auto format = formatOfBytes(head); format != Format::none) return format;
+    if (const auto format = formatOfEnding(path); format != Format::none) return format;
+    return formatOfText(head);
+}
+
+/// The picture that belongs to an OBJ without materials: the only image in its folder whose name
+/// begins with the same word (spot_texture.png for spot_triangulated.obj).
+std::filesystem::path textureBeside(const std::filesystem::path& model) {
+    const auto firstWord = [](const std::filesystem::path& p) {
+        const auto stem = lowerCase(p.stem().string());
+        return stem.substr(0, stem.find_first_of("_-. "));
+    };
+    const auto word = firstWord(model);
+    if (word.size() < 3) return {};
+    std::filesystem::path found;
+    std::error_code error;
+    for (std::filesystem::directory_iterator it(model.parent_path().empty() ? "." : model.parent_path(), error),
+         end;
+         !error && it != end; it.increment(error)) {
+        const auto ending = lowerCase(it->path().extension().string());
+        const bool isImage = ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".tga" ||
+                             ending == ".bmp" || ending == ".webp" || ending == ".tif" || ending == ".tiff";
+        std::error_code ignored;
+        if (!isImage || firstWord(it->path()) != word || !it->is_regular_file(ignored)) continue;
+        if (!found.empty()) return {};
+        found = it->path();
+    }
+    return found;
+}
+
+/// Gives every material without a base colour texture this one.
+Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job) {
+    STX_TRY(const auto bytes, readFile(path, job.limits));
+    auto decoded = decodeImage(bytes, path.filename().string(), job.limits);
+    if (!decoded) return tl::unexpected(decoded.error().at(fmt::format("'{}'", path.string())));
+    const int index = static_cast<int>(mesh.textures.size());
+    mesh.textures.push_back({rgba8From(*decoded)});
+    for (auto& material : mesh.materials) {
+        if (material.baseColourTexture < 0) material.baseColourTexture = index;
+    }
+    return {};
+}
+
+Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path, Job& job) {
+    const auto folder = path.parent_path().empty() || path == "-" ? std::filesystem::path(".")
+                                                                  : path.parent_path();
+    ModelFiles files(folder, job);
+    const auto name = path.filename().string();
+    switch (format) {
+        case Format::gltf:
+        case Format::glb: return readGltf(bytes, files);
+        case Format::draco: return readDraco(bytes, job);
+        case Format::obj: return readWithAssimp(bytes, AssimpFormat::obj, name, files);
+        case Format::ply: return readWithAssimp(bytes, AssimpFormat::ply, name, files);
+        case Format::stl: return readWithAssimp(bytes, AssimpFormat::stl, name, files);
+        case Format::none: break;
+    }
+    return fail(ErrorCode::invalidInput,
+                "the file is no model that is known here: glTF, GLB, OBJ, PLY, STL or Draco (.drc)");
+}
+
+}  // namespace
+
+bool isMesh(const std::filesystem::path& path, ByteSpan head) {
+    return formatOf(path, head.first(std::min<std::size_t>(head.size(), 4096))) != Format::none;
+}
+
+Result<Mesh> readMesh(const std::filesystem::path& path, Job& job, const MeshOptions& options) {
+    STX_TRY(auto bytes, readFile(path, job.limits));
+    return readMesh(std::move(bytes), path, job, options);
+}
+
+Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
+                      const MeshOptions& options) {
+    const auto where = fmt::format("'{}'", path.string());
+    if (bytes.empty())
+        return failAt(where, ErrorCode::invalidInput, "the file is empty; expected a model");
+    const auto format = formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
+    auto mesh = readFormat(format, bytes, path, job);
+    if (!mesh) return tl::unexpected(mesh.error().at(where));
+
+    if (!options.texture.empty()) {
+        if (mesh->uvs.empty())
+            return failAt(where, ErrorCode::usage,
+                          "the model has no texture coordinates, so the texture '{}' cannot be put on it",
+                          options.texture.string());
+        STX_CHECK(addTexture(*mesh, options.texture, job));
+    } else if (format == Format::obj && mesh->textures.empty() && !mesh->uvs.empty() && path != "-" &&
+               textOf(bytes).find("mtllib") == std::string_view::npos) {
+        if (const auto beside = textureBeside(path); !beside.empty()) {
+            if (addTexture(*mesh, beside, job))
+                job.note(fmt::format("the model names no material; '{}' beside it is taken as its texture",
+                                     beside.filename().string()));
+        }
+    }
+    return mesh;
+}
+
+}  // namespace stx

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+#include <glm/glm.hpp>
+
+#include "formats/files/files.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/mesh.hpp"
+
+namespace stx {
+
+/// What a caller knows about a model and the file does not say.
+struct MeshOptions {
+    /// Base colour texture for every material that has none (`--texture FILE`); empty = none. Opened
+    /// as it is given: the caller named it, not the model.
+    std::filesystem::path texture;
+};
+
+/// True when the file looks like a model that readMesh() takes: by its first bytes (GLB, glTF, PLY,
+/// .drc, ASCII STL), else by its ending (OBJ, STL). `head` is the beginning of the file, 512 bytes
+/// are plenty; it may be empty, then only the ending counts.
+[[nodiscard]] bool isMesh(const std::filesystem::path& path, ByteSpan head = {});
+
+/// Reads a model: glTF 2.0 and GLB (with Draco, quantisation, sparse accessors, texture transforms,
+/// instances, skins in rest pose, morph targets at their default weights), OBJ with MTL, PLY, STL
+/// (ASCII and binary), Draco .drc meshes and point clouds. "-" reads stdin.
+///
+/// The result has passed Mesh::check(): world space, all transforms applied, no triangle without
+/// area. `normals` is empty when the file has none: a triangle's own normal counts then. Colours of
+/// glTF are linear as the standard says; those of OBJ, MTL, PLY, STL and .drc are taken as sRGB, as
+/// the programs that write them do, and made linear. A material of a format without the notion is
+/// double-sided. Texture names resolve inside the model's folder only.
+///
+/// What is dropped (animations, lines, cameras, maps other than base colour and normal, a texture
+/// that is missing or broken, triangles without area) is said with job.note().
+///
+/// Errors: io (missing or unreadable file, missing buffer), invalidInput (a broken rule, named with
+/// the object it is in; neither triangles nor points; more than the memory limit), unsupported (a
+/// required glTF extension that is not known, glTF 1.0).
+[[nodiscard]] Result<Mesh> readMesh(const std::filesystem::path& path, Job& job,
+                                    const MeshOptions& options = {});
+
+/// The same for a file in memory. `path` tells the format where the bytes do not, and the folder in
+/// which buffers, material files and textures are looked for.
+[[nodiscard]] Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
+                                    const MeshOptions& options = {});
+
+/// A cloud of points for writePoints(). `colours` and `normals` are empty or as long as `positions`.
+struct PointCloud {
+    std::span<const glm::vec3> positions;
+    std::span<const glm::u8vec4> colours;  ///< sRGB, straight alpha
+    std::span<const glm::vec3> normals;    ///< unit
+    bool alpha = false;                    ///< write the colours' alpha, too
+};
+
+/// How writePoints() codes .drc; .ply is always exact.
+struct PointWriteOptions {
+    /// Bits per coordinate in .drc, 1..30 (of the cloud's largest extent); 0 = exact floats.
+    int positionBits = 0;
+    int normalBits = 10;  ///< bits per octahedral coordinate in .drc, 2..30; 0 = exact floats
+    OutputFile::Options file;
+};
+
+/// Writes points as binary little-endian PLY or Draco, by the ending of `path` (.ply or .drc), whole
+/// or not at all. The same input gives the same bytes. Errors: usage (another ending), invalidInput
+/// (no points, arrays of unlike length, values that are not finite), io.
+[[nodiscard]] Result<void> writePoints(const std::filesystem::path& path, const PointCloud& points,
+                                       const PointWriteOptions& options = {});
+
+}  // namespace stx

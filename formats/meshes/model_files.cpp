@@ -1,0 +1,105 @@
+#include "formats/meshes/model_files.hpp"
+
+#include <algorithm>
+
+#include "formats/images/images.hpp"
+
+namespace stx {
+
+Result<Bytes> ModelFiles::read(std::string_view name) const {
+    auto path = resolveInside(folder_, name, job_.limits);
+    if (!path && path.error().code == ErrorCode::io && name.find('\\') != std::string_view::npos) {
+        std::string slashes(name);
+        std::replace(slashes.begin(), slashes.end(), '\\', '/');
+        path = resolveInside(folder_, slashes, job_.limits);
+    }
+    if (!path) return propagate(path);
+    return readFile(*path, job_.limits);
+}
+
+std::optional<int> ModelFiles::known(std::string_view name, SamplerState s,
+                                     std::vector<MeshTexture>& textures) {
+    const auto it = first_.find(name);
+    if (it == first_.end()) return std::nullopt;
+    if (it->second < 0) return -1;
+    const Key key{std::string(name), s.wrapU, s.wrapV, s.nearest};
+    if (const auto same = textures_.find(key); same != textures_.end()) return same->second;
+    MeshTexture copy = textures[static_cast<std::size_t>(it->second)];
+    copy.wrapU = s.wrapU;
+    copy.wrapV = s.wrapV;
+    copy.nearest = s.nearest;
+    pixelBytes_ += copy.pixels.count() * sizeof(glm::u8vec4);
+    const int index = static_cast<int>(textures.size());
+    textures.push_back(std::move(copy));
+    textures_[key] = index;
+    return index;
+}
+
+Result<int> ModelFiles::textureFromFile(std::string_view name, SamplerState sampler,
+                                        std::vector<MeshTexture>& textures) {
+    if (const auto index = known(name, sampler, textures)) return *index;
+    const auto bytes = read(name);
+    if (!bytes) {
+        if (bytes.error().code != ErrorCode::io)
+            return tl::unexpected(bytes.error().at(fmt::format("texture '{}'", name)));
+        job_.note(fmt::format("texture '{}' cannot be read; the plain colour is used instead", name));
+        first_.emplace(std::string(name), -1);
+        return -1;
+    }
+    return textureFromBytes(*bytes, name, sampler, textures);
+}
+
+Result<int> ModelFiles::textureFromBytes(ByteSpan bytes, std::string_view name, SamplerState sampler,
+                                         std::vector<MeshTexture>& textures) {
+    if (const auto index = known(name, sampler, textures)) return *index;
+    const auto decoded = decodeImage(bytes, name, job_.limits);
+    if (!decoded) {
+        if (decoded.error().code == ErrorCode::failed) return tl::unexpected(decoded.error());
+        job_.note(fmt::format("texture '{}' cannot be decoded ({}); the plain colour is used instead",
+                              name, decoded.error().message));
+        first_.emplace(std::string(name), -1);
+        return -1;
+    }
+    MeshTexture texture{rgba8From(*decoded), sampler.wrapU, sampler.wrapV, sampler.nearest};
+    pixelBytes_ += texture.pixels.count() * sizeof(glm::u8vec4);
+    if (pixelBytes_ > job_.limits.maxMemoryBytes)
+        return fail(ErrorCode::invalidInput,
+                    "the model's textures together need more than the memory limit of {} MiB; raise "
+                    "it with --max-memory if the file is to be trusted",
+                    job_.limits.maxMemoryBytes >> 20);
+    const int index = static_cast<int>(textures.size());
+    textures.push_back(std::move(texture));
+    first_.emplace(std::string(name), index);
+    textures_.emplace(Key{std::string(name), sampler.wrapU, sampler.wrapV, sampler.nearest}, index);
+    return index;
+}
+
+std::string percentDecoded(std::string_view uri) {
+    const auto digit = [](char c) {
+        if (c >= '0' && c <= '9') return c - '0';
+        if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+        if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+        return -1;
+    };
+    std::string text;
+    for (std::size_t i = 0; i < uri.size(); ++i) {
+        if (uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0) {
+            text += static_cast<char>(digit(uri[i + 1]) * 16 + digit(uri[i + 2]));
+            i += 2;
+        } else {
+            text += uri[i];
+        }
+    }
+    return text;
+}
+
+bool hasUriScheme(std::string_view name) {
+    const auto colon = name.find(':');
+    if (colon == std::string_view::npos || colon < 2) return false;
+    return std::all_of(name.begin(), name.begin() + static_cast<std::ptrdiff_t>(colon), [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' ||
+               c == '-' || c == '.';
+    });
+}
+
+}  // namespace stx
