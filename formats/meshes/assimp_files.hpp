@@ -11,7 +11,8 @@
 
 namespace stx {
 
-/// The only files that Assimp sees: the model's bytes in memory, and what ModelFiles opens beside it.
+/// The only files that Assimp sees: the model's bytes in memory, and what ModelFiles opens beside
+/// it.
 class AssimpFiles final : public Assimp::IOSystem {
   public:
     /// A name that does not exist on any disk, so that nothing is opened but through this class.

@@ -1,7 +1,7 @@
-#include <assimp/Importer.hpp>
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
+#include <assimp/Importer.hpp>
 
 #include <new>
 
@@ -17,14 +17,19 @@ namespace {
 
 const char* endingOf(AssimpFormat format) {
     switch (format) {
-        case AssimpFormat::obj: return "obj";
-        case AssimpFormat::ply: return "ply";
-        case AssimpFormat::stl: return "stl";
+        case AssimpFormat::obj:
+            return "obj";
+        case AssimpFormat::ply:
+            return "ply";
+        case AssimpFormat::stl:
+            return "stl";
     }
     return "";
 }
 
-glm::vec3 toVec3(const aiVector3D& v) { return {v.x, v.y, v.z}; }
+glm::vec3 toVec3(const aiVector3D& v) {
+    return {v.x, v.y, v.z};
+}
 
 class SceneConverter {
   public:
@@ -70,23 +75,27 @@ class SceneConverter {
             source.Get(AI_MATKEY_OPACITY, opacity);
         if (opacity <= 0.0f) {
             // Some programs write Tr as d; nobody means an object that cannot be seen.
-            files_.job().note(fmt::format("material '{}' would be invisible; it is taken as opaque", m.name));
+            files_.job().note(
+                fmt::format("material '{}' would be invisible; it is taken as opaque", m.name));
         } else if (opacity < 1.0f) {
             m.baseColour.a = opacity;
             m.alpha = Material::Alpha::blend;
         }
         for (const auto& option : mtl.droppedOptions)
-            files_.job().note(fmt::format("material '{}': option {} of map_Kd is dropped", m.name, option));
+            files_.job().note(
+                fmt::format("material '{}': option {} of map_Kd is dropped", m.name, option));
 
         if (hasMap) {
             STX_TRY(m.baseColourTexture, texture(source, aiTextureType_DIFFUSE, path));
-            if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap) m.alpha = Material::Alpha::blend;
+            if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap)
+                m.alpha = Material::Alpha::blend;
         }
         if (source.GetTexture(aiTextureType_NORMALS, 0, &path) == aiReturn_SUCCESS) {
             STX_TRY(m.normalTexture, texture(source, aiTextureType_NORMALS, path));
         }
         if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap)
-            files_.job().note(fmt::format("material '{}': map_d '{}' is dropped", m.name, mtl.alphaMap));
+            files_.job().note(
+                fmt::format("material '{}': map_d '{}' is dropped", m.name, mtl.alphaMap));
         for (const auto& [type, label] : {std::pair{aiTextureType_HEIGHT, "bump map"},
                                           {aiTextureType_DISPLACEMENT, "displacement map"},
                                           {aiTextureType_EMISSIVE, "emissive map"}}) {
@@ -105,8 +114,10 @@ class SceneConverter {
         };
         SamplerState state;
         int mode = aiTextureMapMode_Wrap;
-        if (material.Get(AI_MATKEY_MAPPINGMODE_U(type, 0), mode) == aiReturn_SUCCESS) state.wrapU = wrap(mode);
-        if (material.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode) == aiReturn_SUCCESS) state.wrapV = wrap(mode);
+        if (material.Get(AI_MATKEY_MAPPINGMODE_U(type, 0), mode) == aiReturn_SUCCESS)
+            state.wrapU = wrap(mode);
+        if (material.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode) == aiReturn_SUCCESS)
+            state.wrapV = wrap(mode);
         return files_.textureFromFile(path.C_Str(), state, builder_.textures());
     }
 
@@ -121,16 +132,19 @@ class SceneConverter {
 
     Result<void> convertMesh(const aiMesh& mesh, const aiMatrix4x4& worldFromMesh) {
         MeshPart part;
-        part.where = mesh.mName.length > 0 ? fmt::format("mesh '{}'", mesh.mName.C_Str()) : "the mesh";
+        part.where =
+            mesh.mName.length > 0 ? fmt::format("mesh '{}'", mesh.mName.C_Str()) : "the mesh";
         const std::size_t count = mesh.mNumVertices;
         STX_CHECK(builder_.charge(count, 80, part.where));
         part.material = mesh.mMaterialIndex < builder_.materials().size() ? mesh.mMaterialIndex : 0;
         const bool moved = !worldFromMesh.IsIdentity();
         for (std::size_t i = 0; i < count; ++i)
-            part.positions.push_back(toVec3(moved ? worldFromMesh * mesh.mVertices[i] : mesh.mVertices[i]));
+            part.positions.push_back(
+                toVec3(moved ? worldFromMesh * mesh.mVertices[i] : mesh.mVertices[i]));
         // A facet's normal in STL is often wrong or zero, and says no more than its corners.
         if (mesh.mNormals && format_ != AssimpFormat::stl) {
-            for (std::size_t i = 0; i < count; ++i) part.normals.push_back(toVec3(mesh.mNormals[i]));
+            for (std::size_t i = 0; i < count; ++i)
+                part.normals.push_back(toVec3(mesh.mNormals[i]));
         }
         if (const auto* colours = mesh.mColors[0]) {
             for (std::size_t i = 0; i < count; ++i)
@@ -139,7 +153,8 @@ class SceneConverter {
         }
         if (const auto* uvs = mesh.mTextureCoords[0]) {
             // v runs up in these formats, down in Mesh.
-            for (std::size_t i = 0; i < count; ++i) part.uvs.emplace_back(uvs[i].x, 1.0f - uvs[i].y);
+            for (std::size_t i = 0; i < count; ++i)
+                part.uvs.emplace_back(uvs[i].x, 1.0f - uvs[i].y);
         }
         std::size_t points = 0;
         part.triangles.reserve(mesh.mNumFaces);
@@ -156,9 +171,10 @@ class SceneConverter {
         if (part.triangles.empty() && !part.points) return {};
         const auto& material = builder_.materials()[part.material];
         if (material.baseColourTexture >= 0 && part.uvs.empty()) {
-            files_.job().note(fmt::format("{} has the textured material '{}' but no texture coordinates; the "
-                                          "plain colour is used",
-                                          part.where, material.name));
+            files_.job().note(
+                fmt::format("{} has the textured material '{}' but no texture coordinates; the "
+                            "plain colour is used",
+                            part.where, material.name));
             auto plain = material;
             plain.baseColourTexture = plain.normalTexture = -1;
             part.material = static_cast<std::uint32_t>(builder_.materials().size());
@@ -196,15 +212,15 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (!scene) {
             std::string reason = importer.GetErrorString();
             std::replace(reason.begin(), reason.end(), '\n', ' ');
-            return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}", endingOf(format),
-                        reason.empty() ? "no reason given" : reason);
+            return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
+                        endingOf(format), reason.empty() ? "no reason given" : reason);
         }
         return SceneConverter(*scene, format, files, system->sideTexts()).convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::invalidInput, "the model needs more memory than there is");
     } catch (const std::exception& e) {
-        return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}", endingOf(format),
-                    e.what());
+        return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
+                    endingOf(format), e.what());
     }
 }
 

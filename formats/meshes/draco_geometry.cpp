@@ -17,8 +17,8 @@ struct HeaderCounts {
     std::uint64_t faces = 0;
 };
 
-/// The counts that a stream's header claims (Draco bitstream specification, sections 3 to 6), so that
-/// they are held against the memory limit before the library believes them.
+/// The counts that a stream's header claims (Draco bitstream specification, sections 3 to 6), so
+/// that they are held against the memory limit before the library believes them.
 Result<HeaderCounts> readCounts(ByteSpan bytes) {
     const auto damaged = [](const char* what) {
         return fail(ErrorCode::invalidInput, "the Draco stream ends inside its {}", what);
@@ -30,8 +30,8 @@ Result<HeaderCounts> readCounts(ByteSpan bytes) {
     const bool isEdgebreaker = isMesh && std::to_integer<int>(bytes[8]) == 1;
     const int version = major * 256 + minor;
     if (version > 0x0202)
-        return fail(ErrorCode::unsupported, "the Draco stream has version {}.{}, known are those up to 2.2",
-                    major, minor);
+        return fail(ErrorCode::unsupported,
+                    "the Draco stream has version {}.{}, known are those up to 2.2", major, minor);
     draco::DecoderBuffer buffer;
     buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size(),
                 static_cast<std::uint16_t>(version));
@@ -68,11 +68,16 @@ Result<HeaderCounts> readCounts(ByteSpan bytes) {
 
 DracoGeometry::Kind kindOf(draco::GeometryAttribute::Type type) {
     switch (type) {
-        case draco::GeometryAttribute::POSITION: return DracoGeometry::Kind::position;
-        case draco::GeometryAttribute::NORMAL: return DracoGeometry::Kind::normal;
-        case draco::GeometryAttribute::COLOR: return DracoGeometry::Kind::colour;
-        case draco::GeometryAttribute::TEX_COORD: return DracoGeometry::Kind::texCoord;
-        default: return DracoGeometry::Kind::generic;
+        case draco::GeometryAttribute::POSITION:
+            return DracoGeometry::Kind::position;
+        case draco::GeometryAttribute::NORMAL:
+            return DracoGeometry::Kind::normal;
+        case draco::GeometryAttribute::COLOR:
+            return DracoGeometry::Kind::colour;
+        case draco::GeometryAttribute::TEX_COORD:
+            return DracoGeometry::Kind::texCoord;
+        default:
+            return DracoGeometry::Kind::generic;
     }
 }
 
@@ -120,7 +125,9 @@ Result<DracoGeometry> DracoGeometry::decode(ByteSpan bytes, const Charge& charge
     return result;
 }
 
-std::size_t DracoGeometry::pointCount() const { return geometry_->num_points(); }
+std::size_t DracoGeometry::pointCount() const {
+    return geometry_->num_points();
+}
 
 std::vector<glm::uvec3> DracoGeometry::triangles() const {
     std::vector<glm::uvec3> triangles;

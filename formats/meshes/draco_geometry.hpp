@@ -35,9 +35,10 @@ class DracoGeometry {
     [[nodiscard]] std::size_t pointCount() const;
     [[nodiscard]] const std::vector<Attribute>& attributes() const { return attributes_; }
     [[nodiscard]] std::vector<glm::uvec3> triangles() const;
-    /// pointCount() x components values of an attribute; integers are divided by their type's largest
-    /// value when `normalise`.
-    [[nodiscard]] Result<std::vector<float>> values(const Attribute& attribute, bool normalise) const;
+    /// pointCount() x components values of an attribute; integers are divided by their type's
+    /// largest value when `normalise`.
+    [[nodiscard]] Result<std::vector<float>> values(const Attribute& attribute,
+                                                    bool normalise) const;
 
   private:
     std::shared_ptr<draco::PointCloud> geometry_;

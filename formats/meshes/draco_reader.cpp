@@ -7,7 +7,8 @@ namespace stx {
 
 Result<Mesh> readDraco(ByteSpan bytes, Job& job) {
     MeshBuilder builder(job);
-    STX_TRY(const auto geometry, DracoGeometry::decode(bytes, [&](std::uint64_t n, std::uint64_t each) {
+    STX_TRY(const auto geometry,
+            DracoGeometry::decode(bytes, [&](std::uint64_t n, std::uint64_t each) {
                 return builder.charge(n, each, "the Draco stream");
             }));
     using Kind = DracoGeometry::Kind;
@@ -21,8 +22,8 @@ Result<Mesh> readDraco(ByteSpan bytes, Job& job) {
         const bool isInteger = !a.isFloat;
         if (a.kind == Kind::position && part.positions.empty()) {
             if (a.components != 3)
-                return fail(ErrorCode::invalidInput, "the Draco positions have {} components, expected 3",
-                            a.components);
+                return fail(ErrorCode::invalidInput,
+                            "the Draco positions have {} components, expected 3", a.components);
             STX_TRY(const auto v, geometry.values(a, false));
             for (std::size_t i = 0; i < count; ++i)
                 part.positions.emplace_back(v[i * 3], v[i * 3 + 1], v[i * 3 + 2]);
@@ -33,7 +34,8 @@ Result<Mesh> readDraco(ByteSpan bytes, Job& job) {
         } else if (a.kind == Kind::texCoord && a.components == 2 && part.uvs.empty()) {
             STX_TRY(const auto v, geometry.values(a, false));
             // The encoder takes them from OBJ and PLY, where v runs up.
-            for (std::size_t i = 0; i < count; ++i) part.uvs.emplace_back(v[i * 2], 1.0f - v[i * 2 + 1]);
+            for (std::size_t i = 0; i < count; ++i)
+                part.uvs.emplace_back(v[i * 2], 1.0f - v[i * 2 + 1]);
         } else if (a.kind == Kind::colour && a.components >= 1 && a.components <= 4 &&
                    part.colours.empty()) {
             STX_TRY(const auto v, geometry.values(a, isInteger));
@@ -42,7 +44,9 @@ Result<Mesh> readDraco(ByteSpan bytes, Job& job) {
                 const float* c = &v[i * n];
                 const bool grey = n < 3;
                 part.colours.emplace_back(c[0], grey ? c[0] : c[1], grey ? c[0] : c[2],
-                                          n == 2 ? c[1] : n == 4 ? c[3] : 1.0f);
+                                          n == 2   ? c[1]
+                                          : n == 4 ? c[3]
+                                                   : 1.0f);
             }
             linearFromSrgbColours(part.colours, a.isFloat);
         } else {

@@ -8,9 +8,15 @@
 namespace stx {
 namespace {
 
-bool finite(glm::vec2 v) { return std::isfinite(v.x) && std::isfinite(v.y); }
-bool finite(glm::vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-bool finite(glm::vec4 v) { return finite(glm::vec3(v)) && std::isfinite(v.w); }
+bool finite(glm::vec2 v) {
+    return std::isfinite(v.x) && std::isfinite(v.y);
+}
+bool finite(glm::vec3 v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+bool finite(glm::vec4 v) {
+    return finite(glm::vec3(v)) && std::isfinite(v.w);
+}
 
 glm::dvec3 areaNormal(const std::vector<glm::vec3>& positions, glm::uvec3 t) {
     const glm::dvec3 a(positions[t.x]), b(positions[t.y]), c(positions[t.z]);
@@ -38,14 +44,16 @@ constexpr glm::vec3 kNoNormal{0.0f};
 
 }  // namespace
 
-Result<void> MeshBuilder::charge(std::uint64_t count, std::uint64_t bytesEach, std::string_view what) {
+Result<void> MeshBuilder::charge(std::uint64_t count, std::uint64_t bytesEach,
+                                 std::string_view what) {
     STX_CHECK(job_.limits.checkAllocation(count, bytesEach, what));
     charged_ += count * bytesEach;
     if (charged_ > job_.limits.maxMemoryBytes)
-        return fail(ErrorCode::invalidInput,
-                    "{} brings the model past the memory limit of {} MiB; raise it with --max-memory "
-                    "if the file is to be trusted",
-                    what, job_.limits.maxMemoryBytes >> 20);
+        return fail(
+            ErrorCode::invalidInput,
+            "{} brings the model past the memory limit of {} MiB; raise it with --max-memory "
+            "if the file is to be trusted",
+            what, job_.limits.maxMemoryBytes >> 20);
     return {};
 }
 
@@ -57,23 +65,24 @@ Result<void> MeshBuilder::add(MeshPart part) {
         const auto p = part.positions[i];
         if (!finite(p))
             return fail(ErrorCode::invalidInput,
-                        "{}: vertex {} is at ({}, {}, {}); positions must be finite numbers", part.where,
-                        i, p.x, p.y, p.z);
+                        "{}: vertex {} is at ({}, {}, {}); positions must be finite numbers",
+                        part.where, i, p.x, p.y, p.z);
     }
     for (std::size_t i = 0; i < part.triangles.size(); ++i) {
         const auto t = part.triangles[i];
         const auto largest = std::max({t.x, t.y, t.z});
         if (largest >= count)
             return fail(ErrorCode::invalidInput,
-                        "{}: triangle {} uses vertex {}, but there are only {} vertices", part.where, i,
-                        largest, count);
+                        "{}: triangle {} uses vertex {}, but there are only {} vertices",
+                        part.where, i, largest, count);
     }
     const auto before = mesh_.positions.size();
     STX_CHECK(charge(count, sizeof(glm::vec3) * 2 + sizeof(glm::vec4) * 2 + sizeof(glm::vec2) * 2,
                      part.where));
     STX_CHECK(charge(part.triangles.size(), sizeof(glm::uvec3) + 4, part.where));
     if (before + count > std::numeric_limits<std::uint32_t>::max())
-        return fail(ErrorCode::invalidInput, "{}: the model has more than 2^32 vertices", part.where);
+        return fail(ErrorCode::invalidInput, "{}: the model has more than 2^32 vertices",
+                    part.where);
     repair(part);
 
     const auto added = part.positions.size();
@@ -111,12 +120,16 @@ void MeshBuilder::repair(MeshPart& part) {
     for (auto& uv : part.normalUvs) {
         if (!finite(uv)) uv = glm::vec2(0), broken = true;
     }
-    if (broken) job_.note(fmt::format("{}: texture coordinates that are not finite are taken as 0", part.where));
+    if (broken)
+        job_.note(
+            fmt::format("{}: texture coordinates that are not finite are taken as 0", part.where));
     broken = false;
     for (auto& c : part.colours) {
         if (!finite(c)) c = glm::vec4(0, 0, 0, 1), broken = true;
     }
-    if (broken) job_.note(fmt::format("{}: vertex colours that are not finite are taken as black", part.where));
+    if (broken)
+        job_.note(
+            fmt::format("{}: vertex colours that are not finite are taken as black", part.where));
 
     std::size_t brokenNormals = 0;
     for (auto& n : part.normals) {
@@ -195,7 +208,8 @@ Result<Mesh> MeshBuilder::finish() {
     if (mesh_.triangles.empty() && mesh_.points.empty()) {
         if (flatTriangles_ > 0)
             return fail(ErrorCode::invalidInput,
-                        "the model has {} triangles, but none with an area, and no points", flatTriangles_);
+                        "the model has {} triangles, but none with an area, and no points",
+                        flatTriangles_);
         return fail(ErrorCode::invalidInput,
                     "the model has neither triangles nor points; there is nothing to see");
     }
@@ -235,7 +249,8 @@ void addTangents(MeshPart& part) {
     std::vector<glm::dvec3> along(part.positions.size(), glm::dvec3(0)), across = along;
     for (const auto& t : part.triangles) {
         const glm::dvec3 p0(part.positions[t.x]);
-        const auto e1 = glm::dvec3(part.positions[t.y]) - p0, e2 = glm::dvec3(part.positions[t.z]) - p0;
+        const auto e1 = glm::dvec3(part.positions[t.y]) - p0,
+                   e2 = glm::dvec3(part.positions[t.z]) - p0;
         const auto d1 = glm::dvec2(uvs[t.y]) - glm::dvec2(uvs[t.x]);
         const auto d2 = glm::dvec2(uvs[t.z]) - glm::dvec2(uvs[t.x]);
         const double det = d1.x * d2.y - d2.x * d1.y;
@@ -252,7 +267,8 @@ void addTangents(MeshPart& part) {
         auto tangent = along[i] - n * glm::dot(n, along[i]);
         if (!(glm::length(tangent) > 0)) {
             // No direction in the uvs: any one across the normal will do.
-            tangent = glm::cross(std::abs(n.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0), n);
+            tangent =
+                glm::cross(std::abs(n.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0), n);
         }
         tangent = glm::normalize(tangent);
         // v runs down in Mesh, so the bitangent (the direction of green) is the opposite of dP/dv.
@@ -292,7 +308,8 @@ void weldVertices(MeshPart& part) {
         if (!part.normals.empty()) std::memcpy(key.values + 3, &part.normals[v], 12);
         if (!part.colours.empty()) std::memcpy(key.values + 6, &part.colours[v], 16);
         if (!part.uvs.empty()) std::memcpy(key.values + 10, &part.uvs[v], 8);
-        const auto [it, isNew] = known.try_emplace(key, static_cast<std::uint32_t>(out.positions.size()));
+        const auto [it, isNew] =
+            known.try_emplace(key, static_cast<std::uint32_t>(out.positions.size()));
         if (isNew) {
             out.positions.push_back(part.positions[v]);
             if (!part.normals.empty()) out.normals.push_back(part.normals[v]);

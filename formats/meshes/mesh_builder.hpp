@@ -35,8 +35,8 @@ class MeshBuilder {
     [[nodiscard]] Result<void> charge(std::uint64_t count, std::uint64_t bytesEach,
                                       std::string_view what);
 
-    /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite, an
-    /// index out of range. Triangles without area are left out and counted; normals that are no
+    /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite,
+    /// an index out of range. Triangles without area are left out and counted; normals that are no
     /// directions are replaced by those of the triangles; uvs and colours that are not finite
     /// become 0.
     [[nodiscard]] Result<void> add(MeshPart part);

@@ -26,7 +26,8 @@ Format formatOfBytes(ByteSpan head) {
     auto text = textOf(head);
     if (text.starts_with("glTF")) return Format::glb;
     if (text.starts_with("DRACO")) return Format::draco;
-    if (text.starts_with("ply") && text.size() > 3 && (text[3] == '\n' || text[3] == '\r' || text[3] == ' '))
+    if (text.starts_with("ply") && text.size() > 3 &&
+        (text[3] == '\n' || text[3] == '\r' || text[3] == ' '))
         return Format::ply;
     return Format::none;
 }
@@ -49,7 +50,8 @@ Format formatOfText(ByteSpan head) {
     if (first != std::string_view::npos && text[first] == '{' &&
         text.find("\"asset\"") != std::string_view::npos)
         return Format::gltf;
-    if (text.starts_with("solid ") && text.find("facet") != std::string_view::npos) return Format::stl;
+    if (text.starts_with("solid ") && text.find("facet") != std::string_view::npos)
+        return Format::stl;
     return Format::none;
 }
 
@@ -70,12 +72,14 @@ std::filesystem::path textureBeside(const std::filesystem::path& model) {
     if (word.size() < 3) return {};
     std::filesystem::path found;
     std::error_code error;
-    for (std::filesystem::directory_iterator it(model.parent_path().empty() ? "." : model.parent_path(), error),
+    for (std::filesystem::directory_iterator
+             it(model.parent_path().empty() ? "." : model.parent_path(), error),
          end;
          !error && it != end; it.increment(error)) {
         const auto ending = lowerCase(it->path().extension().string());
-        const bool isImage = ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".tga" ||
-                             ending == ".bmp" || ending == ".webp" || ending == ".tif" || ending == ".tiff";
+        const bool isImage = ending == ".png" || ending == ".jpg" || ending == ".jpeg" ||
+                             ending == ".tga" || ending == ".bmp" || ending == ".webp" ||
+                             ending == ".tif" || ending == ".tiff";
         std::error_code ignored;
         if (!isImage || firstWord(it->path()) != word || !it->is_regular_file(ignored)) continue;
         if (!found.empty()) return {};
@@ -97,22 +101,30 @@ Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job)
     return {};
 }
 
-Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path, Job& job) {
-    const auto folder = path.parent_path().empty() || path == "-" ? std::filesystem::path(".")
-                                                                  : path.parent_path();
+Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path,
+                        Job& job) {
+    const auto folder =
+        path.parent_path().empty() || path == "-" ? std::filesystem::path(".") : path.parent_path();
     ModelFiles files(folder, job);
     const auto name = path.filename().string();
     switch (format) {
         case Format::gltf:
-        case Format::glb: return readGltf(bytes, files);
-        case Format::draco: return readDraco(bytes, job);
-        case Format::obj: return readWithAssimp(bytes, AssimpFormat::obj, name, files);
-        case Format::ply: return readWithAssimp(bytes, AssimpFormat::ply, name, files);
-        case Format::stl: return readWithAssimp(bytes, AssimpFormat::stl, name, files);
-        case Format::none: break;
+        case Format::glb:
+            return readGltf(bytes, files);
+        case Format::draco:
+            return readDraco(bytes, job);
+        case Format::obj:
+            return readWithAssimp(bytes, AssimpFormat::obj, name, files);
+        case Format::ply:
+            return readWithAssimp(bytes, AssimpFormat::ply, name, files);
+        case Format::stl:
+            return readWithAssimp(bytes, AssimpFormat::stl, name, files);
+        case Format::none:
+            break;
     }
-    return fail(ErrorCode::invalidInput,
-                "the file is no model that is known here: glTF, GLB, OBJ, PLY, STL or Draco (.drc)");
+    return fail(
+        ErrorCode::invalidInput,
+        "the file is no model that is known here: glTF, GLB, OBJ, PLY, STL or Draco (.drc)");
 }
 
 }  // namespace
@@ -131,22 +143,25 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
     const auto where = fmt::format("'{}'", path.string());
     if (bytes.empty())
         return failAt(where, ErrorCode::invalidInput, "the file is empty; expected a model");
-    const auto format = formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
+    const auto format =
+        formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
     auto mesh = readFormat(format, bytes, path, job);
     if (!mesh) return tl::unexpected(mesh.error().at(where));
 
     if (!options.texture.empty()) {
         if (mesh->uvs.empty())
-            return failAt(where, ErrorCode::usage,
-                          "the model has no texture coordinates, so the texture '{}' cannot be put on it",
-                          options.texture.string());
+            return failAt(
+                where, ErrorCode::usage,
+                "the model has no texture coordinates, so the texture '{}' cannot be put on it",
+                options.texture.string());
         STX_CHECK(addTexture(*mesh, options.texture, job));
-    } else if (format == Format::obj && mesh->textures.empty() && !mesh->uvs.empty() && path != "-" &&
-               textOf(bytes).find("mtllib") == std::string_view::npos) {
+    } else if (format == Format::obj && mesh->textures.empty() && !mesh->uvs.empty() &&
+               path != "-" && textOf(bytes).find("mtllib") == std::string_view::npos) {
         if (const auto beside = textureBeside(path); !beside.empty()) {
             if (addTexture(*mesh, beside, job))
-                job.note(fmt::format("the model names no material; '{}' beside it is taken as its texture",
-                                     beside.filename().string()));
+                job.note(fmt::format(
+                    "the model names no material; '{}' beside it is taken as its texture",
+                    beside.filename().string()));
         }
     }
     return mesh;

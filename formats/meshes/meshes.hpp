@@ -13,8 +13,8 @@ namespace stx {
 
 /// What a caller knows about a model and the file does not say.
 struct MeshOptions {
-    /// Base colour texture for every material that has none (`--texture FILE`); empty = none. Opened
-    /// as it is given: the caller named it, not the model.
+    /// Base colour texture for every material that has none (`--texture FILE`); empty = none.
+    /// Opened as it is given: the caller named it, not the model.
     std::filesystem::path texture;
 };
 
@@ -47,7 +47,8 @@ struct MeshOptions {
 [[nodiscard]] Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
                                     const MeshOptions& options = {});
 
-/// A cloud of points for writePoints(). `colours` and `normals` are empty or as long as `positions`.
+/// A cloud of points for writePoints(). `colours` and `normals` are empty or as long as
+/// `positions`.
 struct PointCloud {
     std::span<const glm::vec3> positions;
     std::span<const glm::u8vec4> colours;  ///< sRGB, straight alpha
@@ -63,9 +64,9 @@ struct PointWriteOptions {
     OutputFile::Options file;
 };
 
-/// Writes points as binary little-endian PLY or Draco, by the ending of `path` (.ply or .drc), whole
-/// or not at all. The same input gives the same bytes. Errors: usage (another ending), invalidInput
-/// (no points, arrays of unlike length, values that are not finite), io.
+/// Writes points as binary little-endian PLY or Draco, by the ending of `path` (.ply or .drc),
+/// whole or not at all. The same input gives the same bytes. Errors: usage (another ending),
+/// invalidInput (no points, arrays of unlike length, values that are not finite), io.
 [[nodiscard]] Result<void> writePoints(const std::filesystem::path& path, const PointCloud& points,
                                        const PointWriteOptions& options = {});
 

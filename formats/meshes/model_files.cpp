@@ -42,31 +42,34 @@ Result<int> ModelFiles::textureFromFile(std::string_view name, SamplerState samp
     if (!bytes) {
         if (bytes.error().code != ErrorCode::io)
             return tl::unexpected(bytes.error().at(fmt::format("texture '{}'", name)));
-        job_.note(fmt::format("texture '{}' cannot be read; the plain colour is used instead", name));
+        job_.note(
+            fmt::format("texture '{}' cannot be read; the plain colour is used instead", name));
         first_.emplace(std::string(name), -1);
         return -1;
     }
     return textureFromBytes(*bytes, name, sampler, textures);
 }
 
-Result<int> ModelFiles::textureFromBytes(ByteSpan bytes, std::string_view name, SamplerState sampler,
-                                         std::vector<MeshTexture>& textures) {
+Result<int> ModelFiles::textureFromBytes(ByteSpan bytes, std::string_view name,
+                                         SamplerState sampler, std::vector<MeshTexture>& textures) {
     if (const auto index = known(name, sampler, textures)) return *index;
     const auto decoded = decodeImage(bytes, name, job_.limits);
     if (!decoded) {
         if (decoded.error().code == ErrorCode::failed) return tl::unexpected(decoded.error());
-        job_.note(fmt::format("texture '{}' cannot be decoded ({}); the plain colour is used instead",
-                              name, decoded.error().message));
+        job_.note(
+            fmt::format("texture '{}' cannot be decoded ({}); the plain colour is used instead",
+                        name, decoded.error().message));
         first_.emplace(std::string(name), -1);
         return -1;
     }
     MeshTexture texture{rgba8From(*decoded), sampler.wrapU, sampler.wrapV, sampler.nearest};
     pixelBytes_ += texture.pixels.count() * sizeof(glm::u8vec4);
     if (pixelBytes_ > job_.limits.maxMemoryBytes)
-        return fail(ErrorCode::invalidInput,
-                    "the model's textures together need more than the memory limit of {} MiB; raise "
-                    "it with --max-memory if the file is to be trusted",
-                    job_.limits.maxMemoryBytes >> 20);
+        return fail(
+            ErrorCode::invalidInput,
+            "the model's textures together need more than the memory limit of {} MiB; raise "
+            "it with --max-memory if the file is to be trusted",
+            job_.limits.maxMemoryBytes >> 20);
     const int index = static_cast<int>(textures.size());
     textures.push_back(std::move(texture));
     first_.emplace(std::string(name), index);
@@ -83,7 +86,8 @@ std::string percentDecoded(std::string_view uri) {
     };
     std::string text;
     for (std::size_t i = 0; i < uri.size(); ++i) {
-        if (uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0) {
+        if (uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 &&
+            digit(uri[i + 2]) >= 0) {
             text += static_cast<char>(digit(uri[i + 1]) * 16 + digit(uri[i + 2]));
             i += 2;
         } else {
@@ -97,8 +101,8 @@ bool hasUriScheme(std::string_view name) {
     const auto colon = name.find(':');
     if (colon == std::string_view::npos || colon < 2) return false;
     return std::all_of(name.begin(), name.begin() + static_cast<std::ptrdiff_t>(colon), [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' ||
-               c == '-' || c == '.';
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '+' || c == '-' || c == '.';
     });
 }
 

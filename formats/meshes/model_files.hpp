@@ -33,7 +33,8 @@ class ModelFiles {
                                               std::vector<MeshTexture>& textures);
     /// The same for an image in memory; `name` is for messages and must be the image's own.
     [[nodiscard]] Result<int> textureFromBytes(ByteSpan bytes, std::string_view name,
-                                               SamplerState sampler, std::vector<MeshTexture>& textures);
+                                               SamplerState sampler,
+                                               std::vector<MeshTexture>& textures);
 
     [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
     [[nodiscard]] Job& job() const { return job_; }

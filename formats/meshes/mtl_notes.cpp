@@ -20,7 +20,8 @@ void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& material
         text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
         const auto blank = line.find_first_of(" \t");
         const auto key = line.substr(0, blank);
-        const auto value = blank == std::string_view::npos ? std::string_view{} : trimmed(line.substr(blank));
+        const auto value =
+            blank == std::string_view::npos ? std::string_view{} : trimmed(line.substr(blank));
         if (key == "newmtl") {
             current = &materials[std::string(value)];
         } else if (!current) {

@@ -9,11 +9,11 @@ namespace stx {
 
 /// What Assimp's OBJ importer does not tell about a material of an MTL file.
 struct MtlMaterial {
-    bool hasDiffuse = false;                   ///< a Kd line
-    bool hasDissolve = false;                  ///< a d line
-    bool hasTransparency = false;              ///< a Tr line and no d line
-    std::string diffuseMap, alphaMap;          ///< last word of map_Kd, map_d
-    std::vector<std::string> droppedOptions;   ///< of map_Kd: -s, -o, …
+    bool hasDiffuse = false;                  ///< a Kd line
+    bool hasDissolve = false;                 ///< a d line
+    bool hasTransparency = false;             ///< a Tr line and no d line
+    std::string diffuseMap, alphaMap;         ///< last word of map_Kd, map_d
+    std::vector<std::string> droppedOptions;  ///< of map_Kd: -s, -o, …
 };
 
 /// Adds the materials of one MTL text to `materials`, by name.

@@ -20,12 +20,16 @@ enum ComponentType : std::uint64_t {
 int componentSize(std::uint64_t type) {
     switch (type) {
         case kByte:
-        case kUnsignedByte: return 1;
+        case kUnsignedByte:
+            return 1;
         case kShort:
-        case kUnsignedShort: return 2;
+        case kUnsignedShort:
+            return 2;
         case kUnsignedInt:
-        case kFloat: return 4;
-        default: return 0;
+        case kFloat:
+            return 4;
+        default:
+            return 0;
     }
 }
 
@@ -52,7 +56,8 @@ To convert(From value, bool normalized) {
     if constexpr (std::is_same_v<To, float>) {
         if (!std::is_floating_point_v<From> && normalized)
             return static_cast<float>(std::max(
-                static_cast<double>(value) / static_cast<double>(std::numeric_limits<From>::max()), -1.0));
+                static_cast<double>(value) / static_cast<double>(std::numeric_limits<From>::max()),
+                -1.0));
     }
     return static_cast<To>(value);
 }
@@ -60,23 +65,30 @@ To convert(From value, bool normalized) {
 template <class To>
 To component(const std::byte* at, std::uint64_t type, bool normalized) {
     switch (type) {
-        case kByte: return convert<To>(load<std::int8_t>(at), normalized);
-        case kUnsignedByte: return convert<To>(load<std::uint8_t>(at), normalized);
-        case kShort: return convert<To>(load<std::int16_t>(at), normalized);
-        case kUnsignedShort: return convert<To>(load<std::uint16_t>(at), normalized);
-        case kUnsignedInt: return convert<To>(load<std::uint32_t>(at), normalized);
-        default: return convert<To>(load<float>(at), normalized);
+        case kByte:
+            return convert<To>(load<std::int8_t>(at), normalized);
+        case kUnsignedByte:
+            return convert<To>(load<std::uint8_t>(at), normalized);
+        case kShort:
+            return convert<To>(load<std::int16_t>(at), normalized);
+        case kUnsignedShort:
+            return convert<To>(load<std::uint16_t>(at), normalized);
+        case kUnsignedInt:
+            return convert<To>(load<std::uint32_t>(at), normalized);
+        default:
+            return convert<To>(load<float>(at), normalized);
     }
 }
 
 /// Errors when `count` elements of `size` bytes, each `stride` after the last, leave the view.
-Result<void> checkRange(ByteSpan bytes, std::uint64_t offset, std::uint64_t count, std::uint64_t stride,
-                        std::uint64_t size, const std::string& where) {
+Result<void> checkRange(ByteSpan bytes, std::uint64_t offset, std::uint64_t count,
+                        std::uint64_t stride, std::uint64_t size, const std::string& where) {
     const bool fits = offset <= bytes.size() && size <= bytes.size() - offset &&
                       (count - 1) <= (bytes.size() - offset - size) / stride;
     if (fits) return {};
     return fail(ErrorCode::invalidInput,
-                "{} needs {} elements of {} bytes from byte {} on, each {} after the last, but its bufferView "
+                "{} needs {} elements of {} bytes from byte {} on, each {} after the last, but its "
+                "bufferView "
                 "has only {} bytes",
                 where, count, size, offset, stride, bytes.size());
 }
@@ -101,17 +113,19 @@ Result<Document::Layout> Document::layout(std::uint64_t index, const std::string
     l.where = fmt::format("accessors[{}] ({})", index, user);
     STX_TRY(const auto componentType, getUint(*object, "componentType", l.where));
     if (!componentType || componentSize(*componentType) == 0)
-        return fail(ErrorCode::invalidInput, "{} has componentType {}, expected 5120..5123, 5125 or 5126",
-                    l.where, componentType.value_or(0));
+        return fail(ErrorCode::invalidInput,
+                    "{} has componentType {}, expected 5120..5123, 5125 or 5126", l.where,
+                    componentType.value_or(0));
     l.componentType = *componentType;
     STX_TRY(const auto type, getString(*object, "type", l.where));
     if (!type || std::find(types.begin(), types.end(), *type) == types.end())
-        return fail(ErrorCode::invalidInput, "{} has type '{}', expected {}", l.where, type.value_or(""),
-                    fmt::join(types, " or "));
+        return fail(ErrorCode::invalidInput, "{} has type '{}', expected {}", l.where,
+                    type.value_or(""), fmt::join(types, " or "));
     l.components = componentCount(*type);
     STX_TRY(const auto count, getUint(*object, "count", l.where));
     if (count.value_or(0) == 0)
-        return fail(ErrorCode::invalidInput, "{} has no elements; count must be 1 or more", l.where);
+        return fail(ErrorCode::invalidInput, "{} has no elements; count must be 1 or more",
+                    l.where);
     l.count = *count;
     STX_TRY(const auto normalized, getBool(*object, "normalized", l.where));
     l.normalized = normalized.value_or(false);
@@ -134,8 +148,9 @@ Result<std::vector<Component>> Document::elements(const Layout& l) {
         bytes = view.bytes;
         if (view.stride != 0) stride = view.stride;
         if (stride < elementSize)
-            return fail(ErrorCode::invalidInput, "{}: byteStride {} is less than an element's {} bytes",
-                        l.where, stride, elementSize);
+            return fail(ErrorCode::invalidInput,
+                        "{}: byteStride {} is less than an element's {} bytes", l.where, stride,
+                        elementSize);
         STX_CHECK(checkRange(bytes, l.offset, l.count, stride, elementSize, l.where));
     }
     STX_CHECK(builder_->charge(l.count, components * sizeof(Component), l.where));
@@ -143,7 +158,8 @@ Result<std::vector<Component>> Document::elements(const Layout& l) {
     for (std::uint64_t i = 0; l.view && i < l.count; ++i) {
         const auto* at = bytes.data() + l.offset + i * stride;
         for (std::uint64_t c = 0; c < components; ++c)
-            values[i * components + c] = component<Component>(at + c * size, l.componentType, l.normalized);
+            values[i * components + c] =
+                component<Component>(at + c * size, l.componentType, l.normalized);
     }
     if (!l.sparse) return values;
 
@@ -151,7 +167,8 @@ Result<std::vector<Component>> Document::elements(const Layout& l) {
     STX_TRY(const auto sparseCount, getUint(*l.sparse, "count", where));
     const auto changes = sparseCount.value_or(0);
     if (changes == 0 || changes > l.count)
-        return fail(ErrorCode::invalidInput, "{} replaces {} of {} elements", where, changes, l.count);
+        return fail(ErrorCode::invalidInput, "{} replaces {} of {} elements", where, changes,
+                    l.count);
     STX_TRY(const Json* indexObject, getObject(*l.sparse, "indices", where));
     STX_TRY(const Json* valueObject, getObject(*l.sparse, "values", where));
     if (!indexObject || !valueObject)
@@ -159,12 +176,13 @@ Result<std::vector<Component>> Document::elements(const Layout& l) {
     STX_TRY(const auto indexType, getUint(*indexObject, "componentType", where + ".indices"));
     const auto type = indexType.value_or(0);
     if (type != kUnsignedByte && type != kUnsignedShort && type != kUnsignedInt)
-        return fail(ErrorCode::invalidInput, "{}.indices has componentType {}, expected 5121, 5123 or 5125",
-                    where, type);
+        return fail(ErrorCode::invalidInput,
+                    "{}.indices has componentType {}, expected 5121, 5123 or 5125", where, type);
     STX_TRY(const auto indexView, getUint(*indexObject, "bufferView", where + ".indices"));
     STX_TRY(const auto valueView, getUint(*valueObject, "bufferView", where + ".values"));
     if (!indexView || !valueView)
-        return fail(ErrorCode::invalidInput, "{}: indices and values must name a bufferView", where);
+        return fail(ErrorCode::invalidInput, "{}: indices and values must name a bufferView",
+                    where);
     STX_TRY(const auto indexOffset, getUint(*indexObject, "byteOffset", where + ".indices"));
     STX_TRY(const auto valueOffset, getUint(*valueObject, "byteOffset", where + ".values"));
     STX_TRY(const auto indexBytes, bufferView(*indexView, where));
@@ -172,13 +190,14 @@ Result<std::vector<Component>> Document::elements(const Layout& l) {
     const auto indexSize = static_cast<std::uint64_t>(componentSize(type));
     STX_CHECK(checkRange(indexBytes.bytes, indexOffset.value_or(0), changes, indexSize, indexSize,
                          where + ".indices"));
-    STX_CHECK(checkRange(valueBytes.bytes, valueOffset.value_or(0), changes, elementSize, elementSize,
-                         where + ".values"));
+    STX_CHECK(checkRange(valueBytes.bytes, valueOffset.value_or(0), changes, elementSize,
+                         elementSize, where + ".values"));
     for (std::uint64_t i = 0; i < changes; ++i) {
         const auto target = component<std::uint32_t>(
             indexBytes.bytes.data() + indexOffset.value_or(0) + i * indexSize, type, false);
         if (target >= l.count)
-            return fail(ErrorCode::invalidInput, "{} replaces element {} of {}", where, target, l.count);
+            return fail(ErrorCode::invalidInput, "{} replaces element {} of {}", where, target,
+                        l.count);
         const auto* at = valueBytes.bytes.data() + valueOffset.value_or(0) + i * elementSize;
         for (std::uint64_t c = 0; c < components; ++c)
             values[target * components + c] =
@@ -201,8 +220,9 @@ Result<std::vector<std::uint32_t>> Document::indices(std::uint64_t index, const 
     STX_TRY(const auto l, layout(index, user, {"SCALAR"}));
     if (l.componentType != kUnsignedByte && l.componentType != kUnsignedShort &&
         l.componentType != kUnsignedInt)
-        return fail(ErrorCode::invalidInput, "{} has componentType {}, but indices are 5121, 5123 or 5125",
-                    l.where, l.componentType);
+        return fail(ErrorCode::invalidInput,
+                    "{} has componentType {}, but indices are 5121, 5123 or 5125", l.where,
+                    l.componentType);
     return elements<std::uint32_t>(l);
 }
 

@@ -92,8 +92,8 @@ Result<Document> Document::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& 
         const std::uint64_t length = readU32(bytes, 8);
         if (length > bytes.size())
             return fail(ErrorCode::invalidInput,
-                        "the GLB header says {} bytes, but the file has only {}; it is cut short", length,
-                        bytes.size());
+                        "the GLB header says {} bytes, but the file has only {}; it is cut short",
+                        length, bytes.size());
         if (length < bytes.size())
             document.job().note(fmt::format("{} bytes behind the end of the GLB file are not read",
                                             bytes.size() - length));
@@ -110,8 +110,8 @@ Result<Document> Document::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& 
             at += 8;
             if (size > bytes.size() - at)
                 return fail(ErrorCode::invalidInput,
-                            "GLB chunk {} at byte {} says {} bytes, but only {} follow", chunk, at - 8,
-                            size, bytes.size() - at);
+                            "GLB chunk {} at byte {} says {} bytes, but only {} follow", chunk,
+                            at - 8, size, bytes.size() - at);
             const auto content = bytes.subspan(at, size);
             if (type == 0x4E4F534A && chunk == 0) {
                 json = content;
@@ -144,7 +144,9 @@ Result<void> Document::parse(ByteSpan bytes) {
         if (const auto bracket = what.find("] "); bracket != std::string_view::npos)
             what.remove_prefix(bracket + 2);
         std::string line(what.substr(0, 160));
-        std::replace_if(line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 32; }, ' ');
+        std::replace_if(
+            line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 32; },
+            ' ');
         return fail(ErrorCode::invalidInput, "the glTF text is no JSON: {}", line);
     }
     if (!root_.is_object())
@@ -156,26 +158,30 @@ Result<void> Document::parse(ByteSpan bytes) {
 Result<void> Document::checkAsset() {
     STX_TRY(const Json* asset, getObject(root_, "asset", ""));
     if (!asset)
-        return fail(ErrorCode::invalidInput, "the JSON has no \"asset\" object, so it is no glTF 2.0 file");
+        return fail(ErrorCode::invalidInput,
+                    "the JSON has no \"asset\" object, so it is no glTF 2.0 file");
     STX_TRY(const auto version, getString(*asset, "version", "asset"));
-    if (!version) return fail(ErrorCode::invalidInput, "asset.version is missing; expected \"2.0\"");
+    if (!version)
+        return fail(ErrorCode::invalidInput, "asset.version is missing; expected \"2.0\"");
     if (version->substr(0, 2) != "2.")
-        return fail(version->substr(0, 2) == "1." ? ErrorCode::unsupported : ErrorCode::invalidInput,
-                    "asset.version is \"{}\", expected \"2.0\"; convert the file with a glTF 2 exporter",
-                    *version);
+        return fail(
+            version->substr(0, 2) == "1." ? ErrorCode::unsupported : ErrorCode::invalidInput,
+            "asset.version is \"{}\", expected \"2.0\"; convert the file with a glTF 2 exporter",
+            *version);
     STX_TRY(const Json* required, getArray(root_, "extensionsRequired", ""));
     for (std::size_t i = 0; required && i < required->size(); ++i) {
         const auto& name = (*required)[i];
         if (!name.is_string())
-            return fail(ErrorCode::invalidInput, "extensionsRequired[{}] is a {}, expected a string", i,
-                        name.type_name());
+            return fail(ErrorCode::invalidInput,
+                        "extensionsRequired[{}] is a {}, expected a string", i, name.type_name());
         const auto& text = name.get_ref<const std::string&>();
         if (std::find(std::begin(kKnownExtensions), std::end(kKnownExtensions), text) ==
             std::end(kKnownExtensions))
-            return fail(ErrorCode::unsupported,
-                        "the file requires the glTF extension {}, which is not known here; export it "
-                        "without",
-                        text);
+            return fail(
+                ErrorCode::unsupported,
+                "the file requires the glTF extension {}, which is not known here; export it "
+                "without",
+                text);
     }
     return {};
 }
@@ -185,12 +191,14 @@ Result<Bytes> Document::uri(const std::string& uri, const std::string& user) {
         const auto comma = uri.find(',');
         const std::string_view header = std::string_view(uri).substr(0, comma);
         if (comma == std::string::npos)
-            return fail(ErrorCode::invalidInput, "{}: the data URI has no comma before its data", user);
+            return fail(ErrorCode::invalidInput, "{}: the data URI has no comma before its data",
+                        user);
         const std::string_view data = std::string_view(uri).substr(comma + 1);
         if (header.ends_with(";base64")) {
             auto bytes = decodeBase64(data);
             if (!bytes)
-                return fail(ErrorCode::invalidInput, "{}: the data URI is no valid base64 text", user);
+                return fail(ErrorCode::invalidInput, "{}: the data URI is no valid base64 text",
+                            user);
             return std::move(*bytes);
         }
         const auto text = percentDecoded(data);
@@ -198,9 +206,10 @@ Result<Bytes> Document::uri(const std::string& uri, const std::string& user) {
         return Bytes(first, first + text.size());
     }
     if (hasUriScheme(uri))
-        return fail(ErrorCode::invalidInput,
-                    "{}: '{}' is a network or absolute address; only files beside the model are read",
-                    user, uri.substr(0, 120));
+        return fail(
+            ErrorCode::invalidInput,
+            "{}: '{}' is a network or absolute address; only files beside the model are read", user,
+            uri.substr(0, 120));
     auto bytes = files_->read(percentDecoded(uri));
     if (!bytes && bytes.error().code == ErrorCode::io && percentDecoded(uri) != uri) {
         if (auto literal = files_->read(uri)) return literal;
@@ -228,8 +237,8 @@ Result<ByteSpan> Document::buffer(std::uint64_t index, const std::string& user) 
         return fail(ErrorCode::invalidInput, "{} has neither a uri nor a GLB binary chunk", where);
     }
     if (*length > bytes.size())
-        return fail(ErrorCode::invalidInput, "{} says {} bytes, but its data has only {}", where, *length,
-                    bytes.size());
+        return fail(ErrorCode::invalidInput, "{} says {} bytes, but its data has only {}", where,
+                    *length, bytes.size());
     buffers_[index] = bytes.first(*length);
     return *buffers_[index];
 }
@@ -246,8 +255,9 @@ Result<BufferView> Document::bufferView(std::uint64_t index, const std::string& 
     STX_TRY(const auto bytes, buffer(*bufferIndex, where));
     const auto begin = offset.value_or(0);
     if (begin > bytes.size() || *length > bytes.size() - begin)
-        return fail(ErrorCode::invalidInput, "{} is bytes {} to {} of buffers[{}], which has only {}",
-                    where, begin, begin + *length, *bufferIndex, bytes.size());
+        return fail(ErrorCode::invalidInput,
+                    "{} is bytes {} to {} of buffers[{}], which has only {}", where, begin,
+                    begin + *length, *bufferIndex, bytes.size());
     return BufferView{bytes.subspan(begin, *length), stride.value_or(0)};
 }
 

@@ -25,7 +25,8 @@ struct AccessorValues {
     std::vector<float> values;
 
     [[nodiscard]] float at(std::size_t element, int component) const {
-        return values[element * static_cast<std::size_t>(components) + static_cast<std::size_t>(component)];
+        return values[element * static_cast<std::size_t>(components) +
+                      static_cast<std::size_t>(component)];
     }
 };
 
@@ -33,7 +34,8 @@ struct AccessorValues {
 class Document {
   public:
     /// Errors: no glTF, another version, a required extension that is not known.
-    [[nodiscard]] static Result<Document> open(ByteSpan bytes, ModelFiles& files, MeshBuilder& builder);
+    [[nodiscard]] static Result<Document> open(ByteSpan bytes, ModelFiles& files,
+                                               MeshBuilder& builder);
 
     [[nodiscard]] const Json& root() const { return root_; }
     [[nodiscard]] ModelFiles& files() const { return *files_; }
@@ -44,7 +46,8 @@ class Document {
     [[nodiscard]] Result<AccessorValues> accessor(std::uint64_t index, const std::string& user,
                                                   std::initializer_list<std::string_view> types);
     /// Unsigned SCALARs.
-    [[nodiscard]] Result<std::vector<std::uint32_t>> indices(std::uint64_t index, const std::string& user);
+    [[nodiscard]] Result<std::vector<std::uint32_t>> indices(std::uint64_t index,
+                                                             const std::string& user);
     /// Bytes of a data: URI or of a file beside the model.
     [[nodiscard]] Result<Bytes> uri(const std::string& uri, const std::string& user);
 

@@ -13,13 +13,15 @@ const Json* find(const Json& object, const char* key) {
 
 tl::unexpected<Error> wrongType(const Json& found, const char* key, const std::string& where,
                                 const char* expected) {
-    return fail(ErrorCode::invalidInput, "{}.{} is {} {}, expected {}", where.empty() ? "glTF" : where,
-                key, found.is_array() || found.is_object() ? "an" : "a", found.type_name(), expected);
+    return fail(ErrorCode::invalidInput, "{}.{} is {} {}, expected {}",
+                where.empty() ? "glTF" : where, key,
+                found.is_array() || found.is_object() ? "an" : "a", found.type_name(), expected);
 }
 
 }  // namespace
 
-Result<std::optional<double>> getNumber(const Json& object, const char* key, const std::string& where) {
+Result<std::optional<double>> getNumber(const Json& object, const char* key,
+                                        const std::string& where) {
     const auto* value = find(object, key);
     if (!value) return std::nullopt;
     if (!value->is_number()) return wrongType(*value, key, where, "a number");
@@ -33,8 +35,8 @@ Result<std::optional<std::uint64_t>> getUint(const Json& object, const char* key
     STX_TRY(const auto number, getNumber(object, key, where));
     if (!number) return std::nullopt;
     if (!(*number >= 0) || *number > 9007199254740992.0 || std::floor(*number) != *number)
-        return fail(ErrorCode::invalidInput, "{}.{} is {}, expected a whole number from 0", where, key,
-                    *number);
+        return fail(ErrorCode::invalidInput, "{}.{} is {}, expected a whole number from 0", where,
+                    key, *number);
     return static_cast<std::uint64_t>(*number);
 }
 
@@ -72,13 +74,13 @@ Result<bool> getNumbers(const Json& object, const char* key, const std::string& 
     STX_TRY(const Json* array, getArray(object, key, where));
     if (!array) return false;
     if (array->size() != values.size())
-        return fail(ErrorCode::invalidInput, "{}.{} has {} elements, expected {} numbers", where, key,
-                    array->size(), values.size());
+        return fail(ErrorCode::invalidInput, "{}.{} has {} elements, expected {} numbers", where,
+                    key, array->size(), values.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
         const auto& v = (*array)[i];
         if (!v.is_number() || !std::isfinite(v.get<double>()))
-            return fail(ErrorCode::invalidInput, "{}.{}[{}] is a {}, expected a number", where, key, i,
-                        v.type_name());
+            return fail(ErrorCode::invalidInput, "{}.{}[{}] is a {}, expected a number", where, key,
+                        i, v.type_name());
         values[i] = v.get<double>();
     }
     return true;
@@ -104,8 +106,8 @@ Result<const Json*> element(const Json& root, const char* list, std::uint64_t in
     if (array && !array->is_array()) return wrongType(*array, list, "", "an array");
     const std::size_t size = array ? array->size() : 0;
     if (index >= size)
-        return fail(ErrorCode::invalidInput, "{} refers to {}[{}], but there are only {}", user, list,
-                    index, size);
+        return fail(ErrorCode::invalidInput, "{} refers to {}[{}], but there are only {}", user,
+                    list, index, size);
     const auto& value = (*array)[index];
     if (!value.is_object())
         return fail(ErrorCode::invalidInput, "{}[{}] is a {}, expected an object", list, index,

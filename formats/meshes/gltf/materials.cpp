@@ -8,7 +8,8 @@ glm::vec2 UvSource::apply(glm::vec2 uv) const {
     const double c = std::cos(rotation), s = std::sin(rotation);
     const double u = uv.x * scale.x, v = uv.y * scale.y;
     // The extension's words, its example and Khronos' viewer turn this way; its GLSL the other.
-    return {static_cast<float>(c * u + s * v + offset.x), static_cast<float>(-s * u + c * v + offset.y)};
+    return {static_cast<float>(c * u + s * v + offset.x),
+            static_cast<float>(-s * u + c * v + offset.y)};
 }
 
 Result<MaterialUse> Materials::use(std::optional<std::uint64_t> index, const std::string& user) {
@@ -68,12 +69,16 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
         const auto wrap = [&](const char* key) -> Result<MeshTexture::Wrap> {
             STX_TRY(const auto value, getUint(*s, key, samplerWhere));
             switch (value.value_or(10497)) {
-                case 10497: return MeshTexture::Wrap::repeat;
-                case 33071: return MeshTexture::Wrap::clamp;
-                case 33648: return MeshTexture::Wrap::mirror;
+                case 10497:
+                    return MeshTexture::Wrap::repeat;
+                case 33071:
+                    return MeshTexture::Wrap::clamp;
+                case 33648:
+                    return MeshTexture::Wrap::mirror;
                 default:
-                    return fail(ErrorCode::invalidInput, "{}.{} is {}, expected 10497, 33071 or 33648",
-                                samplerWhere, key, *value);
+                    return fail(ErrorCode::invalidInput,
+                                "{}.{} is {}, expected 10497, 33071 or 33648", samplerWhere, key,
+                                *value);
             }
         };
         STX_TRY(state.wrapU, wrap("wrapS"));
@@ -89,8 +94,8 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
         if (webpSource) source = webpSource;
     }
     if (!source) {
-        document_.job().note(fmt::format("{} names no image that can be read; the plain colour is used",
-                                         textureWhere));
+        document_.job().note(fmt::format(
+            "{} names no image that can be read; the plain colour is used", textureWhere));
         return -1;
     }
     STX_TRY(const Json* image, element(document_.root(), "images", *source, textureWhere));
@@ -101,9 +106,10 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
     int result = -1;
     if (uri && !uri->starts_with("data:")) {
         if (hasUriScheme(*uri))
-            return fail(ErrorCode::invalidInput,
-                        "{}: '{}' is a network or absolute address; only files beside the model are read",
-                        imageWhere, uri->substr(0, 120));
+            return fail(
+                ErrorCode::invalidInput,
+                "{}: '{}' is a network or absolute address; only files beside the model are read",
+                imageWhere, uri->substr(0, 120));
         auto name = percentDecoded(*uri);
         if (name != *uri && resolveInside(document_.files().folder(), *uri, document_.job().limits))
             name = *uri;
@@ -113,7 +119,8 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
         STX_TRY(result, document_.files().textureFromBytes(bytes, imageWhere, state, textures));
     } else if (view) {
         STX_TRY(const auto bytes, document_.bufferView(*view, imageWhere));
-        STX_TRY(result, document_.files().textureFromBytes(bytes.bytes, imageWhere, state, textures));
+        STX_TRY(result,
+                document_.files().textureFromBytes(bytes.bytes, imageWhere, state, textures));
     } else {
         return fail(ErrorCode::invalidInput, "{} has neither a uri nor a bufferView", imageWhere);
     }
@@ -128,11 +135,12 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
     Material m;
     STX_TRY(const auto name, getString(*object, "name", where));
     m.name = name.value_or(where);
-    STX_TRY(const Json* glossy, getExtension(*object, "KHR_materials_pbrSpecularGlossiness", where));
+    STX_TRY(const Json* glossy,
+            getExtension(*object, "KHR_materials_pbrSpecularGlossiness", where));
     STX_TRY(const Json* pbr, getObject(*object, "pbrMetallicRoughness", where));
     const Json* base = glossy ? glossy : pbr;
-    const auto baseWhere =
-        where + (glossy ? ".extensions.KHR_materials_pbrSpecularGlossiness" : ".pbrMetallicRoughness");
+    const auto baseWhere = where + (glossy ? ".extensions.KHR_materials_pbrSpecularGlossiness"
+                                           : ".pbrMetallicRoughness");
     if (base) {
         glm::dvec4 factor(1.0);
         STX_CHECK(getNumbers(*base, glossy ? "diffuseFactor" : "baseColorFactor", baseWhere,
@@ -164,8 +172,8 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
     } else if (alphaMode == "BLEND") {
         m.alpha = Material::Alpha::blend;
     } else if (alphaMode.value_or("OPAQUE") != "OPAQUE") {
-        return fail(ErrorCode::invalidInput, "{}.alphaMode is '{}', expected OPAQUE, MASK or BLEND", where,
-                    *alphaMode);
+        return fail(ErrorCode::invalidInput, "{}.alphaMode is '{}', expected OPAQUE, MASK or BLEND",
+                    where, *alphaMode);
     }
     STX_TRY(const auto cutoff, getNumber(*object, "alphaCutoff", where));
     m.alphaCutoff = static_cast<float>(cutoff.value_or(0.5));

@@ -31,9 +31,11 @@ class Materials {
     Materials(Document& document, MeshBuilder& builder) : document_(document), builder_(builder) {}
 
     /// `index` of `materials`, or nothing for glTF's default material.
-    [[nodiscard]] Result<MaterialUse> use(std::optional<std::uint64_t> index, const std::string& user);
+    [[nodiscard]] Result<MaterialUse> use(std::optional<std::uint64_t> index,
+                                          const std::string& user);
     /// The same material without its textures, for a primitive without texture coordinates.
-    [[nodiscard]] MaterialUse withoutTextures(const MaterialUse& use, bool keepBase, bool keepNormal);
+    [[nodiscard]] MaterialUse withoutTextures(const MaterialUse& use, bool keepBase,
+                                              bool keepNormal);
 
     /// What materials had that a base colour does not show: name -> count.
     std::map<std::string, int> dropped;

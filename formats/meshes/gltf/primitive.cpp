@@ -10,13 +10,15 @@ namespace {
 /// Attributes of one primitive, from accessors or from its Draco stream.
 class Attributes {
   public:
-    Attributes(Document& document, MeshBuilder& builder, const Json& primitive, const std::string& where)
+    Attributes(Document& document, MeshBuilder& builder, const Json& primitive,
+               const std::string& where)
         : document_(document), builder_(builder), primitive_(primitive), where_(where) {}
 
     Result<void> open() {
         STX_TRY(attributes_, getObject(primitive_, "attributes", where_));
         if (!attributes_) return fail(ErrorCode::invalidInput, "{} has no attributes", where_);
-        STX_TRY(const Json* extension, getExtension(primitive_, "KHR_draco_mesh_compression", where_));
+        STX_TRY(const Json* extension,
+                getExtension(primitive_, "KHR_draco_mesh_compression", where_));
         if (!extension) return {};
         const auto at = where_ + ".extensions.KHR_draco_mesh_compression";
         STX_TRY(const auto view, getUint(*extension, "bufferView", at));
@@ -24,9 +26,9 @@ class Attributes {
         STX_TRY(dracoIds_, getObject(*extension, "attributes", at));
         if (!dracoIds_) return fail(ErrorCode::invalidInput, "{} has no attributes", at);
         STX_TRY(const auto bytes, document_.bufferView(*view, at));
-        auto geometry = DracoGeometry::decode(bytes.bytes, [&](std::uint64_t n, std::uint64_t each) {
-            return builder_.charge(n, each, at);
-        });
+        auto geometry = DracoGeometry::decode(
+            bytes.bytes,
+            [&](std::uint64_t n, std::uint64_t each) { return builder_.charge(n, each, at); });
         if (!geometry) return tl::unexpected(geometry.error().at(at));
         if (!geometry->isMesh())
             return fail(ErrorCode::invalidInput, "{} holds a point cloud, expected a mesh", at);
@@ -54,7 +56,8 @@ class Attributes {
     }
 
   private:
-    Result<AccessorValues> fromDraco(const std::string& name, std::uint64_t id, std::uint64_t accessor) {
+    Result<AccessorValues> fromDraco(const std::string& name, std::uint64_t id,
+                                     std::uint64_t accessor) {
         for (const auto& a : draco_->attributes()) {
             if (a.uniqueId != id) continue;
             // The accessor still says whether integers are normalised.
@@ -62,15 +65,16 @@ class Attributes {
             STX_TRY(const auto normalised,
                     getBool(*object, "normalized", fmt::format("accessors[{}]", accessor)));
             STX_CHECK(builder_.charge(draco_->pointCount(),
-                                      static_cast<std::uint64_t>(a.components) * sizeof(float), where_));
+                                      static_cast<std::uint64_t>(a.components) * sizeof(float),
+                                      where_));
             AccessorValues values;
             values.count = draco_->pointCount();
             values.components = a.components;
             STX_TRY(values.values, draco_->values(a, normalised.value_or(false)));
             return values;
         }
-        return fail(ErrorCode::invalidInput, "{}: the Draco stream has no attribute {} for {}", where_, id,
-                    name);
+        return fail(ErrorCode::invalidInput, "{}: the Draco stream has no attribute {} for {}",
+                    where_, id, name);
     }
 
     Document& document_;
@@ -92,12 +96,13 @@ std::vector<Vec> vectors(const AccessorValues& a) {
     return out;
 }
 
-Result<void> checkCount(const std::optional<AccessorValues>& values, std::size_t expected, int components,
-                        const std::string& where, std::string_view name) {
+Result<void> checkCount(const std::optional<AccessorValues>& values, std::size_t expected,
+                        int components, const std::string& where, std::string_view name) {
     if (!values) return {};
     if (values->count != expected)
-        return fail(ErrorCode::invalidInput, "{}: {} has {} elements, POSITION has {}; they must match",
-                    where, name, values->count, expected);
+        return fail(ErrorCode::invalidInput,
+                    "{}: {} has {} elements, POSITION has {}; they must match", where, name,
+                    values->count, expected);
     if (values->components < components)
         return fail(ErrorCode::invalidInput, "{}: {} has {} components, expected {}", where, name,
                     values->components, components);
@@ -114,7 +119,8 @@ std::vector<glm::uvec3> assemble(std::uint64_t mode, std::size_t count, const au
     } else {
         for (std::size_t i = 0; i + 2 < count; ++i) {
             if (mode == 5)
-                triangles.emplace_back(vertexAt(i), vertexAt(i + 1 + i % 2), vertexAt(i + 2 - i % 2));
+                triangles.emplace_back(vertexAt(i), vertexAt(i + 1 + i % 2),
+                                       vertexAt(i + 2 - i % 2));
             else
                 triangles.emplace_back(vertexAt(i + 1), vertexAt(i + 2), vertexAt(0));
         }
@@ -127,8 +133,8 @@ Result<void> applyMorph(Document& document, const Json& primitive, const std::st
     STX_TRY(const Json* targets, getArray(primitive, "targets", where));
     if (!targets) return {};
     if (!weights.empty() && weights.size() != targets->size())
-        return fail(ErrorCode::invalidInput, "{} has {} morph targets, but there are {} weights", where,
-                    targets->size(), weights.size());
+        return fail(ErrorCode::invalidInput, "{} has {} morph targets, but there are {} weights",
+                    where, targets->size(), weights.size());
     for (std::size_t t = 0; t < weights.size(); ++t) {
         if (weights[t] == 0) continue;
         const auto at = fmt::format("{}.targets[{}]", where, t);
@@ -138,8 +144,8 @@ Result<void> applyMorph(Document& document, const Json& primitive, const std::st
             if (!index || values.empty()) return {};
             STX_TRY(const auto deltas, document.accessor(*index, at + " " + name, {"VEC3"}));
             if (deltas.count != values.size())
-                return fail(ErrorCode::invalidInput, "{}: {} has {} elements, the mesh has {}", at, name,
-                            deltas.count, values.size());
+                return fail(ErrorCode::invalidInput, "{}: {} has {} elements, the mesh has {}", at,
+                            name, deltas.count, values.size());
             for (std::size_t i = 0; i < values.size(); ++i) {
                 for (int c = 0; c < 3; ++c)
                     values[i][c] += static_cast<float>(weights[t] * deltas.at(i, c));
@@ -164,7 +170,8 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
     part.where = where;
     STX_TRY(const auto modeValue, getUint(primitive, "mode", where));
     const auto mode = modeValue.value_or(4);
-    if (mode > 6) return fail(ErrorCode::invalidInput, "{}.mode is {}, expected 0 to 6", where, mode);
+    if (mode > 6)
+        return fail(ErrorCode::invalidInput, "{}.mode is {}, expected 0 to 6", where, mode);
     if (mode >= 1 && mode <= 3) {
         ++dropped["line primitives"];
         result.drawn = false;
@@ -217,19 +224,21 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
             // Then uvs serve the normal map alone.
             STX_TRY(part.uvs, readUvs(source));
             part.normalUvs = {};
-        } else if (source.set != material.baseColour.set || source.offset != material.baseColour.offset ||
+        } else if (source.set != material.baseColour.set ||
+                   source.offset != material.baseColour.offset ||
                    source.scale != material.baseColour.scale ||
                    source.rotation != material.baseColour.rotation) {
             STX_TRY(part.normalUvs, readUvs(source));
         }
     }
     const bool baseWorks = !material.baseColour.used || !part.uvs.empty();
-    const bool normalWorks =
-        !material.normal.used || !(part.normalUvs.empty() && part.uvs.empty()) || position->count == 0;
+    const bool normalWorks = !material.normal.used ||
+                             !(part.normalUvs.empty() && part.uvs.empty()) || position->count == 0;
     if (!baseWorks || !normalWorks) {
-        document.job().note(fmt::format("{} has a textured material but no texture coordinates for it; the "
-                                        "plain colour is used",
-                                        where));
+        document.job().note(
+            fmt::format("{} has a textured material but no texture coordinates for it; the "
+                        "plain colour is used",
+                        where));
         material = materials.withoutTextures(material, baseWorks, normalWorks);
     }
     part.material = material.index;
@@ -255,15 +264,17 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
     STX_TRY(const auto indexAccessor, getUint(primitive, "indices", where));
     if (!indexAccessor) {
         STX_CHECK(builder.charge(count, sizeof(glm::uvec3), where));
-        part.triangles = assemble(mode, count, [](std::size_t i) { return static_cast<std::uint32_t>(i); });
+        part.triangles =
+            assemble(mode, count, [](std::size_t i) { return static_cast<std::uint32_t>(i); });
         return result;
     }
     STX_TRY(const auto indices, document.indices(*indexAccessor, where + " indices"));
     for (std::size_t i = 0; i < indices.size(); ++i) {
         if (indices[i] >= count)
-            return fail(ErrorCode::invalidInput,
-                        "accessors[{}] ({} indices): index {} is vertex {}, but there are only {} vertices",
-                        *indexAccessor, where, i, indices[i], count);
+            return fail(
+                ErrorCode::invalidInput,
+                "accessors[{}] ({} indices): index {} is vertex {}, but there are only {} vertices",
+                *indexAccessor, where, i, indices[i], count);
     }
     STX_CHECK(builder.charge(indices.size(), sizeof(glm::uvec3), where));
     part.triangles = assemble(mode, indices.size(), [&](std::size_t i) { return indices[i]; });

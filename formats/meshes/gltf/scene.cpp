@@ -24,7 +24,8 @@ glm::dmat4 fromTrs(glm::dvec3 translation, glm::dvec4 rotation, glm::dvec3 scale
 void transform(MeshPart& part, const glm::dmat4& worldFromMesh) {
     const glm::dmat3 linear(worldFromMesh);
     const double determinant = glm::determinant(linear);
-    // The cofactor matrix is the inverse transpose but for a factor, and exists for flat transforms.
+    // The cofactor matrix is the inverse transpose but for a factor, and exists for flat
+    // transforms.
     const glm::dmat3 forNormals(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
                                 glm::cross(linear[0], linear[1]));
     const double side = determinant < 0 ? -1.0 : 1.0;
@@ -90,13 +91,15 @@ class SceneReader {
             STX_TRY(nodes_[i].children, getIndices(*nodes_[i].json, "children", where));
             for (const auto child : nodes_[i].children) {
                 if (child >= count)
-                    return fail(ErrorCode::invalidInput, "{} has the child {}, but there are only {} nodes",
-                                where, child, count);
+                    return fail(ErrorCode::invalidInput,
+                                "{} has the child {}, but there are only {} nodes", where, child,
+                                count);
                 auto& parent = nodes_[child].parent;
                 if (parent >= 0)
-                    return fail(ErrorCode::invalidInput,
-                                "nodes[{}] is a child of nodes[{}] and of nodes[{}]; a node has one parent",
-                                child, parent, i);
+                    return fail(
+                        ErrorCode::invalidInput,
+                        "nodes[{}] is a child of nodes[{}] and of nodes[{}]; a node has one parent",
+                        child, parent, i);
                 parent = static_cast<std::int64_t>(i);
             }
         }
@@ -114,13 +117,16 @@ class SceneReader {
             auto& node = nodes_[i];
             STX_TRY(const auto local, localMatrix(*node.json, fmt::format("nodes[{}]", i)));
             node.worldFromNode =
-                node.parent < 0 ? local : nodes_[static_cast<std::size_t>(node.parent)].worldFromNode * local;
+                node.parent < 0
+                    ? local
+                    : nodes_[static_cast<std::size_t>(node.parent)].worldFromNode * local;
             stack.insert(stack.end(), node.children.begin(), node.children.end());
         }
         if (reached < count) {
             const auto first = std::find(seen.begin(), seen.end(), false) - seen.begin();
             return fail(ErrorCode::invalidInput,
-                        "nodes[{}] is its own ancestor; the nodes must form a tree without cycles", first);
+                        "nodes[{}] is its own ancestor; the nodes must form a tree without cycles",
+                        first);
         }
         return {};
     }
@@ -139,8 +145,9 @@ class SceneReader {
                     fmt::format("scene {} of {} is read; the others are dropped", index, scenes));
             for (const auto n : stack) {
                 if (n >= nodes_.size())
-                    return fail(ErrorCode::invalidInput, "scenes[{}] has node {}, but there are only {}",
-                                index, n, nodes_.size());
+                    return fail(ErrorCode::invalidInput,
+                                "scenes[{}] has node {}, but there are only {}", index, n,
+                                nodes_.size());
             }
         } else {
             for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -219,7 +226,8 @@ class SceneReader {
             return transforms;
         }
         STX_TRY(const Json* attributes, getObject(*extension, "attributes", where));
-        if (!attributes) return fail(ErrorCode::invalidInput, "{}: instances without attributes", where);
+        if (!attributes)
+            return fail(ErrorCode::invalidInput, "{}: instances without attributes", where);
         std::size_t count = 0;
         const auto read = [&](const char* name,
                               std::string_view type) -> Result<std::optional<AccessorValues>> {
@@ -227,8 +235,9 @@ class SceneReader {
             if (!index) return std::nullopt;
             STX_TRY(auto values, document_.accessor(*index, where + " " + name, {type}));
             if (count != 0 && values.count != count)
-                return fail(ErrorCode::invalidInput, "{}: instance attributes of {} and {} elements", where,
-                            count, values.count);
+                return fail(ErrorCode::invalidInput,
+                            "{}: instance attributes of {} and {} elements", where, count,
+                            values.count);
             count = values.count;
             return values;
         };
@@ -259,14 +268,16 @@ class SceneReader {
         if (accessor) {
             STX_TRY(inverse, document_.accessor(*accessor, where, {"MAT4"}));
             if (inverse->count < joints.size())
-                return fail(ErrorCode::invalidInput, "{} has {} joints but only {} inverse bind matrices",
-                            where, joints.size(), inverse->count);
+                return fail(ErrorCode::invalidInput,
+                            "{} has {} joints but only {} inverse bind matrices", where,
+                            joints.size(), inverse->count);
         }
         std::vector<glm::dmat4> matrices;
         for (std::size_t j = 0; j < joints.size(); ++j) {
             if (joints[j] >= nodes_.size())
-                return fail(ErrorCode::invalidInput, "{}.joints[{}] is node {}, but there are only {}",
-                            where, j, joints[j], nodes_.size());
+                return fail(ErrorCode::invalidInput,
+                            "{}.joints[{}] is node {}, but there are only {}", where, j, joints[j],
+                            nodes_.size());
             glm::dmat4 bind(1.0);
             for (int c = 0; c < 16 && inverse; ++c) bind[c / 4][c % 4] = inverse->at(j, c);
             matrices.push_back(nodes_[joints[j]].worldFromNode * bind);
@@ -288,9 +299,10 @@ class SceneReader {
                     const double joint = influence.joints.at(i, c);
                     if (!(joint >= 0) || joint >= static_cast<double>(joints.size()) ||
                         !std::isfinite(weight))
-                        return fail(ErrorCode::invalidInput,
-                                    "{}: vertex {} follows joint {} by {}, but the skin has {} joints",
-                                    part.where, i, joint, weight, joints.size());
+                        return fail(
+                            ErrorCode::invalidInput,
+                            "{}: vertex {} follows joint {} by {}, but the skin has {} joints",
+                            part.where, i, joint, weight, joints.size());
                     blend += joints[static_cast<std::size_t>(joint)] * weight;
                     sum += weight;
                 }
@@ -307,7 +319,8 @@ class SceneReader {
                 const glm::dmat3 forNormals(glm::cross(linear[1], linear[2]),
                                             glm::cross(linear[2], linear[0]),
                                             glm::cross(linear[0], linear[1]));
-                const auto n = forNormals * glm::dvec3(part.normals[i]) * (determinant < 0 ? -1.0 : 1.0);
+                const auto n =
+                    forNormals * glm::dvec3(part.normals[i]) * (determinant < 0 ? -1.0 : 1.0);
                 const double length = glm::length(n);
                 part.normals[i] = length > 0 ? glm::vec3(n / length) : glm::vec3(0);
             }
@@ -323,8 +336,8 @@ class SceneReader {
 
     Result<void> addMesh(std::uint64_t index, const std::string& user,
                          const std::vector<double>& nodeWeights,
-                         const std::vector<glm::dmat4>& transforms, const std::vector<glm::dmat4>* joints,
-                         bool keep) {
+                         const std::vector<glm::dmat4>& transforms,
+                         const std::vector<glm::dmat4>* joints, bool keep) {
         std::vector<Primitive> fresh;
         const std::vector<Primitive>* primitives = &fresh;
         if (const auto it = meshes_.find(index); it != meshes_.end() && nodeWeights.empty()) {
@@ -339,9 +352,10 @@ class SceneReader {
             STX_TRY(const Json* list, getArray(*mesh, "primitives", where));
             for (std::size_t p = 0; list && p < list->size(); ++p) {
                 const auto at = fmt::format("{}.primitives[{}]", where, p);
-                if (!(*list)[p].is_object()) return fail(ErrorCode::invalidInput, "{} is no object", at);
-                STX_TRY(auto primitive, readPrimitive(document_, builder_, materials_, (*list)[p], at,
-                                                      weights, dropped_));
+                if (!(*list)[p].is_object())
+                    return fail(ErrorCode::invalidInput, "{} is no object", at);
+                STX_TRY(auto primitive, readPrimitive(document_, builder_, materials_, (*list)[p],
+                                                      at, weights, dropped_));
                 if (primitive.drawn) fresh.push_back(std::move(primitive));
             }
             if (keep) primitives = &meshes_.emplace(index, std::move(fresh)).first->second;
@@ -364,7 +378,8 @@ class SceneReader {
 
     /// One line about everything that was left out.
     void say() {
-        if (const auto n = listSize(root(), "animations")) dropped_["animations"] += static_cast<int>(n);
+        if (const auto n = listSize(root(), "animations"))
+            dropped_["animations"] += static_cast<int>(n);
         for (const auto& [name, count] : materials_.dropped) dropped_[name] += count;
         std::string line;
         for (const auto& [name, count] : dropped_)
