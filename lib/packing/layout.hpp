@@ -17,4 +17,8 @@ struct AtlasLayout {
 [[nodiscard]] Result<AtlasLayout> gridLayout(const Bundle& bundle, const PackSettings& settings,
                                              int maxPages);
 
+/// Content only, see PackSettings::Layout::tight. Views without content get no rectangle.
+[[nodiscard]] Result<AtlasLayout> tightLayout(const Bundle& bundle, const PackSettings& settings,
+                                              int maxPages);
+
 }  // namespace stx

@@ -82,6 +82,26 @@ void bleedUncovered(const Image<std::uint8_t>& covered, ReferenceView& view) {
     }
 }
 
+/// Leaves out views without a rectangle when `drop` says so, and numbers the rectangles anew.
+/// Returns the view of the bundle for each that is left.
+std::vector<int> keptViews(const Bundle& bundle, bool drop, std::vector<AtlasRectangle>& rectangles,
+                           Job& job) {
+    std::vector<bool> holds(bundle.views.size(), !drop);
+    for (const auto& r : rectangles) holds[r.view] = true;
+    std::vector<int> kept, number(bundle.views.size(), -1);
+    for (std::size_t i = 0; i < holds.size(); ++i) {
+        if (!holds[i]) continue;
+        number[i] = static_cast<int>(kept.size());
+        kept.push_back(static_cast<int>(i));
+    }
+    for (auto& r : rectangles) r.view = number[r.view];
+    const auto dropped = bundle.views.size() - kept.size();
+    if (dropped > 0)
+        job.note(
+            fmt::format("{} of {} views dropped: they are empty", dropped, bundle.views.size()));
+    return kept;
+}
+
 template <class T>
 void dropIfZero(Image<T>& image) {
     for (const auto& p : image.pixels()) {
@@ -102,18 +122,24 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     STX_CHECK(bundle.check());
     const Contents contents = contentsOf(bundle);
     const int maxPages = 4 / contents.texturesPerPage();
-    STX_TRY(const AtlasLayout layout, gridLayout(bundle, settings, maxPages));
+    const bool tight = settings.layout == PackSettings::Layout::tight;
+    STX_TRY(AtlasLayout layout, tight ? tightLayout(bundle, settings, maxPages)
+                                      : gridLayout(bundle, settings, maxPages));
+    if (layout.rectangles.empty())
+        return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack",
+                    bundle.views.size());
     STX_CHECK(job.limits.checkAllocation(
         static_cast<std::uint64_t>(layout.width) * layout.height * layout.pages,
         contents.bytesPerPixel(), "the atlas"));
 
     Atlas atlas;
-    atlas.layout = "grid";
+    atlas.layout = tight ? "tight" : "grid";
     atlas.padding = settings.padding;
     atlas.bounds = bundle.bounds;
     atlas.title = bundle.title;
-    atlas.rectangles = layout.rectangles;
-    for (const auto& view : bundle.views) atlas.views.push_back(withoutImages(view));
+    const std::vector<int> source = keptViews(bundle, tight, layout.rectangles, job);
+    for (const int i : source) atlas.views.push_back(withoutImages(bundle.views[i]));
+    atlas.rectangles = std::move(layout.rectangles);
     for (int i = 0; i < layout.pages; ++i) {
         AtlasPage page;
         page.texture = emptyTexture(layout.width, layout.height, contents.linear);
@@ -129,7 +155,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     STX_CHECK(job.checkCancelled());
     parallelFor(0, static_cast<std::int64_t>(atlas.rectangles.size()), [&](std::int64_t i) {
         const auto& r = atlas.rectangles[i];
-        fillPage(bundle.views[r.view], r, settings.padding, atlas.pages[r.page]);
+        fillPage(bundle.views[source[r.view]], r, settings.padding, atlas.pages[r.page]);
     });
     atlas.sourcePixels = bundle.pointCount();
     atlas.keptPixels = atlas.sourcePixels;

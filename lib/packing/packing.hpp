@@ -14,8 +14,9 @@ struct PackSettings {
         /// unless maxSize forbids it. A cell is the largest view and `padding` on each side; a
         /// view's pixel (0,0) is at (padding, padding) of its cell.
         grid,
-        /// Views trimmed to their content, cut into patches where that saves room, and fitted
-        /// closely.
+        /// Views trimmed to their content (points, and pixels with coverage), cut into patches
+        /// where that saves room, fitted closely, turned where that makes the textures smaller.
+        /// Views without content are dropped with a note.
         tight,
     };
     Layout layout = Layout::grid;

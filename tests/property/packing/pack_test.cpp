@@ -159,6 +159,7 @@ TEST_P(Pack, SameOnAnyNumberOfThreads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Grid, Pack, testing::Values(PackSettings::Layout::grid));
+INSTANTIATE_TEST_SUITE_P(Tight, Pack, testing::Values(PackSettings::Layout::tight));
 
 }  // namespace
 }  // namespace stx

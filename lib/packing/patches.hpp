@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "lib/base/image.hpp"
+#include "lib/model/reference_view.hpp"
+
+namespace stx {
+
+/// A rectangle of a view, pixels.
+struct Patch {
+    int x = 0, y = 0, width = 0, height = 0;
+
+    bool operator==(const Patch&) const = default;
+};
+
+/// The rectangles that hold all content (points, and pixels with coverage) of a view: its bounding
+/// box, cut in two again and again as long as trimming both parts saves more room than their
+/// padding costs. They do not overlap; none for an empty view.
+[[nodiscard]] std::vector<Patch> contentPatches(const ReferenceView& view, int padding);
+
+}  // namespace stx
