@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+#include "lib/render/renderer.hpp"
+
+namespace stx {
+
+/// Splat mode on plain processor cores: each depth pixel a splat (Lee & Park 2006, sections 3.2 to
+/// 3.4), drawn in two passes. The first finds the nearest surface of each output pixel, the second
+/// blends all splats within a small depth of it with weights that fall off from their centre, and
+/// prefer views that saw the surface head-on and close.
+///
+/// SplatRule::data: the splat is the picture of the source pixel's patch of surface, as splatU and
+/// splatV, the normal or the neighbours' depth tilt it, never smaller than an output pixel.
+/// SplatRule::paper: round, of diameter splatCoefficient / distance pixels; a coefficient of 0 is
+/// chosen so that the nearest view's samples just close. SplatRule::point: one pixel, nearest wins.
+///
+/// Frames carry normals when there is light. The bundle must outlive the renderer and have passed
+/// Bundle::check(). Bytes are the same on any number of threads. Errors of render(): a camera that
+/// fails check(), or a frame over the job's memory limit.
+[[nodiscard]] std::unique_ptr<Renderer> makeCpuSplatRenderer(const Bundle& bundle,
+                                                             const RenderSettings& settings,
+                                                             Job& job);
+
+/// The processor's name and the SIMD target in use, such as "AMD EPYC (AVX3_ZEN4)".
+[[nodiscard]] std::string cpuDeviceName();
+
+}  // namespace stx
