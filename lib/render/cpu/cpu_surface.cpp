@@ -1,0 +1,392 @@
+#include "lib/render/cpu/cpu_surface.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/cpu/surface_fill.hpp"
+#include "lib/render/cpu/surface_fuse.hpp"
+#include "lib/render/cpu/surface_raster.hpp"
+#include "lib/render/cpu/surface_shade.hpp"
+#include "lib/render/cpu/surface_source.hpp"
+
+namespace stx {
+namespace {
+
+using namespace surface;
+
+/// What a quality means.
+struct Effort {
+    int samplesPerPixel = 2;  ///< along one side of a pixel
+    int mostGeometry = 8;     ///< sources that one tile is built from, at most 32
+    ShadeSettings shade;
+};
+
+Effort effortOf(Quality quality) {
+    Effort e;
+    switch (quality) {
+        case Quality::draft:
+            e.samplesPerPixel = 1;
+            e.mostGeometry = 4;
+            e.shade.mostSources = 2;
+            break;
+        case Quality::normal: break;
+        case Quality::best:
+            e.samplesPerPixel = 4;
+            e.mostGeometry = 32;
+            break;
+    }
+    return e;
+}
+
+/// One source in one frame: its maps, and which of its blocks may show in which tile.
+struct FrameSource {
+    const Source* source = nullptr;
+    Warp sourceFromPixel;
+    glm::dmat4 pixelFromSource{1.0};
+    Ray fromEye{};
+    std::vector<std::uint32_t> tileBegin;  ///< tile t has blocks[tileBegin[t] .. tileBegin[t + 1])
+    std::vector<std::uint32_t> blocks;
+};
+
+class CpuSurfaceRenderer final : public Renderer {
+  public:
+    CpuSurfaceRenderer(const Bundle& bundle, const RenderSettings& settings, Job& job)
+        : bundle_(bundle), settings_(settings), effort_(effortOf(settings.quality)), job_(job) {
+        sources_.resize(bundle.views.size());
+        parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
+            sources_[static_cast<std::size_t>(i)] = prepareSource(bundle.views[static_cast<std::size_t>(i)]);
+        });
+        double border = 0;
+        for (const Source& s : sources_) {
+            border += borderCoverage(s) / static_cast<double>(sources_.size());
+            addBounds(s);
+        }
+        fillsFrame_ = border > 0.5;
+    }
+
+    [[nodiscard]] Result<Frame> render(const Camera& camera) override;
+    [[nodiscard]] std::string backend() const override { return "cpu"; }
+    [[nodiscard]] std::string device() const override { return fmt::format("CPU ({})", simdTarget()); }
+
+  private:
+    void addBounds(const Source& s);
+    [[nodiscard]] FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX,
+                                          int tilesY) const;
+    void drawTile(const PixelSpace& space, std::span<const FrameSource> all, int tilesX, int tile,
+                  Frame& frame, Image<float>& q) const;
+    [[nodiscard]] std::vector<int> chooseSources(const PixelSpace& space,
+                                                 std::span<const FrameSource> all, int tile, int tileX,
+                                                 int tileY) const;
+    [[nodiscard]] const ReferenceView* viewAt(const Camera& camera) const;
+    [[nodiscard]] Frame copyOf(const ReferenceView& view) const;
+    void light(const PixelSpace& space, Frame& frame) const;
+
+    const Bundle& bundle_;
+    RenderSettings settings_;
+    Effort effort_;
+    Job& job_;
+    std::vector<Source> sources_;
+    Bounds bounds_;
+    bool fillsFrame_ = false;
+};
+
+void CpuSurfaceRenderer::addBounds(const Source& s) {
+    for (int by = 0; by < s.blocksY; ++by) {
+        for (int bx = 0; bx < s.blocksX; ++bx) {
+            const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
+            if (!(block.qMax > 0)) continue;
+            for (int corner = 0; corner < 8; ++corner) {
+                const double x = std::min((bx + (corner & 1)) * kBlock, s.width);
+                const double y = std::min((by + (corner >> 1 & 1)) * kBlock, s.height);
+                const double q = (corner & 4) ? block.qMax : block.qMin;
+                const glm::dvec4 p = s.space.worldFromPixel * glm::dvec4(x, y, q, 1.0);
+                bounds_.add(glm::dvec3(p) / p.w);
+            }
+        }
+    }
+}
+
+FrameSource CpuSurfaceRenderer::placeSource(const Source& s, const PixelSpace& space, int tilesX,
+                                            int tilesY) const {
+    FrameSource f;
+    f.source = &s;
+    f.pixelFromSource = space.pixelFromWorld * s.space.worldFromPixel;
+    f.sourceFromPixel = warpFrom(s.space.pixelFromWorld * space.worldFromPixel);
+    f.fromEye = rayFrom(s.space, space);
+    const Warp warp = warpFrom(f.pixelFromSource);
+    struct Range {
+        std::uint32_t block;
+        int x0, y0, x1, y1;
+    };
+    std::vector<Range> ranges;
+    f.tileBegin.assign(static_cast<std::size_t>(tilesX) * tilesY + 1, 0);
+    for (std::uint32_t index = 0; index < s.blocks.size(); ++index) {
+        const SourceBlock& block = s.blocks[index];
+        if (!(block.qMax > 0)) continue;
+        const auto bx = static_cast<float>(index % s.blocksX * kBlock);
+        const auto by = static_cast<float>(index / s.blocksX * kBlock);
+        const float margin = 0.021f * s.space.axis.whole(block.qMax);
+        float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
+        bool front = false, behind = false;
+        for (int corner = 0; corner < 8; ++corner) {
+            const float x = (corner & 1) ? bx + kBlock + 1.5f : bx - 0.5f;
+            const float y = (corner & 2) ? by + kBlock + 1.5f : by - 0.5f;
+            const float q = (corner & 4) ? block.qMax + margin : std::max(block.qMin - margin, 0.5f * block.qMin);
+            const glm::vec4 h = warp.homogeneous(x, y, q);
+            if (!(h.w > 0)) {
+                behind = true;
+                continue;
+            }
+            front = true;
+            x0 = std::min(x0, h.x / h.w);
+            x1 = std::max(x1, h.x / h.w);
+            y0 = std::min(y0, h.y / h.w);
+            y1 = std::max(y1, h.y / h.w);
+        }
+        if (!front) continue;
+        const auto limitX = static_cast<float>(space.camera.width), limitY = static_cast<float>(space.camera.height);
+        if (behind) {
+            x0 = y0 = 0;
+            x1 = limitX;
+            y1 = limitY;
+        }
+        x0 = std::max(x0 - 0.5f, 0.0f);
+        y0 = std::max(y0 - 0.5f, 0.0f);
+        x1 = std::min(x1 + 0.5f, limitX - 0.5f);
+        y1 = std::min(y1 + 0.5f, limitY - 0.5f);
+        if (!(x0 <= x1 && y0 <= y1)) continue;
+        const Range r{index, static_cast<int>(x0) / kTile, static_cast<int>(y0) / kTile,
+                      static_cast<int>(x1) / kTile, static_cast<int>(y1) / kTile};
+        ranges.push_back(r);
+        for (int ty = r.y0; ty <= r.y1; ++ty)
+            for (int tx = r.x0; tx <= r.x1; ++tx) ++f.tileBegin[static_cast<std::size_t>(ty * tilesX + tx) + 1];
+    }
+    for (std::size_t t = 1; t < f.tileBegin.size(); ++t) f.tileBegin[t] += f.tileBegin[t - 1];
+    f.blocks.resize(f.tileBegin.back());
+    std::vector<std::uint32_t> next(f.tileBegin.begin(), f.tileBegin.end() - 1);
+    for (const Range& r : ranges)
+        for (int ty = r.y0; ty <= r.y1; ++ty)
+            for (int tx = r.x0; tx <= r.x1; ++tx)
+                f.blocks[next[static_cast<std::size_t>(ty * tilesX + tx)]++] = r.block;
+    return f;
+}
+
+std::vector<int> CpuSurfaceRenderer::chooseSources(const PixelSpace& space,
+                                                   std::span<const FrameSource> all, int tile, int tileX,
+                                                   int tileY) const {
+    std::vector<int> chosen;
+    const auto count = static_cast<int>(all.size());
+    if (count <= effort_.mostGeometry) {
+        for (int i = 0; i < count; ++i) chosen.push_back(i);
+        return chosen;
+    }
+    // A point of the scene in the middle of the tile: where the blocks that fall in it are.
+    double q = 0;
+    int blocks = 0;
+    for (const FrameSource& f : all) {
+        for (auto k = f.tileBegin[static_cast<std::size_t>(tile)]; k < f.tileBegin[static_cast<std::size_t>(tile) + 1]; ++k) {
+            const std::uint32_t index = f.blocks[k];
+            const SourceBlock& block = f.source->blocks[index];
+            const glm::dvec4 h = f.pixelFromSource *
+                                 glm::dvec4((index % f.source->blocksX + 0.5) * kBlock,
+                                            (index / f.source->blocksX + 0.5) * kBlock,
+                                            0.5 * (block.qMin + block.qMax), 1.0);
+            if (!(h.w > 0)) continue;
+            q += h.z / h.w;
+            ++blocks;
+        }
+    }
+    if (!blocks) return chosen;
+    const glm::dvec4 h = space.worldFromPixel *
+                         glm::dvec4(tileX + kTile * 0.5, tileY + kTile * 0.5, q / blocks, 1.0);
+    const glm::dvec3 point = glm::dvec3(h) / h.w;
+    const auto towards = [&](const Camera& c) {
+        return c.orthographic ? c.forward() : glm::normalize(point - c.position);
+    };
+    const glm::dvec3 look = towards(space.camera);
+    std::vector<std::pair<double, int>> ranked;
+    for (int i = 0; i < count; ++i)
+        ranked.emplace_back(-glm::dot(look, towards(all[static_cast<std::size_t>(i)].source->space.camera)), i);
+    std::nth_element(ranked.begin(), ranked.begin() + effort_.mostGeometry - 1, ranked.end());
+    for (int i = 0; i < effort_.mostGeometry; ++i) chosen.push_back(ranked[static_cast<std::size_t>(i)].second);
+    std::sort(chosen.begin(), chosen.end());
+    return chosen;
+}
+
+void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const FrameSource> all, int tilesX,
+                                  int tile, Frame& frame, Image<float>& qImage) const {
+    const int tileX = tile % tilesX * kTile, tileY = tile / tilesX * kTile;
+    const auto t = static_cast<std::size_t>(tile);
+    if (std::all_of(all.begin(), all.end(),
+                    [&](const FrameSource& f) { return f.tileBegin[t] == f.tileBegin[t + 1]; }))
+        return;
+    const SampleGrid grid{effort_.samplesPerPixel};
+    static thread_local std::vector<float> samples;
+    static thread_local Pieces pieces;
+    static thread_local std::vector<glm::vec3> colours;
+    static thread_local std::vector<std::int8_t> best;
+    static thread_local std::vector<LocalSource> local;
+    static thread_local std::vector<ShadeSource> shade;
+    const std::vector<int> chosen = chooseSources(space, all, tile, tileX, tileY);
+    samples.resize(std::max(samples.size(), grid.count() * chosen.size()));
+    local.clear();
+    shade.clear();
+    // Samples from pixels: the tile's corner to the origin, S to the pixel, first sample at ½.
+    glm::dmat4 sampleFromPixel(1.0);
+    sampleFromPixel[0][0] = sampleFromPixel[1][1] = grid.perPixel;
+    sampleFromPixel[3][0] = -tileX * grid.perPixel - 0.5;
+    sampleFromPixel[3][1] = -tileY * grid.perPixel - 0.5;
+    const float qLimit = space.axis.inverse ? std::numeric_limits<float>::max()
+                                            : static_cast<float>(space.axis.q(0.0));
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+        const FrameSource& f = all[static_cast<std::size_t>(chosen[k])];
+        float* mine = samples.data() + grid.count() * k;
+        const std::span<const std::uint32_t> blocks(f.blocks.data() + f.tileBegin[t],
+                                                    f.tileBegin[t + 1] - f.tileBegin[t]);
+        if (!blocks.empty())
+            rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks, grid, qLimit, mine);
+        local.push_back({f.source, f.sourceFromPixel, blocks.empty() ? nullptr : mine});
+        shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
+    }
+    pieces.clear();
+    fuseTile(local, grid, space.axis, tileX, tileY, std::min(kTile, frame.colour.width() - tileX),
+             std::min(kTile, frame.colour.height() - tileY), pieces);
+    shadePieces(pieces, shade, rayFrom(space, space), effort_.shade, colours, best);
+    std::array<float, kTile * kTile> mainShare{};
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const int x = tileX + pieces.pixel[i] % kTile, y = tileY + pieces.pixel[i] / kTile;
+        frame.colour.at(x, y) += glm::vec4(colours[i], 1.0f) * pieces.share[i];
+        float& most = mainShare[pieces.pixel[i]];
+        if (pieces.share[i] > most) {
+            most = pieces.share[i];
+            qImage.at(x, y) = pieces.q[i];
+        }
+    }
+}
+
+const ReferenceView* CpuSurfaceRenderer::viewAt(const Camera& camera) const {
+    const auto near = [](double a, double b) { return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a)); };
+    for (const ReferenceView& view : bundle_.views) {
+        const Camera& c = view.camera;
+        if (c.width != camera.width || c.height != camera.height || c.orthographic != camera.orthographic)
+            continue;
+        if (!near(c.fx, camera.fx) || !near(c.fy, camera.fy) || !near(c.cx, camera.cx) || !near(c.cy, camera.cy))
+            continue;
+        if (glm::length(c.position - camera.position) > 1e-9 * std::max(1.0, glm::length(c.position))) continue;
+        if (std::abs(std::abs(glm::dot(c.orientation, camera.orientation)) - 1.0) > 1e-12) continue;
+        return &view;
+    }
+    return nullptr;
+}
+
+Frame CpuSurfaceRenderer::copyOf(const ReferenceView& view) const {
+    Frame frame;
+    frame.colour = Image<glm::vec4>(view.camera.width, view.camera.height);
+    frame.depth = view.depth;
+    for (int y = 0; y < view.camera.height; ++y) {
+        for (int x = 0; x < view.camera.width; ++x) {
+            const glm::vec4 c = view.texture.at(x, y);
+            frame.colour.at(x, y) = glm::vec4(glm::vec3(c) * c.a, c.a);
+        }
+    }
+    return frame;
+}
+
+void CpuSurfaceRenderer::light(const PixelSpace& space, Frame& frame) const {
+    const int width = frame.colour.width(), height = frame.colour.height();
+    const Lighting lighting = lightsInWorld(settings_.lighting, space.camera.worldFromCamera());
+    frame.albedo = frame.colour;
+    frame.normal = Image<glm::vec3>(width, height, glm::vec3(0.0f));
+    const glm::dmat3 worldFromCamera = glm::mat3_cast(space.camera.orientation);
+    parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            for (int x = 0; x < width; ++x) {
+                const float dist = frame.depth.at(x, y);
+                if (!hasPoint(dist)) continue;
+                const glm::dvec3 here = space.camera.unproject(x + 0.5, y + 0.5, dist);
+                // The tangent along an axis: towards the neighbour that is nearer in depth.
+                const auto tangent = [&](int dx, int dy) {
+                    glm::dvec3 best(0.0);
+                    double least = 0.02 * std::abs(dist);
+                    for (const int sign : {-1, 1}) {
+                        const int nx = x + sign * dx, ny = y + sign * dy;
+                        if (!frame.depth.contains(nx, ny) || !hasPoint(frame.depth.at(nx, ny))) continue;
+                        const double there = frame.depth.at(nx, ny);
+                        if (std::abs(there - dist) >= least) continue;
+                        least = std::abs(there - dist);
+                        best = (space.camera.unproject(nx + 0.5, ny + 0.5, there) - here) * static_cast<double>(sign);
+                    }
+                    return best;
+                };
+                glm::dvec3 normal = glm::cross(tangent(0, 1), tangent(1, 0));
+                const double length = glm::length(normal);
+                normal = length > 0 ? normal / length : glm::dvec3(0, 0, 1);
+                const glm::dvec3 world = space.camera.position + worldFromCamera * here;
+                const glm::dvec3 toEye = -space.camera.viewDirection(x + 0.5, y + 0.5);
+                normal = worldFromCamera * normal;
+                frame.normal.at(x, y) = glm::vec3(normal);
+                glm::vec4& pixel = frame.colour.at(x, y);
+                if (!(pixel.a > 0.0f)) continue;
+                const glm::vec3 lit = shadePhong(lighting, glm::vec3(pixel) / pixel.a, glm::vec3(world),
+                                                 glm::vec3(normal), glm::vec3(toEye));
+                pixel = glm::vec4(lit * pixel.a, pixel.a);
+            }
+        }
+    });
+}
+
+Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
+    STX_CHECK(camera.check());
+    STX_CHECK(job_.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
+                                          sizeof(glm::vec4) + 2 * sizeof(float), "the frame"));
+    const auto start = std::chrono::steady_clock::now();
+    double farthest = 1.0;
+    if (!bounds_.empty())
+        farthest = std::max(1e-6 * bounds_.radius(),
+                            glm::dot(bounds_.centre() - camera.position, camera.forward()) + bounds_.radius());
+    const PixelSpace space(camera, farthest);
+    Frame frame;
+    if (const ReferenceView* view = viewAt(camera)) {
+        frame = copyOf(*view);
+    } else {
+        frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
+        Image<float> q(camera.width, camera.height, 0.0f);
+        const int tilesX = (camera.width + kTile - 1) / kTile, tilesY = (camera.height + kTile - 1) / kTile;
+        std::vector<FrameSource> placed(sources_.size());
+        parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
+            placed[static_cast<std::size_t>(i)] = placeSource(sources_[static_cast<std::size_t>(i)], space, tilesX, tilesY);
+        });
+        parallelFor(0, static_cast<std::int64_t>(tilesX) * tilesY, [&](std::int64_t tile) {
+            if (job_.cancelled) return;
+            drawTile(space, placed, tilesX, static_cast<int>(tile), frame, q);
+        });
+        STX_CHECK(job_.checkCancelled());
+        if (fillsFrame_ && settings_.fill == Fill::background) {
+            fillBackground({frame.colour, q, space});
+        } else {
+            std::vector<LocalSource> all;
+            for (const FrameSource& f : placed) all.push_back({f.source, f.sourceFromPixel, nullptr});
+            fillUnseen({frame.colour, q, space}, all);
+        }
+        frame.depth = Image<float>(camera.width, camera.height, kNoDepth);
+        for (std::size_t i = 0; i < q.count(); ++i)
+            if (q.data()[i] > 0.0f) frame.depth.data()[i] = static_cast<float>(space.axis.dist(q.data()[i]));
+    }
+    frame.linear = bundle_.views[0].texture.isLinear();
+    if (settings_.lighting.on()) light(space, frame);
+    frame.milliseconds =
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    return frame;
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const Bundle& bundle, const RenderSettings& settings,
+                                                 Job& job) {
+    return std::make_unique<CpuSurfaceRenderer>(bundle, settings, job);
+}
+
+}  // namespace stx

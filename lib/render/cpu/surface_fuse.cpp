@@ -1,0 +1,271 @@
+#include "lib/render/cpu/surface_fuse.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "lib/render/cpu/surface_opinion.hpp"
+
+namespace stx::surface {
+namespace {
+
+/// Surfaces closer than this share of their depth are one.
+constexpr float kSame = 0.002f;
+/// Samples of one pixel are one piece until q jumps by more.
+constexpr float kJump = 0.003f;
+
+std::uint32_t bitsOf(float q) { return std::bit_cast<std::uint32_t>(q) & 3u; }
+
+struct Fuser {
+    std::span<const LocalSource> sources;
+    const SampleGrid& grid;
+    const DepthAxis& axis;
+    int tileX, tileY;
+    Pieces& pieces;
+
+    struct Candidate {
+        float q;
+        int source;
+    };
+    struct Accepted {
+        float q = 0;
+        std::uint32_t sources = 0;
+        int sample = 0;
+    };
+
+    [[nodiscard]] float sampleOf(int source, int i, int j) const {
+        const float* samples = sources[static_cast<std::size_t>(source)].samples;
+        return samples ? samples[static_cast<std::ptrdiff_t>(j) * grid.stride() + i] : 0.0f;
+    }
+
+    /// dq/dx, dq/dy per pixel of one source's surface at a sample.
+    [[nodiscard]] glm::vec2 slope(int source, int i, int j) const {
+        const float here = sampleOf(source, i, j);
+        const float limit = 0.01f * axis.whole(here);
+        const auto difference = [&](int di, int dj, float& out) {
+            const int ni = i + di, nj = j + dj;
+            if (ni < 0 || nj < 0 || ni >= grid.side() || nj >= grid.side()) return false;
+            const float there = sampleOf(source, ni, nj);
+            out = (there - here) * static_cast<float>(di + dj);
+            return there > 0.0f && std::abs(out) < limit;
+        };
+        const auto along = [&](int di, int dj) {
+            float a = 0, b = 0;
+            const bool hasA = difference(-di, -dj, a), hasB = difference(di, dj, b);
+            if (hasA && hasB) {
+                if (std::abs(a) < 0.5f * std::abs(b)) return a;
+                if (std::abs(b) < 0.5f * std::abs(a)) return b;
+                return 0.5f * (a + b);
+            }
+            return hasA ? a : hasB ? b : 0.0f;
+        };
+        return glm::vec2(along(1, 0), along(0, 1)) * static_cast<float>(grid.perPixel);
+    }
+
+    [[nodiscard]] bool rejected(const Candidate& c, float x, float y, int i, int j) const {
+        const std::uint32_t bits = bitsOf(c.q);
+        const int enough = (bits & kExtensionBit) ? 1 : 2;
+        int votes = 0;
+        for (int s = 0; s < static_cast<int>(sources.size()); ++s) {
+            const LocalSource& local = sources[static_cast<std::size_t>(s)];
+            if (s == c.source) {
+                if (!local.source->hasAlpha || !(bits & kNearEdgeBit)) continue;
+                const glm::vec4 h = local.sourceFromPixel.homogeneous(x, y, c.q);
+                if (alphaAt(*local.source, std::clamp(h.x / h.w, 0.0f, static_cast<float>(local.source->width)),
+                            std::clamp(h.y / h.w, 0.0f, static_cast<float>(local.source->height))) < kFreeAlpha)
+                    return true;
+                continue;
+            }
+            const float other = sampleOf(s, i, j);
+            if (other > 0.0f && !(bitsOf(other) & kExtensionBit) &&
+                std::abs(other - c.q) < kSame * axis.whole(c.q))
+                continue;
+            switch (opinionOf(*local.source, local.sourceFromPixel, x, y, c.q)) {
+                case Opinion::none: break;
+                case Opinion::freeByAlpha: return true;
+                case Opinion::freeByDepth:
+                    if (++votes >= enough) return true;
+                    break;
+            }
+        }
+        return false;
+    }
+
+    [[nodiscard]] bool fuseSample(int i, int j, Accepted& out) const {
+        std::array<Candidate, 32> candidates;
+        int count = 0;
+        for (int s = 0; s < static_cast<int>(sources.size()); ++s) {
+            const float q = sampleOf(s, i, j);
+            if (!(q > 0.0f)) continue;
+            int at = count++;
+            for (; at > 0 && candidates[static_cast<std::size_t>(at - 1)].q < q; --at)
+                candidates[static_cast<std::size_t>(at)] = candidates[static_cast<std::size_t>(at - 1)];
+            candidates[static_cast<std::size_t>(at)] = {q, s};
+        }
+        const float scale = 1.0f / static_cast<float>(grid.perPixel);
+        const float x = static_cast<float>(tileX) + (static_cast<float>(i) + 0.5f) * scale;
+        const float y = static_cast<float>(tileY) + (static_cast<float>(j) + 0.5f) * scale;
+        for (int c = 0; c < count; ++c) {
+            const Candidate& front = candidates[static_cast<std::size_t>(c)];
+            const float behind = front.q - kSame * axis.whole(front.q);
+            bool sure = false;
+            if (bitsOf(front.q) == 0) {
+                for (int o = c + 1; o < count && candidates[static_cast<std::size_t>(o)].q > behind; ++o)
+                    sure = sure || bitsOf(candidates[static_cast<std::size_t>(o)].q) == 0;
+            }
+            if (!sure && rejected(front, x, y, i, j)) continue;
+            float sum = 0, weights = 0;
+            std::uint32_t meshes = 0, extensions = 0;
+            for (int o = c; o < count && candidates[static_cast<std::size_t>(o)].q > behind; ++o) {
+                const Candidate& other = candidates[static_cast<std::size_t>(o)];
+                const bool extension = bitsOf(other.q) & kExtensionBit;
+                const float weight = extension ? 0.01f : 1.0f;
+                sum += weight * (other.q - front.q);
+                weights += weight;
+                (extension ? extensions : meshes) |= 1u << other.source;
+            }
+            out.q = front.q + sum / weights;
+            out.sources = meshes ? meshes : extensions;
+            return true;
+        }
+        return false;
+    }
+
+    void fusePixel(int column, int row) const {
+        const int S = grid.perPixel;
+        std::array<Accepted, 16> samples;
+        int count = 0;
+        for (int j = 0; j < S; ++j) {
+            for (int i = 0; i < S; ++i) {
+                Accepted a;
+                if (!fuseSample(column * S + i, row * S + j, a)) continue;
+                a.sample = j * S + i;
+                int at = count++;
+                for (; at > 0 && samples[static_cast<std::size_t>(at - 1)].q < a.q; --at)
+                    samples[static_cast<std::size_t>(at)] = samples[static_cast<std::size_t>(at - 1)];
+                samples[static_cast<std::size_t>(at)] = a;
+            }
+        }
+        const float scale = 1.0f / static_cast<float>(S);
+        for (int begin = 0; begin < count;) {
+            int end = begin + 1;
+            while (end < count) {
+                const float before = samples[static_cast<std::size_t>(end - 1)].q;
+                if (before - samples[static_cast<std::size_t>(end)].q > kJump * axis.whole(before)) break;
+                ++end;
+            }
+            float x = 0, y = 0, q = 0;
+            std::uint32_t seenBy = 0;
+            for (int k = begin; k < end; ++k) {
+                const Accepted& a = samples[static_cast<std::size_t>(k)];
+                x += (static_cast<float>(a.sample % S) + 0.5f) * scale;
+                y += (static_cast<float>(a.sample / S) + 0.5f) * scale;
+                q += a.q;
+                seenBy |= a.sources;
+            }
+            const float n = 1.0f / static_cast<float>(end - begin);
+            const Accepted& middle = samples[static_cast<std::size_t>((begin + end) / 2)];
+            const glm::vec2 g = slope(std::countr_zero(middle.sources), column * S + middle.sample % S,
+                                      row * S + middle.sample / S);
+            pieces.add(static_cast<float>(tileX + column) + x * n, static_cast<float>(tileY + row) + y * n,
+                       q * n, g.x, g.y, static_cast<float>(end - begin) * scale * scale, seenBy,
+                       row * kTile + column);
+            begin = end;
+        }
+    }
+
+    void fuseRow(int row, int columns) {
+        const int S = grid.perPixel;
+        // Per source and pixel: the range of its samples and all their remarks.
+        std::array<std::array<float, kTile>, 32> low, high;
+        std::array<std::array<std::uint32_t, kTile>, 32> remarks;
+        for (std::size_t s = 0; s < sources.size(); ++s) {
+            if (!sources[s].samples) continue;
+            low[s].fill(std::numeric_limits<float>::max());
+            high[s].fill(0.0f);
+            remarks[s].fill(0);
+            for (int j = 0; j < S; ++j) {
+                const float* line = sources[s].samples + static_cast<std::ptrdiff_t>(row * S + j) * grid.stride();
+                for (int x = 0; x < kTile; ++x) {
+                    for (int i = 0; i < S; ++i) {
+                        const float q = line[x * S + i];
+                        const auto k = static_cast<std::size_t>(x);
+                        low[s][k] = std::min(low[s][k], q);
+                        high[s][k] = std::max(high[s][k], q);
+                        remarks[s][k] |= std::bit_cast<std::uint32_t>(q);
+                    }
+                }
+            }
+        }
+        for (int column = 0; column < columns; ++column) {
+            const auto k = static_cast<std::size_t>(column);
+            bool simple = true, any = false;
+            std::uint32_t present = 0;
+            float sum = 0, lowMean = std::numeric_limits<float>::max(), highMean = 0;
+            int first = -1;
+            for (std::size_t s = 0; s < sources.size(); ++s) {
+                if (!sources[s].samples || !(high[s][k] > 0.0f)) continue;
+                any = true;
+                if (!(low[s][k] > 0.0f) || (remarks[s][k] & 3u) ||
+                    high[s][k] - low[s][k] > 0.01f * axis.whole(high[s][k])) {
+                    simple = false;
+                    break;
+                }
+                const float mean = 0.5f * (high[s][k] + low[s][k]);
+                lowMean = std::min(lowMean, mean);
+                highMean = std::max(highMean, mean);
+                sum += mean;
+                present |= 1u << s;
+                if (first < 0) first = static_cast<int>(s);
+            }
+            if (!any) continue;
+            if (!simple || highMean - lowMean > kSame * axis.whole(highMean)) {
+                fusePixel(column, row);
+                continue;
+            }
+            const int count = std::popcount(present);
+            const float x = static_cast<float>(tileX + column) + 0.5f;
+            const float y = static_cast<float>(tileY + row) + 0.5f;
+            const float q = sum / static_cast<float>(count);
+            if (count == 1 && sources.size() > 1 &&
+                rejected({q, first}, x, y, column * S + S / 2, row * S + S / 2))
+                continue;
+            const glm::vec2 g = slope(first, column * S + S / 2, row * S + S / 2);
+            pieces.add(x, y, q, g.x, g.y, 1.0f, present, row * kTile + column);
+        }
+    }
+};
+
+}  // namespace
+
+void Pieces::clear() {
+    x.clear();
+    y.clear();
+    q.clear();
+    qx.clear();
+    qy.clear();
+    share.clear();
+    sources.clear();
+    pixel.clear();
+}
+
+void Pieces::add(float px, float py, float depth, float slopeX, float slopeY, float part,
+                 std::uint32_t seenBy, int at) {
+    x.push_back(px);
+    y.push_back(py);
+    q.push_back(depth);
+    qx.push_back(slopeX);
+    qy.push_back(slopeY);
+    share.push_back(part);
+    sources.push_back(seenBy);
+    pixel.push_back(static_cast<std::uint16_t>(at));
+}
+
+void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
+              int tileX, int tileY, int columns, int rows, Pieces& pieces) {
+    Fuser fuser{sources, grid, axis, tileX, tileY, pieces};
+    for (int row = 0; row < rows; ++row) fuser.fuseRow(row, columns);
+}
+
+}  // namespace stx::surface
