@@ -32,7 +32,8 @@ Effort effortOf(Quality quality) {
             e.mostGeometry = 4;
             e.shade.mostSources = 2;
             break;
-        case Quality::normal: break;
+        case Quality::normal:
+            break;
         case Quality::best:
             e.samplesPerPixel = 4;
             e.mostGeometry = 32;
@@ -57,7 +58,8 @@ class CpuSurfaceRenderer final : public Renderer {
         : bundle_(bundle), settings_(settings), effort_(effortOf(settings.quality)), job_(job) {
         sources_.resize(bundle.views.size());
         parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
-            sources_[static_cast<std::size_t>(i)] = prepareSource(bundle.views[static_cast<std::size_t>(i)]);
+            sources_[static_cast<std::size_t>(i)] =
+                prepareSource(bundle.views[static_cast<std::size_t>(i)]);
         });
         double border = 0;
         for (const Source& s : sources_) {
@@ -69,7 +71,9 @@ class CpuSurfaceRenderer final : public Renderer {
 
     [[nodiscard]] Result<Frame> render(const Camera& camera) override;
     [[nodiscard]] std::string backend() const override { return "cpu"; }
-    [[nodiscard]] std::string device() const override { return fmt::format("CPU ({})", simdTarget()); }
+    [[nodiscard]] std::string device() const override {
+        return fmt::format("CPU ({})", simdTarget());
+    }
 
   private:
     void addBounds(const Source& s);
@@ -78,8 +82,8 @@ class CpuSurfaceRenderer final : public Renderer {
     void drawTile(const PixelSpace& space, std::span<const FrameSource> all, int tilesX, int tile,
                   Frame& frame, Image<float>& q) const;
     [[nodiscard]] std::vector<int> chooseSources(const PixelSpace& space,
-                                                 std::span<const FrameSource> all, int tile, int tileX,
-                                                 int tileY) const;
+                                                 std::span<const FrameSource> all, int tile,
+                                                 int tileX, int tileY) const;
     [[nodiscard]] const ReferenceView* viewAt(const Camera& camera) const;
     [[nodiscard]] Frame copyOf(const ReferenceView& view) const;
     void light(const PixelSpace& space, Frame& frame) const;
@@ -134,7 +138,8 @@ FrameSource CpuSurfaceRenderer::placeSource(const Source& s, const PixelSpace& s
         for (int corner = 0; corner < 8; ++corner) {
             const float x = (corner & 1) ? bx + kBlock + 1.5f : bx - 0.5f;
             const float y = (corner & 2) ? by + kBlock + 1.5f : by - 0.5f;
-            const float q = (corner & 4) ? block.qMax + margin : std::max(block.qMin - margin, 0.5f * block.qMin);
+            const float q = (corner & 4) ? block.qMax + margin
+                                         : std::max(block.qMin - margin, 0.5f * block.qMin);
             const glm::vec4 h = warp.homogeneous(x, y, q);
             if (!(h.w > 0)) {
                 behind = true;
@@ -147,7 +152,8 @@ FrameSource CpuSurfaceRenderer::placeSource(const Source& s, const PixelSpace& s
             y1 = std::max(y1, h.y / h.w);
         }
         if (!front) continue;
-        const auto limitX = static_cast<float>(space.camera.width), limitY = static_cast<float>(space.camera.height);
+        const auto limitX = static_cast<float>(space.camera.width),
+                   limitY = static_cast<float>(space.camera.height);
         if (behind) {
             x0 = y0 = 0;
             x1 = limitX;
@@ -162,7 +168,8 @@ FrameSource CpuSurfaceRenderer::placeSource(const Source& s, const PixelSpace& s
                       static_cast<int>(x1) / kTile, static_cast<int>(y1) / kTile};
         ranges.push_back(r);
         for (int ty = r.y0; ty <= r.y1; ++ty)
-            for (int tx = r.x0; tx <= r.x1; ++tx) ++f.tileBegin[static_cast<std::size_t>(ty * tilesX + tx) + 1];
+            for (int tx = r.x0; tx <= r.x1; ++tx)
+                ++f.tileBegin[static_cast<std::size_t>(ty * tilesX + tx) + 1];
     }
     for (std::size_t t = 1; t < f.tileBegin.size(); ++t) f.tileBegin[t] += f.tileBegin[t - 1];
     f.blocks.resize(f.tileBegin.back());
@@ -175,8 +182,8 @@ FrameSource CpuSurfaceRenderer::placeSource(const Source& s, const PixelSpace& s
 }
 
 std::vector<int> CpuSurfaceRenderer::chooseSources(const PixelSpace& space,
-                                                   std::span<const FrameSource> all, int tile, int tileX,
-                                                   int tileY) const {
+                                                   std::span<const FrameSource> all, int tile,
+                                                   int tileX, int tileY) const {
     std::vector<int> chosen;
     const auto count = static_cast<int>(all.size());
     if (count <= effort_.mostGeometry) {
@@ -187,13 +194,14 @@ std::vector<int> CpuSurfaceRenderer::chooseSources(const PixelSpace& space,
     double q = 0;
     int blocks = 0;
     for (const FrameSource& f : all) {
-        for (auto k = f.tileBegin[static_cast<std::size_t>(tile)]; k < f.tileBegin[static_cast<std::size_t>(tile) + 1]; ++k) {
+        for (auto k = f.tileBegin[static_cast<std::size_t>(tile)];
+             k < f.tileBegin[static_cast<std::size_t>(tile) + 1]; ++k) {
             const std::uint32_t index = f.blocks[k];
             const SourceBlock& block = f.source->blocks[index];
-            const glm::dvec4 h = f.pixelFromSource *
-                                 glm::dvec4((index % f.source->blocksX + 0.5) * kBlock,
-                                            (index / f.source->blocksX + 0.5) * kBlock,
-                                            0.5 * (block.qMin + block.qMax), 1.0);
+            const glm::dvec4 h =
+                f.pixelFromSource * glm::dvec4((index % f.source->blocksX + 0.5) * kBlock,
+                                               (index / f.source->blocksX + 0.5) * kBlock,
+                                               0.5 * (block.qMin + block.qMax), 1.0);
             if (!(h.w > 0)) continue;
             q += h.z / h.w;
             ++blocks;
@@ -209,15 +217,17 @@ std::vector<int> CpuSurfaceRenderer::chooseSources(const PixelSpace& space,
     const glm::dvec3 look = towards(space.camera);
     std::vector<std::pair<double, int>> ranked;
     for (int i = 0; i < count; ++i)
-        ranked.emplace_back(-glm::dot(look, towards(all[static_cast<std::size_t>(i)].source->space.camera)), i);
+        ranked.emplace_back(
+            -glm::dot(look, towards(all[static_cast<std::size_t>(i)].source->space.camera)), i);
     std::nth_element(ranked.begin(), ranked.begin() + effort_.mostGeometry - 1, ranked.end());
-    for (int i = 0; i < effort_.mostGeometry; ++i) chosen.push_back(ranked[static_cast<std::size_t>(i)].second);
+    for (int i = 0; i < effort_.mostGeometry; ++i)
+        chosen.push_back(ranked[static_cast<std::size_t>(i)].second);
     std::sort(chosen.begin(), chosen.end());
     return chosen;
 }
 
-void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const FrameSource> all, int tilesX,
-                                  int tile, Frame& frame, Image<float>& qImage) const {
+void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const FrameSource> all,
+                                  int tilesX, int tile, Frame& frame, Image<float>& qImage) const {
     const int tileX = tile % tilesX * kTile, tileY = tile / tilesX * kTile;
     const auto t = static_cast<std::size_t>(tile);
     if (std::all_of(all.begin(), all.end(),
@@ -247,7 +257,8 @@ void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const Frame
         const std::span<const std::uint32_t> blocks(f.blocks.data() + f.tileBegin[t],
                                                     f.tileBegin[t + 1] - f.tileBegin[t]);
         if (!blocks.empty())
-            rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks, grid, qLimit, mine);
+            rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks, grid,
+                            qLimit, mine);
         local.push_back({f.source, f.sourceFromPixel, blocks.empty() ? nullptr : mine});
         shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
     }
@@ -268,14 +279,20 @@ void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const Frame
 }
 
 const ReferenceView* CpuSurfaceRenderer::viewAt(const Camera& camera) const {
-    const auto near = [](double a, double b) { return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a)); };
+    const auto near = [](double a, double b) {
+        return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a));
+    };
     for (const ReferenceView& view : bundle_.views) {
         const Camera& c = view.camera;
-        if (c.width != camera.width || c.height != camera.height || c.orthographic != camera.orthographic)
+        if (c.width != camera.width || c.height != camera.height ||
+            c.orthographic != camera.orthographic)
             continue;
-        if (!near(c.fx, camera.fx) || !near(c.fy, camera.fy) || !near(c.cx, camera.cx) || !near(c.cy, camera.cy))
+        if (!near(c.fx, camera.fx) || !near(c.fy, camera.fy) || !near(c.cx, camera.cx) ||
+            !near(c.cy, camera.cy))
             continue;
-        if (glm::length(c.position - camera.position) > 1e-9 * std::max(1.0, glm::length(c.position))) continue;
+        if (glm::length(c.position - camera.position) >
+            1e-9 * std::max(1.0, glm::length(c.position)))
+            continue;
         if (std::abs(std::abs(glm::dot(c.orientation, camera.orientation)) - 1.0) > 1e-12) continue;
         return &view;
     }
@@ -313,11 +330,13 @@ void CpuSurfaceRenderer::light(const PixelSpace& space, Frame& frame) const {
                     double least = 0.02 * std::abs(dist);
                     for (const int sign : {-1, 1}) {
                         const int nx = x + sign * dx, ny = y + sign * dy;
-                        if (!frame.depth.contains(nx, ny) || !hasPoint(frame.depth.at(nx, ny))) continue;
+                        if (!frame.depth.contains(nx, ny) || !hasPoint(frame.depth.at(nx, ny)))
+                            continue;
                         const double there = frame.depth.at(nx, ny);
                         if (std::abs(there - dist) >= least) continue;
                         least = std::abs(there - dist);
-                        best = (space.camera.unproject(nx + 0.5, ny + 0.5, there) - here) * static_cast<double>(sign);
+                        best = (space.camera.unproject(nx + 0.5, ny + 0.5, there) - here) *
+                               static_cast<double>(sign);
                     }
                     return best;
                 };
@@ -330,8 +349,9 @@ void CpuSurfaceRenderer::light(const PixelSpace& space, Frame& frame) const {
                 frame.normal.at(x, y) = glm::vec3(normal);
                 glm::vec4& pixel = frame.colour.at(x, y);
                 if (!(pixel.a > 0.0f)) continue;
-                const glm::vec3 lit = shadePhong(lighting, glm::vec3(pixel) / pixel.a, glm::vec3(world),
-                                                 glm::vec3(normal), glm::vec3(toEye));
+                const glm::vec3 lit =
+                    shadePhong(lighting, glm::vec3(pixel) / pixel.a, glm::vec3(world),
+                               glm::vec3(normal), glm::vec3(toEye));
                 pixel = glm::vec4(lit * pixel.a, pixel.a);
             }
         }
@@ -345,8 +365,9 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
     const auto start = std::chrono::steady_clock::now();
     double farthest = 1.0;
     if (!bounds_.empty())
-        farthest = std::max(1e-6 * bounds_.radius(),
-                            glm::dot(bounds_.centre() - camera.position, camera.forward()) + bounds_.radius());
+        farthest = std::max(
+            1e-6 * bounds_.radius(),
+            glm::dot(bounds_.centre() - camera.position, camera.forward()) + bounds_.radius());
     const PixelSpace space(camera, farthest);
     Frame frame;
     if (const ReferenceView* view = viewAt(camera)) {
@@ -354,10 +375,12 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
     } else {
         frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
         Image<float> q(camera.width, camera.height, 0.0f);
-        const int tilesX = (camera.width + kTile - 1) / kTile, tilesY = (camera.height + kTile - 1) / kTile;
+        const int tilesX = (camera.width + kTile - 1) / kTile,
+                  tilesY = (camera.height + kTile - 1) / kTile;
         std::vector<FrameSource> placed(sources_.size());
         parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
-            placed[static_cast<std::size_t>(i)] = placeSource(sources_[static_cast<std::size_t>(i)], space, tilesX, tilesY);
+            placed[static_cast<std::size_t>(i)] =
+                placeSource(sources_[static_cast<std::size_t>(i)], space, tilesX, tilesY);
         });
         parallelFor(0, static_cast<std::int64_t>(tilesX) * tilesY, [&](std::int64_t tile) {
             if (job_.cancelled) return;
@@ -368,12 +391,14 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
             fillBackground({frame.colour, q, space});
         } else {
             std::vector<LocalSource> all;
-            for (const FrameSource& f : placed) all.push_back({f.source, f.sourceFromPixel, nullptr});
+            for (const FrameSource& f : placed)
+                all.push_back({f.source, f.sourceFromPixel, nullptr});
             fillUnseen({frame.colour, q, space}, all);
         }
         frame.depth = Image<float>(camera.width, camera.height, kNoDepth);
         for (std::size_t i = 0; i < q.count(); ++i)
-            if (q.data()[i] > 0.0f) frame.depth.data()[i] = static_cast<float>(space.axis.dist(q.data()[i]));
+            if (q.data()[i] > 0.0f)
+                frame.depth.data()[i] = static_cast<float>(space.axis.dist(q.data()[i]));
     }
     frame.linear = bundle_.views[0].texture.isLinear();
     if (settings_.lighting.on()) light(space, frame);
@@ -384,8 +409,8 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
 
 }  // namespace
 
-std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const Bundle& bundle, const RenderSettings& settings,
-                                                 Job& job) {
+std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const Bundle& bundle,
+                                                 const RenderSettings& settings, Job& job) {
     return std::make_unique<CpuSurfaceRenderer>(bundle, settings, job);
 }
 

@@ -13,6 +13,7 @@ namespace stx {
 /// of the references that see it. Prepares every view; the bundle must pass check() and outlive the
 /// renderer. A camera that stands exactly where a reference stands gets that reference's pixels.
 [[nodiscard]] std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const Bundle& bundle,
-                                                               const RenderSettings& settings, Job& job);
+                                                               const RenderSettings& settings,
+                                                               Job& job);
 
 }  // namespace stx

@@ -81,9 +81,11 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
                 std::array<Hit, 8> hits;
                 int count = 0;
                 float nearest = 0, farthest = std::numeric_limits<float>::max();
-                for (std::size_t k = 0; k < kDirections.size() && count + 8 > static_cast<int>(k) + 6; ++k) {
+                for (std::size_t k = 0;
+                     k < kDirections.size() && count + 8 > static_cast<int>(k) + 6; ++k) {
                     for (int step = 1; step <= kReach; ++step) {
-                        const int nx = x + kDirections[k][0] * step, ny = y + kDirections[k][1] * step;
+                        const int nx = x + kDirections[k][0] * step,
+                                  ny = y + kDirections[k][1] * step;
                         if (!frame.q.contains(nx, ny)) break;
                         if (!closed(frame, nx, ny)) continue;
                         const float length = (k & 1) ? 1.41421356f : 1.0f;
@@ -167,7 +169,8 @@ void fillBackground(OpenFrame frame) {
                         if (averaged == 0) {
                             hit = here;
                         } else {
-                            if (std::abs(here.q - hit.q) > 0.03f * frame.space.axis.whole(hit.q)) break;
+                            if (std::abs(here.q - hit.q) > 0.03f * frame.space.axis.whole(hit.q))
+                                break;
                             hit.colour += here.colour;
                         }
                         ++averaged;

@@ -15,7 +15,9 @@ constexpr float kSame = 0.002f;
 /// Samples of one pixel are one piece until q jumps by more.
 constexpr float kJump = 0.003f;
 
-std::uint32_t bitsOf(float q) { return std::bit_cast<std::uint32_t>(q) & 3u; }
+std::uint32_t bitsOf(float q) {
+    return std::bit_cast<std::uint32_t>(q) & 3u;
+}
 
 struct Fuser {
     std::span<const LocalSource> sources;
@@ -72,8 +74,10 @@ struct Fuser {
             if (s == c.source) {
                 if (!local.source->hasAlpha || !(bits & kNearEdgeBit)) continue;
                 const glm::vec4 h = local.sourceFromPixel.homogeneous(x, y, c.q);
-                if (alphaAt(*local.source, std::clamp(h.x / h.w, 0.0f, static_cast<float>(local.source->width)),
-                            std::clamp(h.y / h.w, 0.0f, static_cast<float>(local.source->height))) < kFreeAlpha)
+                if (alphaAt(*local.source,
+                            std::clamp(h.x / h.w, 0.0f, static_cast<float>(local.source->width)),
+                            std::clamp(h.y / h.w, 0.0f, static_cast<float>(local.source->height))) <
+                    kFreeAlpha)
                     return true;
                 continue;
             }
@@ -82,8 +86,10 @@ struct Fuser {
                 std::abs(other - c.q) < kSame * axis.whole(c.q))
                 continue;
             switch (opinionOf(*local.source, local.sourceFromPixel, x, y, c.q)) {
-                case Opinion::none: break;
-                case Opinion::freeByAlpha: return true;
+                case Opinion::none:
+                    break;
+                case Opinion::freeByAlpha:
+                    return true;
                 case Opinion::freeByDepth:
                     if (++votes >= enough) return true;
                     break;
@@ -100,7 +106,8 @@ struct Fuser {
             if (!(q > 0.0f)) continue;
             int at = count++;
             for (; at > 0 && candidates[static_cast<std::size_t>(at - 1)].q < q; --at)
-                candidates[static_cast<std::size_t>(at)] = candidates[static_cast<std::size_t>(at - 1)];
+                candidates[static_cast<std::size_t>(at)] =
+                    candidates[static_cast<std::size_t>(at - 1)];
             candidates[static_cast<std::size_t>(at)] = {q, s};
         }
         const float scale = 1.0f / static_cast<float>(grid.perPixel);
@@ -111,7 +118,8 @@ struct Fuser {
             const float behind = front.q - kSame * axis.whole(front.q);
             bool sure = false;
             if (bitsOf(front.q) == 0) {
-                for (int o = c + 1; o < count && candidates[static_cast<std::size_t>(o)].q > behind; ++o)
+                for (int o = c + 1; o < count && candidates[static_cast<std::size_t>(o)].q > behind;
+                     ++o)
                     sure = sure || bitsOf(candidates[static_cast<std::size_t>(o)].q) == 0;
             }
             if (!sure && rejected(front, x, y, i, j)) continue;
@@ -143,7 +151,8 @@ struct Fuser {
                 a.sample = j * S + i;
                 int at = count++;
                 for (; at > 0 && samples[static_cast<std::size_t>(at - 1)].q < a.q; --at)
-                    samples[static_cast<std::size_t>(at)] = samples[static_cast<std::size_t>(at - 1)];
+                    samples[static_cast<std::size_t>(at)] =
+                        samples[static_cast<std::size_t>(at - 1)];
                 samples[static_cast<std::size_t>(at)] = a;
             }
         }
@@ -152,7 +161,8 @@ struct Fuser {
             int end = begin + 1;
             while (end < count) {
                 const float before = samples[static_cast<std::size_t>(end - 1)].q;
-                if (before - samples[static_cast<std::size_t>(end)].q > kJump * axis.whole(before)) break;
+                if (before - samples[static_cast<std::size_t>(end)].q > kJump * axis.whole(before))
+                    break;
                 ++end;
             }
             float x = 0, y = 0, q = 0;
@@ -166,10 +176,11 @@ struct Fuser {
             }
             const float n = 1.0f / static_cast<float>(end - begin);
             const Accepted& middle = samples[static_cast<std::size_t>((begin + end) / 2)];
-            const glm::vec2 g = slope(std::countr_zero(middle.sources), column * S + middle.sample % S,
-                                      row * S + middle.sample / S);
-            pieces.add(static_cast<float>(tileX + column) + x * n, static_cast<float>(tileY + row) + y * n,
-                       q * n, g.x, g.y, static_cast<float>(end - begin) * scale * scale, seenBy,
+            const glm::vec2 g = slope(std::countr_zero(middle.sources),
+                                      column * S + middle.sample % S, row * S + middle.sample / S);
+            pieces.add(static_cast<float>(tileX + column) + x * n,
+                       static_cast<float>(tileY + row) + y * n, q * n, g.x, g.y,
+                       static_cast<float>(end - begin) * scale * scale, seenBy,
                        row * kTile + column);
             begin = end;
         }
@@ -186,7 +197,8 @@ struct Fuser {
             high[s].fill(0.0f);
             remarks[s].fill(0);
             for (int j = 0; j < S; ++j) {
-                const float* line = sources[s].samples + static_cast<std::ptrdiff_t>(row * S + j) * grid.stride();
+                const float* line =
+                    sources[s].samples + static_cast<std::ptrdiff_t>(row * S + j) * grid.stride();
                 for (int x = 0; x < kTile; ++x) {
                     for (int i = 0; i < S; ++i) {
                         const float q = line[x * S + i];

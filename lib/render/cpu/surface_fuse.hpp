@@ -17,11 +17,11 @@ struct LocalSource {
 
 /// Parts of surfaces to shade, one per pixel and depth, as arrays of equal length.
 struct Pieces {
-    std::vector<float> x, y;                ///< frame pixel position of the part's middle
-    std::vector<float> q, qx, qy;           ///< depth and its slope per pixel
-    std::vector<float> share;               ///< of the pixel, 0..1
-    std::vector<std::uint32_t> sources;     ///< bit i: local source i sees it
-    std::vector<std::uint16_t> pixel;       ///< column + kTile * row in the tile
+    std::vector<float> x, y;             ///< frame pixel position of the part's middle
+    std::vector<float> q, qx, qy;        ///< depth and its slope per pixel
+    std::vector<float> share;            ///< of the pixel, 0..1
+    std::vector<std::uint32_t> sources;  ///< bit i: local source i sees it
+    std::vector<std::uint16_t> pixel;    ///< column + kTile * row in the tile
 
     void clear();
     void add(float px, float py, float depth, float slopeX, float slopeY, float part,

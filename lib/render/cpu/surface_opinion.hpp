@@ -30,8 +30,8 @@ inline constexpr float kFreeAlpha = 0.43f;
 }
 
 /// The opinion of a source on the point at (x, y, q) of the novel view.
-[[nodiscard]] inline Opinion opinionOf(const Source& s, const Warp& sourceFromPixel, float x, float y,
-                                       float q) {
+[[nodiscard]] inline Opinion opinionOf(const Source& s, const Warp& sourceFromPixel, float x,
+                                       float y, float q) {
     const glm::vec4 h = sourceFromPixel.homogeneous(x, y, q);
     if (!(h.w > 0.0f)) return Opinion::none;
     const float inverse = 1.0f / h.w;
@@ -40,7 +40,8 @@ inline constexpr float kFreeAlpha = 0.43f;
           v < static_cast<float>(s.height) && p > 0.0f))
         return Opinion::none;
     if (alphaAt(s, u, v) < kFreeAlpha) return Opinion::freeByAlpha;
-    const int x0 = static_cast<int>(std::floor(u - 0.5f)), y0 = static_cast<int>(std::floor(v - 0.5f));
+    const int x0 = static_cast<int>(std::floor(u - 0.5f)),
+              y0 = static_cast<int>(std::floor(v - 0.5f));
     bool any = false;
     for (int j = 0; j < 2; ++j) {
         for (int i = 0; i < 2; ++i) {
@@ -56,7 +57,8 @@ inline constexpr float kFreeAlpha = 0.43f;
             const glm::vec2 g = s.gradient(cx, cy);
             const float predicted = there + g.x * (u - 0.5f - static_cast<float>(cx)) +
                                     g.y * (v - 0.5f - static_cast<float>(cy));
-            if (p < predicted + margin + 0.125f * (std::abs(g.x) + std::abs(g.y))) return Opinion::none;
+            if (p < predicted + margin + 0.125f * (std::abs(g.x) + std::abs(g.y)))
+                return Opinion::none;
         }
     }
     return any ? Opinion::freeByDepth : Opinion::none;

@@ -130,14 +130,15 @@ constexpr float kLeafGrow = 0.06f;
 HWY_INLINE void drawLeaf(const Target& t, const Warp& warp, const Leaf& leaf, float grow) {
     const float n = leaf.size;
     const float x = leaf.x + 0.5f, y = leaf.y + 0.5f;
-    const Vertex v[4] = {project(warp, x, y, leaf.q0), project(warp, x + n, y, leaf.q0 + n * leaf.qx),
+    const Vertex v[4] = {project(warp, x, y, leaf.q0),
+                         project(warp, x + n, y, leaf.q0 + n * leaf.qx),
                          project(warp, x + n, y + n, leaf.q0 + n * (leaf.qx + leaf.qy)),
                          project(warp, x, y + n, leaf.q0 + n * leaf.qy)};
     fillPolygon<4, false>(t, v, grow, 0);
 }
 
-HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp, const SourceBlock& block,
-                            int x0, int y0) {
+HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
+                            const SourceBlock& block, int x0, int y0) {
     constexpr int kSide = kBlock + 1;
     Vertex grid[kSide][kSide];
     const int xEnd = std::min(x0 + kBlock, s.width - 1), yEnd = std::min(y0 + kBlock, s.height - 1);
@@ -150,7 +151,8 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp, 
         if (!needed[y - y0]) continue;
         const float* q = &s.q.at(x0, y);
         for (int x = 0; x <= xEnd - x0; ++x)
-            grid[y - y0][x] = project(warp, static_cast<float>(x0 + x) + 0.5f, static_cast<float>(y) + 0.5f, q[x]);
+            grid[y - y0][x] = project(warp, static_cast<float>(x0 + x) + 0.5f,
+                                      static_cast<float>(y) + 0.5f, q[x]);
     }
     for (int j = 0; j < kBlock; ++j) {
         for (std::uint32_t left = block.cells[j]; left; left &= left - 1) {
@@ -160,8 +162,9 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp, 
             const Vertex &v01 = grid[j + 1][i], &v11 = grid[j + 1][i + 1];
             const bool top = s.linkRight(x, y), bottom = s.linkRight(x, y + 1);
             const bool leftLink = s.linkDown(x, y), rightLink = s.linkDown(x + 1, y);
-            const int edge = std::min(std::min(s.edgeDistance(x, y), s.edgeDistance(x + 1, y)),
-                                      std::min(s.edgeDistance(x, y + 1), s.edgeDistance(x + 1, y + 1)));
+            const int edge =
+                std::min(std::min(s.edgeDistance(x, y), s.edgeDistance(x + 1, y)),
+                         std::min(s.edgeDistance(x, y + 1), s.edgeDistance(x + 1, y + 1)));
             const std::uint32_t bits = edge < 3 ? kNearEdgeBit : 0;
             const int links = top + bottom + leftLink + rightLink;
             if (links >= 3) {
@@ -234,7 +237,9 @@ void RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uin
     }
 }
 
-const char* SimdTarget() { return hwy::TargetName(HWY_TARGET); }
+const char* SimdTarget() {
+    return hwy::TargetName(HWY_TARGET);
+}
 
 }  // namespace stx::surface::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -251,7 +256,9 @@ void rasteriseSource(const Source& source, const Warp& sampleFromSource,
     HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, qLimit, samples);
 }
 
-const char* simdTarget() { return HWY_DYNAMIC_DISPATCH(SimdTarget)(); }
+const char* simdTarget() {
+    return HWY_DYNAMIC_DISPATCH(SimdTarget)();
+}
 
 }  // namespace stx::surface
 #endif

@@ -16,7 +16,8 @@ inline constexpr int kSamplePadding = 16;
 inline constexpr std::uint32_t kExtensionBit = 1;  ///< beyond the source's own mesh
 inline constexpr std::uint32_t kNearEdgeBit = 2;   ///< from within two pixels of an edge
 
-/// The samples of one tile: `side` x `side`, sample (i, j) at tile pixel ((i + ½) / S, (j + ½) / S).
+/// The samples of one tile: `side` x `side`, sample (i, j) at tile pixel ((i + ½) / S, (j + ½) /
+/// S).
 struct SampleGrid {
     int perPixel = 1;  ///< S, samples along one side of a pixel
     [[nodiscard]] int side() const { return kTile * perPixel; }

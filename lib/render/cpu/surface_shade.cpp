@@ -26,8 +26,8 @@ struct alignas(64) Lanes {
 
 /// One source under a group of pieces.
 struct View {
-    Lanes u, v;                      ///< position in the source, pixels
-    Lanes xu, xv, yu, yv;            ///< d(x, y in the frame) / d(u, v)
+    Lanes u, v;            ///< position in the source, pixels
+    Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
     Lanes weight;
     bool active = false;
     bool plain = true;  ///< all taps of all lanes lie on one surface, fully covered
@@ -82,12 +82,14 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         const V aa = hn::MulAdd(ax, ax, hn::MulAdd(ay, ay, hn::Mul(az, az)));
         const V bb = hn::MulAdd(bx, bx, hn::MulAdd(by, by, hn::Mul(bz, bz)));
         const V cosine = hn::Div(ab, hn::Sqrt(hn::Mul(aa, bb)));
-        const V t = hn::Mul(c(3.0f), hn::Sqrt(hn::Max(hn::NegMulAdd(c(2.0f), cosine, c(2.0f)), hn::Zero(d))));
-        const V series = hn::MulAdd(t, hn::MulAdd(t, hn::MulAdd(t, c(1.0f / 6), c(0.5f)), one), one);
+        const V t = hn::Mul(
+            c(3.0f), hn::Sqrt(hn::Max(hn::NegMulAdd(c(2.0f), cosine, c(2.0f)), hn::Zero(d))));
+        const V series =
+            hn::MulAdd(t, hn::MulAdd(t, hn::MulAdd(t, c(1.0f / 6), c(0.5f)), one), one);
         V weight = hn::Div(hn::Min(one, hn::Sqrt(hn::Max(det, hn::Zero(d)))), series);
-        const auto inFrame =
-            hn::And(hn::And(hn::Ge(u, hn::Zero(d)), hn::Lt(u, c(static_cast<float>(s.source->width)))),
-                    hn::And(hn::Ge(v, hn::Zero(d)), hn::Lt(v, c(static_cast<float>(s.source->height)))));
+        const auto inFrame = hn::And(
+            hn::And(hn::Ge(u, hn::Zero(d)), hn::Lt(u, c(static_cast<float>(s.source->width)))),
+            hn::And(hn::Ge(v, hn::Zero(d)), hn::Lt(v, c(static_cast<float>(s.source->height)))));
         weight = hn::IfThenElseZero(hn::And(inFrame, hn::Gt(w, hn::Zero(d))), weight);
         hn::StoreU(weight, d, &out.weight[l]);
     }
@@ -102,7 +104,8 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
             out.xv[l] = out.yu[l] = 0.0f;
             continue;
         }
-        const int edge = s.source->edgeDistance(static_cast<int>(out.u[l]), static_cast<int>(out.v[l]));
+        const int edge =
+            s.source->edgeDistance(static_cast<int>(out.u[l]), static_cast<int>(out.v[l]));
         out.weight[l] *= 0.01f + 0.99f * std::min(1.0f, static_cast<float>(edge) * (1.0f / 3.0f));
         out.active = true;
         if (edge < 3) out.plain = false;
@@ -123,7 +126,8 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const float pu = px * view.xu[lane] + py * view.yu[lane];
     const float pv = px * view.xv[lane] + py * view.yv[lane];
     const float whole = source.space.axis.whole(p);
-    const float allowed = 0.003f * whole + 0.5f * std::min(std::abs(pu) + std::abs(pv), 0.02f * whole);
+    const float allowed =
+        0.003f * whole + 0.5f * std::min(std::abs(pu) + std::abs(pv), 0.02f * whole);
     for (int j = 0; j < kTaps; ++j) {
         for (int i = 0; i < kTaps; ++i) {
             const int cx = baseU + i, cy = baseV + j;
@@ -132,8 +136,10 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
             if (!source.q.contains(cx, cy)) continue;
             const float there = source.q.at(cx, cy);
             if (!(there > 0.0f)) continue;
-            const float du = static_cast<float>(cx) + 0.5f - u, dv = static_cast<float>(cy) + 0.5f - v;
-            const float predicted = p + std::clamp(pu * du + pv * dv, -0.04f * whole, 0.04f * whole);
+            const float du = static_cast<float>(cx) + 0.5f - u,
+                        dv = static_cast<float>(cy) + 0.5f - v;
+            const float predicted =
+                p + std::clamp(pu * du + pv * dv, -0.04f * whole, 0.04f * whole);
             if (std::abs(there - predicted) > allowed) continue;
             value = source.hasAlpha ? source.alpha(cx, cy) : 1.0f;
         }
@@ -172,8 +178,9 @@ struct Kernel {
         const V sxx = hn::MulAdd(h, hn::MulAdd(xu, xu, hn::Mul(xv, xv)), rest);
         const V syy = hn::MulAdd(h, hn::MulAdd(yu, yu, hn::Mul(yv, yv)), rest);
         const V sxy = hn::Mul(h, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
-        const V scale = hn::Div(hn::Set(d, inverseRadius),
-                                hn::Max(hn::NegMulAdd(sxy, sxy, hn::Mul(sxx, syy)), hn::Set(d, 1e-6f)));
+        const V scale =
+            hn::Div(hn::Set(d, inverseRadius),
+                    hn::Max(hn::NegMulAdd(sxy, sxy, hn::Mul(sxx, syy)), hn::Set(d, 1e-6f)));
         a = hn::Mul(syy, scale);
         b = hn::Mul(hn::Set(d, -2.0f), hn::Mul(sxy, scale));
         c = hn::Mul(sxx, scale);
@@ -198,16 +205,21 @@ struct Kernel {
 /// The first row of the inverse of the 6x6 normal matrix, terms 1, dx, dy, dx², dxdy, dy².
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE void solveFirstRow(D d, const V* m, float ridge, V* out) {
-    // Moments by power: 0:1 1:x 2:y 3:xx 4:xy 5:yy 6:xxx 7:xxy 8:xyy 9:yyy 10:x4 11:x3y 12:x2y2 13:xy3 14:y4
+    // Moments by power: 0:1 1:x 2:y 3:xx 4:xy 5:yy 6:xxx 7:xxy 8:xyy 9:yyy 10:x4 11:x3y 12:x2y2
+    // 13:xy3 14:y4
     const V hold = hn::Mul(m[0], hn::Set(d, ridge));
-    constexpr int kIndex[5][5] = {
-        {3, 4, 6, 7, 8}, {4, 5, 7, 8, 9}, {6, 7, 10, 11, 12}, {7, 8, 11, 12, 13}, {8, 9, 12, 13, 14}};
+    constexpr int kIndex[5][5] = {{3, 4, 6, 7, 8},
+                                  {4, 5, 7, 8, 9},
+                                  {6, 7, 10, 11, 12},
+                                  {7, 8, 11, 12, 13},
+                                  {8, 9, 12, 13, 14}};
     V lower[5][5], inverse[5], z[5];
     for (int i = 0; i < 5; ++i) {
         for (int j = 0; j <= i; ++j) {
             V sum = m[kIndex[i][j]];
             if (i == j) sum = hn::Add(sum, hold);
-            for (int k = 0; k < j; ++k) sum = hn::NegMulAdd(lower[i][k], hn::Mul(lower[j][k], z[k]), sum);
+            for (int k = 0; k < j; ++k)
+                sum = hn::NegMulAdd(lower[i][k], hn::Mul(lower[j][k], z[k]), sum);
             if (i == j) {
                 z[i] = hn::Max(sum, hn::Mul(hold, hn::Set(d, 0.01f)));
                 inverse[i] = hn::Div(hn::Set(d, 1.0f), z[i]);
@@ -280,7 +292,8 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     for (int l = 0; l < g.count; ++l) {
         int top = -1;
         for (int k = 0; k < count; ++k)
-            if (views[list[k]].weight[l] > 0.0f && (top < 0 || views[list[k]].weight[l] > views[top].weight[l]))
+            if (views[list[k]].weight[l] > 0.0f &&
+                (top < 0 || views[list[k]].weight[l] > views[top].weight[l]))
                 top = list[k];
         best[l] = static_cast<std::int8_t>(top);
     }
@@ -311,7 +324,8 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
                 float mask[kTaps * kTaps];
                 if (l < g.count && view.weight[l] > 0.0f) {
                     maskTaps(sources[static_cast<std::size_t>(s)], g, l, view.u[l], view.v[l], view,
-                             static_cast<int>(bases[s][0][l]), static_cast<int>(bases[s][1][l]), mask);
+                             static_cast<int>(bases[s][0][l]), static_cast<int>(bases[s][1][l]),
+                             mask);
                 } else {
                     std::fill(mask, mask + kTaps * kTaps, 0.0f);
                 }
@@ -319,7 +333,8 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             }
         }
         for (int l = 0; l < kGroup; l += n) {
-            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l, 1.0f / settings.kernel);
+            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
+                                             1.0f / settings.kernel);
             V m[kMoments];
             for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
             for (int j = 0; j < kTaps; ++j) {
@@ -329,8 +344,10 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
                         t.weight = hn::Mul(t.weight, hn::LoadU(d, &masks[s][j * kTaps + i][l]));
                     hn::StoreU(t.weight, d, &kernels[s][j * kTaps + i][l]);
                     const V wx = hn::Mul(t.weight, t.dx), wy = hn::Mul(t.weight, t.dy);
-                    const V wxx = hn::Mul(wx, t.dx), wxy = hn::Mul(wx, t.dy), wyy = hn::Mul(wy, t.dy);
-                    const V xx = hn::Mul(t.dx, t.dx), xy = hn::Mul(t.dx, t.dy), yy = hn::Mul(t.dy, t.dy);
+                    const V wxx = hn::Mul(wx, t.dx), wxy = hn::Mul(wx, t.dy),
+                            wyy = hn::Mul(wy, t.dy);
+                    const V xx = hn::Mul(t.dx, t.dx), xy = hn::Mul(t.dx, t.dy),
+                            yy = hn::Mul(t.dy, t.dy);
                     m[0] = hn::Add(m[0], t.weight);
                     m[1] = hn::Add(m[1], wx);
                     m[2] = hn::Add(m[2], wy);
@@ -368,18 +385,20 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         const View& view = views[s];
         const Source& source = *sources[static_cast<std::size_t>(s)].source;
         for (int l = 0; l < kGroup; l += n) {
-            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l, 1.0f / settings.kernel);
+            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
+                                             1.0f / settings.kernel);
             V row[6];
             for (int i = 0; i < 6; ++i) row[i] = hn::LoadU(d, &rows[i][l]);
             V sum = hn::LoadU(d, &total[l]);
             for (int j = 0; j < kTaps; ++j) {
                 for (int i = 0; i < kTaps; ++i) {
-                    const V fi = hn::Set(d, static_cast<float>(i)), fj = hn::Set(d, static_cast<float>(j));
+                    const V fi = hn::Set(d, static_cast<float>(i)),
+                            fj = hn::Set(d, static_cast<float>(j));
                     const V dx = hn::MulAdd(kernel.xv, fj, hn::MulAdd(kernel.xu, fi, kernel.x0));
                     const V dy = hn::MulAdd(kernel.yv, fj, hn::MulAdd(kernel.yu, fi, kernel.y0));
                     const V linear = hn::MulAdd(row[1], dx, hn::MulAdd(row[2], dy, row[0]));
-                    const V quadratic = hn::MulAdd(
-                        dx, hn::MulAdd(row[3], dx, hn::Mul(row[4], dy)), hn::MulAdd(hn::Mul(row[5], dy), dy, linear));
+                    const V quadratic = hn::MulAdd(dx, hn::MulAdd(row[3], dx, hn::Mul(row[4], dy)),
+                                                   hn::MulAdd(hn::Mul(row[5], dy), dy, linear));
                     const V value = hn::Mul(hn::LoadU(d, &kernels[s][j * kTaps + i][l]), quadratic);
                     hn::StoreU(value, d, &kernels[s][j * kTaps + i][l]);
                     sum = hn::Add(sum, value);
@@ -391,7 +410,8 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             if (!(view.weight[l] > 0.0f)) continue;
             alignas(64) float weights[kTaps * kTaps];
             for (int t = 0; t < kTaps * kTaps; ++t) weights[t] = kernels[s][t][l];
-            const int baseU = static_cast<int>(bases[s][0][l]), baseV = static_cast<int>(bases[s][1][l]);
+            const int baseU = static_cast<int>(bases[s][0][l]),
+                      baseV = static_cast<int>(bases[s][1][l]);
             const bool inside = baseU >= 0 && baseV >= 0 && baseU + kTaps <= source.width &&
                                 baseV + kTaps <= source.height;
             fetch(source, baseU, baseV, inside, weights, colour[l]);
@@ -424,8 +444,8 @@ void ShadePieces(const Pieces& p, std::span<const ShadeSource> sources, const Ra
     const std::size_t size = p.size();
     for (std::size_t i = 0; i < size; i += kGroup) {
         if (i + kGroup <= size) {
-            shadeGroup({&p.x[i], &p.y[i], &p.q[i], &p.qx[i], &p.qy[i], &p.sources[i], kGroup}, sources,
-                       fromEye, settings, colours + i, best + i);
+            shadeGroup({&p.x[i], &p.y[i], &p.q[i], &p.qx[i], &p.qy[i], &p.sources[i], kGroup},
+                       sources, fromEye, settings, colours + i, best + i);
             continue;
         }
         Lanes x, y, q, qx, qy;
@@ -439,8 +459,8 @@ void ShadePieces(const Pieces& p, std::span<const ShadeSource> sources, const Ra
             qy[l] = p.qy[k];
             seenBy[l] = p.sources[k];
         }
-        shadeGroup({x.v, y.v, q.v, qx.v, qy.v, seenBy, static_cast<int>(size - i)}, sources, fromEye,
-                   settings, colours + i, best + i);
+        shadeGroup({x.v, y.v, q.v, qx.v, qy.v, seenBy, static_cast<int>(size - i)}, sources,
+                   fromEye, settings, colours + i, best + i);
     }
 }
 
@@ -459,8 +479,9 @@ Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
     const glm::dvec3 forward = eye.camera.forward();
     for (int axis = 0; axis < 3; ++axis) {
         for (int column = 0; column < 4; ++column) {
-            const double value = eye.camera.orthographic ? (column == 3 ? forward[axis] : 0.0)
-                                                         : m[column][axis] - at[axis] * m[column][3];
+            const double value = eye.camera.orthographic
+                                     ? (column == 3 ? forward[axis] : 0.0)
+                                     : m[column][axis] - at[axis] * m[column][3];
             ray[static_cast<std::size_t>(axis * 4 + column)] = static_cast<float>(value);
         }
     }

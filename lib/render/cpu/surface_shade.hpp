@@ -10,7 +10,8 @@
 
 namespace stx::surface {
 
-/// Three affine functions of (x, y, q): the vector from an eye to the point, up to a positive scale.
+/// Three affine functions of (x, y, q): the vector from an eye to the point, up to a positive
+/// scale.
 using Ray = std::array<float, 12>;
 
 /// A source as the shader reads it.
@@ -22,9 +23,9 @@ struct ShadeSource {
 
 /// How colours are fitted; see shadePieces().
 struct ShadeSettings {
-    int mostSources = 4;     ///< sources that one piece takes colours from
-    float kernel = 4.0f;     ///< squared radius of the fit, target pixels
-    float ridge = 0.003f;    ///< holds the linear and quadratic terms down
+    int mostSources = 4;   ///< sources that one piece takes colours from
+    float kernel = 4.0f;   ///< squared radius of the fit, target pixels
+    float ridge = 0.003f;  ///< holds the linear and quadratic terms down
 };
 
 /// The vector from a camera's eye to the point (x, y, q) of a frame (orthographic: along its axis).

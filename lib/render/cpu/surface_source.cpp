@@ -50,7 +50,8 @@ void findLinks(Source& s) {
 void findEdges(Source& s) {
     Image<std::uint8_t> distance(s.width, s.height, kFarFromEdge);
     parallelForBlocks(0, s.blocksY, 1, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from) * kBlock; y < std::min<int>(to * kBlock, s.height); ++y) {
+        for (int y = static_cast<int>(from) * kBlock; y < std::min<int>(to * kBlock, s.height);
+             ++y) {
             for (int x = 0; x < s.width; ++x) {
                 const bool point = s.q.at(x, y) > 0.0f;
                 const bool all = point && s.linkRight(x, y) && s.linkDown(x, y) && x > 0 && y > 0 &&
@@ -58,7 +59,8 @@ void findEdges(Source& s) {
                 if (all && (!s.hasAlpha || s.alpha(x, y) >= 1.0f)) continue;
                 distance.at(x, y) = 0;
                 if (!point || all) continue;
-                auto& block = s.blocks[static_cast<std::size_t>(y / kBlock) * s.blocksX + x / kBlock];
+                auto& block =
+                    s.blocks[static_cast<std::size_t>(y / kBlock) * s.blocksX + x / kBlock];
                 block.edges[y % kBlock] |= static_cast<std::uint16_t>(1u << (x % kBlock));
                 block.anyEdge = true;
             }
@@ -71,7 +73,8 @@ void findEdges(Source& s) {
                 const auto in = distance.row(y);
                 const auto out = rows.row(y);
                 for (int x = 0; x < s.width; ++x)
-                    out[x] = std::min({in[std::max(x - 1, 0)], in[x], in[std::min(x + 1, s.width - 1)]});
+                    out[x] =
+                        std::min({in[std::max(x - 1, 0)], in[x], in[std::min(x + 1, s.width - 1)]});
             }
         });
         parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
@@ -109,8 +112,8 @@ bool fitPlane(const Source& s, int x0, int y0, int size, float tolerance, Leaf& 
             sumY += d * (static_cast<float>(y) - half);
         }
     }
-    const float spread = static_cast<float>(n) * static_cast<float>(n) *
-                         static_cast<float>(n * n - 1) / 12.0f;
+    const float spread =
+        static_cast<float>(n) * static_cast<float>(n) * static_cast<float>(n * n - 1) / 12.0f;
     leaf.x = static_cast<std::uint16_t>(x0);
     leaf.y = static_cast<std::uint16_t>(y0);
     leaf.size = static_cast<std::uint16_t>(size);
@@ -121,7 +124,8 @@ bool fitPlane(const Source& s, int x0, int y0, int size, float tolerance, Leaf& 
     for (int y = 0; y < n; ++y) {
         const float* row = &s.q.at(x0, y0 + y);
         for (int x = 0; x < n; ++x) {
-            const float on = leaf.q0 + leaf.qx * static_cast<float>(x) + leaf.qy * static_cast<float>(y);
+            const float on =
+                leaf.q0 + leaf.qx * static_cast<float>(x) + leaf.qy * static_cast<float>(y);
             if (!(std::abs(on - row[x]) <= limit)) return false;
         }
     }
@@ -146,7 +150,8 @@ void divide(const Source& s, int x, int y, int size, float tolerance, SourceBloc
         divide(s, x + h, y + h, h, tolerance, block, leaves);
         return;
     }
-    const int links = s.linkRight(x, y) + s.linkDown(x, y) + s.linkRight(x, y + 1) + s.linkDown(x + 1, y);
+    const int links =
+        s.linkRight(x, y) + s.linkDown(x, y) + s.linkRight(x, y + 1) + s.linkDown(x + 1, y);
     if (links < 2) return;
     block.cells[y % kBlock] |= static_cast<std::uint16_t>(1u << (x % kBlock));
     block.anyCell = true;
@@ -173,8 +178,8 @@ float unevenness(const Source& s) {
 void findLeaves(Source& s) {
     const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
     const double perPixel = 1.0 / (focal * (s.space.axis.inverse ? 1.0 : s.space.axis.unit));
-    const auto tolerance = static_cast<float>(
-        std::clamp<double>(1.5 * unevenness(s), kPlanarPixels * perPixel, 3 * kPlanarPixels * perPixel));
+    const auto tolerance = static_cast<float>(std::clamp<double>(
+        1.5 * unevenness(s), kPlanarPixels * perPixel, 3 * kPlanarPixels * perPixel));
     std::vector<std::vector<Leaf>> rows(static_cast<std::size_t>(s.blocksY));
     parallelFor(0, s.blocksY, [&](std::int64_t by) {
         auto& leaves = rows[static_cast<std::size_t>(by)];
@@ -268,8 +273,10 @@ glm::vec2 Source::gradient(int x, int y) const {
     };
     const bool left = x > 0 && linkRight(x - 1, y), right = linkRight(x, y);
     const bool up = y > 0 && linkDown(x, y - 1), down = linkDown(x, y);
-    return {choose(left, left ? here - q.at(x - 1, y) : 0.0f, right, right ? q.at(x + 1, y) - here : 0.0f),
-            choose(up, up ? here - q.at(x, y - 1) : 0.0f, down, down ? q.at(x, y + 1) - here : 0.0f)};
+    return {
+        choose(left, left ? here - q.at(x - 1, y) : 0.0f, right,
+               right ? q.at(x + 1, y) - here : 0.0f),
+        choose(up, up ? here - q.at(x, y - 1) : 0.0f, down, down ? q.at(x, y + 1) - here : 0.0f)};
 }
 
 Source prepareSource(const ReferenceView& view) {

@@ -19,7 +19,9 @@ struct DepthAxis {
     double origin = 0.0;  ///< scene units, orthographic only
     double unit = 1.0;    ///< scene units, orthographic only
 
-    [[nodiscard]] double q(double dist) const { return inverse ? 1.0 / dist : (origin - dist) / unit; }
+    [[nodiscard]] double q(double dist) const {
+        return inverse ? 1.0 / dist : (origin - dist) / unit;
+    }
     [[nodiscard]] double dist(double q) const { return inverse ? 1.0 / q : origin - unit * q; }
     /// What a relative depth difference of 1 is in q: q itself, or 1 when orthographic.
     [[nodiscard]] float whole(float q) const { return inverse ? q : 1.0f; }
