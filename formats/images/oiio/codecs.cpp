@@ -57,7 +57,6 @@ void setUpOnce() {
     static std::once_flag once;
     std::call_once(once, [] {
         OIIO::attribute("threads", 1);
-        OIIO::attribute("exr_threads", -1);
         OIIO::attribute("use_tbb", 0);
     });
 }

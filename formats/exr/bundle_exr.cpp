@@ -1,0 +1,309 @@
+#include "formats/exr/bundle_exr.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "formats/exr/exr_colour.hpp"
+#include "lib/base/parallel.hpp"
+
+/// Our attributes, all exact. On each part: stx:position (v3d), stx:orientation (text: axis x y z
+/// and angle in radians), stx:quaternion (text: w x y z), stx:fieldOfView (v2d), stx:orthographic
+/// (int), stx:fx fy cx cy (double, pixels), stx:nearPlane, stx:farPlane (double), stx:depthBits
+/// (int), stx:points (double). On part 0: stx:version (int), stx:kind ("bundle"), stx:colour
+/// ("sRGB8" or "linear"), stx:title (text), stx:boundsMin, stx:boundsMax (v3d).
+namespace stx {
+
+namespace {
+
+constexpr std::int64_t kVersion = 1;
+
+using Type = ExrChannel::Type;
+
+void addVectorChannels(std::vector<ExrChannel>& channels, const std::string& name) {
+    for (const char* axis : {".X", ".Y", ".Z"}) channels.push_back({name + axis, Type::float32});
+}
+
+template <class Pixels, class Pointer>
+void addVectorPixels(std::vector<Pixels>& pixels, const std::string& name, Pointer first) {
+    pixels.push_back({name + ".X", first, 3});
+    pixels.push_back({name + ".Y", first + 1, 3});
+    pixels.push_back({name + ".Z", first + 2, 3});
+}
+
+/// Names of parts must be there and differ.
+std::vector<std::string> partNames(const Bundle& bundle) {
+    std::vector<std::string> names;
+    std::set<std::string> used;
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        std::string name = bundle.views[i].name;
+        if (name.empty()) name = fmt::format("view_{}", i);
+        while (!used.insert(name).second) name += fmt::format("_{}", i);
+        names.push_back(std::move(name));
+    }
+    return names;
+}
+
+/// OpenEXR wants one pixel aspect ratio in all parts; 1 when they differ, the exact one is ours.
+double commonAspect(const Bundle& bundle) {
+    const auto aspect = [](const ReferenceView& v) { return v.camera.fy / v.camera.fx; };
+    const double first = aspect(bundle.views[0]);
+    for (const auto& v : bundle.views) {
+        if (std::abs(aspect(v) - first) > 1e-6 * first) return 1.0;
+    }
+    return std::abs(first - 1.0) < 1e-6 || first < 1e-5 || first > 1e5 ? 1.0 : first;
+}
+
+std::vector<ExrPart> partsFrom(const Bundle& bundle) {
+    glm::ivec2 display(0);
+    for (const auto& v : bundle.views)
+        display = glm::max(display, glm::ivec2(v.camera.width, v.camera.height));
+    const auto names = partNames(bundle);
+    const double aspect = commonAspect(bundle);
+    std::vector<ExrPart> parts;
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        const ReferenceView& view = bundle.views[i];
+        ExrPart part;
+        part.name = names[i];
+        part.view = names[i];
+        part.width = view.camera.width;
+        part.height = view.camera.height;
+        part.displayWidth = display.x;
+        part.displayHeight = display.y;
+        part.pixelAspectRatio = aspect;
+        setExrCamera(part, view);
+        part.attributes["stx:points"] = static_cast<double>(view.pointCount());
+        const Type colour = view.texture.isLinear() ? Type::float32 : Type::half;
+        for (const char* name : {"R", "G", "B", "A"}) part.channels.push_back({name, colour});
+        part.channels.push_back({"Z", Type::float32});
+        if (!view.normal.empty()) addVectorChannels(part.channels, "N");
+        if (!view.splatU.empty()) addVectorChannels(part.channels, "splatU");
+        if (!view.splatV.empty()) addVectorChannels(part.channels, "splatV");
+        parts.push_back(std::move(part));
+    }
+    auto& first = parts[0].attributes;
+    first["stx:version"] = kVersion;
+    first["stx:kind"] = std::string("bundle");
+    first["stx:colour"] = std::string(bundle.views[0].texture.isLinear() ? "linear" : "sRGB8");
+    if (!bundle.title.empty()) first["stx:title"] = bundle.title;
+    const Bounds bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
+    if (!bounds.empty()) {
+        first["stx:boundsMin"] = bounds.min;
+        first["stx:boundsMax"] = bounds.max;
+    }
+    return parts;
+}
+
+Result<void> checkOurs(const ExrReader& reader) {
+    const ExrPart& first = reader.parts()[0];
+    const auto* version = first.attribute<std::int64_t>("stx:version");
+    if (version && *version > kVersion)
+        return failAt(reader.where(), ErrorCode::unsupported,
+                      "it was written by a newer stx (version {} of the attributes; this one knows "
+                      "{})",
+                      *version, kVersion);
+    const auto* kind = first.attribute<std::string>("stx:kind");
+    if (kind && *kind != "bundle")
+        return failAt(reader.where(), ErrorCode::invalidInput, "it holds an stx '{}', not a bundle",
+                      *kind);
+    return {};
+}
+
+bool hasVectors(const ExrPart& part, const std::string& name) {
+    return part.channel(name + ".X") && part.channel(name + ".Y") && part.channel(name + ".Z");
+}
+
+std::uint64_t bytesOfView(const ExrPart& part, bool linear) {
+    std::uint64_t each = (linear ? 16 : 4) + 4;
+    for (const char* name : {"N", "splatU", "splatV"}) {
+        if (hasVectors(part, name)) each += 12;
+    }
+    return each * static_cast<std::uint64_t>(part.width) * part.height;
+}
+
+/// Distances of other programs' files, and planes that hold them.
+void adoptForeignDepth(ReferenceView& view) {
+    float nearest = kNoDepth, farthest = 0.0f;
+    for (float& d : view.depth.pixels()) {
+        if (!(d >= 0.0f) || d >= 1e9f) d = kNoDepth;
+        if (!hasPoint(d)) continue;
+        nearest = std::min(nearest, d);
+        farthest = std::max(farthest, d);
+    }
+    if (nearest > farthest) return;
+    view.nearPlane = nearest;
+    view.farPlane = nearest < farthest ? farthest : std::nextafter(farthest, kNoDepth);
+}
+
+Result<void> readView(const ExrReader& reader, int index, bool linear, ReferenceView& view) {
+    const ExrPart& part = reader.parts()[index];
+    std::vector<ExrPixels> pixels;
+    Image<glm::vec4> colour(part.width, part.height);
+    const bool hasColour = part.channel("R") && part.channel("G") && part.channel("B");
+    float* rgba = &colour.data()->x;
+    if (hasColour) pixels = {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}};
+    if (part.channel("Y") && !hasColour) pixels.push_back({"Y", rgba, 4});
+    if (part.channel("A")) pixels.push_back({"A", rgba + 3, 4});
+    view.depth = Image<float>(part.width, part.height);
+    pixels.push_back({"Z", view.depth.data(), 1});
+    const auto addVectors = [&](const char* name, Image<glm::vec3>& image) {
+        if (!hasVectors(part, name)) return;
+        image = Image<glm::vec3>(part.width, part.height);
+        addVectorPixels(pixels, name, &image.data()->x);
+    };
+    addVectors("N", view.normal);
+    addVectors("splatU", view.splatU);
+    addVectors("splatV", view.splatV);
+    STX_CHECK(reader.readPart(index, pixels));
+    if (!part.channel("A")) {
+        for (auto& p : colour.pixels()) p.a = 1.0f;
+    }
+    if (!hasColour) {
+        for (auto& p : colour.pixels()) p.g = p.b = p.r;
+    }
+    if (!part.attribute<glm::dvec3>("stx:position")) adoptForeignDepth(view);
+    view.texture = linear ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
+    return {};
+}
+
+bool isLinearBundle(const ExrReader& reader) {
+    const auto* colour = reader.parts()[0].attribute<std::string>("stx:colour");
+    return !colour || *colour != "sRGB8";
+}
+
+/// Parts that are views: all of ours, those with Z and a camera of others.
+std::vector<int> partsThatAreViews(const ExrReader& reader) {
+    std::vector<int> views;
+    const auto& parts = reader.parts();
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        const bool ours = parts[i].attribute<glm::dvec3>("stx:position");
+        const bool other = parts[i].attribute<glm::dmat4>("worldToCamera") && parts[i].channel("Z");
+        if (ours || other) views.push_back(static_cast<int>(i));
+    }
+    return views;
+}
+
+}  // namespace
+
+const char* ExrBundleHeader::nodeKind() const {
+    const bool v2 = std::any_of(views.begin(), views.end(),
+                                [](const View& v) { return v.normals || v.splats; });
+    return v2 ? "SimpleTextureV2" : "SimpleTexture";
+}
+
+Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
+    STX_CHECK(bundle.check());
+    const auto parts = partsFrom(bundle);
+    STX_TRY(auto writer, ExrWriter::create(file, parts));
+    const auto count = static_cast<std::int64_t>(parts.size());
+    for (std::int64_t i = 0; i < count; ++i) {
+        STX_CHECK(job.checkCancelled());
+        const ReferenceView& view = bundle.views[i];
+        const Image<glm::vec4> colour = premultipliedLinear(view.texture);
+        const float* rgba = &colour.data()->x;
+        std::vector<ExrConstPixels> pixels = {{"R", rgba, 4},
+                                              {"G", rgba + 1, 4},
+                                              {"B", rgba + 2, 4},
+                                              {"A", rgba + 3, 4},
+                                              {"Z", view.depth.data(), 1}};
+        if (!view.normal.empty()) addVectorPixels(pixels, "N", &view.normal.data()->x);
+        if (!view.splatU.empty()) addVectorPixels(pixels, "splatU", &view.splatU.data()->x);
+        if (!view.splatV.empty()) addVectorPixels(pixels, "splatV", &view.splatV.data()->x);
+        STX_CHECK(writer.writePart(static_cast<int>(i), pixels));
+        job.progress(i + 1, count, "writing views");
+    }
+    return writer.finish();
+}
+
+Result<void> writeExrBundle(const Bundle& bundle, const std::filesystem::path& path, Job& job,
+                            OutputFile::Options options) {
+    STX_TRY(auto file, OutputFile::create(path, options));
+    if (auto ok = writeExrBundle(bundle, file, job); !ok)
+        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    return file.commit();
+}
+
+Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
+    STX_CHECK(checkOurs(reader));
+    ExrBundleHeader header;
+    const ExrPart& first = reader.parts()[0];
+    if (const auto* title = first.attribute<std::string>("stx:title")) header.title = *title;
+    const auto* min = first.attribute<glm::dvec3>("stx:boundsMin");
+    const auto* max = first.attribute<glm::dvec3>("stx:boundsMax");
+    if (min && max) header.bounds = Bounds{*min, *max};
+    header.linear = isLinearBundle(reader);
+    for (const int i : partsThatAreViews(reader)) {
+        const ExrPart& part = reader.parts()[i];
+        auto view = exrCamera(part);
+        if (!view) return tl::unexpected(view.error().at(reader.where()));
+        ExrBundleHeader::View entry;
+        entry.view = std::move(*view);
+        if (auto ok = entry.view.camera.check(); !ok)
+            return tl::unexpected(
+                ok.error().at(fmt::format("{}: part '{}'", reader.where(), part.name)));
+        entry.normals = hasVectors(part, "N");
+        entry.splats = hasVectors(part, "splatU") && hasVectors(part, "splatV");
+        if (const auto* points = part.attribute<double>("stx:points");
+            points && *points >= 0 && *points <= 1e15)
+            entry.points = static_cast<std::int64_t>(*points);
+        entry.bytes = part.bytes;
+        header.views.push_back(std::move(entry));
+    }
+    if (header.views.empty())
+        return failAt(reader.where(), ErrorCode::invalidInput,
+                      "no part has a camera (stx:position or worldToCamera, and a channel Z)");
+    return header;
+}
+
+Result<ExrBundleHeader> readExrBundleHeader(const std::filesystem::path& path,
+                                            const Limits& limits) {
+    STX_TRY(const auto reader, ExrReader::open(path, limits));
+    return readExrBundleHeader(reader);
+}
+
+Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
+    STX_TRY(auto header, readExrBundleHeader(reader));
+    const auto parts = partsThatAreViews(reader);
+    std::uint64_t total = 0;
+    for (const int i : parts) {
+        STX_CHECK(reader.checkPlausible(i));
+        total += bytesOfView(reader.parts()[i], header.linear);
+    }
+    if (auto ok = job.limits.checkAllocation(total, 1, "the views"); !ok)
+        return tl::unexpected(ok.error().at(reader.where()));
+    if (!reader.parts()[0].linearPrimaries)
+        job.note(reader.where() +
+                 ": its primaries are not Rec. 709; colours are taken as if they "
+                 "were");
+    Bundle bundle;
+    bundle.title = header.title;
+    bundle.bounds = header.bounds;
+    for (auto& view : header.views) bundle.views.push_back(std::move(view.view));
+
+    const auto count = static_cast<std::int64_t>(parts.size());
+    std::vector<Result<void>> done(parts.size());
+    std::atomic<std::int64_t> finished = 0;
+    parallelFor(0, count, [&](std::int64_t i) {
+        done[i] = job.checkCancelled();
+        if (!done[i]) return;
+        done[i] = readView(reader, parts[i], header.linear, bundle.views[i]);
+        job.progress(++finished, count, "reading views");
+    });
+    for (auto& result : done) {
+        if (!result) return propagate(result);
+    }
+    if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(reader.where()));
+    return bundle;
+}
+
+Result<Bundle> readExrBundle(ByteSpan bytes, std::string_view name, Job& job) {
+    STX_TRY(const auto reader, ExrReader::open(bytes, name, job.limits));
+    return readExrBundle(reader, job);
+}
+
+Result<Bundle> readExrBundle(const std::filesystem::path& path, Job& job) {
+    STX_TRY(const auto bytes, readFile(path, job.limits));
+    return readExrBundle(bytes, path.string(), job);
+}
+
+}  // namespace stx

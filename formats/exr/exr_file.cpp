@@ -1,0 +1,422 @@
+#include "formats/exr/exr_file.hpp"
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfFloatAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfIntAttribute.h>
+#include <OpenEXR/ImfMatrixAttribute.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfMultiPartOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
+#include <OpenEXR/ImfVecAttribute.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <mutex>
+#include <stdexcept>
+#include <system_error>
+
+#include "formats/exr/exr_streams.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+
+namespace {
+
+/// Where the exceptions of OpenEXR become errors.
+template <class Work>
+auto adapt(ErrorCode code, const std::string& where, const Work& work) -> decltype(work()) {
+    const auto failed = [&](ErrorCode why, std::string_view text) {
+        std::string line(text);
+        std::replace(line.begin(), line.end(), '\n', ' ');
+        while (!line.empty() && (line.back() == ' ' || line.back() == '.')) line.pop_back();
+        return failAt(where, why, "{}", line);
+    };
+    try {
+        return work();
+    } catch (const std::bad_alloc&) {
+        return failed(ErrorCode::failed, "there is not enough memory for the OpenEXR file");
+    } catch (const std::exception& e) {
+        return failed(code, e.what());
+    } catch (...) {
+        return failed(ErrorCode::failed, "the OpenEXR library failed without a reason");
+    }
+}
+
+void startThreadsOnce() {
+    static std::once_flag once;
+    std::call_once(once, [] {
+        const int threads = threadCount();
+        Imf::setGlobalThreadCount(threads > 1 ? threads : 0);
+    });
+}
+
+constexpr const char* kCompressions[] = {"none",  "rle", "zips", "zip",  "piz",
+                                         "pxr24", "b44", "b44a", "dwaa", "dwab"};
+
+template <class Attribute, class Value>
+bool take(const Imf::Attribute& attribute, const std::string& name, ExrPart& part,
+          const Value& convert) {
+    const auto* typed = dynamic_cast<const Attribute*>(&attribute);
+    if (typed) part.attributes[name] = convert(typed->value());
+    return typed != nullptr;
+}
+
+template <class M>
+glm::dmat4 matrixFrom(const M& from) {
+    glm::dmat4 m;
+    for (int r = 0; r < 4; ++r) {
+        for (int c = 0; c < 4; ++c) m[r][c] = from[r][c];
+    }
+    return m;
+}
+
+void takeAttribute(const Imf::Attribute& a, const std::string& name, ExrPart& part) {
+    const auto vec2 = [](const auto& v) { return glm::dvec2(v.x, v.y); };
+    const auto vec3 = [](const auto& v) { return glm::dvec3(v.x, v.y, v.z); };
+    const auto number = [](const auto& v) { return static_cast<double>(v); };
+    const auto matrix = [](const auto& v) { return matrixFrom(v); };
+    (void)(take<Imf::StringAttribute>(a, name, part, [](const std::string& v) { return v; }) ||
+           take<Imf::IntAttribute>(a, name, part, [](int v) { return std::int64_t{v}; }) ||
+           take<Imf::FloatAttribute>(a, name, part, number) ||
+           take<Imf::DoubleAttribute>(a, name, part, number) ||
+           take<Imf::V2fAttribute>(a, name, part, vec2) ||
+           take<Imf::V2dAttribute>(a, name, part, vec2) ||
+           take<Imf::V3fAttribute>(a, name, part, vec3) ||
+           take<Imf::V3dAttribute>(a, name, part, vec3) ||
+           take<Imf::M44fAttribute>(a, name, part, matrix) ||
+           take<Imf::M44dAttribute>(a, name, part, matrix));
+}
+
+bool isRec709(const Imf::Header& header) {
+    if (!Imf::hasChromaticities(header)) return true;
+    const Imf::Chromaticities c = Imf::chromaticities(header), rec709;
+    const auto near = [](Imath::V2f a, Imath::V2f b) { return (a - b).length() < 2e-3f; };
+    return near(c.red, rec709.red) && near(c.green, rec709.green) && near(c.blue, rec709.blue) &&
+           near(c.white, rec709.white);
+}
+
+ExrPart partFrom(const Imf::Header& header) {
+    ExrPart part;
+    if (header.hasName()) part.name = header.name();
+    if (header.hasView()) part.view = header.view();
+    const auto data = header.dataWindow(), display = header.displayWindow();
+    part.originX = data.min.x - display.min.x;
+    part.originY = data.min.y - display.min.y;
+    part.width = data.max.x - data.min.x + 1;
+    part.height = data.max.y - data.min.y + 1;
+    part.displayWidth = display.max.x - display.min.x + 1;
+    part.displayHeight = display.max.y - display.min.y + 1;
+    part.pixelAspectRatio = header.pixelAspectRatio();
+    part.screenWindowCenter = {header.screenWindowCenter().x, header.screenWindowCenter().y};
+    part.screenWindowWidth = header.screenWindowWidth();
+    part.deep = header.hasType() && !Imf::isImage(header.type());
+    part.linearPrimaries = isRec709(header);
+    const int compression = header.compression();
+    if (compression >= 0 && compression < 10) part.compression = kCompressions[compression];
+    for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
+        const auto type = it.channel().type;
+        part.channels.push_back({it.name(), type == Imf::HALF    ? ExrChannel::Type::half
+                                            : type == Imf::FLOAT ? ExrChannel::Type::float32
+                                                                 : ExrChannel::Type::uint32});
+    }
+    for (auto it = header.begin(); it != header.end(); ++it)
+        takeAttribute(it.attribute(), it.name(), part);
+    return part;
+}
+
+/// Sizes of windows are held against the limits before anything is computed from them.
+Result<void> checkWindows(const Imf::Header& header, const Limits& limits, int index) {
+    for (const auto& box : {header.dataWindow(), header.displayWindow()}) {
+        const std::int64_t width = std::int64_t{box.max.x} - box.min.x + 1;
+        const std::int64_t height = std::int64_t{box.max.y} - box.min.y + 1;
+        if (width < 1 || height < 1 || width > limits.maxImageSide || height > limits.maxImageSide)
+            return fail(ErrorCode::invalidInput,
+                        "part {} has a window of {}x{} pixels; 1 to {} a side are read", index,
+                        width, height, limits.maxImageSide);
+        for (const int v : {box.min.x, box.min.y}) {
+            if (std::abs(std::int64_t{v}) > (1 << 28))
+                return fail(ErrorCode::invalidInput, "part {} has a window that starts at {}",
+                            index, v);
+        }
+    }
+    return {};
+}
+
+}  // namespace
+
+const ExrChannel* ExrPart::channel(std::string_view wanted) const {
+    for (const auto& c : channels) {
+        if (c.name == wanted) return &c;
+    }
+    return nullptr;
+}
+
+struct ExrReader::Impl {
+    std::string where;
+    ByteSpan bytes;
+    Descriptor fd;
+    std::uint64_t size = 0;
+    std::unique_ptr<Imf::IStream> stream;
+    std::unique_ptr<Imf::MultiPartInputFile> file;
+    std::vector<ExrPart> parts;
+
+    Result<void> readHeaders(const Limits& limits);
+    bool readAt(std::uint64_t offset, void* to, std::size_t count) const {
+        if (offset > size || count > size - offset) return false;
+        if (!stream->isMemoryMapped())
+            return ::pread(fd.get(), to, count, static_cast<off_t>(offset)) ==
+                   static_cast<ssize_t>(count);
+        std::memcpy(to, bytes.data() + offset, count);
+        return true;
+    }
+};
+
+ExrReader::ExrReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ExrReader::ExrReader(ExrReader&&) noexcept = default;
+ExrReader& ExrReader::operator=(ExrReader&&) noexcept = default;
+ExrReader::~ExrReader() = default;
+
+const std::vector<ExrPart>& ExrReader::parts() const {
+    return impl_->parts;
+}
+const std::string& ExrReader::where() const {
+    return impl_->where;
+}
+
+Result<void> ExrReader::Impl::readHeaders(const Limits& limits) {
+    return adapt(ErrorCode::invalidInput, where, [&]() -> Result<void> {
+        char head[8] = {};
+        if (!readAt(0, head, 8) || std::memcmp(head, "\x76\x2f\x31\x01", 4) != 0)
+            return failAt(where, ErrorCode::invalidInput, "it is no OpenEXR file");
+        // The table of offsets is rebuilt by nobody: a file without one is incomplete.
+        file = std::make_unique<Imf::MultiPartInputFile>(*stream, 0, false);
+        if (file->parts() < 1 || file->parts() > limits.maxViews)
+            return failAt(where, ErrorCode::invalidInput, "it has {} parts; 1 to {} are read",
+                          file->parts(), limits.maxViews);
+        for (int i = 0; i < file->parts(); ++i) {
+            if (auto ok = checkWindows(file->header(i), limits, i); !ok)
+                return tl::unexpected(ok.error().at(where));
+            parts.push_back(partFrom(file->header(i)));
+        }
+        const auto bytesPerPart =
+            exrBytesPerPart([this](std::uint64_t offset, void* to,
+                                   std::size_t count) { return readAt(offset, to, count); },
+                            size);
+        for (std::size_t i = 0; i < std::min(parts.size(), bytesPerPart.size()); ++i)
+            parts[i].bytes = bytesPerPart[i];
+        return {};
+    });
+}
+
+Result<ExrReader> ExrReader::open(ByteSpan bytes, std::string_view name, const Limits& limits) {
+    auto impl = std::make_unique<Impl>();
+    impl->where = fmt::format("'{}'", name);
+    impl->bytes = bytes;
+    impl->size = bytes.size();
+    impl->stream = std::make_unique<exr::MemoryStream>(bytes, impl->where.c_str());
+    STX_CHECK(impl->readHeaders(limits));
+    return ExrReader(std::move(impl));
+}
+
+Result<ExrReader> ExrReader::open(const std::filesystem::path& path, const Limits& limits) {
+    auto impl = std::make_unique<Impl>();
+    impl->where = fmt::format("'{}'", path.string());
+    impl->fd = Descriptor(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+    struct stat info = {};
+    if (impl->fd.get() < 0 || ::fstat(impl->fd.get(), &info) != 0)
+        return fail(ErrorCode::io, "cannot open {}: {}", impl->where,
+                    std::generic_category().message(errno));
+    if (!S_ISREG(info.st_mode))
+        return fail(ErrorCode::io, "cannot read {}: it is no file", impl->where);
+    impl->size = static_cast<std::uint64_t>(info.st_size);
+    impl->stream =
+        std::make_unique<exr::FileStream>(impl->fd.get(), impl->size, impl->where.c_str());
+    STX_CHECK(impl->readHeaders(limits));
+    return ExrReader(std::move(impl));
+}
+
+Result<void> ExrReader::checkPlausible(int index) const {
+    const ExrPart& part = parts()[index];
+    const auto values = static_cast<std::uint64_t>(part.width) * part.height * part.channels.size();
+    const std::uint64_t stored = part.bytes ? part.bytes : impl_->size;
+    // Deflate over runs gives at most some thousand for one; small claims hurt nobody.
+    if (values <= (16u << 20) || values / 8192 <= stored) return {};
+    return failAt(where(), ErrorCode::invalidInput,
+                  "part {} claims {}x{} pixels of {} channels, more than its {} bytes can hold",
+                  index, part.width, part.height, part.channels.size(), stored);
+}
+
+Result<void> ExrReader::readPart(int index, const std::vector<ExrPixels>& pixels) const {
+    const ExrPart& part = parts()[index];
+    if (part.deep)
+        return failAt(where(), ErrorCode::unsupported,
+                      "part {} has deep pixels, which are not supported", index);
+    STX_CHECK(checkPlausible(index));
+    return adapt(ErrorCode::invalidInput, where(), [&]() -> Result<void> {
+        Imf::InputPart in(*impl_->file, index);
+        const auto window = in.header().dataWindow();
+        const auto& channels = in.header().channels();
+        Imf::FrameBuffer buffer;
+        for (const auto& p : pixels) {
+            const auto* channel = channels.findChannel(p.channel);
+            if (!channel) {
+                const auto count = static_cast<std::size_t>(part.width) * part.height;
+                for (std::size_t i = 0; i < count; ++i) p.values[i * p.stride] = 0.0f;
+                continue;
+            }
+            if (channel->xSampling != 1 || channel->ySampling != 1)
+                return failAt(where(), ErrorCode::unsupported,
+                              "channel '{}' of part {} is subsampled, which is not supported",
+                              p.channel, index);
+            buffer.insert(p.channel,
+                          Imf::Slice::Make(Imf::FLOAT, p.values, window, p.stride * sizeof(float),
+                                           p.stride * sizeof(float) * part.width));
+        }
+        if (buffer.begin() == buffer.end()) return {};
+        in.setFrameBuffer(buffer);
+        in.readPixels(window.min.y, window.max.y);
+        return {};
+    });
+}
+
+struct ExrWriter::Impl {
+    std::string where;
+    std::vector<ExrPart> parts;
+    std::unique_ptr<exr::OutputStream> stream;
+    std::unique_ptr<Imf::MultiPartOutputFile> file;
+};
+
+namespace {
+
+Imf::Header headerFrom(const ExrPart& part) {
+    const Imath::Box2i display({0, 0}, {part.displayWidth - 1, part.displayHeight - 1});
+    const Imath::Box2i data({part.originX, part.originY},
+                            {part.originX + part.width - 1, part.originY + part.height - 1});
+    Imf::Header header(display, data, static_cast<float>(part.pixelAspectRatio),
+                       Imath::V2f(static_cast<float>(part.screenWindowCenter.x),
+                                  static_cast<float>(part.screenWindowCenter.y)),
+                       static_cast<float>(part.screenWindowWidth), Imf::INCREASING_Y,
+                       Imf::ZIP_COMPRESSION);
+    header.setType(Imf::SCANLINEIMAGE);
+    if (!part.name.empty()) header.setName(part.name);
+    if (!part.view.empty()) header.setView(part.view);
+    Imf::addChromaticities(header, Imf::Chromaticities());
+    for (const auto& c : part.channels) {
+        header.channels().insert(
+            c.name, Imf::Channel(c.type == ExrChannel::Type::half ? Imf::HALF : Imf::FLOAT));
+    }
+    for (const auto& [name, value] : part.attributes) {
+        if (const auto* s = std::get_if<std::string>(&value)) {
+            header.insert(name, Imf::StringAttribute(*s));
+        } else if (const auto* i = std::get_if<std::int64_t>(&value)) {
+            header.insert(name, Imf::IntAttribute(static_cast<int>(*i)));
+        } else if (const auto* d = std::get_if<double>(&value)) {
+            header.insert(name, Imf::DoubleAttribute(*d));
+        } else if (const auto* v2 = std::get_if<glm::dvec2>(&value)) {
+            header.insert(name, Imf::V2dAttribute(Imath::V2d(v2->x, v2->y)));
+        } else if (const auto* v3 = std::get_if<glm::dvec3>(&value)) {
+            header.insert(name, Imf::V3dAttribute(Imath::V3d(v3->x, v3->y, v3->z)));
+        } else if (const auto* m = std::get_if<glm::dmat4>(&value)) {
+            Imath::M44f f;
+            for (int r = 0; r < 4; ++r) {
+                for (int c = 0; c < 4; ++c) f[r][c] = static_cast<float>((*m)[r][c]);
+            }
+            header.insert(name, Imf::M44fAttribute(f));
+        }
+    }
+    return header;
+}
+
+}  // namespace
+
+ExrWriter::ExrWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ExrWriter::ExrWriter(ExrWriter&&) noexcept = default;
+ExrWriter& ExrWriter::operator=(ExrWriter&&) noexcept = default;
+ExrWriter::~ExrWriter() {
+    if (!impl_ || !impl_->file) return;
+    // An unfinished file still writes its table, which throws on a full disk.
+    try {
+        impl_->file.reset();
+    } catch (...) {
+    }
+}
+
+Result<ExrWriter> ExrWriter::create(OutputFile& file, const std::vector<ExrPart>& parts) {
+    auto impl = std::make_unique<Impl>();
+    impl->where = "cannot write the OpenEXR file";
+    impl->parts = parts;
+    startThreadsOnce();
+    STX_CHECK(adapt(ErrorCode::io, impl->where, [&]() -> Result<void> {
+        std::vector<Imf::Header> headers;
+        for (const auto& part : parts) headers.push_back(headerFrom(part));
+        impl->stream = std::make_unique<exr::OutputStream>(file.temporaryPath());
+        impl->file = std::make_unique<Imf::MultiPartOutputFile>(*impl->stream, headers.data(),
+                                                                static_cast<int>(headers.size()));
+        return {};
+    }));
+    return ExrWriter(std::move(impl));
+}
+
+Result<void> ExrWriter::writePart(int index, const std::vector<ExrConstPixels>& pixels) {
+    return adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
+        const ExrPart& part = impl_->parts[index];
+        Imf::OutputPart out(*impl_->file, index);
+        const auto window = out.header().dataWindow();
+        // In blocks of whole chunks, so that the halves need little memory.
+        constexpr int kBlock = 256;
+        const std::size_t width = static_cast<std::size_t>(part.width);
+        std::vector<std::vector<half>> halves(pixels.size());
+        for (int y = 0; y < part.height; y += kBlock) {
+            const int rows = std::min(kBlock, part.height - y);
+            Imath::Box2i block = window;
+            block.min.y = window.min.y + y;
+            Imf::FrameBuffer buffer;
+            for (std::size_t i = 0; i < pixels.size(); ++i) {
+                const auto& p = pixels[i];
+                const float* from = p.values + static_cast<std::size_t>(y) * width * p.stride;
+                const auto* channel = part.channel(p.channel);
+                if (!channel)
+                    return failAt(impl_->where, ErrorCode::failed, "part {} has no channel '{}'",
+                                  index, p.channel);
+                if (channel->type == ExrChannel::Type::half) {
+                    auto& to = halves[i];
+                    to.resize(width * rows);
+                    parallelForBlocks(0, static_cast<std::int64_t>(to.size()), 1 << 16,
+                                      [&](std::int64_t begin, std::int64_t end) {
+                                          for (auto k = begin; k < end; ++k)
+                                              to[k] = half(from[k * p.stride]);
+                                      });
+                    buffer.insert(p.channel, Imf::Slice::Make(Imf::HALF, to.data(), block,
+                                                              sizeof(half), sizeof(half) * width));
+                } else {
+                    buffer.insert(p.channel, Imf::Slice::Make(Imf::FLOAT, from, block,
+                                                              p.stride * sizeof(float),
+                                                              p.stride * sizeof(float) * width));
+                }
+            }
+            out.setFrameBuffer(buffer);
+            out.writePixels(rows);
+        }
+        return {};
+    });
+}
+
+Result<void> ExrWriter::finish() {
+    return adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
+        impl_->file.reset();
+        impl_->stream->finish();
+        return {};
+    });
+}
+
+}  // namespace stx

@@ -1,0 +1,144 @@
+#include <algorithm>
+#include <cstring>
+
+#include "formats/exr/exr_file.hpp"
+
+namespace stx {
+
+namespace {
+
+/// A cursor over the header's bytes; every read is checked.
+class Cursor {
+  public:
+    using ReadAt = std::function<bool(std::uint64_t offset, void* to, std::size_t size)>;
+    Cursor(const ReadAt& readAt, std::uint64_t size) : readAt_(readAt), size_(size) {}
+
+    bool read(void* to, std::size_t count) {
+        if (count > size_ - at_) return false;
+        auto* out = static_cast<char*>(to);
+        while (count > 0) {
+            const std::size_t inBlock = static_cast<std::size_t>(at_ - blockAt_);
+            if (at_ < blockAt_ || inBlock >= blockSize_) {
+                blockAt_ = at_;
+                blockSize_ =
+                    static_cast<std::size_t>(std::min<std::uint64_t>(sizeof(block_), size_ - at_));
+                if (!readAt_(blockAt_, block_, blockSize_)) return false;
+                continue;
+            }
+            const std::size_t n = std::min(count, blockSize_ - inBlock);
+            std::memcpy(out, block_ + inBlock, n);
+            out += n;
+            at_ += n;
+            count -= n;
+        }
+        return true;
+    }
+    bool skip(std::uint64_t count) {
+        if (count > size_ - at_) return false;
+        at_ += count;
+        return true;
+    }
+    /// A string up to its zero byte; attribute names and types have at most 255.
+    bool readName(std::string& name) {
+        name.clear();
+        char c = 0;
+        while (name.size() < 256) {
+            if (!read(&c, 1)) return false;
+            if (c == 0) return true;
+            name += c;
+        }
+        return false;
+    }
+    bool readInt(std::int32_t& value) {
+        unsigned char b[4];
+        if (!read(b, 4)) return false;
+        value = static_cast<std::int32_t>(b[0] | b[1] << 8 | b[2] << 16 |
+                                          static_cast<std::uint32_t>(b[3]) << 24);
+        return true;
+    }
+    bool readOffset(std::uint64_t& value) {
+        unsigned char b[8];
+        if (!read(b, 8)) return false;
+        value = 0;
+        for (int i = 7; i >= 0; --i) value = value << 8 | b[i];
+        return true;
+    }
+
+  private:
+    const ReadAt& readAt_;
+    std::uint64_t size_;
+    std::uint64_t at_ = 0;
+    std::uint64_t blockAt_ = 0;
+    std::size_t blockSize_ = 0;
+    char block_[16384];
+};
+
+/// Chunks of a single-part file of scan lines, by its compression and data window; 0 = not known.
+std::uint64_t chunksOf(int compression, const std::int32_t (&window)[4], bool tiled) {
+    static constexpr int kLines[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
+    if (tiled || compression < 0 || compression > 9) return 0;
+    const std::int64_t height = std::int64_t{window[3]} - window[1] + 1;
+    if (height < 1) return 0;
+    return static_cast<std::uint64_t>((height + kLines[compression] - 1) / kLines[compression]);
+}
+
+}  // namespace
+
+std::vector<std::uint64_t> exrBytesPerPart(
+    const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
+    std::uint64_t fileSize) {
+    Cursor cursor(readAt, fileSize);
+    std::int32_t magic = 0, version = 0;
+    if (!cursor.readInt(magic) || magic != 20000630 || !cursor.readInt(version)) return {};
+    const bool multi = version & 0x1000, tiled = version & 0x200;
+    std::vector<std::uint64_t> chunks;
+    std::string name, type;
+    for (;;) {
+        if (!cursor.readName(name)) return {};
+        if (name.empty()) break;  // the end of the list of headers
+        std::int32_t chunkCount = 0, window[4] = {};
+        int compression = -1;
+        while (!name.empty()) {
+            std::int32_t size = 0;
+            if (!cursor.readName(type) || !cursor.readInt(size) || size < 0) return {};
+            if (name == "chunkCount" && size == 4) {
+                if (!cursor.readInt(chunkCount)) return {};
+            } else if (name == "compression" && size == 1) {
+                unsigned char c = 0;
+                if (!cursor.read(&c, 1)) return {};
+                compression = c;
+            } else if (name == "dataWindow" && size == 16) {
+                for (auto& v : window) {
+                    if (!cursor.readInt(v)) return {};
+                }
+            } else if (!cursor.skip(static_cast<std::uint64_t>(size))) {
+                return {};
+            }
+            if (!cursor.readName(name)) return {};
+        }
+        const auto count = chunkCount > 0 ? static_cast<std::uint64_t>(chunkCount)
+                                          : chunksOf(compression, window, tiled);
+        if (count == 0 || count > fileSize / 8) return {};
+        chunks.push_back(count);
+        if (!multi) break;
+    }
+    // A chunk ends where the next one begins, whichever part that belongs to.
+    std::vector<std::pair<std::uint64_t, std::size_t>> starts;
+    for (std::size_t part = 0; part < chunks.size(); ++part) {
+        for (std::uint64_t i = 0; i < chunks[part]; ++i) {
+            std::uint64_t offset = 0;
+            if (!cursor.readOffset(offset)) return {};
+            if (offset == 0 || offset > fileSize) return {};
+            starts.emplace_back(offset, part);
+        }
+    }
+    std::sort(starts.begin(), starts.end());
+    std::vector<std::uint64_t> bytes(chunks.size(), 0);
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+        const std::uint64_t end = i + 1 < starts.size() ? starts[i + 1].first : fileSize;
+        bytes[starts[i].second] += end - starts[i].first;
+    }
+    return bytes;
+}
+
+}  // namespace stx
