@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include "formats/meshes/text_encoding.hpp"
+
 namespace stx {
 namespace {
 
@@ -43,10 +45,20 @@ std::string AssimpFiles::relative(const char* name) const {
     return std::string(text);
 }
 
+void AssimpFiles::remember(const std::string& file, const Error& error) const {
+    if (error.code == ErrorCode::io) {
+        if (missing_.empty()) missing_ = file;
+    } else if (!error_) {
+        error_ = error.at(fmt::format("material file '{}'", file));
+    }
+}
+
 bool AssimpFiles::Exists(const char* name) const {
     const auto file = relative(name);
     if (file == modelName_) return true;
-    return files_.read(file).has_value();
+    const auto bytes = files_.read(file);
+    if (!bytes) remember(file, bytes.error());
+    return bytes.has_value();
 }
 
 Assimp::IOStream* AssimpFiles::Open(const char* name, const char*) {
@@ -54,10 +66,10 @@ Assimp::IOStream* AssimpFiles::Open(const char* name, const char*) {
     if (file == modelName_) return new MemoryStream(model_);
     auto bytes = files_.read(file);
     if (!bytes) {
-        if (bytes.error().code != ErrorCode::io && !error_)
-            error_ = bytes.error().at(fmt::format("material file '{}'", file));
+        remember(file, bytes.error());
         return nullptr;
     }
+    if (auto text = utf8FromMarked(*bytes)) *bytes = std::move(*text);
     sideTexts_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
     return new MemoryStream(std::move(*bytes));
 }

@@ -28,16 +28,20 @@ class AssimpFiles final : public Assimp::IOSystem {
 
     /// A name that left the model's folder.
     [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+    /// The first name beside the model that does not exist; empty when all do.
+    [[nodiscard]] const std::string& missing() const { return missing_; }
     /// Text of the material files that were opened, in order.
     [[nodiscard]] const std::vector<std::string>& sideTexts() const { return sideTexts_; }
 
   private:
+    void remember(const std::string& file, const Error& error) const;
     [[nodiscard]] std::string relative(const char* name) const;
 
     ByteSpan model_;
     std::string modelName_;
     ModelFiles& files_;
     mutable std::optional<Error> error_;
+    mutable std::string missing_;
     std::vector<std::string> sideTexts_;
 };
 

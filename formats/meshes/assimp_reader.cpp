@@ -209,6 +209,10 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         const aiScene* scene =
             importer.ReadFile(AssimpFiles::kFolder + modelName, aiProcess_Triangulate);
         if (system->error()) return tl::unexpected(*system->error());
+        if (!system->missing().empty() && system->sideTexts().empty())
+            files.job().note(
+                fmt::format("material file '{}' cannot be read; its materials become plain white",
+                            system->missing()));
         if (!scene) {
             std::string reason = importer.GetErrorString();
             std::replace(reason.begin(), reason.end(), '\n', ' ');

@@ -29,9 +29,6 @@ Result<HeaderCounts> readCounts(ByteSpan bytes) {
     const bool isMesh = std::to_integer<int>(bytes[7]) == 1;
     const bool isEdgebreaker = isMesh && std::to_integer<int>(bytes[8]) == 1;
     const int version = major * 256 + minor;
-    if (version > 0x0202)
-        return fail(ErrorCode::unsupported,
-                    "the Draco stream has version {}.{}, known are those up to 2.2", major, minor);
     draco::DecoderBuffer buffer;
     buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size(),
                 static_cast<std::uint16_t>(version));
@@ -119,7 +116,7 @@ Result<DracoGeometry> DracoGeometry::decode(ByteSpan bytes, const Charge& charge
     for (int i = 0; i < result.geometry_->num_attributes(); ++i) {
         const auto* a = result.geometry_->attribute(i);
         result.attributes_.push_back(
-            {kindOf(a->attribute_type()), a->unique_id(), a->num_components(),
+            {kindOf(a->attribute_type()), i, a->unique_id(), a->num_components(),
              a->data_type() == draco::DT_FLOAT32 || a->data_type() == draco::DT_FLOAT64});
     }
     return result;
@@ -142,7 +139,7 @@ std::vector<glm::uvec3> DracoGeometry::triangles() const {
 }
 
 Result<std::vector<float>> DracoGeometry::values(const Attribute& attribute, bool normalise) const {
-    auto* a = geometry_->attribute(geometry_->GetAttributeIdByUniqueId(attribute.uniqueId));
+    auto* a = geometry_->attribute(attribute.index);
     a->set_normalized(normalise && !attribute.isFloat);
     const auto n = static_cast<std::size_t>(attribute.components);
     std::vector<float> values(pointCount() * n);

@@ -21,6 +21,7 @@ class DracoGeometry {
     enum class Kind { position, normal, colour, texCoord, generic };
     struct Attribute {
         Kind kind = Kind::generic;
+        int index = 0;  ///< in the stream; unique ids of old files are not always unique
         std::uint32_t uniqueId = 0;
         int components = 0;
         bool isFloat = false;

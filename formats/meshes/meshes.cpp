@@ -6,6 +6,7 @@
 
 #include "formats/images/images.hpp"
 #include "formats/meshes/readers.hpp"
+#include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
 namespace {
@@ -107,6 +108,14 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
         path.parent_path().empty() || path == "-" ? std::filesystem::path(".") : path.parent_path();
     ModelFiles files(folder, job);
     const auto name = path.filename().string();
+    if (format == Format::glb && !textOf(bytes).starts_with("glTF"))
+        return fail(
+            ErrorCode::invalidInput,
+            "a GLB file begins with 'glTF'; this one does not, so it is another kind of file");
+    if (format == Format::ply && formatOfBytes(bytes) != Format::ply)
+        return fail(
+            ErrorCode::invalidInput,
+            "a PLY file begins with 'ply'; this one does not, so it is another kind of file");
     switch (format) {
         case Format::gltf:
         case Format::glb:
@@ -143,6 +152,10 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
     const auto where = fmt::format("'{}'", path.string());
     if (bytes.empty())
         return failAt(where, ErrorCode::invalidInput, "the file is empty; expected a model");
+    if (const auto ending = formatOfEnding(path); ending == Format::obj || ending == Format::gltf) {
+        STX_CHECK(job.limits.checkAllocation(bytes.size(), 3, "the text"));
+        if (auto text = utf8FromMarked(bytes)) bytes = std::move(*text);
+    }
     const auto format =
         formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
     auto mesh = readFormat(format, bytes, path, job);

@@ -58,16 +58,16 @@ struct PointCloud {
 
 /// How writePoints() codes .drc; .ply is always exact.
 struct PointWriteOptions {
-    /// Bits per coordinate in .drc, 1..30 (of the cloud's largest extent); 0 = exact floats.
-    int positionBits = 0;
-    int normalBits = 10;  ///< bits per octahedral coordinate in .drc, 2..30; 0 = exact floats
+    int positionBits = 16;  ///< bits per coordinate of the cloud's largest extent, 1..30; 0 = exact
+    int normalBits = 10;    ///< bits per component, 2..30; 0 = exact
     OutputFile::Options file;
 };
 
 /// Writes points as binary little-endian PLY or Draco, by the ending of `path` (.ply or .drc),
-/// whole or not at all. The same input gives the same bytes. Errors: usage (another ending),
-/// invalidInput (no points, arrays of unlike length, values that are not finite), io.
+/// whole or not at all. The same input gives the same bytes. Quantised .drc may put the points in
+/// another order; what is rounded is said with job.note(). Errors: usage (another ending, bits out
+/// of range), invalidInput (no points, arrays of unlike length, values that are not finite), io.
 [[nodiscard]] Result<void> writePoints(const std::filesystem::path& path, const PointCloud& points,
-                                       const PointWriteOptions& options = {});
+                                       Job& job, const PointWriteOptions& options = {});
 
 }  // namespace stx

@@ -1,6 +1,7 @@
 #include "formats/meshes/vertex_colours.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "lib/model/texture.hpp"
 
@@ -14,7 +15,10 @@ void linearFromSrgbColours(std::vector<glm::vec4>& colours, bool mayBeBytes) {
     for (const auto& c : colours) largestAlpha = std::max(largestAlpha, c.a);
     const float alphaScale = scale != 1.0f && largestAlpha > 1.0f ? scale : 1.0f;
     for (auto& c : colours) {
-        for (int k = 0; k < 3; ++k) c[k] = linearFromSrgb(c[k] * scale);
+        for (int k = 0; k < 3; ++k) {
+            // Not-a-numbers stay, so that MeshBuilder sees and says them.
+            if (!std::isnan(c[k])) c[k] = linearFromSrgb(c[k] * scale);
+        }
         c.a *= alphaScale;
     }
 }

@@ -1,5 +1,6 @@
 #include "formats/meshes/gltf/primitive.hpp"
 
+#include <cmath>
 #include <optional>
 
 #include "formats/meshes/draco_geometry.hpp"
@@ -38,6 +39,12 @@ class Attributes {
 
     [[nodiscard]] bool has(const std::string& name) const { return attributes_->contains(name); }
     [[nodiscard]] const std::optional<DracoGeometry>& draco() const { return draco_; }
+
+    /// For messages: the accessor of an attribute.
+    [[nodiscard]] std::string source(const std::string& name) const {
+        return fmt::format("accessors[{}] ({} {})", attributes_->at(name).get<std::int64_t>(),
+                           where_, name);
+    }
 
     /// Values of an attribute, or none when the primitive lacks it.
     Result<std::optional<AccessorValues>> get(const std::string& name,
@@ -189,6 +196,13 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
     const auto count = position->count;
     STX_CHECK(checkCount(position, count, 3, where, "POSITION"));
     part.positions = vectors<glm::vec3>(*position);
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto p = part.positions[i];
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            return fail(ErrorCode::invalidInput,
+                        "{}: vertex {} is at ({}, {}, {}); positions must be finite numbers",
+                        attributes.source("POSITION"), i, p.x, p.y, p.z);
+    }
     STX_TRY(const auto normal, attributes.get("NORMAL", {"VEC3"}));
     STX_CHECK(checkCount(normal, count, 3, where, "NORMAL"));
     if (normal) part.normals = vectors<glm::vec3>(*normal);

@@ -58,7 +58,8 @@ class SceneReader {
     struct Node {
         const Json* json = nullptr;
         std::vector<std::uint64_t> children;
-        std::int64_t parent = -1;
+        std::int64_t parent = -1;  ///< the first one
+        glm::dmat4 parentFromNode{1.0};
         glm::dmat4 worldFromNode{1.0};
     };
 
@@ -80,7 +81,7 @@ class SceneReader {
         return fromTrs(translation, rotation, scale);
     }
 
-    /// All nodes with their transforms; errors when they are no forest.
+    /// All nodes with their transforms; errors when one is its own ancestor.
     Result<void> readNodes() {
         const auto count = listSize(root(), "nodes");
         STX_CHECK(builder_.charge(count, sizeof(Node), "the node list"));
@@ -88,62 +89,75 @@ class SceneReader {
         for (std::size_t i = 0; i < count; ++i) {
             const auto where = fmt::format("nodes[{}]", i);
             STX_TRY(nodes_[i].json, element(root(), "nodes", i, "glTF"));
+            STX_TRY(nodes_[i].parentFromNode, localMatrix(*nodes_[i].json, where));
             STX_TRY(nodes_[i].children, getIndices(*nodes_[i].json, "children", where));
             for (const auto child : nodes_[i].children) {
                 if (child >= count)
                     return fail(ErrorCode::invalidInput,
                                 "{} has the child {}, but there are only {} nodes", where, child,
                                 count);
-                auto& parent = nodes_[child].parent;
-                if (parent >= 0)
-                    return fail(
-                        ErrorCode::invalidInput,
-                        "nodes[{}] is a child of nodes[{}] and of nodes[{}]; a node has one parent",
-                        child, parent, i);
-                parent = static_cast<std::int64_t>(i);
+                if (nodes_[child].parent < 0) nodes_[child].parent = static_cast<std::int64_t>(i);
             }
         }
-        std::vector<std::uint64_t> stack;
-        for (std::size_t i = count; i-- > 0;) {
-            if (nodes_[i].parent < 0) stack.push_back(i);
-        }
-        std::size_t reached = 0;
-        std::vector<bool> seen(count);
-        while (!stack.empty()) {
-            const auto i = stack.back();
-            stack.pop_back();
-            ++reached;
-            seen[i] = true;
-            auto& node = nodes_[i];
-            STX_TRY(const auto local, localMatrix(*node.json, fmt::format("nodes[{}]", i)));
-            node.worldFromNode =
-                node.parent < 0
-                    ? local
-                    : nodes_[static_cast<std::size_t>(node.parent)].worldFromNode * local;
-            stack.insert(stack.end(), node.children.begin(), node.children.end());
-        }
-        if (reached < count) {
-            const auto first = std::find(seen.begin(), seen.end(), false) - seen.begin();
-            return fail(ErrorCode::invalidInput,
+        // Depth-first without recursion: a file may be deeper than the stack.
+        enum class State : std::uint8_t { unseen, open, done };
+        std::vector<State> states(count, State::unseen);
+        std::vector<std::uint64_t> childrenFirst;
+        std::vector<std::pair<std::uint64_t, std::size_t>> stack;
+        for (std::size_t start = 0; start < count; ++start) {
+            if (states[start] != State::unseen) continue;
+            stack.emplace_back(start, 0);
+            states[start] = State::open;
+            while (!stack.empty()) {
+                auto& [node, next] = stack.back();
+                const auto& children = nodes_[node].children;
+                if (next == children.size()) {
+                    states[node] = State::done;
+                    childrenFirst.push_back(node);
+                    stack.pop_back();
+                    continue;
+                }
+                const auto child = children[next++];
+                if (states[child] == State::open)
+                    return fail(
+                        ErrorCode::invalidInput,
                         "nodes[{}] is its own ancestor; the nodes must form a tree without cycles",
-                        first);
+                        child);
+                if (states[child] == State::unseen) {
+                    states[child] = State::open;
+                    stack.emplace_back(child, 0);
+                }
+            }
+        }
+        for (auto it = childrenFirst.rbegin(); it != childrenFirst.rend(); ++it) {
+            auto& node = nodes_[*it];
+            node.worldFromNode = node.parent < 0
+                                     ? node.parentFromNode
+                                     : nodes_[static_cast<std::size_t>(node.parent)].worldFromNode *
+                                           node.parentFromNode;
         }
         return {};
     }
 
-    /// Nodes of the scene, parents first, each once.
-    Result<std::vector<std::uint64_t>> sceneNodes() {
+    struct Visit {
+        std::uint64_t node = 0;
+        glm::dmat4 worldFromNode{1.0};
+    };
+
+    /// Nodes of the scene, parents first. The standard wants a tree; files with a node below
+    /// several parents exist and mean an instance for each.
+    Result<std::vector<Visit>> sceneNodes() {
         const auto scenes = listSize(root(), "scenes");
         STX_TRY(const auto chosen, getUint(root(), "scene", "glTF"));
-        std::vector<std::uint64_t> stack;
+        std::vector<std::uint64_t> roots;
         if (chosen || scenes > 0) {
             const auto index = chosen.value_or(0);
             STX_TRY(const Json* scene, element(root(), "scenes", index, "scene"));
-            STX_TRY(stack, getIndices(*scene, "nodes", fmt::format("scenes[{}]", index)));
+            STX_TRY(roots, getIndices(*scene, "nodes", fmt::format("scenes[{}]", index)));
             if (scenes > 1)
                 document_.job().note(
                     fmt::format("scene {} of {} is read; the others are dropped", index, scenes));
-            for (const auto n : stack) {
+            for (const auto n : roots) {
                 if (n >= nodes_.size())
                     return fail(ErrorCode::invalidInput,
                                 "scenes[{}] has node {}, but there are only {}", index, n,
@@ -151,20 +165,26 @@ class SceneReader {
             }
         } else {
             for (std::size_t i = 0; i < nodes_.size(); ++i) {
-                if (nodes_[i].parent < 0) stack.push_back(i);
+                if (nodes_[i].parent < 0) roots.push_back(i);
             }
         }
-        std::reverse(stack.begin(), stack.end());
-        std::vector<std::uint64_t> order;
-        std::vector<bool> seen(nodes_.size());
+        constexpr std::size_t kMaxVisits = 1 << 20;
+        std::vector<Visit> order, stack;
+        for (auto it = roots.rbegin(); it != roots.rend(); ++it)
+            stack.push_back({*it, nodes_[*it].worldFromNode});
         while (!stack.empty()) {
-            const auto i = stack.back();
+            const auto visit = stack.back();
             stack.pop_back();
-            if (seen[i]) continue;
-            seen[i] = true;
-            order.push_back(i);
-            const auto& children = nodes_[i].children;
-            stack.insert(stack.end(), children.rbegin(), children.rend());
+            order.push_back(visit);
+            const auto& children = nodes_[visit.node].children;
+            if (order.size() + stack.size() + children.size() > kMaxVisits)
+                return fail(
+                    ErrorCode::invalidInput,
+                    "the scene shows more than {} nodes, counting those with several parents each "
+                    "time",
+                    kMaxVisits);
+            for (auto it = children.rbegin(); it != children.rend(); ++it)
+                stack.push_back({*it, visit.worldFromNode * nodes_[*it].parentFromNode});
         }
         return order;
     }
@@ -180,11 +200,11 @@ class SceneReader {
         STX_TRY(const auto order, sceneNodes());
         // Meshes that several nodes show are decoded once.
         std::map<std::uint64_t, int> uses;
-        for (const auto i : order) {
+        for (const auto& [i, worldFromNode] : order) {
             STX_TRY(const auto mesh, getUint(*nodes_[i].json, "mesh", fmt::format("nodes[{}]", i)));
             if (mesh) ++uses[*mesh];
         }
-        for (const auto i : order) {
+        for (const auto& [i, worldFromNode] : order) {
             const auto& node = *nodes_[i].json;
             const auto where = fmt::format("nodes[{}]", i);
             if (node.contains("camera")) ++dropped_["cameras"];
@@ -193,7 +213,7 @@ class SceneReader {
             STX_TRY(const auto mesh, getUint(node, "mesh", where));
             if (!mesh) continue;
             std::vector<glm::dmat4> transforms;
-            STX_TRY(transforms, instances(node, where, nodes_[i].worldFromNode));
+            STX_TRY(transforms, instances(node, where, worldFromNode));
             std::vector<glm::dmat4> joints;
             STX_TRY(const auto skin, getUint(node, "skin", where));
             if (skin) {

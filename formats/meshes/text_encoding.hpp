@@ -1,0 +1,13 @@
+#pragma once
+
+#include <optional>
+
+#include "formats/files/files.hpp"
+
+namespace stx {
+
+/// The text as UTF-8 when it begins with a byte order mark (UTF-8, UTF-16 or UTF-32 of either byte
+/// order), the mark removed; nothing when it has none. Broken surrogates become U+FFFD.
+[[nodiscard]] std::optional<Bytes> utf8FromMarked(ByteSpan text);
+
+}  // namespace stx
