@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace stx {
+
+/// What one view sees of one surface sample.
+struct CoverItem {
+    std::uint32_t sample = 0;
+    float quality = 0;  ///< 0..1
+};
+
+/// Views to choose among: F(S) = sum over samples of weight * max over views in S of quality
+/// (paper.md, "The smallest reference set"). Monotone and submodular.
+struct CoverProblem {
+    std::vector<double> weights;                ///< area of each sample
+    std::vector<std::vector<CoverItem>> views;  ///< per view its samples, ascending
+};
+
+struct CoverSolution {
+    std::vector<int> chosen;     ///< views, the most valuable first
+    std::vector<double> values;  ///< F after each of them
+    double all = 0;              ///< F of all views together
+    /// No choice of as many views has an F above this.
+    double bound = 0;
+};
+
+/// Chooses views by lazy greedy, then exchanges chosen for unchosen ones while that helps. Stops at
+/// `most` views, or when F reaches `share` of F(all), or when no view adds anything. Ties go to the
+/// lower index; the result is the same on any number of threads.
+[[nodiscard]] CoverSolution chooseCover(const CoverProblem& problem, int most, double share);
+
+}  // namespace stx

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <vector>
+
+#include "lib/model/bundle.hpp"
+#include "lib/model/mesh.hpp"
+#include "lib/selection/cover.hpp"
+
+namespace stx {
+
+/// A piece of surface.
+struct SurfaceSample {
+    glm::dvec3 position{0.0};  ///< world
+    glm::dvec3 normal{0.0};    ///< unit, world
+    double area = 0;           ///< scene units squared
+    bool twoSided = false;     ///< seen from behind as well
+};
+
+/// A view that might be chosen: where it would stand and what it would see.
+struct CandidateView {
+    Camera camera;                        ///< at its full resolution: gives the sampling density
+    Camera depthCamera;                   ///< the same view at the resolution of `depth`
+    const Image<float>* depth = nullptr;  ///< planar distances, kNoDepth where nothing
+    double step = 0;                      ///< of the depth code, scene units; 0 = exact
+};
+
+/// About `count` samples, evenly spread over a mesh's triangles (points of a cloud count as
+/// two-sided pieces of equal area that face every way). Deterministic.
+[[nodiscard]] std::vector<SurfaceSample> sampleMesh(const Mesh& mesh, int count);
+
+/// About `count` samples of all that the views of a bundle show. A surface seen by many views
+/// counts once: each sample's area is the inverse of the density with which all views sample its
+/// place.
+[[nodiscard]] std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count);
+
+/// How often and how well a candidate samples a piece of surface.
+struct Sighting {
+    bool visible = false;
+    double cosine = 0;   ///< of the angle between normal and line of sight
+    double density = 0;  ///< samples per scene unit on a surface that faces the camera
+};
+[[nodiscard]] Sighting sight(const CandidateView& view, const SurfaceSample& sample);
+
+/// The problem of choosing among candidates: quality = visible * cosine * min(1, density / target).
+/// `targetDensity` 0 = the median, over the surface seen, of the best density any candidate has.
+[[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
+                                        const std::vector<CandidateView>& candidates,
+                                        double targetDensity);
+
+}  // namespace stx

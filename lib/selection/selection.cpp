@@ -1,0 +1,170 @@
+#include "lib/selection/selection.hpp"
+
+#include <algorithm>
+
+#include "lib/base/parallel.hpp"
+#include "lib/capture/rasterizer.hpp"
+#include "lib/selection/coverage.hpp"
+
+namespace stx {
+namespace {
+
+Result<void> checkSettings(const SelectSettings& s) {
+    if (s.count < 0)
+        return fail(ErrorCode::usage, "{} views cannot be selected; at least 1 must be", s.count);
+    if (!(s.share > 0 && s.share <= 1))
+        return fail(ErrorCode::usage,
+                    "the wanted share of quality is {:g}; it must be over 0 and at most 1",
+                    s.share);
+    if (!(s.targetDensity >= 0) || std::isinf(s.targetDensity))
+        return fail(ErrorCode::usage, "the wanted density is {:g} samples per unit",
+                    s.targetDensity);
+    if (s.samples < 100 || s.samples > 10'000'000)
+        return fail(ErrorCode::usage,
+                    "{} surface samples were asked for; 100 to 10,000,000 are possible", s.samples);
+    return {};
+}
+
+/// Share of the area seen by at least one of some views.
+double seenShare(const CoverProblem& problem, const std::vector<int>& views) {
+    std::vector<bool> seen(problem.weights.size(), false);
+    for (const int v : views) {
+        for (const auto& item : problem.views[v]) seen[item.sample] = true;
+    }
+    double all = 0, part = 0;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+        all += problem.weights[i];
+        if (seen[i]) part += problem.weights[i];
+    }
+    return all > 0 ? part / all : 0;
+}
+
+Selection solve(const CoverProblem& problem, const SelectSettings& settings) {
+    const int most = settings.count > 0 ? settings.count : static_cast<int>(problem.views.size());
+    const CoverSolution solution = chooseCover(problem, most, settings.share);
+    Selection s;
+    s.views = solution.chosen;
+    for (const double value : solution.values) s.quality.push_back(std::min(1.0, value / solution.all));
+    s.certificate =
+        solution.bound > 0 && !s.views.empty() ? solution.values.back() / solution.bound : 1;
+    s.coverage = seenShare(problem, s.views);
+    std::vector<int> every(problem.views.size());
+    for (std::size_t i = 0; i < every.size(); ++i) every[i] = static_cast<int>(i);
+    s.coverageOfAll = seenShare(problem, every);
+    s.candidates = static_cast<int>(problem.views.size());
+    return s;
+}
+
+}  // namespace
+
+Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settings, Job& job) {
+    STX_CHECK(checkSettings(settings));
+    STX_CHECK(bundle.check());
+    std::vector<CandidateView> candidates;
+    int empty = 0;
+    for (const auto& v : bundle.views) {
+        candidates.push_back(
+            {v.camera, v.camera, &v.depth, v.depthBits == 32 ? 0.0 : v.depthCode().step()});
+        empty += v.pointCount() == 0 ? 1 : 0;
+    }
+    if (empty == static_cast<int>(bundle.views.size()))
+        return fail(ErrorCode::invalidInput, "none of the {} views has a point to select by",
+                    empty);
+    if (empty > 0)
+        job.note(fmt::format("{} of {} views dropped: they are empty", empty, bundle.views.size()));
+    STX_CHECK(job.checkCancelled());
+    const auto samples = sampleBundle(bundle, settings.samples);
+    STX_CHECK(job.checkCancelled());
+    const auto problem = coverProblem(samples, candidates, settings.targetDensity);
+    STX_CHECK(job.checkCancelled());
+    return solve(problem, settings);
+}
+
+Bundle keepViews(const Bundle& bundle, const std::vector<int>& views) {
+    std::vector<int> sorted = views;
+    std::sort(sorted.begin(), sorted.end());
+    Bundle kept;
+    kept.title = bundle.title;
+    kept.bounds = bundle.bounds;
+    for (const int v : sorted) kept.views.push_back(bundle.views[v]);
+    return kept;
+}
+
+Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& candidates,
+                                      const SelectSettings& settings, Job& job) {
+    STX_CHECK(checkSettings(settings));
+    if (candidates.directions < 1 || candidates.directions > 4096 || candidates.depthSize < 16 ||
+        candidates.depthSize > 2048)
+        return fail(
+            ErrorCode::usage,
+            "{} candidate directions with depth images of {} pixels; 1 to 4096 and 16 to 2048 "
+            "are possible",
+            candidates.directions, candidates.depthSize);
+    STX_CHECK(mesh.check());
+    ViewLayout layout;
+    layout.kind = ViewLayout::Kind::sphere;
+    layout.count = candidates.directions;
+    STX_TRY(const auto cameras, layoutCameras(layout, candidates.framing, mesh.positions));
+
+    const auto count = static_cast<std::int64_t>(cameras.size());
+    std::vector<CandidateView> views(cameras.size());
+    std::vector<Image<float>> depths(cameras.size());
+    std::vector<Result<void>> done(cameras.size());
+    std::atomic<std::int64_t> finished = 0;
+    parallelFor(0, count, [&](std::int64_t i) {
+        if (done[i] = job.checkCancelled(); !done[i]) return;
+        const Camera& camera = cameras[i];
+        const double scale =
+            static_cast<double>(candidates.depthSize) / std::max(camera.width, camera.height);
+        const auto shrunk = [&](int side) {
+            return std::max(1, static_cast<int>(std::lround(side * scale)));
+        };
+        views[i].camera = camera;
+        views[i].depthCamera =
+            scale < 1 ? camera.resized(shrunk(camera.width), shrunk(camera.height)) : camera;
+        RasterSettings raster;
+        raster.supersampling = 1;
+        auto image = rasterise(mesh, views[i].depthCamera, raster, job);
+        if (!image) {
+            done[i] = propagate(image);
+            return;
+        }
+        depths[i] = std::move(image->depth);
+        job.progress(++finished, count, "looking from candidate directions");
+    });
+    for (const auto& d : done) STX_CHECK(d);
+    for (std::size_t i = 0; i < views.size(); ++i) views[i].depth = &depths[i];
+
+    const auto samples = sampleMesh(mesh, settings.samples);
+    if (samples.empty())
+        return fail(ErrorCode::invalidInput, "the mesh has no surface to select views for");
+    const auto problem = coverProblem(samples, views, settings.targetDensity);
+    STX_CHECK(job.checkCancelled());
+    MeshSelection result;
+    result.selection = solve(problem, settings);
+    result.selection.neverSeen = 1 - result.selection.coverageOfAll;
+    if (result.selection.views.empty())
+        return fail(ErrorCode::failed, "no candidate direction sees anything of the mesh");
+    for (const int v : result.selection.views) result.cameras.push_back(cameras[v]);
+    return result;
+}
+
+Result<int> leastViews(int most, double target, const std::function<Result<double>(int)>& measure) {
+    if (most < 1)
+        return fail(ErrorCode::usage, "the least number of views is sought among {} views", most);
+    int fails = 0, reaches = 1;
+    for (;; reaches = std::min(reaches * 2, most)) {
+        STX_TRY(const double value, measure(reaches));
+        if (value >= target) break;
+        fails = reaches;
+        if (reaches == most) return most;
+    }
+    while (reaches - fails > 1) {
+        const int middle = fails + (reaches - fails) / 2;
+        STX_TRY(const double value, measure(middle));
+        (value >= target ? reaches : fails) = middle;
+    }
+    return reaches;
+}
+
+}  // namespace stx
