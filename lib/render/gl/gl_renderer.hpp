@@ -1,0 +1,16 @@
+#pragma once
+
+#include <memory>
+
+#include "lib/render/renderer.hpp"
+
+namespace stx::gl {
+
+/// The conventional OpenGL path that Lee & Park compare with: points from system memory as vertex
+/// arrays in each frame, splat sizes computed on the CPU, fixed lighting, no shaders of ours.
+/// Splat mode only. Errors: unsupported (no device or no compatibility profile), memory.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> makeGlRenderer(const Bundle& bundle,
+                                                               const RenderSettings& settings,
+                                                               int device, Job& job);
+
+}  // namespace stx::gl

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/render/renderer.hpp"
+
+namespace stx::gpu {
+
+/// What a context can do beyond OpenGL 4.5.
+struct ContextAbilities {
+    bool atomicInt64 = false;  ///< GL_NV_shader_atomic_int64
+    bool atomicFloat = false;  ///< GL_NV_shader_atomic_float
+    bool resetStatus = false;  ///< glGetGraphicsResetStatus tells of a lost device
+    int maxTextureSize = 0;    ///< pixels a side
+    int maxTextureLayers = 0;
+    std::int64_t maxStorageBytes = 0;  ///< of one shader storage block
+};
+
+/// An OpenGL context without a window. One thread at a time may hold it, any thread.
+class EglContext {
+  public:
+    enum class Profile { core, compatibility };
+
+    /// A context of OpenGL 4.5 on one of listDevices(), -1 = the best: the first hardware device,
+    /// else the first. Errors: unsupported, with what was tried device by device and the package
+    /// that would help.
+    [[nodiscard]] static Result<std::shared_ptr<EglContext>> create(int device, Profile profile);
+    ~EglContext();
+    EglContext(const EglContext&) = delete;
+    EglContext& operator=(const EglContext&) = delete;
+
+    [[nodiscard]] const Device& device() const;
+    [[nodiscard]] const ContextAbilities& abilities() const;
+
+    /// Holds the context for the calling thread while it lives.
+    class Current {
+      public:
+        Current(Current&& other) noexcept : context_(std::exchange(other.context_, nullptr)) {}
+        Current(const Current&) = delete;
+        Current& operator=(const Current&) = delete;
+        Current& operator=(Current&&) = delete;
+        ~Current();
+
+      private:
+        friend class EglContext;
+        explicit Current(EglContext* context) : context_(context) {}
+        EglContext* context_;
+    };
+    /// Errors when the context cannot be bound: another thread holds it, or the device is lost.
+    [[nodiscard]] Result<Current> makeCurrent();
+
+    /// Turns pending OpenGL errors (memory, a lost or reset device) into an Error that names
+    /// `doing`.
+    [[nodiscard]] Result<void> check(std::string_view doing) const;
+
+    struct Impl;
+
+  private:
+    explicit EglContext(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+/// listDevices() of lib/render/renderer.hpp; `tried` receives a clause for each failure.
+[[nodiscard]] std::vector<Device> enumerateDevices(std::vector<std::string>& tried);
+
+}  // namespace stx::gpu

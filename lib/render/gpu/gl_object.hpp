@@ -1,0 +1,86 @@
+#pragma once
+
+#include <utility>
+
+#include <epoxy/gl.h>
+
+namespace stx::gpu {
+
+/// Owns one OpenGL name. Made and destroyed while its context is current.
+template <class Traits>
+class GlObject {
+  public:
+    GlObject() = default;
+    explicit GlObject(GLuint name) : name_(name) {}
+    GlObject(GlObject&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
+    GlObject& operator=(GlObject&& other) noexcept {
+        std::swap(name_, other.name_);
+        return *this;
+    }
+    GlObject(const GlObject&) = delete;
+    GlObject& operator=(const GlObject&) = delete;
+    ~GlObject() {
+        if (name_) Traits::destroy(name_);
+    }
+
+    /// A new object; `args` is the target for those made with one (textures).
+    template <class... Args>
+    [[nodiscard]] static GlObject create(Args... args) {
+        return GlObject(Traits::create(args...));
+    }
+    [[nodiscard]] GLuint get() const { return name_; }
+    explicit operator bool() const { return name_ != 0; }
+
+  private:
+    GLuint name_ = 0;
+};
+
+struct BufferTraits {
+    static GLuint create() {
+        GLuint n = 0;
+        glCreateBuffers(1, &n);
+        return n;
+    }
+    static void destroy(GLuint n) { glDeleteBuffers(1, &n); }
+};
+struct TextureTraits {
+    static GLuint create(GLenum target) {
+        GLuint n = 0;
+        glCreateTextures(target, 1, &n);
+        return n;
+    }
+    static void destroy(GLuint n) { glDeleteTextures(1, &n); }
+};
+struct FramebufferTraits {
+    static GLuint create() {
+        GLuint n = 0;
+        glCreateFramebuffers(1, &n);
+        return n;
+    }
+    static void destroy(GLuint n) { glDeleteFramebuffers(1, &n); }
+};
+struct VertexArrayTraits {
+    static GLuint create() {
+        GLuint n = 0;
+        glCreateVertexArrays(1, &n);
+        return n;
+    }
+    static void destroy(GLuint n) { glDeleteVertexArrays(1, &n); }
+};
+struct ShaderTraits {
+    static GLuint create(GLenum type) { return glCreateShader(type); }
+    static void destroy(GLuint n) { glDeleteShader(n); }
+};
+struct ProgramTraits {
+    static GLuint create() { return glCreateProgram(); }
+    static void destroy(GLuint n) { glDeleteProgram(n); }
+};
+
+using GlBuffer = GlObject<BufferTraits>;
+using GlTexture = GlObject<TextureTraits>;
+using GlFramebuffer = GlObject<FramebufferTraits>;
+using GlVertexArray = GlObject<VertexArrayTraits>;
+using GlShader = GlObject<ShaderTraits>;
+using GlProgram = GlObject<ProgramTraits>;
+
+}  // namespace stx::gpu

@@ -1,0 +1,145 @@
+#include "lib/render/gpu/splat_frame.hpp"
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/cpu/splat_plan.hpp"
+
+namespace stx::gpu {
+namespace {
+
+/// Weights below this share of the frame's best would be lost in the integer sums; where such a
+/// view is alone it still has to draw.
+constexpr float kLeastQuality = 2e-5f;
+constexpr double kLargestWeight = 65536.0;
+
+/// Lee & Park find the coefficient by hand; here the view nearest to the camera decides: its
+/// samples, at their mean distance, just close.
+double paperCoefficient(const GpuScene& scene, const RenderSettings& settings,
+                        const Camera& novel) {
+    if (settings.splatCoefficient > 0) return settings.splatCoefficient;
+    double best = 1e300, coefficient = 1;
+    for (const auto& info : scene.views) {
+        const auto& c = info.view->camera;
+        const double distance =
+            glm::distance(c.position, novel.position) - glm::dot(c.forward(), novel.forward());
+        if (info.blocks.empty() || distance >= best) continue;
+        best = distance;
+        double mean = 0;
+        for (const auto& b : info.blocks)
+            mean += 0.5 * (b.zMin + b.zMax) / static_cast<double>(info.blocks.size());
+        const auto spacing = c.sampleSpacing(mean);
+        coefficient = std::sqrt(2.0) * std::max(spacing.x * novel.fx, spacing.y * novel.fy);
+    }
+    return coefficient;
+}
+
+/// Source pixels that fall on one novel pixel where the block is seen as its view saw it.
+double density(const splat::ViewInfo& info, const splat::BlockInfo& block,
+               const splat::BlockTask& task, const Camera& novel) {
+    const auto& c = info.view->camera;
+    const double source = c.orthographic ? 1.0 : block.zMin;
+    const double target = novel.orthographic ? 1.0 : std::max(1e-9, double(task.zMin));
+    return (c.fx * c.fy / (source * source)) * (target * target) / (novel.fx * novel.fy);
+}
+
+FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, const Camera& novel,
+                         int margin) {
+    FrameUniforms u;
+    u.frameSize = {novel.width, novel.height, novel.width + 2, margin};
+    u.counts = {static_cast<int>(scene.views.size()), 0, 0, 0};
+    u.novelLens = {1.0 / novel.fx, 1.0 / novel.fy, novel.cx, novel.cy};
+    const glm::mat3 axes = glm::mat3_cast(glm::quat(novel.orientation));
+    u.novelAxisX = glm::vec4(axes[0], novel.orthographic ? 1.0f : 0.0f);
+    u.novelAxisY = glm::vec4(axes[1], 0.0f);
+    u.novelAxisZ = glm::vec4(axes[2], 0.0f);
+    const double coefficient =
+        settings.splat == SplatRule::paper ? paperCoefficient(scene, settings, novel) : 0.0;
+    u.novelPosition = glm::vec4(novel.position, coefficient);
+    u.ambient = glm::vec4(settings.lighting.ambient, 0.0f);
+    u.specular = glm::vec4(settings.lighting.specular, settings.lighting.shininess);
+    return u;
+}
+
+}  // namespace
+
+SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
+                          const Camera& novel, int margin) {
+    SplatFrame frame;
+    frame.uniforms = uniformsOf(scene, settings, novel, margin);
+    std::vector<TaskEntry> large;
+    double crowd = 0;  // points that may meet in one pixel, all views together
+    struct Planned {
+        splat::BlockTask task;
+        double density = 0;
+        bool seen = false;
+    };
+    std::vector<Planned> planned;
+    for (std::size_t k = 0; k < scene.views.size(); ++k) {
+        const splat::ViewInfo& info = scene.views[k];
+        const Camera& c = info.view->camera;
+        splat::Source source;
+        source.orthographic = c.orthographic;
+        source.fx = static_cast<float>(c.fx);
+        source.fy = static_cast<float>(c.fy);
+        source.map = splat::pixelMap(c, novel);
+        const splat::PixelMap& m = source.map;
+        frame.views.push_back({glm::vec4(m.a0, c.orthographic ? 1.0f : 0.0f), glm::vec4(m.au, c.fx),
+                               glm::vec4(m.av, c.fy), glm::vec4(m.b0, 0), glm::vec4(m.bu, 0),
+                               glm::vec4(m.bv, 0)});
+        planned.assign(info.blocks.size(), {});
+        parallelForBlocks(0, static_cast<std::int64_t>(planned.size()), 512,
+                          [&](std::int64_t from, std::int64_t to) {
+                              for (auto i = from; i < to; ++i) {
+                                  Planned& p = planned[i];
+                                  p.seen =
+                                      splat::planBlock(info, info.blocks[i], source, novel,
+                                                       settings.splat == SplatRule::data, p.task);
+                                  if (p.seen)
+                                      p.density = density(info, info.blocks[i], p.task, novel);
+                              }
+                          });
+        double densest = 0;
+        const glm::ivec3 cell = scene.cells[k];
+        for (const Planned& p : planned) {
+            if (!p.seen) continue;
+            const splat::BlockTask& t = p.task;
+            densest = std::max(densest, p.density);
+            const TaskEntry entry{
+                static_cast<std::uint32_t>(t.u0) | static_cast<std::uint32_t>(t.v0) << 16,
+                static_cast<std::uint32_t>(t.u1 - t.u0) | static_cast<std::uint32_t>(t.v1 - t.v0)
+                                                              << 16,
+                static_cast<std::uint32_t>(cell.x + t.u0) |
+                    static_cast<std::uint32_t>(cell.y + t.v0) << 16,
+                static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(cell.z) << 20,
+                t.slopeX,
+                t.slopeY,
+                t.core2,
+                t.tolerance,
+                t.quality,
+                {}};
+            const bool ellipse = settings.splat == SplatRule::data && !t.small;
+            (ellipse ? large : frame.tasks).push_back(entry);
+        }
+        crowd += std::max(1.0, densest);
+    }
+    frame.smallTasks = static_cast<int>(frame.tasks.size());
+    frame.tasks.insert(frame.tasks.end(), large.begin(), large.end());
+    float best = 0;
+    for (const auto& t : frame.tasks) best = std::max(best, t.quality);
+    for (auto& t : frame.tasks) t.quality = std::max(t.quality / best, kLeastQuality);
+
+    // 32-bit sums: colour steps * weight * crowd must stay below 2^32. Four for what a tilt and
+    // the kernel's four pixels add.
+    const double steps = 255.0;
+    const double weight = std::clamp(4294967295.0 / (steps * 4.0 * crowd), 1.0, kLargestWeight);
+    frame.uniforms.scales = glm::vec4(std::floor(weight), steps / scene.maxColour, 0, 0);
+
+    const Lighting lighting = lightsInWorld(settings.lighting, novel.worldFromCamera());
+    for (const auto& light : lighting.lights)
+        frame.lights.push_back(
+            {glm::vec4(light.vector, light.kind == Light::Kind::point ? 1.0f : 0.0f),
+             glm::vec4(light.colour, 0.0f)});
+    frame.uniforms.counts.w = static_cast<int>(frame.lights.size());
+    return frame;
+}
+
+}  // namespace stx::gpu

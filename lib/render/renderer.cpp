@@ -1,0 +1,103 @@
+#include "lib/render/renderer.hpp"
+
+#include "lib/render/cpu/cpu_splat.hpp"
+#include "lib/render/cpu/cpu_surface.hpp"
+#ifdef STX_WITH_GPU
+#include "lib/render/gl/gl_renderer.hpp"
+#include "lib/render/gpu/egl_context.hpp"
+#include "lib/render/gpu/gpu_splat.hpp"
+#endif
+
+namespace stx {
+namespace {
+
+Result<std::unique_ptr<Renderer>> makeCpu(const Bundle& bundle, const RenderSettings& settings,
+                                          Job& job) {
+    if (settings.mode == RenderMode::splat) return makeCpuSplatRenderer(bundle, settings, job);
+    return makeCpuSurfaceRenderer(bundle, settings, job);
+}
+
+#ifdef STX_WITH_GPU
+Result<std::unique_ptr<Renderer>> makeGpu(const Bundle& bundle, const RenderSettings& settings,
+                                          int device, Job& job) {
+    if (settings.mode == RenderMode::surface)
+        return fail(ErrorCode::unsupported,
+                    "the gpu backend has no surface mode; use --mode splat or --backend cpu");
+    return gpu::makeGpuSplatRenderer(bundle, settings, device, job);
+}
+
+Result<std::unique_ptr<Renderer>> makeGl(const Bundle& bundle, const RenderSettings& settings,
+                                         int device, Job& job) {
+    if (settings.mode == RenderMode::surface)
+        return fail(ErrorCode::unsupported,
+                    "the gl backend draws splats only; use --mode splat or --backend cpu");
+    return gl::makeGlRenderer(bundle, settings, device, job);
+}
+
+/// A hardware GPU among the devices, or the one asked for if it is.
+bool hasHardware(int device) {
+    std::vector<std::string> tried;
+    const auto devices = gpu::enumerateDevices(tried);
+    if (device >= 0)
+        return device < static_cast<int>(devices.size()) &&
+               !devices[static_cast<std::size_t>(device)].software;
+    return std::any_of(devices.begin(), devices.end(), [](const Device& d) { return !d.software; });
+}
+#else
+constexpr const char* kNoGpu =
+    "this build has no {} backend (STX_WITH_GPU was off); use --backend cpu";
+
+Result<std::unique_ptr<Renderer>> makeGpu(const Bundle&, const RenderSettings&, int, Job&) {
+    return fail(ErrorCode::unsupported, kNoGpu, "gpu");
+}
+Result<std::unique_ptr<Renderer>> makeGl(const Bundle&, const RenderSettings&, int, Job&) {
+    return fail(ErrorCode::unsupported, kNoGpu, "gl");
+}
+bool hasHardware(int) {
+    return false;
+}
+#endif
+
+}  // namespace
+
+Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
+                                               const RenderSettings& settings, int device,
+                                               Job& job) {
+    STX_CHECK(bundle.check());
+    switch (backend) {
+        case Backend::gpu:
+            return makeGpu(bundle, settings, device, job);
+        case Backend::gl:
+            return makeGl(bundle, settings, device, job);
+        case Backend::cpu:
+            return makeCpu(bundle, settings, job);
+        case Backend::automatic:
+            break;
+    }
+    // Where the GPU lacks the mode asked for, the CPU has it.
+    if (settings.mode == RenderMode::splat && hasHardware(device)) {
+        auto made = makeGpu(bundle, settings, device, job);
+        if (made) return made;
+        job.note(fmt::format("the gpu backend cannot be used ({}); the cpu backend draws instead",
+                             made.error().text()));
+    }
+    return makeCpu(bundle, settings, job);
+}
+
+std::vector<Device> listDevices(Job& job) {
+#ifdef STX_WITH_GPU
+    std::vector<std::string> tried;
+    auto devices = gpu::enumerateDevices(tried);
+    if (devices.empty()) {
+        std::string text;
+        for (const auto& t : tried) text += (text.empty() ? "" : "; ") + t;
+        job.note("no OpenGL device without a display; tried: " + text);
+    }
+    return devices;
+#else
+    job.note("this build has no GPU backends (STX_WITH_GPU was off)");
+    return {};
+#endif
+}
+
+}  // namespace stx

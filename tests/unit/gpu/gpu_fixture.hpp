@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/renderer.hpp"
+
+/// Skips with a clear line where no OpenGL context without a display can be had.
+#define REQUIRE_GPU()                                                                 \
+    do {                                                                              \
+        ::stx::Job gpuJob;                                                            \
+        if (::stx::listDevices(gpuJob).empty())                                       \
+            GTEST_SKIP() << "no OpenGL 4.5 through EGL here; GPU tests are left out"; \
+    } while (false)
+
+namespace stx::test {
+
+inline double psnr(const Image<glm::vec4>& a, const Image<glm::vec4>& b) {
+    if (a.size() != b.size()) return 0;
+    double sum = 0;
+    for (std::size_t i = 0; i < a.count(); ++i) {
+        const glm::vec4 d = a.pixels()[i] - b.pixels()[i];
+        sum += double(d.r) * d.r + double(d.g) * d.g + double(d.b) * d.b;
+    }
+    if (sum == 0) return std::numeric_limits<double>::infinity();
+    return 10 * std::log10(3.0 * static_cast<double>(a.count()) / sum);
+}
+
+/// Premultiplied picture of a view.
+inline Image<glm::vec4> pictureOf(const ReferenceView& view) {
+    Image<glm::vec4> out(view.camera.width, view.camera.height);
+    for (int y = 0; y < out.height(); ++y)
+        for (int x = 0; x < out.width(); ++x) {
+            const glm::vec4 c = view.texture.at(x, y);
+            out.at(x, y) = {glm::vec3(c) * c.a, c.a};
+        }
+    return out;
+}
+
+/// Pixels of one image that are points where the other has none.
+inline int coverageDifference(const Image<float>& a, const Image<float>& b) {
+    int n = 0;
+    for (std::size_t i = 0; i < a.count(); ++i)
+        n += hasPoint(a.pixels()[i]) != hasPoint(b.pixels()[i]) ? 1 : 0;
+    return n;
+}
+
+inline RenderSettings splatSettings(SplatRule rule = SplatRule::data) {
+    RenderSettings s;
+    s.mode = RenderMode::splat;
+    s.splat = rule;
+    return s;
+}
+
+/// A camera smaller than the scene's own, so that tests stay quick.
+inline Camera small(Camera camera, int width) {
+    return camera.resized(width, width * camera.height / camera.width);
+}
+
+inline Bundle smallRoom(int references, int width = 256) {
+    Bundle bundle;
+    for (int i = 0; i < references; ++i) {
+        bundle.views.push_back(viewOfAnalyticScene(
+            AnalyticScene::room, small(analyticCamera(AnalyticScene::room, i, references), width),
+            2));
+        bundle.views.back().name = fmt::format("view{}", i);
+    }
+    return bundle;
+}
+
+}  // namespace stx::test
