@@ -19,8 +19,6 @@ const char* endingOf(AssimpFormat format) {
     switch (format) {
         case AssimpFormat::obj:
             return "obj";
-        case AssimpFormat::ply:
-            return "ply";
         case AssimpFormat::stl:
             return "stl";
     }

@@ -112,10 +112,6 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
         return fail(
             ErrorCode::invalidInput,
             "a GLB file begins with 'glTF'; this one does not, so it is another kind of file");
-    if (format == Format::ply && formatOfBytes(bytes) != Format::ply)
-        return fail(
-            ErrorCode::invalidInput,
-            "a PLY file begins with 'ply'; this one does not, so it is another kind of file");
     switch (format) {
         case Format::gltf:
         case Format::glb:
@@ -125,7 +121,7 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
         case Format::obj:
             return readWithAssimp(bytes, AssimpFormat::obj, name, files);
         case Format::ply:
-            return readWithAssimp(bytes, AssimpFormat::ply, name, files);
+            return readPly(bytes, files);
         case Format::stl:
             return readWithAssimp(bytes, AssimpFormat::stl, name, files);
         case Format::none:

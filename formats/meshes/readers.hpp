@@ -10,8 +10,10 @@ namespace stx {
 [[nodiscard]] Result<Mesh> readGltf(ByteSpan bytes, ModelFiles& files);
 [[nodiscard]] Result<Mesh> readDraco(ByteSpan bytes, Job& job);
 
-enum class AssimpFormat { obj, ply, stl };
-/// OBJ, PLY and STL. `fileName` is the model's own name in its folder.
+[[nodiscard]] Result<Mesh> readPly(ByteSpan bytes, ModelFiles& files);
+
+enum class AssimpFormat { obj, stl };
+/// OBJ and STL. `fileName` is the model's own name in its folder.
 [[nodiscard]] Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format,
                                           const std::string& fileName, ModelFiles& files);
 

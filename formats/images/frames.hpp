@@ -1,0 +1,50 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include <glm/glm.hpp>
+
+#include "formats/files/files.hpp"
+#include "lib/geometry/camera.hpp"
+#include "lib/render/frame.hpp"
+
+namespace stx {
+
+/// Files that a rendered picture can become.
+enum class FrameFormat {
+    png,   ///< 8-bit sRGB, straight alpha, tagged
+    jpeg,  ///< 8-bit sRGB without alpha; lossy
+    exr,   ///< linear, premultiplied; depth, normals and albedo with it
+};
+
+/// The format by a name's ending: .png, .jpg, .jpeg, .exr in any case; "-" is PNG. Error (usage)
+/// else.
+[[nodiscard]] Result<FrameFormat> frameFormat(const std::filesystem::path& path);
+
+struct FrameOptions {
+    /// Put behind the picture, which gets opaque: sRGB-coded 0..1. Without it PNG and EXR keep
+    /// their alpha, and JPEG has black behind.
+    std::optional<glm::vec3> background;
+    int jpegQuality = 92;  ///< 1..100
+    int pngLevel = 6;      ///< 0..9
+    bool noClobber = false;
+    /// EXR: gets into the standard attributes worldToCamera, worldToNDC, screenWindow...
+    std::optional<Camera> camera;
+};
+
+/// Writes one picture whole or not at all, by the name's ending. Linear frames are coded as sRGB
+/// for PNG and JPEG, sRGB-coded ones are made linear for EXR. EXR channels: R G B A (half,
+/// premultiplied), Z (float32, +inf where nothing was drawn), N.X N.Y N.Z (half) when there are
+/// normals, albedo.R G B A (half) when there is albedo. Safe to call from several threads.
+[[nodiscard]] Result<void> writeFrame(const Frame& frame, const std::filesystem::path& path,
+                                      const FrameOptions& options = {});
+/// PNG or JPEG as bytes. Error (failed) for EXR, which is written to files only.
+[[nodiscard]] Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format,
+                                        const FrameOptions& options = {});
+
+/// 8-bit sRGB with straight alpha of a frame; opaque where a background is given.
+[[nodiscard]] Image<glm::u8vec4> rgba8From(const Frame& frame,
+                                           const std::optional<glm::vec3>& background = {});
+
+}  // namespace stx

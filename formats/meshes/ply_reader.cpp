@@ -1,0 +1,485 @@
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+
+#include "formats/meshes/mesh_builder.hpp"
+#include "formats/meshes/ply_header.hpp"
+#include "formats/meshes/readers.hpp"
+#include "formats/meshes/triangulate.hpp"
+#include "formats/meshes/vertex_colours.hpp"
+
+// Assimp's PLY importer keeps one texture coordinate a vertex where the file has one a corner, and
+// stops at headers with free blanks; so PLY is read here.
+
+namespace stx {
+namespace {
+
+/// The values behind the header, one after the other.
+class PlyValues {
+  public:
+    PlyValues(ByteSpan bytes, std::size_t at, PlyCoding coding)
+        : bytes_(bytes), at_(at), coding_(coding) {}
+
+    [[nodiscard]] std::size_t offset() const { return at_; }
+
+    /// False at the end of the file or where text is no number.
+    bool next(PlyType type, double& value) {
+        return coding_ == PlyCoding::ascii ? nextText(value) : nextBinary(type, value);
+    }
+
+    /// Text has one element a line: blank lines before it do not count, and what its properties
+    /// leave of its line is passed over (MeshLab writes values there that its header does not
+    /// name).
+    void beginElement() {
+        while (coding_ == PlyCoding::ascii && at_ < bytes_.size() && isBlank(byte())) ++at_;
+    }
+    void endElement() {
+        if (coding_ != PlyCoding::ascii) return;
+        for (; at_ < bytes_.size() && byte() != '\n' && byte() != '\r'; ++at_)
+            leftOver_ = leftOver_ || !isBlank(byte());
+    }
+    [[nodiscard]] bool atLineEnd() {
+        if (coding_ != PlyCoding::ascii) return false;
+        while (at_ < bytes_.size() && (byte() == ' ' || byte() == '\t')) ++at_;
+        return at_ == bytes_.size() || byte() == '\n' || byte() == '\r';
+    }
+    [[nodiscard]] bool hasLeftOver() const { return leftOver_; }
+
+  private:
+    [[nodiscard]] char byte() const { return static_cast<char>(bytes_[at_]); }
+    static bool isBlank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+    bool nextText(double& value) {
+        const auto* const begin = reinterpret_cast<const char*>(bytes_.data());
+        while (at_ < bytes_.size() && isBlank(begin[at_])) ++at_;
+        if (at_ < bytes_.size() && begin[at_] == '+') ++at_;
+        const auto [stop, error] = std::from_chars(begin + at_, begin + bytes_.size(), value);
+        if (error == std::errc::result_out_of_range)
+            value = 0;
+        else if (error != std::errc())
+            return false;
+        at_ = static_cast<std::size_t>(stop - begin);
+        return at_ == bytes_.size() || isBlank(begin[at_]);
+    }
+
+    template <class T>
+    double load() {
+        std::array<std::byte, sizeof(T)> raw;
+        std::memcpy(raw.data(), bytes_.data() + at_, sizeof(T));
+        if ((coding_ == PlyCoding::bigEndian) != (std::endian::native == std::endian::big))
+            std::reverse(raw.begin(), raw.end());
+        at_ += sizeof(T);
+        return static_cast<double>(std::bit_cast<T>(raw));
+    }
+
+    bool nextBinary(PlyType type, double& value) {
+        if (bytes_.size() - at_ < plySize(type)) return false;
+        switch (type) {
+            case PlyType::int8:
+                value = load<std::int8_t>();
+                break;
+            case PlyType::uint8:
+                value = load<std::uint8_t>();
+                break;
+            case PlyType::int16:
+                value = load<std::int16_t>();
+                break;
+            case PlyType::uint16:
+                value = load<std::uint16_t>();
+                break;
+            case PlyType::int32:
+                value = load<std::int32_t>();
+                break;
+            case PlyType::uint32:
+                value = load<std::uint32_t>();
+                break;
+            case PlyType::float32:
+                value = load<float>();
+                break;
+            case PlyType::float64:
+                value = load<double>();
+                break;
+        }
+        return true;
+    }
+
+    ByteSpan bytes_;
+    std::size_t at_;
+    PlyCoding coding_;
+    bool leftOver_ = false;
+};
+
+/// What a property of an element means.
+enum class Role {
+    none,
+    x,
+    y,
+    z,
+    nx,
+    ny,
+    nz,
+    red,
+    green,
+    blue,
+    alpha,
+    u,
+    v,
+    indices,
+    corners,
+    texture
+};
+
+Role roleOf(const PlyProperty& p, bool ofFaces) {
+    const std::string_view n = p.name;
+    if (p.isList) {
+        if (!ofFaces) return Role::none;
+        if (n == "vertex_indices" || n == "vertex_index") return Role::indices;
+        if (n == "texcoord") return Role::corners;
+        return Role::none;
+    }
+    if (n == "red" || n == "r" || n == "diffuse_red") return Role::red;
+    if (n == "green" || n == "g" || n == "diffuse_green") return Role::green;
+    if (n == "blue" || n == "b" || n == "diffuse_blue") return Role::blue;
+    if (n == "alpha" || n == "a" || n == "diffuse_alpha") return Role::alpha;
+    if (ofFaces) return n == "texnumber" ? Role::texture : Role::none;
+    if (n == "x") return Role::x;
+    if (n == "y") return Role::y;
+    if (n == "z") return Role::z;
+    if (n == "nx") return Role::nx;
+    if (n == "ny") return Role::ny;
+    if (n == "nz") return Role::nz;
+    if (n == "u" || n == "s" || n == "texture_u" || n == "texture_s") return Role::u;
+    if (n == "v" || n == "t" || n == "texture_v" || n == "texture_t") return Role::v;
+    return Role::none;
+}
+
+/// 255, 65535 or 1: what divides a colour of this type.
+double colourScale(PlyType type) {
+    switch (type) {
+        case PlyType::float32:
+        case PlyType::float64:
+            return 1.0;
+        case PlyType::uint16:
+            return 65535.0;
+        default:
+            return 255.0;
+    }
+}
+
+class PlyReader {
+  public:
+    PlyReader(ByteSpan bytes, PlyHeader header, ModelFiles& files)
+        : header_(std::move(header)),
+          values_(bytes, header_.dataOffset, header_.coding),
+          files_(files),
+          builder_(files.job()) {}
+
+    Result<Mesh> read() {
+        for (const auto& element : header_.elements) {
+            if (element.name == "vertex") {
+                STX_CHECK(readVertices(element));
+            } else if (element.name == "face" || element.name == "tristrips") {
+                STX_CHECK(readFaces(element));
+            } else {
+                if (element.count > 0)
+                    files_.job().note(fmt::format("dropped: PLY elements '{}' ({})", element.name,
+                                                  element.count));
+                STX_CHECK(skip(element));
+            }
+        }
+        if (shortFaces_ > 0)
+            files_.job().note(
+                fmt::format("dropped: faces with less than three corners ({})", shortFaces_));
+        if (values_.hasLeftOver())
+            files_.job().note("dropped: PLY values behind the last property of a line");
+        STX_CHECK(assemble());
+        return builder_.finish();
+    }
+
+  private:
+    struct Face {
+        std::uint32_t firstCorner = 0;  ///< in corners_
+        std::uint32_t texture = 0;
+        glm::vec4 colour{1.0f};
+    };
+    struct Corner {
+        std::uint32_t vertex = 0;
+        glm::vec2 uv{0.0f};
+    };
+
+    Result<double> value(const PlyElement& element, std::uint64_t i, PlyType type) {
+        double v = 0;
+        if (!values_.next(type, v))
+            return fail(ErrorCode::invalidInput,
+                        "{} {} of {} at byte {}: the file ends, or here stands no number",
+                        element.name, i, element.count, values_.offset());
+        return v;
+    }
+
+    /// Length of a list, held against what the file can still hold.
+    Result<std::size_t> length(const PlyElement& element, std::uint64_t i, const PlyProperty& p) {
+        if (values_.atLineEnd()) return 0;
+        STX_TRY(const double n, value(element, i, p.countType));
+        if (!(n >= 0) || n > 1e9 || std::floor(n) != n)
+            return fail(ErrorCode::invalidInput, "{} {}: '{}' has {} values", element.name, i,
+                        p.name, n);
+        return static_cast<std::size_t>(n);
+    }
+
+    Result<void> skip(const PlyElement& element) {
+        for (std::uint64_t i = 0; i < element.count; ++i) {
+            values_.beginElement();
+            for (const auto& p : element.properties) {
+                std::size_t n = 1;
+                if (p.isList) {
+                    STX_TRY(n, length(element, i, p));
+                }
+                for (std::size_t k = 0; k < n; ++k) STX_CHECK(value(element, i, p.type));
+            }
+            values_.endElement();
+        }
+        return {};
+    }
+
+    Result<void> readVertices(const PlyElement& element) {
+        std::vector<Role> roles;
+        for (const auto& p : element.properties) roles.push_back(roleOf(p, false));
+        const auto has = [&](Role r) {
+            return std::find(roles.begin(), roles.end(), r) != roles.end();
+        };
+        if (!has(Role::x) || !has(Role::y) || !has(Role::z))
+            return fail(ErrorCode::invalidInput, "the PLY vertices have no x, y and z");
+        STX_CHECK(builder_.charge(element.count, 12 + 12 + 16 + 8, "the PLY vertices"));
+        const bool hasNormals = has(Role::nx) && has(Role::ny) && has(Role::nz);
+        const bool hasColours = has(Role::red) && has(Role::green) && has(Role::blue);
+        const bool hasUvs = has(Role::u) && has(Role::v);
+        for (std::uint64_t i = 0; i < element.count; ++i) {
+            std::array<double, 16> v{};
+            v[static_cast<std::size_t>(Role::alpha)] = 1.0;
+            values_.beginElement();
+            for (std::size_t k = 0; k < roles.size(); ++k) {
+                const auto& p = element.properties[k];
+                if (p.isList) {
+                    STX_TRY(const auto n, length(element, i, p));
+                    for (std::size_t j = 0; j < n; ++j) STX_CHECK(value(element, i, p.type));
+                    continue;
+                }
+                STX_TRY(double number, value(element, i, p.type));
+                if (roles[k] >= Role::red && roles[k] <= Role::alpha) {
+                    number /= colourScale(p.type);
+                    floatColours_ = floatColours_ || colourScale(p.type) == 1.0;
+                }
+                v[static_cast<std::size_t>(roles[k])] = number;
+            }
+            values_.endElement();
+            const auto f = [&](Role r) {
+                return static_cast<float>(v[static_cast<std::size_t>(r)]);
+            };
+            positions_.emplace_back(f(Role::x), f(Role::y), f(Role::z));
+            if (hasNormals) normals_.emplace_back(f(Role::nx), f(Role::ny), f(Role::nz));
+            if (hasColours)
+                colours_.emplace_back(f(Role::red), f(Role::green), f(Role::blue), f(Role::alpha));
+            if (hasUvs) uvs_.emplace_back(f(Role::u), 1.0f - f(Role::v));
+        }
+        linearFromSrgbColours(colours_, floatColours_);
+        return {};
+    }
+
+    Result<void> readFaces(const PlyElement& element) {
+        const bool strips = element.name == "tristrips";
+        std::vector<double> indices, cornerUvs;
+        for (std::uint64_t i = 0; i < element.count; ++i) {
+            indices.clear();
+            cornerUvs.clear();
+            Face face;
+            glm::dvec4 colour(1.0);
+            values_.beginElement();
+            for (const auto& p : element.properties) {
+                const auto role = roleOf(p, true);
+                std::size_t n = 1;
+                if (p.isList) {
+                    STX_TRY(n, length(element, i, p));
+                }
+                for (std::size_t k = 0; k < n; ++k) {
+                    STX_TRY(const double number, value(element, i, p.type));
+                    if (role == Role::indices) indices.push_back(number);
+                    if (role == Role::corners) cornerUvs.push_back(number);
+                    if (role == Role::texture && number >= 0 && number < 1e6)
+                        face.texture = static_cast<std::uint32_t>(number);
+                    if (role >= Role::red && role <= Role::alpha) {
+                        colour[static_cast<int>(role) - static_cast<int>(Role::red)] =
+                            number / colourScale(p.type);
+                        hasFaceColours_ = hasFaceColours_ || role == Role::green;
+                        floatFaceColours_ = floatFaceColours_ || colourScale(p.type) == 1.0;
+                    }
+                }
+            }
+            values_.endElement();
+            face.colour = glm::vec4(colour);
+            if (strips) {
+                STX_CHECK(addStrips(element, indices));
+                continue;
+            }
+            if (indices.size() < 3) {
+                ++shortFaces_;
+                continue;
+            }
+            const bool withUvs = cornerUvs.size() == indices.size() * 2;
+            hasCornerUvs_ = hasCornerUvs_ || withUvs;
+            face.firstCorner = static_cast<std::uint32_t>(corners_.size());
+            for (std::size_t k = 0; k < indices.size(); ++k) {
+                STX_TRY(Corner corner, cornerAt(element, i, indices[k]));
+                if (withUvs)
+                    corner.uv = {static_cast<float>(cornerUvs[k * 2]),
+                                 1.0f - static_cast<float>(cornerUvs[k * 2 + 1])};
+                corners_.push_back(corner);
+            }
+            faces_.push_back(face);
+            STX_CHECK(builder_.charge(indices.size(), 120, "the PLY faces"));
+        }
+        return {};
+    }
+
+    Result<Corner> cornerAt(const PlyElement& element, std::uint64_t i, double index) {
+        if (!(index >= 0) || index >= static_cast<double>(positions_.size()) ||
+            std::floor(index) != index)
+            return fail(ErrorCode::invalidInput,
+                        "{} {} uses vertex {}, but there are only {} vertices", element.name, i,
+                        index, positions_.size());
+        return Corner{static_cast<std::uint32_t>(index)};
+    }
+
+    /// Stanford's triangle strips: one list, -1 begins a new strip.
+    Result<void> addStrips(const PlyElement& element, const std::vector<double>& indices) {
+        std::size_t start = 0;
+        STX_CHECK(builder_.charge(indices.size(), 360, "the PLY strips"));
+        for (std::size_t k = 0; k < indices.size(); ++k) {
+            if (indices[k] == -1) {
+                start = k + 1;
+                continue;
+            }
+            if (k < start + 2) continue;
+            const bool odd = (k - start) % 2 == 1;
+            faces_.push_back({.firstCorner = static_cast<std::uint32_t>(corners_.size())});
+            for (const auto from : {odd ? k - 1 : k - 2, odd ? k - 2 : k - 1, k}) {
+                STX_TRY(const auto corner, cornerAt(element, 0, indices[from]));
+                corners_.push_back(corner);
+            }
+        }
+        return {};
+    }
+
+    /// Faces as triangles, one part for each texture; points when there are no faces.
+    Result<void> assemble() {
+        if (corners_.size() > std::numeric_limits<std::uint32_t>::max())
+            return fail(ErrorCode::invalidInput, "the PLY file has more than 2^32 corners");
+        std::vector<Material> materials;
+        if (!header_.textureFiles.empty() && uvs_.empty() && !hasCornerUvs_)
+            files_.job().note("the PLY file names a texture but has no texture coordinates for it");
+        for (const auto& name : header_.textureFiles) {
+            Material m{.name = name};
+            if (!uvs_.empty() || hasCornerUvs_) {
+                STX_TRY(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
+            }
+            materials.push_back(std::move(m));
+        }
+        if (materials.empty()) materials.push_back({.name = "default"});
+        builder_.materials() = materials;
+        if (faces_.empty()) {
+            MeshPart part;
+            part.where = "PLY";
+            part.positions = std::move(positions_);
+            part.normals = std::move(normals_);
+            part.colours = std::move(colours_);
+            part.points = true;
+            return builder_.add(std::move(part));
+        }
+        const bool useFaceColours = hasFaceColours_ && colours_.empty();
+        if (useFaceColours) {
+            std::vector<glm::vec4> colours;
+            for (const auto& f : faces_) colours.push_back(f.colour);
+            linearFromSrgbColours(colours, floatFaceColours_);
+            for (std::size_t i = 0; i < faces_.size(); ++i) faces_[i].colour = colours[i];
+        }
+        std::map<std::uint32_t, MeshPart> parts;
+        const bool shared = !hasCornerUvs_ && !useFaceColours && materials.size() == 1;
+        std::vector<glm::vec3> polygon;
+        std::vector<glm::uvec3> triangles;
+        for (std::size_t f = 0; f < faces_.size(); ++f) {
+            const auto& face = faces_[f];
+            const auto end = f + 1 < faces_.size() ? faces_[f + 1].firstCorner
+                                                   : static_cast<std::uint32_t>(corners_.size());
+            polygon.clear();
+            triangles.clear();
+            for (auto c = face.firstCorner; c < end; ++c)
+                polygon.push_back(positions_[corners_[c].vertex]);
+            triangulate(polygon, triangles);
+            const auto texture = std::min<std::uint32_t>(
+                face.texture, static_cast<std::uint32_t>(materials.size() - 1));
+            auto& part = parts[texture];
+            const auto base = static_cast<std::uint32_t>(part.positions.size());
+            for (const auto& t : triangles) {
+                if (shared)
+                    part.triangles.emplace_back(corners_[face.firstCorner + t.x].vertex,
+                                                corners_[face.firstCorner + t.y].vertex,
+                                                corners_[face.firstCorner + t.z].vertex);
+                else
+                    part.triangles.push_back(t + base);
+            }
+            for (auto c = face.firstCorner; !shared && c < end; ++c) {
+                const auto v = corners_[c].vertex;
+                part.positions.push_back(positions_[v]);
+                if (!normals_.empty()) part.normals.push_back(normals_[v]);
+                if (useFaceColours)
+                    part.colours.push_back(face.colour);
+                else if (!colours_.empty())
+                    part.colours.push_back(colours_[v]);
+                if (hasCornerUvs_)
+                    part.uvs.push_back(corners_[c].uv);
+                else if (!uvs_.empty())
+                    part.uvs.push_back(uvs_[v]);
+            }
+        }
+        for (auto& [texture, part] : parts) {
+            part.where = "PLY";
+            part.material = texture;
+            if (shared) {
+                part.positions = std::move(positions_);
+                part.normals = std::move(normals_);
+                part.colours = std::move(colours_);
+                part.uvs = std::move(uvs_);
+            } else {
+                weldVertices(part);
+            }
+            STX_CHECK(builder_.add(std::move(part)));
+        }
+        return {};
+    }
+
+    PlyHeader header_;
+    PlyValues values_;
+    ModelFiles& files_;
+    MeshBuilder builder_;
+    std::vector<glm::vec3> positions_, normals_;
+    std::vector<glm::vec4> colours_;
+    std::vector<glm::vec2> uvs_;
+    std::vector<Face> faces_;
+    std::vector<Corner> corners_;
+    bool hasCornerUvs_ = false, hasFaceColours_ = false;
+    bool floatColours_ = false, floatFaceColours_ = false;
+    std::size_t shortFaces_ = 0;
+};
+
+}  // namespace
+
+Result<Mesh> readPly(ByteSpan bytes, ModelFiles& files) {
+    STX_TRY(auto header, readPlyHeader(bytes));
+    return PlyReader(bytes, std::move(header), files).read();
+}
+
+}  // namespace stx
