@@ -26,14 +26,16 @@ constexpr float kNearest = 1e-12f;
 
 // A row of a block: H = (a + i au) z + (b + i bu) for its i-th pixel.
 struct RowMap {
-    float a[3], au[3], b[3], bu[3];
+    float a[3], au[3], av[3], b[3], bu[3], bv[3];
     RowMap(const PixelMap& m, int u, int v) {
-        const glm::dvec3 av = m.a0 + m.au * double(u) + m.av * double(v);
-        const glm::dvec3 bv = m.b0 + m.bu * double(u) + m.bv * double(v);
+        const glm::dvec3 rowA = m.a0 + m.au * double(u) + m.av * double(v);
+        const glm::dvec3 rowB = m.b0 + m.bu * double(u) + m.bv * double(v);
         for (int k = 0; k < 3; ++k) {
-            a[k] = static_cast<float>(av[k]);
+            a[k] = static_cast<float>(rowA[k]);
             au[k] = static_cast<float>(m.au[k]);
-            b[k] = static_cast<float>(bv[k]);
+            av[k] = static_cast<float>(m.av[k]);
+            bv[k] = static_cast<float>(m.bv[k]);
+            b[k] = static_cast<float>(rowB[k]);
             bu[k] = static_cast<float>(m.bu[k]);
         }
     }
@@ -47,46 +49,49 @@ HWY_INLINE VF loadDepth(DF d, const float* from, int count) {
     return hn::Load(d, padded);
 }
 
-// Points of a row that land in the band: the pixel to the upper left of each, how far into the next
-// it lies (0..1), its novel depth.
+// Points of a row and where they land: the pixel to the upper left of each (only where `inside`
+// the band), how far into the next it lies (0..1), its novel depth.
 struct Landed {
     VI offset;
-    VF fx, fy, z;
-    hn::Mask<DF> in;
+    VF x, y, fx, fy, z;
+    VF a[3], inverse;  // H = a z + ..., and 1 / H.z (1 when orthographic)
+    hn::Mask<DF> inFront, inside;
 };
 
 HWY_INLINE Landed land(DF d, const RowMap& m, int i, VF z, const Band& band) {
     const VF index = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(i)));
-    const auto h = [&](int k) HWY_ATTR {
-        const VF a = hn::MulAdd(index, hn::Set(d, m.au[k]), hn::Set(d, m.a[k]));
-        const VF b = hn::MulAdd(index, hn::Set(d, m.bu[k]), hn::Set(d, m.b[k]));
-        return hn::MulAdd(a, z, b);
-    };
-    VF x = h(0), y = h(1);
-    const VF w = h(2);
-    if (!band.orthographic) {
-        const VF inverse = hn::Div(hn::Set(d, 1.0f), w);
-        x = hn::Mul(x, inverse);
-        y = hn::Mul(y, inverse);
-    }
     Landed out;
-    const VF x0 = hn::Floor(x), y0 = hn::Floor(y);
+    const auto h = [&](int k) HWY_ATTR {
+        out.a[k] = hn::MulAdd(index, hn::Set(d, m.au[k]), hn::Set(d, m.a[k]));
+        const VF b = hn::MulAdd(index, hn::Set(d, m.bu[k]), hn::Set(d, m.b[k]));
+        return hn::MulAdd(out.a[k], z, b);
+    };
+    out.x = h(0);
+    out.y = h(1);
+    out.z = h(2);
+    out.inverse = hn::Set(d, 1.0f);
+    if (!band.orthographic) {
+        out.inverse = hn::Div(out.inverse, out.z);
+        out.x = hn::Mul(out.x, out.inverse);
+        out.y = hn::Mul(out.y, out.inverse);
+    }
+    const VF x0 = hn::Floor(out.x), y0 = hn::Floor(out.y);
     // Comparisons with NaN are false, which takes care of pixels without a point.
-    out.in = hn::And(
+    out.inFront = hn::And(hn::Gt(out.z, hn::Set(d, kNearest)), hn::Lt(z, hn::Set(d, kInfinity)));
+    out.inside = hn::And(
         hn::And(hn::And(hn::Ge(x0, hn::Set(d, -1.0f)), hn::Lt(x0, hn::Set(d, float(band.width)))),
                 hn::And(hn::Ge(y0, hn::Set(d, float(band.top - 1))),
                         hn::Lt(y0, hn::Set(d, float(band.top + band.rows))))),
-        hn::And(hn::Gt(w, hn::Set(d, kNearest)), hn::Lt(z, hn::Set(d, kInfinity))));
+        out.inFront);
     const DI di;
     // Zero where outside, so that conversions and gathers stay in range.
-    const VF xs = hn::IfThenElseZero(out.in, x0);
-    const VF ys = hn::IfThenElse(out.in, y0, hn::Set(d, float(band.top)));
+    const VF xs = hn::IfThenElseZero(out.inside, x0);
+    const VF ys = hn::IfThenElse(out.inside, y0, hn::Set(d, float(band.top)));
     const VI row = hn::Sub(hn::ConvertTo(di, ys), hn::Set(di, band.top - 1));
     out.offset = hn::Add(hn::Mul(row, hn::Set(di, band.stride)),
                          hn::Add(hn::ConvertTo(di, xs), hn::Set(di, 1)));
-    out.fx = hn::Sub(x, x0);
-    out.fy = hn::Sub(y, y0);
-    out.z = w;
+    out.fx = hn::Sub(out.x, x0);
+    out.fy = hn::Sub(out.y, y0);
     return out;
 }
 
@@ -179,15 +184,239 @@ HWY_INLINE Paint paintOf(const Source& s, std::size_t pixel, bool opaque) {
     return p;
 }
 
-// --- Splats of 2x2 output pixels -------------------------------------------------------------
+// --- Splats ----------------------------------------------------------------------------------
 
-void depthSmall(const Source& s, const BlockTask& t, const Band& band) {
+// Half width of the Gaussian in sample spacings, and of the low-pass filter in pixels.
+constexpr float kSigmaSource = 0.5f, kSigmaPixel = 0.3f;
+// Where a large splat ends, and where it stops to hide, in squared standard deviations. The lattice
+// closes at half a diagonal: 0.5 / kSigmaSource^2 = 2.
+constexpr float kReach2 = 5.0f, kCore2 = 2.1f;
+// None is larger, in pixels from its centre: a point almost at the viewpoint would fill the frame.
+constexpr float kLargest = 256.0f;
+// Steeper planes (relative depth per pixel) are nearly edge-on and would run away.
+constexpr float kSteepest = 0.05f;
+
+// The splats of some neighbouring pixels.
+struct Splats {
+    Landed at;
+    hn::Mask<DF> small, large;
+    VF slopeX, slopeY;  // of novel depth, relative, per pixel
+    VF core2;           // of small ones, squared pixels
+    VF quality;
+    VF qxx, qxy, qyy;  // of large ones: squared deviations = qxx dx^2 + 2 qxy dx dy + qyy dy^2
+    VF halfX, halfY;   // of their bounding boxes
+};
+
+// Slopes and sizes of up to a vector of pixels.
+HWY_INLINE void loadShape(DF d, const Source& s, std::size_t pixel, int count, VF& u, VF& v,
+                          VF& size) {
+    const DI di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    HWY_ALIGN float su[kBlock], sv[kBlock];
+    static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
+    VI packed;
+    if (count >= lanes) {
+        packed = hn::LoadU(di, reinterpret_cast<const std::int32_t*>(s.slopes + pixel));
+        u = hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
+        v = hn::ConvertTo(d, hn::ShiftRight<16>(packed));
+    } else {
+        for (int i = 0; i < lanes; ++i) {
+            su[i] = i < count ? s.slopes[pixel + i].u : 0.0f;
+            sv[i] = i < count ? s.slopes[pixel + i].v : 0.0f;
+        }
+        u = hn::Load(d, su);
+        v = hn::Load(d, sv);
+    }
+    size = hn::Set(d, 1.0f);
+    if (s.sizes) {
+        for (int i = 0; i < lanes; ++i)
+            su[i] = i < count ? s.sizes[pixel + i] * (1.0f / 64.0f) : 1.0f;
+        size = hn::Load(d, su);
+    }
+}
+
+// kUniform: all points of the block are small and share its tilt.
+template <bool kUniform>
+HWY_INLINE Splats splatsOf(DF d, const Source& s, const BlockTask& t, const RowMap& map, int i,
+                           std::size_t pixel, int count, const Band& band) {
+    Splats out;
+    const VF depth = loadDepth(d, s.depth + pixel, count);
+    out.at = land(d, map, i, depth, band);
+    const VF one = hn::Set(d, 1.0f);
+    if (kUniform) {
+        out.small = out.at.inside;
+        out.large = hn::Lt(one, one);
+        out.slopeX = hn::Set(d, t.slopeX);
+        out.slopeY = hn::Set(d, t.slopeY);
+        out.core2 = hn::Set(d, t.core2);
+        out.quality = hn::Set(d, t.quality * t.density);
+        return out;
+    }
+    VF su, sv, size;
+    loadShape(d, s, pixel, count, su, sv, size);
+    const VF spacing = s.orthographic ? one : depth;
+    const VF du = hn::Mul(su, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fx))));
+    const VF dv = hn::Mul(sv, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fy))));
+    // Derivatives of H and then of the pixel by u and v.
+    const auto hu = [&](int k) HWY_ATTR {
+        return hn::MulAdd(hn::Set(d, map.au[k]), depth,
+                          hn::MulAdd(out.at.a[k], du, hn::Set(d, map.bu[k])));
+    };
+    const auto hv = [&](int k) HWY_ATTR {
+        return hn::MulAdd(hn::Set(d, map.av[k]), depth,
+                          hn::MulAdd(out.at.a[k], dv, hn::Set(d, map.bv[k])));
+    };
+    const VF zu = hu(2), zv = hv(2);
+    VF xu = hu(0), yu = hu(1), xv = hv(0), yv = hv(1);
+    if (!band.orthographic) {
+        xu = hn::Mul(hn::NegMulAdd(out.at.x, zu, xu), out.at.inverse);
+        yu = hn::Mul(hn::NegMulAdd(out.at.y, zu, yu), out.at.inverse);
+        xv = hn::Mul(hn::NegMulAdd(out.at.x, zv, xv), out.at.inverse);
+        yv = hn::Mul(hn::NegMulAdd(out.at.y, zv, yv), out.at.inverse);
+    }
+    const VF det = hn::Sub(hn::Mul(xu, yv), hn::Mul(xv, yu));
+    const auto square = [](VF x, VF y) HWY_ATTR { return hn::MulAdd(x, x, hn::Mul(y, y)); };
+    const VF cover2 = hn::Mul(hn::Mul(hn::Mul(size, size), hn::Set(d, 0.25f)),
+                              hn::Max(square(hn::Add(xu, xv), hn::Add(yu, yv)),
+                                      square(hn::Sub(xu, xv), hn::Sub(yu, yv))));
+    // Those with a determinant that is not positive face away.
+    const auto seen = hn::And(out.at.inFront, hn::Gt(det, hn::Zero(d)));
+    const auto fits = hn::Lt(cover2, hn::Set(d, kSmallCover2));
+    out.small = hn::And(hn::And(seen, fits), out.at.inside);
+    out.large = hn::AndNot(fits, seen);
+    out.core2 = hn::Max(hn::Set(d, 0.5f), hn::Mul(cover2, hn::Set(d, 1.08f)));
+    const VF limit = hn::Set(d, kSteepest);
+    const VF perPixel = hn::Div(one, hn::Mul(det, out.at.z));
+    const auto limited = [&](VF v) HWY_ATTR { return hn::Min(hn::Max(v, hn::Neg(limit)), limit); };
+    out.slopeX = limited(hn::Mul(hn::Sub(hn::Mul(zu, yv), hn::Mul(zv, yu)), perPixel));
+    out.slopeY = limited(hn::Mul(hn::Sub(hn::Mul(zv, xu), hn::Mul(zu, xv)), perPixel));
+    const VF density = hn::Div(one, hn::Max(one, hn::Max(square(xu, yu), square(xv, yv))));
+    out.quality = hn::Mul(hn::Set(d, t.quality),
+                          hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
+    if (!hn::AllFalse(d, out.large)) {
+        // The lattice's Gaussian carried into the picture, and the low-pass filter added.
+        const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
+        const VF low = hn::Set(d, kSigmaPixel * kSigmaPixel);
+        const VF vxx = hn::MulAdd(k, square(xu, xv), low), vyy = hn::MulAdd(k, square(yu, yv), low);
+        const VF vxy = hn::Mul(k, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
+        const VF scale = hn::Div(one, hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy)));
+        out.qxx = hn::Mul(vyy, scale);
+        out.qyy = hn::Mul(vxx, scale);
+        out.qxy = hn::Neg(hn::Mul(vxy, scale));
+        const VF reach = hn::Set(d, kReach2), largest = hn::Set(d, kLargest);
+        out.halfX = hn::Min(hn::Sqrt(hn::Mul(reach, vxx)), largest);
+        out.halfY = hn::Min(hn::Sqrt(hn::Mul(reach, vyy)), largest);
+    }
+    return out;
+}
+
+struct Ellipse {
+    float x, y, z;
+    float slopeX, slopeY;
+    float qxx, qxy, qyy;
+    float halfX, halfY;
+    float core2;
+    float quality;
+};
+
+// The large splats among some neighbouring pixels, one by one: draw(pixel, ellipse).
+template <class F>
+HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const F& draw) {
+    HWY_ALIGN float v[11][kBlock];
+    const VF all[11] = {p.at.x, p.at.y, p.at.z,  p.slopeX, p.slopeY, p.qxx,
+                        p.qxy,  p.qyy,  p.halfX, p.halfY,  p.quality};
+    for (int k = 0; k < 11; ++k) hn::Store(all[k], d, v[k]);
+    while (bits) {
+        const int k = __builtin_ctz(bits);
+        bits &= bits - 1;
+        draw(k, Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
+                        v[8][k], v[9][k], kCore2, v[10][k]});
+    }
+}
+
+// Calls row(first x, last x, y) for the part of the ellipse's box that lies in the band.
+template <class F>
+HWY_INLINE void forRows(const Ellipse& e, const Band& band, const F& row) {
+    // Off-screen coordinates may be beyond what an int holds.
+    if (!(e.x + e.halfX >= 0 && e.x - e.halfX <= band.width - 1 && e.y + e.halfY >= band.top &&
+          e.y - e.halfY <= band.top + band.rows - 1))
+        return;
+    const int x0 = static_cast<int>(std::ceil(std::max(e.x - e.halfX, 0.0f)));
+    const int x1 = static_cast<int>(std::floor(std::min(e.x + e.halfX, band.width - 1.0f)));
+    const int y0 = static_cast<int>(std::ceil(std::max(e.y - e.halfY, float(band.top))));
+    const int y1 =
+        static_cast<int>(std::floor(std::min(e.y + e.halfY, band.top + band.rows - 1.0f)));
+    if (x0 > x1) return;
+    for (int y = y0; y <= y1; ++y) row(x0, x1, y);
+}
+
+// Lanes of one row of an ellipse: squared deviations and depth of the plane there.
+struct Across {
+    VF q, z;
+    hn::Mask<DF> in;
+};
+
+HWY_INLINE Across across(DF d, const Ellipse& e, int x, int x1, int y) {
+    Across out;
+    const VF dx = hn::Sub(hn::Add(hn::Iota(d, 0), hn::Set(d, float(x))), hn::Set(d, e.x));
+    const float dy = y - e.y;
+    out.q = hn::MulAdd(dx, hn::MulAdd(dx, hn::Set(d, e.qxx), hn::Set(d, 2 * e.qxy * dy)),
+                       hn::Set(d, e.qyy * dy * dy));
+    out.z = hn::MulAdd(dx, hn::Set(d, e.slopeX * e.z), hn::Set(d, e.z * (1 + e.slopeY * dy)));
+    // A plane that runs through the viewpoint must not hide all.
+    out.z = hn::Max(out.z, hn::Set(d, 0.5f * e.z));
+    out.in = hn::Le(hn::Iota(d, 0), hn::Set(d, float(x1 - x)));
+    return out;
+}
+
+HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Band& band) {
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
+        float* row = band.depth + static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
+        for (int x = x0; x <= x1; x += lanes) {
+            const Across a = across(d, e, x, x1, y);
+            const auto core = hn::And(a.in, hn::Le(a.q, hn::Set(d, e.core2)));
+            const VF old = hn::LoadU(d, row + x);
+            hn::StoreU(hn::IfThenElse(core, hn::Min(old, a.z), old), d, row + x);
+        }
+    });
+}
+
+HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const Paint& paint, float tolerance,
+                              bool normals, const Band& band) {
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    HWY_ALIGN float weights[kBlock];
+    forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
+        const std::size_t start = static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
+        for (int x = x0; x <= x1; x += lanes) {
+            const Across a = across(d, e, x, x1, y);
+            const VF front = hn::LoadU(d, band.depth + start + x);
+            const auto near = hn::And(hn::And(a.in, hn::Lt(a.q, hn::Set(d, kReach2))),
+                                      hn::Le(a.z, hn::Mul(front, hn::Set(d, 1.0f + tolerance))));
+            std::uint32_t bits = bitsOf(d, near);
+            if (!bits) continue;
+            // Falls off like a Gaussian and reaches zero at kReach2.
+            const VF fall = hn::MulAdd(a.q, hn::Set(d, -1.0f / kReach2), hn::Set(d, 1.0f));
+            hn::Store(hn::Mul(hn::Mul(fall, fall), hn::Mul(fall, hn::Set(d, e.quality))), d,
+                      weights);
+            while (bits) {
+                const int k = __builtin_ctz(bits);
+                bits &= bits - 1;
+                const std::size_t at = start + x + k;
+                addTo(band.colour + 4 * at, weights[k], paint.colour);
+                band.missing[at] += weights[k] * paint.missing;
+                if (normals) addTo(band.normals + 4 * at, weights[k], paint.normal);
+            }
+        }
+    });
+}
+
+template <bool kUniform>
+void depthBlock(const Source& s, const BlockTask& t, const Band& band) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const VF one = hn::Set(d, 1.0f), infinity = hn::Set(d, kInfinity);
-    const VF core2 = hn::Set(d, t.core2), slopeX = hn::Set(d, t.slopeX),
-             slopeY = hn::Set(d, t.slopeY);
     HWY_ALIGN std::int32_t offset[kBlock];
     HWY_ALIGN float z00[kBlock], z10[kBlock], z01[kBlock], z11[kBlock];
     for (int v = t.v0; v < t.v1; ++v) {
@@ -195,19 +424,29 @@ void depthSmall(const Source& s, const BlockTask& t, const Band& band) {
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Landed p = land(d, map, i, loadDepth(d, s.depth + pixel, count), band);
-            if (!t.opaque) p.in = hn::And(p.in, alphaAbove(d, s, pixel, count, 127));
-            std::uint32_t bits = bitsOf(d, p.in);
+            Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
+            if (!t.opaque) {
+                const auto solid = alphaAbove(d, s, pixel, count, 127);
+                p.small = hn::And(p.small, solid);
+                p.large = hn::And(p.large, solid);
+            }
+            if (!kUniform) {
+                if (const std::uint32_t large = bitsOf(d, p.large))
+                    forLarge(d, p, large,
+                             [&](int, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
+            }
+            std::uint32_t bits = bitsOf(d, p.small);
             if (!bits) continue;
-            hn::Store(p.offset, di, offset);
-            const VF gx = hn::Sub(one, p.fx), gy = hn::Sub(one, p.fy);
-            const VF fx2 = hn::Mul(p.fx, p.fx), gx2 = hn::Mul(gx, gx);
-            const VF fy2 = hn::Mul(p.fy, p.fy), gy2 = hn::Mul(gy, gy);
+            hn::Store(p.at.offset, di, offset);
+            const VF fx = p.at.fx, fy = p.at.fy;
+            const VF gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
+            const VF fx2 = hn::Mul(fx, fx), gx2 = hn::Mul(gx, gx);
+            const VF fy2 = hn::Mul(fy, fy), gy2 = hn::Mul(gy, gy);
             // The plane of the splat at the four pixel centres.
-            const VF zx = hn::Mul(p.z, slopeX), zy = hn::Mul(p.z, slopeY);
-            const VF z = hn::NegMulAdd(p.fx, zx, hn::NegMulAdd(p.fy, zy, p.z));
+            const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
+            const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
             const auto keep = [&](VF x2, VF y2, VF depth, float* to) HWY_ATTR {
-                hn::Store(hn::IfThenElse(hn::Le(hn::Add(x2, y2), core2), depth, infinity), d, to);
+                hn::Store(hn::IfThenElse(hn::Le(hn::Add(x2, y2), p.core2), depth, infinity), d, to);
             };
             keep(fx2, fy2, z, z00);
             keep(gx2, fy2, hn::Add(z, zx), z10);
@@ -234,14 +473,13 @@ HWY_INLINE VF lowPass(DF d, VF x2) {
     return hn::Mul(b, b);
 }
 
-template <bool kOpaque, bool kNormals>
-void colourSmall(const Source& s, const BlockTask& t, const Band& band) {
+template <bool kUniform, bool kOpaque, bool kNormals>
+void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const VF one = hn::Set(d, 1.0f);
-    const VF tolerance = hn::Set(d, 1.0f + t.tolerance), quality = hn::Set(d, t.quality);
-    const VF slopeX = hn::Set(d, t.slopeX), slopeY = hn::Set(d, t.slopeY);
+    const VF tolerance = hn::Set(d, 1.0f + t.tolerance);
     const VI stride = hn::Set(di, band.stride), nextPixel = hn::Set(di, 1);
     HWY_ALIGN std::int32_t offset[kBlock];
     HWY_ALIGN float w00[kBlock], w10[kBlock], w01[kBlock], w11[kBlock];
@@ -250,30 +488,42 @@ void colourSmall(const Source& s, const BlockTask& t, const Band& band) {
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Landed p = land(d, map, i, loadDepth(d, s.depth + pixel, count), band);
-            if (!kOpaque) p.in = hn::And(p.in, alphaAbove(d, s, pixel, count, 0));
-            if (hn::AllFalse(d, p.in)) continue;
-            const VF gx = hn::Sub(one, p.fx), gy = hn::Sub(one, p.fy);
-            const VF zx = hn::Mul(p.z, slopeX), zy = hn::Mul(p.z, slopeY);
-            const VF z = hn::NegMulAdd(p.fx, zx, hn::NegMulAdd(p.fy, zy, p.z));
+            Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
+            if (!kOpaque) {
+                const auto any = alphaAbove(d, s, pixel, count, 0);
+                p.small = hn::And(p.small, any);
+                p.large = hn::And(p.large, any);
+            }
+            if (!kUniform) {
+                if (const std::uint32_t large = bitsOf(d, p.large))
+                    forLarge(d, p, large, [&](int k, const Ellipse& e) HWY_ATTR {
+                        colourEllipse(d, e, paintOf(s, pixel + k, kOpaque), t.tolerance, kNormals,
+                                      band);
+                    });
+            }
+            if (hn::AllFalse(d, p.small)) continue;
+            const VF fx = p.at.fx, fy = p.at.fy;
+            const VF gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
+            const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
+            const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
             const auto weigh = [&](VF wx, VF wy, VF depth, VI at, float* to) HWY_ATTR {
                 const VF front = hn::GatherIndex(d, band.depth, at);
-                const auto near = hn::And(p.in, hn::Le(depth, hn::Mul(front, tolerance)));
+                const auto near = hn::And(p.small, hn::Le(depth, hn::Mul(front, tolerance)));
                 hn::Store(hn::IfThenElseZero(near, hn::Mul(wx, wy)), d, to);
                 return near;
             };
-            const VF x0 = hn::Mul(quality, lowPass(d, hn::Mul(p.fx, p.fx)));
-            const VF x1 = hn::Mul(quality, lowPass(d, hn::Mul(gx, gx)));
-            const VF y0 = lowPass(d, hn::Mul(p.fy, p.fy)), y1 = lowPass(d, hn::Mul(gy, gy));
-            const VI below = hn::Add(p.offset, stride);
+            const VF x0 = hn::Mul(p.quality, lowPass(d, hn::Mul(fx, fx)));
+            const VF x1 = hn::Mul(p.quality, lowPass(d, hn::Mul(gx, gx)));
+            const VF y0 = lowPass(d, hn::Mul(fy, fy)), y1 = lowPass(d, hn::Mul(gy, gy));
+            const VI below = hn::Add(p.at.offset, stride);
             const VF zRight = hn::Add(z, zx);
             const auto any =
-                hn::Or(hn::Or(weigh(x0, y0, z, p.offset, w00),
-                              weigh(x1, y0, zRight, hn::Add(p.offset, nextPixel), w10)),
+                hn::Or(hn::Or(weigh(x0, y0, z, p.at.offset, w00),
+                              weigh(x1, y0, zRight, hn::Add(p.at.offset, nextPixel), w10)),
                        hn::Or(weigh(x0, y1, hn::Add(z, zy), below, w01),
                               weigh(x1, y1, hn::Add(zRight, zy), hn::Add(below, nextPixel), w11)));
             std::uint32_t bits = bitsOf(d, any);
-            hn::Store(p.offset, di, offset);
+            hn::Store(p.at.offset, di, offset);
             while (bits) {
                 const int k = __builtin_ctz(bits);
                 bits &= bits - 1;
@@ -293,176 +543,31 @@ void colourSmall(const Source& s, const BlockTask& t, const Band& band) {
     }
 }
 
-// --- Splats of any size ----------------------------------------------------------------------
+// --- SplatRule::paper ------------------------------------------------------------------------
 
-// Half width of the Gaussian in sample spacings, and of the low-pass filter in pixels.
-constexpr float kSigmaSource = 0.5f, kSigmaPixel = 0.3f;
-// Where a splat ends, and where it stops to hide, in squared standard deviations. The lattice
-// closes at half a diagonal: 0.5 / kSigmaSource^2 = 2.
-constexpr float kReach2 = 5.0f, kCore2 = 2.1f;
-// No splat is larger, in pixels from its centre: a point almost at the viewpoint would fill the
-// frame.
-constexpr float kLargest = 256.0f;
-
-struct Ellipse {
-    float x, y, z;         // pixels, novel depth
-    float slopeX, slopeY;  // of novel depth, relative, per pixel
-    float qxx, qxy, qyy;   // squared standard deviations = qxx dx^2 + 2 qxy dx dy + qyy dy^2
-    float halfX, halfY;    // of the bounding box at kReach2
-    float core2;
-};
-
-// False when the point cannot be seen.
-inline bool ellipseOf(const Source& s, const Shape& shape, int u, int v, const Band& band,
-                      Ellipse& e) {
-    const std::size_t pixel = static_cast<std::size_t>(v) * s.width + u;
-    const float z = s.depth[pixel];
-    if (!(z < kInfinity)) return false;
-    const PixelMap& m = s.map;
-    const glm::dvec3 a = m.a0 + m.au * double(u) + m.av * double(v);
-    const glm::dvec3 h = a * double(z) + m.b0 + m.bu * double(u) + m.bv * double(v);
-    if (!(h.z > kNearest)) return false;
-    const double inverse = band.orthographic ? 1.0 : 1.0 / h.z;
-    e.x = static_cast<float>(h.x * inverse);
-    e.y = static_cast<float>(h.y * inverse);
-    e.z = static_cast<float>(h.z);
-    const double spacing = s.orthographic ? 1.0 : z;
-    const double slopeU = s.slopes[pixel].u / (double(kSlopeScale) * s.fx) * spacing;
-    const double slopeV = s.slopes[pixel].v / (double(kSlopeScale) * s.fy) * spacing;
-    const glm::dvec3 hu = m.au * double(z) + m.bu + a * slopeU;
-    const glm::dvec3 hv = m.av * double(z) + m.bv + a * slopeV;
-    const double back = band.orthographic ? 0.0 : 1.0;
-    const double xu = (hu.x - back * e.x * hu.z) * inverse,
-                 yu = (hu.y - back * e.y * hu.z) * inverse;
-    const double xv = (hv.x - back * e.x * hv.z) * inverse,
-                 yv = (hv.y - back * e.y * hv.z) * inverse;
-    const double det = xu * yv - xv * yu;
-    if (shape.coefficient > 0) {
-        const float radius =
-            std::max(0.5f, 0.5f * shape.coefficient * (band.orthographic ? 1.0f : 1.0f / e.z));
-        e.qxx = e.qyy = kReach2 / (radius * radius);
-        e.qxy = 0;
-        e.halfX = e.halfY = std::min(radius, kLargest);
-        e.core2 = kReach2;
-        e.slopeX = e.slopeY = 0;
-        return true;
-    }
-    if (!(det > 0)) return false;  // faces away
-    const double size = s.sizes ? s.sizes[pixel] / 64.0 : 1.0;
-    const double k = kSigmaSource * kSigmaSource * size * size, low = kSigmaPixel * kSigmaPixel;
-    const double vxx = k * (xu * xu + xv * xv) + low, vyy = k * (yu * yu + yv * yv) + low;
-    const double vxy = k * (xu * yu + xv * yv);
-    const double scale = 1.0 / (vxx * vyy - vxy * vxy);
-    e.qxx = static_cast<float>(vyy * scale);
-    e.qyy = static_cast<float>(vxx * scale);
-    e.qxy = static_cast<float>(-vxy * scale);
-    e.halfX = std::min(static_cast<float>(std::sqrt(kReach2 * vxx)), kLargest);
-    e.halfY = std::min(static_cast<float>(std::sqrt(kReach2 * vyy)), kLargest);
-    e.core2 = kCore2;
-    // The plane's depth per pixel; nearly edge-on it would run away.
-    const auto limited = [](double v0) {
-        return static_cast<float>(v0 < -0.05 ? -0.05 : v0 > 0.05 ? 0.05 : v0);
-    };
-    e.slopeX = limited((hu.z * yv - hv.z * yu) / (det * h.z));
-    e.slopeY = limited((hv.z * xu - hu.z * xv) / (det * h.z));
-    return true;
-}
-
-// Calls row(first x, last x, y) for the part of the ellipse's box that lies in the band.
+// Calls draw(pixel, splat) for each point of a block as a round splat.
 template <class F>
-HWY_INLINE void forRows(const Ellipse& e, const Band& band, const F& row) {
-    // Off-screen coordinates may be beyond what an int holds.
-    if (!(e.x + e.halfX >= 0 && e.x - e.halfX <= band.width - 1 && e.y + e.halfY >= band.top &&
-          e.y - e.halfY <= band.top + band.rows - 1))
-        return;
-    const int x0 = static_cast<int>(std::ceil(std::max(e.x - e.halfX, 0.0f)));
-    const int x1 = static_cast<int>(std::floor(std::min(e.x + e.halfX, band.width - 1.0f)));
-    const int y0 = static_cast<int>(std::ceil(std::max(e.y - e.halfY, float(band.top))));
-    const int y1 =
-        static_cast<int>(std::floor(std::min(e.y + e.halfY, band.top + band.rows - 1.0f)));
-    if (x0 > x1) return;
-    for (int y = y0; y <= y1; ++y) row(x0, x1, y);
-}
-
-// Lanes of one row of an ellipse: squared deviations and depth of the plane there.
-struct Across {
-    VF q, z;
-    hn::Mask<DF> in;
-    Across(DF d, const Ellipse& e, int x, int x1, int y) {
-        const VF dx = hn::Sub(hn::Add(hn::Iota(d, 0), hn::Set(d, float(x))), hn::Set(d, e.x));
-        const float dy = y - e.y;
-        q = hn::MulAdd(dx, hn::MulAdd(dx, hn::Set(d, e.qxx), hn::Set(d, 2 * e.qxy * dy)),
-                       hn::Set(d, e.qyy * dy * dy));
-        z = hn::MulAdd(dx, hn::Set(d, e.slopeX * e.z), hn::Set(d, e.z * (1 + e.slopeY * dy)));
-        // A plane that runs through the viewpoint must not hide all.
-        z = hn::Max(z, hn::Set(d, 0.5f * e.z));
-        in = hn::Le(hn::Iota(d, 0), hn::Set(d, float(x1 - x)));
-    }
-};
-
-void depthLarge(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
-    const DF d;
-    const int lanes = static_cast<int>(hn::Lanes(d));
+HWY_INLINE void forRound(const Source& s, const BlockTask& t, const Shape& shape, const Band& band,
+                         int alphaThreshold, const F& draw) {
     for (int v = t.v0; v < t.v1; ++v) {
+        const RowMap map(s.map, t.u0, v);
         for (int u = t.u0; u < t.u1; ++u) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.width + u;
-            if (!t.opaque &&
-                !(s.rgba8 ? s.rgba8[4 * pixel + 3] > 127 : s.rgbaFloat[4 * pixel + 3] > 0.5f))
-                continue;
-            Ellipse e;
-            if (!ellipseOf(s, shape, u, v, band, e)) continue;
-            forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
-                float* row =
-                    band.depth + static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
-                for (int x = x0; x <= x1; x += lanes) {
-                    const Across a(d, e, x, x1, y);
-                    const auto core = hn::And(a.in, hn::Le(a.q, hn::Set(d, e.core2)));
-                    const VF old = hn::LoadU(d, row + x);
-                    hn::StoreU(hn::IfThenElse(core, hn::Min(old, a.z), old), d, row + x);
-                }
-            });
-        }
-    }
-}
-
-void colourLarge(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
-    const DF d;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    HWY_ALIGN float weights[kBlock];
-    for (int v = t.v0; v < t.v1; ++v) {
-        for (int u = t.u0; u < t.u1; ++u) {
-            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + u;
-            if (!t.opaque &&
-                !(s.rgba8 ? s.rgba8[4 * pixel + 3] > 0 : s.rgbaFloat[4 * pixel + 3] > 0))
-                continue;
-            Ellipse e;
-            if (!ellipseOf(s, shape, u, v, band, e)) continue;
-            const Paint paint = paintOf(s, pixel, t.opaque);
-            forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
-                const std::size_t start =
-                    static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
-                for (int x = x0; x <= x1; x += lanes) {
-                    const Across a(d, e, x, x1, y);
-                    const VF front = hn::LoadU(d, band.depth + start + x);
-                    const auto near =
-                        hn::And(hn::And(a.in, hn::Lt(a.q, hn::Set(d, kReach2))),
-                                hn::Le(a.z, hn::Mul(front, hn::Set(d, 1.0f + t.tolerance))));
-                    std::uint32_t bits = bitsOf(d, near);
-                    if (!bits) continue;
-                    // Falls off like a Gaussian and reaches zero at kReach2.
-                    const VF fall = hn::MulAdd(a.q, hn::Set(d, -1.0f / kReach2), hn::Set(d, 1.0f));
-                    hn::Store(hn::Mul(hn::Mul(fall, fall), hn::Mul(fall, hn::Set(d, t.quality))), d,
-                              weights);
-                    while (bits) {
-                        const int k = __builtin_ctz(bits);
-                        bits &= bits - 1;
-                        const std::size_t at = start + x + k;
-                        addTo(band.colour + 4 * at, weights[k], paint.colour);
-                        band.missing[at] += weights[k] * paint.missing;
-                        if (s.normals) addTo(band.normals + 4 * at, weights[k], paint.normal);
-                    }
-                }
-            });
+            const float alpha =
+                s.rgba8 ? s.rgba8[4 * pixel + 3] : s.rgbaFloat[4 * pixel + 3] * 255.0f;
+            if (!(s.depth[pixel] < kInfinity) || !(alpha > alphaThreshold)) continue;
+            float h[3];
+            for (int k = 0; k < 3; ++k) {
+                const float i = static_cast<float>(u - t.u0);
+                h[k] = (map.a[k] + i * map.au[k]) * s.depth[pixel] + (map.b[k] + i * map.bu[k]);
+            }
+            if (!(h[2] > kNearest)) continue;
+            const float inverse = band.orthographic ? 1.0f : 1.0f / h[2];
+            const float radius =
+                std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), kLargest);
+            const float q = kReach2 / (radius * radius);
+            draw(pixel, Ellipse{h[0] * inverse, h[1] * inverse, h[2], 0, 0, q, 0, q, radius, radius,
+                                kReach2, 1.0f});
         }
     }
 }
@@ -483,8 +588,8 @@ void pointsImpl(const Source& s, const BlockTask& t, const Band& band) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
             Landed p = land(d, map, i, loadDepth(d, s.depth + pixel, count), band);
-            if (!t.opaque) p.in = hn::And(p.in, alphaAbove(d, s, pixel, count, 0));
-            std::uint32_t bits = bitsOf(d, p.in);
+            if (!t.opaque) p.inside = hn::And(p.inside, alphaAbove(d, s, pixel, count, 0));
+            std::uint32_t bits = bitsOf(d, p.inside);
             if (!bits) continue;
             // The nearest of the four pixels.
             VI at = p.offset;
@@ -507,23 +612,40 @@ void pointsImpl(const Source& s, const BlockTask& t, const Band& band) {
 }
 
 void depthImpl(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
-    if (t.small && !(shape.coefficient > 0))
-        depthSmall(s, t, band);
+    const DF d;
+    if (shape.coefficient > 0) {
+        forRound(s, t, shape, band, 127,
+                 [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
+    } else if (t.uniform) {
+        depthBlock<true>(s, t, band);
+    } else {
+        depthBlock<false>(s, t, band);
+    }
+}
+
+template <bool kUniform>
+void colourOfBlock(const Source& s, const BlockTask& t, const Band& band) {
+    if (t.opaque && !s.normals)
+        colourBlock<kUniform, true, false>(s, t, band);
+    else if (t.opaque)
+        colourBlock<kUniform, true, true>(s, t, band);
+    else if (!s.normals)
+        colourBlock<kUniform, false, false>(s, t, band);
     else
-        depthLarge(s, t, shape, band);
+        colourBlock<kUniform, false, true>(s, t, band);
 }
 
 void colourImpl(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
-    if (!t.small || shape.coefficient > 0)
-        colourLarge(s, t, shape, band);
-    else if (t.opaque && !s.normals)
-        colourSmall<true, false>(s, t, band);
-    else if (t.opaque)
-        colourSmall<true, true>(s, t, band);
-    else if (!s.normals)
-        colourSmall<false, false>(s, t, band);
-    else
-        colourSmall<false, true>(s, t, band);
+    const DF d;
+    if (shape.coefficient > 0) {
+        forRound(s, t, shape, band, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
+            colourEllipse(d, e, paintOf(s, pixel, t.opaque), t.tolerance, s.normals, band);
+        });
+    } else if (t.uniform) {
+        colourOfBlock<true>(s, t, band);
+    } else {
+        colourOfBlock<false>(s, t, band);
+    }
 }
 
 const char* targetImpl() {

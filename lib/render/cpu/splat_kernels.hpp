@@ -8,6 +8,12 @@
 
 namespace stx::splat {
 
+/// A splat closes its gaps within 2x2 pixels while no point of the surface is farther from a sample
+/// than this, squared.
+inline constexpr float kSmallCover2 = 0.9f;
+/// Sparse samples weigh less than dense ones, down to this share.
+inline constexpr float kLeastDensity = 1e-3f;
+
 /// Where the pixels of a source land: with (u, v) a pixel's index and z its depth,
 /// H = (a0 + au u + av v) z + (b0 + bu u + bv v), and then x = H.x / H.z, y = H.y / H.z (or H.x,
 /// H.y when the novel camera is orthographic), novel depth H.z. Pixel centres are whole numbers.
@@ -34,12 +40,13 @@ struct Source {
 struct BlockTask {
     std::uint16_t u0 = 0, v0 = 0, u1 = 0, v1 = 0;
     std::uint16_t source = 0;
-    bool small = true;  ///< every splat closes its gaps within 2x2 output pixels
+    bool uniform = true;  ///< every splat closes its gaps within 2x2 pixels, and all share a tilt
     bool opaque = true;
-    float slopeX = 0, slopeY = 0;  ///< relative change of novel depth per output pixel (small ones)
-    float core2 = 0.5f;       ///< squared radius in which a splat hides what is behind (small ones)
+    float slopeX = 0, slopeY = 0;  ///< relative change of novel depth per output pixel, if uniform
+    float core2 = 0.5f;       ///< squared radius in which a splat hides what is behind, if uniform
     float tolerance = 0.01f;  ///< relative depth behind the front that still blends
-    float quality = 1;        ///< weight among views
+    float quality = 1;        ///< weight among views by the angle between them
+    float density = 1;        ///< weight by the density of samples, if uniform
     float zMin = 0;           ///< nearest novel depth of its points
     std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< output pixels it may touch, inclusive
 };

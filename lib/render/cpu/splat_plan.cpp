@@ -5,8 +5,6 @@
 namespace stx::splat {
 namespace {
 
-// A splat closes its gaps within 2x2 pixels while no point of the surface is farther from a sample.
-constexpr double kSmallCover2 = 0.9;
 // Relative depth behind the front that still belongs to it (Lee & Park blend all; 1 to 3 % is known
 // to be good): for blocks whose tilt is known, and for others.
 constexpr float kTolerance = 0.01f, kToleranceRough = 0.02f;
@@ -137,7 +135,7 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     }
     if (cullBackFaces && !(det > 0)) return false;
     cover2 *= block.size * block.size;
-    task.small = cover2 < kSmallCover2;
+    task.uniform = smooth && cover2 < kSmallCover2;
     task.core2 = static_cast<float>(std::max(0.5, 1.08 * cover2));
 
     task.tolerance = smooth ? kTolerance : kToleranceRough;
@@ -152,6 +150,7 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     // Views that saw the surface close (dense samples) and head-on count more, and those that saw
     // it from about where we stand, since looks change with the angle.
     const double density = 1.0 / std::max(1.0, stretch2);
+    task.density = std::max(static_cast<float>(density * density), kLeastDensity);
     const auto& c = view.view->camera;
     const glm::dvec3 point =
         c.position +
@@ -161,8 +160,7 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     };
     const double cosAngle = glm::dot(directionFrom(c), directionFrom(novel));
     const double angle = std::max(0.0, cosAngle);
-    task.quality = static_cast<float>(density * density * (0.01 + angle * angle * angle * angle));
-    if (!(task.quality > 0)) task.quality = 1e-3f;
+    task.quality = static_cast<float>(0.01 + angle * angle * angle * angle);
 
     if (crossing) {
         task.x0 = task.y0 = 0;
@@ -170,7 +168,7 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
         task.y1 = novel.height - 1;
         return true;
     }
-    const double reach = task.small ? 1.0 : 2.0 + 2.4 * std::sqrt(cover2);
+    const double reach = task.uniform ? 1.0 : 2.0 + 2.4 * std::sqrt(cover2);
     x0 -= reach;
     y0 -= reach;
     x1 += reach;
