@@ -288,6 +288,9 @@ void CpuSplatRenderer::resolveBlended(Picture& picture, const Band& band) const 
             if (total > 0) {
                 const float scale = 1.0f / total;
                 colour = glm::vec4(sums[0], sums[1], sums[2], sums[3]) * scale;
+                // Continued colours may leave what a picture holds.
+                colour = glm::max(colour, glm::vec4(0.0f));
+                if (!frame.linear) colour = glm::min(colour, glm::vec4(colour.a));
             }
             if (!opaque_ && !hasPoint(depth)) {
                 // Only faint splats of a silhouette reach here, or only the skirts of full ones.

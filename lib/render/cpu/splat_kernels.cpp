@@ -130,8 +130,21 @@ HWY_INLINE Four fourFrom(const T* p) {
 HWY_INLINE Four times(Four a, Four b) {
     return {{a.v[0] * b.v[0], a.v[1] * b.v[1], a.v[2] * b.v[2], a.v[3] * b.v[3]}};
 }
-HWY_INLINE void addTo(float* sums, float weight, Four value) {
-    for (int k = 0; k < 4; ++k) sums[k] += weight * value.v[k];
+HWY_INLINE Four plus(Four a, Four b) {
+    return {{a.v[0] + b.v[0], a.v[1] + b.v[1], a.v[2] + b.v[2], a.v[3] + b.v[3]}};
+}
+HWY_INLINE Four plus(Four a, float scale, Four b) {
+    return {{a.v[0] + scale * b.v[0], a.v[1] + scale * b.v[1], a.v[2] + scale * b.v[2],
+             a.v[3] + scale * b.v[3]}};
+}
+HWY_INLINE Four difference(Four a, Four b) {
+    return plus(a, -1.0f, b);
+}
+HWY_INLINE Four times(float scale, Four a) {
+    return {{scale * a.v[0], scale * a.v[1], scale * a.v[2], scale * a.v[3]}};
+}
+HWY_INLINE void store(Four a, float* to) {
+    for (int k = 0; k < 4; ++k) to[k] = a.v[k];
 }
 #else
 using D4 = hn::FixedTag<float, 4>;
@@ -148,17 +161,33 @@ HWY_INLINE Four fourFrom(const T* p) {
 HWY_INLINE Four times(Four a, Four b) {
     return hn::Mul(a, b);
 }
-HWY_INLINE void addTo(float* sums, float weight, Four value) {
-    const D4 d4;
-    hn::StoreU(hn::MulAdd(hn::Set(d4, weight), value, hn::LoadU(d4, sums)), d4, sums);
+HWY_INLINE Four times(float scale, Four a) {
+    return hn::Mul(hn::Set(D4(), scale), a);
+}
+HWY_INLINE Four plus(Four a, Four b) {
+    return hn::Add(a, b);
+}
+HWY_INLINE Four plus(Four a, float scale, Four b) {
+    return hn::MulAdd(hn::Set(D4(), scale), b, a);
+}
+HWY_INLINE Four difference(Four a, Four b) {
+    return hn::Sub(a, b);
+}
+HWY_INLINE void store(Four a, float* to) {
+    hn::StoreU(a, D4(), to);
 }
 #endif
+
+HWY_INLINE void addTo(float* sums, float weight, Four value) {
+    store(plus(fourFrom(sums), weight, value), sums);
+}
 
 // What a point adds for each unit of weight.
 struct Paint {
     Four colour;  // R, G, B times alpha, alpha; all times 255
     Four normal;
-    float missing;  // 255 - alpha
+    float missing;      // 255 - alpha
+    Four across, down;  // change of colour per output pixel
 };
 
 HWY_INLINE Paint paintOf(const Source& s, std::size_t pixel, bool opaque) {
@@ -181,7 +210,27 @@ HWY_INLINE Paint paintOf(const Source& s, std::size_t pixel, bool opaque) {
     }
     static constexpr float kNone[4] = {0, 0, 0, 0};
     p.normal = s.normals ? fourFrom(s.normals + 4 * pixel) : fourFrom(kNone);
+    p.across = p.down = fourFrom(kNone);
     return p;
+}
+
+// How the colour of an opaque point changes over the picture, from its four neighbours, given the
+// source pixels that go by per output pixel.
+HWY_INLINE void addGradient(const Source& s, std::size_t pixel, float uAcross, float vAcross,
+                            float uDown, float vDown, Paint& p) {
+    const std::size_t row = static_cast<std::size_t>(s.width);
+    Four u, v;
+    if (s.rgba8) {
+        const std::uint8_t* c = s.rgba8 + 4 * pixel;
+        u = difference(fourFrom(c + 4), fourFrom(c - 4));
+        v = difference(fourFrom(c + 4 * row), fourFrom(c - 4 * row));
+    } else {
+        const float* c = s.rgbaFloat + 4 * pixel;
+        u = times(255.0f, difference(fourFrom(c + 4), fourFrom(c - 4)));
+        v = times(255.0f, difference(fourFrom(c + 4 * row), fourFrom(c - 4 * row)));
+    }
+    p.across = plus(times(uAcross, u), vAcross, v);
+    p.down = plus(times(uDown, u), vDown, v);
 }
 
 // --- Splats ----------------------------------------------------------------------------------
@@ -205,33 +254,33 @@ struct Splats {
     VF quality;
     VF qxx, qxy, qyy;  // of large ones: squared deviations = qxx dx^2 + 2 qxy dx dy + qyy dy^2
     VF halfX, halfY;   // of their bounding boxes
+    // Half the source pixels that go by per output pixel; zero where colour must not be continued.
+    VF uAcross, vAcross, uDown, vDown;
 };
 
-// Slopes and sizes of up to a vector of pixels.
+// Slopes, sizes and links of up to a vector of pixels.
 HWY_INLINE void loadShape(DF d, const Source& s, std::size_t pixel, int count, VF& u, VF& v,
-                          VF& size) {
+                          VF& size, hn::Mask<DF>& linked) {
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    HWY_ALIGN float su[kBlock], sv[kBlock];
     static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
     VI packed;
     if (count >= lanes) {
         packed = hn::LoadU(di, reinterpret_cast<const std::int32_t*>(s.slopes + pixel));
-        u = hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
-        v = hn::ConvertTo(d, hn::ShiftRight<16>(packed));
     } else {
-        for (int i = 0; i < lanes; ++i) {
-            su[i] = i < count ? s.slopes[pixel + i].u : 0.0f;
-            sv[i] = i < count ? s.slopes[pixel + i].v : 0.0f;
-        }
-        u = hn::Load(d, su);
-        v = hn::Load(d, sv);
+        HWY_ALIGN std::int32_t padded[kBlock] = {};
+        std::memcpy(padded, s.slopes + pixel, static_cast<std::size_t>(count) * sizeof(Slope));
+        packed = hn::Load(di, padded);
     }
+    u = hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
+    v = hn::ConvertTo(d, hn::ShiftRight<16>(packed));
+    linked = hn::RebindMask(d, hn::TestBit(packed, hn::Set(di, Slope::kLinked)));
     size = hn::Set(d, 1.0f);
     if (s.sizes) {
+        HWY_ALIGN float sizes[kBlock];
         for (int i = 0; i < lanes; ++i)
-            su[i] = i < count ? s.sizes[pixel + i] * (1.0f / 64.0f) : 1.0f;
-        size = hn::Load(d, su);
+            sizes[i] = i < count ? s.sizes[pixel + i] * (1.0f / 64.0f) : 1.0f;
+        size = hn::Load(d, sizes);
     }
 }
 
@@ -250,10 +299,15 @@ HWY_INLINE Splats splatsOf(DF d, const Source& s, const BlockTask& t, const RowM
         out.slopeY = hn::Set(d, t.slopeY);
         out.core2 = hn::Set(d, t.core2);
         out.quality = hn::Set(d, t.quality * t.density);
+        out.uAcross = hn::Set(d, t.uAcross);
+        out.vAcross = hn::Set(d, t.vAcross);
+        out.uDown = hn::Set(d, t.uDown);
+        out.vDown = hn::Set(d, t.vDown);
         return out;
     }
     VF su, sv, size;
-    loadShape(d, s, pixel, count, su, sv, size);
+    hn::Mask<DF> linked;
+    loadShape(d, s, pixel, count, su, sv, size, linked);
     const VF spacing = s.orthographic ? one : depth;
     const VF du = hn::Mul(su, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fx))));
     const VF dv = hn::Mul(sv, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fy))));
@@ -293,6 +347,15 @@ HWY_INLINE Splats splatsOf(DF d, const Source& s, const BlockTask& t, const RowM
     const VF density = hn::Div(one, hn::Max(one, hn::Max(square(xu, yu), square(xv, yv))));
     out.quality = hn::Mul(hn::Set(d, t.quality),
                           hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
+    const VF fade = hn::IfThenElseZero(
+        linked, hn::Min(one, hn::Max(hn::Zero(d),
+                                     hn::MulAdd(det, hn::Set(d, 1 / kFadeTo), hn::Set(d, -1.0f)))));
+    const VF half =
+        hn::Div(hn::Mul(fade, hn::Set(d, 0.5f * kGradient)), hn::IfThenElse(seen, det, one));
+    out.uAcross = hn::Mul(yv, half);
+    out.uDown = hn::Neg(hn::Mul(xv, half));
+    out.vAcross = hn::Neg(hn::Mul(yu, half));
+    out.vDown = hn::Mul(xu, half);
     if (!hn::AllFalse(d, out.large)) {
         // The lattice's Gaussian carried into the picture, and the low-pass filter added.
         const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
@@ -317,20 +380,23 @@ struct Ellipse {
     float halfX, halfY;
     float core2;
     float quality;
+    float uAcross, vAcross, uDown, vDown;
 };
 
 // The large splats among some neighbouring pixels, one by one: draw(pixel, ellipse).
 template <class F>
 HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const F& draw) {
-    HWY_ALIGN float v[11][kBlock];
-    const VF all[11] = {p.at.x, p.at.y, p.at.z,  p.slopeX, p.slopeY, p.qxx,
-                        p.qxy,  p.qyy,  p.halfX, p.halfY,  p.quality};
-    for (int k = 0; k < 11; ++k) hn::Store(all[k], d, v[k]);
+    constexpr int kValues = 15;
+    HWY_ALIGN float v[kValues][kBlock];
+    const VF all[kValues] = {p.at.x, p.at.y, p.at.z,  p.slopeX, p.slopeY, p.qxx,
+                             p.qxy,  p.qyy,  p.halfX, p.halfY,  p.quality};
+    for (int k = 0; k < kValues; ++k) hn::Store(all[k], d, v[k]);
     while (bits) {
         const int k = __builtin_ctz(bits);
         bits &= bits - 1;
-        draw(k, Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
-                        v[8][k], v[9][k], kCore2, v[10][k]});
+        draw(k,
+             Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
+                     v[8][k], v[9][k], kCore2, v[10][k], v[11][k], v[12][k], v[13][k], v[14][k]});
     }
 }
 
@@ -403,7 +469,9 @@ HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const Paint& paint, float 
                 const int k = __builtin_ctz(bits);
                 bits &= bits - 1;
                 const std::size_t at = start + x + k;
-                addTo(band.colour + 4 * at, weights[k], paint.colour);
+                const Four colour =
+                    plus(plus(paint.colour, x + k - e.x, paint.across), y - e.y, paint.down);
+                addTo(band.colour + 4 * at, weights[k], colour);
                 band.missing[at] += weights[k] * paint.missing;
                 if (normals) addTo(band.normals + 4 * at, weights[k], paint.normal);
             }
@@ -483,6 +551,17 @@ void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
     const VI stride = hn::Set(di, band.stride), nextPixel = hn::Set(di, 1);
     HWY_ALIGN std::int32_t offset[kBlock];
     HWY_ALIGN float w00[kBlock], w10[kBlock], w01[kBlock], w11[kBlock];
+    HWY_ALIGN float fractionX[kBlock], fractionY[kBlock];
+    HWY_ALIGN float uAcross[kBlock], vAcross[kBlock], uDown[kBlock], vDown[kBlock];
+    if (kUniform) {
+        // The same for all pixels.
+        for (int i = 0; i < kBlock; ++i) {
+            uAcross[i] = t.uAcross;
+            vAcross[i] = t.vAcross;
+            uDown[i] = t.uDown;
+            vDown[i] = t.vDown;
+        }
+    }
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
@@ -497,8 +576,11 @@ void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
                     forLarge(d, p, large, [&](int k, const Ellipse& e) HWY_ATTR {
-                        colourEllipse(d, e, paintOf(s, pixel + k, kOpaque), t.tolerance, kNormals,
-                                      band);
+                        Paint paint = paintOf(s, pixel + k, kOpaque);
+                        if (e.uAcross != 0 || e.vDown != 0)
+                            addGradient(s, pixel + k, e.uAcross, e.vAcross, e.uDown, e.vDown,
+                                        paint);
+                        colourEllipse(d, e, paint, t.tolerance, kNormals, band);
                     });
             }
             if (hn::AllFalse(d, p.small)) continue;
@@ -524,20 +606,39 @@ void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
                               weigh(x1, y1, hn::Add(zRight, zy), hn::Add(below, nextPixel), w11)));
             std::uint32_t bits = bitsOf(d, any);
             hn::Store(p.at.offset, di, offset);
+            hn::Store(fx, d, fractionX);
+            hn::Store(fy, d, fractionY);
+            if (!kUniform) {
+                hn::Store(p.uAcross, d, uAcross);
+                hn::Store(p.vAcross, d, vAcross);
+                hn::Store(p.uDown, d, uDown);
+                hn::Store(p.vDown, d, vDown);
+            }
             while (bits) {
                 const int k = __builtin_ctz(bits);
                 bits &= bits - 1;
-                const Paint paint = paintOf(s, pixel + k, kOpaque);
+                Paint paint = paintOf(s, pixel + k, kOpaque);
                 const std::size_t at = static_cast<std::size_t>(offset[k]);
-                const auto add = [&](std::size_t to, float weight) HWY_ATTR {
-                    addTo(band.colour + 4 * to, weight, paint.colour);
+                const auto add = [&](std::size_t to, float weight, Four colour) HWY_ATTR {
+                    addTo(band.colour + 4 * to, weight, colour);
                     if (!kOpaque) band.missing[to] += weight * paint.missing;
                     if (kNormals) addTo(band.normals + 4 * to, weight, paint.normal);
                 };
-                add(at, w00[k]);
-                add(at + 1, w10[k]);
-                add(at + band.stride, w01[k]);
-                add(at + band.stride + 1, w11[k]);
+                if (uAcross[k] == 0 && vDown[k] == 0) {
+                    add(at, w00[k], paint.colour);
+                    add(at + 1, w10[k], paint.colour);
+                    add(at + band.stride, w01[k], paint.colour);
+                    add(at + band.stride + 1, w11[k], paint.colour);
+                    continue;
+                }
+                addGradient(s, pixel + k, uAcross[k], vAcross[k], uDown[k], vDown[k], paint);
+                const Four c00 = plus(plus(paint.colour, -fractionX[k], paint.across),
+                                      -fractionY[k], paint.down);
+                const Four c01 = plus(c00, paint.down);
+                add(at, w00[k], c00);
+                add(at + 1, w10[k], plus(c00, paint.across));
+                add(at + band.stride, w01[k], c01);
+                add(at + band.stride + 1, w11[k], plus(c01, paint.across));
             }
         }
     }
@@ -567,7 +668,7 @@ HWY_INLINE void forRound(const Source& s, const BlockTask& t, const Shape& shape
                 std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), kLargest);
             const float q = kReach2 / (radius * radius);
             draw(pixel, Ellipse{h[0] * inverse, h[1] * inverse, h[2], 0, 0, q, 0, q, radius, radius,
-                                kReach2, 1.0f});
+                                kReach2, 1.0f, 0, 0, 0, 0});
         }
     }
 }

@@ -13,6 +13,10 @@ namespace stx::splat {
 inline constexpr float kSmallCover2 = 0.9f;
 /// Sparse samples weigh less than dense ones, down to this share.
 inline constexpr float kLeastDensity = 1e-3f;
+/// Inside its splat a point's colour goes on as its neighbours' does, by this share of the
+/// gradient. Where samples are so dense that their mean matters more this fades out: all at twice
+/// kFadeTo output pixels per source pixel, nothing at kFadeTo.
+inline constexpr float kGradient = 0.75f, kFadeTo = 0.3f;
 
 /// Where the pixels of a source land: with (u, v) a pixel's index and z its depth,
 /// H = (a0 + au u + av v) z + (b0 + bu u + bv v), and then x = H.x / H.z, y = H.y / H.z (or H.x,
@@ -47,7 +51,9 @@ struct BlockTask {
     float tolerance = 0.01f;  ///< relative depth behind the front that still blends
     float quality = 1;        ///< weight among views by the angle between them
     float density = 1;        ///< weight by the density of samples, if uniform
-    float zMin = 0;           ///< nearest novel depth of its points
+    /// If uniform: half the source pixels that go by per output pixel, to continue colours with.
+    float uAcross = 0, vAcross = 0, uDown = 0, vDown = 0;
+    float zMin = 0;                               ///< nearest novel depth of its points
     std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< output pixels it may touch, inclusive
 };
 

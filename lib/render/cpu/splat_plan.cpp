@@ -135,16 +135,22 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     }
     if (cullBackFaces && !(det > 0)) return false;
     cover2 *= block.size * block.size;
-    task.uniform = smooth && cover2 < kSmallCover2;
+    task.uniform = smooth && block.linked && cover2 < kSmallCover2;
     task.core2 = static_cast<float>(std::max(0.5, 1.08 * cover2));
 
     task.tolerance = smooth ? kTolerance : kToleranceRough;
     task.slopeX = task.slopeY = 0;
+    task.uAcross = task.vAcross = task.uDown = task.vDown = 0;
     if (const double d = middle.det(); smooth && d > 1e-3 * stretch2) {
         task.slopeX = static_cast<float>(
             std::clamp((middle.zu * middle.v.y - middle.zv * middle.u.y) / d, -0.05, 0.05));
         task.slopeY = static_cast<float>(
             std::clamp((middle.zv * middle.u.x - middle.zu * middle.v.x) / d, -0.05, 0.05));
+        const double half = 0.5 * kGradient * std::clamp(d / kFadeTo - 1.0, 0.0, 1.0) / d;
+        task.uAcross = static_cast<float>(middle.v.y * half);
+        task.uDown = static_cast<float>(-middle.v.x * half);
+        task.vAcross = static_cast<float>(-middle.u.y * half);
+        task.vDown = static_cast<float>(middle.u.x * half);
     }
 
     // Views that saw the surface close (dense samples) and head-on count more, and those that saw

@@ -68,6 +68,22 @@ glm::vec2 slopeFromDepth(const ReferenceView& v, int x, int y) {
             slopeFromNeighbours(t, z, b, scale(c.fy, t), scale(c.fy, b))};
 }
 
+// The pixel and its four neighbours are opaque points of one surface.
+bool linked(const ReferenceView& v, int x, int y) {
+    if (x == 0 || y == 0 || x + 1 == v.depth.width() || y + 1 == v.depth.height()) return false;
+    const auto& c = v.camera;
+    const float z = v.depth.at(x, y);
+    if (v.texture.at(x, y).a < 1.0f) return false;
+    for (const glm::ivec2 step : {glm::ivec2(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
+        const float other = v.depth.at(x + step.x, y + step.y);
+        const double f = step.x ? c.fx : c.fy;
+        const float slope = (other - z) * static_cast<float>(c.orthographic ? f : f / other);
+        if (!(std::abs(slope) <= kSteepest) || v.texture.at(x + step.x, y + step.y).a < 1.0f)
+            return false;
+    }
+    return true;
+}
+
 bool usable(glm::vec3 v) {
     return glm::dot(v, v) > 0.0f;
 }
@@ -102,7 +118,9 @@ void prepareRow(const ReferenceView& v, const glm::mat3& cameraFromWorld, int y,
         } else {
             slope = slopeFromDepth(v, x, y);
         }
-        out.slopes[i] = {coded(slope.x), coded(slope.y)};
+        out.slopes[i] = {static_cast<std::int16_t>((coded(slope.x) & ~Slope::kLinked) |
+                                                   (linked(v, x, y) ? Slope::kLinked : 0)),
+                         coded(slope.y)};
         if (!out.normals.empty()) {
             const glm::vec3 n = v.hasNormals() && usable(v.normal.at(x, y))
                                     ? glm::normalize(v.normal.at(x, y))
@@ -140,6 +158,7 @@ std::vector<BlockInfo> blocksOfRow(const ViewInfo& info, int v0) {
                 b.slopeMax = {std::max(b.slopeMax.u, s.u), std::max(b.slopeMax.v, s.v)};
                 if (!info.sizes.empty()) b.size = std::max(b.size, info.sizes[i] / 64.0f);
                 b.opaque = b.opaque && alpha >= 1.0f;
+                b.linked = b.linked && (s.u & Slope::kLinked);
             }
         }
         // Points of alpha 0 still have to be told apart from the others.

@@ -16,6 +16,9 @@ inline constexpr int kBlock = 16;
 /// tangent of the angle to the image plane, along the line of sight), times kSlopeScale.
 struct Slope {
     std::int16_t u = 0, v = 0;
+
+    /// The lowest bit of u: all four neighbours are opaque points of the same surface.
+    static constexpr int kLinked = 1;
 };
 inline constexpr float kSlopeScale = 2048.0f;
 
@@ -25,6 +28,7 @@ struct BlockInfo {
     float zMin = 0, zMax = 0;                      ///< of its points
     Slope slopeMin, slopeMax;
     float size = 1;      ///< largest size of its splats, relative to what closes the lattice
+    bool linked = true;  ///< all its points are linked
     bool opaque = true;  ///< all its points have full alpha
 };
 
