@@ -244,6 +244,8 @@ constexpr float kReach2 = 5.0f, kCore2 = 2.1f;
 constexpr float kLargest = 256.0f;
 // Steeper planes (relative depth per pixel) are nearly edge-on and would run away.
 constexpr float kSteepest = 0.05f;
+// Where a surface ends: the share of the squared radius that hides; beside any edge: of the weight.
+constexpr float kRimCore2 = 0.5f, kEdgeQuality = 0.05f;
 
 // The splats of some neighbouring pixels.
 struct Splats {
@@ -260,7 +262,7 @@ struct Splats {
 
 // Slopes, sizes and links of up to a vector of pixels.
 HWY_INLINE void loadShape(DF d, const Source& s, std::size_t pixel, int count, VF& u, VF& v,
-                          VF& size, hn::Mask<DF>& linked) {
+                          VF& size, hn::Mask<DF>& linked, hn::Mask<DF>& rim) {
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
@@ -275,6 +277,7 @@ HWY_INLINE void loadShape(DF d, const Source& s, std::size_t pixel, int count, V
     u = hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
     v = hn::ConvertTo(d, hn::ShiftRight<16>(packed));
     linked = hn::RebindMask(d, hn::TestBit(packed, hn::Set(di, Slope::kLinked)));
+    rim = hn::RebindMask(d, hn::TestBit(packed, hn::Set(di, Slope::kRim << 16)));
     size = hn::Set(d, 1.0f);
     if (s.sizes) {
         HWY_ALIGN float sizes[kBlock];
@@ -306,8 +309,8 @@ HWY_INLINE Splats splatsOf(DF d, const Source& s, const BlockTask& t, const RowM
         return out;
     }
     VF su, sv, size;
-    hn::Mask<DF> linked;
-    loadShape(d, s, pixel, count, su, sv, size, linked);
+    hn::Mask<DF> linked, rim;
+    loadShape(d, s, pixel, count, su, sv, size, linked, rim);
     const VF spacing = s.orthographic ? one : depth;
     const VF du = hn::Mul(su, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fx))));
     const VF dv = hn::Mul(sv, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fy))));
@@ -338,15 +341,18 @@ HWY_INLINE Splats splatsOf(DF d, const Source& s, const BlockTask& t, const RowM
     const auto fits = hn::Lt(cover2, hn::Set(d, kSmallCover2));
     out.small = hn::And(hn::And(seen, fits), out.at.inside);
     out.large = hn::AndNot(fits, seen);
-    out.core2 = hn::Max(hn::Set(d, 0.5f), hn::Mul(cover2, hn::Set(d, 1.08f)));
+    // At its rim the surface ends within half a sample; beside any edge colours are mixed.
+    out.core2 = hn::Mul(hn::Max(hn::Set(d, 0.5f), hn::Mul(cover2, hn::Set(d, 1.08f))),
+                        hn::IfThenElse(rim, hn::Set(d, kRimCore2), one));
     const VF limit = hn::Set(d, kSteepest);
     const VF perPixel = hn::Div(one, hn::Mul(det, out.at.z));
     const auto limited = [&](VF v) HWY_ATTR { return hn::Min(hn::Max(v, hn::Neg(limit)), limit); };
     out.slopeX = limited(hn::Mul(hn::Sub(hn::Mul(zu, yv), hn::Mul(zv, yu)), perPixel));
     out.slopeY = limited(hn::Mul(hn::Sub(hn::Mul(zv, xu), hn::Mul(zu, xv)), perPixel));
     const VF density = hn::Div(one, hn::Max(one, hn::Max(square(xu, yu), square(xv, yv))));
-    out.quality = hn::Mul(hn::Set(d, t.quality),
-                          hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
+    out.quality = hn::Mul(
+        hn::Mul(hn::Set(d, t.quality), hn::IfThenElse(linked, one, hn::Set(d, kEdgeQuality))),
+        hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
     const VF fade = hn::IfThenElseZero(
         linked, hn::Min(one, hn::Max(hn::Zero(d),
                                      hn::MulAdd(det, hn::Set(d, 1 / kFadeTo), hn::Set(d, -1.0f)))));

@@ -68,20 +68,31 @@ glm::vec2 slopeFromDepth(const ReferenceView& v, int x, int y) {
             slopeFromNeighbours(t, z, b, scale(c.fy, t), scale(c.fy, b))};
 }
 
-// The pixel and its four neighbours are opaque points of one surface.
-bool linked(const ReferenceView& v, int x, int y) {
-    if (x == 0 || y == 0 || x + 1 == v.depth.width() || y + 1 == v.depth.height()) return false;
+struct Surroundings {
+    bool linked = true;
+    bool rim = false;
+};
+
+// See Slope: how a point hangs together with its four neighbours.
+Surroundings surroundings(const ReferenceView& v, int x, int y) {
+    Surroundings out;
     const auto& c = v.camera;
     const float z = v.depth.at(x, y);
-    if (v.texture.at(x, y).a < 1.0f) return false;
+    out.linked = v.texture.at(x, y).a >= 1.0f;
     for (const glm::ivec2 step : {glm::ivec2(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
-        const float other = v.depth.at(x + step.x, y + step.y);
+        const int i = x + step.x, j = y + step.y;
+        if (!v.depth.contains(i, j)) {
+            out.linked = false;
+            continue;
+        }
+        const float other = v.depth.at(i, j);
         const double f = step.x ? c.fx : c.fy;
         const float slope = (other - z) * static_cast<float>(c.orthographic ? f : f / other);
-        if (!(std::abs(slope) <= kSteepest) || v.texture.at(x + step.x, y + step.y).a < 1.0f)
-            return false;
+        const bool same = std::abs(slope) <= kSteepest;
+        if (!same || v.texture.at(i, j).a < 1.0f) out.linked = false;
+        if (!same && other > z) out.rim = true;
     }
-    return true;
+    return out;
 }
 
 bool usable(glm::vec3 v) {
@@ -118,9 +129,12 @@ void prepareRow(const ReferenceView& v, const glm::mat3& cameraFromWorld, int y,
         } else {
             slope = slopeFromDepth(v, x, y);
         }
-        out.slopes[i] = {static_cast<std::int16_t>((coded(slope.x) & ~Slope::kLinked) |
-                                                   (linked(v, x, y) ? Slope::kLinked : 0)),
-                         coded(slope.y)};
+        const Surroundings around = surroundings(v, x, y);
+        const auto flagged = [](std::int16_t code, bool flag) {
+            return static_cast<std::int16_t>((code & ~1) | (flag ? 1 : 0));
+        };
+        out.slopes[i] = {flagged(coded(slope.x), around.linked),
+                         flagged(coded(slope.y), around.rim)};
         if (!out.normals.empty()) {
             const glm::vec3 n = v.hasNormals() && usable(v.normal.at(x, y))
                                     ? glm::normalize(v.normal.at(x, y))

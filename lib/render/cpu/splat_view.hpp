@@ -17,8 +17,9 @@ inline constexpr int kBlock = 16;
 struct Slope {
     std::int16_t u = 0, v = 0;
 
-    /// The lowest bit of u: all four neighbours are opaque points of the same surface.
-    static constexpr int kLinked = 1;
+    /// The lowest bit of u: all four neighbours are opaque points of the same surface. The lowest
+    /// bit of v: the surface ends here, a neighbour lies behind or is empty.
+    static constexpr int kLinked = 1, kRim = 1;
 };
 inline constexpr float kSlopeScale = 2048.0f;
 
