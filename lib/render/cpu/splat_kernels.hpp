@@ -44,13 +44,15 @@ struct Source {
 struct BlockTask {
     std::uint16_t u0 = 0, v0 = 0, u1 = 0, v1 = 0;
     std::uint16_t source = 0;
-    bool uniform = true;  ///< every splat closes its gaps within 2x2 pixels, and all share a tilt
+    bool small = true;    ///< every splat closes its gaps within 2x2 pixels
+    bool uniform = true;  ///< small, and all share a tilt and go on in colour
     bool opaque = true;
-    float slopeX = 0, slopeY = 0;  ///< relative change of novel depth per output pixel, if uniform
-    float core2 = 0.5f;       ///< squared radius in which a splat hides what is behind, if uniform
+    float slopeX = 0,
+          slopeY = 0;         ///< relative change of novel depth per output pixel; 0 if not smooth
+    float core2 = 0.5f;       ///< squared radius in which a splat hides what is behind, if small
     float tolerance = 0.01f;  ///< relative depth behind the front that still blends
     float quality = 1;        ///< weight among views by the angle between them
-    float density = 1;        ///< weight by the density of samples, if uniform
+    float density = 1;        ///< weight by the density of samples
     /// If uniform: half the source pixels that go by per output pixel, to continue colours with.
     float uAcross = 0, vAcross = 0, uDown = 0, vDown = 0;
     float zMin = 0;                               ///< nearest novel depth of its points

@@ -135,7 +135,8 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     }
     if (cullBackFaces && !(det > 0)) return false;
     cover2 *= block.size * block.size;
-    task.uniform = smooth && block.linked && cover2 < kSmallCover2;
+    task.small = cover2 < kSmallCover2;
+    task.uniform = task.small && smooth && block.linked;
     task.core2 = static_cast<float>(std::max(0.5, 1.08 * cover2));
 
     task.tolerance = smooth ? kTolerance : kToleranceRough;
@@ -174,7 +175,7 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
         task.y1 = novel.height - 1;
         return true;
     }
-    const double reach = task.uniform ? 1.0 : 2.0 + 2.4 * std::sqrt(cover2);
+    const double reach = task.small ? 1.0 : 2.0 + 2.4 * std::sqrt(cover2);
     x0 -= reach;
     y0 -= reach;
     x1 += reach;

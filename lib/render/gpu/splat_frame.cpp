@@ -114,7 +114,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                 t.slopeY,
                 t.core2,
                 t.tolerance,
-                t.quality,
+                t.quality * t.density,
                 {}};
             const bool ellipse = settings.splat == SplatRule::data && !t.small;
             (ellipse ? large : frame.tasks).push_back(entry);
