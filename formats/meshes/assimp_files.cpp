@@ -41,7 +41,11 @@ class MemoryStream final : public Assimp::IOStream {
 std::string AssimpFiles::relative(const char* name) const {
     std::string_view text(name);
     while (text.starts_with("./")) text.remove_prefix(2);
-    if (text.starts_with(kFolder)) text.remove_prefix(std::strlen(kFolder));
+    if (text.starts_with(kFolder)) {
+        text.remove_prefix(std::strlen(kFolder));
+        // Assimp joins folder and name with one slash too many at times.
+        while (text.starts_with('/')) text.remove_prefix(1);
+    }
     return std::string(text);
 }
 

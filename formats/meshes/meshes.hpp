@@ -60,7 +60,7 @@ struct PointCloud {
 struct PointWriteOptions {
     int positionBits = 16;  ///< bits per coordinate of the cloud's largest extent, 1..30; 0 = exact
     int normalBits = 10;    ///< bits per component, 2..30; 0 = exact
-    OutputFile::Options file;
+    OutputFile::Options file = {};
 };
 
 /// Writes points as binary little-endian PLY or Draco, by the ending of `path` (.ply or .drc),

@@ -1,0 +1,243 @@
+#include <fstream>
+
+#include "formats/meshes/text_encoding.hpp"
+#include "formats/meshes/triangulate.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/meshes/models.hpp"
+
+namespace stx {
+namespace {
+
+ByteSpan bytesOf(const std::string& text) {
+    return {reinterpret_cast<const std::byte*>(text.data()), text.size()};
+}
+
+TEST(IsMesh, ByBytesThenByEnding) {
+    EXPECT_TRUE(isMesh("a.glb"));
+    EXPECT_TRUE(isMesh("a.STL"));
+    EXPECT_TRUE(isMesh("folder/a.obj"));
+    EXPECT_FALSE(isMesh("a.png"));
+    EXPECT_FALSE(isMesh("transforms.json", bytesOf("{\"frames\": []}")));
+    EXPECT_TRUE(isMesh("-", bytesOf("glTF\2\0\0\0")));
+    EXPECT_TRUE(isMesh("scan", bytesOf("ply\nformat ascii 1.0\n")));
+    EXPECT_TRUE(isMesh("scan", bytesOf("DRACO\2\2")));
+    EXPECT_TRUE(isMesh("-", bytesOf("{\"asset\": {\"version\": \"2.0\"}}")));
+    EXPECT_FALSE(isMesh("-", bytesOf("plywood")));
+}
+
+TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
+    // A comb with three teeth, drawn in a slanted plane.
+    const std::vector<glm::vec2> outline = {{0, 0}, {6, 0}, {6, 4}, {5, 1}, {4, 4},
+                                            {3, 1}, {2, 4}, {1, 1}, {0, 4}};
+    for (const bool reversed : {false, true}) {
+        std::vector<glm::vec3> corners;
+        for (const auto& p : outline) corners.emplace_back(p.x, p.y * 0.5f, p.y + p.x);
+        if (reversed) std::reverse(corners.begin(), corners.end());
+        std::vector<glm::uvec3> triangles;
+        triangulate(corners, triangles);
+        ASSERT_EQ(triangles.size(), outline.size() - 2);
+        double sum = 0;
+        glm::dvec3 whole(0.0);
+        for (const auto& t : triangles) {
+            const auto area = glm::cross(glm::dvec3(corners[t.y] - corners[t.x]),
+                                         glm::dvec3(corners[t.z] - corners[t.x]));
+            sum += glm::length(area);
+            whole += area;
+        }
+        EXPECT_NEAR(sum, glm::length(whole), 1e-6);
+    }
+}
+
+TEST(Triangulate, NonsenseStillEnds) {
+    std::vector<glm::vec3> corners(50, glm::vec3(1));
+    std::vector<glm::uvec3> triangles;
+    triangulate(corners, triangles);
+    EXPECT_EQ(triangles.size(), 48u);
+    triangles.clear();
+    corners = {{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}};  // a bow tie
+    triangulate(corners, triangles);
+    EXPECT_EQ(triangles.size(), 2u);
+}
+
+TEST(TextEncoding, MarkedTextBecomesUtf8) {
+    const auto text = [](std::string bytes) {
+        const auto utf8 = utf8FromMarked(bytesOf(bytes));
+        return utf8 ? std::string(reinterpret_cast<const char*>(utf8->data()), utf8->size())
+                    : "none";
+    };
+    EXPECT_EQ(text("v 0"), "none");
+    EXPECT_EQ(text("\xef\xbb\xbfv"), "v");
+    EXPECT_EQ(text(std::string("\xfe\xff\0v\x20\xac", 6)), "v\xe2\x82\xac");
+    EXPECT_EQ(text(std::string("\xff\xfev\0\x3d\xd8\x00\xde", 8)), "v\xf0\x9f\x98\x80");
+    EXPECT_EQ(text(std::string("\xff\xfe\x3d\xd8", 4)), "\xef\xbf\xbd");  // half a pair
+}
+
+TEST(Obj, VRunsDownInMeshAndKdIsSrgb) {
+    TemporaryFolder folder;
+    std::ofstream(folder / "a.mtl") << "newmtl half\nKd 0.5 1 0\nd 0.25\n";
+    std::ofstream(folder / "a.obj")
+        << "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 0.75\n"
+           "usemtl half\nf 1/1 2/2 3/3\n";
+    const auto [mesh, notes] = readGood(folder / "a.obj");
+    ASSERT_EQ(mesh.uvs.size(), 3u);
+    EXPECT_FLOAT_EQ(mesh.uvs[0].y, 1.0f);
+    EXPECT_FLOAT_EQ(mesh.uvs[2].y, 0.25f);
+    const auto& m = mesh.materials.at(mesh.triangleMaterial[0]);
+    EXPECT_NEAR(m.baseColour.r, 0.2140411f, 1e-5f);
+    EXPECT_FLOAT_EQ(m.baseColour.a, 0.25f);
+    EXPECT_EQ(m.alpha, Material::Alpha::blend);
+    EXPECT_TRUE(m.doubleSided);
+}
+
+TEST(Obj, MissingMaterialFileIsSaid) {
+    const auto model =
+        readGoodText("mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n", "a.obj");
+    EXPECT_TRUE(model.hasNote("gone.mtl"));
+    EXPECT_EQ(model.mesh.materials.at(model.mesh.triangleMaterial[0]).baseColour, glm::vec4(1));
+}
+
+TEST(Ply, BigEndianIsRead) {
+    std::string text =
+        "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property short z\nelement face 1\nproperty list uchar ushort vertex_index\nend_header\n";
+    const auto put = [&](std::initializer_list<int> bytes) {
+        for (const int b : bytes) text += static_cast<char>(b);
+    };
+    put({0, 0, 0, 0, 0, 0, 0, 0, 1, 2});           // 0 0 258
+    put({0x3f, 0x80, 0, 0, 0, 0, 0, 0, 0, 0});     // 1 0 0
+    put({0, 0, 0, 0, 0xc0, 0, 0, 0, 0xff, 0xff});  // 0 -2 -1
+    put({3, 0, 0, 0, 1, 0, 2});
+    const auto [mesh, notes] = readGoodText(text, "a.ply");
+    ASSERT_EQ(mesh.triangles.size(), 1u);
+    EXPECT_EQ(mesh.positions[0], glm::vec3(0, 0, 258));
+    EXPECT_EQ(mesh.positions[2], glm::vec3(0, -2, -1));
+}
+
+TEST(Ply, FaceColoursAndStrips) {
+    const auto coloured = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+        "float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty "
+        "uchar green\n"
+        "property uchar blue\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3 0 0 "
+        "255\n",
+        "a.ply");
+    ASSERT_EQ(coloured.mesh.colours.size(), 6u);
+    EXPECT_EQ(coloured.mesh.colours[0], glm::vec4(1, 0, 0, 1));
+    EXPECT_EQ(coloured.mesh.colours[5], glm::vec4(0, 0, 1, 1));
+    const auto strips = readGoodText(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+        "float z\n"
+        "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+        "0 0 0\n1 0 0\n0 1 0\n1 1 0\n8 0 1 2 3 -1 0 1 2\n",
+        "a.ply");
+    ASSERT_EQ(strips.mesh.triangles.size(), 3u);
+    for (const auto& t : strips.mesh.triangles) {
+        const auto& p = strips.mesh.positions;
+        EXPECT_GT(glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]).z, 0.0f);
+    }
+}
+
+class WritePoints : public testing::Test {
+  protected:
+    WritePoints() {
+        for (int i = 0; i < 500; ++i) {
+            const float a = static_cast<float>(i) * 0.1f;
+            positions_.emplace_back(std::cos(a), std::sin(a), static_cast<float>(i) * 0.004f);
+            normals_.emplace_back(std::cos(a), std::sin(a), 0.0f);
+            colours_.emplace_back(i % 256, i / 2, 255 - i % 256, 255 - i / 4);
+        }
+    }
+    [[nodiscard]] PointCloud cloud() const { return {positions_, colours_, normals_, true}; }
+
+    Result<ReadModel> roundTrip(const std::string& name, const PointWriteOptions& options = {}) {
+        Job job;
+        STX_CHECK(writePoints(folder_ / name, cloud(), job, options));
+        return readGood(folder_ / name);
+    }
+    /// Largest distance of a written point to the read one that is nearest, with its colour alike.
+    [[nodiscard]] double worst(const Mesh& mesh) const {
+        double result = 0;
+        for (std::size_t i = 0; i < positions_.size(); ++i) {
+            double nearest = 1e9;
+            for (std::size_t k = 0; k < mesh.positions.size(); ++k) {
+                if (std::abs(mesh.colours[k].a * 255 - colours_[i].a) > 0.01f) continue;
+                nearest = std::min(
+                    nearest, static_cast<double>(glm::distance(mesh.positions[k], positions_[i])));
+            }
+            result = std::max(result, nearest);
+        }
+        return result;
+    }
+
+    TemporaryFolder folder_;
+    std::vector<glm::vec3> positions_, normals_;
+    std::vector<glm::u8vec4> colours_;
+};
+
+TEST_F(WritePoints, PlyIsExact) {
+    const auto model = roundTrip("p.ply");
+    ASSERT_TRUE(model);
+    EXPECT_EQ(model->mesh.positions, positions_);
+    ASSERT_EQ(model->mesh.colours.size(), 500u);
+    EXPECT_NEAR(model->mesh.colours[300].r, 0.02518686f, 1e-6f);  // 44 in sRGB
+    EXPECT_LT(glm::distance(model->mesh.normals[7], normals_[7]), 1e-6f);
+}
+
+TEST_F(WritePoints, DracoExactAndRounded) {
+    const auto exact = roundTrip("e.drc", {.positionBits = 0, .normalBits = 0});
+    ASSERT_TRUE(exact);
+    EXPECT_EQ(exact->mesh.positions, positions_);
+    const auto rounded = roundTrip("r.drc");
+    ASSERT_TRUE(rounded);
+    ASSERT_EQ(rounded->mesh.positions.size(), 500u);
+    ASSERT_EQ(rounded->mesh.normals.size(), 500u);
+    // 16 bits of an extent of 2, in each of three axes.
+    EXPECT_LT(worst(rounded->mesh), 2.0 / 65535 / 2 * std::sqrt(3.0) * 1.01);
+    EXPECT_LT(std::filesystem::file_size(folder_ / "r.drc"),
+              std::filesystem::file_size(folder_ / "e.drc"));
+}
+
+TEST_F(WritePoints, SameInputSameBytes) {
+    for (const char* ending : {"ply", "drc"}) {
+        Job job;
+        const auto a = folder_ / fmt::format("a.{}", ending),
+                   b = folder_ / fmt::format("b.{}", ending);
+        ASSERT_TRUE(writePoints(a, cloud(), job));
+        ASSERT_TRUE(writePoints(b, cloud(), job));
+        EXPECT_EQ(*readFile(a, job.limits), *readFile(b, job.limits));
+    }
+}
+
+TEST_F(WritePoints, DebiansDecoderReadsIt) {
+    if (std::system("command -v draco_decoder > /dev/null") != 0)
+        GTEST_SKIP() << "no draco_decoder here";
+    Job job;
+    ASSERT_TRUE(writePoints(folder_ / "p.drc", cloud(), job));
+    const auto out = folder_ / "out.ply";
+    ASSERT_EQ(std::system(fmt::format("draco_decoder -i '{}' -o '{}' > /dev/null",
+                                      (folder_ / "p.drc").string(), out.string())
+                              .c_str()),
+              0);
+    const auto model = readGood(out);
+    EXPECT_EQ(model.mesh.points.size(), 500u);
+    EXPECT_EQ(model.mesh.normals.size(), 500u);
+    EXPECT_LT(worst(model.mesh), 3e-5);
+}
+
+TEST_F(WritePoints, BadRequests) {
+    Job job;
+    EXPECT_EQ(writePoints(folder_ / "p.xyz", cloud(), job).error().code, ErrorCode::usage);
+    EXPECT_EQ(writePoints(folder_ / "p.ply", {}, job).error().code, ErrorCode::invalidInput);
+    EXPECT_EQ(writePoints(folder_ / "p.drc", cloud(), job, {.positionBits = 31}).error().code,
+              ErrorCode::usage);
+    colours_.pop_back();
+    EXPECT_EQ(writePoints(folder_ / "p.ply", cloud(), job).error().code, ErrorCode::invalidInput);
+    colours_.emplace_back();
+    positions_[3].y = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_EQ(writePoints(folder_ / "p.drc", cloud(), job).error().code, ErrorCode::invalidInput);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "p.drc"));
+}
+
+}  // namespace
+}  // namespace stx

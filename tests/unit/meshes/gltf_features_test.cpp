@@ -1,0 +1,346 @@
+#include <cmath>
+#include <fstream>
+
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/meshes/models.hpp"
+
+// Features of glTF that the shared models lack, in files built here.
+
+namespace stx {
+namespace {
+
+using nlohmann::json;
+
+void expectNear(glm::vec2 a, glm::vec2 b) {
+    EXPECT_NEAR(a.x, b.x, 1e-6f);
+    EXPECT_NEAR(a.y, b.y, 1e-6f);
+}
+void expectNear(glm::vec3 a, glm::vec3 b) {
+    EXPECT_NEAR(a.x, b.x, 1e-5f);
+    EXPECT_NEAR(a.y, b.y, 1e-5f);
+    EXPECT_NEAR(a.z, b.z, 1e-5f);
+}
+
+glm::vec3 faceNormal(const Mesh& mesh, std::size_t triangle) {
+    const auto t = mesh.triangles.at(triangle);
+    return glm::normalize(glm::cross(mesh.positions[t.y] - mesh.positions[t.x],
+                                     mesh.positions[t.z] - mesh.positions[t.x]));
+}
+
+GltfText texturedQuad() {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.addTexture();
+    gltf.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    gltf.primitive()["material"] = 0;
+    return gltf;
+}
+
+TEST(Gltf, TextureFactorAndMaskArrive) {
+    auto gltf = texturedQuad();
+    gltf.root["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.25, 0.5, 0.75, 0.5};
+    gltf.root["materials"][0]["alphaMode"] = "MASK";
+    gltf.root["materials"][0]["alphaCutoff"] = 0.3;
+    gltf.root["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}, {"magFilter", 9728}}};
+    gltf.root["textures"][0]["sampler"] = 0;
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.materials.size(), 1u);
+    const auto& m = mesh.materials[0];
+    EXPECT_EQ(m.baseColour, glm::vec4(0.25f, 0.5f, 0.75f, 0.5f));
+    EXPECT_EQ(m.alpha, Material::Alpha::mask);
+    EXPECT_FLOAT_EQ(m.alphaCutoff, 0.3f);
+    EXPECT_FALSE(m.doubleSided);
+    ASSERT_EQ(mesh.textures.size(), 1u);
+    const auto& texture = mesh.textures[0];
+    ASSERT_EQ(texture.pixels.size(), glm::ivec2(2, 1));
+    EXPECT_EQ(texture.pixels.at(0, 0), glm::u8vec4(255, 0, 0, 255));
+    EXPECT_EQ(texture.pixels.at(1, 0), glm::u8vec4(0, 255, 0, 128));
+    EXPECT_EQ(texture.wrapU, MeshTexture::Wrap::clamp);
+    EXPECT_EQ(texture.wrapV, MeshTexture::Wrap::mirror);
+    EXPECT_TRUE(texture.nearest);
+    expectNear(mesh.uvs[2], {1, 1});
+}
+
+TEST(Gltf, TextureTransformTurnsCounterClockwise) {
+    auto gltf = texturedQuad();
+    // The extension's own example: the lower left quadrant of the image, turned by 90 degrees.
+    auto& info = gltf.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"];
+    info["extensions"]["KHR_texture_transform"] = {
+        {"offset", {0, 1}}, {"rotation", std::acos(-1.0) / 2}, {"scale", {0.5, 0.5}}};
+    gltf.root["extensionsRequired"] = {"KHR_texture_transform"};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.uvs.size(), 4u);
+    expectNear(mesh.uvs[0], {0, 1});
+    expectNear(mesh.uvs[1], {0, 0.5});
+    expectNear(mesh.uvs[2], {0.5, 0.5});
+    expectNear(mesh.uvs[3], {0.5, 1});
+}
+
+TEST(Gltf, SecondUvSetAndItsOverride) {
+    auto gltf = texturedQuad();
+    const auto uv1 = gltf.accessor(std::vector<std::uint16_t>{0, 65535, 65535, 0, 13107, 0, 0, 0},
+                                   5123, "VEC2", 4, true);
+    gltf.primitive()["attributes"]["TEXCOORD_1"] = uv1;
+    auto& info = gltf.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"];
+    info["texCoord"] = 1;
+    const auto first = readGoodText(gltf.text(), "a.gltf");
+    expectNear(first.mesh.uvs[0], {0, 1});
+    expectNear(first.mesh.uvs[2], {0.2f, 0});
+    info["texCoord"] = 0;
+    info["extensions"]["KHR_texture_transform"] = {{"texCoord", 1}};
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.uvs, first.mesh.uvs);
+}
+
+TEST(Gltf, NormalMapHasItsOwnUvs) {
+    auto gltf = texturedQuad();
+    gltf.root["materials"][0]["normalTexture"] = {
+        {"index", 0},
+        {"scale", 0.5},
+        {"extensions", {{"KHR_texture_transform", {{"scale", {2, 3}}}}}}};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.normalUvs.size(), 4u);
+    expectNear(mesh.normalUvs[2], {2, 3});
+    expectNear(mesh.uvs[2], {1, 1});
+    EXPECT_FLOAT_EQ(mesh.materials[0].normalScale, 0.5f);
+    // No normals and tangents in the file: the triangles' own. u runs along +x, v along +y, and a
+    // normal map's green points against v: the handedness is negative.
+    expectNear(mesh.normals.at(0), {0, 0, 1});
+    EXPECT_EQ(mesh.tangents.at(0), glm::vec4(1, 0, 0, -1));
+    EXPECT_EQ(mesh.textures.size(), 1u);
+}
+
+TEST(Gltf, VertexColoursOfAllTypesAreTheSame) {
+    const auto coloursWith = [](int type) {
+        GltfText gltf;
+        gltf.addQuad();
+        int accessor = -1;
+        if (type == 0)
+            accessor =
+                gltf.accessor(std::vector<float>{1, 0, 0.2f, 1, 0, 1, 0, 1, 0, 0, 1, 1, 1, 1, 1, 1},
+                              5126, "VEC4", 4);
+        if (type == 1)
+            accessor = gltf.accessor(std::vector<std::uint8_t>{255, 0, 51, 255, 0, 255, 0, 255, 0,
+                                                               0, 255, 255, 255, 255, 255, 255},
+                                     5121, "VEC4", 4, true);
+        if (type == 2)
+            accessor = gltf.accessor(std::vector<std::uint16_t>{65535, 0, 13107, 0, 65535, 0, 0, 0,
+                                                                65535, 65535, 65535, 65535},
+                                     5123, "VEC3", 4, true);
+        gltf.primitive()["attributes"]["COLOR_0"] = accessor;
+        return readGoodText(gltf.text(), "a.gltf").mesh.colours;
+    };
+    const auto floats = coloursWith(0);
+    ASSERT_EQ(floats.size(), 4u);
+    EXPECT_EQ(floats[0], glm::vec4(1, 0, 0.2f, 1));
+    for (const int type : {1, 2}) {
+        const auto other = coloursWith(type);
+        ASSERT_EQ(other.size(), 4u);
+        for (int i = 0; i < 4; ++i) EXPECT_LT(glm::length(other[i] - floats[i]), 1e-6f);
+    }
+}
+
+TEST(Gltf, MirroringNodesTurnTheTrianglesAround) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.root["nodes"] = json::parse(R"([
+        {"mesh": 0, "scale": [-1, 1, 1], "translation": [5, 0, 0]},
+        {"children": [2], "rotation": [0, 0.70710678, 0, 0.70710678]},
+        {"mesh": 0, "matrix": [2,0,0,0, 0,2,0,0, 0,0,2,0, 1,2,3,1]}])");
+    gltf.root["scenes"][0]["nodes"] = {0, 1};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.triangles.size(), 4u);
+    expectNear(mesh.positions[1], {4, 0, 0});
+    // Mirrored in x, the quad still shows its front to +z.
+    expectNear(faceNormal(mesh, 0), {0, 0, 1});
+    // Turned by 90 degrees about y: (x, y, z) of the inner node becomes (z, y, -x).
+    expectNear(mesh.positions[4], {3, 2, -1});
+    expectNear(mesh.positions[5], {3, 2, -3});
+    expectNear(faceNormal(mesh, 2), {1, 0, 0});
+}
+
+TEST(Gltf, QuantisedStridedAndSparseAccessors) {
+    GltfText gltf;
+    // KHR_mesh_quantization: positions as shorts, 8 bytes apart; a sparse part lifts vertex 2.
+    const int view = gltf.view(
+        std::vector<std::int16_t>{0, 0, 0, 99, 10, 0, 0, 99, 10, 10, 0, 99, 0, 10, 0, 99}, 8);
+    const int indices = gltf.view(std::vector<std::uint8_t>{2});
+    const int values = gltf.view(std::vector<std::int16_t>{10, 10, 7});
+    const int position =
+        gltf.accessor({{"bufferView", view},
+                       {"componentType", 5122},
+                       {"type", "VEC3"},
+                       {"count", 4},
+                       {"sparse",
+                        {{"count", 1},
+                         {"indices", {{"bufferView", indices}, {"componentType", 5121}}},
+                         {"values", {{"bufferView", values}}}}}});
+    const int normal = gltf.accessor(
+        std::vector<std::int8_t>{0, 0, 127, 0, 0, 0, 127, 0, 0, 0, 127, 0, 0, 0, 127, 0}, 5120,
+        "VEC3", 4, true);
+    gltf.root["bufferViews"][3]["byteStride"] = 4;
+    gltf.root["meshes"][0]["primitives"] = {
+        {{"attributes", {{"POSITION", position}, {"NORMAL", normal}}}, {"mode", 5}}};
+    gltf.root["extensionsRequired"] = {"KHR_mesh_quantization"};
+    gltf.root["nodes"][0]["scale"] = {0.1, 0.1, 0.1};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.positions.size(), 4u);
+    expectNear(mesh.positions[1], {1, 0, 0});
+    expectNear(mesh.positions[2], {1, 1, 0.7f});
+    expectNear(mesh.normals[3], {0, 0, 1});
+}
+
+TEST(Gltf, StripsFansListsAndPoints) {
+    const auto trianglesOf = [](int mode) {
+        GltfText gltf;
+        const int position =
+            gltf.accessor(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0}, 5126, "VEC3", 4);
+        gltf.root["meshes"][0]["primitives"] = {
+            {{"attributes", {{"POSITION", position}}}, {"mode", mode}}};
+        return readGoodText(gltf.text(), "a.gltf").mesh;
+    };
+    const auto strip = trianglesOf(5);
+    ASSERT_EQ(strip.triangles.size(), 2u);
+    // All triangles of a strip face the same way.
+    expectNear(faceNormal(strip, 0), {0, 0, 1});
+    expectNear(faceNormal(strip, 1), {0, 0, 1});
+    const auto fan = trianglesOf(6);
+    ASSERT_EQ(fan.triangles.size(), 2u);
+    for (const auto& t : fan.triangles) EXPECT_TRUE(t.x == 0 || t.y == 0 || t.z == 0);
+    EXPECT_EQ(trianglesOf(4).triangles.size(), 1u);
+    const auto points = trianglesOf(0);
+    EXPECT_EQ(points.points.size(), 4u);
+    EXPECT_TRUE(points.triangles.empty());
+}
+
+TEST(Gltf, MorphTargetsStandAtTheirDefaultWeights) {
+    GltfText gltf;
+    gltf.addQuad();
+    const int target =
+        gltf.accessor(std::vector<float>{0, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0}, 5126, "VEC3", 4);
+    gltf.primitive()["targets"] = {{{"POSITION", target}}};
+    gltf.root["meshes"][0]["weights"] = {0.5};
+    expectNear(readGoodText(gltf.text(), "a.gltf").mesh.positions[2], {1, 1, 2});
+    gltf.root["nodes"][0]["weights"] = {0.25};
+    expectNear(readGoodText(gltf.text(), "a.gltf").mesh.positions[2], {1, 1, 1});
+}
+
+TEST(Gltf, SkinIgnoresItsNodeAndFollowsItsJoints) {
+    GltfText gltf;
+    gltf.addQuad();
+    const int joints = gltf.accessor(
+        std::vector<std::uint8_t>{0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, 5121, "VEC4", 4);
+    const int weights = gltf.accessor(
+        std::vector<float>{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0.5f, 0.5f, 0, 0}, 5126, "VEC4", 4);
+    const int inverse =
+        gltf.accessor(std::vector<float>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,  1,
+                                         1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -1, 1},
+                      5126, "MAT4", 2);
+    gltf.primitive()["attributes"]["JOINTS_0"] = joints;
+    gltf.primitive()["attributes"]["WEIGHTS_0"] = weights;
+    gltf.root["skins"] = {{{"joints", {1, 2}}, {"inverseBindMatrices", inverse}}};
+    gltf.root["nodes"] = json::parse(R"([
+        {"mesh": 0, "skin": 0, "translation": [100, 0, 0]},
+        {"translation": [0, 0, 0], "children": [2]},
+        {"translation": [0, 0, 5]}])");
+    gltf.root["scenes"][0]["nodes"] = {0, 1};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    expectNear(mesh.positions.at(0), {0, 0, 0});
+    expectNear(mesh.positions.at(2), {1, 1, 4});  // joint 1: +5 after -1
+    expectNear(mesh.positions.at(3), {0, 1, 2});  // half of both
+}
+
+TEST(Gltf, GpuInstancesAreExpanded) {
+    GltfText gltf;
+    gltf.addQuad();
+    const int translation = gltf.accessor(std::vector<float>{0, 0, 0, 0, 0, 3}, 5126, "VEC3", 2);
+    gltf.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"] = {
+        {"attributes", {{"TRANSLATION", translation}}}};
+    gltf.root["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    EXPECT_EQ(mesh.triangles.size(), 4u);
+    EXPECT_DOUBLE_EQ(mesh.bounds().max.z, 3.0);
+}
+
+TEST(Gltf, SpecularGlossinessGivesItsDiffuseColour) {
+    auto gltf = texturedQuad();
+    gltf.root["materials"][0] = {
+        {"extensions",
+         {{"KHR_materials_pbrSpecularGlossiness",
+           {{"diffuseFactor", {0.1, 0.2, 0.3, 1}}, {"diffuseTexture", {{"index", 0}}}}}}}};
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    EXPECT_FLOAT_EQ(mesh.materials[0].baseColour.g, 0.2f);
+    EXPECT_EQ(mesh.materials[0].baseColourTexture, 0);
+}
+
+TEST(Gltf, WhatIsDroppedIsSaidInOneLine) {
+    auto gltf = texturedQuad();
+    gltf.root["animations"] = {{{"channels", json::array()}, {"samplers", json::array()}}};
+    gltf.root["nodes"][0]["camera"] = 0;
+    gltf.root["materials"][0]["emissiveTexture"] = {{"index", 0}};
+    gltf.root["meshes"][0]["primitives"].push_back(
+        {{"attributes", {{"POSITION", 0}}}, {"mode", 1}});
+    const auto model = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(model.notes.size(), 1u);
+    EXPECT_EQ(model.notes[0],
+              "dropped: animations (1), cameras (1), emissive maps (1), line primitives (1)");
+}
+
+TEST(Gltf, PrimitivesWithAndWithoutNormalsAndColoursMix) {
+    GltfText gltf;
+    gltf.addQuad();
+    gltf.addQuad();
+    const int normal =
+        gltf.accessor(std::vector<float>{1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0}, 5126, "VEC3", 4);
+    const int colour =
+        gltf.accessor(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, 5126, "VEC3", 4);
+    gltf.root["meshes"][0]["primitives"][1]["attributes"]["NORMAL"] = normal;
+    gltf.root["meshes"][0]["primitives"][1]["attributes"]["COLOR_0"] = colour;
+    const auto [mesh, notes] = readGoodText(gltf.text(), "a.gltf");
+    ASSERT_EQ(mesh.normals.size(), 8u);
+    expectNear(mesh.normals[0], {0, 0, 1});  // the first quad's own
+    expectNear(mesh.normals[5], {1, 0, 0});
+    EXPECT_EQ(mesh.colours[0], glm::vec4(1));
+    EXPECT_EQ(mesh.colours[5], glm::vec4(0, 0, 1, 1));
+}
+
+TEST(Gltf, TexturesResolveInsideTheFolderOnly) {
+    TemporaryFolder folder;
+    std::filesystem::create_directory(folder / "model");
+    std::filesystem::create_directory(folder / "model/my maps");
+    const auto write = [](const std::filesystem::path& path, const std::string& text) {
+        std::ofstream(path, std::ios::binary) << text;
+    };
+    auto gltf = texturedQuad();
+    const auto read = [&](const char* uri) {
+        gltf.root["images"][0] = {{"uri", uri}};
+        write(folder / "model/m.gltf", gltf.text());
+        Job job;
+        auto mesh = readMesh(folder / "model/m.gltf", job);
+        return std::pair(std::move(mesh), job.takeNotes());
+    };
+    {
+        const auto [mesh, notes] = read("none.png");
+        ASSERT_TRUE(mesh) << mesh.error().text();
+        EXPECT_EQ(mesh->materials[0].baseColourTexture, -1);
+        ASSERT_EQ(notes.size(), 1u);
+        EXPECT_NE(notes[0].find("none.png"), std::string::npos);
+    }
+    {
+        write(folder / "model/my maps/broken.png", "no image");
+        const auto [mesh, notes] = read("my%20maps/broken.png");
+        ASSERT_TRUE(mesh) << mesh.error().text();
+        ASSERT_EQ(notes.size(), 1u);
+        EXPECT_NE(notes[0].find("cannot be decoded"), std::string::npos);
+    }
+    write(folder / "outside.png", "secret");
+    for (const char* uri : {"../outside.png", "https://example.org/a.png", "file:///etc/hosts",
+                            "/etc/hosts", "%2e%2e/outside.png"}) {
+        SCOPED_TRACE(uri);
+        const auto [mesh, notes] = read(uri);
+        ASSERT_FALSE(mesh);
+        EXPECT_EQ(mesh.error().code, ErrorCode::invalidInput) << mesh.error().text();
+    }
+}
+
+}  // namespace
+}  // namespace stx
