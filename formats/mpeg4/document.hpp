@@ -64,8 +64,8 @@ struct BifsConfig {
 /// One access unit of a media stream.
 struct Sample {
     ByteRange data;
-    std::uint64_t time = 0;  ///< decoding time in the stream's timescale
-    std::uint32_t duration = 0;
+    std::uint64_t time = 0;         ///< decoding time in the stream's timescale
+    std::uint32_t duration = 1000;  ///< one second at the usual timescale
     std::int32_t compositionOffset = 0;
     bool sync = true;
 };

@@ -111,10 +111,9 @@ const FieldValue& defaultValue(const NodeInfo& node, int fieldIndex) {
 }
 
 std::size_t itemCount(const FieldValue& value) {
-    if (!isMultiple(typeOf(value))) return 1;
     return std::visit(
         [](const auto& v) -> std::size_t {
-            if constexpr (requires { v.size(); })
+            if constexpr (kIsList<std::decay_t<decltype(v)>>)
                 return v.size();
             else
                 return 1;

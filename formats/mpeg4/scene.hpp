@@ -71,6 +71,12 @@ using FieldValue =
                  std::vector<glm::vec2>, std::vector<glm::vec3>, std::vector<Color>,
                  std::vector<Rotation>, NodeList>;
 
+/// Whether T is the C++ type of an MF value.
+template <class T>
+inline constexpr bool kIsList = false;
+template <class T>
+inline constexpr bool kIsList<std::vector<T>> = true;
+
 [[nodiscard]] inline FieldType typeOf(const FieldValue& value) {
     return static_cast<FieldType>(value.index());
 }

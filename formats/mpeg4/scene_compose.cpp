@@ -247,12 +247,7 @@ class Composer {
                         target->info->name, info.name);
         return std::visit(
             [&](auto& list) -> Result<void> {
-                if constexpr (requires {
-                                  list.begin();
-                                  list.size();
-                                  typename std::decay_t<decltype(list)>::value_type;
-                              } &&
-                              !std::is_same_v<std::decay_t<decltype(list)>, std::string>) {
+                if constexpr (kIsList<std::decay_t<decltype(list)>>) {
                     using Item = typename std::decay_t<decltype(list)>::value_type;
                     const auto size = static_cast<std::int64_t>(list.size());
                     const std::int64_t last = what == Change::insert ? size : size - 1;
