@@ -66,7 +66,7 @@ Result<void> finished(const ByteReader& in, std::uint8_t tag) {
 
 void depart(const DescriptorContext& context, Mp4Departure::Kind kind, std::string text,
             std::string where) {
-    if (context.departures != nullptr)
+    if (context.departures != nullptr && context.departures->size() < kMaxDepartures)
         context.departures->push_back({kind, std::move(text), std::move(where)});
 }
 

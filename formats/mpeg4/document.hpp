@@ -176,6 +176,9 @@ struct Mp4Departure {
     std::string where;  ///< box path and byte offset
 };
 
+/// Departures beyond these are not told.
+inline constexpr std::size_t kMaxDepartures = 1000;
+
 struct Mp4Facts {
     std::string majorBrand;  ///< four characters; empty when there is no ftyp
     std::vector<std::string> brands;
@@ -192,12 +195,13 @@ struct Mp4Facts {
 struct Document {
     InitialObjectDescriptor iod;
 
-    /// The scene: its stream's descriptor (no samples: they are `frames`), config and commands.
+    /// The scene: its stream's descriptor, config and commands. readMp4 leaves the access units as
+    /// they stand in the file in `samples`; writers take `frames` and look at nothing else.
     ElementaryStream sceneStream;
     BifsConfig bifsConfig;
     std::vector<CommandFrame> frames;
 
-    /// The object descriptor stream (no samples: they are `odFrames`).
+    /// The object descriptor stream, likewise.
     ElementaryStream odStream;
     std::vector<OdFrame> odFrames;
 
@@ -205,7 +209,8 @@ struct Document {
     std::optional<Mp4Facts> mp4;
 
     /// All object descriptors as they stand after the frames with time <= `until` (ticks of the OD
-    /// stream): updates replace, removals remove. Pointers into this document.
+    /// stream): updates replace, removals remove. In order of their ids. Pointers into this
+    /// document.
     [[nodiscard]] std::vector<const ObjectDescriptor*> objectDescriptors(
         std::uint64_t until = ~std::uint64_t{0}) const;
     /// One of them, null when there is none of that id.
