@@ -1,0 +1,482 @@
+#include "formats/atlas/atlas_files.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include "formats/atlas/atlas_json.hpp"
+#include "formats/atlas/atlas_textures.hpp"
+#include "formats/exr/exr_colour.hpp"
+#include "formats/images/images.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Type = ExrChannel::Type;
+
+constexpr const char* kIndexFile = "atlas.json";
+
+bool isExrName(const fs::path& path) {
+    const std::string ending = path.extension().string();
+    return ending == ".exr" || ending == ".EXR";
+}
+
+/// All that a folder of ours may hold, for the replacing of one. Digits stand for any number.
+std::vector<std::string> ownNames() {
+    std::vector<std::string> names = {kIndexFile};
+    for (const char* attribute : {"colour", "depth", "normal", "splat"}) {
+        for (const char* ending : {".png", "_1.png", ".exr", "_1.exr"})
+            names.push_back(std::string(attribute) + ending);
+    }
+    return names;
+}
+
+std::string fileName(const AtlasTexture& t) {
+    const char* ending = t.coding == "float" ? "exr" : "png";
+    return t.page == 0 ? fmt::format("{}.{}", t.attribute, ending)
+                       : fmt::format("{}_{}.{}", t.attribute, t.page, ending);
+}
+
+/// Everything but the pixels, and which textures there will be.
+AtlasHeader headerOf(const Atlas& atlas, bool inOneExr) {
+    AtlasHeader header;
+    Atlas& a = header.atlas;
+    a.views = atlas.views;
+    a.rectangles = atlas.rectangles;
+    a.layout = atlas.layout;
+    a.padding = atlas.padding;
+    a.bounds = atlas.bounds;
+    a.title = atlas.title;
+    a.sourcePixels = atlas.sourcePixels;
+    a.keptPixels = atlas.keptPixels;
+    header.pages = static_cast<int>(atlas.pages.size());
+    header.pageWidth = atlas.width();
+    header.pageHeight = atlas.height();
+    header.linear = atlas.pages[0].texture.isLinear();
+    bool floats = inOneExr, only8 = true;
+    for (const auto& v : atlas.views) {
+        floats = floats || v.depthBits == 32;
+        only8 = only8 && v.depthBits == 8;
+    }
+    for (int i = 0; i < header.pages; ++i) {
+        const AtlasPage& page = atlas.pages[i];
+        const auto add = [&](const char* attribute, const char* coding) -> AtlasTexture& {
+            AtlasTexture& t = header.textures.emplace_back();
+            t.attribute = attribute;
+            t.page = i;
+            t.coding = coding;
+            t.width = header.pageWidth;
+            t.height = header.pageHeight;
+            if (!inOneExr) t.file = fileName(t);
+            return t;
+        };
+        add("colour", header.linear || inOneExr ? "float" : "sRGB8");
+        add("depth", floats ? "float" : only8 ? "code8" : "code16");
+        if (!page.normal.empty()) add("normal", floats ? "float" : "snorm16");
+        if (!page.splatU.empty()) {
+            AtlasTexture& t = add("splat", floats ? "float" : "snorm16");
+            if (floats) continue;
+            t.scale = std::max(largestComponent(page.splatU), largestComponent(page.splatV));
+            // Along the shorter side, to stay within what a GPU takes.
+            (t.width <= t.height ? t.splatVX : t.splatVY) =
+                t.width <= t.height ? t.width : t.height;
+            t.width += t.splatVX;
+            t.height += t.splatVY;
+        }
+    }
+    return header;
+}
+
+template <class Pixels, class Pointer>
+void addVectors(std::vector<Pixels>& pixels, const std::string& name, Pointer first) {
+    pixels.push_back({name + ".X", first, 3});
+    pixels.push_back({name + ".Y", first + 1, 3});
+    pixels.push_back({name + ".Z", first + 2, 3});
+}
+
+/// The channels of one attribute of a page.
+void addAttribute(const AtlasPage& page, const std::string& attribute,
+                  const Image<glm::vec4>& colour, std::vector<ExrConstPixels>& pixels) {
+    if (attribute == "colour") {
+        const float* rgba = &colour.data()->x;
+        pixels.insert(pixels.end(),
+                      {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}, {"A", rgba + 3, 4}});
+    }
+    if (attribute == "depth") pixels.push_back({"Z", page.depth.data(), 1});
+    if (attribute == "normal") addVectors(pixels, "N", &page.normal.data()->x);
+    if (attribute == "splat") {
+        addVectors(pixels, "splatU", &page.splatU.data()->x);
+        addVectors(pixels, "splatV", &page.splatV.data()->x);
+    }
+}
+
+ExrPart exrPartOf(const AtlasHeader& header, const std::vector<ExrConstPixels>& pixels) {
+    ExrPart part;
+    part.width = part.displayWidth = header.pageWidth;
+    part.height = part.displayHeight = header.pageHeight;
+    for (const auto& p : pixels) {
+        const bool colour = p.channel.size() == 1 && p.channel != "Z";
+        part.channels.push_back({p.channel, colour && !header.linear ? Type::half : Type::float32});
+    }
+    return part;
+}
+
+Result<void> writeFloatImage(const AtlasHeader& header, const AtlasPage& page,
+                             const AtlasTexture& t, const fs::path& path) {
+    Image<glm::vec4> colour;
+    if (t.attribute == "colour") colour = premultipliedLinear(page.texture);
+    std::vector<ExrConstPixels> pixels;
+    addAttribute(page, t.attribute, colour, pixels);
+    STX_TRY(auto file, OutputFile::create(path));
+    STX_TRY(auto writer, ExrWriter::create(file, {exrPartOf(header, pixels)}));
+    STX_CHECK(writer.writePart(0, pixels));
+    STX_CHECK(writer.finish());
+    return file.commit();
+}
+
+Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, Job& job) {
+    const AtlasPage& page = atlas.pages[t.page];
+    if (t.attribute == "colour")
+        return encodePng(t.width, t.height, 4, 8, page.texture.rgba8()->data(), true);
+    if (t.attribute == "depth") {
+        const DepthCodes coded = depthCodes(atlas, t.page);
+        if (coded.outside) job.note("depth outside of all rectangles was dropped from the atlas");
+        if (coded.clamped)
+            job.note("depth beyond nearPlane or farPlane was clamped to them in the atlas");
+        if (t.coding == "code16")
+            return encodePng(t.width, t.height, 1, 16, coded.codes.data(), false);
+        std::vector<std::uint8_t> bytes(coded.codes.pixels().begin(), coded.codes.pixels().end());
+        return encodePng(t.width, t.height, 1, 8, bytes.data(), false);
+    }
+    std::vector<std::uint16_t> rgb(static_cast<std::size_t>(t.width) * t.height * 3);
+    if (t.attribute == "normal") {
+        codeVectors(page.normal, t.scale, 0, 0, t.width, rgb);
+    } else {
+        codeVectors(page.splatU, t.scale, 0, 0, t.width, rgb);
+        codeVectors(page.splatV, t.scale, t.splatVX, t.splatVY, t.width, rgb);
+    }
+    return encodePng(t.width, t.height, 3, 16, rgb.data(), false);
+}
+
+Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
+                         OutputFile::Options options) {
+    const AtlasHeader header = headerOf(atlas, false);
+    STX_TRY(auto folder, OutputFolder::create(path, options, ownNames()));
+    const auto count = static_cast<std::int64_t>(header.textures.size());
+    std::vector<Result<void>> done(header.textures.size());
+    parallelFor(0, count, [&](std::int64_t i) {
+        const AtlasTexture& t = header.textures[i];
+        const fs::path file = folder.temporaryPath() / t.file;
+        if (t.coding == "float") {
+            done[i] = writeFloatImage(header, atlas.pages[t.page], t, file);
+            return;
+        }
+        const auto bytes = encodeImage(atlas, t, job);
+        done[i] = bytes ? writeFile(file, *bytes) : Result<void>(tl::unexpected(bytes.error()));
+    });
+    for (auto& result : done) {
+        if (!result) return propagate(result);
+    }
+    const std::string json = atlasJson(header);
+    STX_CHECK(writeFile(folder.temporaryPath() / kIndexFile, std::as_bytes(std::span(json))));
+    STX_CHECK(job.checkCancelled());
+    return folder.commit();
+}
+
+Result<void> writeExr(const Atlas& atlas, const fs::path& path, Job& job,
+                      OutputFile::Options options) {
+    const AtlasHeader header = headerOf(atlas, true);
+    const auto pixelsOf = [&](int page, const Image<glm::vec4>& colour) {
+        std::vector<ExrConstPixels> pixels;
+        for (const auto& t : header.textures) {
+            if (t.page == page) addAttribute(atlas.pages[page], t.attribute, colour, pixels);
+        }
+        return pixels;
+    };
+    std::vector<ExrPart> parts;
+    for (int i = 0; i < header.pages; ++i) {
+        parts.push_back(exrPartOf(header, pixelsOf(i, Image<glm::vec4>(1, 1))));
+        parts.back().name = fmt::format("page {}", i);
+    }
+    parts[0].attributes["stx:version"] = std::int64_t{1};
+    parts[0].attributes["stx:kind"] = std::string("atlas");
+    parts[0].attributes["stx:atlas"] = atlasJson(header);
+    STX_TRY(auto file, OutputFile::create(path, options));
+    STX_TRY(auto writer, ExrWriter::create(file, parts));
+    for (int i = 0; i < header.pages; ++i) {
+        STX_CHECK(job.checkCancelled());
+        const auto colour = premultipliedLinear(atlas.pages[i].texture);
+        STX_CHECK(writer.writePart(i, pixelsOf(i, colour)));
+    }
+    STX_CHECK(writer.finish());
+    return file.commit();
+}
+
+/// Reads the channels of one attribute from a part into a page.
+Result<void> readFloats(const ExrReader& reader, int part,
+                        const std::vector<std::string>& attributes, bool linear, AtlasPage& page) {
+    const ExrPart& header = reader.parts()[part];
+    const int width = header.width, height = header.height;
+    std::vector<ExrPixels> pixels;
+    Image<glm::vec4> colour;
+    const auto vectors = [&](const char* name, Image<glm::vec3>& image) {
+        image = Image<glm::vec3>(width, height);
+        addVectors(pixels, name, &image.data()->x);
+    };
+    for (const auto& attribute : attributes) {
+        if (attribute == "colour") {
+            colour = Image<glm::vec4>(width, height);
+            float* rgba = &colour.data()->x;
+            pixels.insert(
+                pixels.end(),
+                {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}, {"A", rgba + 3, 4}});
+        }
+        if (attribute == "depth") {
+            page.depth = Image<float>(width, height);
+            pixels.push_back({"Z", page.depth.data(), 1});
+        }
+        if (attribute == "normal") vectors("N", page.normal);
+        if (attribute == "splat") {
+            vectors("splatU", page.splatU);
+            vectors("splatV", page.splatV);
+        }
+    }
+    for (const auto& p : pixels) {
+        if (!header.channel(p.channel))
+            return failAt(reader.where(), ErrorCode::invalidInput, "part {} lacks the channel '{}'",
+                          part, p.channel);
+    }
+    STX_CHECK(reader.readPart(part, pixels));
+    for (const float d : page.depth.pixels()) {
+        if (!(d >= 0))
+            return failAt(reader.where(), ErrorCode::invalidInput,
+                          "depth holds {}; distances are 0 or more", d);
+    }
+    if (!colour.empty())
+        page.texture =
+            linear ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
+    return {};
+}
+
+Result<void> checkPartSize(const ExrReader& reader, int part, const AtlasHeader& header) {
+    const ExrPart& p = reader.parts()[part];
+    if (p.width == header.pageWidth && p.height == header.pageHeight) return {};
+    return failAt(reader.where(), ErrorCode::invalidInput,
+                  "part {} has {}x{} pixels, but the atlas' pages {}x{}", part, p.width, p.height,
+                  header.pageWidth, header.pageHeight);
+}
+
+/// One image of a folder into its page.
+Result<void> readImage(const fs::path& file, const AtlasHeader& header, const AtlasTexture& t,
+                       AtlasPage& page, const Limits& limits) {
+    STX_TRY(const auto bytes, readFile(file, limits));
+    const auto where = fmt::format("'{}'", file.string());
+    if (t.coding == "float") {
+        STX_TRY(const auto reader, ExrReader::open(bytes, file.string(), limits));
+        STX_CHECK(checkPartSize(reader, 0, header));
+        return readFloats(reader, 0, {t.attribute}, header.linear, page);
+    }
+    STX_TRY(auto image, decodeImage(bytes, file.string(), limits));
+    const int channels = t.attribute == "colour" ? 4 : t.attribute == "depth" ? 1 : 3;
+    const int bits = t.coding == "sRGB8" || t.coding == "code8" ? 8 : 16;
+    if (image.width != t.width || image.height != t.height || image.channels != channels ||
+        image.bits() != bits)
+        return failAt(where, ErrorCode::invalidInput,
+                      "it has {}x{} pixels of {} channels with {} bits, but atlas.json says {}x{} "
+                      "of {} with {}",
+                      image.width, image.height, image.channels, image.bits(), t.width, t.height,
+                      channels, bits);
+    if (t.attribute == "colour") {
+        Rgba8Image rgba(t.width, t.height);
+        const auto& from = std::get<0>(image.values);
+        for (std::size_t i = 0; i < rgba.count(); ++i)
+            rgba.pixels()[i] = {from[i * 4], from[i * 4 + 1], from[i * 4 + 2], from[i * 4 + 3]};
+        page.texture = Texture(std::move(rgba));
+        return {};
+    }
+    if (t.attribute == "depth") {
+        Image<std::uint16_t> codes(t.width, t.height);
+        const auto fill = [&](const auto& from) {
+            std::copy(from.begin(), from.end(), codes.pixels().begin());
+        };
+        if (bits == 8) fill(std::get<0>(image.values));
+        if (bits == 16) fill(std::get<1>(image.values));
+        auto depth = depthFromCodes(header.atlas, t.page, codes);
+        if (!depth) return tl::unexpected(depth.error().at(where));
+        page.depth = std::move(*depth);
+        return {};
+    }
+    const auto& rgb = std::get<1>(image.values);
+    const glm::ivec2 size(header.pageWidth, header.pageHeight);
+    if (t.attribute == "normal") page.normal = vectorsFromCodes(rgb, t.scale, 0, 0, t.width, size);
+    if (t.attribute == "splat") {
+        page.splatU = vectorsFromCodes(rgb, t.scale, 0, 0, t.width, size);
+        page.splatV = vectorsFromCodes(rgb, t.scale, t.splatVX, t.splatVY, t.width, size);
+    }
+    return {};
+}
+
+/// Rectangles must name views and pages that exist before depth codes are looked up by them.
+Result<void> checkRectangles(const AtlasHeader& header, const std::string& where) {
+    for (std::size_t i = 0; i < header.atlas.rectangles.size(); ++i) {
+        const auto& r = header.atlas.rectangles[i];
+        if (r.view >= static_cast<int>(header.atlas.views.size()) || r.page >= header.pages ||
+            r.atlasX + r.atlasWidth() > header.pageWidth ||
+            r.atlasY + r.atlasHeight() > header.pageHeight)
+            return failAt(where, ErrorCode::invalidInput,
+                          "rectangles[{}] names a view or page that does not exist, or leaves its "
+                          "page",
+                          i);
+    }
+    return {};
+}
+
+Result<void> checkMemory(const AtlasHeader& header, const std::string& where,
+                         const Limits& limits) {
+    std::uint64_t each = 0;
+    for (const auto& t : header.textures)
+        each += t.attribute == "colour"   ? (header.linear ? 16 : 4)
+                : t.attribute == "depth"  ? 4
+                : t.attribute == "normal" ? 12
+                                          : 24;
+    const auto pixels = static_cast<std::uint64_t>(header.pageWidth) * header.pageHeight;
+    if (auto ok = limits.checkAllocation(pixels, each, "the atlas"); !ok)
+        return tl::unexpected(ok.error().at(where));
+    return {};
+}
+
+fs::path folderOf(const fs::path& path) {
+    return path.filename() == kIndexFile ? path.parent_path() : path;
+}
+
+Result<AtlasHeader> exrHeader(const ExrReader& reader, const Limits& limits) {
+    const auto* json = reader.parts()[0].attribute<std::string>("stx:atlas");
+    if (!json || !isExrAtlas(reader))
+        return failAt(reader.where(), ErrorCode::invalidInput, "it holds no stx atlas");
+    STX_TRY(auto header, atlasFromJson(*json, reader.where() + ": stx:atlas", limits));
+    if (static_cast<int>(reader.parts().size()) != header.pages)
+        return failAt(reader.where(), ErrorCode::invalidInput,
+                      "it has {} parts, but the atlas {} pages", reader.parts().size(),
+                      header.pages);
+    for (auto& t : header.textures) {
+        if (t.coding != "float")
+            return failAt(reader.where(), ErrorCode::invalidInput,
+                          "the coding of its {} texture is '{}', not float", t.attribute, t.coding);
+    }
+    for (int i = 0; i < header.pages; ++i) STX_CHECK(checkPartSize(reader, i, header));
+    STX_CHECK(checkRectangles(header, reader.where()));
+    return header;
+}
+
+Result<AtlasHeader> folderHeader(const fs::path& path, const Limits& limits) {
+    const fs::path index = folderOf(path) / kIndexFile;
+    STX_TRY(const auto bytes, readFile(index, limits));
+    const auto where = fmt::format("'{}'", index.string());
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    STX_TRY(auto header, atlasFromJson(text, where, limits));
+    STX_CHECK(checkRectangles(header, where));
+    return header;
+}
+
+Result<Atlas> checked(Atlas atlas, const std::string& where) {
+    if (auto ok = atlas.check(); !ok) return tl::unexpected(ok.error().at(where));
+    return atlas;
+}
+
+Result<Atlas> readFolder(const fs::path& path, Job& job) {
+    STX_TRY(const auto header, folderHeader(path, job.limits));
+    const fs::path folder = folderOf(path);
+    const auto where = fmt::format("'{}'", folder.string());
+    STX_CHECK(checkMemory(header, where, job.limits));
+    Atlas atlas = header.atlas;
+    atlas.pages.resize(static_cast<std::size_t>(header.pages));
+    std::vector<Result<void>> done(header.textures.size());
+    parallelFor(0, static_cast<std::int64_t>(done.size()), [&](std::int64_t i) {
+        const AtlasTexture& t = header.textures[i];
+        auto file = resolveInside(folder, t.file, job.limits);
+        done[i] = file ? readImage(*file, header, t, atlas.pages[t.page], job.limits)
+                       : Result<void>(tl::unexpected(file.error().at(where)));
+    });
+    for (auto& result : done) {
+        if (!result) return propagate(result);
+    }
+    return checked(std::move(atlas), where);
+}
+
+Result<Atlas> readExr(const fs::path& path, Job& job) {
+    STX_TRY(const auto bytes, readFile(path, job.limits));
+    STX_TRY(const auto reader, ExrReader::open(bytes, path.string(), job.limits));
+    STX_TRY(const auto header, exrHeader(reader, job.limits));
+    STX_CHECK(checkMemory(header, reader.where(), job.limits));
+    Atlas atlas = header.atlas;
+    atlas.pages.resize(static_cast<std::size_t>(header.pages));
+    for (int i = 0; i < header.pages; ++i) {
+        std::vector<std::string> attributes;
+        for (const auto& t : header.textures) {
+            if (t.page == i) attributes.push_back(t.attribute);
+        }
+        STX_CHECK(readFloats(reader, i, attributes, header.linear, atlas.pages[i]));
+    }
+    return checked(std::move(atlas), reader.where());
+}
+
+/// A file is an OpenEXR atlas unless it is the folder's index.
+bool isFolderPath(const fs::path& path) {
+    std::error_code ec;
+    return fs::is_directory(path, ec) || path.filename() == kIndexFile;
+}
+
+}  // namespace
+
+double AtlasHeader::used() const {
+    double covered = 0;
+    for (const auto& r : atlas.rectangles) covered += static_cast<double>(r.width) * r.height;
+    return covered / (static_cast<double>(pageWidth) * pageHeight * pages);
+}
+
+Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,
+                        OutputFile::Options options) {
+    STX_CHECK(atlas.check());
+    auto ok = isExrName(path) ? writeExr(atlas, path, job, options)
+                              : writeFolder(atlas, path, job, options);
+    return ok;
+}
+
+Result<Atlas> readAtlas(const fs::path& path, Job& job) {
+    return isFolderPath(path) ? readFolder(path, job) : readExr(path, job);
+}
+
+Result<AtlasHeader> readAtlasHeader(const fs::path& path, const Limits& limits) {
+    if (!isFolderPath(path)) {
+        STX_TRY(const auto reader, ExrReader::open(path, limits));
+        STX_TRY(auto header, exrHeader(reader, limits));
+        // Which of a part's bytes are whose is not told; they stand with its colour.
+        for (auto& t : header.textures)
+            t.bytes = t.attribute == "colour" ? reader.parts()[t.page].bytes : 0;
+        return header;
+    }
+    STX_TRY(auto header, folderHeader(path, limits));
+    for (auto& t : header.textures) {
+        std::error_code ec;
+        if (const auto file = resolveInside(folderOf(path), t.file, limits)) {
+            const auto size = fs::file_size(*file, ec);
+            t.bytes = ec ? 0 : size;
+        }
+    }
+    return header;
+}
+
+bool isAtlasFolder(const fs::path& path) {
+    std::error_code ec;
+    return fs::is_regular_file(folderOf(path) / kIndexFile, ec) && isFolderPath(path);
+}
+
+bool isExrAtlas(const ExrReader& reader) {
+    const auto* kind = reader.parts()[0].attribute<std::string>("stx:kind");
+    return kind && *kind == "atlas";
+}
+
+}  // namespace stx

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "formats/exr/exr_file.hpp"
+#include "formats/files/files.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/atlas.hpp"
+
+namespace stx {
+
+/// One image of an atlas set.
+struct AtlasTexture {
+    std::string
+        attribute;  ///< "colour", "depth", "normal" or "splat" (splatU and splatV share one)
+    int page = 0;
+    std::string file;  ///< name in the folder; empty in an OpenEXR atlas
+    /// "sRGB8": 8-bit sRGB, straight alpha · "code8", "code16": the DepthImage codes of each
+    /// rectangle's view (its nearPlane, farPlane, depthBits) · "snorm16": 32768 + 32767 * v / scale
+    /// of each component · "float": OpenEXR, as in bundles.
+    std::string coding;
+    int width = 0, height = 0;  ///< pixels of the image; splat images in snorm16 hold two
+    double scale = 1.0;         ///< snorm16: the value of code 65535
+    /// snorm16 splats: where the pixel (0, 0) of splatV lies; splatU starts at (0, 0).
+    int splatVX = 0, splatVY = 0;
+    std::uint64_t bytes = 0;  ///< as it lies in the file; 0 = not known
+};
+
+/// What an atlas says without its pixels.
+struct AtlasHeader {
+    Atlas atlas;  ///< pages have no images, so its width(), height() and used() are 0
+    int pageWidth = 0, pageHeight = 0;
+    int pages = 0;
+    bool linear = false;
+    std::vector<AtlasTexture> textures;  ///< at most 4
+
+    /// Share of the page area that rectangles cover, 0..1.
+    [[nodiscard]] double used() const;
+};
+
+/// Writes an atlas: one multi-part OpenEXR file (a part for each page) when the name ends in .exr,
+/// else a folder of atlas.json (formats/atlas/atlas.schema.json) and at most four images:
+/// colour.png, depth.png, normal.png, splat.png, those of page k > 0 as colour_k.png and so on.
+/// 8- and 16-bit depth comes back to the code and normals to 1/32767; an atlas with a view of 32
+/// depth bits gets .exr images, and everything comes back to the bit. Linear colour is colour.exr.
+/// Depth that belongs to no rectangle or its padding is dropped with a note. Colours under alpha 0
+/// are bled anew when they come from OpenEXR. Errors: Atlas::check(), files.
+[[nodiscard]] Result<void> writeAtlas(const Atlas& atlas, const std::filesystem::path& path,
+                                      Job& job, OutputFile::Options options = {});
+
+/// Reads what writeAtlas() wrote: a folder, its atlas.json, or an .exr file. The images' names
+/// resolve inside the folder only. The result passes Atlas::check().
+[[nodiscard]] Result<Atlas> readAtlas(const std::filesystem::path& path, Job& job);
+/// The same without pixels, in milliseconds.
+[[nodiscard]] Result<AtlasHeader> readAtlasHeader(const std::filesystem::path& path,
+                                                  const Limits& limits);
+
+/// The path is a folder that holds an atlas.json, or that file itself.
+[[nodiscard]] bool isAtlasFolder(const std::filesystem::path& path);
+/// An OpenEXR file that holds an atlas and no bundle.
+[[nodiscard]] bool isExrAtlas(const ExrReader& reader);
+
+}  // namespace stx

@@ -1,0 +1,353 @@
+#include "formats/atlas/atlas_json.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace stx {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json arrayOf(glm::dvec2 v) {
+    return Json::array({v.x, v.y});
+}
+Json arrayOf(glm::dvec3 v) {
+    return Json::array({v.x, v.y, v.z});
+}
+Json arrayOf(glm::dvec4 v) {
+    return Json::array({v.x, v.y, v.z, v.w});
+}
+
+Json jsonOf(const ReferenceView& v) {
+    const Camera& c = v.camera;
+    Json j;
+    j["name"] = v.name;
+    j["width"] = c.width;
+    j["height"] = c.height;
+    j["position"] = arrayOf(c.position);
+    j["orientation"] = arrayOf(axisAngleFromQuat(c.orientation));
+    j["quaternion"] =
+        Json::array({c.orientation.w, c.orientation.x, c.orientation.y, c.orientation.z});
+    j["fieldOfView"] = arrayOf(c.fieldOfView());
+    j["orthographic"] = c.orthographic;
+    j["fx"] = c.fx;
+    j["fy"] = c.fy;
+    j["cx"] = c.cx;
+    j["cy"] = c.cy;
+    j["nearPlane"] = v.nearPlane;
+    j["farPlane"] = v.farPlane;
+    j["depthBits"] = v.depthBits;
+    return j;
+}
+
+Json jsonOf(const AtlasRectangle& r) {
+    return {{"view", r.view},     {"page", r.page},     {"viewX", r.viewX},
+            {"viewY", r.viewY},   {"width", r.width},   {"height", r.height},
+            {"atlasX", r.atlasX}, {"atlasY", r.atlasY}, {"turned", r.turned}};
+}
+
+Json jsonOf(const AtlasTexture& t) {
+    Json j = {{"attribute", t.attribute}, {"page", t.page}};
+    if (!t.file.empty()) j["file"] = t.file;
+    j["coding"] = t.coding;
+    j["width"] = t.width;
+    j["height"] = t.height;
+    if (t.coding == "snorm16") j["scale"] = t.scale;
+    if (t.coding == "snorm16" && t.attribute == "splat")
+        j["splatV"] = Json::array({t.splatVX, t.splatVY});
+    return j;
+}
+
+/// "name": [ one entry a line ]. Long lists stay readable, and a diff shows what changed.
+template <class List>
+std::string linesOf(const char* name, const List& list) {
+    std::string text = fmt::format("  \"{}\": [", name);
+    const char* separator = "\n    ";
+    for (const auto& entry : list) {
+        text += separator + jsonOf(entry).dump(-1, ' ', false, Json::error_handler_t::replace);
+        separator = ",\n    ";
+    }
+    return text + (list.empty() ? "]" : "\n  ]");
+}
+
+/// Typed access that says where in the document something is wrong.
+class Reader {
+  public:
+    Reader(const Json& json, std::string path, const std::string& where)
+        : json_(json), path_(std::move(path)), where_(where) {}
+
+    template <class T>
+    Result<void> number(const char* name, T& to, double least, double most) const {
+        const auto it = json_.find(name);
+        if (it == json_.end()) return wrong(name, "is missing");
+        constexpr bool whole = std::is_integral_v<T>;
+        if (whole ? !it->is_number_integer() : !it->is_number())
+            return wrong(name, whole ? "must be a whole number" : "must be a number");
+        const double value = it->template get<double>();
+        if (!(value >= least && value <= most))
+            return wrong(name, fmt::format("is {}; {} to {} is possible", value, least, most));
+        to = it->template get<T>();
+        return {};
+    }
+    Result<void> finite(const char* name, double& to) const {
+        return number(name, to, -1e300, 1e300);
+    }
+    Result<void> flag(const char* name, bool& to) const {
+        const auto it = json_.find(name);
+        if (it == json_.end() || !it->is_boolean()) return wrong(name, "must be true or false");
+        to = it->get<bool>();
+        return {};
+    }
+    Result<void> text(const char* name, std::string& to, bool needed = true) const {
+        const auto it = json_.find(name);
+        if (it == json_.end() && !needed) return {};
+        if (it == json_.end() || !it->is_string()) return wrong(name, "must be a text");
+        to = it->get<std::string>();
+        return {};
+    }
+    template <std::size_t N>
+    Result<void> vector(const char* name, std::array<double, N>& to) const {
+        const auto it = json_.find(name);
+        if (it == json_.end() || !it->is_array() || it->size() != N)
+            return wrong(name, fmt::format("must be a list of {} numbers", N));
+        for (std::size_t i = 0; i < N; ++i) {
+            if (!(*it)[i].is_number()) return wrong(name, "holds something that is no number");
+            to[i] = (*it)[i].get<double>();
+            if (!std::isfinite(to[i])) return wrong(name, "holds a number that is not finite");
+        }
+        return {};
+    }
+    /// Calls take(reader of entry) for each object in a list.
+    template <class Take>
+    Result<void> list(const char* name, std::size_t most, const Take& take) const {
+        const auto it = json_.find(name);
+        if (it == json_.end() || !it->is_array()) return wrong(name, "must be a list");
+        if (it->size() > most)
+            return wrong(name,
+                         fmt::format("has {} entries; at most {} are read", it->size(), most));
+        for (std::size_t i = 0; i < it->size(); ++i) {
+            const Reader entry((*it)[i], fmt::format("{}{}[{}]", path_, name, i), where_);
+            if (!(*it)[i].is_object()) return entry.wrong("", "must be an object");
+            STX_CHECK(take(entry.inside()));
+        }
+        return {};
+    }
+    /// The object of that name, when it is there.
+    [[nodiscard]] std::optional<Reader> object(const char* name) const {
+        const auto it = json_.find(name);
+        if (it == json_.end() || !it->is_object()) return std::nullopt;
+        return Reader(*it, fmt::format("{}{}.", path_, name), where_);
+    }
+    [[nodiscard]] Reader inside() const { return {json_, path_ + ".", where_}; }
+    [[nodiscard]] tl::unexpected<Error> wrong(const char* name, std::string_view what) const {
+        return failAt(where_, ErrorCode::invalidInput, "{}{} {}", path_, name, what);
+    }
+
+  private:
+    const Json& json_;
+    std::string path_;
+    const std::string& where_;
+};
+
+constexpr double kAnyInt = 2147483647.0;
+
+Result<void> readView(const Reader& r, const Limits& limits, ReferenceView& v) {
+    Camera& c = v.camera;
+    std::array<double, 3> position{};
+    std::array<double, 4> q{};
+    STX_CHECK(r.text("name", v.name));
+    STX_CHECK(r.number("width", c.width, 1, limits.maxImageSide));
+    STX_CHECK(r.number("height", c.height, 1, limits.maxImageSide));
+    STX_CHECK(r.vector("position", position));
+    STX_CHECK(r.vector("quaternion", q));
+    STX_CHECK(r.flag("orthographic", c.orthographic));
+    STX_CHECK(r.finite("fx", c.fx));
+    STX_CHECK(r.finite("fy", c.fy));
+    STX_CHECK(r.finite("cx", c.cx));
+    STX_CHECK(r.finite("cy", c.cy));
+    STX_CHECK(r.number("nearPlane", v.nearPlane, 0, 1e300));
+    STX_CHECK(r.number("farPlane", v.farPlane, 0, 1e300));
+    if (!(v.nearPlane < v.farPlane)) return r.wrong("farPlane", "must be beyond nearPlane");
+    STX_CHECK(r.number("depthBits", v.depthBits, 8, 32));
+    if (v.depthBits != 8 && v.depthBits != 16 && v.depthBits != 32)
+        return r.wrong("depthBits", "must be 8, 16 or 32");
+    c.position = {position[0], position[1], position[2]};
+    c.orientation = glm::dquat(q[0], q[1], q[2], q[3]);
+    return {};
+}
+
+Result<void> readTexture(const Reader& r, const Limits& limits, const AtlasHeader& header,
+                         AtlasTexture& t) {
+    STX_CHECK(r.text("attribute", t.attribute));
+    const bool known = t.attribute == "colour" || t.attribute == "depth" ||
+                       t.attribute == "normal" || t.attribute == "splat";
+    if (!known) return r.wrong("attribute", "must be colour, depth, normal or splat");
+    STX_CHECK(r.number("page", t.page, 0, header.pages - 1));
+    STX_CHECK(r.text("file", t.file, false));
+    STX_CHECK(r.text("coding", t.coding));
+    STX_CHECK(r.number("width", t.width, 1, limits.maxImageSide * 2.0));
+    STX_CHECK(r.number("height", t.height, 1, limits.maxImageSide * 2.0));
+    const bool vectors = t.attribute == "normal" || t.attribute == "splat";
+    const bool fits = t.coding == "float" || (t.attribute == "colour" && t.coding == "sRGB8") ||
+                      (t.attribute == "depth" && (t.coding == "code8" || t.coding == "code16")) ||
+                      (vectors && t.coding == "snorm16");
+    if (!fits) return r.wrong("coding", fmt::format("is unknown for the {} texture", t.attribute));
+    int width = header.pageWidth, height = header.pageHeight;
+    if (t.coding == "snorm16") {
+        STX_CHECK(r.number("scale", t.scale, 0, 1e30));
+        if (t.attribute == "splat") {
+            std::array<double, 2> start{};
+            STX_CHECK(r.vector("splatV", start));
+            const bool beside = start[0] == width && start[1] == 0;
+            const bool below = start[0] == 0 && start[1] == height;
+            if (!beside && !below) return r.wrong("splatV", "must be beside or below splatU");
+            t.splatVX = beside ? width : 0;
+            t.splatVY = beside ? 0 : height;
+            width += t.splatVX;
+            height += t.splatVY;
+        }
+    }
+    if (t.width != width || t.height != height)
+        return r.wrong("width", fmt::format("and height are {}x{}, but the page needs {}x{}",
+                                            t.width, t.height, width, height));
+    return {};
+}
+
+Result<void> checkTextures(const Reader& r, const AtlasHeader& header) {
+    if (header.textures.size() > 4) return r.wrong("textures", "are more than 4");
+    for (int page = 0; page < header.pages; ++page) {
+        std::map<std::string, int> count;
+        for (const auto& t : header.textures) count[t.attribute] += t.page == page ? 1 : 0;
+        for (const auto& [attribute, n] : count) {
+            if (n > 1)
+                return r.wrong("textures",
+                               fmt::format("hold two of {} for page {}", attribute, page));
+        }
+        for (const char* needed : {"colour", "depth"}) {
+            if (count[needed] != 1)
+                return r.wrong("textures", fmt::format("lack the {} of page {}", needed, page));
+        }
+    }
+    return {};
+}
+
+/// Deeper nesting than we ever write would only exhaust something.
+Result<void> checkNesting(std::string_view text, const std::string& where, int most) {
+    int depth = 0;
+    bool quoted = false;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
+        if (quoted && c == '\\') ++i;
+        if (c == '"') quoted = !quoted;
+        if (quoted) continue;
+        if (c == '[' || c == '{') ++depth;
+        if (c == ']' || c == '}') --depth;
+        if (depth > most)
+            return failAt(where, ErrorCode::invalidInput,
+                          "the JSON is nested more than {} deep at byte {}", most, i);
+    }
+    return {};
+}
+
+Result<Json> parse(std::string_view text, const std::string& where) {
+    try {
+        return Json::parse(text);
+    } catch (const Json::parse_error& e) {
+        return failAt(where, ErrorCode::invalidInput, "it is no valid JSON at byte {}", e.byte);
+    } catch (const std::exception& e) {
+        return failAt(where, ErrorCode::invalidInput, "it is no valid JSON: {}", e.what());
+    }
+}
+
+}  // namespace
+
+std::string atlasJson(const AtlasHeader& header) {
+    const Atlas& atlas = header.atlas;
+    Json top;
+    top["$schema"] = kAtlasSchema;
+    top["version"] = 1;
+    top["title"] = atlas.title;
+    top["layout"] = atlas.layout;
+    top["padding"] = atlas.padding;
+    top["pages"] = header.pages;
+    top["width"] = header.pageWidth;
+    top["height"] = header.pageHeight;
+    top["linear"] = header.linear;
+    if (atlas.bounds && !atlas.bounds->empty())
+        top["bounds"] = {{"min", arrayOf(atlas.bounds->min)}, {"max", arrayOf(atlas.bounds->max)}};
+    top["pixels"] = {{"source", atlas.sourcePixels}, {"kept", atlas.keptPixels}};
+    std::string text = "{\n";
+    for (const auto& [key, value] : top.items())
+        text += fmt::format("  \"{}\": {},\n", key,
+                            value.dump(-1, ' ', false, Json::error_handler_t::replace));
+    text += linesOf("textures", header.textures) + ",\n";
+    text += linesOf("views", atlas.views) + ",\n";
+    text += linesOf("rectangles", atlas.rectangles) + "\n}\n";
+    return text;
+}
+
+Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& where,
+                                  const Limits& limits) {
+    // A parsed document takes some 30 times its text.
+    if (auto ok = limits.checkAllocation(text.size(), 32, "the atlas' JSON"); !ok)
+        return tl::unexpected(ok.error().at(where));
+    STX_CHECK(checkNesting(text, where, std::min(limits.maxNesting, 16)));
+    STX_TRY(const Json json, parse(text, where));
+    if (!json.is_object())
+        return failAt(where, ErrorCode::invalidInput, "it is no JSON object, so no atlas");
+    const Reader top(json, "", where);
+    AtlasHeader header;
+    Atlas& atlas = header.atlas;
+    int version = 0;
+    STX_CHECK(top.number("version", version, 1, kAnyInt));
+    if (version > 1)
+        return failAt(where, ErrorCode::unsupported,
+                      "it was written by a newer stx (version {}; this one knows 1)", version);
+    STX_CHECK(top.text("title", atlas.title, false));
+    STX_CHECK(top.text("layout", atlas.layout));
+    if (atlas.layout != "grid" && atlas.layout != "tight")
+        return top.wrong("layout", "must be grid or tight");
+    STX_CHECK(top.number("padding", atlas.padding, 0, limits.maxImageSide));
+    STX_CHECK(top.number("pages", header.pages, 1, 2));
+    STX_CHECK(top.number("width", header.pageWidth, 1, limits.maxImageSide));
+    STX_CHECK(top.number("height", header.pageHeight, 1, limits.maxImageSide));
+    STX_CHECK(top.flag("linear", header.linear));
+    if (const auto bounds = top.object("bounds")) {
+        std::array<double, 3> min{}, max{};
+        STX_CHECK(bounds->vector("min", min));
+        STX_CHECK(bounds->vector("max", max));
+        atlas.bounds = Bounds{{min[0], min[1], min[2]}, {max[0], max[1], max[2]}};
+    }
+    if (const auto pixels = top.object("pixels")) {
+        STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));
+        STX_CHECK(pixels->number("kept", atlas.keptPixels, 0, 1e15));
+    }
+    STX_CHECK(top.list("textures", 4, [&](const Reader& r) {
+        return readTexture(r, limits, header, header.textures.emplace_back());
+    }));
+    STX_CHECK(checkTextures(top, header));
+    STX_CHECK(top.list("views", static_cast<std::size_t>(limits.maxViews), [&](const Reader& r) {
+        return readView(r, limits, atlas.views.emplace_back());
+    }));
+    const auto most = static_cast<std::size_t>(header.pageWidth) * header.pageHeight * header.pages;
+    const auto readRectangle = [&](const Reader& r) -> Result<void> {
+        AtlasRectangle& rect = atlas.rectangles.emplace_back();
+        for (const auto& [name, to] :
+             std::initializer_list<std::pair<const char*, int*>>{{"view", &rect.view},
+                                                                 {"page", &rect.page},
+                                                                 {"viewX", &rect.viewX},
+                                                                 {"viewY", &rect.viewY},
+                                                                 {"width", &rect.width},
+                                                                 {"height", &rect.height},
+                                                                 {"atlasX", &rect.atlasX},
+                                                                 {"atlasY", &rect.atlasY}}) {
+            STX_CHECK(r.number(name, *to, 0, kAnyInt / 4));
+        }
+        return r.flag("turned", rect.turned);
+    };
+    STX_CHECK(top.list("rectangles", most, readRectangle));
+    return header;
+}
+
+}  // namespace stx

@@ -1,0 +1,127 @@
+#include "formats/atlas/atlas_textures.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+
+namespace {
+
+/// Calls visit(rectangle, x0, y0, x1, y1) for each rectangle of the page: first all with their
+/// padding, then all without, so that a rectangle's own pixels are always its own.
+template <class Visit>
+void forEachArea(const Atlas& atlas, int page, const Visit& visit) {
+    for (const bool padded : {true, false}) {
+        const int around = padded ? atlas.padding : 0;
+        if (padded && around == 0) continue;
+        for (const auto& r : atlas.rectangles) {
+            if (r.page != page) continue;
+            visit(r, std::max(0, r.atlasX - around), std::max(0, r.atlasY - around),
+                  r.atlasX + r.atlasWidth() + around, r.atlasY + r.atlasHeight() + around);
+        }
+    }
+}
+
+/// The same in an order of rows, so that overlapping paddings are settled alike on both ways:
+/// which view each pixel belongs to, -1 = none.
+Image<std::int32_t> owners(const Atlas& atlas, int page, glm::ivec2 size) {
+    Image<std::int32_t> owner(size.x, size.y, -1);
+    forEachArea(atlas, page, [&](const AtlasRectangle& r, int x0, int y0, int x1, int y1) {
+        for (int y = y0; y < std::min(y1, size.y); ++y) {
+            const auto row = owner.row(y);
+            std::fill(row.begin() + x0, row.begin() + std::min(x1, size.x), r.view);
+        }
+    });
+    return owner;
+}
+
+}  // namespace
+
+DepthCodes depthCodes(const Atlas& atlas, int page) {
+    const Image<float>& depth = atlas.pages[page].depth;
+    const auto owner = owners(atlas, page, depth.size());
+    DepthCodes result;
+    result.codes = Image<std::uint16_t>(depth.width(), depth.height());
+    std::atomic<std::int64_t> outside = 0, clamped = 0;
+    parallelFor(0, depth.height(), [&](std::int64_t row) {
+        std::int64_t lost = 0, moved = 0;
+        for (int x = 0, y = static_cast<int>(row); x < depth.width(); ++x) {
+            const float d = depth.at(x, y);
+            if (!hasPoint(d)) continue;
+            const int view = owner.at(x, y);
+            if (view < 0) {
+                ++lost;
+                continue;
+            }
+            const DepthCode code = atlas.views[view].depthCode();
+            result.codes.at(x, y) = static_cast<std::uint16_t>(code.encode(d));
+            const double slack = code.step() * 0.5 + 1e-6 * code.farPlane;
+            if (d < code.nearPlane - slack || d > code.farPlane + slack) ++moved;
+        }
+        outside += lost;
+        clamped += moved;
+    });
+    result.outside = outside;
+    result.clamped = clamped;
+    return result;
+}
+
+Result<Image<float>> depthFromCodes(const Atlas& atlas, int page,
+                                    const Image<std::uint16_t>& codes) {
+    const auto owner = owners(atlas, page, codes.size());
+    Image<float> depth(codes.width(), codes.height(), kNoDepth);
+    std::atomic<bool> tooLarge = false;
+    parallelFor(0, codes.height(), [&](std::int64_t row) {
+        for (int x = 0, y = static_cast<int>(row); x < codes.width(); ++x) {
+            const std::uint32_t d = codes.at(x, y);
+            const int view = owner.at(x, y);
+            if (d == 0 || view < 0) continue;
+            const DepthCode code = atlas.views[view].depthCode();
+            if (d > code.dmax) tooLarge = true;
+            depth.at(x, y) = static_cast<float>(code.decode(d));
+        }
+    });
+    if (tooLarge)
+        return fail(ErrorCode::invalidInput,
+                    "the depth texture of page {} holds codes above 255 where its view has 8 bits",
+                    page);
+    return depth;
+}
+
+double largestComponent(const Image<glm::vec3>& vectors) {
+    float largest = 0.0f;
+    for (const auto& v : vectors.pixels())
+        largest = std::max({largest, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    return largest > 0.0f ? largest : 1.0;
+}
+
+void codeVectors(const Image<glm::vec3>& vectors, double scale, int x0, int y0, int width,
+                 std::vector<std::uint16_t>& rgb) {
+    parallelFor(0, vectors.height(), [&](std::int64_t y) {
+        auto* to = rgb.data() + ((y + y0) * static_cast<std::size_t>(width) + x0) * 3;
+        for (const auto& v : vectors.row(static_cast<int>(y))) {
+            for (int c = 0; c < 3; ++c) {
+                const double value = std::clamp(v[c] / scale, -1.0, 1.0);
+                *to++ = static_cast<std::uint16_t>(32768 + std::lround(32767.0 * value));
+            }
+        }
+    });
+}
+
+Image<glm::vec3> vectorsFromCodes(const std::vector<std::uint16_t>& rgb, double scale, int x0,
+                                  int y0, int width, glm::ivec2 size) {
+    Image<glm::vec3> vectors(size.x, size.y);
+    parallelFor(0, size.y, [&](std::int64_t y) {
+        const auto* from = rgb.data() + ((y + y0) * static_cast<std::size_t>(width) + x0) * 3;
+        for (auto& v : vectors.row(static_cast<int>(y))) {
+            for (int c = 0; c < 3; ++c)
+                v[c] = static_cast<float>((static_cast<int>(*from++) - 32768) * scale / 32767.0);
+        }
+    });
+    return vectors;
+}
+
+}  // namespace stx

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "formats/atlas/atlas_files.hpp"
+
+namespace stx {
+
+/// Pixels of an atlas' textures as the integers that PNG files hold, and back.
+
+/// Codes of a page's depth: each rectangle and its padding with the code of its view, all else 0.
+/// Counts points that no rectangle holds (they become 0) and points outside their view's planes.
+struct DepthCodes {
+    Image<std::uint16_t> codes;
+    std::int64_t outside = 0;
+    std::int64_t clamped = 0;
+};
+[[nodiscard]] DepthCodes depthCodes(const Atlas& atlas, int page);
+/// The inverse, for an atlas whose rectangles were checked. A code beyond the view's dmax is an
+/// error (invalidInput).
+[[nodiscard]] Result<Image<float>> depthFromCodes(const Atlas& atlas, int page,
+                                                  const Image<std::uint16_t>& codes);
+
+/// Largest component of vectors, the scale of their codes; 1 when all are zero.
+[[nodiscard]] double largestComponent(const Image<glm::vec3>& vectors);
+/// 32768 + 32767 * v / scale of each component, into interleaved RGB at (x0, y0) of an image that
+/// is `width` pixels wide.
+void codeVectors(const Image<glm::vec3>& vectors, double scale, int x0, int y0, int width,
+                 std::vector<std::uint16_t>& rgb);
+/// The inverse; zero comes back as zero.
+[[nodiscard]] Image<glm::vec3> vectorsFromCodes(const std::vector<std::uint16_t>& rgb, double scale,
+                                                int x0, int y0, int width, glm::ivec2 size);
+
+}  // namespace stx
