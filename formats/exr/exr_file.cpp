@@ -36,6 +36,10 @@ namespace {
 template <class Work>
 auto adapt(ErrorCode code, const std::string& where, const Work& work) -> decltype(work()) {
     const auto failed = [&](ErrorCode why, std::string_view text) {
+        // The library wraps a reason once for each layer; ours names the file already.
+        for (auto quote = text.find("\". "); quote != std::string_view::npos;
+             quote = text.find("\". "))
+            text.remove_prefix(quote + 3);
         std::string line(text);
         std::replace(line.begin(), line.end(), '\n', ' ');
         while (!line.empty() && (line.back() == ' ' || line.back() == '.')) line.pop_back();

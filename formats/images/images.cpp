@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <mutex>
+#include <shared_mutex>
 
+#include "formats/exr/exr_image.hpp"
 #include "formats/images/codec_module.hpp"
+#include "formats/images/isolated_decode.hpp"
 #include "formats/images/strip.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/texture.hpp"
@@ -104,12 +108,20 @@ void appendBytes(void* context, const void* bytes, std::size_t size) {
     static_cast<Bytes*>(context)->insert(static_cast<Bytes*>(context)->end(), from, from + size);
 }
 
+/// Shared while a thread is inside the codecs, alone while a process is forked for one: the copy
+/// must not find their locks taken by threads that it has not.
+std::shared_mutex& codecsInUse() {
+    static std::shared_mutex mutex;
+    return mutex;
+}
+
 Result<Bytes> encode(codecs::EncodeRequest request, std::string_view kind) {
     STX_TRY(const auto* table, loadCodecs());
     Bytes bytes;
     request.context = &bytes;
     request.emit = appendBytes;
     codecs::Failure failure;
+    const std::shared_lock lock(codecsInUse());
     if (!table->encode(request, failure))
         return fail(ErrorCode::failed, "cannot encode a {} of {}x{} pixels: {}", kind,
                     request.width, request.height, failure.message);
@@ -137,8 +149,10 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
     const std::string shown(name);
     const auto where = fmt::format("'{}'", shown);
     if (bytes.empty()) return failAt(where, ErrorCode::invalidInput, "the image file is empty");
+    if (isExr(bytes)) return decodeExr(bytes, name, limits);
     // Told from a few bytes, before a library is loaded or trusted.
-    if (const auto info = probeImage(bytes)) {
+    const auto info = probeImage(bytes);
+    if (info) {
         codecs::Header header;
         header.width = info->width;
         header.height = info->height;
@@ -159,8 +173,16 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
     request.context = &decoding;
     request.allocate = allocateImage;
     codecs::Failure failure;
-    if (!(*table)->decode(request, failure))
-        return failAt(where, codeOf(failure), "{}", failure.message);
+    bool decoded = false;
+    if (info) {
+        const std::shared_lock lock(codecsInUse());
+        decoded = (*table)->decode(request, failure);
+    } else {
+        // PNG and JPEG reach their decoders without metadata; the others' fail on less.
+        const std::unique_lock lock(codecsInUse());
+        decoded = decodeIsolated(**table, request, limits.maxMemoryBytes, failure);
+    }
+    if (!decoded) return failAt(where, codeOf(failure), "{}", failure.message);
     return std::move(decoding.image);
 }
 

@@ -69,17 +69,10 @@ const char* formatByContent(std::string_view head) {
         const char* format;
     };
     static constexpr Magic kMagics[] = {
-        {"\x89PNG\r\n"sv, "png"},
-        {"\xff\xd8\xff"sv, "jpeg"},
-        {"\x76\x2f\x31\x01"sv, "openexr"},
-        {"II*\0"sv, "tiff"},
-        {"MM\0*"sv, "tiff"},
-        {"BM"sv, "bmp"},
-        {"GIF8"sv, "gif"},
-        {"#?"sv, "hdr"},
-        {"8BPS"sv, "psd"},
-        {"DDS "sv, "dds"},
-        {"SDPX"sv, "dpx"},
+        {"\x89PNG\r\n"sv, "png"}, {"\xff\xd8\xff"sv, "jpeg"},
+
+        {"II*\0"sv, "tiff"},      {"MM\0*"sv, "tiff"},        {"BM"sv, "bmp"},   {"GIF8"sv, "gif"},
+        {"#?"sv, "hdr"},          {"8BPS"sv, "psd"},          {"DDS "sv, "dds"}, {"SDPX"sv, "dpx"},
         {"XPDS"sv, "dpx"},
     };
     for (const auto& magic : kMagics) {
@@ -87,6 +80,29 @@ const char* formatByContent(std::string_view head) {
     }
     if (head.starts_with("RIFF") && head.size() >= 12 && head.substr(8, 4) == "WEBP") return "webp";
     return "";
+}
+
+/// Formats without telling first bytes. The library has more, which make pictures out of nothing
+/// but the name, or read films.
+std::string formatByEnding(std::string_view ending) {
+    std::string lower(ending);
+    for (char& c : lower) {
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    }
+    struct Ending {
+        std::string_view ending;
+        const char* format;
+    };
+    static constexpr Ending kEndings[] = {
+        {"tga", "targa"},    {"tpic", "targa"},   {"pnm", "pnm"},      {"ppm", "pnm"},
+        {"pgm", "pnm"},      {"pbm", "pnm"},      {"pfm", "pnm"},      {"jp2", "jpeg2000"},
+        {"j2k", "jpeg2000"}, {"j2c", "jpeg2000"}, {"jpc", "jpeg2000"}, {"sgi", "sgi"},
+        {"rgb", "sgi"},      {"rgba", "sgi"},     {"bw", "sgi"},       {"int", "sgi"},
+    };
+    for (const auto& known : kEndings) {
+        if (lower == known.ending) return known.format;
+    }
+    return {};
 }
 
 /// A file without a name, for formats that the library reads by name only.
@@ -124,12 +140,12 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     if (format.empty()) {
         const std::string_view name = request.name;
         const auto dot = name.rfind('.');
-        if (dot == std::string_view::npos)
-            throw Failed{ErrorCode::invalidInput,
-                         "it is no image of a known kind (neither its first bytes nor its name "
-                         "tell one)"};
-        format = name.substr(dot + 1);
+        if (dot != std::string_view::npos) format = formatByEnding(name.substr(dot + 1));
     }
+    if (format.empty())
+        throw Failed{ErrorCode::invalidInput,
+                     "it is no image of a known kind (PNG, JPEG, TIFF, BMP, "
+                     "TGA, HDR, WebP, GIF, PSD, PNM, DDS, JPEG 2000, SGI)"};
 
     OIIO::ImageSpec config;
     // Alpha and colour as the file stores them: no multiplying, no dividing.

@@ -195,8 +195,7 @@ TEST(Decode, MalformedFilesEndInResultsOrErrors) {
     Limits limits;
     limits.maxMemoryBytes = 1ull << 30;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-        const auto ending = entry.path().extension();
-        if (ending != ".png" && ending != ".jpg") continue;
+        if (!entry.is_regular_file()) continue;
         SCOPED_TRACE(entry.path().string());
         ++files;
         const auto bytes = readFile(entry.path(), limits);
@@ -209,7 +208,7 @@ TEST(Decode, MalformedFilesEndInResultsOrErrors) {
             EXPECT_FALSE(image.error().message.empty());
         }
     }
-    EXPECT_GT(files, 15);
+    EXPECT_GT(files, 50);
 }
 
 TEST(Decode, IsSafeFromManyThreads) {
