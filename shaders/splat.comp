@@ -45,7 +45,6 @@ Paint paintOf(Point p) {
 void add(int at, float kernel, float depth, Paint paint) {
     float nearest = uintBitsToFloat(front[at]);
     if (!(depth <= nearest * (1.0 + paint.tolerance))) return;
-    if (!(kernel > 0.0)) return;
 #if ACCUMULATE == 1
     float weight = kernel * paint.quality;
 #else
@@ -143,10 +142,13 @@ void main() {
 #else
     Paint paint = paintOf(p);
     vec2 near = lowPass(f2), far = lowPass(g2);
-    add(index, near.x * near.y, z, paint);
-    add(index + 1, far.x * near.y, z + zx, paint);
-    add(index + stride, near.x * far.y, z + zy, paint);
-    add(index + stride + 1, far.x * far.y, z + zx + zy, paint);
+    vec4 kernel = vec4(near.x, far.x, near.x, far.x) * vec4(near.yy, far.yy);
+    vec4 radius2 = vec4(f2.x, g2.x, f2.x, g2.x) + vec4(f2.yy, g2.yy);
+    float core2 = tasks[p.task].core2;
+    if (worthwhile(kernel.x, radius2.x, core2)) add(index, kernel.x, z, paint);
+    if (worthwhile(kernel.y, radius2.y, core2)) add(index + 1, kernel.y, z + zx, paint);
+    if (worthwhile(kernel.z, radius2.z, core2)) add(index + stride, kernel.z, z + zy, paint);
+    if (worthwhile(kernel.w, radius2.w, core2)) add(index + stride + 1, kernel.w, z + zx + zy, paint);
 #endif
 #else
     Ellipse e;
@@ -168,7 +170,7 @@ void main() {
 #if PASS == 1
             if (q <= e.core2) atomicMin(front[index], floatBitsToUint(depth));
 #else
-            if (q < kReach2) add(index, ellipseKernel(q), depth, paint);
+            if (q < kFaint2) add(index, ellipseKernel(q), depth, paint);
 #endif
         }
     }

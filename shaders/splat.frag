@@ -19,7 +19,7 @@ flat in vec3 centre;
 #if RULE != 0
 flat in vec2 slope;
 #endif
-#if RULE == 1 && PASS == 1
+#if RULE == 1
 flat in float core2;
 #elif RULE >= 2
 flat in vec3 inverse;
@@ -36,7 +36,7 @@ void main() {
 #if PASS == 1
     if (q > core2) discard;
 #else
-    if (q >= kReach2) discard;
+    if (q >= kFaint2) discard;
     kernel = ellipseKernel(q);
 #endif
 #elif RULE == 1
@@ -46,6 +46,7 @@ void main() {
 #else
     vec2 k = lowPass(min(d * d, vec2(1.0)));
     kernel = k.x * k.y;
+    if (!worthwhile(kernel, dot(d, d), core2)) discard;
 #endif
 #endif
 #if PASS == 1

@@ -11,7 +11,7 @@ flat out vec3 centre;  // pixel, distance
 #if RULE != 0
 flat out vec2 slope;
 #endif
-#if RULE == 1 && PASS == 1
+#if RULE == 1
 flat out float core2;
 #elif RULE >= 2
 flat out vec3 inverse;
@@ -42,9 +42,7 @@ void main() {
     gl_PointSize = 2.0;
     at = floor(p.pixel) + 1.0;  // the corner that the 2x2 pixels share
     slope = vec2(tasks[p.task].slopeX, tasks[p.task].slopeY) * p.dist;
-#if PASS == 1
     core2 = tasks[p.task].core2;
-#endif
 #else
     at = floor(p.pixel + 0.5) + 0.5;
 #endif

@@ -75,7 +75,15 @@ vec2 lowPass(vec2 squared) {
     return b * b;
 }
 
+// Fainter than 1/64 a small splat's weight is not worth its atomics, unless it closes the surface.
+bool worthwhile(float kernel, float radius2, float core2) {
+    return kernel > 1.0 / 64.0 || radius2 <= core2;
+}
+
 #if RULE >= 2
+// The same for ellipses: where their kernel is 1/64. Silhouettes are made of faint ones, too.
+const float kFaint2 = RULE == 3 || TRANSLUCENT == 1 ? kReach2 : 0.75 * kReach2;
+
 // q(d) = (xx, 2 xy, yy) . (dx dx, dx dy, dy dy), d in pixels from the point.
 struct Ellipse {
     vec3 q;
@@ -118,7 +126,7 @@ bool ellipseOf(Point p, out Ellipse e) {
     // vxx vyy - vxy vxy without cancellation.
     float determinant = k * k * det * det + kSigmaPixel2 * (vxx + vyy - kSigmaPixel2);
     e.q = vec3(vyy, -2.0 * vxy, vxx) / determinant;
-    e.reach = min(sqrt(kReach2 * vec2(vxx, vyy)), vec2(kLargest));
+    e.reach = min(sqrt(kFaint2 * vec2(vxx, vyy)), vec2(kLargest));
     e.core2 = kCore2;
     // The plane's distance per pixel; nearly edge-on it would run away.
     vec2 relative = vec2(hu.z * ev.y - hv.z * eu.y, hv.z * eu.x - hu.z * ev.x) / (det * p.h.z);
