@@ -113,7 +113,7 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     const float unit = 1.0f / kSlopeScale;
     const float su0 = block.slopeMin.u * unit, su1 = block.slopeMax.u * unit;
     const float sv0 = block.slopeMin.v * unit, sv1 = block.slopeMax.v * unit;
-    const bool smooth = su1 - su0 < 0.35f && sv1 - sv0 < 0.35f && block.zMax < 1.3f * block.zMin;
+    const bool smooth = su1 - su0 < 0.35f && sv1 - sv0 < 0.35f && block.zMax < 1.2f * block.zMin;
     double cover2 = 0, det = -1e300, stretch2 = 0;
     Cell middle = cellAt(s, uc, vc, 0.5 * (block.zMin + block.zMax), 0.5 * (su0 + su1),
                          0.5 * (sv0 + sv1), novel.orthographic);
@@ -129,9 +129,15 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
         };
         for (int corner = 0; corner < 4; ++corner) {
             const double su = (corner & 1) ? su1 : su0, sv = (corner & 2) ? sv1 : sv0;
-            consider(cellAt(s, uc, vc, block.zMin, su, sv, novel.orthographic));
-            if (!smooth) consider(cellAt(s, uc, vc, block.zMax, su, sv, novel.orthographic));
+            // Smooth blocks need only half of the eight combinations.
+            const bool first = corner == 0 || corner == 3;
+            if (first || !smooth)
+                consider(cellAt(s, uc, vc, block.zMin, su, sv, novel.orthographic));
+            if (!first || !smooth)
+                consider(cellAt(s, uc, vc, block.zMax, su, sv, novel.orthographic));
         }
+        // The block's corners differ a little from its middle.
+        cover2 *= 1.08;
     }
     if (cullBackFaces && !(det > 0)) return false;
     cover2 *= block.size * block.size;

@@ -8,7 +8,7 @@ namespace stx::splat {
 namespace {
 
 // Steeper than 83 degrees is a discontinuity, not a surface.
-constexpr float kSteepest = 8.0f;
+constexpr float kSteepest = 8.0f, kSteepestRim = 1.0f;
 
 std::int16_t coded(float slope) {
     return static_cast<std::int16_t>(
@@ -130,6 +130,10 @@ void prepareRow(const ReferenceView& v, const glm::mat3& cameraFromWorld, int y,
             slope = slopeFromDepth(v, x, y);
         }
         const Surroundings around = surroundings(v, x, y);
+        // Where a surface turns away its tilt runs off to infinity; a splat that followed it would
+        // stick out.
+        if (around.rim && !hasSplat)
+            slope = glm::clamp(slope, glm::vec2(-kSteepestRim), glm::vec2(kSteepestRim));
         const auto flagged = [](std::int16_t code, bool flag) {
             return static_cast<std::int16_t>((code & ~1) | (flag ? 1 : 0));
         };
