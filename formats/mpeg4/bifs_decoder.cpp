@@ -223,30 +223,8 @@ struct BifsDecoder::Impl {
         return result;
     }
 
-    Result<FieldValue> readList(const NodeInfo& node, const FieldInfo& field, int depth) {
-        if (config.usePredictiveMFField && in.flag())
-            return error(ErrorCode::unsupported,
-                         "{}.{} uses predictive coding, which is not supported", node.name,
-                         field.name);
-        FieldValue value = emptyValue(field.type);
-        if (in.flag()) {
-            STX_CHECK(check(fmt::format("{}.{}", node.name, field.name)));
-            return value;  // the reserved bit: nothing follows
-        }
-        const auto read = [&](auto& items) -> Result<void> {
-            using Items = std::decay_t<decltype(items)>;
-            if constexpr (std::is_same_v<Items, NodeList>) {
-                return readNodes(node, field, items, depth);
-            } else if constexpr (kIsList<Items>) {
-                return readItems(node, field, items);
-            } else {
-                return {};
-            }
-        };
-        STX_CHECK(std::visit(read, value));
-        return value;
-    }
-
+    // readList stands behind what it calls: clang 14 does not define templates that a generic lambda
+    // needs before they were seen.
     /// Calls `readOne` for each item of an MF field in either form.
     template <class ReadOne>
     Result<void> readEach(const NodeInfo& node, const FieldInfo& field, std::uint64_t fewest,
@@ -301,6 +279,30 @@ struct BifsDecoder::Impl {
             items.push_back(std::move(child));
             return {};
         });
+    }
+
+    Result<FieldValue> readList(const NodeInfo& node, const FieldInfo& field, int depth) {
+        if (config.usePredictiveMFField && in.flag())
+            return error(ErrorCode::unsupported,
+                         "{}.{} uses predictive coding, which is not supported", node.name,
+                         field.name);
+        FieldValue value = emptyValue(field.type);
+        if (in.flag()) {
+            STX_CHECK(check(fmt::format("{}.{}", node.name, field.name)));
+            return value;  // the reserved bit: nothing follows
+        }
+        const auto read = [&](auto& items) -> Result<void> {
+            using Items = std::decay_t<decltype(items)>;
+            if constexpr (std::is_same_v<Items, NodeList>) {
+                return readNodes(node, field, items, depth);
+            } else if constexpr (kIsList<Items>) {
+                return readItems(node, field, items);
+            } else {
+                return {};
+            }
+        };
+        STX_CHECK(std::visit(read, value));
+        return value;
     }
 
     // ---- nodes

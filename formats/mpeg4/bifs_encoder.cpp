@@ -143,21 +143,8 @@ struct BifsEncoder::Impl {
 
     // ---- fields
 
-    Result<void> writeField(const FieldInfo& field, const FieldValue& value, int depth) {
-        if (typeOf(value) != field.type)
-            return error("{} is {}, but its value is {}", field.name, name(field.type),
-                         name(typeOf(value)));
-        return std::visit(
-            [&](const auto& v) -> Result<void> {
-                using T = std::decay_t<decltype(v)>;
-                if constexpr (kIsList<T>)
-                    return writeList(field, v, depth);
-                else
-                    return writeItem(field, v, depth);
-            },
-            value);
-    }
-
+    // writeField stands behind what it calls: clang 14 does not define templates that a generic
+    // lambda needs before they were seen.
     template <class T>
     Result<void> writeItem(const FieldInfo& field, const T& value, int depth) {
         if constexpr (std::is_same_v<T, NodePtr>) {
@@ -193,6 +180,21 @@ struct BifsEncoder::Impl {
         }
         if (asList) out.flag(true);
         return {};
+    }
+
+    Result<void> writeField(const FieldInfo& field, const FieldValue& value, int depth) {
+        if (typeOf(value) != field.type)
+            return error("{} is {}, but its value is {}", field.name, name(field.type),
+                         name(typeOf(value)));
+        return std::visit(
+            [&](const auto& v) -> Result<void> {
+                using T = std::decay_t<decltype(v)>;
+                if constexpr (kIsList<T>)
+                    return writeList(field, v, depth);
+                else
+                    return writeItem(field, v, depth);
+            },
+            value);
     }
 
     // ---- nodes
@@ -239,7 +241,10 @@ struct BifsEncoder::Impl {
         for (const Node::SetField& set : node.setFields) {
             const NodePtr* child = std::get_if<NodePtr>(&set.value);
             if (child != nullptr && !*child) continue;
-            if (style.omitDefaults && set.value == defaultValue(*node.info, set.index)) continue;
+            const FieldValue& byDefault = defaultValue(*node.info, set.index);
+            // Equal in bits, too: -0 is not left out for 0.
+            if (style.omitDefaults && set.value == byDefault && sameValue(set.value, byDefault))
+                continue;
             fields.push_back(&set);
         }
         return fields;
@@ -441,7 +446,8 @@ struct BifsEncoder::Impl {
 
     Result<Bytes> encode(const std::vector<Command>& commands) {
         if (commands.empty()) return error("an access unit without commands");
-        if (ids.highestNode > (std::uint64_t{1} << config.nodeIdBits) - 1)
+        if (config.nodeIdBits > 31 || config.routeIdBits > 31 ||
+            ids.highestNode > (std::uint64_t{1} << config.nodeIdBits) - 1)
             return error("node id {} does not fit into {} bits", ids.highestNode,
                          config.nodeIdBits);
         out = BitWriter();
