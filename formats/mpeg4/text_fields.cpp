@@ -266,9 +266,11 @@ bool isPlainName(std::string_view name) {
 }
 
 Result<void> NodeNames::define(const std::string& name, const NodePtr& node,
-                               const std::string& where) {
+                               const std::string& where, bool again) {
     const auto [entry, isNew] = byName_.try_emplace(name, Entry{node, where});
-    if (!isNew)
+    if (!isNew && again) {
+        entry->second = Entry{node, where};
+    } else if (!isNew)
         return failAt(where, ErrorCode::invalidInput,
                       "DEF '{}' names a second node; the first stands at {}", excerpt(name),
                       entry->second.where);

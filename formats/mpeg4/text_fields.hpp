@@ -38,9 +38,10 @@ class NodeNames {
     explicit NodeNames(const Limits& limits) : limits_(limits) {}
 
     /// DEF: from here on `node` is open until closed() is called with the height of its tree. Errors
-    /// when the name stands for another node. Names like N12 become ids.
+    /// when the name stands for another node, unless `again`: commands may bring a node that takes
+    /// over a name. Names like N12 become ids.
     [[nodiscard]] Result<void> define(const std::string& name, const NodePtr& node,
-                                      const std::string& where);
+                                      const std::string& where, bool again);
     void closed(const NodePtr& node, int height);
 
     /// USE of a name at a nesting depth. Null: not defined yet, call useLater(). Errors when the node
