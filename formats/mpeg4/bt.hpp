@@ -13,12 +13,12 @@ namespace stx::mpeg4 {
 /// are taken in any case of letters. Times are ticks of the stream (milliseconds unless its
 /// SLConfigDescriptor has another timeStampResolution). DEF names like N12 stand for node ids.
 /// Streams get their file names, not their bytes: see loadMedia() in mpeg4.hpp.
-/// `name` is for errors, which are at `'name':line:column`. Errors (invalidInput): what the syntax or
-/// the node table does not have, with what was found and what expected; (unsupported) PROTO.
+/// `name` is for errors, which are at `'name':line:column`. Errors (invalidInput): what the syntax
+/// or the node table does not have, with what was found and what expected; (unsupported) PROTO.
 [[nodiscard]] Result<Document> readBt(std::string_view text, const std::string& name, Job& job);
 
-/// The text of a presentation; readBt() gives it back, floats to the bit. Errors (invalidInput) when
-/// nodes nest deeper than the job allows.
+/// The text of a presentation; readBt() gives it back, floats to the bit. Errors (invalidInput)
+/// when nodes nest deeper than the job allows.
 [[nodiscard]] Result<std::string> writeBt(const Document& document, Job& job);
 
 }  // namespace stx::mpeg4

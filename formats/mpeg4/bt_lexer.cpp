@@ -5,17 +5,26 @@
 namespace stx::mpeg4 {
 namespace {
 
-bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == ','; }
-bool isMark(char c) { return c == '{' || c == '}' || c == '[' || c == ']'; }
-bool endsWord(char c) { return isBlank(c) || isMark(c) || c == '#' || c == '"'; }
+bool isBlank(char c) {
+    return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == ',';
+}
+bool isMark(char c) {
+    return c == '{' || c == '}' || c == '[' || c == ']';
+}
+bool endsWord(char c) {
+    return isBlank(c) || isMark(c) || c == '#' || c == '"';
+}
 
 }  // namespace
 
 std::string BtToken::describe() const {
     switch (kind) {
-        case Kind::end: return "the end of the file";
-        case Kind::string: return fmt::format("\"{}\"", excerpt(text));
-        default: return fmt::format("'{}'", excerpt(text));
+        case Kind::end:
+            return "the end of the file";
+        case Kind::string:
+            return fmt::format("\"{}\"", excerpt(text));
+        default:
+            return fmt::format("'{}'", excerpt(text));
     }
 }
 

@@ -21,7 +21,8 @@ struct BtToken {
 };
 
 /// Cuts a BT text into pieces, one at a time and without a copy. Blanks and commas separate, `#`
-/// begins a comment that runs to the end of the line; `{ } [ ]` stand for themselves; text in `"` or
+/// begins a comment that runs to the end of the line; `{ } [ ]` stand for themselves; text in `"`
+/// or
 /// `'` is a string, in which a backslash guards a quote or a backslash. All else is words: numbers,
 /// names, `TR.translation`, `od:10`.
 class BtLexer {

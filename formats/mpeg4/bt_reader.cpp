@@ -85,7 +85,8 @@ class BtReader {
     Result<void> readTopNode(const std::string& defName, const std::string& where) {
         if (lexer_.peek().kind != Kind::word)
             return unexpected("a node, ROUTE, AT or InitialObjectDescriptor");
-        if (haveScene_) return unexpected("ROUTE, AT or the end of the file (there is a scene already)");
+        if (haveScene_)
+            return unexpected("ROUTE, AT or the end of the file (there is a scene already)");
         haveScene_ = true;
         ReplaceScene scene;
         int height = 0;
@@ -122,8 +123,7 @@ class BtReader {
             return failAt(lexer_.where(), ErrorCode::invalidInput,
                           "the ROUTE leads from {} {} to {} {}; both must have one type",
                           name(source.type), source.name, name(target.type), target.name);
-        if (!route.name.empty() || route.id != 0)
-            routeIds_[textNameOf(route)] = route.id;
+        if (!route.name.empty() || route.id != 0) routeIds_[textNameOf(route)] = route.id;
         return route;
     }
     Result<void> readRouteEnd(NodePtr& node, int& field, FieldUse use) {
@@ -148,10 +148,9 @@ class BtReader {
         const bool relative = !text.empty() && (text[0] == 'D' || text[0] == 'd');
         const auto number = integerFromText(relative ? std::string_view(text).substr(1) : text);
         if (!number || *number < 0 || *number > (std::int64_t{1} << 53))
-            return failAt(where, ErrorCode::invalidInput, "found '{}', expected a time of 0 or more ticks",
-                          excerpt(text));
-        const std::uint64_t time =
-            static_cast<std::uint64_t>(*number) + (relative ? lastTime_ : 0);
+            return failAt(where, ErrorCode::invalidInput,
+                          "found '{}', expected a time of 0 or more ticks", excerpt(text));
+        const std::uint64_t time = static_cast<std::uint64_t>(*number) + (relative ? lastTime_ : 0);
         lastTime_ = time;
         STX_TRY(const bool in, takeIf("IN"));
         if (in) {
@@ -206,8 +205,9 @@ class BtReader {
         const auto dot = text.rfind('.');
         STX_TRY(target.node, names_.target(text.substr(0, dot), target.where));
         if (dot != std::string::npos) {
-            STX_TRY(target.field, fieldOfCommand(*target.node, std::string_view(text).substr(dot + 1),
-                                                 FieldUse::in, target.where));
+            STX_TRY(target.field,
+                    fieldOfCommand(*target.node, std::string_view(text).substr(dot + 1),
+                                   FieldUse::in, target.where));
         }
         if (lexer_.peek().kind == Kind::openBracket && target.field >= 0) {
             STX_TRY([[maybe_unused]] const auto open, lexer_.take());
@@ -243,8 +243,8 @@ class BtReader {
         if (type == FieldType::SFNode) {
             const std::string where = lexer_.where();
             STX_TRY(auto node, readNode(1, height, nullptr, -1, -1));
-            STX_CHECK(checkNodePlace(node.get(), field.nodeType, target.node->info->name, field.name,
-                                     where));
+            STX_CHECK(checkNodePlace(node.get(), field.nodeType, target.node->info->name,
+                                     field.name, where));
             return FieldValue(std::move(node));
         }
         if (type == FieldType::MFNode) {
@@ -305,8 +305,9 @@ class BtReader {
         }
         STX_TRY(auto value, readCommandValue(target, target.position.has_value()));
         if (target.position) {
-            addCommand(document_.frames, time,
-                       ReplaceIndexed{target.node, target.field, *target.position, std::move(value)});
+            addCommand(
+                document_.frames, time,
+                ReplaceIndexed{target.node, target.field, *target.position, std::move(value)});
         } else {
             addCommand(document_.frames, time,
                        ReplaceField{target.node, target.field, std::move(value)});
@@ -346,8 +347,9 @@ class BtReader {
             addCommand(document_.frames, time,
                        InsertNode{target.node, *target.position, std::get<NodePtr>(value)});
         } else {
-            addCommand(document_.frames, time,
-                       InsertIndexed{target.node, target.field, *target.position, std::move(value)});
+            addCommand(
+                document_.frames, time,
+                InsertIndexed{target.node, target.field, *target.position, std::move(value)});
         }
         return {};
     }
@@ -382,9 +384,10 @@ class BtReader {
             return failAt(where, ErrorCode::invalidInput, "no ROUTE has the DEF name '{}'",
                           excerpt(routeName));
         if (found->second == 0)
-            return failAt(where, ErrorCode::unsupported,
-                          "commands reach ROUTEs by number only: name it R0, R1, ... instead of '{}'",
-                          excerpt(routeName));
+            return failAt(
+                where, ErrorCode::unsupported,
+                "commands reach ROUTEs by number only: name it R0, R1, ... instead of '{}'",
+                excerpt(routeName));
         return found->second;
     }
 
@@ -409,9 +412,8 @@ class BtReader {
         RemoveObjectDescriptors remove;
         STX_CHECK(take(Kind::openBracket, "'['"));
         while (lexer_.peek().kind != Kind::closeBracket) {
-            const auto id = lexer_.peek().kind == Kind::word
-                                ? odFromUrl(lexer_.peek().text)
-                                : std::nullopt;
+            const auto id =
+                lexer_.peek().kind == Kind::word ? odFromUrl(lexer_.peek().text) : std::nullopt;
             if (!id) return unexpected("an object descriptor's id or ']'");
             remove.ids.push_back(*id);
             STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
@@ -460,7 +462,8 @@ class BtReader {
         if (kind == Kind::word && lexer_.peek().kind == Kind::openBrace)
             return skipBraces(std::string(token.text), lexer_.where(token));
         descriptor.fields.push_back(
-            {fieldName, kind == Kind::string ? std::move(token.value) : std::string(token.text), where});
+            {fieldName, kind == Kind::string ? std::move(token.value) : std::string(token.text),
+             where});
         return {};
     }
     /// A descriptor that has no place in the document: passed over, and said.
@@ -497,8 +500,8 @@ class BtReader {
     }
 
     // ---- Nodes
-    /// NULL, USE name, or [DEF name] Type { ... }. With an owner, a USE of a name that comes later is
-    /// remembered for its field; null is given then.
+    /// NULL, USE name, or [DEF name] Type { ... }. With an owner, a USE of a name that comes later
+    /// is remembered for its field; null is given then.
     Result<NodePtr> readNode(int depth, int& height, NodePtr owner, int field, int item) {
         height = 0;
         const std::string where = lexer_.where();
@@ -547,14 +550,17 @@ class BtReader {
             const FieldInfo& field = info->fields[index];
             if (!field.hasValue())
                 return failAt(fieldWhere, ErrorCode::invalidInput,
-                              "{}.{} is an {} and takes no value", type, field.name, name(field.kind));
+                              "{}.{} is an {} and takes no value", type, field.name,
+                              name(field.kind));
             if (isWord("IS"))
-                return failAt(lexer_.where(), ErrorCode::unsupported, "PROTO (IS) is not supported");
+                return failAt(lexer_.where(), ErrorCode::unsupported,
+                              "PROTO (IS) is not supported");
             int fieldHeight = 0;
             if (field.type == FieldType::SFNode) {
                 const std::string childWhere = lexer_.where();
                 STX_TRY(auto child, readNode(depth + 1, fieldHeight, node, index, -1));
-                STX_CHECK(checkNodePlace(child.get(), field.nodeType, type, field.name, childWhere));
+                STX_CHECK(
+                    checkNodePlace(child.get(), field.nodeType, type, field.name, childWhere));
                 node->set(index, std::move(child));
             } else if (field.type == FieldType::MFNode) {
                 STX_CHECK(readNodeList(node, index, depth + 1, fieldHeight, true));
@@ -588,7 +594,8 @@ class BtReader {
             const bool isNull = isWord("NULL");
             int itemHeight = 0;
             STX_TRY(auto child, readNode(depth, itemHeight, waits ? owner : nullptr, index, item));
-            STX_CHECK(checkNodePlace(child.get(), field.nodeType, owner->info->name, field.name, where));
+            STX_CHECK(
+                checkNodePlace(child.get(), field.nodeType, owner->info->name, field.name, where));
             if (isNull) {
                 std::get<NodeList>(owner->edit(index)).pop_back();
             } else {

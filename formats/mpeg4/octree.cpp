@@ -24,16 +24,17 @@ Result<Octree> Octree::parse(std::span<const std::int32_t> octree, std::int32_t 
     if (octree.empty()) width = 0;
     for (int level = 0; level < tree.levels_ && width > 0; ++level) {
         if (octree.size() - at < width)
-            return fail(ErrorCode::invalidInput,
-                        "OctreeImage.octree has {} bytes, but level {} of the tree has {} inner nodes "
-                        "from byte {} on",
-                        octree.size(), level, width, at);
+            return fail(
+                ErrorCode::invalidInput,
+                "OctreeImage.octree has {} bytes, but level {} of the tree has {} inner nodes "
+                "from byte {} on",
+                octree.size(), level, width, at);
         std::uint64_t below = 0;
         for (std::uint64_t i = 0; i < width; ++i, ++at) {
             const std::int32_t byte = octree[at];
             if (byte < 0 || byte > 255)
-                return fail(ErrorCode::invalidInput, "OctreeImage.octree[{}] is {}; bytes are 0..255",
-                            at, byte);
+                return fail(ErrorCode::invalidInput,
+                            "OctreeImage.octree[{}] is {}; bytes are 0..255", at, byte);
             Node node;
             node.children = static_cast<std::uint8_t>(byte);
             node.first = static_cast<std::uint32_t>(tree.nodes_.size() + (width - i) + below);

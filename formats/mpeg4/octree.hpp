@@ -11,15 +11,15 @@
 
 namespace stx::mpeg4 {
 
-/// The voxels of an OctreeImage (ISO/IEC 14496-16, 4.5.4): a cube of side 1 around the origin, cut in
-/// half along each axis at each level. One byte stands for each inner node, breadth first; its bit i
-/// says that child i exists. Which octant bit i means is shown by a figure only; here it is
+/// The voxels of an OctreeImage (ISO/IEC 14496-16, 4.5.4): a cube of side 1 around the origin, cut
+/// in half along each axis at each level. One byte stands for each inner node, breadth first; its
+/// bit i says that child i exists. Which octant bit i means is shown by a figure only; here it is
 /// x = i & 1, y = (i >> 1) & 1, z = (i >> 2) & 1, upwards along the axes.
 class Octree {
   public:
-    /// `octree` and `octreeResolution` as in the node. Levels = the least with 2^levels >= resolution.
-    /// Errors: a resolution outside 1..65536, values outside 0..255, fewer bytes than the tree names
-    /// inner nodes. Bytes behind the tree are counted in unusedBytes().
+    /// `octree` and `octreeResolution` as in the node. Levels = the least with 2^levels >=
+    /// resolution. Errors: a resolution outside 1..65536, values outside 0..255, fewer bytes than
+    /// the tree names inner nodes. Bytes behind the tree are counted in unusedBytes().
     [[nodiscard]] static Result<Octree> parse(std::span<const std::int32_t> octree,
                                               std::int32_t octreeResolution, const Limits& limits);
 
@@ -28,8 +28,8 @@ class Octree {
     /// Voxels that exist at the finest level.
     [[nodiscard]] std::int64_t voxelCount() const { return voxels_; }
 
-    /// Distance along `direction` (unit) from `origin` to the first voxel that the whole line meets,
-    /// which may be negative; kNoDepth when it meets none.
+    /// Distance along `direction` (unit) from `origin` to the first voxel that the whole line
+    /// meets, which may be negative; kNoDepth when it meets none.
     [[nodiscard]] double firstHit(glm::dvec3 origin, glm::dvec3 direction) const;
 
   private:

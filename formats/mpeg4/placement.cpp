@@ -23,7 +23,8 @@ Result<Similarity> similarityFrom(const glm::dmat4& worldFromLocal) {
     if (!std::isfinite(determinant) || !std::isfinite(glm::length(worldFromLocal[3])))
         return fail(ErrorCode::invalidInput,
                     "the Transforms above the DepthImage give values that are not finite");
-    const glm::dvec3 lengths(glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2]));
+    const glm::dvec3 lengths(glm::length(linear[0]), glm::length(linear[1]),
+                             glm::length(linear[2]));
     if (!(std::abs(determinant) > 0) || !(lengths.x > 0 && lengths.y > 0 && lengths.z > 0))
         return fail(ErrorCode::invalidInput,
                     "the Transforms above the DepthImage scale by 0; scales must be above 0");
@@ -32,19 +33,21 @@ Result<Similarity> similarityFrom(const glm::dmat4& worldFromLocal) {
     double skew = 0;
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-            skew = std::max(skew, std::abs(glm::dot(linear[i], linear[j]) /
-                                               (result.scale * result.scale) -
-                                           (i == j ? 1.0 : 0.0)));
+            skew = std::max(
+                skew, std::abs(glm::dot(linear[i], linear[j]) / (result.scale * result.scale) -
+                               (i == j ? 1.0 : 0.0)));
     if (skew > 2 * kTolerance)
-        return fail(ErrorCode::invalidInput,
-                    "the Transforms above the DepthImage scale by {:.6g} {:.6g} {:.6g} or shear; only "
-                    "one scale for all axes can be folded into a camera (apply it to the object "
-                    "before capturing)",
-                    lengths.x, lengths.y, lengths.z);
+        return fail(
+            ErrorCode::invalidInput,
+            "the Transforms above the DepthImage scale by {:.6g} {:.6g} {:.6g} or shear; only "
+            "one scale for all axes can be folded into a camera (apply it to the object "
+            "before capturing)",
+            lengths.x, lengths.y, lengths.z);
     if (determinant < 0)
-        return fail(ErrorCode::invalidInput,
-                    "the Transforms above the DepthImage mirror it; only scales above 0 can be folded "
-                    "into a camera");
+        return fail(
+            ErrorCode::invalidInput,
+            "the Transforms above the DepthImage mirror it; only scales above 0 can be folded "
+            "into a camera");
     // A scale within rounding of one is one: planes then stay as the file has them.
     if (std::abs(result.scale - 1.0) < 1e-7) result.scale = 1.0;
     result.rotation = glm::normalize(glm::quat_cast(linear / result.scale));
@@ -90,10 +93,11 @@ Result<Padding> centringPadding(const Camera& camera, int maxSide) {
         return p;
     }
     if (std::abs(offX) > maxSide || std::abs(offY) > maxSide)
-        return fail(ErrorCode::unsupported,
-                    "the principal point {:.6g} {:.6g} is so far from the centre of the {}x{} image "
-                    "that padding would exceed {} pixels; crop the view first",
-                    camera.cx, camera.cy, camera.width, camera.height, maxSide);
+        return fail(
+            ErrorCode::unsupported,
+            "the principal point {:.6g} {:.6g} is so far from the centre of the {}x{} image "
+            "that padding would exceed {} pixels; crop the view first",
+            camera.cx, camera.cy, camera.width, camera.height, maxSide);
     // A rest that rounding in float makes no difference to is no rest.
     const auto whole = [](double off) { return static_cast<int>(std::lround(off)); };
     const int x = whole(offX), y = whole(offY);
@@ -102,11 +106,12 @@ Result<Padding> centringPadding(const Camera& camera, int maxSide) {
     p.camera.width += std::abs(x);
     p.camera.height += std::abs(y);
     if (p.camera.width > maxSide || p.camera.height > maxSide)
-        return fail(ErrorCode::unsupported,
-                    "the view is {}x{} with its principal point at {:.6g} {:.6g}; centred by padding "
-                    "it would be {}x{}, above {} pixels",
-                    camera.width, camera.height, camera.cx, camera.cy, p.camera.width,
-                    p.camera.height, maxSide);
+        return fail(
+            ErrorCode::unsupported,
+            "the view is {}x{} with its principal point at {:.6g} {:.6g}; centred by padding "
+            "it would be {}x{}, above {} pixels",
+            camera.width, camera.height, camera.cx, camera.cy, p.camera.width, p.camera.height,
+            maxSide);
     p.camera.cx = p.camera.width * 0.5;
     p.camera.cy = p.camera.height * 0.5;
     p.shift = std::hypot(p.camera.cx - (camera.cx + p.left), p.camera.cy - (camera.cy + p.top));

@@ -26,25 +26,27 @@ struct Similarity {
     }
 };
 
-/// The matrix as a similarity. Errors (invalidInput) when it scales the axes unlike, shears, mirrors,
-/// flattens or is not finite: a DepthImage's camera cannot express that.
+/// The matrix as a similarity. Errors (invalidInput) when it scales the axes unlike, shears,
+/// mirrors, flattens or is not finite: a DepthImage's camera cannot express that.
 [[nodiscard]] Result<Similarity> similarityFrom(const glm::dmat4& worldFromLocal);
 
 /// Moves a view, with planes, normals, splats and depth, from a local frame into the world.
 void applySimilarity(ReferenceView& view, const Similarity& worldFromLocal);
 
-/// How a view's image is widened so that its principal point is the centre, which a DepthImage needs.
+/// How a view's image is widened so that its principal point is the centre, which a DepthImage
+/// needs.
 struct Padding {
     int left = 0, top = 0, right = 0, bottom = 0;  ///< pixels without a point
-    Camera camera;              ///< of the padded image, centred
-    double shift = 0.0;         ///< pixels by which the principal point had to be moved, at most 0.36
+    Camera camera;                                 ///< of the padded image, centred
+    double shift = 0.0;  ///< pixels by which the principal point had to be moved, at most 0.36
 
     [[nodiscard]] bool any() const { return left + top + right + bottom > 0; }
 };
 
-/// Padding in whole pixels, never cropping; what is left is less than a quarter pixel along each axis
-/// and is taken by moving the principal point. An orthographic camera is shifted instead, which is
-/// exact. Errors: unsupported when the padded image would have more than `maxSide` pixels on a side.
+/// Padding in whole pixels, never cropping; what is left is less than a quarter pixel along each
+/// axis and is taken by moving the principal point. An orthographic camera is shifted instead,
+/// which is exact. Errors: unsupported when the padded image would have more than `maxSide` pixels
+/// on a side.
 [[nodiscard]] Result<Padding> centringPadding(const Camera& camera, int maxSide);
 
 }  // namespace stx::mpeg4

@@ -39,12 +39,14 @@ Result<int> fieldOfCommand(const Node& node, std::string_view fieldName, FieldUs
                       excerpt(fieldName));
     const FieldInfo& field = node.info->fields[index];
     if (use == FieldUse::in && field.inId < 0)
-        return failAt(where, ErrorCode::invalidInput,
-                      "{}.{} is a plain {}: no command or ROUTE can change it; replace the whole node",
-                      node.info->name, field.name, name(field.kind));
+        return failAt(
+            where, ErrorCode::invalidInput,
+            "{}.{} is a plain {}: no command or ROUTE can change it; replace the whole node",
+            node.info->name, field.name, name(field.kind));
     if (use == FieldUse::out && field.outId < 0)
-        return failAt(where, ErrorCode::invalidInput, "{}.{} is a plain {} and no source of a ROUTE",
-                      node.info->name, field.name, name(field.kind));
+        return failAt(where, ErrorCode::invalidInput,
+                      "{}.{} is a plain {} and no source of a ROUTE", node.info->name, field.name,
+                      name(field.kind));
     return index;
 }
 
@@ -71,8 +73,75 @@ Result<void> finishDocument(Document& document, NodeNames& names) {
         od.streamType = StreamType::objectDescriptor;
         if (od.objectTypeIndication == 0) od.objectTypeIndication = oti::kSystemsV1;
     }
-    [[maybe_unused]] const HighestIds ids = assignNodeIds(document.frames);
     return {};
+}
+
+Result<TextNames> TextNames::make(const Document& document, const Limits& limits) {
+    TextNames result;
+    for (const CommandFrame& frame : document.frames) {
+        for (const Command& command : frame.commands) {
+            Result<void> fits;
+            const auto check = [&](const NodePtr& root) {
+                if (!fits) return;
+                auto depth = nestingDepth(root);
+                if (!depth) {
+                    fits = propagate(depth);
+                } else if (*depth > limits.maxNesting) {
+                    fits =
+                        fail(ErrorCode::invalidInput, "nodes nest {} deep; at most {} are written",
+                             *depth, limits.maxNesting);
+                }
+            };
+            if (const auto* scene = std::get_if<ReplaceScene>(&command)) check(scene->root);
+            if (const auto* replace = std::get_if<ReplaceNode>(&command))
+                check(replace->replacement);
+            if (const auto* insert = std::get_if<InsertNode>(&command)) check(insert->node);
+            std::visit(
+                [&](const auto& c) {
+                    if constexpr (requires { c.value; }) {
+                        if (const auto* node = std::get_if<NodePtr>(&c.value)) check(*node);
+                        if (const auto* list = std::get_if<NodeList>(&c.value))
+                            for (const NodePtr& node : *list) check(node);
+                    }
+                },
+                command);
+            STX_CHECK(fits);
+        }
+    }
+    const NodeIds ids = assignNodeIds(document.frames);
+    std::unordered_map<std::string, int> taken;
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands)
+            forEachNode(command, [&](const NodePtr& node) {
+                if (result.names_.contains(node.get())) return;
+                std::string text = textNameOf(*node);
+                if (text.empty()) {
+                    const auto id = ids.nodes.find(node.get());
+                    if (id == ids.nodes.end()) return;
+                    text = fmt::format("N{}", id->second - 1);
+                }
+                // A name that would not read back as itself: other characters give way to '_'.
+                if (!isPlainName(text)) {
+                    for (char& c : text)
+                        if (!isPlainName(std::string("a") + c)) c = '_';
+                    if (!isPlainName(text)) text = fmt::format("_{}", text);
+                }
+                const std::string base = text;
+                // Two nodes of one name stand for different nodes only when commands replaced one.
+                while (taken.contains(text)) text = fmt::format("{}_{}", base, ++taken[base]);
+                taken[text] = 1;
+                result.names_[node.get()] = text;
+            });
+    return result;
+}
+
+const std::string* TextNames::find(const Node& node) const {
+    const auto found = names_.find(&node);
+    return found == names_.end() ? nullptr : &found->second;
+}
+
+bool TextNames::firstTime(const Node& node) {
+    return written_.insert(&node).second;
 }
 
 }  // namespace stx::mpeg4

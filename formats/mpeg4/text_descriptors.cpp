@@ -70,12 +70,20 @@ struct NamedNumber {
     int number;
 };
 constexpr NamedNumber kObjectTypes[] = {
-    {"JPEG", 0x6C}, {"PNG", 0x6D}, {"MPEG4Systems1", 1}, {"MPEG4Systems2", 2},
-    {"MPEG4Visual", 0x20}, {"Unspecified", 0xFF},
+    {"JPEG", 0x6C},       {"PNG", 0x6D},         {"MPEG4Systems1", 1},
+    {"MPEG4Systems2", 2}, {"MPEG4Visual", 0x20}, {"Unspecified", 0xFF},
 };
 constexpr NamedNumber kStreamTypes[] = {
-    {"ObjectDescriptor", 1}, {"ClockReference", 2}, {"SceneDescription", 3}, {"Visual", 4},
-    {"Audio", 5}, {"MPEG7", 6}, {"IPMP", 7}, {"OCI", 8}, {"MPEGJ", 9}, {"Interaction", 10},
+    {"ObjectDescriptor", 1},
+    {"ClockReference", 2},
+    {"SceneDescription", 3},
+    {"Visual", 4},
+    {"Audio", 5},
+    {"MPEG7", 6},
+    {"IPMP", 7},
+    {"OCI", 8},
+    {"MPEGJ", 9},
+    {"Interaction", 10},
 };
 
 template <class T, std::size_t N>
@@ -145,10 +153,11 @@ Result<void> readMux(const TextDescriptor& d, ElementaryStream& stream) {
     if (frameRate > 0 && stream.fileName.find('%') != std::string::npos) {
         const double frames = std::nearbyint(seconds * frameRate);
         if (durationMs < 0 || !(frames >= 1 && frames <= kMaxSamples))
-            return failAt(d.where, ErrorCode::invalidInput,
-                          "'{}' at {:g} images a second lasts {:g} ms, which is no number of images "
-                          "from 1 to {}",
-                          excerpt(stream.fileName), frameRate, durationMs, kMaxSamples);
+            return failAt(
+                d.where, ErrorCode::invalidInput,
+                "'{}' at {:g} images a second lasts {:g} ms, which is no number of images "
+                "from 1 to {}",
+                excerpt(stream.fileName), frameRate, durationMs, kMaxSamples);
         count = static_cast<std::int64_t>(frames);
         seconds = 1.0 / frameRate;
     }
@@ -211,9 +220,11 @@ std::optional<std::uint32_t> numberOfTextId(std::string_view text, const TextIds
     if (const auto number = integerFromText(text); number && *number >= 0 && *number <= 0xFFFFFFFF)
         return static_cast<std::uint32_t>(*number);
     // "od10", "es10": what other tools write, meaning 10.
-    if (text.size() > 2 && (equalNoCase(text.substr(0, 2), "od") || equalNoCase(text.substr(0, 2), "es"))) {
+    if (text.size() > 2 &&
+        (equalNoCase(text.substr(0, 2), "od") || equalNoCase(text.substr(0, 2), "es"))) {
         std::uint32_t number = 0;
-        const auto [at, error] = std::from_chars(text.data() + 2, text.data() + text.size(), number);
+        const auto [at, error] =
+            std::from_chars(text.data() + 2, text.data() + text.size(), number);
         if (error == std::errc() && at == text.data() + text.size()) return number;
     }
     return {};
@@ -305,16 +316,18 @@ Result<void> initialDescriptorFromText(const TextDescriptor& d, const TextIds& o
             bifs.hasSize = config->find({"pixelWidth", "pixelHeight"}) != nullptr;
             STX_CHECK(f.result());
             if (!bifs.isCommandStream)
-                return failAt(config->where, ErrorCode::unsupported,
-                              "the scene stream is an animation stream (isCommandStream false); only "
-                              "command streams are read");
+                return failAt(
+                    config->where, ErrorCode::unsupported,
+                    "the scene stream is an animation stream (isCommandStream false); only "
+                    "command streams are read");
         } else if (stream.streamType == StreamType::objectDescriptor && !haveOd) {
             haveOd = true;
             document.odStream = std::move(stream);
             document.odStream.samples.clear();
         } else {
-            job.note(fmt::format("stream {} of the InitialObjectDescriptor (streamType {}) is left out",
-                                 stream.esId, static_cast<int>(stream.streamType)));
+            job.note(
+                fmt::format("stream {} of the InitialObjectDescriptor (streamType {}) is left out",
+                            stream.esId, static_cast<int>(stream.streamType)));
         }
     }
     return {};
@@ -322,7 +335,8 @@ Result<void> initialDescriptorFromText(const TextDescriptor& d, const TextIds& o
 
 std::string percentText(ByteSpan bytes) {
     std::string text;
-    for (const std::byte b : bytes) fmt::format_to(std::back_inserter(text), "%{:02X}", std::to_integer<int>(b));
+    for (const std::byte b : bytes)
+        fmt::format_to(std::back_inserter(text), "%{:02X}", std::to_integer<int>(b));
     return text;
 }
 
@@ -335,12 +349,47 @@ std::optional<Bytes> bytesFromPercentText(std::string_view text) {
         }
         if (text.size() - i < 3) return {};
         int value = 0;
-        const auto [at, error] = std::from_chars(text.data() + i + 1, text.data() + i + 3, value, 16);
+        const auto [at, error] =
+            std::from_chars(text.data() + i + 1, text.data() + i + 3, value, 16);
         if (error != std::errc() || at != text.data() + i + 3) return {};
         bytes.push_back(static_cast<std::byte>(value));
         i += 3;
     }
     return bytes;
+}
+
+MuxTimes muxTimes(const ElementaryStream& stream) {
+    MuxTimes times;
+    if (stream.samples.empty()) return times;
+    const double tick = 1000.0 / stream.timescale;
+    times.startMs = static_cast<double>(stream.samples[0].time) * tick;
+    times.durationMs = static_cast<double>(stream.samples[0].duration) * tick *
+                       static_cast<double>(stream.samples.size());
+    if (stream.samples.size() > 1 && stream.samples[0].duration > 0)
+        times.frameRate = static_cast<double>(stream.timescale) / stream.samples[0].duration;
+    return times;
+}
+
+ElementaryStream sceneStreamForText(const Document& document) {
+    ElementaryStream stream = document.sceneStream;
+    stream.streamType = StreamType::sceneDescription;
+    if (stream.objectTypeIndication == 0)
+        stream.objectTypeIndication =
+            document.bifsConfig.version == 2 ? oti::kSystemsV2 : oti::kSystemsV1;
+    stream.samples.clear();
+    return stream;
+}
+
+bool hasOdStream(const Document& document) {
+    return !document.odFrames.empty() || document.odStream.esId != 0;
+}
+
+ElementaryStream odStreamForText(const Document& document) {
+    ElementaryStream stream = document.odStream;
+    stream.streamType = StreamType::objectDescriptor;
+    if (stream.objectTypeIndication == 0) stream.objectTypeIndication = oti::kSystemsV1;
+    stream.samples.clear();
+    return stream;
 }
 
 std::vector<std::string> sampleFileNames(const ElementaryStream& stream) {
@@ -353,10 +402,12 @@ std::vector<std::string> sampleFileNames(const ElementaryStream& stream) {
     int width = 0;
     while (at < name.size() && name[at] >= '0' && name[at] <= '9' && width < 10)
         width = width * 10 + (name[at++] - '0');
-    if (at >= name.size() || name[at] != 'd') return stream.samples.size() == 1 ? std::vector{name} : std::vector<std::string>();
+    if (at >= name.size() || name[at] != 'd')
+        return stream.samples.size() == 1 ? std::vector{name} : std::vector<std::string>();
     std::vector<std::string> names;
     for (std::size_t i = 0; i < stream.samples.size(); ++i)
-        names.push_back(fmt::format("{}{:0{}}{}", name.substr(0, percent), i, width, name.substr(at + 1)));
+        names.push_back(
+            fmt::format("{}{:0{}}{}", name.substr(0, percent), i, width, name.substr(at + 1)));
     return names;
 }
 

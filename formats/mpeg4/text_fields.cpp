@@ -10,6 +10,11 @@ namespace {
 
 using Kind = BtToken::Kind;
 
+template <class T>
+inline constexpr bool kIsList = false;
+template <class T>
+inline constexpr bool kIsList<std::vector<T>> = true;
+
 /// One item (of an SF type) at a time.
 class ItemReader {
   public:
@@ -110,8 +115,8 @@ class ItemReader {
                 return static_cast<std::uint32_t>(*value);
             };
             Result<std::uint32_t> pixel = parsed<std::uint32_t>(
-                fits, fmt::format("pixel {} of {}, an integer of {} bytes", i, count,
-                                  image.components));
+                fits,
+                fmt::format("pixel {} of {}, an integer of {} bytes", i, count, image.components));
             if (!pixel) return propagate(pixel);
             for (int c = image.components - 1; c >= 0; --c)
                 image.pixels.push_back(static_cast<std::uint8_t>(*pixel >> (8 * c)));
@@ -138,13 +143,21 @@ void append(std::string& out, bool v, TextStyle style) {
         out += v ? "true" : "false";
     }
 }
-void append(std::string& out, std::int32_t v, TextStyle) { fmt::format_to(std::back_inserter(out), "{}", v); }
-void append(std::string& out, float v, TextStyle) { fmt::format_to(std::back_inserter(out), "{}", v); }
-void append(std::string& out, double v, TextStyle) { fmt::format_to(std::back_inserter(out), "{}", v); }
-void append(std::string& out, const std::string& v, TextStyle) { out += quoted(v); }
+void append(std::string& out, std::int32_t v, TextStyle) {
+    fmt::format_to(std::back_inserter(out), "{}", v);
+}
+void append(std::string& out, float v, TextStyle) {
+    fmt::format_to(std::back_inserter(out), "{}", v);
+}
+void append(std::string& out, double v, TextStyle) {
+    fmt::format_to(std::back_inserter(out), "{}", v);
+}
+void append(std::string& out, const std::string& v, TextStyle) {
+    out += quotedText(v);
+}
 void append(std::string& out, const Url& v, TextStyle style) {
     if (v.objectDescriptorId == 0) {
-        out += quoted(v.text);
+        out += quotedText(v.text);
     } else if (style == TextStyle::bt) {
         fmt::format_to(std::back_inserter(out), "od:{}", v.objectDescriptorId);
     } else {
@@ -156,9 +169,15 @@ void appendAll(std::string& out, TextStyle style, const T&... values) {
     bool first = true;
     (((first ? void() : void(out += ' ')), first = false, append(out, values, style)), ...);
 }
-void append(std::string& out, glm::vec2 v, TextStyle s) { appendAll(out, s, v.x, v.y); }
-void append(std::string& out, glm::vec3 v, TextStyle s) { appendAll(out, s, v.x, v.y, v.z); }
-void append(std::string& out, Color v, TextStyle s) { appendAll(out, s, v.r, v.g, v.b); }
+void append(std::string& out, glm::vec2 v, TextStyle s) {
+    appendAll(out, s, v.x, v.y);
+}
+void append(std::string& out, glm::vec3 v, TextStyle s) {
+    appendAll(out, s, v.x, v.y, v.z);
+}
+void append(std::string& out, Color v, TextStyle s) {
+    appendAll(out, s, v.r, v.g, v.b);
+}
 void append(std::string& out, const Rotation& v, TextStyle s) {
     appendAll(out, s, v.axis.x, v.axis.y, v.axis.z, v.angle);
 }
@@ -184,8 +203,7 @@ Result<FieldValue> readFieldValue(BtLexer& lexer, FieldType type, bool wholeText
         using T = std::decay_t<decltype(v)>;
         if constexpr (std::is_same_v<T, NodeList>) {
             return reader.unexpected("a value without nodes");
-        } else if constexpr (requires { v.push_back(typename T::value_type{}); } &&
-                             !std::is_same_v<T, std::string>) {
+        } else if constexpr (kIsList<T>) {
             const bool brackets = lexer.peek().kind == Kind::openBracket;
             if (brackets) {
                 if (auto taken = lexer.take(); !taken) return propagate(taken);
@@ -219,7 +237,7 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
     std::visit(
         [&](const auto& v) {
             using T = std::decay_t<decltype(v)>;
-            if constexpr (requires { v.push_back(v[0]); } && !std::is_same_v<T, std::string>) {
+            if constexpr (kIsList<T>) {
                 if (style == TextStyle::bt) out += '[';
                 bool first = true;
                 for (const auto& item : v) {
@@ -283,7 +301,9 @@ Result<void> NodeNames::define(const std::string& name, const NodePtr& node,
     return {};
 }
 
-void NodeNames::closed(const NodePtr& node, int height) { heights_[node.get()] = height; }
+void NodeNames::closed(const NodePtr& node, int height) {
+    heights_[node.get()] = height;
+}
 
 Result<NodePtr> NodeNames::use(const std::string& name, int depth, const std::string& where,
                                int& height) const {

@@ -11,9 +11,10 @@
 /// What BT and XMT-A share: the spelling of field values, and the names of nodes.
 namespace stx::mpeg4 {
 
-/// Reads the value of a field that is no node. In BT, `[` ... `]` holds the items of an MF field and
-/// a single item may stand without; in the attribute of XMT-A (`wholeText`) items run to the end of
-/// the text and brackets are optional. Errors name the place, what was found and what is expected.
+/// Reads the value of a field that is no node. In BT, `[` ... `]` holds the items of an MF field
+/// and a single item may stand without; in the attribute of XMT-A (`wholeText`) items run to the
+/// end of the text and brackets are optional. Errors name the place, what was found and what is
+/// expected.
 [[nodiscard]] Result<FieldValue> readFieldValue(BtLexer& lexer, FieldType type, bool wholeText);
 
 /// Spelling of values.
@@ -37,15 +38,16 @@ class NodeNames {
   public:
     explicit NodeNames(const Limits& limits) : limits_(limits) {}
 
-    /// DEF: from here on `node` is open until closed() is called with the height of its tree. Errors
-    /// when the name stands for another node, unless `again`: commands may bring a node that takes
-    /// over a name. Names like N12 become ids.
+    /// DEF: from here on `node` is open until closed() is called with the height of its tree.
+    /// Errors when the name stands for another node, unless `again`: commands may bring a node that
+    /// takes over a name. Names like N12 become ids.
     [[nodiscard]] Result<void> define(const std::string& name, const NodePtr& node,
                                       const std::string& where, bool again);
     void closed(const NodePtr& node, int height);
 
-    /// USE of a name at a nesting depth. Null: not defined yet, call useLater(). Errors when the node
-    /// is open (it would hold itself) or its tree would nest too deeply here. Gives the tree's height.
+    /// USE of a name at a nesting depth. Null: not defined yet, call useLater(). Errors when the
+    /// node is open (it would hold itself) or its tree would nest too deeply here. Gives the tree's
+    /// height.
     [[nodiscard]] Result<NodePtr> use(const std::string& name, int depth, const std::string& where,
                                       int& height) const;
     /// Remembers that `owner`'s field (item `item` of a list, or -1) waits for a name.

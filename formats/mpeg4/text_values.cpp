@@ -9,7 +9,9 @@
 namespace stx::mpeg4 {
 namespace {
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+char lower(char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
 
 /// The digits of a hexadecimal integer without sign and 0x, or nothing.
 std::optional<std::uint64_t> hexFromText(std::string_view digits) {
@@ -53,18 +55,27 @@ std::optional<T> realFromText(std::string_view text) {
         return static_cast<T>(wide);
     }
     const auto exponent = text.find_first_of("eE");
-    if (exponent != std::string_view::npos && exponent + 1 < text.size() && text[exponent + 1] == '-')
+    if (exponent != std::string_view::npos && exponent + 1 < text.size() &&
+        text[exponent + 1] == '-')
         return T(0);
     return {};
 }
 
 }  // namespace
 
-std::string textFromFloat(float value) { return fmt::format("{}", value); }
-std::string textFromDouble(double value) { return fmt::format("{}", value); }
+std::string textFromFloat(float value) {
+    return fmt::format("{}", value);
+}
+std::string textFromDouble(double value) {
+    return fmt::format("{}", value);
+}
 
-std::optional<float> floatFromText(std::string_view text) { return realFromText<float>(text); }
-std::optional<double> doubleFromText(std::string_view text) { return realFromText<double>(text); }
+std::optional<float> floatFromText(std::string_view text) {
+    return realFromText<float>(text);
+}
+std::optional<double> doubleFromText(std::string_view text) {
+    return realFromText<double>(text);
+}
 
 std::optional<std::int64_t> integerFromText(std::string_view text) {
     if (!stripPlus(text)) return {};
@@ -120,7 +131,7 @@ bool equalNoCase(std::string_view a, std::string_view b) {
     return true;
 }
 
-std::string quoted(std::string_view text) {
+std::string quotedText(std::string_view text) {
     std::string result = "\"";
     for (const char c : text) {
         if (c == '"' || c == '\\') result += '\\';

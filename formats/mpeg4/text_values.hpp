@@ -36,7 +36,7 @@ namespace stx::mpeg4 {
 [[nodiscard]] bool equalNoCase(std::string_view a, std::string_view b);
 
 /// `text` in quotes for BT and for lists of strings in XMT-A: `"` and `\` get a backslash before.
-[[nodiscard]] std::string quoted(std::string_view text);
+[[nodiscard]] std::string quotedText(std::string_view text);
 
 /// At most 40 bytes of `text` for a message, control characters replaced.
 [[nodiscard]] std::string excerpt(std::string_view text);
