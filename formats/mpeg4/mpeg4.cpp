@@ -1,0 +1,194 @@
+#include "formats/mpeg4/mpeg4.hpp"
+
+#include "formats/mpeg4/bt.hpp"
+#include "formats/mpeg4/isobmff.hpp"
+#include "formats/mpeg4/text_descriptors.hpp"
+#include "formats/mpeg4/text_values.hpp"
+#include "formats/mpeg4/xmt.hpp"
+
+namespace stx {
+
+using namespace mpeg4;
+
+namespace {
+
+std::string_view textOf(ByteSpan bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// The folder of a path, "." where it has none.
+std::filesystem::path folderOf(const std::filesystem::path& path) {
+    auto folder = path.parent_path();
+    return folder.empty() ? std::filesystem::path(".") : folder;
+}
+
+std::string imagesFolderName(const std::filesystem::path& path) {
+    return path.stem().string() + "_images";
+}
+
+/// Files in a folder that an earlier text's images left there, by the names that we give.
+std::vector<std::string> earlierImages(const std::filesystem::path& folder) {
+    std::vector<std::string> names;
+    std::error_code error;
+    for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+         it.increment(error)) {
+        const std::string name = it->path().filename().string(), stem = it->path().stem().string();
+        bool ours = stem.starts_with("od") && integerFromText(stem.substr(2)).has_value();
+        for (const char* role : {"_texture", "_depth", "_normal", "_splatU", "_splatV"})
+            ours = ours || stem.ends_with(role);
+        if (ours) names.push_back(name);
+    }
+    return names;
+}
+
+Result<void> writeText(const Document& source, const std::filesystem::path& path,
+                       Mpeg4Container container, Job& job, const OutputFile::Options& options) {
+    Document document = source;
+    const auto names = mediaFileNames(document);
+    const std::string folderName = imagesFolderName(path);
+    struct Part {
+        ElementaryStream* stream;
+        std::string name;
+    };
+    std::vector<Part> parts;
+    std::size_t next = 0;
+    for (OdFrame& frame : document.odFrames) {
+        for (OdCommand& command : frame.commands) {
+            auto* update = std::get_if<UpdateObjectDescriptors>(&command);
+            if (!update) continue;
+            for (ObjectDescriptor& od : update->descriptors) {
+                for (ElementaryStream& stream : od.streams) {
+                    const std::string& name = names.at(next++);
+                    if (name.empty()) continue;
+                    for (const Sample& sample : stream.samples)
+                        if (sample.duration != stream.samples[0].duration)
+                            return fail(ErrorCode::unsupported,
+                                        "object descriptor {} has pictures of unequal duration, "
+                                        "which a text "
+                                        "cannot say; keep this presentation as .mp4",
+                                        od.id);
+                    parts.push_back({&stream, name});
+                }
+            }
+        }
+    }
+    for (Part& part : parts) part.stream->fileName = folderName + "/" + part.name;
+    STX_TRY(const auto text,
+            container == Mpeg4Container::bt ? writeBt(document, job) : writeXmt(document, job));
+    if (path == "-") {
+        if (!parts.empty())
+            return fail(
+                ErrorCode::usage,
+                "a text with images cannot go to stdout: its images need a folder; name a file");
+    }
+    STX_TRY(auto file, OutputFile::create(path, options));
+    STX_CHECK(file.write(text));
+    if (parts.empty()) return file.commit();
+
+    std::vector<std::string> allNames;
+    for (const Part& part : parts) {
+        for (const std::string& name : sampleFileNames(*part.stream))
+            allNames.push_back(name.substr(folderName.size() + 1));
+    }
+    STX_TRY(auto folder, OutputFolder::create(path.parent_path() / folderName, options,
+                                              earlierImages(path.parent_path() / folderName)));
+    next = 0;
+    for (const Part& part : parts) {
+        STX_CHECK(job.checkCancelled());
+        for (const Sample& sample : part.stream->samples) {
+            STX_TRY(const auto bytes, sample.data.load(job.limits));
+            STX_CHECK(writeFile(folder.temporaryPath() / allNames[next++], bytes));
+        }
+    }
+    STX_CHECK(folder.commit());
+    return file.commit();
+}
+
+}  // namespace
+
+std::optional<Mpeg4Container> mpeg4ContainerOf(const std::filesystem::path& path) {
+    const std::string ending = path.extension().string();
+    if (equalNoCase(ending, ".mp4") || equalNoCase(ending, ".m4v")) return Mpeg4Container::mp4;
+    if (equalNoCase(ending, ".bt")) return Mpeg4Container::bt;
+    if (equalNoCase(ending, ".xmt") || equalNoCase(ending, ".xmta")) return Mpeg4Container::xmt;
+    return {};
+}
+
+std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head) {
+    if (looksLikeMp4(head)) return Mpeg4Container::mp4;
+    const std::string_view text = textOf(head);
+    const auto first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+    if (first != std::string_view::npos && text[first] == '<' &&
+        text.find("<XMT-A") != std::string_view::npos)
+        return Mpeg4Container::xmt;
+    for (const std::string_view word : {"InitialObjectDescriptor", "Group {", "OrderedGroup {"})
+        if (first != std::string_view::npos && text.substr(first).starts_with(word))
+            return Mpeg4Container::bt;
+    return {};
+}
+
+Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job) {
+    const std::string where = fmt::format("'{}'", path.string());
+    ByteSource source;
+    Bytes whole;
+    if (path == "-") {
+        STX_TRY(whole, readFile(path, job.limits));
+        source = ByteSource::fromBytes(whole);
+    } else {
+        STX_TRY(source, ByteSource::open(path));
+    }
+    Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));
+    if (auto ok = source.read(0, head); !ok) return tl::unexpected(ok.error().at(where));
+    auto container = mpeg4ContainerOf(ByteSpan(head));
+    if (!container) container = mpeg4ContainerOf(path);
+    if (!container)
+        return failAt(
+            where, ErrorCode::invalidInput,
+            "the file is neither an MP4 nor a BT or XMT-A text (endings .mp4, .bt, .xmt)");
+    if (*container == Mpeg4Container::mp4) {
+        auto document = readMp4(source, job);
+        if (!document) return tl::unexpected(document.error().at(where));
+        return document;
+    }
+    if (path != "-") {
+        STX_TRY(whole, readFile(path, job.limits));
+    }
+    auto document = *container == Mpeg4Container::bt ? readBt(textOf(whole), path.string(), job)
+                                                     : readXmt(textOf(whole), path.string(), job);
+    if (!document) return document;
+    if (auto ok = loadMedia(*document, folderOf(path), job); !ok)
+        return tl::unexpected(ok.error().at(where));
+    return document;
+}
+
+Result<void> writeMpeg4(const Mpeg4Document& document, const std::filesystem::path& path, Job& job,
+                        const Mpeg4WriteOptions& options) {
+    const auto container = path == "-" ? Mpeg4Container::mp4 : mpeg4ContainerOf(path);
+    if (!container)
+        return fail(ErrorCode::usage, "'{}' has no ending of an MPEG-4 file: .mp4, .bt or .xmt",
+                    path.string());
+    if (*container != Mpeg4Container::mp4)
+        return writeText(document, path, *container, job, options.output);
+    STX_TRY(auto file, OutputFile::create(path, options.output));
+    Mp4WriteOptions mp4;
+    mp4.style = options.style;
+    STX_CHECK(writeMp4(document, file, job, mp4));
+    return file.commit();
+}
+
+Result<Bundle> readMpeg4Bundle(const std::filesystem::path& path, Job& job) {
+    STX_TRY(const auto document, readMpeg4(path, job));
+    SceneReadOptions options;
+    options.folder = folderOf(path);
+    auto bundle = bundleFromScene(document, options, job);
+    if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", path.string())));
+    return bundle;
+}
+
+Result<void> writeMpeg4Bundle(const Bundle& bundle, const std::filesystem::path& path, Job& job,
+                              const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
+    STX_TRY(const auto document, sceneFromBundle(bundle, scene, job));
+    return writeMpeg4(document, path, job, options);
+}
+
+}  // namespace stx

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+#include "formats/files/files.hpp"
+#include "formats/mpeg4/bifs.hpp"
+#include "formats/mpeg4/document.hpp"
+#include "formats/mpeg4/mapping.hpp"
+
+/// MPEG-4 presentations as files: .mp4, .bt and .xmt. Between these, convert documents and not
+/// bundles: images then keep their bytes.
+namespace stx {
+
+enum class Mpeg4Container { mp4, bt, xmt };
+
+/// By the ending (.mp4 .m4v .bt .xmt .xmta, in any case of letters); nothing for others.
+[[nodiscard]] std::optional<Mpeg4Container> mpeg4ContainerOf(const std::filesystem::path& path);
+/// By the first bytes of a file: an ftyp box, XML with <XMT-A, or BT's words.
+[[nodiscard]] std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head);
+
+/// Reads a presentation. The content tells the container; where it does not, the ending does. The
+/// images of an .mp4 stay in the file; the files that texts name are looked for beside the text
+/// (resolveInside) and opened. Errors as the readers', with the file's name.
+[[nodiscard]] Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job);
+
+struct Mpeg4WriteOptions {
+    OutputFile::Options output;
+    mpeg4::BifsStyle style;  ///< for .mp4: mask and vector forms
+};
+
+/// Writes a presentation into the container of the path's ending, whole or not at all. Beside
+/// `name.bt` and `name.xmt` stands the folder `name_images` with the streams' bytes, untouched.
+/// Errors: (usage) another ending, or a text for stdout that has images; (io); what the writers
+/// say.
+[[nodiscard]] Result<void> writeMpeg4(const Mpeg4Document& document,
+                                      const std::filesystem::path& path, Job& job,
+                                      const Mpeg4WriteOptions& options = {});
+
+/// Both ways between files and bundles; mapping.hpp has the details.
+[[nodiscard]] Result<Bundle> readMpeg4Bundle(const std::filesystem::path& path, Job& job);
+[[nodiscard]] Result<void> writeMpeg4Bundle(const Bundle& bundle, const std::filesystem::path& path,
+                                            Job& job, const mpeg4::SceneWriteOptions& scene = {},
+                                            const Mpeg4WriteOptions& options = {});
+
+namespace mpeg4 {
+
+/// Opens the files that the streams of a document (from a text) name, found in `folder`. Streams
+/// that do not say what they are get their type from the file. `name.mp4#3` is stream 3 of an .mp4.
+/// Errors: (invalidInput) names that leave the folder; (io) files that are not there.
+[[nodiscard]] Result<void> loadMedia(Document& document, const std::filesystem::path& folder,
+                                     Job& job);
+
+/// Names for the files of all streams, each once: their own name where it is a plain one, else by
+/// object descriptor. In the order of the streams in document.odFrames.
+[[nodiscard]] std::vector<std::string> mediaFileNames(const Document& document);
+
+}  // namespace mpeg4
+}  // namespace stx
