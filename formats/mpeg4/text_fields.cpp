@@ -10,11 +10,6 @@ namespace {
 
 using Kind = BtToken::Kind;
 
-template <class T>
-inline constexpr bool kIsList = false;
-template <class T>
-inline constexpr bool kIsList<std::vector<T>> = true;
-
 /// One item (of an SF type) at a time.
 class ItemReader {
   public:
