@@ -74,6 +74,10 @@ Assimp::IOStream* AssimpFiles::Open(const char* name, const char*) {
         return nullptr;
     }
     if (auto text = utf8FromMarked(*bytes)) *bytes = std::move(*text);
+    if (sideTexts_.empty()) {
+        const auto slash = file.find_last_of("/\\");
+        if (slash != std::string::npos) materialFolder_ = file.substr(0, slash);
+    }
     sideTexts_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
     return new MemoryStream(std::move(*bytes));
 }

@@ -30,6 +30,8 @@ class AssimpFiles final : public Assimp::IOSystem {
     [[nodiscard]] const std::optional<Error>& error() const { return error_; }
     /// The first name beside the model that does not exist; empty when all do.
     [[nodiscard]] const std::string& missing() const { return missing_; }
+    /// Folder of the first material file, relative to the model's; empty when it is the same.
+    [[nodiscard]] const std::string& materialFolder() const { return materialFolder_; }
     /// Text of the material files that were opened, in order.
     [[nodiscard]] const std::vector<std::string>& sideTexts() const { return sideTexts_; }
 
@@ -42,6 +44,7 @@ class AssimpFiles final : public Assimp::IOSystem {
     ModelFiles& files_;
     mutable std::optional<Error> error_;
     mutable std::string missing_;
+    std::string materialFolder_;
     std::vector<std::string> sideTexts_;
 };
 

@@ -9,6 +9,7 @@
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
 #include "formats/meshes/readers.hpp"
+#include "formats/meshes/triangulate.hpp"
 #include "formats/meshes/vertex_colours.hpp"
 #include "lib/model/texture.hpp"
 
@@ -32,9 +33,13 @@ glm::vec3 toVec3(const aiVector3D& v) {
 class SceneConverter {
   public:
     SceneConverter(const aiScene& scene, AssimpFormat format, ModelFiles& files,
-                   const std::vector<std::string>& materialTexts)
-        : scene_(scene), format_(format), files_(files), builder_(files.job()) {
-        for (const auto& text : materialTexts) scanMtl(text, mtl_);
+                   const AssimpFiles& system)
+        : scene_(scene),
+          format_(format),
+          files_(files),
+          builder_(files.job()),
+          materialFolder_(system.materialFolder()) {
+        for (const auto& text : system.sideTexts()) scanMtl(text, mtl_);
     }
 
     Result<Mesh> convert() {
@@ -116,7 +121,10 @@ class SceneConverter {
             state.wrapU = wrap(mode);
         if (material.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode) == aiReturn_SUCCESS)
             state.wrapV = wrap(mode);
-        return files_.textureFromFile(path.C_Str(), state, builder_.textures());
+        std::string name = path.C_Str();
+        // Names are relative to the material file for some programs, to the model for others.
+        if (!materialFolder_.empty() && !files_.read(name)) name = materialFolder_ + "/" + name;
+        return files_.textureFromFile(name, state, builder_.textures());
     }
 
     Result<void> convertNode(const aiNode& node, const aiMatrix4x4& parent) {
@@ -156,14 +164,26 @@ class SceneConverter {
         }
         std::size_t points = 0;
         part.triangles.reserve(mesh.mNumFaces);
+        std::vector<glm::vec3> corners;
+        std::vector<glm::uvec3> cut;
         for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
             const auto& face = mesh.mFaces[f];
-            if (face.mNumIndices == 3)
+            if (face.mNumIndices == 3) {
                 part.triangles.emplace_back(face.mIndices[0], face.mIndices[1], face.mIndices[2]);
-            else if (face.mNumIndices == 1)
+            } else if (face.mNumIndices > 3) {
+                corners.clear();
+                cut.clear();
+                for (unsigned k = 0; k < face.mNumIndices; ++k)
+                    corners.push_back(part.positions.at(face.mIndices[k]));
+                triangulate(corners, cut);
+                for (const auto& t : cut)
+                    part.triangles.emplace_back(face.mIndices[t.x], face.mIndices[t.y],
+                                                face.mIndices[t.z]);
+            } else if (face.mNumIndices == 1) {
                 ++points;
-            else
+            } else {
                 ++lines_;
+            }
         }
         part.points = part.triangles.empty() && (points > 0 || mesh.mNumFaces == 0);
         if (part.triangles.empty() && !part.points) return {};
@@ -187,6 +207,7 @@ class SceneConverter {
     ModelFiles& files_;
     MeshBuilder builder_;
     std::map<std::string, MtlMaterial> mtl_;
+    std::string materialFolder_;
     std::size_t lines_ = 0;
 };
 
@@ -204,8 +225,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         modelName = modelName.substr(0, dot) + "." + endingOf(format);
         auto* system = new AssimpFiles(bytes, modelName, files);
         importer.SetIOHandler(system);  // which owns it
-        const aiScene* scene =
-            importer.ReadFile(AssimpFiles::kFolder + modelName, aiProcess_Triangulate);
+        const aiScene* scene = importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
         if (system->error()) return tl::unexpected(*system->error());
         if (!system->missing().empty() && system->sideTexts().empty())
             files.job().note(
@@ -217,7 +237,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
             return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
                         endingOf(format), reason.empty() ? "no reason given" : reason);
         }
-        return SceneConverter(*scene, format, files, system->sideTexts()).convert();
+        return SceneConverter(*scene, format, files, *system).convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::invalidInput, "the model needs more memory than there is");
     } catch (const std::exception& e) {

@@ -207,8 +207,10 @@ Result<std::vector<Component>> Document::elements(const Layout& l) {
 }
 
 Result<AccessorValues> Document::accessor(std::uint64_t index, const std::string& user,
-                                          std::initializer_list<std::string_view> types) {
-    STX_TRY(const auto l, layout(index, user, types));
+                                          std::initializer_list<std::string_view> types,
+                                          bool normalise) {
+    STX_TRY(auto l, layout(index, user, types));
+    l.normalized = l.normalized || normalise;
     AccessorValues result;
     result.count = l.count;
     result.components = l.components;

@@ -133,8 +133,14 @@ Result<Document> Document::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& 
 }
 
 Result<void> Document::parse(ByteSpan bytes) {
-    // A value of JSON takes two bytes of text at least and some 24 in memory.
-    STX_CHECK(builder_->charge(bytes.size(), 12, "the JSON text"));
+    // Each value follows one of these; it takes some 40 bytes, its text once more.
+    std::uint64_t values = 1;
+    for (const auto b : bytes) {
+        const auto c = static_cast<char>(b);
+        values += c == ',' || c == '[' || c == '{' || c == ':' ? 1 : 0;
+    }
+    STX_CHECK(builder_->charge(values, 40, "the JSON text"));
+    STX_CHECK(builder_->charge(bytes.size(), 1, "the JSON text"));
     const auto* text = reinterpret_cast<const char*>(bytes.data());
     try {
         root_ = Json::parse(text, text + bytes.size());

@@ -42,9 +42,11 @@ class Document {
     [[nodiscard]] Job& job() const { return files_->job(); }
 
     [[nodiscard]] Result<BufferView> bufferView(std::uint64_t index, const std::string& user);
-    /// `types`: what is allowed, e.g. {"VEC3", "VEC4"}.
+    /// `types`: what is allowed, e.g. {"VEC3", "VEC4"}. `normalise`: integers are normalised even
+    /// if the file forgets to say so.
     [[nodiscard]] Result<AccessorValues> accessor(std::uint64_t index, const std::string& user,
-                                                  std::initializer_list<std::string_view> types);
+                                                  std::initializer_list<std::string_view> types,
+                                                  bool normalise = false);
     /// Unsigned SCALARs.
     [[nodiscard]] Result<std::vector<std::uint32_t>> indices(std::uint64_t index,
                                                              const std::string& user);

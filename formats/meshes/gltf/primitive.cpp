@@ -58,7 +58,9 @@ class Attributes {
                 return values;
             }
         }
-        STX_TRY(auto values, document_.accessor(*index, where_ + " " + name, types));
+        // Colours must be normalised; exporters forget to say so.
+        STX_TRY(auto values,
+                document_.accessor(*index, where_ + " " + name, types, name.starts_with("COLOR")));
         return values;
     }
 
@@ -77,7 +79,8 @@ class Attributes {
             AccessorValues values;
             values.count = draco_->pointCount();
             values.components = a.components;
-            STX_TRY(values.values, draco_->values(a, normalised.value_or(false)));
+            STX_TRY(values.values,
+                    draco_->values(a, normalised.value_or(false) || name.starts_with("COLOR")));
             return values;
         }
         return fail(ErrorCode::invalidInput, "{}: the Draco stream has no attribute {} for {}",
