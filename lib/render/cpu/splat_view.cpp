@@ -79,19 +79,24 @@ Surroundings surroundings(const ReferenceView& v, int x, int y) {
     const auto& c = v.camera;
     const float z = v.depth.at(x, y);
     out.linked = v.texture.at(x, y).a >= 1.0f;
-    for (const glm::ivec2 step : {glm::ivec2(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
-        const int i = x + step.x, j = y + step.y;
+    bool behind[4] = {};
+    constexpr glm::ivec2 kSteps[4] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+    for (int k = 0; k < 4; ++k) {
+        const int i = x + kSteps[k].x, j = y + kSteps[k].y;
         if (!v.depth.contains(i, j)) {
             out.linked = false;
             continue;
         }
         const float other = v.depth.at(i, j);
-        const double f = step.x ? c.fx : c.fy;
+        const double f = k < 2 ? c.fx : c.fy;
         const float slope = (other - z) * static_cast<float>(c.orthographic ? f : f / other);
         const bool same = std::abs(slope) <= kSteepest;
         if (!same || v.texture.at(i, j).a < 1.0f) out.linked = false;
-        if (!same && other > z) out.rim = true;
+        behind[k] = !same && other > z;
     }
+    // What is one pixel thin has no rim: it would break into dots.
+    const bool thin = (behind[0] && behind[1]) || (behind[2] && behind[3]);
+    out.rim = !thin && (behind[0] || behind[1] || behind[2] || behind[3]);
     return out;
 }
 
