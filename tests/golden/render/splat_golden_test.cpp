@@ -62,7 +62,7 @@ class SplatGolden : public testing::Test {
         Figures out;
         out.all = compare(ours, truth)->psnrY.value_or(99);
         out.covered = compare(ours, truth, settingsOfMask)->psnrY.value_or(99);
-        // A pinhole: nothing was drawn where the surface was seen and is drawn all around.
+        // A pinhole: nothing was drawn where the surface was seen and is drawn around it.
         const auto& depth = frame->depth;
         for (int y = 1; y + 1 < depth.height(); ++y) {
             for (int x = 1; x + 1 < depth.width(); ++x) {
@@ -70,7 +70,7 @@ class SplatGolden : public testing::Test {
                 int around = 0;
                 for (int dy = -1; dy <= 1; ++dy)
                     for (int dx = -1; dx <= 1; ++dx) around += hasPoint(depth.at(x + dx, y + dy));
-                out.pinholes += around >= 6;
+                out.pinholes += around >= 7;
             }
         }
         std::printf("%s: Y %.2f dB, covered part %.2f dB, %lld pinholes\n", view.c_str(), out.all,
@@ -87,8 +87,8 @@ TEST_F(SplatGolden, SpheresCenter) {
     REQUIRE_SHARED(folder, "data/imagesets/spheres-miv");
     const auto f = figures(folder, "center", SplatRule::data);
     EXPECT_GT(f.all, 41.0) << "the figure that splat mode promises";
-    EXPECT_GT(f.all, 43.4 - kTolerance);
-    EXPECT_GT(f.covered, 45.2 - kTolerance);
+    EXPECT_GT(f.all, 43.5 - kTolerance);
+    EXPECT_GT(f.covered, 45.3 - kTolerance);
     EXPECT_EQ(f.pinholes, 0);
 }
 
@@ -103,7 +103,9 @@ TEST_F(SplatGolden, SpheresNear) {
 TEST_F(SplatGolden, SpheresOutside) {
     REQUIRE_SHARED(folder, "data/imagesets/spheres-miv");
     const auto f = figures(folder, "outside", SplatRule::data);
-    EXPECT_GT(f.covered, 40.6 - kTolerance);
+    EXPECT_GT(f.covered, 40.7 - kTolerance);
+    // Outside of what the sources enclose, rims that they saw edge-on fray a little.
+    EXPECT_LE(f.pinholes, 4);
 }
 
 TEST_F(SplatGolden, PointsOfOnePixelAreWhatOthersGet) {
