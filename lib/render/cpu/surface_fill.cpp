@@ -139,7 +139,7 @@ void fillBackground(OpenFrame frame) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
                 if (frame.albedo.at(x, y).a >= kClosed) continue;
-                constexpr int kRays = 16;
+                constexpr int kRays = 32;
                 std::array<Hit, kRays> hits;
                 int count = 0;
                 for (int k = 0; k < kRays; ++k) {
@@ -148,7 +148,7 @@ void fillBackground(OpenFrame frame) {
                     float along = 1;
                     Hit hit;
                     int averaged = 0;
-                    while (averaged < 8) {
+                    while (averaged < 2) {
                         const float px = static_cast<float>(x) + 0.5f + dx * along;
                         const float py = static_cast<float>(y) + 0.5f + dy * along;
                         if (!(px >= 0 && py >= 0 && px < static_cast<float>(width) &&
@@ -180,16 +180,18 @@ void fillBackground(OpenFrame frame) {
                     hits[static_cast<std::size_t>(count++)] = hit;
                 }
                 if (!count) continue;
-                float farthest = hits[0].q;
-                for (int k = 1; k < count; ++k)
+                float farthest = hits[0].q, nearest = hits[0].q;
+                for (int k = 1; k < count; ++k) {
                     farthest = std::min(farthest, hits[static_cast<std::size_t>(k)].q);
-                const float limit = farthest + 0.15f * frame.space.axis.whole(farthest);
+                    nearest = std::max(nearest, hits[static_cast<std::size_t>(k)].q);
+                }
+                const float range = nearest - farthest + 0.05f * frame.space.axis.whole(nearest);
                 glm::vec3 sum(0.0f);
                 float weights = 0, depth = 0;
                 for (int k = 0; k < count; ++k) {
                     const Hit& hit = hits[static_cast<std::size_t>(k)];
-                    if (hit.q > limit) continue;
-                    const float weight = 1.0f / (hit.distance * hit.distance);
+                    const float behind = (nearest - hit.q) / range + 0.01f;
+                    const float weight = behind * behind / (hit.distance * std::sqrt(hit.distance));
                     sum += weight * hit.colour;
                     depth += weight * hit.q;
                     weights += weight;

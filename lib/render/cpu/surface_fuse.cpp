@@ -13,7 +13,7 @@ namespace {
 /// Surfaces closer than this share of their depth are one.
 constexpr float kSame = 0.002f;
 /// Samples of one pixel are one piece until q jumps by more.
-constexpr float kJump = 0.003f;
+constexpr float kJump = 0.0015f;
 
 std::uint32_t bitsOf(float q) {
     return std::bit_cast<std::uint32_t>(q) & 3u;
@@ -25,6 +25,7 @@ struct Fuser {
     const DepthAxis& axis;
     int tileX, tileY;
     Pieces& pieces;
+    float step;  ///< coarsest depth code of the sources, scene units
 
     struct Candidate {
         float q;
@@ -36,6 +37,11 @@ struct Fuser {
         int sample = 0;
     };
 
+    /// Surfaces that lie no further apart than this in q are one.
+    [[nodiscard]] float same(float q) const {
+        return kSame * axis.whole(q) + step * axis.perUnit(q);
+    }
+
     [[nodiscard]] float sampleOf(int source, int i, int j) const {
         const float* samples = sources[static_cast<std::size_t>(source)].samples;
         return samples ? samples[static_cast<std::ptrdiff_t>(j) * grid.stride() + i] : 0.0f;
@@ -44,7 +50,7 @@ struct Fuser {
     /// dq/dx, dq/dy per pixel of one source's surface at a sample.
     [[nodiscard]] glm::vec2 slope(int source, int i, int j) const {
         const float here = sampleOf(source, i, j);
-        const float limit = 0.01f * axis.whole(here);
+        const float limit = 0.03f * axis.whole(here);
         const auto difference = [&](int di, int dj, float& out) {
             const int ni = i + di, nj = j + dj;
             if (ni < 0 || nj < 0 || ni >= grid.side() || nj >= grid.side()) return false;
@@ -83,7 +89,7 @@ struct Fuser {
             }
             const float other = sampleOf(s, i, j);
             if (other > 0.0f && !(bitsOf(other) & kExtensionBit) &&
-                std::abs(other - c.q) < kSame * axis.whole(c.q))
+                std::abs(other - c.q) < same(c.q))
                 continue;
             switch (opinionOf(*local.source, local.sourceFromPixel, x, y, c.q)) {
                 case Opinion::none:
@@ -115,7 +121,7 @@ struct Fuser {
         const float y = static_cast<float>(tileY) + (static_cast<float>(j) + 0.5f) * scale;
         for (int c = 0; c < count; ++c) {
             const Candidate& front = candidates[static_cast<std::size_t>(c)];
-            const float behind = front.q - kSame * axis.whole(front.q);
+            const float behind = front.q - same(front.q);
             bool sure = false;
             if (bitsOf(front.q) == 0) {
                 for (int o = c + 1; o < count && candidates[static_cast<std::size_t>(o)].q > behind;
@@ -161,7 +167,8 @@ struct Fuser {
             int end = begin + 1;
             while (end < count) {
                 const float before = samples[static_cast<std::size_t>(end - 1)].q;
-                if (before - samples[static_cast<std::size_t>(end)].q > kJump * axis.whole(before))
+                if (before - samples[static_cast<std::size_t>(end)].q >
+                    kJump * axis.whole(before) + step * axis.perUnit(before))
                     break;
                 ++end;
             }
@@ -232,7 +239,7 @@ struct Fuser {
                 if (first < 0) first = static_cast<int>(s);
             }
             if (!any) continue;
-            if (!simple || highMean - lowMean > kSame * axis.whole(highMean)) {
+            if (!simple || highMean - lowMean > same(highMean)) {
                 fusePixel(column, row);
                 continue;
             }
@@ -276,7 +283,9 @@ void Pieces::add(float px, float py, float depth, float slopeX, float slopeY, fl
 
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
               int tileX, int tileY, int columns, int rows, Pieces& pieces) {
-    Fuser fuser{sources, grid, axis, tileX, tileY, pieces};
+    float step = 0;
+    for (const LocalSource& s : sources) step = std::max(step, s.source->step);
+    Fuser fuser{sources, grid, axis, tileX, tileY, pieces, step};
     for (int row = 0; row < rows; ++row) fuser.fuseRow(row, columns);
 }
 

@@ -15,7 +15,10 @@ enum class Opinion {
 
 /// Bilinear alpha below which a point is outside the object. Points tangent to a silhouette sit at
 /// one half, so this is clearly less.
-inline constexpr float kFreeAlpha = 0.43f;
+inline constexpr float kFreeAlpha = 0.45f;
+
+/// A point this share of its depth in front of a surface is in front of it.
+inline constexpr float kClearlyBehind = 0.0005f;
 
 /// Bilinear alpha of a source at pixel position (u, v); 1 when the view has none.
 [[nodiscard]] inline float alphaAt(const Source& s, float u, float v) {
@@ -51,8 +54,9 @@ inline constexpr float kFreeAlpha = 0.43f;
             if (!(there > 0.0f)) continue;
             any = true;
             // The cheap half of the test first: most surfaces are not behind the point at all.
-            const float margin = 0.001f * s.space.axis.whole(p);
-            const float reach = 4 * 0.01f * s.space.axis.whole(there);
+            const float margin =
+                kClearlyBehind * s.space.axis.whole(p) + s.step * s.space.axis.perUnit(p);
+            const float reach = 4 * 0.03f * s.space.axis.whole(there);
             if (p < there + margin - reach) return Opinion::none;
             const glm::vec2 g = s.gradient(cx, cy);
             const float predicted = there + g.x * (u - 0.5f - static_cast<float>(cx)) +

@@ -173,7 +173,7 @@ struct Kernel {
         y0 = hn::MulAdd(yu, u0, hn::Mul(yv, v0));
         weight = hn::LoadU(d, &view.weight[l]);
         // A sample covers its own pixel, so a coarse source spreads: (1-h) I + h J Jt, inverted.
-        constexpr float kOwn = 0.3f;
+        constexpr float kOwn = 0.15f;
         const V h = hn::Set(d, kOwn), rest = hn::Set(d, 1.0f - kOwn);
         const V sxx = hn::MulAdd(h, hn::MulAdd(xu, xu, hn::Mul(xv, xv)), rest);
         const V syy = hn::MulAdd(h, hn::MulAdd(yu, yu, hn::Mul(yv, yv)), rest);
@@ -204,10 +204,10 @@ struct Kernel {
 
 /// The first row of the inverse of the 6x6 normal matrix, terms 1, dx, dy, dx², dxdy, dy².
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE void solveFirstRow(D d, const V* m, float ridge, V* out) {
+HWY_INLINE void solveFirstRow(D d, const V* m, V ridge, V* out) {
     // Moments by power: 0:1 1:x 2:y 3:xx 4:xy 5:yy 6:xxx 7:xxy 8:xyy 9:yyy 10:x4 11:x3y 12:x2y2
     // 13:xy3 14:y4
-    const V hold = hn::Mul(m[0], hn::Set(d, ridge));
+    const V hold = hn::Mul(m[0], ridge);
     constexpr int kIndex[5][5] = {{3, 4, 6, 7, 8},
                                   {4, 5, 7, 8, 9},
                                   {6, 7, 10, 11, 12},
@@ -374,7 +374,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         V m[kMoments], row[6];
         for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
         m[0] = hn::Max(m[0], hn::Set(d, 1e-12f));
-        solveFirstRow(d, m, settings.ridge, row);
+        solveFirstRow(d, m, hn::Set(d, settings.ridge), row);
         for (int i = 0; i < 6; ++i) hn::StoreU(row[i], d, &rows[i][l]);
     }
 

@@ -23,9 +23,9 @@ struct ShadeSource {
 
 /// How colours are fitted; see shadePieces().
 struct ShadeSettings {
-    int mostSources = 4;   ///< sources that one piece takes colours from
-    float kernel = 4.0f;   ///< squared radius of the fit, target pixels
-    float ridge = 0.003f;  ///< holds the linear and quadratic terms down
+    int mostSources = 4;    ///< sources that one piece takes colours from
+    float kernel = 3.0f;    ///< squared radius of the fit, target pixels
+    float ridge = 0.0015f;  ///< holds the linear and quadratic terms down
 };
 
 /// The vector from a camera's eye to the point (x, y, q) of a frame (orthographic: along its axis).

@@ -8,13 +8,23 @@
 namespace stx::surface {
 namespace {
 
-/// Neighbours whose q differ by less than this share are one surface.
-constexpr float kLink = 0.01f;
+/// Neighbours whose q differ by less than this share of it are one surface; by more than the
+/// second, never; between them, when the slope goes on.
+constexpr float kLinkAlways = 0.005f, kLinkNever = 0.03f;
 /// A leaf may leave its plane by this many pixels of parallax at a right angle.
-constexpr float kPlanarPixels = 0.04f;
+constexpr float kPlanarPixels = 0.08f;
 
-bool linked(const DepthAxis& axis, float a, float b) {
-    return a > 0.0f && b > 0.0f && std::abs(a - b) < kLink * axis.whole(std::max(a, b));
+/// Whether neighbours b and c lie on one surface, given the pixels before and after them (0 =
+/// none). Small steps always do; larger ones when the surface goes on with the same slope.
+bool linked(const DepthAxis& axis, float codeStep, float a, float b, float c, float d) {
+    if (!(b > 0.0f && c > 0.0f)) return false;
+    const float step = c - b, size = std::abs(step);
+    const float whole = axis.whole(std::max(b, c));
+    if (size < kLinkAlways * whole + 1.5f * codeStep * axis.perUnit(std::max(b, c))) return true;
+    if (size >= kLinkNever * whole) return false;
+    const float agree = 0.5f * size;
+    return (a > 0.0f && std::abs(step - (b - a)) < agree) ||
+           (d > 0.0f && std::abs(step - (d - c)) < agree);
 }
 
 double farthestPoint(const ReferenceView& view) {
@@ -30,9 +40,13 @@ void findLinks(Source& s) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < s.width; ++x) {
                 std::uint8_t bits = 0;
-                if (x + 1 < s.width && linked(axis, s.q.at(x, y), s.q.at(x + 1, y)))
+                const auto at = [&](int nx, int ny) {
+                    return s.q.contains(nx, ny) ? s.q.at(nx, ny) : 0.0f;
+                };
+                const float q = s.q.at(x, y);
+                if (linked(axis, s.step, at(x - 1, y), q, at(x + 1, y), at(x + 2, y)))
                     bits |= Source::kLinkRight;
-                if (y + 1 < s.height && linked(axis, s.q.at(x, y), s.q.at(x, y + 1)))
+                if (linked(axis, s.step, at(x, y - 1), q, at(x, y + 1), at(x, y + 2)))
                     bits |= Source::kLinkDown;
                 const auto empty = [&](int nx, int ny) {
                     return s.q.contains(nx, ny) && !(s.q.at(nx, ny) > 0.0f);
@@ -285,6 +299,7 @@ Source prepareSource(const ReferenceView& view) {
     s.width = view.depth.width();
     s.height = view.depth.height();
     s.space = PixelSpace(view.camera, farthestPoint(view));
+    if (view.depthBits < 32) s.step = static_cast<float>(view.depthCode().step());
     s.q = Image<float>(s.width, s.height);
     s.info = Image<std::uint8_t>(s.width, s.height);
     s.blocksX = (s.width + kBlock - 1) / kBlock;

@@ -25,6 +25,10 @@ struct DepthAxis {
     [[nodiscard]] double dist(double q) const { return inverse ? 1.0 / q : origin - unit * q; }
     /// What a relative depth difference of 1 is in q: q itself, or 1 when orthographic.
     [[nodiscard]] float whole(float q) const { return inverse ? q : 1.0f; }
+    /// How much q changes over one scene unit of distance.
+    [[nodiscard]] float perUnit(float q) const {
+        return inverse ? q * q : static_cast<float>(1.0 / unit);
+    }
 };
 
 /// A projective map of (x, y, q, 1): rows x, y, q and the denominator, which is positive in front.
@@ -78,6 +82,7 @@ struct Source {
     PixelSpace space;
     int width = 0, height = 0;
     bool hasAlpha = false;  ///< some pixel is not fully covered
+    float step = 0;         ///< scene units between neighbouring depth codes
     Image<float> q;         ///< 0 = no point
 
     static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4;
