@@ -19,7 +19,7 @@ layout(std430, binding = 3) readonly buffer FrontBuffer { uint front[]; };
 #if ACCUMULATE == 1
 layout(std430, binding = 4) readonly buffer SumBuffer { float sums[]; };
 #else
-layout(std430, binding = 4) readonly buffer SumBuffer { uint sums[]; };
+layout(std430, binding = 4) readonly buffer SumBuffer { int sums[]; };
 #endif
 #endif
 layout(std430, binding = 6) writeonly buffer ColourOut { vec4 colourOut[]; };
@@ -38,6 +38,17 @@ float frontAt(ivec2 at) {
     return uintBitsToFloat(front[(at.y + 1) * frameSize.z + at.x + 1]);
 #endif
 }
+
+#if !RASTER
+// Channel k of the pixel whose channels begin at j.
+float sumOf(int j, int k) {
+#if ACCUMULATE == 2
+    // The upper half of a 64-bit sum lends one to a lower half below zero.
+    if ((k & 1) == 1) return float(sums[j + k] + (sums[j + k - 1] < 0 ? 1 : 0));
+#endif
+    return float(sums[j + k]);
+}
+#endif
 
 vec3 worldPosition(vec2 pixel, float dist) {
     vec2 ray = (pixel - novelLens.zw) * novelLens.xy * vec2(1.0, -1.0);
@@ -66,19 +77,23 @@ void main() {
     }
 #else
     int j = ((at.y + 1) * frameSize.z + at.x + 1) * STRIDE;
-    float weight = float(sums[j + 3]);
+    float weight = sumOf(j, 3);
     if (weight > 0.0) {
         float scale = 1.0 / (weight * scales.y);
-        colour = vec4(vec3(sums[j], sums[j + 1], sums[j + 2]) * scale, 1.0);
+        colour = vec4(vec3(sumOf(j, 0), sumOf(j, 1), sumOf(j, 2)) * scale, 1.0);
 #if TRANSLUCENT
-        colour.a = min(float(sums[j + 4]) * scale, 1.0);
+        colour.a = min(sumOf(j, 4) * scale, 1.0);
 #endif
 #if NORMALS
-        normal = vec3(sums[j + 4 + TRANSLUCENT], sums[j + 5 + TRANSLUCENT],
-                      sums[j + 6 + TRANSLUCENT]) *
-                     (2.0 * scale) - 1.0;
+        const int n = 4 + TRANSLUCENT;
+        normal = vec3(sumOf(j, n), sumOf(j, n + 1), sumOf(j, n + 2)) * (2.0 * scale) - 1.0;
 #endif
     }
+#endif
+    // Continued colours may leave what a picture holds.
+    colour.rgb = max(colour.rgb, vec3(0.0));
+#if !LINEAR
+    colour.rgb = min(colour.rgb, vec3(colour.a));
 #endif
     if (!(dist < kNone)) {
 #if TRANSLUCENT

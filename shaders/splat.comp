@@ -1,8 +1,8 @@
 // Splatting with atomics. PASS 1: the front distance per pixel. PASS 2: what lies within the
 // tolerance of the front is added with its weight. Needs splat_points.glsl.
 // ACCUMULATE: 0 = 32-bit integers, 1 = floats, 2 = pairs of 32-bit integers in 64 bits.
-// NORMALS: normals are kept. Channels of a pixel: R, G, B (times alpha), weight, alpha,
-// normal.
+// NORMALS: normals are kept. Channels of a pixel: R, G, B (times alpha), weight, alpha, normal.
+// Continued colours may be negative: sums are two's complement.
 layout(local_size_x = 256) in;
 
 layout(std430, binding = 3) buffer FrontBuffer { uint front[]; };
@@ -11,22 +11,30 @@ layout(std430, binding = 3) buffer FrontBuffer { uint front[]; };
 #define CHANNELS (4 + TRANSLUCENT + 3 * NORMALS)
 #define PAIRS ((CHANNELS + 1) / 2)
 #if ACCUMULATE == 0
-layout(std430, binding = 4) buffer SumBuffer { uint sums[]; };
+layout(std430, binding = 4) buffer SumBuffer { int sums[]; };
 #elif ACCUMULATE == 1
 layout(std430, binding = 4) buffer SumBuffer { float sums[]; };
 #else
 layout(std430, binding = 4) buffer SumBuffer { uint64_t sums[]; };
 #endif
 
+#if ACCUMULATE == 2
+// low + high * 2^32 as one number; resolve.comp takes it apart.
+uint64_t pair(int low, int high) {
+    return packUint2x32(uvec2(uint(low), uint(low < 0 ? high - 1 : high)));
+}
+#endif
+
 // What a point adds for each unit of weight, times the colour scale.
 struct Paint {
-    float alpha;  // 0..1
+    float alpha;
     vec3 colour;  // times alpha
+    vec3 across, down;  // its change per pixel
     vec3 normal;  // 0..1
     float quality, tolerance;
 };
 
-Paint paintOf(Point p) {
+Paint paintOf(Point p, Splat splat) {
     Paint paint;
     vec4 colour = pointColour(p);
 #if TRANSLUCENT
@@ -37,14 +45,18 @@ Paint paintOf(Point p) {
 #if NORMALS
     paint.normal = (pointNormal(p) * 0.5 + 0.5) * scales.y;
 #endif
-    paint.quality = tasks[p.task].quality * scales.x;
+    colourGradient(p, splat.steps, paint.across, paint.down);
+    paint.across *= scales.y;
+    paint.down *= scales.y;
+    paint.quality = splat.quality * scales.x;
     paint.tolerance = tasks[p.task].tolerance;
     return paint;
 }
 
-void add(int at, float kernel, float depth, Paint paint) {
+void add(int at, float kernel, vec2 d, float depth, Paint paint) {
     float nearest = uintBitsToFloat(front[at]);
     if (!(depth <= nearest * (1.0 + paint.tolerance))) return;
+    vec3 colour = paint.colour + d.x * paint.across + d.y * paint.down;
 #if ACCUMULATE == 1
     float weight = kernel * paint.quality;
 #else
@@ -53,9 +65,9 @@ void add(int at, float kernel, float depth, Paint paint) {
 #endif
 #if ACCUMULATE == 1
     int j = at * CHANNELS;
-    atomicAdd(sums[j], paint.colour.r * weight);
-    atomicAdd(sums[j + 1], paint.colour.g * weight);
-    atomicAdd(sums[j + 2], paint.colour.b * weight);
+    atomicAdd(sums[j], colour.r * weight);
+    atomicAdd(sums[j + 1], colour.g * weight);
+    atomicAdd(sums[j + 2], colour.b * weight);
     atomicAdd(sums[j + 3], weight);
 #if TRANSLUCENT
     atomicAdd(sums[j + 4], paint.alpha * weight);
@@ -66,13 +78,13 @@ void add(int at, float kernel, float depth, Paint paint) {
     atomicAdd(sums[j + 6 + TRANSLUCENT], paint.normal.z * weight);
 #endif
 #else
-    uvec3 c = uvec3(paint.colour * weight + 0.5);
-    uint w = uint(weight);
+    ivec3 c = ivec3(round(colour * weight));
+    int w = int(weight);
 #if TRANSLUCENT
-    uint a = uint(paint.alpha * weight + 0.5);
+    int a = int(paint.alpha * weight + 0.5);
 #endif
 #if NORMALS
-    uvec3 n = uvec3(paint.normal * weight + 0.5);
+    ivec3 n = ivec3(paint.normal * weight + 0.5);
 #endif
 #if ACCUMULATE == 0
     int j = at * CHANNELS;
@@ -89,18 +101,17 @@ void add(int at, float kernel, float depth, Paint paint) {
     atomicAdd(sums[j + 6 + TRANSLUCENT], n.z);
 #endif
 #else
-    // The halves of a pair cannot run into each other while no 32-bit sum overflows.
     int j = at * PAIRS;
-    atomicAdd(sums[j], packUint2x32(c.rg));
-    atomicAdd(sums[j + 1], packUint2x32(uvec2(c.b, w)));
+    atomicAdd(sums[j], pair(c.r, c.g));
+    atomicAdd(sums[j + 1], pair(c.b, w));
 #if TRANSLUCENT && NORMALS
-    atomicAdd(sums[j + 2], packUint2x32(uvec2(a, n.x)));
-    atomicAdd(sums[j + 3], packUint2x32(n.yz));
+    atomicAdd(sums[j + 2], pair(a, n.x));
+    atomicAdd(sums[j + 3], pair(n.y, n.z));
 #elif TRANSLUCENT
-    atomicAdd(sums[j + 2], packUint2x32(uvec2(a, 0u)));
+    atomicAdd(sums[j + 2], pair(a, 0));
 #elif NORMALS
-    atomicAdd(sums[j + 2], packUint2x32(n.xy));
-    atomicAdd(sums[j + 3], packUint2x32(uvec2(n.z, 0u)));
+    atomicAdd(sums[j + 2], pair(n.x, n.y));
+    atomicAdd(sums[j + 3], pair(n.z, 0));
 #endif
 #endif
 #endif
@@ -120,10 +131,12 @@ void main() {
 #if PASS == 1
     atomicMin(front[index], floatBitsToUint(p.dist));
 #else
-    Paint paint = paintOf(p);
-    paint.quality = scales.x;
+    Splat splat;
+    splat.quality = 1.0;
+    splat.steps = vec4(0.0);
+    Paint paint = paintOf(p, splat);
     paint.tolerance = 0.0;
-    add(index, 1.0, p.dist, paint);
+    add(index, 1.0, vec2(0.0), p.dist, paint);
 #endif
 #elif RULE == 1
     vec2 corner = floor(p.pixel);
@@ -131,46 +144,55 @@ void main() {
     vec2 f = p.pixel - corner, g = 1.0 - f;
     vec2 f2 = f * f, g2 = g * g;
     int index = (int(corner.y) + 1) * stride + int(corner.x) + 1;
-    float zx = p.dist * tasks[p.task].slopeX, zy = p.dist * tasks[p.task].slopeY;
+    Splat splat;
+    splatOf(p, splat);
+    float zx = splat.slope.x, zy = splat.slope.y, core2 = splat.core2;
     float z = p.dist - f.x * zx - f.y * zy;
 #if PASS == 1
-    float core2 = tasks[p.task].core2;
     if (f2.x + f2.y <= core2) atomicMin(front[index], floatBitsToUint(z));
     if (g2.x + f2.y <= core2) atomicMin(front[index + 1], floatBitsToUint(z + zx));
     if (f2.x + g2.y <= core2) atomicMin(front[index + stride], floatBitsToUint(z + zy));
     if (g2.x + g2.y <= core2) atomicMin(front[index + stride + 1], floatBitsToUint(z + zx + zy));
 #else
-    Paint paint = paintOf(p);
+    Paint paint = paintOf(p, splat);
     vec2 near = lowPass(f2), far = lowPass(g2);
     vec4 kernel = vec4(near.x, far.x, near.x, far.x) * vec4(near.yy, far.yy);
     vec4 radius2 = vec4(f2.x, g2.x, f2.x, g2.x) + vec4(f2.yy, g2.yy);
-    float core2 = tasks[p.task].core2;
-    if (worthwhile(kernel.x, radius2.x, core2)) add(index, kernel.x, z, paint);
-    if (worthwhile(kernel.y, radius2.y, core2)) add(index + 1, kernel.y, z + zx, paint);
-    if (worthwhile(kernel.z, radius2.z, core2)) add(index + stride, kernel.z, z + zy, paint);
-    if (worthwhile(kernel.w, radius2.w, core2)) add(index + stride + 1, kernel.w, z + zx + zy, paint);
+    if (worthwhile(kernel.x, radius2.x, core2)) add(index, kernel.x, -f, z, paint);
+    if (worthwhile(kernel.y, radius2.y, core2))
+        add(index + 1, kernel.y, vec2(g.x, -f.y), z + zx, paint);
+    if (worthwhile(kernel.z, radius2.z, core2))
+        add(index + stride, kernel.z, vec2(-f.x, g.y), z + zy, paint);
+    if (worthwhile(kernel.w, radius2.w, core2))
+        add(index + stride + 1, kernel.w, g, z + zx + zy, paint);
 #endif
 #else
-    Ellipse e;
-    if (!ellipseOf(p, e)) return;
-    vec2 low = max(ceil(p.pixel - e.reach), vec2(0.0));
-    vec2 high = min(floor(p.pixel + e.reach), vec2(frameSize.xy - 1));
+    Splat splat;
+    if (!splatOf(p, splat)) return;
+    vec2 low = floor(p.pixel), high = low + 1.0;
+    if (!splat.small) {
+        low = ceil(p.pixel - splat.reach);
+        high = floor(p.pixel + splat.reach);
+    }
+    low = max(low, vec2(0.0));
+    high = min(high, vec2(frameSize.xy - 1));
     if (!all(lessThanEqual(low, high))) return;
     ivec2 from = ivec2(low), to = ivec2(high);
 #if PASS == 2
-    Paint paint = paintOf(p);
+    Paint paint = paintOf(p, splat);
 #endif
     for (int y = from.y; y <= to.y; ++y) {
         for (int x = from.x; x <= to.x; ++x) {
             vec2 d = vec2(x, y) - p.pixel;
-            float q = squaredRadius(e.q, d);
+            float q = squaredRadius(splat, d);
             // A plane that runs through the viewpoint must not hide all.
-            float depth = max(p.dist + dot(e.slope, d), 0.5 * p.dist);
+            float depth = max(p.dist + dot(splat.slope, d), 0.5 * p.dist);
             int index = (y + 1) * stride + x + 1;
 #if PASS == 1
-            if (q <= e.core2) atomicMin(front[index], floatBitsToUint(depth));
+            if (q <= splat.core2) atomicMin(front[index], floatBitsToUint(depth));
 #else
-            if (q < kFaint2) add(index, ellipseKernel(q), depth, paint);
+            float kernel = kernelAt(splat, d, q);
+            if (kernel > 0.0) add(index, kernel, d, depth, paint);
 #endif
         }
     }

@@ -2,11 +2,12 @@
 // the raster pipeline. Needs splat_points.glsl.
 #if PASS == 2
 flat in vec4 colour;
+flat in vec3 across, down;
+flat in vec2 weighing;
 #if NORMALS
 flat in vec3 normal;
 layout(location = 2) out vec4 normalSum;
 #endif
-flat in vec2 weighing;
 layout(location = 0) out vec4 colourSum;  // rgb * alpha * w, w
 #if TRANSLUCENT
 layout(location = 1) out float alphaSum;
@@ -16,55 +17,52 @@ layout(binding = 4) uniform sampler2D frontTexture;
 layout(location = 0) out float frontDistance;
 #endif
 flat in vec3 centre;
-#if RULE != 0
-flat in vec2 slope;
-#endif
-#if RULE == 1
-flat in float core2;
-#elif RULE >= 2
 flat in vec3 inverse;
-flat in float core2;
-#endif
+flat in vec4 shape;
 
 void main() {
     vec2 d = gl_FragCoord.xy - 0.5 - float(frameSize.w) - centre.xy;
     float depth = centre.z;
     float kernel = 1.0;
+#if RULE != 0
+    Splat splat;
+    splat.small = RULE == 1 || shape.x != 0.0;
+    splat.q = inverse;
+    float q = squaredRadius(splat, d);
+    depth += dot(shape.zw, d);
 #if RULE >= 2
-    float q = squaredRadius(inverse, d);
-    depth = max(depth + dot(slope, d), 0.5 * centre.z);
-#if PASS == 1
-    if (q > core2) discard;
-#else
-    if (q >= kFaint2) discard;
-    kernel = ellipseKernel(q);
+    // A plane that runs through the viewpoint must not hide all.
+    depth = max(depth, 0.5 * centre.z);
 #endif
-#elif RULE == 1
-    depth += dot(slope, d);
 #if PASS == 1
-    if (dot(d, d) > core2) discard;
+    if (q > shape.y) discard;
 #else
-    vec2 k = lowPass(min(d * d, vec2(1.0)));
-    kernel = k.x * k.y;
-    if (!worthwhile(kernel, dot(d, d), core2)) discard;
+    kernel = kernelAt(splat, d, q);
+    if (!(kernel > 0.0)) discard;
+#if RULE == 1
+    if (!worthwhile(kernel, q, shape.y)) discard;
+#endif
 #endif
 #endif
 #if PASS == 1
     frontDistance = depth;
 #else
     float nearest = texelFetch(frontTexture, ivec2(gl_FragCoord.xy), 0).r;
+    vec3 rgb = colour.rgb;
+#if TRANSLUCENT
+    rgb *= colour.a;
+#endif
 #if RULE == 0
     if (depth > nearest) discard;
     float weight = 1.0;
 #else
     if (!(depth <= nearest * (1.0 + weighing.y))) discard;
     float weight = kernel * weighing.x;
+    rgb += d.x * across + d.y * down;
 #endif
+    colourSum = vec4(rgb * weight, weight);
 #if TRANSLUCENT
-    colourSum = vec4(colour.rgb * (colour.a * weight), weight);
     alphaSum = colour.a * weight;
-#else
-    colourSum = vec4(colour.rgb * weight, weight);
 #endif
 #if NORMALS
     normalSum = vec4(normal * weight, 0.0);

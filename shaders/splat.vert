@@ -1,22 +1,17 @@
 // Lee & Park's vertex shader: no vertex attributes; each vertex fetches its point from the textures.
-// Small splats are GL points, ellipses are two triangles. Needs splat_points.glsl.
+// Small splats are GL points, those of blocks with larger ones two triangles. Needs
+// splat_points.glsl.
 #if PASS == 2
 flat out vec4 colour;
+flat out vec3 across, down;
+flat out vec2 weighing;  // quality, tolerance
 #if NORMALS
 flat out vec3 normal;
 #endif
-flat out vec2 weighing;  // quality, tolerance
 #endif
 flat out vec3 centre;  // pixel, distance
-#if RULE != 0
-flat out vec2 slope;
-#endif
-#if RULE == 1
-flat out float core2;
-#elif RULE >= 2
 flat out vec3 inverse;
-flat out float core2;
-#endif
+flat out vec4 shape;  // small, core2, slope
 
 void main() {
     gl_Position = vec4(0.0, 0.0, -2.0, 1.0);  // outside: clipped
@@ -28,28 +23,30 @@ void main() {
 #endif
     Point p;
     if (!fetchPoint((id >> 8u) + uint(counts.z), id & 255u, p)) return;
-    vec2 at = p.pixel + 0.5;
+    Splat splat;
+    if (!splatOf(p, splat)) return;
 #if RULE >= 2
-    Ellipse e;
-    if (!ellipseOf(p, e)) return;
     // Corners 0 1 2 and 3 4 5: (-,-) (+,-) (+,+) and (-,-) (+,+) (-,+).
-    at += e.reach * vec2(corner == 1u || corner == 2u || corner == 4u ? 1.0 : -1.0,
-                        corner == 2u || corner >= 4u ? 1.0 : -1.0);
-    inverse = e.q;
-    slope = e.slope;
-    core2 = e.core2;
+    vec2 side = vec2(corner == 1u || corner == 2u || corner == 4u ? 1.0 : -1.0,
+                     corner == 2u || corner >= 4u ? 1.0 : -1.0);
+    vec2 at = splat.small ? floor(p.pixel) + 1.0 + side : p.pixel + 0.5 + side * splat.reach;
 #elif RULE == 1
     gl_PointSize = 2.0;
-    at = floor(p.pixel) + 1.0;  // the corner that the 2x2 pixels share
-    slope = vec2(tasks[p.task].slopeX, tasks[p.task].slopeY) * p.dist;
-    core2 = tasks[p.task].core2;
+    vec2 at = floor(p.pixel) + 1.0;  // the corner that the 2x2 pixels share
 #else
-    at = floor(p.pixel + 0.5) + 0.5;
+    vec2 at = floor(p.pixel + 0.5) + 0.5;
 #endif
     centre = vec3(p.pixel, p.dist);
+#if RULE >= 2
+    inverse = splat.q;
+#endif
+    shape = vec4(splat.small ? 1.0 : 0.0, splat.core2, splat.slope);
 #if PASS == 2
     colour = pointColour(p);
-    weighing = vec2(tasks[p.task].quality, tasks[p.task].tolerance);
+    weighing = vec2(splat.quality, tasks[p.task].tolerance);
+#if RULE != 0
+    colourGradient(p, splat.steps, across, down);
+#endif
 #if NORMALS
     normal = pointNormal(p);
 #endif

@@ -1,6 +1,7 @@
 // Fetching a point of the object and laying out its splat; the twin of
 // lib/render/cpu/splat_kernels.cpp. Needs splat_frame.glsl.
-// RULE: 0 = one pixel, 1 = small splats (2x2 pixels), 2 = ellipses from the data, 3 = the paper's.
+// RULE: 0 = one pixel, 1 = small splats (2x2 pixels) that share a tilt, 2 = each from its own data,
+// small or an ellipse, 3 = the paper's.
 // PASS: 1 = visibility, 2 = blending. SIZES: the slope texture holds sizes too.
 
 struct Task {
@@ -12,6 +13,7 @@ struct Task {
     float core2;           // squared radius in which a splat hides what is behind (small ones)
     float tolerance;       // relative distance behind the front that still blends
     float quality;         // weight among views
+    float uAcross, vAcross, uDown, vDown;  // half the source pixels that go by per novel pixel
     float pad0, pad1, pad2;
 };
 layout(std430, binding = 1) readonly buffer TaskBuffer { Task tasks[]; };
@@ -80,36 +82,63 @@ bool worthwhile(float kernel, float radius2, float core2) {
     return kernel > 1.0 / 64.0 || radius2 <= core2;
 }
 
-#if RULE >= 2
-// The same for ellipses: where their kernel is 1/64. Silhouettes are made of faint ones, too.
-const float kFaint2 = RULE == 3 || TRANSLUCENT == 1 ? kReach2 : 0.75 * kReach2;
-
-// q(d) = (xx, 2 xy, yy) . (dx dx, dx dy, dy dy), d in pixels from the point.
-struct Ellipse {
+// A splat's footprint. Small: the 2x2 pixels around, q and core2 in squared pixels. Else an
+// ellipse: q(d) = (xx, 2 xy, yy) . (dx dx, dx dy, dy dy), d in pixels from the point.
+struct Splat {
+    bool small;
     vec3 q;
     vec2 reach;    // of the bounding box
     float core2;   // q up to which it hides what is behind
     vec2 slope;    // distance per pixel
+    float quality;
+    vec4 steps;    // uAcross, vAcross, uDown, vDown; zero where colour must not be continued
 };
 
+float squaredRadius(Splat s, vec2 d) {
+    return s.small ? dot(d, d) : s.q.x * d.x * d.x + s.q.y * d.x * d.y + s.q.z * d.y * d.y;
+}
+
+// Weight at d, whose squaredRadius is q. Ellipses fall off like a Gaussian and end at kReach2.
+float kernelAt(Splat s, vec2 d, float q) {
+    if (s.small) {
+        vec2 k = lowPass(min(d * d, vec2(1.0)));
+        return k.x * k.y;
+    }
+    float fall = max(0.0, 1.0 - q * (1.0 / kReach2));
+    return fall * fall * fall;
+}
+
 // False when the splat faces away.
-bool ellipseOf(Point p, out Ellipse e) {
-#if RULE == 3
-    float radius = max(0.5, 0.5 * novelPosition.w * (novelAxisX.w != 0.0 ? 1.0 : 1.0 / p.dist));
-    e.q = vec3(1.0, 0.0, 1.0) * (kReach2 / (radius * radius));
-    e.reach = vec2(min(radius, kLargest));
-    e.core2 = kReach2;
-    e.slope = vec2(0.0);
+bool splatOf(Point p, out Splat s) {
+#if RULE <= 1
+    s.small = true;
+    s.core2 = tasks[p.task].core2;
+    s.slope = vec2(tasks[p.task].slopeX, tasks[p.task].slopeY) * p.dist;
+    s.quality = tasks[p.task].quality;
+    s.steps = vec4(tasks[p.task].uAcross, tasks[p.task].vAcross, tasks[p.task].uDown,
+                   tasks[p.task].vDown);
+    return true;
+#elif RULE == 3
+    float radius =
+        min(max(0.5, 0.5 * novelPosition.w * (novelAxisX.w != 0.0 ? 1.0 : 1.0 / p.dist)), LARGEST);
+    s.small = false;
+    s.q = vec3(1.0, 0.0, 1.0) * (kReach2 / (radius * radius));
+    s.reach = vec2(radius);
+    s.core2 = kReach2;
+    s.slope = vec2(0.0);
+    s.quality = 1.0;
+    s.steps = vec4(0.0);
     return true;
 #else
     View view = views[p.view];
     float inverse = novelAxisX.w != 0.0 ? 1.0 : 1.0 / p.h.z;
     float back = novelAxisX.w != 0.0 ? 0.0 : 1.0;
     ivec4 coded = texelFetch(slopeTexture, p.texel, 0);
+    bool linked = (coded.x & 1) != 0, rim = (coded.y & 1) != 0;
     float spacing = view.a0.w != 0.0 ? 1.0 : p.source;
-    vec2 slope = vec2(coded.xy) * (spacing / kSlopeScale) / vec2(view.au.w, view.av.w);
-    vec3 hu = view.au.xyz * p.source + view.bu.xyz + p.a * slope.x;
-    vec3 hv = view.av.xyz * p.source + view.bv.xyz + p.a * slope.y;
+    vec2 tilt = vec2(coded.xy) * (spacing / kSlopeScale) / vec2(view.au.w, view.av.w);
+    vec3 hu = view.au.xyz * p.source + view.bu.xyz + p.a * tilt.x;
+    vec3 hv = view.av.xyz * p.source + view.bv.xyz + p.a * tilt.y;
     vec2 eu = (hu.xy - back * p.pixel * hu.z) * inverse;
     vec2 ev = (hv.xy - back * p.pixel * hv.z) * inverse;
     float det = eu.x * ev.y - ev.x * eu.y;
@@ -119,27 +148,43 @@ bool ellipseOf(Point p, out Ellipse e) {
 #else
     const float size = 1.0;
 #endif
+    vec2 longer = eu + ev, other = eu - ev;
+    float cover2 = size * size * 0.25 * max(dot(longer, longer), dot(other, other));
+    s.small = cover2 < SMALL_COVER_2;
+    // The plane's distance per pixel; nearly edge-on it would run away.
+    vec2 relative = vec2(hu.z * ev.y - hv.z * eu.y, hv.z * eu.x - hu.z * ev.x) / (det * p.h.z);
+    s.slope = clamp(relative, vec2(-STEEPEST), vec2(STEEPEST)) * p.dist;
+    float density = 1.0 / max(1.0, max(dot(eu, eu), dot(ev, ev)));
+    s.quality = tasks[p.task].quality * (linked ? 1.0 : EDGE_QUALITY) *
+                max(density * density, LEAST_DENSITY);
+    float fade = linked ? clamp(det / FADE_TO - 1.0, 0.0, 1.0) : 0.0;
+    s.steps = vec4(ev.y, -eu.y, -ev.x, eu.x) * (fade * 0.5 * GRADIENT / det);
+    if (s.small) {
+        // At its rim the surface ends within half a sample.
+        s.core2 = max(0.5, 1.08 * cover2) * (rim ? RIM_CORE_2 : 1.0);
+        return true;
+    }
+    s.core2 = kCore2;
     float k = kSigmaSource2 * size * size;
     float vxx = k * (eu.x * eu.x + ev.x * ev.x) + kSigmaPixel2;
     float vyy = k * (eu.y * eu.y + ev.y * ev.y) + kSigmaPixel2;
     float vxy = k * (eu.x * eu.y + ev.x * ev.y);
     // vxx vyy - vxy vxy without cancellation.
     float determinant = k * k * det * det + kSigmaPixel2 * (vxx + vyy - kSigmaPixel2);
-    e.q = vec3(vyy, -2.0 * vxy, vxx) / determinant;
-    e.reach = min(sqrt(kFaint2 * vec2(vxx, vyy)), vec2(kLargest));
-    e.core2 = kCore2;
-    // The plane's distance per pixel; nearly edge-on it would run away.
-    vec2 relative = vec2(hu.z * ev.y - hv.z * eu.y, hv.z * eu.x - hu.z * ev.x) / (det * p.h.z);
-    e.slope = clamp(relative, vec2(-0.05), vec2(0.05)) * p.dist;
+    s.q = vec3(vyy, -2.0 * vxy, vxx) / determinant;
+    s.reach = min(sqrt(kReach2 * vec2(vxx, vyy)), vec2(kLargest));
     return true;
 #endif
 }
 
-float squaredRadius(vec3 q, vec2 d) { return q.x * d.x * d.x + q.y * d.x * d.y + q.z * d.y * d.y; }
-
-// Falls off like a Gaussian and reaches zero at kReach2.
-float ellipseKernel(float q) {
-    float fall = max(0.0, 1.0 - q * (1.0 / kReach2));
-    return fall * fall * fall;
+// Change of a point's colour per novel pixel across and down, from its four neighbours.
+void colourGradient(Point p, vec4 steps, out vec3 across, out vec3 down) {
+    across = down = vec3(0.0);
+    if (steps.x == 0.0 && steps.w == 0.0) return;
+    vec3 u = texelFetchOffset(colourTexture, p.texel, 0, ivec2(1, 0)).rgb -
+             texelFetchOffset(colourTexture, p.texel, 0, ivec2(-1, 0)).rgb;
+    vec3 v = texelFetchOffset(colourTexture, p.texel, 0, ivec2(0, 1)).rgb -
+             texelFetchOffset(colourTexture, p.texel, 0, ivec2(0, -1)).rgb;
+    across = steps.x * u + steps.y * v;
+    down = steps.z * u + steps.w * v;
 }
-#endif

@@ -176,8 +176,9 @@ Camera analyticCamera(AnalyticScene scene, double index, int count) {
     }
     const double turn = glm::two_pi<double>() * index / count;
     const double lift = glm::radians(35.0);
-    const glm::dvec3 eye(4 * std::cos(lift) * std::sin(turn), 4 * std::sin(lift),
-                         4 * std::cos(lift) * std::cos(turn));
+    const double distance = 4.9;  // makes the object a sixth of the picture, as the paper's is
+    const glm::dvec3 eye(distance * std::cos(lift) * std::sin(turn), distance * std::sin(lift),
+                         distance * std::cos(lift) * std::cos(turn));
     return placed(eye, glm::dvec3(0), glm::radians(34.0), 256, 256);
 }
 

@@ -394,8 +394,9 @@ template <class F>
 HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const F& draw) {
     constexpr int kValues = 15;
     HWY_ALIGN float v[kValues][kBlock];
-    const VF all[kValues] = {p.at.x, p.at.y, p.at.z,  p.slopeX, p.slopeY, p.qxx,
-                             p.qxy,  p.qyy,  p.halfX, p.halfY,  p.quality};
+    const VF all[kValues] = {p.at.x,    p.at.y,    p.at.z,    p.slopeX, p.slopeY,
+                             p.qxx,     p.qxy,     p.qyy,     p.halfX,  p.halfY,
+                             p.quality, p.uAcross, p.vAcross, p.uDown,  p.vDown};
     for (int k = 0; k < kValues; ++k) hn::Store(all[k], d, v[k]);
     while (bits) {
         const int k = __builtin_ctz(bits);

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "embedded_shaders.hpp"
+#include "lib/render/cpu/splat_kernels.hpp"
 #include "lib/render/gpu/egl_context.hpp"
 #include "lib/render/gpu/gl_object.hpp"
 #include "lib/render/gpu/gpu_scene.hpp"
@@ -123,11 +124,14 @@ std::string GpuSplatRenderer::header(int pass, Rule rule) const {
     define("LIT", lit() ? 1 : 0);
     define("SIZES", scene.hasSizes ? 1 : 0);
     define("RASTER", raster_ ? 1 : 0);
-    // Of lib/render/cpu/splat_kernels.cpp: a splat is a Gaussian of half a source pixel, filtered
-    // by one of 0.3 of an output pixel; squared radii are in those deviations.
-    text +=
+    define("LINEAR", scene.linear ? 1 : 0);
+    // The kernel's constants; their meaning stands in lib/render/cpu/splat_kernels.
+    text += fmt::format(
         "#define SIGMA_SOURCE_2 0.25\n#define SIGMA_PIXEL_2 0.09\n#define REACH_2 5.0\n"
-        "#define CORE_2 2.1\n#define LARGEST 256.0\n";
+        "#define CORE_2 2.1\n#define LARGEST 256.0\n#define STEEPEST 0.05\n"
+        "#define RIM_CORE_2 0.5\n#define EDGE_QUALITY 0.05\n#define SMALL_COVER_2 {:.9e}\n"
+        "#define LEAST_DENSITY {:.9e}\n#define GRADIENT {:.9e}\n#define FADE_TO {:.9e}\n",
+        splat::kSmallCover2, splat::kLeastDensity, splat::kGradient, splat::kFadeTo);
     return text;
 }
 

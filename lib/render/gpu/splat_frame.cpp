@@ -6,10 +6,9 @@
 namespace stx::gpu {
 namespace {
 
-/// Weights below this share of the frame's best would be lost in the integer sums; where such a
-/// view is alone it still has to draw.
-constexpr float kLeastQuality = 2e-5f;
-constexpr double kLargestWeight = 65536.0;
+/// Steps of a weight in the integer sums. A sparse view's weight may be a thousandth of this; where
+/// such views are alone the steps still have to tell them apart.
+constexpr double kLargestWeight = 1048576.0;
 
 /// Lee & Park find the coefficient by hand; here the view nearest to the camera decides: its
 /// samples, at their mean distance, just close.
@@ -114,23 +113,23 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                 t.slopeY,
                 t.core2,
                 t.tolerance,
-                t.quality * t.density,
+                t.quality * (t.uniform ? t.density : 1.0f),
+                t.uAcross,
+                t.vAcross,
+                t.uDown,
+                t.vDown,
                 {}};
-            const bool ellipse = settings.splat == SplatRule::data && !t.small;
+            const bool ellipse = settings.splat == SplatRule::data && !t.uniform;
             (ellipse ? large : frame.tasks).push_back(entry);
         }
         crowd += std::max(1.0, densest);
     }
     frame.smallTasks = static_cast<int>(frame.tasks.size());
     frame.tasks.insert(frame.tasks.end(), large.begin(), large.end());
-    float best = 0;
-    for (const auto& t : frame.tasks) best = std::max(best, t.quality);
-    for (auto& t : frame.tasks) t.quality = std::max(t.quality / best, kLeastQuality);
-
-    // 32-bit sums: colour steps * weight * crowd must stay below 2^32. Four for what a tilt and
+    // 32-bit sums: colour steps * weight * crowd must stay below 2^31. Four for what a tilt and
     // the kernel's four pixels add.
     const double steps = 255.0;
-    const double weight = std::clamp(4294967295.0 / (steps * 4.0 * crowd), 1.0, kLargestWeight);
+    const double weight = std::clamp(2147483647.0 / (steps * 4.0 * crowd), 1.0, kLargestWeight);
     frame.uniforms.scales = glm::vec4(std::floor(weight), steps / scene.maxColour, 0, 0);
 
     const Lighting lighting = lightsInWorld(settings.lighting, novel.worldFromCamera());

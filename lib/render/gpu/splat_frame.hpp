@@ -29,6 +29,7 @@ struct ViewEntry {
 struct TaskEntry {
     std::uint32_t uv, count, atlasXY, viewLayer;
     float slopeX, slopeY, core2, tolerance, quality;
+    float uAcross, vAcross, uDown, vDown;
     float pad[3];
 };
 
@@ -41,7 +42,7 @@ struct LightEntry {
 struct SplatFrame {
     FrameUniforms uniforms;
     std::vector<ViewEntry> views;
-    std::vector<TaskEntry> tasks;  ///< small splats first, then ellipses
+    std::vector<TaskEntry> tasks;  ///< blocks of small, alike splats first, then the others
     int smallTasks = 0;
     std::vector<LightEntry> lights;
 };

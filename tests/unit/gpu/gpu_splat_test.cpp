@@ -56,9 +56,20 @@ TEST_P(GpuSplat, ClosesTheSurfaceAtEveryZoom) {
         camera.fy *= zoom;
         const auto frame = draw(bundle, splatSettings(), camera);
         ASSERT_TRUE(frame) << frame.error().text();
+        // A rim and what it hides may part by a pixel; a surface may not open anywhere.
+        const auto truth = viewOfAnalyticScene(AnalyticScene::room, camera);
+        const auto nearRim = [&](int x, int y) {
+            for (int j = std::max(0, y - 2); j <= std::min(camera.height - 1, y + 2); ++j)
+                for (int i = std::max(0, x - 2); i <= std::min(camera.width - 1, x + 2); ++i)
+                    if (std::abs(truth.depth.at(i, j) / truth.depth.at(x, y) - 1) > 0.05f)
+                        return true;
+            return false;
+        };
         int holes = 0;
-        for (const float d : frame->depth.pixels()) holes += hasPoint(d) ? 0 : 1;
-        for (const auto& c : frame->colour.pixels()) holes += c.a == 1.0f ? 0 : 1;
+        for (int y = 0; y < camera.height; ++y)
+            for (int x = 0; x < camera.width; ++x)
+                if (!hasPoint(frame->depth.at(x, y)) || frame->colour.at(x, y).a != 1.0f)
+                    holes += nearRim(x, y) ? 0 : 1;
         EXPECT_EQ(holes, 0) << "zoom " << zoom;
     }
 }
@@ -223,8 +234,8 @@ TEST_P(GpuSplat, WorksFromAnotherThread) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Pipelines, GpuSplat, testing::Values(Pipeline::compute, Pipeline::raster),
-                         [](const auto& info) {
-                             return info.param == Pipeline::compute ? "compute" : "raster";
+                         [](const auto& pipeline) {
+                             return pipeline.param == Pipeline::compute ? "compute" : "raster";
                          });
 
 TEST(Devices, AreNamed) {

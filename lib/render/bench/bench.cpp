@@ -1,0 +1,103 @@
+#include "lib/render/bench/bench.hpp"
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/cpu/cpu_splat.hpp"
+#include "lib/render/cpu/cpu_surface.hpp"
+#ifdef STX_WITH_GPU
+#include "lib/render/gl/gl_renderer.hpp"
+#include "lib/render/gpu/gpu_splat.hpp"
+#endif
+
+namespace stx {
+namespace {
+
+Result<std::unique_ptr<Renderer>> makePath(const std::string& path, const Bundle& bundle,
+                                           int device, Job& job) {
+    RenderSettings settings;
+    settings.mode = path == "surface" ? RenderMode::surface : RenderMode::splat;
+    settings.splat = path == "points" ? SplatRule::point : SplatRule::data;
+    if (path == "surface") return makeCpuSurfaceRenderer(bundle, settings, job);
+    if (path == "software" || path == "points") return makeCpuSplatRenderer(bundle, settings, job);
+#ifdef STX_WITH_GPU
+    if (path == "gl") return gl::makeGlRenderer(bundle, settings, device, job);
+    return gpu::makeGpuSplatRenderer(
+        bundle, settings, device, job,
+        path == "shader" ? gpu::Pipeline::raster : gpu::Pipeline::compute);
+#else
+    (void)device;
+    return fail(ErrorCode::unsupported, "this build has no GPU backends");
+#endif
+}
+
+/// Milliseconds of the median frame.
+Result<double> measure(Renderer& renderer, const Camera& camera, int repeats, Job& job) {
+    std::vector<double> times;
+    for (int i = 0; i <= repeats; ++i) {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(const Frame frame, renderer.render(camera));
+        if (i > 0) times.push_back(frame.milliseconds);  // the first only warms up
+    }
+    std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2),
+                     times.end());
+    return std::max(times[times.size() / 2], 1e-6);
+}
+
+}  // namespace
+
+const std::vector<std::string>& benchPaths() {
+    static const std::vector<std::string> paths{"shader",  "gl",     "software",
+                                                "compute", "points", "surface"};
+    return paths;
+}
+
+Result<BenchReport> runBench(const BenchSettings& settings, Job& job) {
+    if (settings.repeats < 1 || settings.repeats > 1000)
+        return fail(ErrorCode::usage, "{} repeats; 1 to 1000 are possible", settings.repeats);
+    for (const auto& path : settings.paths) {
+        if (std::find(benchPaths().begin(), benchPaths().end(), path) == benchPaths().end())
+            return fail(ErrorCode::usage, "no path is called '{}'; there are {}", path,
+                        fmt::join(benchPaths(), ", "));
+    }
+    const auto& paths = settings.paths.empty() ? benchPaths() : settings.paths;
+    struct Case {
+        int table;
+        AnalyticScene scene;
+        int references;
+    };
+    std::vector<Case> cases;
+    if (settings.table1)
+        for (const int n : {4, 9, 16}) cases.push_back({1, AnalyticScene::object, n});
+    if (settings.table2)
+        for (const int n : {1, 4, 8}) cases.push_back({2, AnalyticScene::room, n});
+
+    BenchReport report;
+    report.processor = cpuDeviceName();
+    report.threads = threadCount();
+    const auto total = static_cast<std::int64_t>(cases.size() * paths.size());
+    std::int64_t done = 0;
+    for (const Case& one : cases) {
+        const Bundle bundle = analyticBundle(one.scene, one.references);
+        const std::int64_t points = bundle.pointCount();
+        const Camera camera = analyticCamera(one.scene, 0.5, one.references);
+        for (const auto& path : paths) {
+            STX_CHECK(job.checkCancelled());
+            job.progress(done++, total, path);
+            auto renderer = makePath(path, bundle, settings.device, job);
+            if (!renderer) {
+                // A wrong request is an error; what the machine lacks is a gap in the table.
+                if (renderer.error().code == ErrorCode::usage) return propagate(renderer);
+                job.note(fmt::format("path {} is left out: {}", path, renderer.error().text()));
+                continue;
+            }
+            if ((*renderer)->backend() != "cpu") report.device = (*renderer)->device();
+            STX_TRY(const double milliseconds, measure(**renderer, camera, settings.repeats, job));
+            report.rows.push_back({one.table, one.references, points, path, 1000.0 / milliseconds,
+                                   static_cast<double>(points) / milliseconds * 1e-3});
+        }
+    }
+    job.progress(total, total, "done");
+    return report;
+}
+
+}  // namespace stx

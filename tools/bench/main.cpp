@@ -1,0 +1,79 @@
+// stx-bench: the benchmark alone, for machines that have no image or mesh library. The same as
+// `stx bench`.
+#include <cstdio>
+
+#include <CLI/CLI.hpp>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/bench/bench.hpp"
+#include "lib/render/renderer.hpp"
+
+namespace {
+
+int report(const stx::Error& error) {
+    fmt::print(stderr, "stx-bench: {}\n", error.text());
+    return static_cast<int>(error.code);
+}
+
+bool writeWhole(const std::string& path, const std::string& text) {
+    const std::string temporary = path + ".part";
+    std::FILE* file = std::fopen(temporary.c_str(), "wb");
+    if (!file) return false;
+    bool ok = std::fwrite(text.data(), 1, text.size(), file) == text.size();
+    ok = std::fclose(file) == 0 && ok;
+    ok = ok && std::rename(temporary.c_str(), path.c_str()) == 0;
+    if (!ok) std::remove(temporary.c_str());
+    return ok;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app{"Measures Lee & Park's two tables on this machine.", "stx-bench"};
+    stx::BenchSettings settings;
+    std::string format = "text", svg;
+    int table = 0, threads = 0;
+    bool devices = false;
+    app.set_version_flag("--version", STX_VERSION);
+    app.add_option("--format", format, "text (default) or json")
+        ->check(CLI::IsMember({"text", "json"}));
+    app.add_option("--table", table, "1 or 2; both by default")->check(CLI::Range(1, 2));
+    app.add_option("--path", settings.paths,
+                   "only these: shader, gl, software, compute, points, surface");
+    app.add_option("--repeats", settings.repeats, "frames measured for each row")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    app.add_option("--device", settings.device, "one of --list-devices; the best by default")
+        ->check(CLI::Range(0, 1023));
+    app.add_option("--threads", threads, "0 = all processors")->check(CLI::Range(0, 4096));
+    app.add_option("--svg", svg, "writes a plot there, too");
+    app.add_flag("--list-devices", devices, "lists the GPUs and ends");
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp& e) {
+        return app.exit(e);
+    } catch (const CLI::CallForVersion& e) {
+        return app.exit(e);
+    } catch (const CLI::ParseError& e) {
+        fmt::print(stderr, "stx-bench: {}\nSee 'stx-bench --help'.\n", e.what());
+        return static_cast<int>(stx::ErrorCode::usage);
+    }
+    const stx::ThreadLimit limit(threads);
+    stx::Job job;
+    if (devices) {
+        for (const auto& d : stx::listDevices(job))
+            fmt::print("{}  {}  {}  {}{}  textures up to {}\n", d.index, d.name, d.version,
+                       d.platform, d.software ? "  software" : "", d.maxTextureSize);
+        for (const auto& note : job.takeNotes()) fmt::print(stderr, "stx-bench: {}\n", note);
+        return 0;
+    }
+    settings.table1 = table != 2;
+    settings.table2 = table != 1;
+    const auto result = stx::runBench(settings, job);
+    for (const auto& note : job.takeNotes()) fmt::print(stderr, "stx-bench: {}\n", note);
+    if (!result) return report(result.error());
+    if (!svg.empty() && !writeWhole(svg, stx::benchSvg(*result)))
+        return report({stx::ErrorCode::io, fmt::format("cannot write '{}'", svg), {}});
+    fmt::print("{}", format == "json" ? stx::benchJson(*result) : stx::benchText(*result));
+    return 0;
+}
