@@ -48,6 +48,8 @@ class SceneConverter {
         if (builder_.materials().empty()) builder_.materials().push_back({.name = "default"});
         if (scene_.mRootNode) STX_CHECK(convertNode(*scene_.mRootNode, aiMatrix4x4()));
         if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
+        if (points_ > 0)
+            files_.job().note(fmt::format("dropped: points in a mesh of triangles ({})", points_));
         return builder_.finish();
     }
 
@@ -185,6 +187,7 @@ class SceneConverter {
                 ++lines_;
             }
         }
+        if (!part.triangles.empty()) points_ += points;
         part.points = part.triangles.empty() && (points > 0 || mesh.mNumFaces == 0);
         if (part.triangles.empty() && !part.points) return {};
         const auto& material = builder_.materials()[part.material];
@@ -208,7 +211,7 @@ class SceneConverter {
     MeshBuilder builder_;
     std::map<std::string, MtlMaterial> mtl_;
     std::string materialFolder_;
-    std::size_t lines_ = 0;
+    std::size_t lines_ = 0, points_ = 0;
 };
 
 }  // namespace
