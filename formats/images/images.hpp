@@ -51,6 +51,10 @@ struct DecodedImage {
 /// that of the stored pixels.
 [[nodiscard]] Image<glm::u8vec4> rgba8From(const DecodedImage& image);
 
+/// Float RGBA with straight alpha of any decoded image, in the image's own coding: integers / their
+/// maximum, floats as they are. Grey is spread, missing alpha is 1.
+[[nodiscard]] Image<glm::vec4> rgbaFloatFrom(const DecodedImage& image);
+
 /// PNG bytes of 1..4 channels with 8 or 16 bits (values in host order), tagged sRGB when `srgb`.
 /// The same input gives the same bytes. `level` 0..9 is zlib's.
 [[nodiscard]] Result<Bytes> encodePng(int width, int height, int channels, int bits,

@@ -89,6 +89,8 @@ MaterialSampler::MaterialSampler(const Mesh& mesh) : mesh_(mesh) {
     for (const auto& m : mesh.materials) {
         seeThrough_.push_back(m.alpha != Material::Alpha::opaque);
         plainTexture_.push_back(mesh.colours.empty() && m.baseColour == glm::vec4(1.0f));
+        constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0);
+        constantColour_.emplace_back(srgbFast(m.baseColour.x), srgbFast(m.baseColour.y), srgbFast(m.baseColour.z));
     }
 }
 

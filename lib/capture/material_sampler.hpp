@@ -22,6 +22,21 @@ class MaterialSampler {
     [[nodiscard]] bool seeThrough(std::uint32_t triangle) const {
         return seeThrough_[mesh_.triangleMaterial[triangle]];
     }
+    /// The colour of a triangle that has only one, else null.
+    [[nodiscard]] const glm::vec3* constantColour(std::uint32_t triangle) const {
+        const auto material = mesh_.triangleMaterial[triangle];
+        return constant_[material] ? &constantColour_[material] : nullptr;
+    }
+    /// The uvs of a triangle whose colour is its texture alone, else null.
+    [[nodiscard]] const std::vector<glm::vec2>* plainTextureUvs(std::uint32_t triangle) const {
+        const auto material = mesh_.triangleMaterial[triangle];
+        const bool plain = plainTexture_[material] && mesh_.materials[material].baseColourTexture >= 0;
+        return plain ? &mesh_.uvs : nullptr;
+    }
+    /// The base colour texture of a triangle that has one.
+    [[nodiscard]] const MeshTexture& texture(std::uint32_t triangle) const {
+        return mesh_.textures[mesh_.materials[mesh_.triangleMaterial[triangle]].baseColourTexture];
+    }
     /// Unit world normal: interpolated, normal-mapped where the material says so; the geometric one
     /// where the mesh has no normals; zero on triangles without area.
     [[nodiscard]] glm::vec3 normal(std::uint32_t triangle, glm::vec3 barycentric) const;
@@ -30,6 +45,8 @@ class MaterialSampler {
     const Mesh& mesh_;
     std::vector<bool> seeThrough_;    ///< per material
     std::vector<bool> plainTexture_;  ///< per material: the texture alone decides, no conversion
+    std::vector<bool> constant_;      ///< per material: one colour everywhere
+    std::vector<glm::vec3> constantColour_;
 };
 
 /// Bilinear (or nearest) texel value at uv, straight RGBA 0..1 as stored.

@@ -50,6 +50,7 @@ class Rasterizer {
                   std::vector<float>& depth, std::vector<std::uint32_t>& ids) const;
     void shadeTile(int tileX, int tileY, const RasterSettings& settings,
                    const std::vector<std::uint32_t>& ids, RasterImage& out) const;
+    [[nodiscard]] glm::vec4 shadeUniform(const SetUp& s, int px, int py, int samples) const;
     [[nodiscard]] glm::vec3 lit(const Lighting& lighting, const SetUp& s, glm::vec3 albedo,
                                 double x, double y) const;
     void resolveCentres(int tileX, int tileY, const std::vector<std::uint32_t>& ids,
@@ -191,6 +192,51 @@ glm::vec3 Rasterizer::lit(const Lighting& lighting, const SetUp& s, glm::vec3 al
     return glm::clamp(shadePhong(lighting, albedo, position, n, toEye), 0.0f, 1.0f);
 }
 
+/// Whether all samples of a pixel see the same triangle, or none.
+bool uniform(const std::uint32_t* ids, int samples, int stride) {
+    for (int y = 0; y < samples; ++y) {
+        for (int x = 0; x < samples; ++x) {
+            if (ids[y * stride + x] != *ids) return false;
+        }
+    }
+    return true;
+}
+
+glm::vec4 Rasterizer::shadeUniform(const SetUp& s, int px, int py, int samples) const {
+    if (const auto* constant = sampler_.constantColour(s.triangle)) return glm::vec4(*constant, 1.0f);
+    // uv is (U / S, V / S) with U, V, S affine in the pixel: one division a sample.
+    const auto* uvs = sampler_.plainTextureUvs(s.triangle);
+    const double step = 1.0 / samples;
+    glm::vec3 sum(0.0f);
+    if (uvs == nullptr) {
+        for (int k = 0; k < samples * samples; ++k) {
+            const auto b = barycentric(s, px + (k % samples + 0.5) * step, py + (k / samples + 0.5) * step);
+            sum += glm::vec3(sampler_.colour(s.triangle, b));
+        }
+    } else {
+        const auto& t = mesh_.triangles[s.triangle];
+        Affine total, u, v;
+        for (int k = 0; k < 3; ++k) {
+            const auto& e = s.edge[k];
+            const glm::vec2 uv = (*uvs)[t[k]];
+            total = {total.a + e.a, total.b + e.b, total.c + e.c};
+            u = {u.a + e.a * uv.x, u.b + e.b * uv.x, u.c + e.c * uv.x};
+            v = {v.a + e.a * uv.y, v.b + e.b * uv.y, v.c + e.c * uv.y};
+        }
+        const auto& texture = sampler_.texture(s.triangle);
+        for (int sy = 0; sy < samples; ++sy) {
+            const double y = py + (sy + 0.5) * step;
+            for (int sx = 0; sx < samples; ++sx) {
+                const double x = px + (sx + 0.5) * step;
+                const double inverse = 1.0 / total.at(x, y);
+                sum += glm::vec3(sampleTexture(
+                    texture, {static_cast<float>(u.at(x, y) * inverse), static_cast<float>(v.at(x, y) * inverse)}));
+            }
+        }
+    }
+    return glm::vec4(sum / static_cast<float>(samples * samples), 1.0f);
+}
+
 void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                            const std::vector<std::uint32_t>& ids, RasterImage& out) const {
     const int samples = settings.supersampling;
@@ -202,6 +248,13 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
     for (int py = 0; py < y1; ++py) {
         for (int px = 0; px < x1; ++px) {
             glm::vec4 sum(0.0f), litSum(0.0f);
+            const auto* corner = ids.data() + static_cast<std::size_t>(py * samples) * side + px * samples;
+            if (!settings.lighting.on() && uniform(corner, samples, side)) {
+                if (*corner == kNone) continue;
+                out.colour.at(tileX * kTile + px, tileY * kTile + py) =
+                    shadeUniform(setUps_[*corner], tileX * kTile + px, tileY * kTile + py, samples);
+                continue;
+            }
             for (int k = 0; k < samples * samples; ++k) {
                 const int sx = px * samples + k % samples, sy = py * samples + k / samples;
                 const auto id = ids[static_cast<std::size_t>(sy) * side + sx];
