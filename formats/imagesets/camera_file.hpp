@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/geometry/camera.hpp"
+
+namespace stx {
+
+struct NamedCamera {
+    std::string name;
+    Camera camera;
+};
+
+/// The cameras of a file, in its order, without any image: transforms.json (NeRF, nerfstudio,
+/// Blender), MIV/RVS JSON, or our own cameras.json; told apart by their keys. Each camera has its
+/// own intrinsics and size. Errors: io, invalidInput with file and key.
+[[nodiscard]] Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path,
+                                                              Job& job);
+
+}  // namespace stx

@@ -1,0 +1,176 @@
+#include "formats/open.hpp"
+
+#include <algorithm>
+#include <fstream>
+
+#include "formats/atlas/atlas_files.hpp"
+#include "formats/exr/bundle_exr.hpp"
+#include "formats/meshes/meshes.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
+#include "lib/packing/packing.hpp"
+
+namespace stx {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string lowerExtension(const fs::path& path) {
+    std::string e = path.extension().string();
+    std::transform(e.begin(), e.end(), e.begin(),
+                   [](unsigned char c) { return c < 128 ? std::tolower(c) : c; });
+    return e;
+}
+
+/// The first bytes of a file; empty when it cannot be read.
+Bytes headOf(const fs::path& path) {
+    Bytes head(4096);
+    std::ifstream file(path, std::ios::binary);
+    file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+    head.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, file.gcount())));
+    return head;
+}
+
+bool startsWith(ByteSpan bytes, std::string_view text, std::size_t at = 0) {
+    if (bytes.size() < at + text.size()) return false;
+    return std::equal(text.begin(), text.end(), reinterpret_cast<const char*>(bytes.data()) + at);
+}
+
+Error notThere(const fs::path& path) {
+    return {ErrorCode::io,
+            fmt::format("cannot read '{}': there is no such file or folder", path.string()),
+            {}};
+}
+
+}  // namespace
+
+const char* nameOf(FileKind kind) {
+    switch (kind) {
+        case FileKind::mesh:
+            return "a mesh";
+        case FileKind::mpeg4:
+            return "an MPEG-4 file";
+        case FileKind::exr:
+            return "an OpenEXR bundle";
+        case FileKind::atlas:
+            return "an atlas";
+        case FileKind::imageSet:
+            return "an image set";
+        case FileKind::image:
+            return "a picture";
+        case FileKind::unknown:
+            break;
+    }
+    return "an unknown file";
+}
+
+Result<FileKind> recognise(const fs::path& path) {
+    std::error_code ec;
+    const auto status = fs::status(path, ec);
+    if (path != "-" && !fs::exists(status)) return tl::unexpected(notThere(path));
+    if (fs::is_directory(status)) {
+        if (fs::exists(path / "atlas.json", ec)) return FileKind::atlas;
+        return FileKind::imageSet;
+    }
+    const auto head = headOf(path);
+    const auto ending = lowerExtension(path);
+    if (path.filename() == "atlas.json") return FileKind::atlas;
+    if (startsWith(head, "\x76\x2f\x31\x01")) {
+        const auto reader = ExrReader::open(path, Limits());
+        return reader && isExrAtlas(*reader) ? FileKind::atlas : FileKind::exr;
+    }
+    if (startsWith(head, "ftyp", 4) || startsWith(head, "moov", 4) || startsWith(head, "mdat", 4) ||
+        ending == ".mp4" || ending == ".m4v" || ending == ".xmt" || ending == ".xmta" ||
+        ending == ".bt")
+        return FileKind::mpeg4;
+    if (startsWith(head, "\x89PNG") || startsWith(head, "\xff\xd8\xff")) return FileKind::image;
+    if (isMesh(path, head)) return FileKind::mesh;
+    if (ending == ".json" || ending == ".txt") return FileKind::imageSet;
+    if (ending == ".exr") return FileKind::exr;
+    return FileKind::unknown;
+}
+
+Result<Bundle> openBundle(const fs::path& path, const OpenOptions& options, Job& job) {
+    STX_TRY(auto opened, openRenderable(path, options, job));
+    if (std::holds_alternative<Mesh>(opened))
+        return fail(ErrorCode::invalidInput,
+                    "'{}' is a mesh, not a bundle; make one first: stx convert '{}' -o bundle.mp4",
+                    path.string(), path.string());
+    return std::move(std::get<Bundle>(opened));
+}
+
+Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const OpenOptions& options,
+                                                  Job& job) {
+    using Opened = std::variant<Mesh, Bundle>;
+    STX_TRY(const auto kind, recognise(path));
+    Result<Bundle> bundle = Bundle();
+    switch (kind) {
+        case FileKind::mesh: {
+            STX_TRY(auto mesh, readMesh(path, job, {options.texture}));
+            return Opened(std::move(mesh));
+        }
+        case FileKind::exr:
+            bundle = readExrBundle(path, job);
+            break;
+        case FileKind::mpeg4:
+            bundle = readMpeg4Bundle(path, job);
+            break;
+        case FileKind::atlas: {
+            STX_TRY(const auto atlas, readAtlas(path, job));
+            bundle = unpack(atlas, job);
+            break;
+        }
+        case FileKind::imageSet:
+        case FileKind::image:
+        case FileKind::unknown:
+            return fail(ErrorCode::invalidInput,
+                        "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, DRC) nor a bundle "
+                        "(.mp4, .xmt, .bt, .exr) "
+                        "nor an atlas nor an image set",
+                        path.string());
+    }
+    if (!bundle) return propagate(bundle);
+    if (auto ok = bundle->check(); !ok)
+        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    return Opened(std::move(*bundle));
+}
+
+Result<FileKind> containerOf(const fs::path& target) {
+    const auto ending = lowerExtension(target);
+    if (ending == ".exr") return FileKind::exr;
+    if (ending == ".mp4" || ending == ".xmt" || ending == ".bt") return FileKind::mpeg4;
+    return fail(ErrorCode::usage,
+                "'{}' ends in '{}'; a bundle is written as .exr, .mp4, .xmt or .bt",
+                target.string(), ending);
+}
+
+Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const SaveOptions& options,
+                        Job& job) {
+    STX_CHECK(bundle.check());
+    STX_TRY(const auto container, containerOf(target));
+    if (container == FileKind::exr) return writeExrBundle(bundle, target, job, {options.noClobber});
+    mpeg4::SceneWriteOptions scene;
+    if (options.jpegQuality > 0) {
+        scene.texture = mpeg4::SceneWriteOptions::Texture::jpeg;
+        scene.jpegQuality = options.jpegQuality;
+    }
+    scene.pointTexture = options.pointTexture;
+    Mpeg4WriteOptions write;
+    write.output.noClobber = options.noClobber;
+    return writeMpeg4Bundle(bundle, target, job, scene, write);
+}
+
+Result<bool> convertDocument(const fs::path& input, const fs::path& target,
+                             const SaveOptions& options, bool changesDepth, Job& job) {
+    STX_TRY(const auto from, recognise(input));
+    STX_TRY(const auto to, containerOf(target));
+    if (from != FileKind::mpeg4 || to != FileKind::mpeg4 || changesDepth ||
+        options.jpegQuality != 0 || options.pointTexture)
+        return false;
+    STX_TRY(const auto document, readMpeg4(input, job));
+    Mpeg4WriteOptions write;
+    write.output.noClobber = options.noClobber;
+    STX_CHECK(writeMpeg4(document, target, job, write));
+    return true;
+}
+
+}  // namespace stx

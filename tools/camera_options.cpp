@@ -1,0 +1,170 @@
+#include "tools/camera_options.hpp"
+
+#include <numbers>
+
+#include "formats/imagesets/camera_file.hpp"
+#include "lib/geometry/view_layout.hpp"
+
+namespace stx::tools {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kDefaultFovDeg = 40.0;
+
+/// A camera with a vertical field of view, square pixels, centred.
+Camera withVerticalFov(glm::dvec3 eye, glm::dquat orientation, double fovRad, glm::ivec2 size) {
+    Camera c;
+    c.position = eye;
+    c.orientation = orientation;
+    c.width = size.x;
+    c.height = size.y;
+    c.fx = c.fy = size.y * 0.5 / std::tan(fovRad * 0.5);
+    c.cx = size.x * 0.5;
+    c.cy = size.y * 0.5;
+    return c;
+}
+
+/// Distance at which a sphere fills the narrower side of the frame.
+double framingDistance(double radius, double verticalFovRad, glm::ivec2 size) {
+    const double tangent = std::tan(verticalFovRad * 0.5);
+    const double half = std::atan(std::min(1.0, static_cast<double>(size.x) / size.y) * tangent);
+    return radius / std::sin(half) * 1.02;
+}
+
+}  // namespace
+
+void addCameraOptions(CLI::App& command, CameraOptions& o) {
+    const char* group = "Camera";
+    command
+        .add_option("--eye", o.eye,
+                    "Where the camera stands; scene units (write --eye=-1,2,3 for a leading minus)")
+        ->type_name("X,Y,Z")
+        ->group(group);
+    command
+        .add_option("--target", o.target, "What it looks at (default: the middle of the object)")
+        ->type_name("X,Y,Z")
+        ->group(group);
+    command.add_option("--up", o.up, "What is up in the picture (default 0,1,0)")
+        ->type_name("X,Y,Z")
+        ->group(group);
+    command
+        .add_option("--fov", o.fovDeg,
+                    "Vertical field of view in degrees, above 0 and below 180 (default 40)")
+        ->type_name("DEG")
+        ->group(group);
+    command
+        .add_option("--ortho", o.orthoHeight,
+                    "Orthographic camera with a window of this height, in scene units")
+        ->type_name("HEIGHT")
+        ->group(group);
+    command.add_option("--view", o.view, "The camera of reference view K, from 0")
+        ->type_name("K")
+        ->check(CLI::NonNegativeNumber)
+        ->group(group);
+    command.add_option("--orbit", o.orbit, "N cameras on a circle around the object")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1000000))
+        ->group(group);
+    command
+        .add_option("--elevation", o.elevationDeg,
+                    "Height of the orbit above the horizon in degrees (default 15)")
+        ->type_name("DEG")
+        ->check(CLI::Range(-90.0, 90.0))
+        ->group(group);
+    command
+        .add_option("--cameras", o.cameraFile,
+                    "Every camera of a file (transforms.json, MIV JSON, cameras.json)")
+        ->type_name("FILE")
+        ->group(group);
+    command
+        .add_option("--size", o.size,
+                    "Size of the picture (default: that of the camera, else 512x512)")
+        ->type_name("WxH")
+        ->group(group);
+}
+
+Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraContext& context,
+                                        Program& program) {
+    const bool pose = !o.eye.empty() || !o.target.empty() || !o.up.empty();
+    const int ways = (pose ? 1 : 0) + (o.view >= 0 ? 1 : 0) + (o.orbit > 0 ? 1 : 0) +
+                     (o.cameraFile.empty() ? 0 : 1);
+    if (ways > 1)
+        return fail(
+            ErrorCode::usage,
+            "--eye/--target/--up, --view, --orbit and --cameras exclude each other; give one");
+    std::optional<glm::ivec2> size;
+    if (!o.size.empty()) {
+        STX_TRY(size, parseSize(o.size, program.job.limits));
+    }
+    if (o.fovDeg && !(*o.fovDeg > 0.0 && *o.fovDeg < 180.0))
+        return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 180 degrees",
+                    *o.fovDeg);
+    if (o.orthoHeight && !(*o.orthoHeight > 0.0 && std::isfinite(*o.orthoHeight)))
+        return fail(ErrorCode::usage, "--ortho is {:g}; the window's height must be above 0",
+                    *o.orthoHeight);
+    if (o.fovDeg && o.orthoHeight)
+        return fail(ErrorCode::usage, "--fov and --ortho exclude each other; give one");
+
+    if (o.view >= 0) {
+        if (o.view >= static_cast<int>(context.views.size()))
+            return fail(ErrorCode::usage,
+                        "--view is {}, but the input has {} reference views, from 0", o.view,
+                        context.views.size());
+        Camera c = context.views[o.view];
+        if (size) c = c.resized(size->x, size->y);
+        return std::vector<Camera>{c};
+    }
+    if (!o.cameraFile.empty()) {
+        STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job));
+        std::vector<Camera> out;
+        for (auto& c : cameras) out.push_back(size ? c.camera.resized(size->x, size->y) : c.camera);
+        return out;
+    }
+
+    const glm::ivec2 frame = size.value_or(glm::ivec2(512));
+    const double fov = o.fovDeg.value_or(kDefaultFovDeg) * kDegree;
+    const double radius = std::max(context.bounds.radius(), 1e-9);
+    const double distance = framingDistance(radius, fov, frame);
+    const auto finish = [&](glm::dvec3 eye, glm::dquat orientation, double orthoDefault) {
+        Camera c = withVerticalFov(eye, orientation, fov, frame);
+        if (o.orthoHeight) {
+            c.orthographic = true;
+            c.fx = c.fy = frame.y / o.orthoHeight.value_or(orthoDefault);
+        }
+        return c;
+    };
+    glm::dvec3 up(0, 1, 0),
+        target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
+    if (!o.up.empty()) {
+        STX_TRY(up, parseVec3(o.up, "--up"));
+        if (!(glm::length(up) > 0))
+            return fail(ErrorCode::usage, "--up is 0,0,0; it must point somewhere");
+    }
+    if (!o.target.empty()) {
+        STX_TRY(target, parseVec3(o.target, "--target"));
+    }
+    std::vector<Camera> out;
+    if (pose) {
+        glm::dvec3 eye;
+        if (o.eye.empty()) {
+            eye = target + glm::dvec3(0, 0, distance);
+        } else {
+            STX_TRY(eye, parseVec3(o.eye, "--eye"));
+        }
+        STX_TRY(const auto orientation, lookAt(eye, target, up));
+        out.push_back(finish(eye, orientation, 2.0 * radius));
+        return out;
+    }
+    ViewLayout ring;
+    ring.kind = ViewLayout::Kind::ring;
+    ring.count = std::max(o.orbit, 1);
+    ring.elevationRad = o.elevationDeg * kDegree;
+    for (const auto& direction : layoutDirections(ring)) {
+        const glm::dvec3 eye = target + direction * distance;
+        STX_TRY(const auto orientation, lookAt(eye, target, up));
+        out.push_back(finish(eye, orientation, 2.0 * radius));
+    }
+    return out;
+}
+
+}  // namespace stx::tools

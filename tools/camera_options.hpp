@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "lib/base/result.hpp"
+#include "lib/geometry/bounds.hpp"
+#include "lib/geometry/camera.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+
+/// The novel cameras of `stx render`, as the command line gives them.
+struct CameraOptions {
+    std::string eye, target, up;  ///< "X,Y,Z", empty = not given
+    std::optional<double> fovDeg;
+    std::optional<double> orthoHeight;  ///< orthographic novel camera: window height in scene units
+    int view = -1;
+    int orbit = 0;
+    double elevationDeg = 15.0;
+    std::string cameraFile;
+    std::string size;
+};
+
+void addCameraOptions(CLI::App& command, CameraOptions& options);
+
+/// What the cameras are made for: the object and its reference views.
+struct CameraContext {
+    Bounds bounds;              ///< of the object
+    std::vector<Camera> views;  ///< of the reference views; empty for a mesh
+};
+
+/// The cameras asked for, in order. Without any camera option: one from the front, slightly above.
+/// Errors (usage) on contradicting options and on views that do not exist.
+[[nodiscard]] Result<std::vector<Camera>> makeCameras(const CameraOptions& options,
+                                                      const CameraContext& context,
+                                                      Program& program);
+
+}  // namespace stx::tools

@@ -1,0 +1,72 @@
+#include <chrono>
+
+#include "formats/images/images.hpp"
+#include "formats/open.hpp"
+#include "lib/surface/normals.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+namespace {
+
+struct BakeOptions {
+    std::string input, output;
+    std::string method = "robust";
+    BakeSettings settings;
+};
+
+Result<int> bakeBundle(const BakeOptions& o, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(containerOf(o.output));
+    preloadCodecs();
+    STX_TRY(auto bundle, openBundle(o.input, {}, program.job));
+    BakeSettings settings = o.settings;
+    settings.method =
+        o.method == "paper" ? BakeSettings::Method::paper : BakeSettings::Method::robust;
+    STX_CHECK(bake(bundle, settings, program.job));
+    SaveOptions save;
+    save.noClobber = program.common.noClobber;
+    STX_CHECK(saveBundle(bundle, o.output, save, program.job));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format("{} ({}) → {} ({}), {} views with normals and splats, {:.2g} s",
+                            std::filesystem::path(o.input).filename().string(),
+                            humanBytes(bytesOf(o.input)),
+                            std::filesystem::path(o.output).filename().string(),
+                            humanBytes(bytesOf(o.output)), bundle.views.size(), seconds));
+    STX_CHECK(program.writeReport({{"$schema", "bake-report.schema.json"},
+                                   {"input", o.input},
+                                   {"output", o.output},
+                                   {"method", o.method},
+                                   {"views", bundle.views.size()},
+                                   {"points", bundle.pointCount()},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+}  // namespace
+
+Command addBake(CLI::App& app, Program& program) {
+    auto* c =
+        app.add_subcommand("bake",
+                           "Normals and splat axes from depth: SimpleTexture to SimpleTextureV2\n\n"
+                           "  stx bake model.exr -o baked.exr");
+    auto o = std::make_shared<BakeOptions>();
+    c->add_option("BUNDLE", o->input, "Bundle to bake")->required();
+    c->add_option("-o,--output", o->output, "Bundle to write (.exr, .mp4, .xmt, .bt)")
+        ->required()
+        ->type_name("OUT");
+    c->add_option("--method", o->method,
+                  "robust: local fit that respects edges and depth steps; paper: differences to "
+                  "the 4 neighbours (default robust)")
+        ->check(CLI::IsMember({"robust", "paper"}));
+    c->add_option(
+         "--discontinuity", o->settings.discontinuity,
+         "Relative depth difference beyond the slope that parts two surfaces (default 0.01)")
+        ->check(CLI::Range(1e-6, 1.0));
+    addCommonOptions(*c, program, kOutput | kOutside);
+    return {c, [o](Program& p) { return bakeBundle(*o, p); }};
+}
+
+}  // namespace stx::tools

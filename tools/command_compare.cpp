@@ -1,0 +1,173 @@
+#include <cmath>
+
+#include "formats/images/images.hpp"
+#include "lib/metrics/compare.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+namespace {
+
+struct CompareOptions {
+    std::string a, b;
+    std::string mask, errorPicture, background = "0,0,0";
+    double gain = 8.0;
+    std::optional<double> minPsnr;
+    int firstFrame = 0;
+    int frames = 0;
+};
+
+struct LoadedImage {
+    Image<glm::u8vec4> coded;  ///< always
+    Image<glm::vec4> linear;   ///< of float formats
+    bool isLinear = false;
+};
+
+Result<LoadedImage> load(const std::string& path, Program& program) {
+    STX_TRY(const auto bytes, readFile(path, program.job.limits));
+    auto decoded = decodeImage(bytes, path, program.job.limits);
+    if (!decoded) return tl::unexpected(decoded.error().at(fmt::format("'{}'", path)));
+    LoadedImage out;
+    out.isLinear = decoded->linear;
+    if (decoded->linear) out.linear = rgbaFloatFrom(*decoded);
+    out.coded = rgba8From(*decoded);
+    return out;
+}
+
+nlohmann::ordered_json number(std::optional<double> v) {
+    if (!v) return nullptr;
+    return *v;
+}
+
+nlohmann::ordered_json toJson(const Comparison& c) {
+    return {{"psnr", {{"rgb", number(c.psnrRgb)}, {"y", number(c.psnrY)}}},
+            {"ssim", {{"y", c.ssimY}}},
+            {"worst", {{"x", c.worst.x}, {"y", c.worst.y}, {"difference", c.worst.difference}}},
+            {"pixels", c.pixels},
+            {"differentPixels", c.differentPixels},
+            {"identical", c.identical()}};
+}
+
+Result<Comparison> comparePair(const std::string& a, const std::string& b, const CompareOptions& o,
+                               const Image<std::uint8_t>* mask, Program& program) {
+    STX_TRY(const auto first, load(a, program));
+    STX_TRY(const auto second, load(b, program));
+    const bool linear = first.isLinear && second.isLinear;
+    if (first.isLinear != second.isLinear)
+        program.job.note(
+            "one picture is linear float, the other 8-bit: both are compared as 8-bit sRGB");
+    CompareSettings settings;
+    settings.mask = mask;
+    STX_TRY(const auto background, parseVec3(o.background, "--background"));
+    settings.background = glm::vec3(background);
+    auto result = linear ? compare(first.linear, second.linear, settings)
+                         : compare(first.coded, second.coded, settings);
+    if (!result) return tl::unexpected(result.error().at(fmt::format("'{}' and '{}'", a, b)));
+    if (!o.errorPicture.empty()) {
+        STX_TRY(const auto picture,
+                linear ? errorPicture(first.linear, second.linear, settings, o.gain)
+                       : errorPicture(first.coded, second.coded, settings, o.gain));
+        STX_TRY(const auto png,
+                encodePng(picture.width(), picture.height(), 4, 8, picture.data(), true));
+        STX_CHECK(writeFile(o.errorPicture, png, program.outputOptions()));
+    }
+    return result;
+}
+
+std::string decibels(std::optional<double> v) {
+    return v ? fmt::format("{:.2f} dB", *v) : std::string("identical");
+}
+
+Result<int> compareImages(const CompareOptions& o, Program& program) {
+    preloadCodecs();
+    std::optional<Image<std::uint8_t>> mask;
+    if (!o.mask.empty()) {
+        STX_TRY(const auto loaded, load(o.mask, program));
+        if (loaded.isLinear)
+            return fail(ErrorCode::usage, "--mask '{}' must be an 8-bit image", o.mask);
+        mask.emplace(loaded.coded.width(), loaded.coded.height());
+        for (std::size_t i = 0; i < mask->count(); ++i)
+            mask->pixels()[i] = loaded.coded.pixels()[i].x;
+    }
+    const auto* maskImage = mask ? &*mask : nullptr;
+
+    Comparison total;
+    auto perFrame = nlohmann::ordered_json::array();
+    int worstFrame = -1;
+    if (frameName(o.a, 0) && frameName(o.b, 0)) {
+        SequenceComparison sequence(255.0);
+        for (int frame = o.firstFrame; o.frames == 0 || frame < o.firstFrame + o.frames; ++frame) {
+            STX_CHECK(program.job.checkCancelled());
+            const auto a = *frameName(o.a, frame), b = *frameName(o.b, frame);
+            std::error_code ec;
+            if (o.frames == 0 && frame > o.firstFrame && !std::filesystem::exists(a, ec) &&
+                !std::filesystem::exists(b, ec))
+                break;
+            CompareOptions one = o;
+            one.errorPicture =
+                o.errorPicture.empty() ? "" : frameName(o.errorPicture, frame).value_or("");
+            STX_TRY(const auto c, comparePair(a, b, one, maskImage, program));
+            sequence.add(c);
+            auto entry = toJson(c);
+            entry["frame"] = frame;
+            perFrame.push_back(std::move(entry));
+        }
+        total = sequence.total();
+        worstFrame = o.firstFrame + sequence.worstFrame();
+    } else {
+        STX_TRY(total, comparePair(o.a, o.b, o, maskImage, program));
+    }
+
+    if (program.common.format == "json") {
+        nlohmann::ordered_json out = {{"$schema", "compare.schema.json"}};
+        out.update(toJson(total));
+        if (worstFrame >= 0) {
+            out["worst"]["frame"] = worstFrame;
+            out["frames"] = perFrame;
+        }
+        program.print(out.dump(2) + "\n");
+    } else if (total.identical()) {
+        program.print("identical\n");
+    } else {
+        program.print(fmt::format(
+            "PSNR {} (Y {}), SSIM {:.4f}, worst pixel ({}, {}){} differs by {:g}, {} of {} pixels "
+            "differ\n",
+            decibels(total.psnrRgb), decibels(total.psnrY), total.ssimY, total.worst.x,
+            total.worst.y, worstFrame >= 0 ? fmt::format(" of frame {}", worstFrame) : "",
+            total.worst.difference, total.differentPixels, total.pixels));
+    }
+    if (total.identical()) return 0;
+    if (o.minPsnr && total.psnrRgb && *total.psnrRgb >= *o.minPsnr) return 0;
+    return static_cast<int>(ErrorCode::difference);
+}
+
+}  // namespace
+
+Command addCompare(CLI::App& app, Program& program) {
+    auto* c = app.add_subcommand("compare",
+                                 "PSNR, SSIM and the worst pixel of two images or sequences; exit "
+                                 "code 7 when they differ\n\n"
+                                 "  stx compare novel.png truth.png --error-picture error.png\n"
+                                 "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40");
+    auto o = std::make_shared<CompareOptions>();
+    c->add_option("A", o->a, "Image, or sequence as name_%04d.png")->required();
+    c->add_option("B", o->b, "The same")->required();
+    c->add_option("--mask", o->mask, "Image; only pixels that are white in it count")
+        ->type_name("IMAGE");
+    c->add_option("--error-picture", o->errorPicture, "Write where they differ as a PNG")
+        ->type_name("FILE.png");
+    c->add_option("--gain", o->gain, "Of the error picture (default 8)")
+        ->check(CLI::Range(0.001, 1e6));
+    c->add_option("--background", o->background,
+                  "Colour behind transparent pixels, 0..1 (default 0,0,0)")
+        ->type_name("R,G,B");
+    c->add_option("--min-psnr", o->minPsnr, "Exit code 0 when the PSNR of RGB is at least this")
+        ->type_name("DB");
+    c->add_option("--first-frame", o->firstFrame, "First frame of sequences (default 0)")
+        ->check(CLI::NonNegativeNumber);
+    c->add_option("--frames", o->frames, "Number of frames (default: all that exist)")
+        ->check(CLI::NonNegativeNumber);
+    addCommonOptions(*c, program, kFormat | kOutput);
+    return {c, [o](Program& p) { return compareImages(*o, p); }};
+}
+
+}  // namespace stx::tools

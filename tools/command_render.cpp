@@ -1,0 +1,283 @@
+#include <chrono>
+
+#include "formats/images/images.hpp"
+#include "formats/open.hpp"
+#include "lib/capture/capture.hpp"
+#include "lib/render/renderer.hpp"
+#include "tools/camera_options.hpp"
+#include "tools/frame_writer.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+namespace {
+
+struct RenderOptions {
+    std::string input, output;
+    CameraOptions camera;
+    std::string backend = "auto", mode = "surface", quality = "normal", splat = "data",
+                fill = "background";
+    double splatCoefficient = 0;
+    std::string background = "none";
+    std::vector<std::string> lights;
+    std::string ambient = "0.2", specular = "0";
+    double shininess = 32;
+    std::string fileFormat;
+    double framesPerSecond = 25;
+    bool skipExisting = false, listDevices = false;
+    int device = -1;
+    OpenOptions open;
+};
+
+/// "0.2" or "r,g,b".
+Result<glm::vec3> parseGreyOrRgb(const std::string& text, const char* option) {
+    if (text.find(',') != std::string::npos) {
+        STX_TRY(const auto v, parseVec3(text, option));
+        return glm::vec3(v);
+    }
+    STX_TRY(const auto v, parseNumbers(text, 1, option));
+    return glm::vec3(static_cast<float>(v[0]));
+}
+
+/// dir:X,Y,Z[,r,g,b] or point:X,Y,Z[,r,g,b], with a trailing @camera for camera space.
+Result<Light> parseLight(const std::string& text) {
+    Light light;
+    std::string body = text;
+    if (const auto at = body.rfind("@camera"); at != std::string::npos && at + 7 == body.size()) {
+        light.inCameraSpace = true;
+        body.resize(at);
+    }
+    if (body.rfind("dir:", 0) == 0)
+        light.kind = Light::Kind::directional;
+    else if (body.rfind("point:", 0) == 0)
+        light.kind = Light::Kind::point;
+    else
+        return fail(ErrorCode::usage,
+                    "--light is '{}'; dir:X,Y,Z[,r,g,b] or point:X,Y,Z[,r,g,b] is expected", text);
+    body = body.substr(body.find(':') + 1);
+    const auto commas = std::count(body.begin(), body.end(), ',');
+    STX_TRY(const auto v, parseNumbers(body, commas >= 3 ? 6 : 3, "--light"));
+    light.vector = glm::vec3(v[0], v[1], v[2]);
+    if (v.size() == 6) light.colour = glm::vec3(v[3], v[4], v[5]);
+    if (light.kind == Light::Kind::directional && light.vector == glm::vec3(0.0f))
+        return fail(ErrorCode::usage, "--light '{}' has no direction", text);
+    return light;
+}
+
+/// R,G,B in 0..1, or in 0..255 when one is above 1; nothing for `none`.
+Result<std::optional<glm::vec3>> parseBackground(const std::string& text) {
+    if (text == "none") return std::optional<glm::vec3>();
+    STX_TRY(auto v, parseVec3(text, "--background"));
+    if (v.x > 1 || v.y > 1 || v.z > 1) v /= 255.0;
+    if (glm::any(glm::lessThan(v, glm::dvec3(0))) || glm::any(glm::greaterThan(v, glm::dvec3(1))))
+        return fail(ErrorCode::usage,
+                    "--background is '{}'; each value must be 0 to 1 (or 0 to 255)", text);
+    return std::optional<glm::vec3>(glm::vec3(v));
+}
+
+Result<RenderSettings> settingsOf(const RenderOptions& o) {
+    RenderSettings s;
+    s.mode = o.mode == "splat" ? RenderMode::splat : RenderMode::surface;
+    s.quality = o.quality == "draft"  ? Quality::draft
+                : o.quality == "best" ? Quality::best
+                                      : Quality::normal;
+    s.splat = o.splat == "paper"   ? SplatRule::paper
+              : o.splat == "point" ? SplatRule::point
+                                   : SplatRule::data;
+    s.splatCoefficient = o.splatCoefficient;
+    s.fill = o.fill == "none" ? Fill::none : Fill::background;
+    for (const auto& text : o.lights) {
+        STX_TRY(const auto light, parseLight(text));
+        s.lighting.lights.push_back(light);
+    }
+    STX_TRY(s.lighting.ambient, parseGreyOrRgb(o.ambient, "--ambient"));
+    STX_TRY(s.lighting.specular, parseGreyOrRgb(o.specular, "--specular"));
+    s.lighting.shininess = static_cast<float>(o.shininess);
+    return s;
+}
+
+Backend backendOf(const std::string& name) {
+    if (name == "gpu") return Backend::gpu;
+    if (name == "gl") return Backend::gl;
+    if (name == "cpu") return Backend::cpu;
+    return Backend::automatic;
+}
+
+Result<int> printDevices(Program& program) {
+    const auto devices = listDevices(program.job);
+    for (const auto& d : devices)
+        program.print(fmt::format("{}: {} ({}, OpenGL {}, textures up to {}{})\n", d.index, d.name,
+                                  d.platform, d.version, d.maxTextureSize,
+                                  d.software ? ", software" : ""));
+    if (!devices.empty()) return 0;
+    return fail(ErrorCode::unsupported,
+                "no OpenGL device was found through EGL; install libegl-mesa0 and libgl1-mesa-dri "
+                "for a software one");
+}
+
+Result<int> render(const RenderOptions& o, Program& program) {
+    if (o.listDevices) return printDevices(program);
+    if (o.input.empty() || o.output.empty())
+        return fail(ErrorCode::usage, "an input and -o OUTPUT are needed. See 'stx render --help'");
+    STX_TRY(const auto settings, settingsOf(o));
+    STX_TRY(const auto background, parseBackground(o.background));
+    STX_CHECK(checkTarget(o.output, program));
+    FrameWriter::Settings writing;
+    writing.pattern = o.output;
+    writing.background = background;
+    writing.stream = o.fileFormat;
+    writing.framesPerSecond = o.framesPerSecond;
+    writing.noClobber = program.common.noClobber;
+    STX_CHECK(FrameWriter::check(writing));
+
+    preloadCodecs();
+    STX_TRY(auto opened, openRenderable(o.input, o.open, program.job));
+    CameraContext context;
+    std::int64_t points = 0;
+    std::unique_ptr<Renderer> renderer;
+    if (const auto* mesh = std::get_if<Mesh>(&opened)) {
+        STX_CHECK(mesh->check());
+        context.bounds = mesh->bounds();
+    } else {
+        const auto& bundle = std::get<Bundle>(opened);
+        context.bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
+        for (const auto& v : bundle.views) context.views.push_back(v.camera);
+        points = bundle.pointCount();
+    }
+    STX_TRY(const auto cameras, makeCameras(o.camera, context, program));
+    if (cameras.size() > 1 && !frameName(o.output, 0) && o.output != "-")
+        return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
+                    cameras.size());
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        if (auto ok = cameras[i].check(); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("camera {}", i)));
+        STX_CHECK(program.job.limits.checkAllocation(
+            static_cast<std::uint64_t>(cameras[i].width) * cameras[i].height, 64, "the picture"));
+    }
+    if (const auto* mesh = std::get_if<Mesh>(&opened)) {
+        renderer = makeMeshRenderer(*mesh, settings, program.job);
+    } else {
+        STX_TRY(renderer, makeRenderer(backendOf(o.backend), std::get<Bundle>(opened), settings,
+                                       o.device, program.job));
+    }
+    program.sayNotes();
+
+    FrameWriter writer(writing, program.job);
+    auto views = nlohmann::ordered_json::array();
+    double total = 0;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        const auto name = writer.nameOf(static_cast<int>(i));
+        std::error_code ec;
+        if (o.skipExisting && o.output != "-" && std::filesystem::exists(name, ec)) {
+            views.push_back({{"output", name}, {"skipped", true}});
+            continue;
+        }
+        STX_CHECK(program.job.checkCancelled());
+        const auto start = std::chrono::steady_clock::now();
+        auto frame = renderer->render(cameras[i]);
+        if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
+        const double milliseconds =
+            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                .count();
+        total += milliseconds;
+        views.push_back({{"output", name}, {"milliseconds", milliseconds}});
+        STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), cameras[i]));
+        program.job.progress(static_cast<std::int64_t>(i) + 1,
+                             static_cast<std::int64_t>(cameras.size()), "rendering");
+    }
+    STX_CHECK(writer.finish());
+    program.sayNotes();
+    program.say(fmt::format("{} → {}, {} picture{} {}x{}, {}, {:.1f} ms each",
+                            std::filesystem::path(o.input).filename().string(), o.output,
+                            cameras.size(), cameras.size() == 1 ? "" : "s", cameras[0].width,
+                            cameras[0].height, renderer->backend(),
+                            total / static_cast<double>(cameras.size())));
+    STX_CHECK(program.writeReport({{"$schema", "render-report.schema.json"},
+                                   {"backend", renderer->backend()},
+                                   {"device", renderer->device()},
+                                   {"mode", o.mode},
+                                   {"points", points},
+                                   {"views", views}}));
+    return 0;
+}
+
+}  // namespace
+
+Command addRender(CLI::App& app, Program& program) {
+    auto* c = app.add_subcommand(
+        "render",
+        "Novel views of a bundle, an atlas or a mesh\n\n"
+        "  stx render model.mp4 -o view.png --eye 0,1,4 --target 0,0,0\n"
+        "  stx render atlas -o orbit_%04d.png --orbit 60 --elevation 20\n"
+        "  stx render model.exr -o - --orbit 250 --file-format y4m | ffmpeg -i - orbit.mp4");
+    auto o = std::make_shared<RenderOptions>();
+    c->add_option("IN", o->input, "Bundle, atlas or mesh");
+    c->add_option("-o,--output", o->output,
+                  ".png, .jpg or .exr; name_%04d.png for several; - for a y4m stream")
+        ->type_name("IMAGE");
+    addCameraOptions(*c, o->camera);
+    const char* drawing = "Drawing";
+    c->add_option("--backend", o->backend,
+                  "auto, gpu, gl or cpu (default auto: a real GPU, else cpu)")
+        ->check(CLI::IsMember({"auto", "gpu", "gl", "cpu"}))
+        ->group(drawing);
+    c->add_option("--device", o->device, "Number of the GPU to use, see --list-devices")
+        ->group(drawing);
+    c->add_flag("--list-devices", o->listDevices, "Print the GPUs there are and stop")
+        ->group(drawing);
+    c->add_option("--mode", o->mode, "surface: best pictures; splat: the paper's (default surface)")
+        ->check(CLI::IsMember({"surface", "splat"}))
+        ->group(drawing);
+    c->add_option("--quality", o->quality,
+                  "Of surface mode: draft, normal or best (default normal)")
+        ->check(CLI::IsMember({"draft", "normal", "best"}))
+        ->group(drawing);
+    c->add_option("--splat", o->splat,
+                  "Size and shape of splats: data, paper or point (default data)")
+        ->check(CLI::IsMember({"data", "paper", "point"}))
+        ->group(drawing);
+    c->add_option("--splat-coefficient", o->splatCoefficient,
+                  "Of --splat paper: pixels times scene units (default: fitted)")
+        ->check(CLI::NonNegativeNumber)
+        ->group(drawing);
+    c->add_option("--fill", o->fill,
+                  "What no view saw in full scenes: background or none (default background)")
+        ->check(CLI::IsMember({"background", "none"}))
+        ->group(drawing);
+    c->add_option("--background", o->background,
+                  "Colour behind the object, 0..1 each; none keeps alpha (default none)")
+        ->type_name("R,G,B|none")
+        ->group(drawing);
+    const char* lighting = "Lighting (Phong; off without --light)";
+    c->add_option("--light", o->lights,
+                  "dir:X,Y,Z[,r,g,b] shines along X,Y,Z; point:X,Y,Z[,r,g,b] stands there; @camera "
+                  "appended: in camera space. Repeat for more")
+        ->type_name("LIGHT")
+        ->group(lighting);
+    c->add_option("--ambient", o->ambient, "Ambient light, grey or r,g,b (default 0.2)")
+        ->group(lighting);
+    c->add_option("--specular", o->specular, "Specular reflection, grey or r,g,b (default 0)")
+        ->group(lighting);
+    c->add_option("--shininess", o->shininess, "Phong exponent, above 0 (default 32)")
+        ->check(CLI::PositiveNumber)
+        ->group(lighting);
+    const char* output = "Output";
+    c->add_option("--file-format", o->fileFormat, "Of a stream on stdout: y4m")
+        ->check(CLI::IsMember({"y4m"}))
+        ->group(output);
+    c->add_option("--format", o->fileFormat, "The same as --file-format")
+        ->check(CLI::IsMember({"y4m"}))
+        ->group(output);
+    c->add_option("--fps", o->framesPerSecond,
+                  "Frame rate told to readers of the stream (default 25)")
+        ->check(CLI::Range(0.001, 1000.0))
+        ->group(output);
+    c->add_flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
+        ->group(output);
+    c->add_option("--texture", o->open.texture, "Texture of a mesh that names none")
+        ->type_name("IMAGE")
+        ->group(output);
+    addCommonOptions(*c, program, kOutput | kOutside);
+    return {c, [o](Program& p) { return render(*o, p); }};
+}
+
+}  // namespace stx::tools

@@ -1,0 +1,91 @@
+#include <chrono>
+
+#include "formats/images/images.hpp"
+#include "formats/open.hpp"
+#include "lib/selection/selection.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+namespace {
+
+struct SelectOptions {
+    std::string input, output, plot;
+    SelectSettings settings;
+    double sharePercent = 95.0;
+    bool shareGiven = false;
+};
+
+Result<int> select(const SelectOptions& o, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(containerOf(o.output));
+    preloadCodecs();
+    STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
+    SelectSettings settings = o.settings;
+    settings.share = settings.count > 0 && !o.shareGiven ? 1.0 : o.sharePercent / 100.0;
+    STX_TRY(const auto selection, selectViews(bundle, settings, program.job));
+    SaveOptions save;
+    save.noClobber = program.common.noClobber;
+    STX_CHECK(saveBundle(keepViews(bundle, selection.views), o.output, save, program.job));
+    if (!o.plot.empty()) {
+        const std::string svg =
+            selectionPlotSvg(selection, std::filesystem::path(o.input).filename().string());
+        STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
+    }
+    const double quality = selection.quality.empty() ? 0.0 : selection.quality.back();
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format(
+        "{} → {}, {} of {} views, {:.1f} % of the quality of all, at least {:.1f} % of the best "
+        "possible "
+        "choice; they see {:.1f} % of the surface, all see {:.1f} %; {:.2g} s",
+        std::filesystem::path(o.input).filename().string(), o.output, selection.views.size(),
+        bundle.views.size(), quality * 100, selection.certificate * 100, selection.coverage * 100,
+        selection.coverageOfAll * 100, seconds));
+    STX_CHECK(program.writeReport({{"$schema", "select-report.schema.json"},
+                                   {"input", o.input},
+                                   {"output", o.output},
+                                   {"views", selection.views},
+                                   {"of", bundle.views.size()},
+                                   {"quality", selection.quality},
+                                   {"certificate", selection.certificate},
+                                   {"coverage", selection.coverage},
+                                   {"coverageOfAll", selection.coverageOfAll},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+}  // namespace
+
+Command addSelect(CLI::App& app, Program& program) {
+    auto* c =
+        app.add_subcommand("select",
+                           "Keep the fewest reference views that still cover the surface\n\n"
+                           "  stx select model.exr -o fewer.exr --count 12\n"
+                           "  stx select model.exr -o fewer.exr --share 98 --plot quality.svg");
+    auto o = std::make_shared<SelectOptions>();
+    c->add_option("IN", o->input, "Bundle to choose from")->required();
+    c->add_option("-o,--output", o->output, "Bundle to write")->required()->type_name("OUT");
+    c->add_option("--count", o->settings.count, "Number of views to keep")
+        ->check(CLI::Range(1, 65536))
+        ->type_name("N");
+    c->add_option_function<double>(
+         "--share",
+         [o](const double& v) {
+             o->sharePercent = v;
+             o->shareGiven = true;
+         },
+         "Keep as many as reach this much of the quality of all views, in percent (default 95)")
+        ->check(CLI::Range(0.1, 100.0))
+        ->type_name("PERCENT");
+    c->add_option("--density", o->settings.targetDensity,
+                  "Wanted samples per scene unit (default: what the views typically have)")
+        ->check(CLI::NonNegativeNumber);
+    c->add_option("--plot", o->plot, "Draw quality against the number of views")
+        ->type_name("FILE.svg");
+    addCommonOptions(*c, program, kOutput | kOutside);
+    return {c, [o](Program& p) { return select(*o, p); }};
+}
+
+}  // namespace stx::tools

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "formats/files/files.hpp"
+#include "formats/images/y4m.hpp"
+#include "lib/base/job.hpp"
+#include "lib/geometry/camera.hpp"
+#include "lib/render/frame.hpp"
+
+namespace stx::tools {
+
+/// Writes rendered frames while the next ones are drawn: encoding runs on its own threads, with a
+/// short queue between, so memory stays the same for any number of frames.
+class FrameWriter {
+  public:
+    struct Settings {
+        std::string pattern;  ///< file, name_%04d.png, or - for a stream
+        std::optional<glm::vec3> background;
+        std::string stream;  ///< "y4m" for stdout
+        double framesPerSecond = 25;
+        bool noClobber = false;
+    };
+    /// Errors (usage) when the ending or the stream makes no sense.
+    [[nodiscard]] static Result<void> check(const Settings& settings);
+
+    FrameWriter(Settings settings, Job& job);
+    ~FrameWriter();
+    FrameWriter(const FrameWriter&) = delete;
+    FrameWriter& operator=(const FrameWriter&) = delete;
+
+    [[nodiscard]] std::string nameOf(int frame) const;
+    /// Takes a frame; blocks while the queue is full. The error of an earlier frame comes back here
+    /// or from finish().
+    [[nodiscard]] Result<void> write(int index, Frame frame, const Camera& camera);
+    /// Waits until everything is on disk.
+    [[nodiscard]] Result<void> finish();
+
+  private:
+    struct Item {
+        int index = 0;
+        Frame frame;
+        Camera camera;
+    };
+    void work();
+    [[nodiscard]] Result<void> writeOne(const Item& item);
+
+    Settings settings_;
+    Job& job_;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::deque<Item> queue_;
+    bool closed_ = false;
+    std::optional<Error> error_;
+    std::optional<OutputFile> streamFile_;
+    std::optional<Y4mWriter> stream_;
+    std::vector<std::thread> threads_;
+};
+
+}  // namespace stx::tools

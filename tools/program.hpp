@@ -1,0 +1,104 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <glm/glm.hpp>
+#include <nlohmann/json.hpp>
+
+#include "formats/files/files.hpp"
+#include "lib/base/job.hpp"
+
+namespace stx::tools {
+
+/// Options that every command has.
+struct CommonOptions {
+    int threads = 0;  ///< 0 = all processors
+    bool quiet = false;
+    int verbose = 0;
+    bool noClobber = false;
+    bool allowOutside = false;
+    std::uint64_t maxMemoryMiB = 4096;
+    std::string report;           ///< path of a JSON report; empty = none
+    std::string format = "text";  ///< or "json", for commands that answer on stdout
+};
+
+/// What a command gets: its options, a Job to pass on, and where to say things.
+class Program {
+  public:
+    CommonOptions common;
+    Job job;
+
+    /// A result for stdout. Errors of writing (a closed pipe, a full disk) become the exit code.
+    void print(std::string_view text);
+    /// One line for a person on stderr, unless --quiet.
+    void say(std::string_view line) const;
+    /// The notes of the job as lines on stderr, unless --quiet.
+    void sayNotes();
+    /// Writes the --report file, when one was asked for.
+    [[nodiscard]] Result<void> writeReport(const nlohmann::ordered_json& report) const;
+    [[nodiscard]] OutputFile::Options outputOptions() const { return {common.noClobber}; }
+
+    /// Runs a command's body with limits, threads and progress set up; prints its error and returns
+    /// the exit code.
+    [[nodiscard]] int run(const std::function<Result<int>()>& body);
+
+  private:
+    bool outputFailed_ = false;
+};
+
+/// Which of the shared options a command has beside --threads, --max-memory, --quiet, -v.
+enum CommonOption : unsigned {
+    kOutput = 1,   ///< --no-clobber, --report
+    kFormat = 2,   ///< --format text|json
+    kOutside = 4,  ///< --allow-outside
+};
+void addCommonOptions(CLI::App& command, Program& program, unsigned which);
+
+/// Makes `command` call `body` and keep its exit code in `exitCode`.
+using Body = std::function<Result<int>(Program&)>;
+
+/// A command's file: adds its options to the app; returns what to run once they are parsed.
+struct Command {
+    CLI::App* app = nullptr;
+    Body body;
+};
+Command addConvert(CLI::App& app, Program& program);
+Command addSelect(CLI::App& app, Program& program);
+Command addPack(CLI::App& app, Program& program);
+Command addBake(CLI::App& app, Program& program);
+Command addRender(CLI::App& app, Program& program);
+Command addExtract(CLI::App& app, Program& program);
+Command addInfo(CLI::App& app, Program& program);
+Command addValidate(CLI::App& app, Program& program);
+Command addCompare(CLI::App& app, Program& program);
+Command addBench(CLI::App& app, Program& program);
+
+// ---- Values of options. All parse the C locale's numbers and refuse trailing text. ----
+
+/// "640x480".
+[[nodiscard]] Result<glm::ivec2> parseSize(std::string_view text, const Limits& limits);
+/// `count` numbers separated by commas; the option's name is for the message.
+[[nodiscard]] Result<std::vector<double>> parseNumbers(std::string_view text, std::size_t count,
+                                                       std::string_view option);
+[[nodiscard]] Result<glm::dvec3> parseVec3(std::string_view text, std::string_view option);
+
+/// The file of one frame of a sequence named `name_%04d.png`; nothing when the name has no number.
+[[nodiscard]] std::optional<std::string> frameName(const std::string& pattern, int frame);
+
+/// "1.2 MB", for messages.
+[[nodiscard]] std::string humanBytes(std::uint64_t bytes);
+/// The nearest of `words` to `word`, or empty when none is near.
+[[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
+/// Size of a file, or of all files in a folder.
+[[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
+/// Errors early when the target's folder is missing or not writable, or, under --no-clobber, when
+/// the target exists: before an hour of work, not after it.
+[[nodiscard]] Result<void> checkTarget(const std::filesystem::path& target, const Program& program);
+
+}  // namespace stx::tools
