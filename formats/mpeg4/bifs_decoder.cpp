@@ -223,8 +223,8 @@ struct BifsDecoder::Impl {
         return result;
     }
 
-    // readList stands behind what it calls: clang 14 does not define templates that a generic lambda
-    // needs before they were seen.
+    // readList stands behind what it calls: clang 14 does not define templates that a generic
+    // lambda needs before they were seen.
     /// Calls `readOne` for each item of an MF field in either form.
     template <class ReadOne>
     Result<void> readEach(const NodeInfo& node, const FieldInfo& field, std::uint64_t fewest,
@@ -249,14 +249,16 @@ struct BifsDecoder::Impl {
 
     template <class T>
     Result<void> readItems(const NodeInfo& node, const FieldInfo& field, std::vector<T>& items) {
-        STX_TRY(const auto coding, located(quantisation.codingOf(field)));
-        return readEach(node, field, fewestBits(itemType(field.type), coding),
+        // A coding that cannot be is no error where there is no item.
+        const auto coding = located(quantisation.codingOf(field));
+        return readEach(node, field, coding ? fewestBits(itemType(field.type), *coding) : 1,
                         [&](std::uint64_t left) -> Result<void> {
                             STX_CHECK(spend(sizeof(T)));
                             if (items.empty() && left > 0)
                                 items.reserve(static_cast<std::size_t>(
                                     std::min<std::uint64_t>(left, 1u << 20)));
-                            STX_TRY(T item, readItem<T>(coding));
+                            if (!coding) return tl::unexpected(coding.error());
+                            STX_TRY(T item, readItem<T>(*coding));
                             if (in.failed())
                                 return check(fmt::format("{}.{}", node.name, field.name));
                             items.push_back(std::move(item));

@@ -221,6 +221,7 @@ class Writer {
             return fail(ErrorCode::invalidInput, "{} is {}x{} pixels; 65535x65535 are possible",
                         what, out.width, out.height);
         const bool visual = out.streamType == StreamType::visual;
+        if (!visual) out.width = out.height = 0;
         track.handler = visual ? "vide" : out.streamType == StreamType::audio ? "soun" : "gesm";
         track.handlerName = visual ? "MPEG-4 image" : "MPEG-4 stream";
         STX_CHECK(finish(track, what));
