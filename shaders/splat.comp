@@ -138,14 +138,14 @@ void main() {
     paint.tolerance = 0.0;
     add(index, 1.0, vec2(0.0), p.dist, paint);
 #endif
-#elif RULE == 1
+#elif TWO_BY_TWO
     vec2 corner = floor(p.pixel);
     if (!(all(greaterThanEqual(corner, vec2(-1.0))) && all(lessThan(corner, vec2(frameSize.xy))))) return;
     vec2 f = p.pixel - corner, g = 1.0 - f;
     vec2 f2 = f * f, g2 = g * g;
     int index = (int(corner.y) + 1) * stride + int(corner.x) + 1;
     Splat splat;
-    splatOf(p, splat);
+    if (!splatOf(p, splat)) return;
     float zx = splat.slope.x, zy = splat.slope.y, core2 = splat.core2;
     float z = p.dist - f.x * zx - f.y * zy;
 #if PASS == 1

@@ -26,11 +26,11 @@ void main() {
     float kernel = 1.0;
 #if RULE != 0
     Splat splat;
-    splat.small = RULE == 1 || shape.x != 0.0;
+    splat.small = TWO_BY_TWO || shape.x != 0.0;
     splat.q = inverse;
     float q = squaredRadius(splat, d);
     depth += dot(shape.zw, d);
-#if RULE >= 2
+#if BOXES
     // A plane that runs through the viewpoint must not hide all.
     depth = max(depth, 0.5 * centre.z);
 #endif
@@ -39,7 +39,7 @@ void main() {
 #else
     kernel = kernelAt(splat, d, q);
     if (!(kernel > 0.0)) discard;
-#if RULE == 1
+#if TWO_BY_TWO
     if (!worthwhile(kernel, q, shape.y)) discard;
 #endif
 #endif

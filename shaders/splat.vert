@@ -1,5 +1,5 @@
 // Lee & Park's vertex shader: no vertex attributes; each vertex fetches its point from the textures.
-// Small splats are GL points, those of blocks with larger ones two triangles. Needs
+// Small splats are GL points, others are two triangles. Needs
 // splat_points.glsl.
 #if PASS == 2
 flat out vec4 colour;
@@ -16,7 +16,7 @@ flat out vec4 shape;  // small, core2, slope
 void main() {
     gl_Position = vec4(0.0, 0.0, -2.0, 1.0);  // outside: clipped
     gl_PointSize = 1.0;
-#if RULE >= 2
+#if BOXES
     uint corner = uint(gl_VertexID) % 6u, id = uint(gl_VertexID) / 6u;
 #else
     uint id = uint(gl_VertexID);
@@ -25,19 +25,19 @@ void main() {
     if (!fetchPoint((id >> 8u) + uint(counts.z), id & 255u, p)) return;
     Splat splat;
     if (!splatOf(p, splat)) return;
-#if RULE >= 2
+#if BOXES
     // Corners 0 1 2 and 3 4 5: (-,-) (+,-) (+,+) and (-,-) (+,+) (-,+).
     vec2 side = vec2(corner == 1u || corner == 2u || corner == 4u ? 1.0 : -1.0,
                      corner == 2u || corner >= 4u ? 1.0 : -1.0);
     vec2 at = splat.small ? floor(p.pixel) + 1.0 + side : p.pixel + 0.5 + side * splat.reach;
-#elif RULE == 1
+#elif TWO_BY_TWO
     gl_PointSize = 2.0;
     vec2 at = floor(p.pixel) + 1.0;  // the corner that the 2x2 pixels share
 #else
     vec2 at = floor(p.pixel + 0.5) + 0.5;
 #endif
     centre = vec3(p.pixel, p.dist);
-#if RULE >= 2
+#if BOXES
     inverse = splat.q;
 #endif
     shape = vec4(splat.small ? 1.0 : 0.0, splat.core2, splat.slope);

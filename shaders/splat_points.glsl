@@ -1,8 +1,12 @@
 // Fetching a point of the object and laying out its splat; the twin of
 // lib/render/cpu/splat_kernels.cpp. Needs splat_frame.glsl.
 // RULE: 0 = one pixel, 1 = small splats (2x2 pixels) that share a tilt, 2 = each from its own data,
-// small or an ellipse, 3 = the paper's.
+// small or an ellipse, 3 = the paper's, 4 = each from its own data, all small.
 // PASS: 1 = visibility, 2 = blending. SIZES: the slope texture holds sizes too.
+
+#define TWO_BY_TWO (RULE == 1 || RULE == 4)
+#define OWN_DATA (RULE == 2 || RULE == 4)
+#define BOXES (RULE == 2 || RULE == 3)
 
 struct Task {
     uint uv;         // u0 | v0 << 16, pixel of the view
@@ -150,7 +154,7 @@ bool splatOf(Point p, out Splat s) {
 #endif
     vec2 longer = eu + ev, other = eu - ev;
     float cover2 = size * size * 0.25 * max(dot(longer, longer), dot(other, other));
-    s.small = cover2 < SMALL_COVER_2;
+    s.small = RULE == 4 || cover2 < SMALL_COVER_2;
     // The plane's distance per pixel; nearly edge-on it would run away.
     vec2 relative = vec2(hu.z * ev.y - hv.z * eu.y, hv.z * eu.x - hu.z * ev.x) / (det * p.h.z);
     s.slope = clamp(relative, vec2(-STEEPEST), vec2(STEEPEST)) * p.dist;

@@ -354,6 +354,10 @@ std::unique_ptr<Renderer> makeCpuSplatRenderer(const Bundle& bundle, const Rende
     return std::make_unique<CpuSplatRenderer>(bundle, settings, job);
 }
 
+void closeSplatPinholes(Frame& frame) {
+    closePinholes(frame);
+}
+
 std::string cpuDeviceName() {
     std::string name = "CPU";
 #if defined(__x86_64__)

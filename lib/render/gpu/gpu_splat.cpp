@@ -4,6 +4,7 @@
 #include <map>
 
 #include "embedded_shaders.hpp"
+#include "lib/render/cpu/cpu_splat.hpp"
 #include "lib/render/cpu/splat_kernels.hpp"
 #include "lib/render/gpu/egl_context.hpp"
 #include "lib/render/gpu/gl_object.hpp"
@@ -21,7 +22,7 @@ constexpr int kLargestPiece = 4096;
 
 enum class Sums { integers = 0, floats = 1, pairs = 2 };
 /// RULE of the shaders.
-enum class Rule { point = 0, small = 1, ellipse = 2, paper = 3 };
+enum class Rule { point = 0, uniform = 1, ellipse = 2, paper = 3, small = 4 };
 
 /// A buffer that grows to what a frame needs.
 struct GrowingBuffer {
@@ -164,7 +165,7 @@ Result<GLuint> GpuSplatRenderer::program(const char* kind, int pass, Rule rule) 
 
 Result<void> GpuSplatRenderer::buildPrograms() {
     const char* kind = raster_ ? "raster" : "compute";
-    std::vector<Rule> rules{Rule::small, Rule::ellipse};
+    std::vector<Rule> rules{Rule::uniform, Rule::small, Rule::ellipse};
     if (settings_.splat == SplatRule::point) rules = {Rule::point};
     if (settings_.splat == SplatRule::paper) rules = {Rule::paper};
     for (const Rule rule : rules) {
@@ -244,14 +245,16 @@ Result<void> GpuSplatRenderer::drawCompute(SplatFrame& frame) {
                           static_cast<GLuint>((count + 32767) / 32768), 1);
         return {};
     };
+    const int large = frame.uniformTasks + frame.smallTasks;
     const int all = static_cast<int>(frame.tasks.size());
     const Rule first = settings_.splat == SplatRule::point   ? Rule::point
                        : settings_.splat == SplatRule::paper ? Rule::paper
-                                                             : Rule::small;
+                                                             : Rule::uniform;
     for (const int pass : {1, 2}) {
         glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-        STX_CHECK(dispatch(pass, first, 0, frame.smallTasks));
-        STX_CHECK(dispatch(pass, Rule::ellipse, frame.smallTasks, all - frame.smallTasks));
+        STX_CHECK(dispatch(pass, first, 0, frame.uniformTasks));
+        STX_CHECK(dispatch(pass, Rule::small, frame.uniformTasks, frame.smallTasks));
+        STX_CHECK(dispatch(pass, Rule::ellipse, large, all - large));
     }
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     return {};
@@ -329,16 +332,18 @@ Result<void> GpuSplatRenderer::drawRaster(SplatFrame& frame) {
         }
         return {};
     };
+    const int large = frame.uniformTasks + frame.smallTasks;
     const int all = static_cast<int>(frame.tasks.size());
     const Rule rule = settings_.splat == SplatRule::point   ? Rule::point
                       : settings_.splat == SplatRule::paper ? Rule::paper
-                                                            : Rule::small;
+                                                            : Rule::uniform;
     for (const int pass : {1, 2}) {
         glBindFramebuffer(GL_FRAMEBUFFER, pass == 1 ? r.frontPass.get() : r.blendPass.get());
         glBlendEquation(pass == 1 ? GL_MIN : GL_FUNC_ADD);
         if (pass == 2) glBindTextureUnit(4, r.frontTarget.get());
-        STX_CHECK(draw(pass, rule, 0, frame.smallTasks));
-        STX_CHECK(draw(pass, Rule::ellipse, frame.smallTasks, all - frame.smallTasks));
+        STX_CHECK(draw(pass, rule, 0, frame.uniformTasks));
+        STX_CHECK(draw(pass, Rule::small, frame.uniformTasks, frame.smallTasks));
+        STX_CHECK(draw(pass, Rule::ellipse, large, all - large));
     }
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glBindTextureUnit(4, r.frontTarget.get());
@@ -441,6 +446,13 @@ Result<Frame> GpuSplatRenderer::render(const Camera& camera) {
                     .count();
             STX_CHECK(readPiece({x, y}, {part.width, part.height}, frame));
         }
+    }
+    if (settings_.splat == SplatRule::data) {
+        const auto start = std::chrono::steady_clock::now();
+        closeSplatPinholes(frame);
+        frame.milliseconds +=
+            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                .count();
     }
     return frame;
 }

@@ -64,7 +64,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                           const Camera& novel, int margin) {
     SplatFrame frame;
     frame.uniforms = uniformsOf(scene, settings, novel, margin);
-    std::vector<TaskEntry> large;
+    std::vector<TaskEntry> small, large;
     double crowd = 0;  // points that may meet in one pixel, all views together
     struct Planned {
         splat::BlockTask task;
@@ -119,12 +119,14 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                 t.uDown,
                 t.vDown,
                 {}};
-            const bool ellipse = settings.splat == SplatRule::data && !t.uniform;
-            (ellipse ? large : frame.tasks).push_back(entry);
+            const bool own = settings.splat == SplatRule::data && !t.uniform;
+            (!own ? frame.tasks : t.small ? small : large).push_back(entry);
         }
         crowd += std::max(1.0, densest);
     }
-    frame.smallTasks = static_cast<int>(frame.tasks.size());
+    frame.uniformTasks = static_cast<int>(frame.tasks.size());
+    frame.smallTasks = static_cast<int>(small.size());
+    frame.tasks.insert(frame.tasks.end(), small.begin(), small.end());
     frame.tasks.insert(frame.tasks.end(), large.begin(), large.end());
     // 32-bit sums: colour steps * weight * crowd must stay below 2^31. Four for what a tilt and
     // the kernel's four pixels add.

@@ -42,8 +42,9 @@ struct LightEntry {
 struct SplatFrame {
     FrameUniforms uniforms;
     std::vector<ViewEntry> views;
-    std::vector<TaskEntry> tasks;  ///< blocks of small, alike splats first, then the others
-    int smallTasks = 0;
+    /// Blocks of small splats that share a tilt; then blocks of small ones; then all others.
+    std::vector<TaskEntry> tasks;
+    int uniformTasks = 0, smallTasks = 0;
     std::vector<LightEntry> lights;
 };
 
