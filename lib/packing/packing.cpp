@@ -68,16 +68,43 @@ ReferenceView withoutImages(const ReferenceView& view) {
     return v;
 }
 
-/// Colours what no rectangle covers from what is covered, so that filters find nothing black.
-void bleedUncovered(const Image<std::uint8_t>& covered, ReferenceView& view) {
-    Texture bled = view.texture;
-    bleedColour(bled);
-    for (int y = 0; y < covered.height(); ++y) {
-        for (int x = 0; x < covered.width(); ++x) {
-            if (covered.at(x, y)) continue;
-            if (auto* image = view.texture.rgba8()) image->at(x, y) = bled.rgba8()->at(x, y);
+/// Pixels that belong to the object: points, and those of full alpha whose distance is not told.
+std::int64_t objectPixels(const ReferenceView& view) {
+    std::int64_t n = 0;
+    for (int y = 0; y < view.depth.height(); ++y) {
+        for (int x = 0; x < view.depth.width(); ++x)
+            n += hasPoint(view.depth.at(x, y)) || view.texture.at(x, y).a >= 1.0f ? 1 : 0;
+    }
+    return n;
+}
+
+/// Colours what no rectangle covers from what is covered, so that filters find nothing black. Where
+/// `told` is 0 the alpha becomes full when `unknown` is set (the pixel was pruned), else 0.
+void fillUncovered(const Image<std::uint8_t>& told, bool unknown, ReferenceView& view) {
+    bleedColour(view.texture);
+    if (!unknown) return;
+    for (int y = 0; y < told.height(); ++y) {
+        for (int x = 0; x < told.width(); ++x) {
+            if (told.at(x, y)) continue;
+            if (auto* image = view.texture.rgba8()) image->at(x, y).a = 255;
+            if (auto* image = view.texture.rgbaFloat()) image->at(x, y).a = 1.0f;
+        }
+    }
+}
+
+/// Colour and alpha of the padding of a rectangle, back into its view: what surrounds it there.
+void copyPadding(const AtlasRectangle& r, const Atlas& atlas, ReferenceView& view,
+                 Image<std::uint8_t>& told) {
+    const AtlasPage& page = atlas.pages[r.page];
+    for (int y = r.viewY - atlas.padding; y < r.viewY + r.height + atlas.padding; ++y) {
+        for (int x = r.viewX - atlas.padding; x < r.viewX + r.width + atlas.padding; ++x) {
+            const glm::ivec2 p = r.atlasFromView(x, y);
+            if (!view.depth.contains(x, y) || !page.depth.contains(p.x, p.y)) continue;
+            if (auto* image = view.texture.rgba8())
+                image->at(x, y) = page.texture.rgba8()->at(p.x, p.y);
             if (auto* image = view.texture.rgbaFloat())
-                image->at(x, y) = bled.rgbaFloat()->at(x, y);
+                image->at(x, y) = page.texture.rgbaFloat()->at(p.x, p.y);
+            told.at(x, y) = 1;
         }
     }
 }
@@ -157,8 +184,8 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
         const auto& r = atlas.rectangles[i];
         fillPage(bundle.views[source[r.view]], r, settings.padding, atlas.pages[r.page]);
     });
-    atlas.sourcePixels = bundle.pointCount();
-    atlas.keptPixels = atlas.sourcePixels;
+    for (const auto& view : bundle.views) atlas.sourcePixels += objectPixels(view);
+    atlas.keptPixels = bundle.pointCount();
     return atlas;
 }
 
@@ -172,6 +199,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     STX_CHECK(
         job.limits.checkAllocation(pixels, contents.bytesPerPixel() + 1, "the views of the atlas"));
 
+    const bool pruned = atlas.keptPixels < atlas.sourcePixels;
     std::vector<std::vector<const AtlasRectangle*>> ofView(atlas.views.size());
     for (const auto& r : atlas.rectangles) ofView[r.view].push_back(&r);
     Bundle bundle;
@@ -189,8 +217,11 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
             view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
             view.splatV = view.splatU;
         }
-        Image<std::uint8_t> covered(width, height, 0);
-        std::int64_t area = 0;
+        Image<std::uint8_t> told(width, height, 0);  // 1 = by padding, 2 = by a rectangle
+        if (pruned) {
+            for (const AtlasRectangle* r : ofView[i]) copyPadding(*r, atlas, view, told);
+        }
+        std::int64_t covered = 0;
         for (const AtlasRectangle* r : ofView[i]) {
             const AtlasPage& page = atlas.pages[r->page];
             const auto copy = [&](const auto& from, auto& to) {
@@ -208,11 +239,12 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
                 copy(page.splatV, view.splatV);
             }
             forEachPixel(*r, view.depth.size(), 0, [&](glm::ivec2, glm::ivec2 v) {
-                area += covered.at(v.x, v.y) ? 0 : 1;
-                covered.at(v.x, v.y) = 1;
+                covered += told.at(v.x, v.y) == 2 ? 0 : 1;
+                told.at(v.x, v.y) = 2;
             });
         }
-        if (area < static_cast<std::int64_t>(covered.count())) bleedUncovered(covered, view);
+        // Whole views come back as they were, colours under alpha 0 included.
+        if (covered < static_cast<std::int64_t>(told.count())) fillUncovered(told, pruned, view);
         // An atlas keeps room for normals when any view has them; give them back only to those.
         dropIfZero(view.normal);
         dropIfZero(view.splatU);

@@ -14,9 +14,11 @@ struct PackSettings {
         /// unless maxSize forbids it. A cell is the largest view and `padding` on each side; a
         /// view's pixel (0,0) is at (padding, padding) of its cell.
         grid,
-        /// Views trimmed to their content (points, and pixels with coverage), cut into patches
-        /// where that saves room, fitted closely, turned where that makes the textures smaller.
-        /// Views without content are dropped with a note.
+        /// Views trimmed to their content (points, and pixels with partial coverage), cut into
+        /// patches where that saves room, fitted closely, turned where that makes the textures
+        /// smaller. Views without content are dropped with a note. Pixels of full alpha without a
+        /// depth (pruned, or missed by a sensor) are left out and counted in
+        /// Atlas::sourcePixels.
         tight,
     };
     Layout layout = Layout::grid;
@@ -33,9 +35,11 @@ struct PackSettings {
 /// that would be needed and what to change; cancelled; memory over the limit.
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
 
-/// The bundle of an atlas: every pixel of every rectangle back in its view; pixels in no rectangle
-/// are background, coloured from the nearest covered ones. unpack(pack(b)) == b for the pixels that
-/// are points or have coverage (alpha). Errors: an atlas that fails check(), memory over the limit.
+/// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle
+/// are coloured from the nearest covered ones and are background (alpha 0) or, when the atlas was
+/// pruned (keptPixels < sourcePixels), of full alpha: the object may be there, nobody tells where;
+/// next to rectangles the padding tells. unpack(pack(b)) == b for points and pixels of partial
+/// coverage. Errors: an atlas that fails check(), memory over the limit.
 [[nodiscard]] Result<Bundle> unpack(const Atlas& atlas, Job& job);
 
 }  // namespace stx

@@ -129,9 +129,10 @@ std::vector<Patch> contentPatches(const ReferenceView& view, int padding) {
     Image<std::uint8_t> content(view.depth.width(), view.depth.height(), 0);
     for (int y = 0; y < content.height(); ++y) {
         for (int x = 0; x < content.width(); ++x) {
-            const bool covered = view.texture.rgba8() ? view.texture.rgba8()->at(x, y).a > 0
-                                                      : view.texture.rgbaFloat()->at(x, y).a > 0;
-            content.at(x, y) = covered || hasPoint(view.depth.at(x, y)) ? 1 : 0;
+            const bool rim = view.texture.rgba8() ? view.texture.rgba8()->at(x, y).a % 255 != 0
+                                                  : view.texture.rgbaFloat()->at(x, y).a > 0 &&
+                                                        view.texture.rgbaFloat()->at(x, y).a < 1;
+            content.at(x, y) = rim || hasPoint(view.depth.at(x, y)) ? 1 : 0;
         }
     }
     std::vector<Patch> patches;

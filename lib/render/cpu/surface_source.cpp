@@ -327,7 +327,9 @@ double borderCoverage(const Source& s) {
     std::int64_t points = 0, all = 0;
     const auto count = [&](int x, int y) {
         ++all;
-        points += s.q.at(x, y) > 0.0f;
+        // Full alpha without a depth is a pixel whose distance is not told: it was pruned, or a
+        // sensor missed it. The scene goes on there all the same.
+        points += s.q.at(x, y) > 0.0f || s.alpha(x, y) >= 1.0f;
     };
     for (int x = 0; x < s.width; ++x) {
         count(x, 0);

@@ -106,7 +106,7 @@ struct Source {
 
 [[nodiscard]] Source prepareSource(const ReferenceView& view);
 
-/// Share of the image border where the view has points: near 1 in scenes that fill the frame.
+/// Share of the image border where the view has points or full alpha: near 1 in scenes that fill the frame.
 [[nodiscard]] double borderCoverage(const Source& source);
 
 }  // namespace stx::surface

@@ -1,0 +1,319 @@
+#include "lib/packing/prune.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+
+#include "lib/base/parallel.hpp"
+#include "lib/packing/redundancy.hpp"
+#include "lib/selection/coverage.hpp"
+
+namespace stx {
+namespace {
+
+/// Side of the squares that a budget left over gives back, pixels.
+constexpr int kBlock = 16;
+/// Pruned pixels keep their colour this near to kept ones.
+constexpr int kColourBand = 4;
+
+/// Views by what each adds to the coverage; empty ones last.
+std::vector<int> rankViews(const Bundle& bundle) {
+    const auto views = static_cast<std::int64_t>(bundle.views.size());
+    const auto count =
+        static_cast<int>(std::clamp<std::int64_t>(20'000'000 / (views * views + 1), 200, 8000));
+    std::vector<CandidateView> candidates;
+    for (const auto& v : bundle.views)
+        candidates.push_back(
+            {v.camera, v.camera, &v.depth, v.depthBits == 32 ? 0.0 : v.depthCode().step()});
+    const auto problem = coverProblem(sampleBundle(bundle, count), candidates, 0);
+    std::vector<int> rank = chooseCover(problem, static_cast<int>(views), 1.0).chosen;
+    std::vector<bool> ranked(bundle.views.size(), false);
+    for (const int v : rank) ranked[v] = true;
+    for (int v = 0; v < views; ++v) {
+        if (!ranked[v]) rank.push_back(v);
+    }
+    return rank;
+}
+
+std::int64_t countKept(const std::vector<PruneView>& views) {
+    std::int64_t n = 0;
+    for (const auto& v : views) n += std::count(v.kept.pixels().begin(), v.kept.pixels().end(), 1);
+    return n;
+}
+
+/// Views from the lowest rank up give away what others show. Locks hold what replaced something.
+void giveAway(std::vector<PruneView>& views, const std::vector<int>& rank,
+              const PruneSettings& settings) {
+    for (auto k = rank.rbegin(); k != rank.rend(); ++k) {
+        PruneView& from = views[*k];
+        if (from.partners.empty()) continue;
+        Image<std::uint8_t> next = from.kept;
+        parallelForBlocks(0, from.kept.height(), 8, [&](std::int64_t begin, std::int64_t end) {
+            for (int y = static_cast<int>(begin); y < end; ++y) {
+                for (int x = 0; x < from.kept.width(); ++x) {
+                    if (!from.kept.at(x, y) || from.locked.at(x, y)) continue;
+                    for (const int j : from.partners) {
+                        PruneView& to = views[j];
+                        const Replacement r = findReplacement(from, x, y, to, settings);
+                        if (!r.found) continue;
+                        for (int c = 0; c < 4; ++c)
+                            std::atomic_ref(to.locked.at(r.x + (c & 1), r.y + (c >> 1)))
+                                .store(1, std::memory_order_relaxed);
+                        next.at(x, y) = 0;
+                        from.error.at(x, y) = static_cast<float>(r.error);
+                        break;
+                    }
+                }
+            }
+        });
+        from.kept = std::move(next);
+    }
+}
+
+/// One ring of points around what is kept; returns how many that would be, and adds them when told.
+std::int64_t growBand(std::vector<PruneView>& views, bool apply) {
+    std::vector<std::int64_t> added(views.size(), 0);
+    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+        PruneView& v = views[i];
+        const int width = v.kept.width(), height = v.kept.height();
+        Image<std::uint8_t> grown = v.kept;
+        for (int y = 0; y < height; ++y) {
+            for (int x = 0; x < width; ++x) {
+                if (v.kept.at(x, y) || !v.point(x, y)) continue;
+                bool beside = false;
+                for (int ny = std::max(0, y - 1); ny <= std::min(height - 1, y + 1) && !beside;
+                     ++ny) {
+                    for (int nx = std::max(0, x - 1); nx <= std::min(width - 1, x + 1); ++nx)
+                        beside = beside || v.kept.at(nx, ny);
+                }
+                if (!beside) continue;
+                grown.at(x, y) = 1;
+                ++added[i];
+            }
+        }
+        if (apply) v.kept = std::move(grown);
+    });
+    std::int64_t sum = 0;
+    for (const auto n : added) sum += n;
+    return sum;
+}
+
+double lostError(const std::vector<PruneView>& views) {
+    double sum = 0;
+    for (const auto& v : views) {
+        for (std::size_t k = 0; k < v.kept.count(); ++k) {
+            if (!v.kept.pixels()[k]) sum += v.error.pixels()[k];
+        }
+    }
+    return sum;
+}
+
+/// Gives whole blocks back, those with the largest error per pixel first: up to `budget` pixels, or
+/// until the error left is at most `mostError`.
+void giveBack(std::vector<PruneView>& views, std::int64_t budget, double mostError) {
+    struct Block {
+        double error;
+        std::int64_t pixels;
+        int view, x, y;
+    };
+    std::vector<Block> blocks;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const PruneView& v = views[i];
+        for (int y = 0; y < v.kept.height(); y += kBlock) {
+            for (int x = 0; x < v.kept.width(); x += kBlock) {
+                Block b{0, 0, static_cast<int>(i), x, y};
+                for (int py = y; py < std::min(y + kBlock, v.kept.height()); ++py) {
+                    for (int px = x; px < std::min(x + kBlock, v.kept.width()); ++px) {
+                        if (v.kept.at(px, py) || !v.point(px, py)) continue;
+                        b.error += v.error.at(px, py);
+                        ++b.pixels;
+                    }
+                }
+                if (b.pixels > 0) blocks.push_back(b);
+            }
+        }
+    }
+    std::stable_sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) {
+        return a.error * static_cast<double>(b.pixels) > b.error * static_cast<double>(a.pixels);
+    });
+    std::int64_t kept = countKept(views);
+    double error = lostError(views);
+    for (const Block& b : blocks) {
+        if (error <= mostError) break;
+        if (kept + b.pixels > budget) continue;
+        kept += b.pixels;
+        error -= b.error;
+        PruneView& v = views[b.view];
+        for (int py = b.y; py < std::min(b.y + kBlock, v.kept.height()); ++py) {
+            for (int px = b.x; px < std::min(b.x + kBlock, v.kept.width()); ++px) {
+                if (v.point(px, py)) v.kept.at(px, py) = 1;
+            }
+        }
+    }
+}
+
+template <class Colour>
+void smoothFarColours(const Image<std::uint8_t>& state, Image<Colour>& colour) {
+    // State 2 = taken away and far from everything kept.
+    if (std::find(state.pixels().begin(), state.pixels().end(), 2) == state.pixels().end()) return;
+    Image<Colour> work = colour;
+    for (std::size_t k = 0; k < state.count(); ++k) {
+        if (state.pixels()[k] == 2) work.pixels()[k].a = 0;
+    }
+    Texture bled(std::move(work));
+    bleedColour(bled);
+    for (int y = 0; y < state.height(); ++y) {
+        for (int x = 0; x < state.width(); ++x) {
+            if (state.at(x, y) != 2) continue;
+            const auto alpha = colour.at(x, y).a;
+            if constexpr (std::is_same_v<Colour, glm::u8vec4>) {
+                colour.at(x, y) = bled.rgba8()->at(x, y);
+            } else {
+                colour.at(x, y) = bled.rgbaFloat()->at(x, y);
+            }
+            colour.at(x, y).a = alpha;
+        }
+    }
+}
+
+/// Takes the pixels that are not kept out of a view.
+void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
+    const int width = kept.width(), height = kept.height();
+    Image<std::uint8_t> state(width, height, 0);
+    bool any = false;
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            if (kept.at(x, y) || !hasPoint(view.depth.at(x, y))) continue;
+            any = true;
+            state.at(x, y) = 2;
+        }
+    }
+    if (!any) return;
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            if (!kept.at(x, y)) continue;
+            // Only the rim of a kept region reaches out.
+            const bool inner = x > 0 && y > 0 && x + 1 < width && y + 1 < height &&
+                               kept.at(x - 1, y) && kept.at(x + 1, y) && kept.at(x, y - 1) &&
+                               kept.at(x, y + 1);
+            if (inner) continue;
+            for (int ny = std::max(0, y - kColourBand); ny <= std::min(height - 1, y + kColourBand);
+                 ++ny) {
+                for (int nx = std::max(0, x - kColourBand);
+                     nx <= std::min(width - 1, x + kColourBand); ++nx)
+                    state.at(nx, ny) = std::min<std::uint8_t>(state.at(nx, ny), 1);
+            }
+        }
+    }
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            if (kept.at(x, y) || !hasPoint(view.depth.at(x, y))) continue;
+            view.depth.at(x, y) = kNoDepth;
+            if (auto* c = view.texture.rgba8()) c->at(x, y).a = 255;
+            if (auto* c = view.texture.rgbaFloat()) c->at(x, y).a = 1.0f;
+            if (view.hasNormals()) view.normal.at(x, y) = glm::vec3(0);
+            if (view.hasSplats()) view.splatU.at(x, y) = view.splatV.at(x, y) = glm::vec3(0);
+        }
+    }
+    // A silhouette whose points are gone tells nothing any more.
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            const float alpha = view.texture.at(x, y).a;
+            if (hasPoint(view.depth.at(x, y)) || !(alpha > 0 && alpha < 1)) continue;
+            bool beside = false;
+            for (int ny = std::max(0, y - 1); ny <= std::min(height - 1, y + 1); ++ny) {
+                for (int nx = std::max(0, x - 1); nx <= std::min(width - 1, x + 1); ++nx)
+                    beside = beside || kept.at(nx, ny);
+            }
+            if (beside) continue;
+            if (auto* c = view.texture.rgba8()) c->at(x, y).a = 255;
+            if (auto* c = view.texture.rgbaFloat()) c->at(x, y).a = 1.0f;
+        }
+    }
+    if (auto* c = view.texture.rgba8()) smoothFarColours(state, *c);
+    if (auto* c = view.texture.rgbaFloat()) smoothFarColours(state, *c);
+}
+
+Result<void> checkSettings(const PruneSettings& s) {
+    if (s.budget < 0)
+        return fail(ErrorCode::usage, "a budget of {} pixels cannot be kept", s.budget);
+    if (!(s.minPsnr >= 0) || std::isinf(s.minPsnr))
+        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be 0 or more", s.minPsnr);
+    if (s.overlap < 0 || s.overlap > 16)
+        return fail(ErrorCode::usage, "the overlap is {} pixels; 0 to 16 is possible", s.overlap);
+    if (!(s.rateTolerance >= 1) || !(s.depthTolerance > 0 && s.depthTolerance <= 0.1) ||
+        !(s.colourTolerance >= 0 && s.colourTolerance <= 1))
+        return fail(
+            ErrorCode::usage,
+            "pruning tolerances out of range: rate {:g} (at least 1), depth {:g} (over 0, at "
+            "most 0.1), colour {:g} (0 to 1)",
+            s.rateTolerance, s.depthTolerance, s.colourTolerance);
+    return {};
+}
+
+}  // namespace
+
+Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job) {
+    STX_CHECK(checkSettings(settings));
+    STX_CHECK(bundle.check());
+    std::uint64_t pixels = 0;
+    for (const auto& v : bundle.views) pixels += v.depth.count();
+    STX_CHECK(job.limits.checkAllocation(pixels, 24, "pruning"));
+    PruneReport report;
+    report.sourcePixels = bundle.pointCount();
+    const std::vector<int> rank = rankViews(bundle);
+    STX_CHECK(job.checkCancelled());
+    STX_TRY(auto views, preparePruning(bundle, rank, job));
+
+    PruneSettings now = settings;
+    const std::int64_t budget =
+        settings.budget > 0 ? settings.budget : std::numeric_limits<std::int64_t>::max();
+    // A wanted quality is reached from below: the least set first, then blocks come back.
+    if (settings.minPsnr > 0 && settings.budget == 0)
+        now.rateTolerance = std::max(now.rateTolerance, 2.0);
+    giveAway(views, rank, now);
+    STX_CHECK(job.checkCancelled());
+    if (countKept(views) > budget) {
+        // Coarser and less alike replacements, rather than an object with holes. From the start:
+        // what the first round locked would stand in the way.
+        for (auto& v : views) {
+            for (std::size_t k = 0; k < v.kept.count(); ++k)
+                v.kept.pixels()[k] = std::isnan(v.surface.w.pixels()[k]) ? 0 : 1;
+            v.locked = Image<std::uint8_t>(v.kept.width(), v.kept.height(), 0);
+            v.error = Image<float>(v.kept.width(), v.kept.height(), 0.0f);
+        }
+        now.rateTolerance = 1e6;
+        now.colourTolerance = 1;
+        giveAway(views, rank, now);
+        job.note(
+            "the pruning budget is met only by giving away pixels that other views show more "
+            "coarsely");
+    }
+    std::int64_t kept = countKept(views);
+    if (kept > budget)
+        return fail(
+            ErrorCode::invalidInput,
+            "a budget of {} pixels is too small: the views show {} pixels of surface that only "
+            "one of them sees, and pruning leaves no holes; allow at least that many",
+            budget, kept);
+    for (int ring = 0; ring < settings.overlap; ++ring) {
+        if (kept + growBand(views, false) > budget) break;
+        kept += growBand(views, true);
+    }
+    const double all = static_cast<double>(std::max<std::int64_t>(report.sourcePixels, 1));
+    if (settings.minPsnr > 0) {
+        giveBack(views, budget, all * std::pow(10.0, -settings.minPsnr / 10));
+    } else if (settings.budget > 0) {
+        giveBack(views, budget, 0);
+    }
+    STX_CHECK(job.checkCancelled());
+    report.keptPixels = countKept(views);
+    const double error = lostError(views) / all;
+    report.psnr = error > 0 ? -10 * std::log10(error) : std::numeric_limits<double>::infinity();
+    parallelFor(0, static_cast<std::int64_t>(views.size()),
+                [&](std::int64_t i) { takeAway(views[i].kept, bundle.views[i]); });
+    for (const auto& v : bundle.views) report.emptiedViews += v.pointCount() == 0 ? 1 : 0;
+    return report;
+}
+
+}  // namespace stx

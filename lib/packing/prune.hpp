@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+
+namespace stx {
+
+/// What pruning may take away.
+struct PruneSettings {
+    /// Object pixels to keep at most; 0 = no limit. Without a limit and without minPsnr everything
+    /// goes that another view shows at a finer or equal rate.
+    std::int64_t budget = 0;
+    /// Estimated PSNR of the pruned pixels against what replaces them, dB; 0 = not asked for.
+    double minPsnr = 0;
+    /// Pixels kept around each kept region, so that filters work across its border; 0..16. With a
+    /// budget it grows as far as there is room.
+    int overlap = 2;
+    /// A view may replace pixels that sample the surface up to this factor finer than it does,
+    /// >= 1.
+    double rateTolerance = 1.25;
+    /// Distances of one surface seen by two views agree within this share of the distance (and the
+    /// steps of the depth codes, and half a pixel of slope), over 0, at most 0.1.
+    double depthTolerance = 0.003;
+    /// Colours of one surface agree within this, 0..1 in the bundle's own coding, beyond the
+    /// contrast of the pixels around.
+    double colourTolerance = 0.06;
+};
+
+struct PruneReport {
+    std::int64_t sourcePixels = 0;  ///< object pixels before
+    std::int64_t keptPixels = 0;    ///< and after
+    double psnr = 0;                ///< estimate, dB; infinity when nothing was lost
+    int emptiedViews = 0;           ///< views without a pixel left
+};
+
+/// Takes away pixels that other views show as well or better. Which view keeps a piece of surface:
+/// views are ranked by what they add to the coverage of the object, and a pixel goes when all four
+/// pixels around its place in a view of higher rank are kept, show the same surface, sample it at a
+/// finer or equal rate and agree in colour; or when a view of lower rank shows it finer. What
+/// replaces a pixel is kept for good, so no hole can open.
+///
+/// A pixel taken away has no depth but full alpha: "the object is here, its distance is not told".
+/// Renderers take no empty space from it. It keeps its colour next to kept pixels, for filters;
+/// farther off the colours are smooth.
+///
+/// Errors: settings out of range; a bundle that fails check(); a budget below what can be kept
+/// without a hole, with that number; cancelled. A pruned bundle gives the same bytes on any number
+/// of threads.
+[[nodiscard]] Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job);
+
+}  // namespace stx
