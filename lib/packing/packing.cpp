@@ -65,6 +65,7 @@ ReferenceView withoutImages(const ReferenceView& view) {
     v.nearPlane = view.nearPlane;
     v.farPlane = view.farPlane;
     v.depthBits = view.depthBits;
+    v.pruned = view.pruned;
     return v;
 }
 
@@ -78,16 +79,55 @@ std::int64_t objectPixels(const ReferenceView& view) {
     return n;
 }
 
-/// Colours what no rectangle covers from what is covered, so that filters find nothing black. Where
-/// `told` is 0 the alpha becomes full when `unknown` is set (the pixel was pruned), else 0.
-void fillUncovered(const Image<std::uint8_t>& told, bool unknown, ReferenceView& view) {
-    bleedColour(view.texture);
-    if (!unknown) return;
+/// Marks where the points of other views fall in a view, a little generously. What was pruned from
+/// the view is there: it went because others show it.
+void markShown(const std::vector<ReferenceView>& views, std::size_t of,
+               Image<std::uint8_t>& shown) {
+    constexpr int kMostReach = 6;  // pixels
+    const Camera& camera = views[of].camera;
+    const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const ReferenceView& other = views[i];
+        if (i == of) continue;
+        const glm::dmat4 fromOther = cameraFromWorld * other.camera.worldFromCamera();
+        for (int y = 0; y < other.depth.height(); ++y) {
+            for (int x = 0; x < other.depth.width(); ++x) {
+                const float dist = other.depth.at(x, y);
+                if (!hasPoint(dist)) continue;
+                const glm::dvec3 p(fromOther *
+                                   glm::dvec4(other.camera.unproject(x + 0.5, y + 0.5, dist), 1.0));
+                if (!camera.orthographic && !(p.z < 0)) continue;
+                const glm::dvec3 at = camera.project(p);
+                if (!(at.x > -kMostReach && at.y > -kMostReach &&
+                      at.x < camera.width + kMostReach && at.y < camera.height + kMostReach))
+                    continue;
+                const double coarser =
+                    other.camera.sampleSpacing(dist).x / camera.sampleSpacing(-p.z).x;
+                const int reach = 1 + static_cast<int>(std::min(coarser, kMostReach - 1.0));
+                const int cx = static_cast<int>(std::floor(at.x)),
+                          cy = static_cast<int>(std::floor(at.y));
+                for (int ny = std::max(0, cy - reach);
+                     ny <= std::min(camera.height - 1, cy + reach); ++ny) {
+                    for (int nx = std::max(0, cx - reach);
+                         nx <= std::min(camera.width - 1, cx + reach); ++nx)
+                        shown.at(nx, ny) = 1;
+                }
+            }
+        }
+    }
+}
+
+/// Pixels of a pruned view that neither rectangles nor padding tell: full alpha where other views
+/// show something, else background.
+void fillPruned(const std::vector<ReferenceView>& views, const Image<std::uint8_t>& told,
+                std::size_t of, Texture& texture) {
+    Image<std::uint8_t> shown(told.width(), told.height(), 0);
+    markShown(views, of, shown);
     for (int y = 0; y < told.height(); ++y) {
         for (int x = 0; x < told.width(); ++x) {
-            if (told.at(x, y)) continue;
-            if (auto* image = view.texture.rgba8()) image->at(x, y).a = 255;
-            if (auto* image = view.texture.rgbaFloat()) image->at(x, y).a = 1.0f;
+            if (told.at(x, y) || !shown.at(x, y)) continue;
+            if (auto* image = texture.rgba8()) image->at(x, y).a = 255;
+            if (auto* image = texture.rgbaFloat()) image->at(x, y).a = 1.0f;
         }
     }
 }
@@ -185,6 +225,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
         fillPage(bundle.views[source[r.view]], r, settings.padding, atlas.pages[r.page]);
     });
     for (const auto& view : bundle.views) atlas.sourcePixels += objectPixels(view);
+    if (settings.sourcePixels > 0) atlas.sourcePixels = settings.sourcePixels;
     atlas.keptPixels = bundle.pointCount();
     return atlas;
 }
@@ -206,9 +247,11 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     bundle.title = atlas.title;
     bundle.bounds = atlas.bounds;
     bundle.views.resize(atlas.views.size());
+    std::vector<Image<std::uint8_t>> toldOf(atlas.views.size());
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
+        view.pruned = pruned;
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);
@@ -217,7 +260,8 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
             view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
             view.splatV = view.splatU;
         }
-        Image<std::uint8_t> told(width, height, 0);  // 1 = by padding, 2 = by a rectangle
+        Image<std::uint8_t>& told = toldOf[i];  // 1 = by padding, 2 = by a rectangle
+        told = Image<std::uint8_t>(width, height, 0);
         if (pruned) {
             for (const AtlasRectangle* r : ofView[i]) copyPadding(*r, atlas, view, told);
         }
@@ -244,13 +288,19 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
             });
         }
         // Whole views come back as they were, colours under alpha 0 included.
-        if (covered < static_cast<std::int64_t>(told.count())) fillUncovered(told, pruned, view);
+        if (covered < static_cast<std::int64_t>(told.count())) bleedColour(view.texture);
         // An atlas keeps room for normals when any view has them; give them back only to those.
         dropIfZero(view.normal);
         dropIfZero(view.splatU);
         dropIfZero(view.splatV);
     });
     STX_CHECK(job.checkCancelled());
+    if (pruned) {
+        parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
+            fillPruned(bundle.views, toldOf[i], static_cast<std::size_t>(i),
+                       bundle.views[i].texture);
+        });
+    }
     return bundle;
 }
 

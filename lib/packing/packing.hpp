@@ -24,6 +24,9 @@ struct PackSettings {
     Layout layout = Layout::grid;
     int padding = 2;      ///< pixels around each rectangle, 0..64
     int maxSize = 16384;  ///< largest width and height of a texture: what a GPU takes; 1..65535
+    /// Object pixels before pruning (PruneReport::sourcePixels), for Atlas::sourcePixels; 0 = the
+    /// points and the pixels of full alpha without a depth.
+    std::int64_t sourcePixels = 0;
 };
 
 /// Merges the views of a bundle into one atlas of at most four textures: one page, or two when
@@ -36,10 +39,11 @@ struct PackSettings {
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle
-/// are coloured from the nearest covered ones and are background (alpha 0) or, when the atlas was
-/// pruned (keptPixels < sourcePixels), of full alpha: the object may be there, nobody tells where;
-/// next to rectangles the padding tells. unpack(pack(b)) == b for points and pixels of partial
-/// coverage. Errors: an atlas that fails check(), memory over the limit.
+/// are coloured from the nearest covered ones and are background (alpha 0). When the atlas was
+/// pruned (keptPixels < sourcePixels), those where points of other views fall have full alpha
+/// instead (the object is there, another view tells its distance), and next to rectangles the
+/// padding tells. unpack(pack(b)) == b for points and pixels of partial coverage. Errors: an atlas
+/// that fails check(), memory over the limit.
 [[nodiscard]] Result<Bundle> unpack(const Atlas& atlas, Job& job);
 
 }  // namespace stx

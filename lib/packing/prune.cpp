@@ -15,6 +15,8 @@ namespace {
 constexpr int kBlock = 16;
 /// Pruned pixels keep their colour this near to kept ones.
 constexpr int kColourBand = 4;
+/// Background pixels this near to pruned ones, and not beside kept ones, are untold as well.
+constexpr int kSilhouetteBand = 2;
 
 /// Views by what each adds to the coverage; empty ones last.
 std::vector<int> rankViews(const Bundle& bundle) {
@@ -179,16 +181,18 @@ void smoothFarColours(const Image<std::uint8_t>& state, Image<Colour>& colour) {
 /// Takes the pixels that are not kept out of a view.
 void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
     const int width = kept.width(), height = kept.height();
-    Image<std::uint8_t> state(width, height, 0);
+    Image<std::uint8_t> state(width, height, 0), gone = state;
     bool any = false;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (kept.at(x, y) || !hasPoint(view.depth.at(x, y))) continue;
             any = true;
             state.at(x, y) = 2;
+            gone.at(x, y) = 1;
         }
     }
     if (!any) return;
+    view.pruned = true;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (!kept.at(x, y)) continue;
@@ -215,20 +219,30 @@ void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
             if (view.hasSplats()) view.splatU.at(x, y) = view.splatV.at(x, y) = glm::vec3(0);
         }
     }
-    // A silhouette whose points are gone tells nothing any more.
+    // A silhouette whose points are gone tells nothing any more: points of other views that lie on
+    // it must not be taken for empty space, and no second view vouches for them now.
+    const auto near = [&](int x, int y, int reach, const auto& is) {
+        for (int ny = std::max(0, y - reach); ny <= std::min(height - 1, y + reach); ++ny) {
+            for (int nx = std::max(0, x - reach); nx <= std::min(width - 1, x + reach); ++nx) {
+                if (is(nx, ny)) return true;
+            }
+        }
+        return false;
+    };
+    std::vector<glm::ivec2> untold;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            const float alpha = view.texture.at(x, y).a;
-            if (hasPoint(view.depth.at(x, y)) || !(alpha > 0 && alpha < 1)) continue;
-            bool beside = false;
-            for (int ny = std::max(0, y - 1); ny <= std::min(height - 1, y + 1); ++ny) {
-                for (int nx = std::max(0, x - 1); nx <= std::min(width - 1, x + 1); ++nx)
-                    beside = beside || kept.at(nx, ny);
-            }
-            if (beside) continue;
-            if (auto* c = view.texture.rgba8()) c->at(x, y).a = 255;
-            if (auto* c = view.texture.rgbaFloat()) c->at(x, y).a = 1.0f;
+            if (state.at(x, y) == 2 || hasPoint(view.depth.at(x, y)) ||
+                view.texture.at(x, y).a >= 1)
+                continue;
+            if (near(x, y, kSilhouetteBand, [&](int nx, int ny) { return gone.at(nx, ny) != 0; }) &&
+                !near(x, y, 1, [&](int nx, int ny) { return kept.at(nx, ny) != 0; }))
+                untold.emplace_back(x, y);
         }
+    }
+    for (const auto p : untold) {
+        if (auto* c = view.texture.rgba8()) c->at(p.x, p.y).a = 255;
+        if (auto* c = view.texture.rgbaFloat()) c->at(p.x, p.y).a = 1.0f;
     }
     if (auto* c = view.texture.rgba8()) smoothFarColours(state, *c);
     if (auto* c = view.texture.rgbaFloat()) smoothFarColours(state, *c);

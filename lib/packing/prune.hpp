@@ -42,8 +42,8 @@ struct PruneReport {
 /// replaces a pixel is kept for good, so no hole can open.
 ///
 /// A pixel taken away has no depth but full alpha: "the object is here, its distance is not told".
-/// Renderers take no empty space from it. It keeps its colour next to kept pixels, for filters;
-/// farther off the colours are smooth.
+/// Renderers take no empty space from it. So are the background pixels beside pruned silhouettes.
+/// It keeps its colour next to kept pixels, for filters; farther off the colours are smooth.
 ///
 /// Errors: settings out of range; a bundle that fails check(); a budget below what can be kept
 /// without a hole, with that number; cancelled. A pruned bundle gives the same bytes on any number

@@ -10,6 +10,9 @@ namespace {
 /// Views that a view is compared with; with hundreds of views the nearest say it all.
 constexpr std::size_t kMostPartners = 24;
 
+/// Share of the distance by which the corners of a quad may differ for it to be drawn.
+constexpr double kBridged = 0.009;
+
 void findBounds(PruneView& p) {
     Bounds bounds;
     const ReferenceView& v = *p.view;
@@ -120,6 +123,15 @@ Replacement findReplacement(const PruneView& from, int x, int y, const PruneView
         if (std::abs(predicted - wz) > share + steps + 0.5 * (std::abs(g.x) + std::abs(g.y)))
             return r;
     }
+    // Renderers bridge neighbours only when their depths are close; a quad they leave open shows
+    // nothing, whatever its corners say.
+    double low = to.surface.w.at(x0, y0), high = low;
+    for (int k = 1; k < 4; ++k) {
+        const double corner = to.surface.w.at(x0 + (k & 1), y0 + (k >> 1));
+        low = std::min(low, corner);
+        high = std::max(high, corner);
+    }
+    if (!(high - low < kBridged * (b.orthographic ? std::max(high, to.worldRadius) : high))) return r;
     const int nx = static_cast<int>(pixel.x), ny = static_cast<int>(pixel.y);
     if (rateAt(to, nx, ny, to.surface.w.at(nx, ny)) * settings.rateTolerance *
             settings.rateTolerance <

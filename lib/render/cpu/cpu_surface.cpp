@@ -61,12 +61,17 @@ class CpuSurfaceRenderer final : public Renderer {
             sources_[static_cast<std::size_t>(i)] =
                 prepareSource(bundle.views[static_cast<std::size_t>(i)]);
         });
-        double border = 0;
+        double border = 0, told = 0;
         for (const Source& s : sources_) {
             border += borderCoverage(s) / static_cast<double>(sources_.size());
+            told += s.told / static_cast<double>(sources_.size());
             addBounds(s);
         }
         fillsFrame_ = border > 0.5;
+        // Of pruned views as many are needed as together show what the usual number would.
+        if (told < 1)
+            effort_.mostGeometry =
+                static_cast<int>(std::min(32.0, std::ceil(effort_.mostGeometry / told)));
     }
 
     [[nodiscard]] Result<Frame> render(const Camera& camera) override;
@@ -283,6 +288,7 @@ const ReferenceView* CpuSurfaceRenderer::viewAt(const Camera& camera) const {
         return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a));
     };
     for (const ReferenceView& view : bundle_.views) {
+        if (view.pruned) continue;
         const Camera& c = view.camera;
         if (c.width != camera.width || c.height != camera.height ||
             c.orthographic != camera.orthographic)

@@ -229,6 +229,19 @@ void findLeaves(Source& s) {
     }
 }
 
+/// See Source::told.
+double toldShare(const Source& s) {
+    if (!s.view->pruned) return 1.0;
+    std::int64_t points = 0, object = 0;
+    for (int y = 0; y < s.height; ++y) {
+        for (int x = 0; x < s.width; ++x) {
+            points += s.q.at(x, y) > 0.0f;
+            object += s.q.at(x, y) > 0.0f || s.alpha(x, y) >= 1.0f;
+        }
+    }
+    return object > 0 ? static_cast<double>(points) / static_cast<double>(object) : 1.0;
+}
+
 }  // namespace
 
 PixelSpace::PixelSpace(const Camera& c, double farthest) : camera(c) {
@@ -317,6 +330,7 @@ Source prepareSource(const ReferenceView& view) {
         }
     });
     s.hasAlpha = std::find(rowHasAlpha.begin(), rowHasAlpha.end(), 1) != rowHasAlpha.end();
+    s.told = toldShare(s);
     findLinks(s);
     findEdges(s);
     findLeaves(s);

@@ -83,6 +83,7 @@ struct Source {
     int width = 0, height = 0;
     bool hasAlpha = false;  ///< some pixel is not fully covered
     float step = 0;         ///< scene units between neighbouring depth codes
+    double told = 1.0;      ///< share of the pixels of the object (points, or full alpha) with depth
     Image<float> q;         ///< 0 = no point
 
     static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4;
@@ -106,7 +107,8 @@ struct Source {
 
 [[nodiscard]] Source prepareSource(const ReferenceView& view);
 
-/// Share of the image border where the view has points or full alpha: near 1 in scenes that fill the frame.
+/// Share of the image border where the view has points or full alpha: near 1 in scenes that fill
+/// the frame.
 [[nodiscard]] double borderCoverage(const Source& source);
 
 }  // namespace stx::surface

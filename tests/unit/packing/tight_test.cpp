@@ -169,6 +169,15 @@ TEST(Patches, TrimAndCutWhatSavesRoom) {
     EXPECT_EQ(contentPatches(speck, 2).size(), 1u);
 }
 
+TEST(Patches, PixelsOfFullAlphaWithoutADepthAreNoContent) {
+    ReferenceView v = blankView(100, 100);
+    paint(v, 10, 10, 5, 5);
+    for (int y = 40; y < 100; ++y) {
+        for (int x = 0; x < 100; ++x) v.texture.rgba8()->at(x, y).a = 255;
+    }
+    EXPECT_EQ(contentPatches(v, 2), (std::vector<Patch>{{10, 10, 5, 5}}));
+}
+
 TEST(Tight, EmptyViewsAreDroppedAndSaid) {
     Bundle bundle;
     for (int i = 0; i < 3; ++i) {
