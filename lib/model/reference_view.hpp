@@ -26,9 +26,6 @@ struct ReferenceView {
     int depthBits = 16;
 
     Texture texture;     ///< colour with coverage in alpha
-    /// Parts were taken away that other views show (lib/packing/prune.hpp). There, alpha is full,
-    /// depth is kNoDepth and the colour only feeds filters.
-    bool pruned = false;
     Image<float> depth;  ///< planar distance in scene units; kNoDepth where there is no point
 
     /// SimpleTextureV2. Empty when absent; else one value per pixel, zero where there is no point.

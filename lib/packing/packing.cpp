@@ -65,7 +65,6 @@ ReferenceView withoutImages(const ReferenceView& view) {
     v.nearPlane = view.nearPlane;
     v.farPlane = view.farPlane;
     v.depthBits = view.depthBits;
-    v.pruned = view.pruned;
     return v;
 }
 
@@ -251,7 +250,6 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
-        view.pruned = pruned;
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);

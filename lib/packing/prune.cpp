@@ -192,7 +192,6 @@ void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
         }
     }
     if (!any) return;
-    view.pruned = true;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (!kept.at(x, y)) continue;

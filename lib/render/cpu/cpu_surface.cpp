@@ -17,6 +17,9 @@ namespace {
 
 using namespace surface;
 
+/// Views that tell less of the object than this are taken for pruned ones.
+constexpr double kWhole = 0.9;
+
 /// What a quality means.
 struct Effort {
     int samplesPerPixel = 2;  ///< along one side of a pixel
@@ -288,7 +291,9 @@ const ReferenceView* CpuSurfaceRenderer::viewAt(const Camera& camera) const {
         return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a));
     };
     for (const ReferenceView& view : bundle_.views) {
-        if (view.pruned) continue;
+        // A view that has lost much to pruning has no picture of its own to give back.
+        if (sources_[static_cast<std::size_t>(&view - bundle_.views.data())].told < kWhole)
+            continue;
         const Camera& c = view.camera;
         if (c.width != camera.width || c.height != camera.height ||
             c.orthographic != camera.orthographic)

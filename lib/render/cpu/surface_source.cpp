@@ -231,7 +231,6 @@ void findLeaves(Source& s) {
 
 /// See Source::told.
 double toldShare(const Source& s) {
-    if (!s.view->pruned) return 1.0;
     std::int64_t points = 0, object = 0;
     for (int y = 0; y < s.height; ++y) {
         for (int x = 0; x < s.width; ++x) {

@@ -155,8 +155,10 @@ TEST(Prune, OneViewAndViewsThatShareNothingStayWhole) {
     ASSERT_TRUE(report);
     EXPECT_EQ(report->keptPixels, count);
     bundle.views.resize(1);
+    const Bundle one = bundle;
     EXPECT_TRUE(prune(bundle, {}, job));
-    EXPECT_FALSE(bundle.views[0].pruned);
+    EXPECT_EQ(bundle.views[0].depth, one.views[0].depth);
+    EXPECT_EQ(bundle.views[0].texture, one.views[0].texture);
 }
 
 TEST(Prune, OnePixelObjectsAndEmptyViews) {
