@@ -42,6 +42,8 @@ std::optional<T> realFromText(std::string_view text) {
         const auto hex = hexFromText(text.substr(2));
         return hex ? std::optional<T>(static_cast<T>(*hex)) : std::nullopt;
     }
+    // from_chars would take "nan(17)", whose bits no decimal gives back.
+    if (text.find('(') != std::string_view::npos) return {};
     T value = 0;
     const char* const end = text.data() + text.size();
     auto [at, error] = std::from_chars(text.data(), end, value);

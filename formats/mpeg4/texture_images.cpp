@@ -70,6 +70,10 @@ DecodedImage decodedFromPixels(const PixelImage& image) {
     out.width = image.width;
     out.height = image.height;
     out.channels = image.components;
+    out.channelNames = image.components == 1   ? std::vector<std::string>{"Y"}
+                       : image.components == 2 ? std::vector<std::string>{"Y", "A"}
+                       : image.components == 3 ? std::vector<std::string>{"R", "G", "B"}
+                                               : std::vector<std::string>{"R", "G", "B", "A"};
     const std::size_t row = static_cast<std::size_t>(image.width) * image.components;
     std::vector<std::uint8_t> values(row * image.height);
     for (int y = 0; y < image.height; ++y)

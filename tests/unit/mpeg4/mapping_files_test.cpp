@@ -1,0 +1,217 @@
+#include <cstdlib>
+#include <fstream>
+
+#include "formats/mpeg4/bt.hpp"
+#include "formats/mpeg4/isobmff.hpp"
+#include "tests/shared_data.hpp"
+#include "tests/unit/mpeg4/mapping_fixtures.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+namespace fs = std::filesystem;
+
+Bundle twoViews() {
+    Bundle bundle;
+    bundle.title = "files";
+    bundle.views = {makeView(13, 9, 16, 1), makeView(8, 8, 8, 2)};
+    addVectors(bundle.views[1]);
+    bundle.bounds = bundle.computeBounds();
+    return bundle;
+}
+
+void mustWrite(const Result<void>& result) {
+    ASSERT_TRUE(result) << result.error().text();
+}
+
+TEST(Mpeg4Files, aBundleIsTheSameFromEveryContainer) {
+    const TemporaryFolder folder("containers");
+    const Bundle bundle = twoViews();
+    Job job;
+    std::vector<Bundle> read;
+    for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
+        mustWrite(writeMpeg4Bundle(bundle, folder / name, job));
+        auto back = readMpeg4Bundle(folder / name, job);
+        ASSERT_TRUE(back) << name << ": " << back.error().text();
+        read.push_back(std::move(*back));
+    }
+    for (const Bundle& back : read) {
+        ASSERT_EQ(back.views.size(), 2u);
+        EXPECT_EQ(back.title, "files");
+        EXPECT_EQ(back.bounds, bundle.bounds);
+        for (std::size_t i = 0; i < 2; ++i) {
+            EXPECT_EQ(back.views[i].camera, read[0].views[i].camera);
+            EXPECT_EQ(back.views[i].depth, bundle.views[i].depth);
+            EXPECT_EQ(back.views[i].texture, bundle.views[i].texture);
+            EXPECT_EQ(back.views[i].name, bundle.views[i].name);
+            EXPECT_EQ(back.views[i].normal, read[0].views[i].normal);
+        }
+    }
+    EXPECT_TRUE(fs::exists(folder / "a_images" / "view1_texture.png"));
+}
+
+TEST(Mpeg4Files, mp4ThroughATextIsTheSameFile) {
+    const TemporaryFolder folder("roundtrip");
+    Job job;
+    mustWrite(writeMpeg4Bundle(twoViews(), folder / "a.mp4", job));
+    const Bytes original = bytesOfFile(folder / "a.mp4");
+    for (const char* name : {"b.bt", "c.xmt"}) {
+        auto document = readMpeg4(folder / "a.mp4", job);
+        ASSERT_TRUE(document) << document.error().text();
+        mustWrite(writeMpeg4(*document, folder / name, job));
+        auto text = readMpeg4(folder / name, job);
+        ASSERT_TRUE(text) << text.error().text();
+        mustWrite(writeMpeg4(*text, folder / "d.mp4", job));
+        EXPECT_EQ(bytesOfFile(folder / "d.mp4"), original) << name;
+    }
+}
+
+TEST(Mpeg4Files, writingTwiceReplacesTextAndImages) {
+    const TemporaryFolder folder("twice");
+    Job job;
+    Bundle bundle = twoViews();
+    mustWrite(writeMpeg4Bundle(bundle, folder / "a.bt", job));
+    bundle.views.pop_back();
+    bundle.views[0].name = "other";
+    mustWrite(writeMpeg4Bundle(bundle, folder / "a.bt", job));
+    EXPECT_FALSE(fs::exists(folder / "a_images" / "view2_texture.png"));
+    EXPECT_TRUE(fs::exists(folder / "a_images" / "other_texture.png"));
+    // A stranger's file in that folder is no image of ours.
+    std::ofstream(folder / "a_images" / "letter.txt") << "dear";
+    const auto refused = writeMpeg4Bundle(bundle, folder / "a.bt", job);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().text().find("letter.txt"), std::string::npos);
+    EXPECT_TRUE(fs::exists(folder / "a_images" / "letter.txt"));
+}
+
+TEST(Mpeg4Files, imageNamesStayInsideTheFolder) {
+    const TemporaryFolder folder("inside");
+    Job job;
+    fs::create_directories(folder / "sub");
+    const auto write = [&](const std::string& name) {
+        std::ofstream(folder / "sub" / "a.bt")
+            << "Group { children [ DepthImage { diTexture SimpleTexture { texture ImageTexture { "
+               "url [od:5] } } } ] }\n"
+               "AT 0 { UPDATE OD [ ObjectDescriptor { objectDescriptorID 5 esDescr [ ES_Descriptor "
+               "{ muxInfo MuxInfo "
+               "{ fileName \""
+            << name << "\" } } ] } ] }";
+    };
+    std::ofstream(folder / "secret.png") << "x";
+    std::error_code error;
+    fs::create_symlink("../secret.png", folder / "sub" / "link.png", error);
+    for (const std::string& name :
+         {std::string("../secret.png"), (folder / "secret.png").string(),
+          std::string("http://example.com/a.png"), std::string("link.png")}) {
+        write(name);
+        const auto document = readMpeg4(folder / "sub" / "a.bt", job);
+        ASSERT_FALSE(document) << name;
+        EXPECT_EQ(document.error().code, ErrorCode::invalidInput) << document.error().text();
+    }
+    write("missing.png");
+    EXPECT_EQ(readMpeg4(folder / "sub" / "a.bt", job).error().code, ErrorCode::io);
+}
+
+TEST(Mpeg4Files, endingsAreChecked) {
+    const TemporaryFolder folder("endings");
+    Job job;
+    const auto refused = writeMpeg4Bundle(twoViews(), folder / "a.avi", job);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::usage);
+    std::ofstream(folder / "x.dat") << "nothing";
+    EXPECT_FALSE(readMpeg4(folder / "x.dat", job));
+}
+
+class ReferenceMp4 : public testing::TestWithParam<const char*> {};
+
+TEST_P(ReferenceMp4, isTheSceneOfItsBtAndSurvivesTheTexts) {
+    REQUIRE_SHARED(reference, "reference");
+    const std::string name = GetParam();
+    Job job;
+    job.limits.allowOutside = true;  // its images stand in ../images
+    const auto mp4 = readMpeg4(reference / "mp4" / (name + ".mp4"), job);
+    ASSERT_TRUE(mp4) << mp4.error().text();
+    const auto bt = readMpeg4(name == "xmt_01_depthimage_simpletexture"
+                                  ? reference / "xmt" / "01_depthimage_simpletexture.xmt"
+                                  : reference / "bt" / (name + ".bt"),
+                              job);
+    ASSERT_TRUE(bt) << bt.error().text();
+    const bool rounded = name == "10_quantized" || name == "11_efficient_float";
+    if (!rounded) {
+        ASSERT_EQ(mp4->frames.size(), bt->frames.size());
+        for (std::size_t i = 0; i < bt->frames.size(); ++i) {
+            EXPECT_EQ(mp4->frames[i].time, bt->frames[i].time);
+            EXPECT_TRUE(
+                sameFrames({mp4->frames[i]}, {bt->frames[i]}, {.ids = false, .names = false}))
+                << i;
+        }
+    }
+    const auto ods = mp4->objectDescriptors();
+    ASSERT_EQ(ods.size(), bt->objectDescriptors().size());
+    for (const ObjectDescriptor* od : ods) {
+        const ObjectDescriptor* other = bt->findObjectDescriptor(od->id);
+        ASSERT_TRUE(other);
+        EXPECT_EQ(*od->streams.at(0).samples.at(0).data.load(Limits()),
+                  *other->streams.at(0).samples.at(0).data.load(Limits()));
+    }
+
+    // What we write of it is the same, straight and through each text.
+    const TemporaryFolder folder("reference");
+    const auto straight = writeMp4(*mp4, job);
+    ASSERT_TRUE(straight) << straight.error().text();
+    for (const char* text : {"a.bt", "a.xmt"}) {
+        mustWrite(writeMpeg4(*mp4, folder / text, job));
+        const auto back = readMpeg4(folder / text, job);
+        ASSERT_TRUE(back) << back.error().text();
+        const auto bytes = writeMp4(*back, job);
+        ASSERT_TRUE(bytes) << bytes.error().text();
+        EXPECT_EQ(*bytes, *straight) << text;
+        fs::remove_all(folder / "a_images");
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ReferenceMp4,
+                         testing::Values("01_depthimage_simpletexture", "02_all_defaults",
+                                         "03_v2_nodes", "04_pointtexture", "05_octreeimage",
+                                         "06_multiview_transform_hierarchy", "07_url_strings",
+                                         "08_use_names", "09_routes", "10_quantized",
+                                         "11_efficient_float", "12_ordered_group_root",
+                                         "14_movietexture", "15_bifs_v2_config", "16_commands",
+                                         "17_background", "18_long_mf_vector", "19_png16_rgba",
+                                         "20_minimal", "xmt_01_depthimage_simpletexture"),
+                         [](const auto& param) { return std::string(param.param); });
+
+TEST(ReferenceBundles, readAsTheirTextsSay) {
+    REQUIRE_SHARED(reference, "reference/mp4");
+    Job job;
+    const auto one = readMpeg4Bundle(reference / "01_depthimage_simpletexture.mp4", job);
+    ASSERT_TRUE(one) << one.error().text();
+    ASSERT_EQ(one->views.size(), 1u);
+    EXPECT_EQ(one->title, "DIBR simple");
+    const ReferenceView& view = one->views[0];
+    EXPECT_EQ(view.camera.width, 16);
+    EXPECT_EQ(view.camera.height, 12);
+    EXPECT_FALSE(view.camera.orthographic);
+    EXPECT_NEAR(view.camera.fieldOfView().x, 0.6, 1e-6);
+    const glm::dvec3 expected =
+        quatFromAxisAngle({0, 1, 0, 0.5}) * glm::dvec3(0.5, 0.25, 12) + glm::dvec3(1, 2, 3);
+    EXPECT_LT(glm::length(view.camera.position - expected), 1e-5);
+    EXPECT_GT(view.pointCount(), 0);
+
+    const auto rgba = readMpeg4Bundle(reference / "19_png16_rgba.mp4", job);
+    ASSERT_TRUE(rgba) << rgba.error().text();
+    EXPECT_EQ(rgba->views[0].depthBits, 16);
+
+    const auto octree = readMpeg4Bundle(reference / "05_octreeimage.mp4", job);
+    ASSERT_TRUE(octree) << octree.error().text();
+    EXPECT_EQ(octree->views.size(), 2u);
+    EXPECT_GT(octree->pointCount(), 0);
+
+    const auto uneven = readMpeg4Bundle(reference / "06_multiview_transform_hierarchy.mp4", job);
+    ASSERT_FALSE(uneven);
+    EXPECT_NE(uneven.error().text().find("only one scale for all axes"), std::string::npos)
+        << uneven.error().text();
+}
+
+}  // namespace
+}  // namespace stx::mpeg4
