@@ -80,7 +80,8 @@ int mainProgram(int argc, char** argv) {
         "4 failed while working, 5 not supported here, 7 a difference or a broken rule.");
     const std::vector<Command> commands = {addConvert(app, program), addSelect(app, program),
                                            addPack(app, program),    addBake(app, program),
-                                           addRender(app, program),  addCompare(app, program)};
+                                           addRender(app, program),  addInfo(app, program),
+                                           addCompare(app, program), addBench(app, program)};
     for (const auto& command : commands)
         command.app->set_help_flag("-h,--help", "Print this help and stop");
 

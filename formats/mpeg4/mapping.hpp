@@ -32,6 +32,9 @@ struct SceneReadOptions {
     /// Images that the scene names by a string are looked for in here; empty: they are errors.
     std::filesystem::path folder;
     ImageDecoder decode = decodeImage;
+    /// Without pixels only headers are read: the views have cameras, planes and depthBits, but empty
+    /// images, and a PointTexture gives one view.
+    bool pixels = true;
 };
 
 /// The object of a presentation as it stands at its first moment: a view for each DepthImage (and
@@ -43,6 +46,10 @@ struct SceneReadOptions {
 /// unevenly, shear or mirror are refused. Notes tell what is left out.
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
+
+/// What the scene's objects are: "SimpleTexture", "SimpleTextureV2", "PointTexture", "OctreeImage", or
+/// "none"; the richest where there are several.
+[[nodiscard]] const char* nodeKindOf(const Document& document);
 
 struct SceneWriteOptions {
     enum class Texture { png, jpeg };

@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 #include <set>
 #include <unordered_map>
@@ -50,10 +51,10 @@ class BundleReader {
         std::vector<Result<std::vector<ReferenceView>>> read(plans.size());
         STX_TRY(const auto images, StreamImages::make(document_, options_.folder, job_.limits));
         images_ = &images;
-        STX_CHECK(checkMemory(plans));
+        if (options_.pixels) STX_CHECK(checkMemory(plans));
         parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
             const auto at = static_cast<std::size_t>(i);
-            if (!job_.cancelled) read[at] = readView(plans[at]);
+            if (!job_.cancelled) read[at] = options_.pixels ? readView(plans[at]) : readHeader(plans[at]);
         });
         STX_CHECK(job_.checkCancelled());
         Bundle bundle;
@@ -74,7 +75,7 @@ class BundleReader {
             return fail(ErrorCode::invalidInput, "the scene has {} views; at most {} are read",
                         bundle.views.size(), job_.limits.maxViews);
         makeNamesUnique(bundle);
-        STX_CHECK(bundle.check());
+        if (options_.pixels) STX_CHECK(bundle.check());
         return bundle;
     }
 
@@ -210,6 +211,21 @@ class BundleReader {
         std::vector<ReferenceView> views;
         views.push_back(std::move(view));
         return views;
+    }
+
+    /// The view without its images: size and depth bits from the image's header.
+    Result<std::vector<ReferenceView>> readHeader(const Plan& plan) const {
+        if (plan.texture->info->find("depthNbBits") >= 0) {
+            STX_TRY(const auto view, cameraOf(plan, plan.texture->get<std::int32_t>("width"),
+                                              plan.texture->get<std::int32_t>("height")));
+            return std::vector<ReferenceView>{view};
+        }
+        const NodePtr& depth = plan.texture->get<NodePtr>("depth");
+        const NodePtr& colour = plan.texture->get<NodePtr>("texture");
+        STX_TRY(const auto info, images_->probe(depth && !plan.octree ? *depth : *colour));
+        STX_TRY(auto view, cameraOf(plan, info.width, info.height));
+        view.depthBits = info.bits;
+        return std::vector<ReferenceView>{view};
     }
 
     Result<ReferenceView> readSimpleTexture(const Plan& plan) const {
@@ -349,6 +365,24 @@ class BundleReader {
 Result<Bundle> bundleFromScene(const Document& document, const SceneReadOptions& options,
                                Job& job) {
     return BundleReader(document, options, job).read();
+}
+
+const char* nodeKindOf(const Document& document) {
+    static constexpr std::array<const char*, 4> kKinds = {"SimpleTexture", "PointTexture", "OctreeImage",
+                                                          "SimpleTextureV2"};
+    int best = -1;
+    for (const auto& frame : document.frames) {
+        for (const auto& command : frame.commands) {
+            forEachNode(command, [&](const NodePtr& node) {
+                for (int i = 0; i < static_cast<int>(kKinds.size()); ++i) {
+                    if (node->is(kKinds[static_cast<std::size_t>(i)]) ||
+                        (i == 1 && node->is("PointTextureV2")))
+                        best = std::max(best, i);
+                }
+            });
+        }
+    }
+    return best < 0 ? "none" : kKinds[static_cast<std::size_t>(best)];
 }
 
 }  // namespace stx::mpeg4

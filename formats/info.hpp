@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "lib/base/job.hpp"
+
+namespace stx {
+
+struct InfoOptions {
+    /// Decode the pixels where the file does not tell the bounds or the points.
+    bool bounds = false;
+};
+
+/// What is in a file, as JSON by tools/schemas/info.schema.json: container, node kind, cameras,
+/// sizes, bytes. Reads headers only, unless options.bounds asks for more. Errors: io, invalidInput.
+[[nodiscard]] Result<nlohmann::ordered_json> describe(const std::filesystem::path& path,
+                                                      const InfoOptions& options, Job& job);
+
+/// The same for people.
+[[nodiscard]] std::string describeAsText(const nlohmann::ordered_json& info);
+
+}  // namespace stx
