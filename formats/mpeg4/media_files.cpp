@@ -1,3 +1,4 @@
+#include <map>
 #include <set>
 
 #include "formats/mpeg4/isobmff.hpp"
@@ -54,6 +55,35 @@ std::string_view endingOf(const ElementaryStream& stream) {
         default:
             return ".bin";
     }
+}
+
+/// What the object descriptors of a scene are for: `front_depth` for the depth of DepthImage
+/// `front`.
+std::map<int, std::string> rolesOf(const Document& document) {
+    std::map<int, std::string> roles;
+    int count = 0;
+    const auto visit = [&](const NodePtr& node) {
+        const int index = node->info->find("diTexture");
+        if (index < 0) return;
+        const auto* texture = std::get_if<NodePtr>(&node->value(index));
+        const std::string base =
+            isPlainFileName(node->defName) ? node->defName : fmt::format("view{}", count);
+        ++count;
+        if (!texture || !*texture) return;
+        for (const Node::SetField& field : (*texture)->setFields) {
+            const auto* image = std::get_if<NodePtr>(&field.value);
+            const int url = image && *image ? (*image)->info->find("url") : -1;
+            if (url < 0) continue;
+            if (const auto* urls = std::get_if<std::vector<Url>>(&(*image)->value(url)))
+                for (const Url& one : *urls)
+                    if (one.objectDescriptorId != 0)
+                        roles.try_emplace(one.objectDescriptorId,
+                                          base + "_" + (*texture)->info->fields[field.index].name);
+        }
+    };
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands) forEachNode(command, visit);
+    return roles;
 }
 
 /// Files are opened, or, when there are many, read: a process may have a thousand files open.
@@ -146,6 +176,7 @@ Result<void> loadMedia(Document& document, const std::filesystem::path& folder, 
 std::vector<std::string> mediaFileNames(const Document& document) {
     std::vector<std::string> names;
     std::set<std::string> taken;
+    const auto roles = rolesOf(document);
     const auto added =
         forEachStream(document, [&](const ElementaryStream& stream, int odId) -> Result<void> {
             if (stream.samples.empty()) {
@@ -167,7 +198,11 @@ std::vector<std::string> mediaFileNames(const Document& document) {
             const bool fits = equalNoCase(own, ending) ||
                               (ending == ".jpg" && equalNoCase(own, ".jpeg")) ||
                               (ending == ".bin" && !own.empty());
-            if (!isPlainFileName(name) || !fits) name = fmt::format("od{}{}", odId, ending);
+            if (!isPlainFileName(name) || !fits) {
+                const auto role = roles.find(odId);
+                name = (role != roles.end() ? role->second : fmt::format("od{}", odId)) +
+                       std::string(ending);
+            }
             const auto end = name.rfind('.');
             const std::string stem = name.substr(0, end), tail = name.substr(end);
             // Some file systems take A.png and a.png for one.

@@ -51,8 +51,9 @@ namespace mpeg4 {
 [[nodiscard]] Result<void> loadMedia(Document& document, const std::filesystem::path& folder,
                                      Job& job);
 
-/// Names for the files of all streams, each once: their own name where it is a plain one, else by
-/// object descriptor. In the order of the streams in document.odFrames.
+/// Names for the files of all streams, each once: their own name where it is a plain one, else what
+/// they are for (`front_depth.png`, from the DEF name of the DepthImage), else by object
+/// descriptor. In the order of the streams in document.odFrames; empty for streams without samples.
 [[nodiscard]] std::vector<std::string> mediaFileNames(const Document& document);
 
 }  // namespace mpeg4

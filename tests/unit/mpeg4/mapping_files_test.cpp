@@ -66,6 +66,70 @@ TEST(Mpeg4Files, mp4ThroughATextIsTheSameFile) {
     }
 }
 
+TEST(Mpeg4Files, imagesOfAnMp4AreNamedByWhatTheyAreFor) {
+    const TemporaryFolder folder("names");
+    Job job;
+    mustWrite(writeMpeg4Bundle(twoViews(), folder / "a.mp4", job));
+    const auto document = readMpeg4(folder / "a.mp4", job);
+    ASSERT_TRUE(document) << document.error().text();
+    EXPECT_EQ(mediaFileNames(*document),
+              (std::vector<std::string>{"view1_texture.png", "view1_depth.png", "view2_texture.png",
+                                        "view2_depth.png", "view2_normal.png", "view2_splatU.png",
+                                        "view2_splatV.png"}));
+}
+
+TEST(Mpeg4Files, streamsOfSeveralPicturesSurviveTheTexts) {
+    const TemporaryFolder folder("movie");
+    Job job;
+    Bundle bundle;
+    bundle.views = {makeView(8, 6, 8, 1)};
+    auto scene = sceneFromBundle(bundle, {}, job);
+    ASSERT_TRUE(scene);
+    auto& ods = std::get<UpdateObjectDescriptors>(scene->odFrames[0].commands[0]).descriptors;
+    ElementaryStream& stream = ods[0].streams[0];
+    stream.timescale = 90000;
+    const Sample first = stream.samples[0];
+    stream.samples.clear();
+    for (int i = 0; i < 3; ++i) {
+        Sample sample = first;
+        sample.time = 3000ull * static_cast<unsigned>(i);
+        sample.duration = 3000;
+        stream.samples.push_back(sample);
+    }
+    const auto straight = writeMp4(*scene, job);
+    ASSERT_TRUE(straight) << straight.error().text();
+    for (const char* name : {"a.bt", "a.xmt"}) {
+        mustWrite(writeMpeg4(*scene, folder / name, job));
+        EXPECT_TRUE(fs::exists(folder / "a_images" / "view1_texture_0002.png"));
+        const auto back = readMpeg4(folder / name, job);
+        ASSERT_TRUE(back) << back.error().text();
+        const auto& again = back->findObjectDescriptor(ods[0].id)->streams.at(0);
+        ASSERT_EQ(again.samples.size(), 3u);
+        EXPECT_EQ(again.samples[2].time, 6000u);
+        EXPECT_EQ(again.samples[2].duration, 3000u);
+        const auto bytes = writeMp4(*back, job);
+        ASSERT_TRUE(bytes) << bytes.error().text();
+        EXPECT_EQ(*bytes, *straight);
+    }
+    stream.samples[1].duration = 3001;
+    EXPECT_EQ(writeMpeg4(*scene, folder / "b.bt", job).error().code, ErrorCode::unsupported);
+    EXPECT_FALSE(fs::exists(folder / "b.bt"));
+}
+
+TEST(Mpeg4Files, nothingIsReplacedWithNoClobber) {
+    Job job;
+    const auto document = sceneOf(twoViews());
+    const TemporaryFolder folder("clobber");
+    mustWrite(writeMpeg4(document, folder / "a.xmt", job));
+    Mpeg4WriteOptions options;
+    options.output.noClobber = true;
+    EXPECT_FALSE(writeMpeg4(document, folder / "a.xmt", job, options));
+    fs::remove(folder / "a.xmt");
+    EXPECT_FALSE(writeMpeg4(document, folder / "a.xmt", job, options))
+        << "the folder of images is there";
+    EXPECT_FALSE(fs::exists(folder / "a.xmt"));
+}
+
 TEST(Mpeg4Files, writingTwiceReplacesTextAndImages) {
     const TemporaryFolder folder("twice");
     Job job;
