@@ -9,8 +9,7 @@ namespace stx::gpu {
 namespace {
 
 constexpr const char* kPackages =
-    "install Debian's libegl1, libopengl0 and libgl1-mesa-dri (software or Mesa drivers), or the "
-    "graphics driver's own EGL package (libnvidia-egl... for NVIDIA)";
+    "install Debian's libegl1, libopengl0 and libgl1-mesa-dri (for NVIDIA: libegl-nvidia0)";
 
 /// libepoxy ends the process when a library it needs is missing, so look before it does.
 bool canLoad(const char* name) {
