@@ -9,6 +9,9 @@
 namespace stx {
 namespace {
 
+/// Samples times views that a selection among a bundle's views looks at.
+constexpr std::int64_t kLooks = 50'000'000;
+
 Result<void> checkSettings(const SelectSettings& s) {
     if (s.count < 0)
         return fail(ErrorCode::usage, "{} views cannot be selected; at least 1 must be", s.count);
@@ -44,7 +47,8 @@ Selection solve(const CoverProblem& problem, const SelectSettings& settings) {
     const CoverSolution solution = chooseCover(problem, most, settings.share);
     Selection s;
     s.views = solution.chosen;
-    for (const double value : solution.values) s.quality.push_back(std::min(1.0, value / solution.all));
+    for (const double value : solution.values)
+        s.quality.push_back(std::min(1.0, value / solution.all));
     s.certificate =
         solution.bound > 0 && !s.views.empty() ? solution.values.back() / solution.bound : 1;
     s.coverage = seenShare(problem, s.views);
@@ -73,7 +77,11 @@ Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settin
     if (empty > 0)
         job.note(fmt::format("{} of {} views dropped: they are empty", empty, bundle.views.size()));
     STX_CHECK(job.checkCancelled());
-    const auto samples = sampleBundle(bundle, settings.samples);
+    // Each sample is looked for in each view: thousands of views get fewer samples.
+    const auto views = static_cast<std::int64_t>(bundle.views.size());
+    const auto count =
+        std::min<std::int64_t>(settings.samples, std::max<std::int64_t>(1000, kLooks / views));
+    const auto samples = sampleBundle(bundle, static_cast<int>(count));
     STX_CHECK(job.checkCancelled());
     const auto problem = coverProblem(samples, candidates, settings.targetDensity);
     STX_CHECK(job.checkCancelled());

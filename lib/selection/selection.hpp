@@ -19,7 +19,8 @@ struct SelectSettings {
     double share = 1.0;
     double targetDensity =
         0;                ///< wanted samples per scene unit; 0 = what candidates typically give
-    int samples = 40000;  ///< pieces of surface looked at, 100..10,000,000
+    int samples = 40000;  ///< pieces of surface looked at, 100..10,000,000;
+                          ///< fewer among more than a thousand views
 };
 
 /// The views chosen among candidates, and how good the choice is.
