@@ -86,11 +86,8 @@ class ItemReader {
     Result<void> read(PixelImage& image) {
         const std::string where = lexer_.where();
         if (auto ok = readAll(image.width, image.height, image.components); !ok) return ok;
-        if (image.width == 0 || image.height == 0) {
-            // Also how an empty image is written: 0 0 0.
-            image = PixelImage();
-            return {};
-        }
+        // An empty image is written 0 0 0.
+        if ((image.width == 0 || image.height == 0) && image.components == 0) image.components = 1;
         if (image.width < 0 || image.height < 0 || image.width > 4095 || image.height > 4095 ||
             image.components < 1 || image.components > 4)
             return failAt(where, ErrorCode::invalidInput,
@@ -177,9 +174,8 @@ void append(std::string& out, const Rotation& v, TextStyle s) {
     appendAll(out, s, v.axis.x, v.axis.y, v.axis.z, v.angle);
 }
 void append(std::string& out, const PixelImage& image, TextStyle) {
-    const bool empty = image.width == 0 || image.height == 0;
     fmt::format_to(std::back_inserter(out), "{} {} {}", image.width, image.height,
-                   empty ? 0 : image.components);
+                   image.components);
     static constexpr char kDigits[] = "0123456789ABCDEF";
     for (std::size_t i = 0; i < image.pixels.size(); ++i) {
         if (i % image.components == 0) out += " 0x";

@@ -381,6 +381,28 @@ TEST(Text, stringsSurviveBothForms) {
     EXPECT_TRUE(sameFrames(d.frames, mustReadXmt(xmtOf(d)).frames)) << xmtOf(d);
 }
 
+TEST(Text, imagesSurviveBothForms) {
+    Document d = mustReadBt(kMinimal);
+    for (int components = 1; components <= 4; ++components) {
+        for (const glm::ivec2 size : {glm::ivec2(3, 2), glm::ivec2(0, 0), glm::ivec2(5, 0)}) {
+            PixelImage image;
+            image.width = size.x;
+            image.height = size.y;
+            image.components = components;
+            for (int i = 0; i < size.x * size.y * components; ++i)
+                image.pixels.push_back(static_cast<std::uint8_t>(i * 37));
+            NodePtr texture = makeNode("PixelTexture"), appearance = makeNode("Appearance"),
+                    shape = makeNode("Shape");
+            texture->set("image", image);
+            appearance->set("texture", texture);
+            shape->set("appearance", appearance);
+            rootOf(d)->edit<NodeList>("children").push_back(shape);
+        }
+    }
+    EXPECT_TRUE(sameFrames(d.frames, mustReadBt(btOf(d)).frames)) << btOf(d);
+    EXPECT_TRUE(sameFrames(d.frames, mustReadXmt(xmtOf(d)).frames)) << xmtOf(d);
+}
+
 TEST(Text, charactersThatXmlCannotHoldAreReplacedAndSaid) {
     Document d = mustReadBt(kMinimal);
     NodePtr info = makeNode("WorldInfo");
