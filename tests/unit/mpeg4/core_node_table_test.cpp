@@ -1,5 +1,6 @@
 // The table of nodes against the facts it was made from, and the scene graph's own rules.
 
+#include <charconv>
 #include <fstream>
 
 #include <gtest/gtest.h>
@@ -10,6 +11,23 @@
 
 namespace stx::mpeg4 {
 namespace {
+
+/// The words of a default; numbers as floats, so that 0.785398 is 0.78539801.
+std::vector<std::string> words(const std::string& text) {
+    std::vector<std::string> all;
+    std::string word;
+    for (const char c : text + " ") {
+        if (std::string_view(" ,[]\"").find(c) == std::string_view::npos) {
+            word += c;
+        } else if (!word.empty()) {
+            float number = 0;
+            const auto parsed = std::from_chars(word.data(), word.data() + word.size(), number);
+            all.push_back(parsed.ec == std::errc{} ? fmt::format("{}", number) : word);
+            word.clear();
+        }
+    }
+    return all;
+}
 
 TEST(NodeTable, EveryNodeFieldCodeAndIdIsThatOfTheFacts) {
     REQUIRE_SHARED(path, "reference/facts/nodes.json");
@@ -42,6 +60,9 @@ TEST(NodeTable, EveryNodeFieldCodeAndIdIsThatOfTheFacts) {
             EXPECT_EQ(field.name, f["name"]);
             EXPECT_EQ(name(field.kind), f["kind"]);
             EXPECT_EQ(name(field.type), f["type"]);
+            if (!f["default"].is_null() && f["default"] != "NULL") {
+                EXPECT_EQ(words(field.defaultText), words(f["default"]));
+            }
             EXPECT_EQ(field.defId, number("def"));
             EXPECT_EQ(field.inId, number("in"));
             EXPECT_EQ(field.outId, number("out"));
