@@ -1,5 +1,7 @@
 #include "lib/packing/layout.hpp"
 
+#include <algorithm>
+
 namespace stx {
 namespace {
 

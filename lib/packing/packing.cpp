@@ -1,5 +1,7 @@
 #include "lib/packing/packing.hpp"
 
+#include <algorithm>
+
 #include "lib/base/parallel.hpp"
 #include "lib/packing/layout.hpp"
 

@@ -1,6 +1,7 @@
 #include "lib/packing/patches.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 
 namespace stx {

@@ -1,8 +1,12 @@
 #include "lib/packing/rectangles.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 
 #include "lib/base/parallel.hpp"
 #include "lib/packing/skyline.hpp"

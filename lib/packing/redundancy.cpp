@@ -1,6 +1,7 @@
 #include "lib/packing/redundancy.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "lib/base/parallel.hpp"
 
@@ -131,7 +132,8 @@ Replacement findReplacement(const PruneView& from, int x, int y, const PruneView
         low = std::min(low, corner);
         high = std::max(high, corner);
     }
-    if (!(high - low < kBridged * (b.orthographic ? std::max(high, to.worldRadius) : high))) return r;
+    if (!(high - low < kBridged * (b.orthographic ? std::max(high, to.worldRadius) : high)))
+        return r;
     const int nx = static_cast<int>(pixel.x), ny = static_cast<int>(pixel.y);
     if (rateAt(to, nx, ny, to.surface.w.at(nx, ny)) * settings.rateTolerance *
             settings.rateTolerance <

@@ -1,6 +1,8 @@
 #include "lib/selection/selection.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 
 #include "lib/base/parallel.hpp"
 #include "lib/capture/rasterizer.hpp"

@@ -1,7 +1,10 @@
 #include "lib/surface/depth_gradient.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
+#include <vector>
 
 #include "lib/base/parallel.hpp"
 

@@ -1,5 +1,7 @@
 #include "lib/surface/normals.hpp"
 
+#include <cmath>
+
 #include "lib/base/parallel.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
