@@ -7,6 +7,7 @@
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "tools/batch.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -28,6 +29,7 @@ struct ConvertOptions {
     int quality = 92;
     bool pointTexture = false;
     OpenOptions open;
+    BatchOptions batch;
 };
 
 SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
@@ -97,12 +99,6 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
     return std::move(bundle);
 }
 
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-    for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + with.size()))
-        text.replace(at, what.size(), with);
-    return text;
-}
-
 Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                                           const std::filesystem::path& target,
                                           const ConvertOptions& o, Program& program) {
@@ -136,28 +132,35 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
 }
 
 Result<int> convert(const ConvertOptions& o, Program& program) {
-    if (o.inputs.size() > 1 && o.output.find("{stem}") == std::string::npos)
-        return fail(ErrorCode::usage,
-                    "{} inputs need an output name for each; write {{stem}} in -o, as in "
-                    "'out/{{stem}}.mp4'",
-                    o.inputs.size());
+    STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
+    STX_TRY(const auto items, planBatch(inputs, o.output));
     if (o.views.rfind("auto:", 0) != 0) {
         std::error_code ec;
         if (auto layout = parseViewLayout(o.views);
             !layout && !std::filesystem::exists(o.views, ec))
             return tl::unexpected(layout.error());
     }
-    // Loading the image libraries takes 190 ms: let it happen while the model is read.
-    preloadCodecs();
-    auto report = nlohmann::ordered_json::array();
-    for (const auto& input : o.inputs) {
-        const auto target =
-            replaced(o.output, "{stem}", std::filesystem::path(input).stem().string());
-        STX_TRY(auto entry, convertOne(input, target, o, program));
-        report.push_back(std::move(entry));
+    STX_CHECK(containerOf(items[0].output));
+    const BatchWork work = [&](const BatchItem& item, Program& p) {
+        // Loading the image libraries takes 190 ms: let it happen while the model is read.
+        preloadCodecs();
+        return convertOne(item.input, item.output, o, p);
+    };
+    // One name on the command line is one conversion; a list is a batch, however short.
+    if (items.size() > 1 || o.inputs[0][0] == '@') return runBatch(items, o.batch, work, program);
+
+    std::error_code ec;
+    nlohmann::ordered_json entry;
+    if (o.batch.skipExisting && std::filesystem::exists(items[0].output, ec)) {
+        entry = {{"input", items[0].input},
+                 {"output", items[0].output},
+                 {"status", "skipped"},
+                 {"exitCode", 0}};
+    } else {
+        STX_TRY(entry, work(items[0], program));
     }
-    STX_CHECK(
-        program.writeReport({{"$schema", "convert-report.schema.json"}, {"conversions", report}}));
+    STX_CHECK(program.writeReport({{"$schema", "convert-report.schema.json"},
+                                   {"conversions", nlohmann::ordered_json::array({entry})}}));
     return 0;
 }
 
@@ -170,9 +173,11 @@ Command addConvert(CLI::App& app, Program& program) {
         "(.mp4, .xmt, .bt: MPEG-4; .exr: OpenEXR)\n\n"
         "  stx convert model.glb -o model.mp4 --views sphere:16 --size 512x512\n"
         "  stx convert model.mp4 -o model.xmt\n"
-        "  stx convert capture/transforms.json -o capture.exr");
+        "  stx convert capture/transforms.json -o capture.exr\n"
+        "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
     auto o = std::make_shared<ConvertOptions>();
-    c->add_option("IN", o->inputs, "Files or folders to convert")->required();
+    c->add_option("IN", o->inputs, "Files or folders to convert; @FILE: those named in its lines")
+        ->required();
     c->add_option("-o,--output", o->output, "What to write; {stem} stands for an input's name")
         ->required()
         ->type_name("OUT");
@@ -226,6 +231,16 @@ Command addConvert(CLI::App& app, Program& program) {
         ->group(coding);
     c->add_flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)")
         ->group(coding);
+    const char* many = "Many inputs";
+    c->add_option("--jobs,-j", o->batch.jobs,
+                  "Inputs at a time, each in a process of its own (default 1)")
+        ->check(CLI::Range(1, 1024))
+        ->type_name("N")
+        ->group(many);
+    c->add_flag("--keep-going,-k", o->batch.keepGoing, "Go on with the others when an input fails")
+        ->group(many);
+    c->add_flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
+        ->group(many);
     const char* sets = "Image sets";
     c->add_option("--from", o->open.from,
                   "Kind of image set, when it cannot be told from the files")

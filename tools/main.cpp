@@ -1,35 +1,10 @@
-#include <sys/resource.h>
-#include <clocale>
-#include <csignal>
 #include <cstdio>
 
 #include "tools/program.hpp"
+#include "tools/stop_signals.hpp"
 
 namespace stx::tools {
 namespace {
-
-Program* running = nullptr;  // for the signal handlers only
-volatile std::sig_atomic_t stopSignal = 0;
-
-void onStopSignal(int signal) {
-    if (stopSignal != 0) std::_Exit(128 + signal);  // the second one does not wait
-    stopSignal = signal;
-    if (running != nullptr) running->job.cancelled.store(true);
-}
-
-void handleSignals(Program& program) {
-    running = &program;
-    struct sigaction action {};
-    action.sa_handler = onStopSignal;
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, nullptr);
-    sigaction(SIGTERM, &action, nullptr);
-    // A closed pipe is an error of writing with an exit code, not a silent death.
-    action.sa_handler = SIG_IGN;
-    sigaction(SIGPIPE, &action, nullptr);
-    // A file that grows past `ulimit -f` likewise.
-    sigaction(SIGXFSZ, &action, nullptr);
-}
 
 /// One line and where to read on, with the nearest known word for an unknown one.
 int usageError(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
@@ -99,11 +74,11 @@ int mainProgram(int argc, char** argv) {
         return usageError(app, e, argc, argv);
     }
 
-    handleSignals(program);
+    watchStopSignals(program.job.cancelled);
     for (const auto& command : commands) {
         if (!command.app->parsed()) continue;
         const int code = program.run([&] { return command.body(program); });
-        return stopSignal != 0 ? 128 + stopSignal : code;
+        return stopSignal() != 0 ? 128 + stopSignal() : code;
     }
     return static_cast<int>(ErrorCode::usage);
 }

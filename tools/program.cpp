@@ -19,7 +19,8 @@ void Program::say(std::string_view line) const {
 }
 
 void Program::sayNotes() {
-    for (const auto& note : job.takeNotes()) say("note: " + note);
+    const std::string about = subject.empty() ? "" : fmt::format("'{}': ", subject);
+    for (const auto& note : job.takeNotes()) say("note: " + about + note);
 }
 
 Result<void> Program::writeReport(const nlohmann::ordered_json& report) const {

@@ -33,6 +33,8 @@ class Program {
   public:
     CommonOptions common;
     Job job;
+    /// What notes are about, when there are many inputs; empty = they need no name.
+    std::string subject;
 
     /// A result for stdout. Errors of writing (a closed pipe, a full disk) become the exit code.
     void print(std::string_view text);

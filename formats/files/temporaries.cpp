@@ -32,9 +32,25 @@ bool lockAndKeep(int fd, const fs::path& path) {
 
 constexpr int kAttempts = 1000;
 
+/// Folders where this process has made temporaries.
+struct Folders {
+    std::mutex mutex;
+    std::set<fs::path> paths;
+};
+Folders& foldersUsed() {
+    static auto* const folders = new Folders;  // outlives every thread
+    return *folders;
+}
+
+void remember(const fs::path& folder) {
+    const std::lock_guard lock(foldersUsed().mutex);
+    foldersUsed().paths.insert(folder);
+}
+
 }  // namespace
 
 tl::expected<Temporary, int> createTemporaryFile(const fs::path& folder) {
+    remember(folder);
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const fs::path path = nextName(folder);
         Descriptor fd(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
@@ -48,6 +64,7 @@ tl::expected<Temporary, int> createTemporaryFile(const fs::path& folder) {
 }
 
 tl::expected<Temporary, int> createTemporaryFolder(const fs::path& folder) {
+    remember(folder);
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const fs::path path = nextName(folder);
         if (::mkdir(path.c_str(), 0777) != 0) {
@@ -86,6 +103,22 @@ void removeStaleTemporariesNow(const fs::path& folder) {
         std::error_code ignored;
         if (S_ISDIR(info.st_mode)) fs::remove_all(it->path(), ignored);
         if (S_ISREG(info.st_mode)) fs::remove(it->path(), ignored);
+    }
+}
+
+void removeOwnTemporaries() {
+    const std::string prefix = fmt::format("{}{}-", kTemporaryPrefix, ::getpid());
+    // Never waits: the thread that holds the lock may be the one that hangs.
+    const std::unique_lock lock(foldersUsed().mutex, std::try_to_lock);
+    if (!lock) return;
+    for (const auto& folder : foldersUsed().paths) {
+        std::error_code ec;
+        for (auto it = fs::directory_iterator(folder, ec); !ec && it != fs::directory_iterator();
+             it.increment(ec)) {
+            std::error_code ignored;
+            if (it->path().filename().string().starts_with(prefix))
+                fs::remove_all(it->path(), ignored);
+        }
     }
 }
 

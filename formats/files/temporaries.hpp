@@ -57,4 +57,7 @@ void removeStaleTemporaries(const std::filesystem::path& folder);
 /// The same, looking again each time.
 void removeStaleTemporariesNow(const std::filesystem::path& folder);
 
+/// Removes the unfinished outputs of this very process, for the moment before it ends by a signal.
+void removeOwnTemporaries();
+
 }  // namespace stx

@@ -1,0 +1,403 @@
+#include "tools/batch.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <map>
+#include <optional>
+
+#include "formats/files/temporaries.hpp"
+#include "lib/base/parallel.hpp"
+#include "tools/stop_signals.hpp"
+
+namespace stx::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+// A worker starts afresh after so many inputs, so that what libraries keep cannot add up.
+constexpr int kInputsPerWorker = 200;
+
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::string stemOf(const std::string& input) {
+    const fs::path path(input);
+    return (path.has_filename() ? path : path.parent_path()).stem().string();
+}
+
+std::string withStem(std::string text, const std::string& stem) {
+    const std::string what = "{stem}";
+    for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + stem.size()))
+        text.replace(at, what.size(), stem);
+    return text;
+}
+
+bool sendAll(int fd, const void* from, std::size_t size) {
+    for (const char* at = static_cast<const char*>(from); size > 0;) {
+        const auto n = ::write(fd, at, size);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return false;
+        at += n;
+        size -= static_cast<std::size_t>(n);
+    }
+    return true;
+}
+
+bool receiveAll(int fd, void* to, std::size_t size) {
+    for (char* at = static_cast<char*>(to); size > 0;) {
+        const auto n = ::read(fd, at, size);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return false;
+        at += n;
+        size -= static_cast<std::size_t>(n);
+    }
+    return true;
+}
+
+Json entryOf(const BatchItem& item, const char* status) {
+    return {{"input", item.input}, {"output", item.output}, {"status", status}, {"exitCode", 0}};
+}
+
+Json failedEntry(const BatchItem& item, int exitCode, std::string message) {
+    auto entry = entryOf(item, "error");
+    entry["exitCode"] = exitCode;
+    entry["message"] = std::move(message);
+    return entry;
+}
+
+/// Does one item in this process, whatever it throws.
+Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
+    Result<Json> done = Json();
+    try {
+        done = work(item, program);
+    } catch (const std::bad_alloc&) {
+        done = fail(ErrorCode::failed, "out of memory");
+    } catch (const std::exception& e) {
+        done = fail(ErrorCode::failed, "{}", e.what());
+    }
+    program.sayNotes();
+    if (done) return *done;
+    return failedEntry(item, static_cast<int>(done.error().code), done.error().text());
+}
+
+/// A worker's life: numbers of items come in, their reports go out.
+[[noreturn]] void workerMain(const std::vector<BatchItem>& items, const BatchWork& work,
+                             Program& program, int in, int out, int threads, pid_t parent) {
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (::getppid() != parent) ::_exit(1);
+    watchStopSignals(program.job.cancelled);
+    program.job.onProgress = nullptr;
+    const ThreadLimit limit(threads);
+    std::uint32_t index = 0;
+    while (receiveAll(in, &index, sizeof(index)) && index < items.size()) {
+        const auto start = Clock::now();
+        program.subject = items[index].input;
+        auto entry = doItem(items[index], work, program);
+        if (stopSignal() != 0) break;
+        entry["seconds"] = secondsSince(start);
+        const std::string text = entry.dump(-1, ' ', false, Json::error_handler_t::replace);
+        const auto size = static_cast<std::uint32_t>(text.size());
+        if (!sendAll(out, &size, sizeof(size)) || !sendAll(out, text.data(), size)) break;
+    }
+    std::fflush(nullptr);
+    ::_exit(stopSignal() != 0 ? 128 + stopSignal() : 0);
+}
+
+struct Worker {
+    pid_t pid = -1;
+    Descriptor in, out;  ///< of the worker: its items, its reports
+    std::optional<std::size_t> item;
+    Clock::time_point since;
+    int done = 0;
+};
+
+/// The processes of one batch; ends them when it goes.
+class Batch {
+  public:
+    Batch(const std::vector<BatchItem>& items, const BatchOptions& options, const BatchWork& work,
+          Program& program)
+        : items_(items),
+          options_(options),
+          work_(work),
+          program_(program),
+          entries_(items.size()) {}
+    ~Batch() { stopWorkers(); }
+    Batch(const Batch&) = delete;
+    Batch& operator=(const Batch&) = delete;
+
+    Result<int> run();
+
+  private:
+    [[nodiscard]] bool mayStart() const {
+        return next_ < items_.size() && !program_.job.cancelled && (options_.keepGoing || !failed_);
+    }
+    [[nodiscard]] Result<Worker> startWorker();
+    [[nodiscard]] Result<void> giveItems();
+    void takeReport(Worker& worker);
+    void finish(std::size_t item, Json entry);
+    void endWorker(Worker& worker);
+    void stopWorkers();
+    [[nodiscard]] Result<void> writeLines() const;
+
+    const std::vector<BatchItem>& items_;
+    const BatchOptions& options_;
+    const BatchWork& work_;
+    Program& program_;
+    std::vector<Json> entries_;
+    std::vector<Worker> workers_;
+    std::size_t next_ = 0, done_ = 0, skipped_ = 0, failed_ = 0;
+};
+
+Result<Worker> Batch::startWorker() {
+    int toWorker[2], fromWorker[2];
+    if (::pipe2(toWorker, O_CLOEXEC) != 0)
+        return fail(ErrorCode::failed, "cannot make a pipe: {}", std::strerror(errno));
+    Descriptor workerIn(toWorker[0]);
+    Worker worker;
+    worker.in = Descriptor(toWorker[1]);
+    if (::pipe2(fromWorker, O_CLOEXEC) != 0)
+        return fail(ErrorCode::failed, "cannot make a pipe: {}", std::strerror(errno));
+    worker.out = Descriptor(fromWorker[0]);
+    Descriptor workerOut(fromWorker[1]);
+    const int all = program_.common.threads > 0 ? program_.common.threads : threadCount();
+    const int threads = std::max(1, all / std::max(1, options_.jobs));
+    const pid_t parent = ::getpid();
+    std::fflush(nullptr);
+    worker.pid = ::fork();
+    if (worker.pid < 0)
+        return fail(ErrorCode::failed, "cannot start a process: {}", std::strerror(errno));
+    if (worker.pid == 0) {
+        // The ends of other workers' pipes must not stay open here: their ends would go unnoticed.
+        workers_.clear();
+        worker.in.close();
+        worker.out.close();
+        workerMain(items_, work_, program_, workerIn.get(), workerOut.get(), threads, parent);
+    }
+    return worker;
+}
+
+void Batch::finish(std::size_t item, Json entry) {
+    const std::string status = entry.value("status", "error");
+    ++done_;
+    if (status == "skipped") ++skipped_;
+    if (status == "error") {
+        ++failed_;
+        // Not hushed by --quiet: nothing else tells which input it was.
+        fmt::print(stderr, "error: '{}': {}\n", items_[item].input, entry.value("message", ""));
+    }
+    entries_[item] = std::move(entry);
+    program_.job.progress(static_cast<std::int64_t>(done_),
+                          static_cast<std::int64_t>(items_.size()), "inputs");
+}
+
+void Batch::takeReport(Worker& worker) {
+    std::uint32_t size = 0;
+    std::string text;
+    bool good = worker.item && receiveAll(worker.out.get(), &size, sizeof(size));
+    if (good) {
+        text.resize(size);
+        good = receiveAll(worker.out.get(), text.data(), size);
+    }
+    if (good) {
+        auto entry = Json::parse(text, nullptr, false);
+        ++worker.done;
+        finish(*std::exchange(worker.item, std::nullopt), std::move(entry));
+        return;
+    }
+    // It ended without an answer.
+    int status = 0;
+    while (::waitpid(worker.pid, &status, 0) < 0 && errno == EINTR) {
+    }
+    worker.pid = -1;
+    if (!worker.item || program_.job.cancelled) return;
+    const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+    auto entry = failedEntry(
+        items_[*worker.item], static_cast<int>(ErrorCode::failed),
+        signal == SIGKILL ? std::string("its process was killed, perhaps for lack of memory")
+        : signal != 0     ? fmt::format("its process ended by signal {}", signal)
+                          : fmt::format("its process ended with {}", WEXITSTATUS(status)));
+    entry["seconds"] = secondsSince(worker.since);
+    finish(*std::exchange(worker.item, std::nullopt), std::move(entry));
+}
+
+void Batch::endWorker(Worker& worker) {
+    worker.in.close();
+    while (worker.pid > 0 && ::waitpid(worker.pid, nullptr, 0) < 0 && errno == EINTR) {
+    }
+    worker.pid = -1;
+}
+
+void Batch::stopWorkers() {
+    for (auto& w : workers_) {
+        w.in.close();
+        if (w.pid > 0) ::kill(w.pid, SIGTERM);
+    }
+    // Each ends by itself within a second (watchStopSignals); SIGKILL is for one that is stuck.
+    const auto start = Clock::now();
+    for (auto& w : workers_) {
+        while (w.pid > 0) {
+            const pid_t ended = ::waitpid(w.pid, nullptr, WNOHANG);
+            if (ended == w.pid || (ended < 0 && errno != EINTR)) w.pid = -1;
+            if (w.pid > 0 && secondsSince(start) > 2) ::kill(w.pid, SIGKILL);
+            if (w.pid > 0) ::usleep(5000);
+        }
+    }
+}
+
+Result<void> Batch::giveItems() {
+    for (auto& w : workers_) {
+        if (!w.item && w.pid > 0 && w.done >= kInputsPerWorker) endWorker(w);
+    }
+    std::erase_if(workers_, [](const Worker& w) { return w.pid < 0; });
+    const auto wanted = static_cast<std::size_t>(std::max(1, options_.jobs));
+    while (mayStart()) {
+        const auto& item = items_[next_];
+        std::error_code ec;
+        if (options_.skipExisting && fs::exists(item.output, ec)) {
+            auto entry = entryOf(item, "skipped");
+            entry["seconds"] = 0.0;
+            finish(next_++, std::move(entry));
+            continue;
+        }
+        auto idle =
+            std::find_if(workers_.begin(), workers_.end(), [](const Worker& w) { return !w.item; });
+        if (idle == workers_.end()) {
+            if (workers_.size() >= wanted) return {};
+            STX_TRY(auto worker, startWorker());
+            workers_.push_back(std::move(worker));
+            idle = workers_.end() - 1;
+        }
+        idle->item = next_;
+        idle->since = Clock::now();
+        const auto index = static_cast<std::uint32_t>(next_++);
+        // A worker that is gone shows when its report is read.
+        (void)sendAll(idle->in.get(), &index, sizeof(index));
+    }
+    return {};
+}
+
+Result<int> Batch::run() {
+    for (;;) {
+        STX_CHECK(giveItems());
+        std::vector<pollfd> waiting;
+        for (const auto& w : workers_) {
+            if (w.item) waiting.push_back({w.out.get(), POLLIN, 0});
+        }
+        if (program_.job.cancelled || waiting.empty()) break;
+        // The stop signals go to another thread, so poll() does not end by them.
+        if (::poll(waiting.data(), waiting.size(), 50) <= 0) continue;
+        for (const auto& ready : waiting) {
+            if (ready.revents == 0) continue;
+            for (auto& w : workers_) {
+                if (w.item && w.out.get() == ready.fd) takeReport(w);
+            }
+        }
+    }
+    stopWorkers();
+    STX_CHECK(writeLines());
+    STX_CHECK(program_.job.checkCancelled());
+    const auto converted = done_ - skipped_ - failed_;
+    const std::string counts = fmt::format("{} inputs: {} done, {} skipped, {} failed",
+                                           items_.size(), converted, skipped_, failed_);
+    if (failed_ == 0) {
+        program_.say(counts);
+        return 0;
+    }
+    const auto first = std::find_if(entries_.begin(), entries_.end(), [](const Json& e) {
+        return e.is_object() && e.value("status", "") == "error";
+    });
+    const auto code = static_cast<ErrorCode>(first->value("exitCode", 4));
+    if (!options_.keepGoing && done_ < items_.size())
+        return fail(code, "{}, {} not begun; --keep-going goes on after an error", counts,
+                    items_.size() - done_);
+    return fail(code, "{}", counts);
+}
+
+Result<void> Batch::writeLines() const {
+    if (program_.common.report.empty()) return {};
+    std::string lines;
+    for (const auto& entry : entries_) {
+        if (entry.is_object())
+            lines += entry.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    }
+    return writeFile(program_.common.report, std::as_bytes(std::span(lines)));
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
+                                              const Limits& limits) {
+    std::vector<std::string> names;
+    for (const auto& input : inputs) {
+        if (input.size() < 2 || input[0] != '@') {
+            names.push_back(input);
+            continue;
+        }
+        const std::string list = input.substr(1);
+        STX_TRY(const auto bytes, readFile(list, limits));
+        const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        const auto before = names.size();
+        for (std::size_t at = 0; at < text.size();) {
+            const auto end = std::min(text.find('\n', at), text.size());
+            auto line = text.substr(at, end - at);
+            if (line.ends_with('\r')) line.remove_suffix(1);
+            if (line.find('\0') != std::string_view::npos)
+                return fail(ErrorCode::invalidInput,
+                            "'{}' holds zero bytes; a list is text, one name in each line", list);
+            if (!line.empty()) names.emplace_back(line);
+            at = end + 1;
+        }
+        if (names.size() == before)
+            return fail(ErrorCode::invalidInput, "the list '{}' names no input", list);
+    }
+    if (names.empty()) return fail(ErrorCode::usage, "there is no input");
+    return names;
+}
+
+Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
+                                         const std::string& pattern) {
+    if (inputs.size() > 1 && pattern.find("{stem}") == std::string::npos)
+        return fail(ErrorCode::usage,
+                    "{} inputs need an output name for each; write {{stem}} in -o, as in "
+                    "'out/{{stem}}.mp4'",
+                    inputs.size());
+    std::vector<BatchItem> items;
+    std::map<std::string, std::string> inputOf;
+    for (const auto& input : inputs) {
+        BatchItem item{input, withStem(pattern, stemOf(input))};
+        const auto key = fs::path(item.output).lexically_normal().string();
+        if (const auto [known, fresh] = inputOf.emplace(key, input); !fresh)
+            return fail(ErrorCode::usage,
+                        "'{}' and '{}' would both be written to '{}'; rename one, or convert them "
+                        "into different folders",
+                        known->second, input, item.output);
+        items.push_back(std::move(item));
+    }
+    return items;
+}
+
+Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& options,
+                     const BatchWork& work, Program& program) {
+    // What can be told before any work is told then; with --keep-going each input is on its own.
+    if (!options.keepGoing) {
+        std::error_code ec;
+        for (const auto& item : items) {
+            if (options.skipExisting && fs::exists(item.output, ec)) continue;
+            STX_CHECK(checkTarget(item.output, program));
+        }
+    }
+    return Batch(items, options, work, program).run();
+}
+
+}  // namespace stx::tools

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tools/program.hpp"
+
+namespace stx::tools {
+
+/// One input of a batch and what becomes of it.
+struct BatchItem {
+    std::string input, output;
+};
+
+struct BatchOptions {
+    int jobs = 1;               ///< inputs at a time
+    bool keepGoing = false;     ///< an input that fails does not stop the others
+    bool skipExisting = false;  ///< an input whose output exists is done already
+};
+
+/// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
+/// the current folder; empty lines are passed over. Errors: io; (invalidInput) a list without a
+/// name; (usage) no input at all.
+[[nodiscard]] Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
+                                                            const Limits& limits);
+
+/// Names each input's output: `{stem}` in `pattern` stands for the input's file name without its
+/// ending. Errors (usage): several inputs and no {stem}, two inputs with the same output.
+[[nodiscard]] Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
+                                                       const std::string& pattern);
+
+/// Does one item and returns its report: an object with at least input, output, status, exitCode.
+using BatchWork = std::function<Result<nlohmann::ordered_json>(const BatchItem&, Program&)>;
+
+/// Does all items, `jobs` at a time, each in a worker process: a crash or lack of memory costs that
+/// one input. The threads asked for are shared among the workers; --max-memory counts for each.
+/// Writes the report as JSON lines, in the order of the inputs, whatever happened to them. The
+/// error is that of the first input that failed, or the number of those that did (keepGoing).
+[[nodiscard]] Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& options,
+                                   const BatchWork& work, Program& program);
+
+}  // namespace stx::tools

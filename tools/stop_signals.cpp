@@ -1,0 +1,62 @@
+#include "tools/stop_signals.hpp"
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <ctime>
+#include <functional>
+#include <thread>
+
+#include "formats/files/temporaries.hpp"
+
+namespace stx::tools {
+namespace {
+
+// How long the work may take to notice; with the removal of temporaries it stays below a second.
+constexpr timespec kPatience = {0, 700'000'000};
+
+std::atomic<int> signalThatCame = 0;
+
+void watch(sigset_t signals, std::atomic<bool>& cancelled) {
+    int signal = 0;
+    while (sigwait(&signals, &signal) != 0) {
+    }
+    signalThatCame = signal;
+    cancelled = true;
+    // Some work (a decoder of a library, a kernel over a whole picture) looks seldom or never.
+    // sigtimedwait also returns at once when the signal comes a second time.
+    while (sigtimedwait(&signals, nullptr, &kPatience) < 0 && errno == EINTR) {
+    }
+    removeOwnTemporaries();
+    _exit(128 + signal);
+}
+
+}  // namespace
+
+void watchStopSignals(std::atomic<bool>& cancelled) {
+    struct sigaction action {};
+    sigemptyset(&action.sa_mask);
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &action, nullptr);
+    sigaction(SIGXFSZ, &action, nullptr);
+
+    // Blocked in every thread, they wait for the one that takes them. A signal that the caller
+    // ignores (nohup, a job in the background of a script) stays ignored.
+    sigset_t signals;
+    sigemptyset(&signals);
+    for (const int signal : {SIGINT, SIGTERM}) {
+        struct sigaction now {};
+        sigaction(signal, nullptr, &now);
+        if (now.sa_handler != SIG_IGN) sigaddset(&signals, signal);
+    }
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    std::thread(watch, signals, std::ref(cancelled)).detach();
+}
+
+int stopSignal() {
+    return signalThatCame;
+}
+
+}  // namespace stx::tools
