@@ -11,6 +11,7 @@
 #include "lib/render/cpu/surface_raster.hpp"
 #include "lib/render/cpu/surface_shade.hpp"
 #include "lib/render/cpu/surface_source.hpp"
+#include "lib/surface/depth_gradient.hpp"
 
 namespace stx {
 namespace {
@@ -75,6 +76,7 @@ class CpuSurfaceRenderer final : public Renderer {
         if (told < 1)
             effort_.mostGeometry =
                 static_cast<int>(std::min(32.0, std::ceil(effort_.mostGeometry / told)));
+        if (settings.lighting.on()) findNormals();
     }
 
     [[nodiscard]] Result<Frame> render(const Camera& camera) override;
@@ -85,6 +87,9 @@ class CpuSurfaceRenderer final : public Renderer {
 
   private:
     void addBounds(const Source& s);
+    void findNormals();
+    /// Unit world normal of a source at pixel position (u, v); zero where it has none.
+    [[nodiscard]] glm::vec3 normalAt(std::size_t source, float u, float v) const;
     [[nodiscard]] FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX,
                                           int tilesY) const;
     void drawTile(const PixelSpace& space, std::span<const FrameSource> all, int tilesX, int tile,
@@ -92,8 +97,9 @@ class CpuSurfaceRenderer final : public Renderer {
     [[nodiscard]] std::vector<int> chooseSources(const PixelSpace& space,
                                                  std::span<const FrameSource> all, int tile,
                                                  int tileX, int tileY) const;
-    [[nodiscard]] const ReferenceView* viewAt(const Camera& camera) const;
-    [[nodiscard]] Frame copyOf(const ReferenceView& view) const;
+    /// The view that stands exactly where the camera does, -1 = none.
+    [[nodiscard]] int viewAt(const Camera& camera) const;
+    [[nodiscard]] Frame copyOf(std::size_t index) const;
     void light(const PixelSpace& space, Frame& frame) const;
 
     const Bundle& bundle_;
@@ -101,6 +107,7 @@ class CpuSurfaceRenderer final : public Renderer {
     Effort effort_;
     Job& job_;
     std::vector<Source> sources_;
+    std::vector<Image<glm::vec3>> normals_;  ///< of views that bring none, while a light is on
     Bounds bounds_;
     bool fillsFrame_ = false;
 };
@@ -119,6 +126,41 @@ void CpuSurfaceRenderer::addBounds(const Source& s) {
             }
         }
     }
+}
+
+void CpuSurfaceRenderer::findNormals() {
+    normals_.resize(sources_.size());
+    parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
+        const ReferenceView& view = bundle_.views[static_cast<std::size_t>(i)];
+        if (view.hasNormals()) return;
+        const DepthSurface surface = depthSurface(view, {});
+        const glm::dmat3 worldFromCamera = glm::mat3_cast(view.camera.orientation);
+        auto& normals = normals_[static_cast<std::size_t>(i)];
+        normals = Image<glm::vec3>(view.camera.width, view.camera.height, glm::vec3(0.0f));
+        for (int y = 0; y < normals.height(); ++y)
+            for (int x = 0; x < normals.width(); ++x)
+                if (hasPoint(view.depth.at(x, y)))
+                    normals.at(x, y) = glm::vec3(worldFromCamera *
+                                                 planeNormal(view.camera, x, y, surface.w.at(x, y),
+                                                             surface.gradient.at(x, y)));
+    });
+}
+
+glm::vec3 CpuSurfaceRenderer::normalAt(std::size_t source, float u, float v) const {
+    const ReferenceView& view = bundle_.views[source];
+    const Image<glm::vec3>& normals = view.hasNormals() ? view.normal : normals_[source];
+    const float fu = std::floor(u - 0.5f), fv = std::floor(v - 0.5f);
+    glm::vec3 sum(0.0f);
+    for (int j = 0; j < 2; ++j) {
+        for (int i = 0; i < 2; ++i) {
+            const int x = static_cast<int>(fu) + i, y = static_cast<int>(fv) + j;
+            if (!normals.contains(x, y)) continue;
+            const float tu = u - 0.5f - fu, tv = v - 0.5f - fv;
+            sum += (i ? tu : 1 - tu) * (j ? tv : 1 - tv) * normals.at(x, y);
+        }
+    }
+    const float length = glm::length(sum);
+    return length > 1e-6f ? sum / length : glm::vec3(0.0f);
 }
 
 FrameSource CpuSurfaceRenderer::placeSource(const Source& s, const PixelSpace& space, int tilesX,
@@ -282,19 +324,24 @@ void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const Frame
         if (pieces.share[i] > most) {
             most = pieces.share[i];
             qImage.at(x, y) = pieces.q[i];
+            if (frame.normal.empty() || best[i] < 0) continue;
+            const auto k = static_cast<std::size_t>(best[i]);
+            const glm::vec4 h =
+                local[k].sourceFromPixel.homogeneous(pieces.x[i], pieces.y[i], pieces.q[i]);
+            frame.normal.at(x, y) =
+                normalAt(static_cast<std::size_t>(chosen[k]), h.x / h.w, h.y / h.w);
         }
     }
 }
 
-const ReferenceView* CpuSurfaceRenderer::viewAt(const Camera& camera) const {
+int CpuSurfaceRenderer::viewAt(const Camera& camera) const {
     const auto near = [](double a, double b) {
         return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a));
     };
-    for (const ReferenceView& view : bundle_.views) {
+    for (std::size_t i = 0; i < bundle_.views.size(); ++i) {
         // A view that has lost much to pruning has no picture of its own to give back.
-        if (sources_[static_cast<std::size_t>(&view - bundle_.views.data())].told < kWhole)
-            continue;
-        const Camera& c = view.camera;
+        if (sources_[i].told < kWhole) continue;
+        const Camera& c = bundle_.views[i].camera;
         if (c.width != camera.width || c.height != camera.height ||
             c.orthographic != camera.orthographic)
             continue;
@@ -305,13 +352,15 @@ const ReferenceView* CpuSurfaceRenderer::viewAt(const Camera& camera) const {
             1e-9 * std::max(1.0, glm::length(c.position)))
             continue;
         if (std::abs(std::abs(glm::dot(c.orientation, camera.orientation)) - 1.0) > 1e-12) continue;
-        return &view;
+        return static_cast<int>(i);
     }
-    return nullptr;
+    return -1;
 }
 
-Frame CpuSurfaceRenderer::copyOf(const ReferenceView& view) const {
+Frame CpuSurfaceRenderer::copyOf(std::size_t index) const {
+    const ReferenceView& view = bundle_.views[index];
     Frame frame;
+    if (settings_.lighting.on()) frame.normal = view.hasNormals() ? view.normal : normals_[index];
     frame.colour = Image<glm::vec4>(view.camera.width, view.camera.height);
     frame.depth = view.depth;
     for (int y = 0; y < view.camera.height; ++y) {
@@ -327,42 +376,22 @@ void CpuSurfaceRenderer::light(const PixelSpace& space, Frame& frame) const {
     const int width = frame.colour.width(), height = frame.colour.height();
     const Lighting lighting = lightsInWorld(settings_.lighting, space.camera.worldFromCamera());
     frame.albedo = frame.colour;
-    frame.normal = Image<glm::vec3>(width, height, glm::vec3(0.0f));
     const glm::dmat3 worldFromCamera = glm::mat3_cast(space.camera.orientation);
     parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
                 const float dist = frame.depth.at(x, y);
-                if (!hasPoint(dist)) continue;
-                const glm::dvec3 here = space.camera.unproject(x + 0.5, y + 0.5, dist);
-                // The tangent along an axis: towards the neighbour that is nearer in depth.
-                const auto tangent = [&](int dx, int dy) {
-                    glm::dvec3 best(0.0);
-                    double least = 0.02 * std::abs(dist);
-                    for (const int sign : {-1, 1}) {
-                        const int nx = x + sign * dx, ny = y + sign * dy;
-                        if (!frame.depth.contains(nx, ny) || !hasPoint(frame.depth.at(nx, ny)))
-                            continue;
-                        const double there = frame.depth.at(nx, ny);
-                        if (std::abs(there - dist) >= least) continue;
-                        least = std::abs(there - dist);
-                        best = (space.camera.unproject(nx + 0.5, ny + 0.5, there) - here) *
-                               static_cast<double>(sign);
-                    }
-                    return best;
-                };
-                glm::dvec3 normal = glm::cross(tangent(0, 1), tangent(1, 0));
-                const double length = glm::length(normal);
-                normal = length > 0 ? normal / length : glm::dvec3(0, 0, 1);
-                const glm::dvec3 world = space.camera.position + worldFromCamera * here;
-                const glm::dvec3 toEye = -space.camera.viewDirection(x + 0.5, y + 0.5);
-                normal = worldFromCamera * normal;
-                frame.normal.at(x, y) = glm::vec3(normal);
                 glm::vec4& pixel = frame.colour.at(x, y);
-                if (!(pixel.a > 0.0f)) continue;
-                const glm::vec3 lit =
-                    shadePhong(lighting, glm::vec3(pixel) / pixel.a, glm::vec3(world),
-                               glm::vec3(normal), glm::vec3(toEye));
+                if (!hasPoint(dist) || !(pixel.a > 0.0f)) continue;
+                const glm::vec3 toEye(-space.camera.viewDirection(x + 0.5, y + 0.5));
+                glm::vec3& normal = frame.normal.at(x, y);
+                // What was filled has no normal of its own.
+                if (normal == glm::vec3(0.0f)) normal = toEye;
+                const glm::dvec3 world =
+                    space.camera.position +
+                    worldFromCamera * space.camera.unproject(x + 0.5, y + 0.5, dist);
+                const glm::vec3 lit = shadePhong(lighting, glm::vec3(pixel) / pixel.a,
+                                                 glm::vec3(world), normal, toEye);
                 pixel = glm::vec4(lit * pixel.a, pixel.a);
             }
         }
@@ -381,11 +410,13 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
             glm::dot(bounds_.centre() - camera.position, camera.forward()) + bounds_.radius());
     const PixelSpace space(camera, farthest);
     Frame frame;
-    if (const ReferenceView* view = viewAt(camera)) {
-        frame = copyOf(*view);
+    if (const int same = viewAt(camera); same >= 0) {
+        frame = copyOf(static_cast<std::size_t>(same));
     } else {
         frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
         Image<float> q(camera.width, camera.height, 0.0f);
+        if (settings_.lighting.on())
+            frame.normal = Image<glm::vec3>(camera.width, camera.height, glm::vec3(0.0f));
         const int tilesX = (camera.width + kTile - 1) / kTile,
                   tilesY = (camera.height + kTile - 1) / kTile;
         std::vector<FrameSource> placed(sources_.size());
