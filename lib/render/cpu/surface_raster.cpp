@@ -170,7 +170,11 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
             if (links >= 3) {
                 const float q00 = s.q.at(x, y), q10 = s.q.at(x + 1, y);
                 const float q01 = s.q.at(x, y + 1), q11 = s.q.at(x + 1, y + 1);
-                if (std::abs(q00 - q11) < std::abs(q10 - q01)) {
+                if (links == 4 &&
+                    std::abs(q00 + q11 - q10 - q01) <= 2 * s.flat * s.space.axis.whole(q00)) {
+                    const Vertex quad[4] = {v00, v10, v11, v01};
+                    fillPolygon<4, false>(t, quad, kCrack, bits);
+                } else if (std::abs(q00 - q11) < std::abs(q10 - q01)) {
                     const Vertex a[3] = {v00, v10, v11}, b[3] = {v00, v11, v01};
                     fillPolygon<3, false>(t, a, kCrack, bits);
                     fillPolygon<3, false>(t, b, kCrack, bits);

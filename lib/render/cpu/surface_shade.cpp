@@ -47,6 +47,7 @@ struct Group {
 HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, std::uint32_t bit,
                       View& out) {
     const hn::ScalableTag<float> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
     using V = hn::Vec<decltype(d)>;
     const int n = static_cast<int>(hn::Lanes(d));
     const auto& m = s.sourceFromPixel.m;
@@ -69,12 +70,6 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         const V vy = hn::Mul(hn::NegMulAdd(v, wy, hn::MulAdd(c(m[6]), qy, c(m[5]))), inverse);
         const V det = hn::NegMulAdd(uy, vx, hn::Mul(ux, vy));
         const V inverseDet = hn::Div(one, hn::Max(det, c(1e-4f)));
-        hn::StoreU(u, d, &out.u[l]);
-        hn::StoreU(v, d, &out.v[l]);
-        hn::StoreU(hn::Mul(vy, inverseDet), d, &out.xu[l]);
-        hn::StoreU(hn::Neg(hn::Mul(uy, inverseDet)), d, &out.xv[l]);
-        hn::StoreU(hn::Neg(hn::Mul(vx, inverseDet)), d, &out.yu[l]);
-        hn::StoreU(hn::Mul(ux, inverseDet), d, &out.yv[l]);
         // exp(-3 angle), as one over the first terms of exp(3 angle).
         const V ax = row(&fromEye[0]), ay = row(&fromEye[4]), az = row(&fromEye[8]);
         const V bx = row(&s.fromEye[0]), by = row(&s.fromEye[4]), bz = row(&s.fromEye[8]);
@@ -90,26 +85,37 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         const auto inFrame = hn::And(
             hn::And(hn::Ge(u, hn::Zero(d)), hn::Lt(u, c(static_cast<float>(s.source->width)))),
             hn::And(hn::Ge(v, hn::Zero(d)), hn::Lt(v, c(static_cast<float>(s.source->height)))));
-        weight = hn::IfThenElseZero(hn::And(inFrame, hn::Gt(w, hn::Zero(d))), weight);
-        hn::StoreU(weight, d, &out.weight[l]);
+        const auto bits = hn::LoadU(du, g.sources + l);
+        const auto chosen = hn::RebindMask(d, hn::TestBit(bits, hn::Set(du, bit)));
+        const auto active = hn::And(hn::And(inFrame, chosen), hn::Gt(w, hn::Zero(d)));
+        // Lanes without this source get a harmless place, so that none reads outside.
+        hn::StoreU(hn::IfThenElseZero(active, weight), d, &out.weight[l]);
+        hn::StoreU(hn::IfThenElse(active, u, one), d, &out.u[l]);
+        hn::StoreU(hn::IfThenElse(active, v, one), d, &out.v[l]);
+        hn::StoreU(hn::IfThenElse(active, hn::Mul(vy, inverseDet), one), d, &out.xu[l]);
+        hn::StoreU(hn::IfThenElseZero(active, hn::Neg(hn::Mul(uy, inverseDet))), d, &out.xv[l]);
+        hn::StoreU(hn::IfThenElseZero(active, hn::Neg(hn::Mul(vx, inverseDet))), d, &out.yu[l]);
+        hn::StoreU(hn::IfThenElse(active, hn::Mul(ux, inverseDet), one), d, &out.yv[l]);
     }
-    out.active = false;
-    out.plain = true;
+    const std::uint8_t* info = s.source->info.data();
+    const int stride = s.source->width;
+    const int lastX = stride - 1, lastY = s.source->height - 1;
+    alignas(64) std::int32_t pixel[kGroup];
+    for (int l = 0; l < kGroup; ++l)
+        pixel[l] = std::min(static_cast<int>(out.v[l]), lastY) * stride +
+                   std::min(static_cast<int>(out.u[l]), lastX);
+    alignas(64) std::int32_t edge[kGroup];
+    for (int l = 0; l < kGroup; ++l) edge[l] = info[pixel[l]] >> 4;
+    int any = 0, rough = 0;
     for (int l = 0; l < kGroup; ++l) {
-        if (l >= g.count || !(g.sources[l] & bit) || !(out.weight[l] > 0.0f)) {
-            out.weight[l] = 0.0f;
-            // A harmless place, so that no lane reads outside.
-            out.u[l] = out.v[l] = 4.0f;
-            out.xu[l] = out.yv[l] = 1.0f;
-            out.xv[l] = out.yu[l] = 0.0f;
-            continue;
-        }
-        const int edge =
-            s.source->edgeDistance(static_cast<int>(out.u[l]), static_cast<int>(out.v[l]));
-        out.weight[l] *= 0.01f + 0.99f * std::min(1.0f, static_cast<float>(edge) * (1.0f / 3.0f));
-        out.active = true;
-        if (edge < 3) out.plain = false;
+        const float e = std::min(static_cast<float>(edge[l]) * (1.0f / 3.0f), 1.0f);
+        const int on = out.weight[l] > 0.0f ? 1 : 0;
+        any |= on;
+        rough |= on & (edge[l] < 3 ? 1 : 0);
+        out.weight[l] *= 0.01f + 0.99f * e;
     }
+    out.active = any != 0;
+    out.plain = rough == 0;
 }
 
 /// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row.
@@ -244,32 +250,54 @@ HWY_INLINE void solveFirstRow(D d, const V* m, V ridge, V* out) {
     for (int i = 0; i < 5; ++i) out[i + 1] = hn::Neg(hn::Mul(y[i], first));
 }
 
-/// Adds the weighted taps of one lane to its colour.
-HWY_INLINE void fetch(const Source& source, int baseU, int baseV, bool inside,
-                      const float* HWY_RESTRICT weights, float colour[4]) {
-    const hn::CappedTag<float, 4> d;
-    const hn::Rebind<std::uint8_t, decltype(d)> d8;
-    const hn::Rebind<std::int32_t, decltype(d)> d32;
-    const Rgba8Image* bytes = source.view->texture.rgba8();
-    const RgbaFloatImage* floats = source.view->texture.rgbaFloat();
-    for (std::size_t channel = 0; channel < 4; channel += hn::Lanes(d)) {
-        auto sum = hn::Load(d, colour + channel);
-        for (int j = 0; j < kTaps; ++j) {
-            const int y = baseV + j;
-            if (!inside && (y < 0 || y >= source.height)) continue;
-            for (int i = 0; i < kTaps; ++i) {
-                const int x = baseU + i;
-                if (!inside && (x < 0 || x >= source.width)) continue;
-                const auto w = hn::Set(d, weights[j * kTaps + i]);
-                if (bytes) {
-                    const auto texel = hn::LoadU(d8, &bytes->at(x, y).x + channel);
-                    sum = hn::MulAdd(w, hn::ConvertTo(d, hn::PromoteTo(d32, texel)), sum);
-                } else {
-                    sum = hn::MulAdd(w, hn::LoadU(d, &floats->at(x, y).x + channel), sum);
-                }
-            }
+/// Running sums of one lane's colour: RGBA, several times over, to be added up at the end.
+struct alignas(64) ColourSum {
+    float v[16];
+};
+
+/// Adds the weighted taps of one lane, one by one: at borders and of float textures.
+HWY_NOINLINE void fetchSlowly(const Source& source, int baseU, int baseV, const Lanes* weights,
+                              int lane, ColourSum& sum) {
+    for (int j = 0; j < kTaps; ++j) {
+        for (int i = 0; i < kTaps; ++i) {
+            const int x = baseU + i, y = baseV + j;
+            if (!source.q.contains(x, y)) continue;
+            const float w = weights[j * kTaps + i][lane];
+            const glm::vec4 texel = source.view->texture.rgba8()
+                                        ? glm::vec4(source.view->texture.rgba8()->at(x, y))
+                                        : source.view->texture.rgbaFloat()->at(x, y);
+            for (int c = 0; c < 4; ++c) sum.v[c] += w * texel[c];
         }
-        hn::Store(sum, d, colour + channel);
+    }
+}
+
+/// The same where all taps are inside an 8-bit texture: a row of four texels at a time.
+HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const Lanes* weights, int lane,
+                          ColourSum& sum) {
+    const hn::CappedTag<float, 16> d;
+    using V = hn::Vec<decltype(d)>;
+    constexpr int kN = static_cast<int>(hn::MaxLanes(d));
+    if constexpr (kN < 4) {
+        for (int t = 0; t < kTaps * kTaps; ++t)
+            for (int c = 0; c < 4; ++c)
+                sum.v[c] += weights[t][lane] * texels[t / kTaps * stride + t % kTaps][c];
+    } else {
+        constexpr int kTexels = kN / 4;  // in one vector
+        const hn::Rebind<std::uint8_t, decltype(d)> d8;
+        const hn::RebindToSigned<decltype(d)> d32;
+        const auto lanes = hn::Iota(d32, 0);
+        const auto spread = hn::ShiftRight<2>(lanes);
+        V w[kTaps * kTaps / kN];
+        for (int k = 0; k < kTaps * kTaps / kN; ++k)
+            w[k] = hn::GatherIndex(d, &weights[k * kN][lane], hn::ShiftLeft<4>(lanes));
+        V acc = hn::Load(d, sum.v);
+        for (int t = 0; t < kTaps * kTaps; t += kTexels) {
+            const auto* from = &texels[t / kTaps * stride + t % kTaps].x;
+            const V texel = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, from)));
+            const auto indices = hn::IndicesFromVec(d, hn::Add(spread, hn::Set(d32, t % kN)));
+            acc = hn::MulAdd(hn::TableLookupLanes(w[t / kN], indices), texel, acc);
+        }
+        hn::Store(acc, d, sum.v);
     }
 }
 
@@ -289,14 +317,21 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         place(sources[static_cast<std::size_t>(s)], fromEye, g, 1u << s, views[s]);
         if (views[s].active) list[count++] = s;
     }
-    for (int l = 0; l < g.count; ++l) {
-        int top = -1;
-        for (int k = 0; k < count; ++k)
-            if (views[list[k]].weight[l] > 0.0f &&
-                (top < 0 || views[list[k]].weight[l] > views[top].weight[l]))
-                top = list[k];
-        best[l] = static_cast<std::int8_t>(top);
+    alignas(64) std::int32_t top[kGroup];
+    Lanes topWeight;
+    for (int l = 0; l < kGroup; ++l) {
+        top[l] = -1;
+        topWeight[l] = 0.0f;
     }
+    for (int k = 0; k < count; ++k) {
+        const View& view = views[list[k]];
+        for (int l = 0; l < kGroup; ++l) {
+            const bool better = view.weight[l] > topWeight[l];
+            topWeight[l] = better ? view.weight[l] : topWeight[l];
+            top[l] = better ? list[k] : top[l];
+        }
+    }
+    for (int l = 0; l < g.count; ++l) best[l] = static_cast<std::int8_t>(top[l]);
     if (count > settings.mostSources) {
         for (int l = 0; l < g.count; ++l) {
             float kept[32];
@@ -315,9 +350,10 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     for (int k = 0; k < count; ++k) {
         const int s = list[k];
         View& view = views[s];
-        for (int l = 0; l < kGroup; ++l) {
-            bases[s][0][l] = std::floor(view.u[l] - 0.5f) - 1.0f;
-            bases[s][1][l] = std::floor(view.v[l] - 0.5f) - 1.0f;
+        for (int l = 0; l < kGroup; l += n) {
+            const V shift = hn::Set(d, -1.5f);
+            hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.u[l]), shift)), d, &bases[s][0][l]);
+            hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.v[l]), shift)), d, &bases[s][1][l]);
         }
         if (!view.plain) {
             for (int l = 0; l < kGroup; ++l) {
@@ -378,12 +414,13 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         for (int i = 0; i < 6; ++i) hn::StoreU(row[i], d, &rows[i][l]);
     }
 
-    alignas(64) float colour[kGroup][4] = {};
+    ColourSum sums[kGroup] = {};
     alignas(64) float total[kGroup] = {};
     for (int k = 0; k < count; ++k) {
         const int s = list[k];
         const View& view = views[s];
         const Source& source = *sources[static_cast<std::size_t>(s)].source;
+        const Rgba8Image* bytes = source.view->texture.rgba8();
         for (int l = 0; l < kGroup; l += n) {
             const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
                                              1.0f / settings.kernel);
@@ -408,13 +445,15 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         }
         for (int l = 0; l < g.count; ++l) {
             if (!(view.weight[l] > 0.0f)) continue;
-            alignas(64) float weights[kTaps * kTaps];
-            for (int t = 0; t < kTaps * kTaps; ++t) weights[t] = kernels[s][t][l];
-            const int baseU = static_cast<int>(bases[s][0][l]),
-                      baseV = static_cast<int>(bases[s][1][l]);
-            const bool inside = baseU >= 0 && baseV >= 0 && baseU + kTaps <= source.width &&
-                                baseV + kTaps <= source.height;
-            fetch(source, baseU, baseV, inside, weights, colour[l]);
+            const int baseU = static_cast<int>(bases[s][0][l]);
+            const int baseV = static_cast<int>(bases[s][1][l]);
+            if (bytes && baseU >= 0 && baseV >= 0 && baseU + kTaps <= source.width &&
+                baseV + kTaps <= source.height) {
+                fetchRows(bytes->data() + static_cast<std::ptrdiff_t>(baseV) * source.width + baseU,
+                          source.width, kernels[s], l, sums[l]);
+            } else {
+                fetchSlowly(source, baseU, baseV, kernels[s], l, sums[l]);
+            }
         }
     }
     for (int l = 0; l < g.count; ++l) {
@@ -422,7 +461,10 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         const float scale = bytes ? 1.0f / 255.0f : 1.0f;
         if (total[l] > 0.5f) {
             const float f = scale / total[l];
-            glm::vec3 value(colour[l][0] * f, colour[l][1] * f, colour[l][2] * f);
+            glm::vec3 value;
+            for (int c = 0; c < 3; ++c)
+                value[c] =
+                    (sums[l].v[c] + sums[l].v[4 + c] + sums[l].v[8 + c] + sums[l].v[12 + c]) * f;
             value = glm::max(value, glm::vec3(0.0f));
             if (bytes) value = glm::min(value, glm::vec3(1.0f));
             colours[l] = value;

@@ -192,8 +192,8 @@ float unevenness(const Source& s) {
 void findLeaves(Source& s) {
     const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
     const double perPixel = 1.0 / (focal * (s.space.axis.inverse ? 1.0 : s.space.axis.unit));
-    const auto tolerance = static_cast<float>(std::clamp<double>(
-        1.5 * unevenness(s), kPlanarPixels * perPixel, 3 * kPlanarPixels * perPixel));
+    s.flat = static_cast<float>(std::clamp<double>(1.5 * unevenness(s), kPlanarPixels * perPixel,
+                                                   3 * kPlanarPixels * perPixel));
     std::vector<std::vector<Leaf>> rows(static_cast<std::size_t>(s.blocksY));
     parallelFor(0, s.blocksY, [&](std::int64_t by) {
         auto& leaves = rows[static_cast<std::size_t>(by)];
@@ -213,7 +213,7 @@ void findLeaves(Source& s) {
             block.qMin = low;
             block.qMax = high;
             block.leafBegin = static_cast<std::uint32_t>(leaves.size());
-            divide(s, x0, y0, kBlock, tolerance, block, leaves);
+            divide(s, x0, y0, kBlock, s.flat, block, leaves);
             block.leafEnd = static_cast<std::uint32_t>(leaves.size());
         }
     });

@@ -83,8 +83,9 @@ struct Source {
     int width = 0, height = 0;
     bool hasAlpha = false;  ///< some pixel is not fully covered
     float step = 0;         ///< scene units between neighbouring depth codes
-    double told = 1.0;      ///< share of the pixels of the object (points, or full alpha) with depth
-    Image<float> q;         ///< 0 = no point
+    double told = 1.0;  ///< share of the pixels of the object (points, or full alpha) with depth
+    float flat = 0;     ///< share of q by which pixels may leave the plane of a piece
+    Image<float> q;     ///< 0 = no point
 
     static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4;
     Image<std::uint8_t> info;  ///< the links, and the distance to the nearest edge << 4

@@ -121,6 +121,13 @@ Frame draw(const Bundle& bundle, const Camera& camera, RenderSettings settings =
     return std::move(*frame);
 }
 
+RenderSettings with(Quality quality, Fill fill = Fill::background) {
+    RenderSettings settings;
+    settings.quality = quality;
+    settings.fill = fill;
+    return settings;
+}
+
 double psnr(const Frame& frame, const Scene& scene, const Camera& camera) {
     double error = 0;
     for (int y = 0; y < camera.height; ++y) {
@@ -161,9 +168,9 @@ TEST(CpuSurface, ASourcesOwnPoseComesBackExactly) {
 TEST(CpuSurface, NovelViewsMatchTheScene) {
     const Bundle bundle = bundleOf(ball, around());
     const Camera novel = at({0.7, 0.5, 2.8});
-    EXPECT_GT(psnr(draw(bundle, novel, {.quality = Quality::draft}), ball, novel), 30.0);
-    EXPECT_GT(psnr(draw(bundle, novel, {.quality = Quality::normal}), ball, novel), 36.0);
-    EXPECT_GT(psnr(draw(bundle, novel, {.quality = Quality::best}), ball, novel), 38.0);
+    EXPECT_GT(psnr(draw(bundle, novel, with(Quality::draft)), ball, novel), 30.0);
+    EXPECT_GT(psnr(draw(bundle, novel, with(Quality::normal)), ball, novel), 36.0);
+    EXPECT_GT(psnr(draw(bundle, novel, with(Quality::best)), ball, novel), 38.0);
 }
 
 TEST(CpuSurface, MapsBetweenBothProjections) {
@@ -194,7 +201,7 @@ TEST(CpuSurface, GeneralIntrinsics) {
 TEST(CpuSurface, SilhouettesAreAntiAliased) {
     const Bundle bundle = bundleOf(ball, around());
     const Camera novel = at({0.7, 0.5, 2.8});
-    const Frame frame = draw(bundle, novel, {.quality = Quality::best});
+    const Frame frame = draw(bundle, novel, with(Quality::best));
     double truth = 0;
     int partial = 0;
     for (int y = 0; y < novel.height; ++y) {
@@ -263,7 +270,7 @@ TEST(CpuSurface, WhatNobodySawIsFilledFromTheBackground) {
     };
     const Bundle bundle = bundleOf(room, {at({0, 0, 3}, {0, 0, 0})});
     const Camera novel = at({0.8, 0, 2.9}, {0.8, 0, 0});
-    const Frame open = draw(bundle, novel, {.fill = Fill::none});
+    const Frame open = draw(bundle, novel, with(Quality::normal, Fill::none));
     const Frame filled = draw(bundle, novel);
     int holes = 0;
     for (int y = 20; y < 140; ++y) {
@@ -284,11 +291,11 @@ TEST(CpuSurface, TheSameBytesOnAnyNumberOfThreads) {
         Frame one, many;
         {
             const ThreadLimit limit(1);
-            one = draw(bundle, novel, {.quality = quality});
+            one = draw(bundle, novel, with(quality));
         }
         {
             const ThreadLimit limit(4);
-            many = draw(bundle, novel, {.quality = quality});
+            many = draw(bundle, novel, with(quality));
         }
         EXPECT_EQ(one.colour, many.colour);
         EXPECT_EQ(one.depth, many.depth);
