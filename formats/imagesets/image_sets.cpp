@@ -1,0 +1,123 @@
+#include "formats/imagesets/image_sets.hpp"
+
+#include <set>
+
+#include "formats/images/images.hpp"
+#include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/recognise.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+using namespace imagesets;
+
+Result<SetDescription> describe(const std::filesystem::path& path, const ImageSetOptions& options,
+                                Job& job) {
+    std::string kind = options.from;
+    if (kind.empty()) {
+        STX_TRY(kind, recogniseImageSet(path));
+    }
+    std::error_code ec;
+    if (!std::filesystem::exists(path, ec))
+        return failAt(inQuotes(path.string()), ErrorCode::io, "there is no such file or folder");
+    const KindEntry* entry = kindNamed(kind);
+    if (!entry) {
+        std::string known;
+        for (const ImageSetKind& k : imageSetKinds())
+            known += fmt::format("{}{}", known.empty() ? "" : ", ", k.name);
+        return fail(ErrorCode::usage, "'{}' is no kind of image set; known are {}", kind, known);
+    }
+    return entry->describe(path, options, job);
+}
+
+Result<void> checkOptions(const ImageSetOptions& o) {
+    if (o.depthBits != 8 && o.depthBits != 16 && o.depthBits != 32)
+        return fail(ErrorCode::usage, "depth in {} bits; 8, 16 and 32 are possible", o.depthBits);
+    if (o.frame < 0) return fail(ErrorCode::usage, "frame {}; frames count from 0", o.frame);
+    if (o.every < 1) return fail(ErrorCode::usage, "each {}-th view; 1 is the least", o.every);
+    if ((o.depthMin != 0 || o.depthMax != 0) && !(o.depthMin > 0 && o.depthMin < o.depthMax))
+        return fail(ErrorCode::usage,
+                    "the depth range is {:g} to {:g}; the least must be above 0 and below the "
+                    "greatest",
+                    o.depthMin, o.depthMax);
+    return {};
+}
+
+/// Names become part and file names: each is there once.
+void makeNamesUnique(std::vector<ReferenceView>& views) {
+    std::set<std::string> taken;
+    for (ReferenceView& view : views) {
+        if (view.name.empty()) view.name = "view";
+        std::string name = view.name;
+        for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", view.name, i);
+        view.name = std::move(name);
+    }
+}
+
+}  // namespace
+
+Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
+                            Job& job) {
+    STX_CHECK(checkOptions(options));
+    preloadCodecs();
+    STX_TRY(SetDescription set, describe(path, options, job));
+    const std::string where = inQuotes(path.string());
+    if (options.every > 1) {
+        std::vector<SetView> some;
+        for (std::size_t i = 0; i < set.views.size(); i += static_cast<std::size_t>(options.every))
+            some.push_back(std::move(set.views[i]));
+        set.views = std::move(some);
+    }
+    if (set.views.empty())
+        return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+    if (options.frame >= set.frames)
+        return failAt(where, ErrorCode::invalidInput,
+                      "frame {} is asked for, but the set has {} (from 0)", options.frame,
+                      set.frames);
+    STX_CHECK(checkViewCount(set.views.size(), job.limits, where));
+    std::uint64_t pixels = 0;
+    for (const SetView& view : set.views)
+        pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
+    STX_CHECK(within(
+        where, job.limits.checkAllocation(
+                   pixels, sizeof(float) + sizeof(glm::u8vec4),
+                   fmt::format("{} views (take each N-th with --every N)", set.views.size()))));
+
+    const auto count = static_cast<std::int64_t>(set.views.size());
+    std::vector<Result<std::vector<ReferenceView>>> loaded(set.views.size());
+    std::atomic<std::int64_t> done = 0;
+    std::atomic<bool> failed = false;
+    parallelFor(0, count, [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        if (failed) return;
+        try {
+            loaded[at] = loadSetView(set.views[at], options, job);
+        } catch (const std::bad_alloc&) {
+            loaded[at] = fail(ErrorCode::failed, "view '{}': there is not enough memory",
+                              set.views[at].name);
+        }
+        if (!loaded[at]) failed = true;
+        job.progress(++done, count, "reading views");
+    });
+    Bundle bundle;
+    bundle.title = std::move(set.title);
+    for (auto& views : loaded) {
+        if (!views) return tl::unexpected(views.error().at(where));
+        for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));
+    }
+    makeNamesUnique(bundle.views);
+    if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
+    bundle.bounds = bundle.computeBounds();
+    return bundle;
+}
+
+Result<int> imageSetFrameCount(const std::filesystem::path& path, const ImageSetOptions& options,
+                               Job& job) {
+    STX_CHECK(checkOptions(options));
+    STX_TRY(const SetDescription set, describe(path, options, job));
+    return set.frames;
+}
+
+}  // namespace stx

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+
+/// Photographs with depth and cameras, as other programs leave them. Axes, pixel centres and the
+/// meaning of depth of every kind: formats/imagesets/README.md.
+namespace stx {
+
+enum class MixedPixels {
+    automatic,  ///< dropped from sensors' and reconstructed depth (TUM, 7-Scenes, COLMAP)
+    drop,
+    keep,
+};
+
+/// How pictures stored as Y, Cb, Cr become RGB.
+struct YuvColour {
+    bool bt601 = false;      ///< the matrix of BT.601 instead of BT.709
+    bool fullRange = false;  ///< 0..255 instead of 16..235 (of 8 bits)
+};
+
+struct ImageSetOptions {
+    std::string from;  ///< one of imageSetKinds(); empty = recognise
+    int frame = 0;     ///< of sets that have time, from 0
+    int every = 1;     ///< takes each N-th view, for recordings of thousands
+    /// Depth range that the set itself does not tell (MSR), scene units; 0, 0 = not given.
+    double depthMin = 0, depthMax = 0;
+    /// Names of the images relative to the set's folder with {name} {w} {h} {format} {frame}
+    /// {frame:04} in them (MIV); empty = the usual names.
+    std::string texturePattern, depthPattern;
+    /// Older Middlebury sets: focal length in pixels, scene units from the first to the last view,
+    /// and what is added to a disparity (dmin of 2006); 0 = not given.
+    double focal = 0, baseline = 0, disparityOffset = 0;
+    /// Stored value of one pixel of disparity (Middlebury 2001: 8, 2003: 4 at quarter size).
+    double disparityScale = 1;
+    /// fx, fy, cx, cy of TUM and 7-Scenes recordings whose folder does not tell, in pixels as these
+    /// sets count them (the first pixel's centre is 0, 0); fx = 0: not given.
+    double intrinsics[4] = {0, 0, 0, 0};
+    MixedPixels mixedPixels = MixedPixels::automatic;
+    YuvColour yuv;
+    int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
+};
+
+/// A kind of image set, for `--from` and its help.
+struct ImageSetKind {
+    std::string_view name;
+    std::string_view description;
+};
+[[nodiscard]] const std::vector<ImageSetKind>& imageSetKinds();
+
+/// The kind of the set that a file or folder is. Looks at names and the first bytes only. Errors:
+/// io when there is nothing, invalidInput when it is no image set, with what was looked for.
+[[nodiscard]] Result<std::string> recogniseImageSet(const std::filesystem::path& path);
+
+/// Reads one frame of a set. Cameras are exact; lens distortion and skew are undone and rotations
+/// repaired, with a note of their size in pixels. Depth that is unknown is no part of the object;
+/// nearPlane and farPlane of each view are fitted. Several views at a time, in the memory of one
+/// per thread beside the bundle. Errors: io, usage (an option that this kind needs or does not
+/// have), invalidInput with file and line or key.
+[[nodiscard]] Result<Bundle> readImageSet(const std::filesystem::path& path,
+                                          const ImageSetOptions& options, Job& job);
+
+/// Frames of a set that has time, 1 for others.
+[[nodiscard]] Result<int> imageSetFrameCount(const std::filesystem::path& path,
+                                             const ImageSetOptions& options, Job& job);
+
+}  // namespace stx

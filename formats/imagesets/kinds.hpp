@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "formats/imagesets/camera_file.hpp"
+#include "formats/imagesets/json_values.hpp"
+#include "formats/imagesets/set_view.hpp"
+
+/// One describe function for each kind of set: cameras, and where the images are. None reads a
+/// pixel. `path` is the file or folder given.
+namespace stx::imagesets {
+
+using std::filesystem::path;
+
+[[nodiscard]] Result<SetDescription> describeTransforms(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeMiv(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeMsr(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeColmap(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeMiddlebury(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeRgbd(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeSevenScenes(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeExr(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeCamerasJson(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describePanorama(const path&, const ImageSetOptions&, Job&);
+
+/// What a JSON file with cameras is.
+enum class JsonKind { transforms, miv, cameras, none };
+[[nodiscard]] JsonKind jsonKindOf(const Json& file);
+/// Reads and parses a JSON file; errors name it.
+[[nodiscard]] Result<Json> readJson(const path& file, const Limits& limits);
+
+/// The views of a JSON's cameras without their images, in the file's order.
+[[nodiscard]] Result<std::vector<SetView>> transformsViews(const Json& file, Job& job);
+[[nodiscard]] Result<std::vector<SetView>> mivViews(const Json& file, Job& job);
+[[nodiscard]] Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job);
+
+/// The file in `folder` that has one of these names, in that order; empty when there is none.
+[[nodiscard]] std::string firstThere(const path& folder, const std::vector<std::string>& names);
+/// `name` as given, or with the ending of a usual image format.
+[[nodiscard]] std::string withImageEnding(const path& folder, const std::string& name);
+/// resolveInside with the place of the error; fills path and name.
+[[nodiscard]] Result<PictureSource> sourceInside(const path& folder, const std::string& name,
+                                                 const std::string& where, const Limits& limits);
+/// Names of the regular files in a folder, sorted.
+[[nodiscard]] std::vector<std::string> filesIn(const path& folder);
+/// Errors when there are more views than limits.maxViews.
+[[nodiscard]] Result<void> checkViewCount(std::uint64_t count, const Limits& limits,
+                                          const std::string& where);
+
+}  // namespace stx::imagesets

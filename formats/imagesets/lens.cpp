@@ -1,0 +1,52 @@
+#include "formats/imagesets/lens.hpp"
+
+#include <algorithm>
+
+namespace stx::imagesets {
+
+glm::dvec2 Lens::realFromIdeal(const Camera& c, glm::dvec2 pixel) const {
+    const double x = (pixel.x - c.cx) / c.fx;
+    const double y = (pixel.y - c.cy) / c.fy;
+    const double r2 = x * x + y * y;
+    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
+    const double yd = y * radial + 2.0 * p2 * x * y + p1 * (r2 + 2.0 * y * y);
+    return {c.fx * xd + skew * yd + c.cx, c.fy * yd + c.cy};
+}
+
+namespace {
+
+constexpr int kGrid = 64;  ///< cells of the grid on which the mapping is judged
+
+template <class Visit>
+void overGrid(const Camera& c, const Visit& visit) {
+    for (int j = 0; j <= kGrid; ++j)
+        for (int i = 0; i <= kGrid; ++i)
+            visit(glm::dvec2(c.width * static_cast<double>(i) / kGrid,
+                             c.height * static_cast<double>(j) / kGrid));
+}
+
+}  // namespace
+
+double Lens::largestShift(const Camera& c) const {
+    double largest = 0;
+    overGrid(c, [&](glm::dvec2 p) {
+        largest = std::max(largest, glm::length(realFromIdeal(c, p) - p));
+    });
+    return largest;
+}
+
+bool Lens::invertible(const Camera& c) const {
+    bool fine = true;
+    overGrid(c, [&](glm::dvec2 p) {
+        const glm::dvec2 here = realFromIdeal(c, p);
+        const glm::dvec2 dx = realFromIdeal(c, p + glm::dvec2(0.5, 0)) - here;
+        const glm::dvec2 dy = realFromIdeal(c, p + glm::dvec2(0, 0.5)) - here;
+        // Where the picture itself is looked at; beyond it, nothing is fetched.
+        const bool inside = here.x >= 0 && here.y >= 0 && here.x <= c.width && here.y <= c.height;
+        if (inside && !(dx.x * dy.y - dx.y * dy.x > 1e-3)) fine = false;
+    });
+    return fine;
+}
+
+}  // namespace stx::imagesets

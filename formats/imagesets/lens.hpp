@@ -1,0 +1,29 @@
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "lib/geometry/camera.hpp"
+
+namespace stx::imagesets {
+
+/// What a real camera does to an ideal pinhole's picture. Coordinates as in OpenCV and COLMAP: x
+/// right, y down, of the plane at distance 1:
+/// x' = x (1 + k1 r2 + k2 r4 + k3 r6) + 2 p1 x y + p2 (r2 + 2 x x), y' alike; then the image point
+/// is (fx x' + skew y' + cx, fy y' + cy). SIMPLE_RADIAL: k1; RADIAL: k1 k2; OPENCV: k1 k2 p1 p2.
+struct Lens {
+    double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0;
+    double skew = 0;  ///< pixels
+
+    [[nodiscard]] bool ideal() const { return !distorts() && skew == 0; }
+    [[nodiscard]] bool distorts() const {
+        return k1 != 0 || k2 != 0 || k3 != 0 || p1 != 0 || p2 != 0;
+    }
+    /// Where the pixel position of the ideal pinhole is in the real picture.
+    [[nodiscard]] glm::dvec2 realFromIdeal(const Camera& camera, glm::dvec2 pixel) const;
+    /// The largest shift over the picture, in pixels.
+    [[nodiscard]] double largestShift(const Camera& camera) const;
+    /// The mapping does not fold inside the picture: it can be undone.
+    [[nodiscard]] bool invertible(const Camera& camera) const;
+};
+
+}  // namespace stx::imagesets

@@ -1,0 +1,220 @@
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "formats/imagesets/mixed_pixels.hpp"
+#include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/resample.hpp"
+#include "formats/imagesets/set_view.hpp"
+#include "lib/capture/capture.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+/// The two images have the same shape but for the rounding of one pixel.
+bool sameShape(int w1, int h1, int w2, int h2) {
+    const double difference = std::abs(static_cast<double>(w1) * h2 - static_cast<double>(w2) * h1);
+    return difference <= std::max({w1, h1, w2, h2});
+}
+
+/// Fills in a camera that has no size, and errors when sizes disagree.
+Result<Camera> cameraOfSize(const SetView& set, int width, int height) {
+    Camera c = set.camera;
+    if (c.width == 0) {
+        c.width = width;
+        c.height = height;
+        if (!set.panorama) {
+            c.fx = width * 0.5 / std::tan(set.angleX * 0.5);
+            c.fy = set.angleY > 0 ? height * 0.5 / std::tan(set.angleY * 0.5) : c.fx;
+        }
+        c.cx = width * 0.5;
+        c.cy = height * 0.5;
+    }
+    if (c.width != width || c.height != height)
+        return fail(ErrorCode::invalidInput,
+                    "'{}' is {}x{}, but the camera '{}' has {}x{} pixels; both must match",
+                    set.texture.name, width, height, set.name, c.width, c.height);
+    if (auto ok = c.check(); !ok)
+        return tl::unexpected(ok.error().at(fmt::format("camera '{}'", set.name)));
+    return c;
+}
+
+/// Where there is no point there is no object. Partly covered pixels of the set's own alpha stay:
+/// they are the silhouette of points beside them.
+void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha) {
+    const auto work = [&](auto& image, auto full) {
+        for (std::size_t i = 0; i < depth.count(); ++i) {
+            auto& alpha = image.data()[i].a;
+            if (!ownAlpha) alpha = full;
+            if (alpha == 0) depth.data()[i] = kNoDepth;
+            if (!hasPoint(depth.data()[i]) && alpha == full) alpha = 0;
+        }
+    };
+    if (auto* bytes = texture.rgba8())
+        work(*bytes, std::uint8_t{255});
+    else
+        work(*texture.rgbaFloat(), 1.0f);
+}
+
+std::int64_t countPoints(const Image<float>& depth) {
+    return std::count_if(depth.pixels().begin(), depth.pixels().end(),
+                         [](float d) { return hasPoint(d); });
+}
+
+Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options, Job& job) {
+    if (set.load) return set.load(set, job);
+    StoredView stored;
+    STX_TRY(auto colour, readColour(set.texture, options.yuv, job));
+    stored.texture = std::move(colour.texture);
+    stored.alpha = colour.alpha;
+    STX_TRY(auto depth, readDepth(set.depth, job));
+    stored.depth = std::move(depth.values);
+    stored.depthBits = depth.bits;
+    return stored;
+}
+
+/// Sets nearPlane, farPlane and depthBits.
+void setPlanes(ReferenceView& view, const SetView& set, const ImageSetOptions& options, Job& job) {
+    if (set.planes && set.depthBits != 0 && set.depthBits == options.depthBits) {
+        const bool holdsAll =
+            std::all_of(view.depth.pixels().begin(), view.depth.pixels().end(), [&](float d) {
+                return !hasPoint(d) || (d >= static_cast<float>(set.planes->nearPlane) &&
+                                        d <= static_cast<float>(set.planes->farPlane));
+            });
+        if (holdsAll) {
+            view.nearPlane = set.planes->nearPlane;
+            view.farPlane = set.planes->farPlane;
+            view.depthBits = set.depthBits;
+            if (set.depthBits == 32) return;
+            const DepthCode code = view.depthCode();
+            for (float& d : view.depth.pixels())
+                if (hasPoint(d)) d = static_cast<float>(code.decode(code.encode(d)));
+            return;
+        }
+    }
+    view.depthBits = options.depthBits;
+    fitDepthRange(view);
+    if (view.depthBits == 8)
+        job.note(fmt::format(
+            "view '{}': depth in 8 bits is exact to {:.3g} scene units (16 bits: "
+            "{:.2g})",
+            view.name, view.depthCode().step() / 2, (view.farPlane - view.nearPlane) / 65534 / 2));
+}
+
+Result<ReferenceView> finish(const SetView& set, std::string name, const Camera& camera,
+                             Texture texture, Image<float> depth, bool ownAlpha,
+                             const ImageSetOptions& options, Job& job) {
+    coverOnlyPoints(texture, depth, ownAlpha);
+    ReferenceView view;
+    view.name = std::move(name);
+    view.camera = camera;
+    view.texture = std::move(texture);
+    view.depth = std::move(depth);
+    if (view.pointCount() == 0) return view;
+    bleedColour(view.texture);
+    setPlanes(view, set, options, job);
+    return view;
+}
+
+}  // namespace
+
+void dropImpossible(Image<float>& distances) {
+    for (float& d : distances.pixels())
+        if (!(d > 0 && d < 1e9f)) d = kNoDepth;
+}
+
+std::function<Result<void>(Image<float>&, const Camera&, int)> scaledIntegers(double unit,
+                                                                              float alsoNone) {
+    return [unit, alsoNone](Image<float>& values, const Camera&, int) -> Result<void> {
+        for (float& v : values.pixels())
+            v = v == 0 || v == alsoNone ? kNoDepth : static_cast<float>(v * unit);
+        return {};
+    };
+}
+
+Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSetOptions& options,
+                                               Job& job) {
+    STX_CHECK(job.checkCancelled());
+    STX_TRY(StoredView stored, readImages(set, options, job));
+    const int tw = stored.texture.width(), th = stored.texture.height();
+    const int dw = stored.depth.width(), dh = stored.depth.height();
+    STX_TRY(Camera camera, cameraOfSize(set, tw, th));
+    if (tw != dw || th != dh) {
+        if (!sameShape(tw, th, dw, dh))
+            return fail(ErrorCode::invalidInput,
+                        "'{}' is {}x{} but its depth '{}' is {}x{}; both must match, or have the "
+                        "same shape",
+                        set.texture.name, tw, th, set.depth.name, dw, dh);
+        job.note(fmt::format("images of {}x{} are resampled to the size of their depth, {}x{}", tw,
+                             th, dw, dh));
+        stored.texture = resizeTexture(stored.texture, dw, dh);
+        camera = camera.resized(dw, dh);
+    }
+    if (set.distances) {
+        if (auto ok = set.distances(stored.depth, camera, stored.depthBits); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("'{}'", set.depth.name)));
+    }
+    dropImpossible(stored.depth);
+    if (countPoints(stored.depth) == 0)
+        return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
+                      "not one of its {}x{} pixels has a valid depth; at least one is needed", dw,
+                      dh);
+
+    const bool drop = options.mixedPixels == MixedPixels::drop ||
+                      (options.mixedPixels == MixedPixels::automatic && set.sensor);
+    if (drop) {
+        const std::int64_t dropped = dropMixedPixels(stored.depth);
+        if (dropped > 0)
+            job.note(fmt::format("view '{}': {} mixed pixels at depth edges are dropped ({:.2g} %)",
+                                 set.name, dropped,
+                                 100.0 * static_cast<double>(dropped) / stored.depth.count()));
+        if (countPoints(stored.depth) == 0)
+            return failAt(
+                fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
+                "all of its pixels look like noise at depth edges; keep them, if they are "
+                "not");
+    }
+
+    std::vector<ReferenceView> views;
+    if (set.panorama) {
+        static constexpr const char* kFaces[6] = {"front", "left", "back", "right", "up", "down"};
+        const auto faces = cubeFaces(camera, *set.panorama, dw, dh);
+        for (std::size_t i = 0; i < faces.size(); ++i) {
+            auto [texture, depth] =
+                faceOfPanorama(stored.texture, stored.depth, faces[i], camera, *set.panorama);
+            STX_TRY(auto view, finish(set, fmt::format("{}_{}", set.name, kFaces[i]), faces[i],
+                                      std::move(texture), std::move(depth), true, options, job));
+            if (view.pointCount() > 0) views.push_back(std::move(view));
+        }
+        if (views.empty())
+            return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
+                          "no cube face of the panorama has a valid depth");
+        return views;
+    }
+    if (!set.lens.ideal()) {
+        if (!set.lens.invertible(camera))
+            return failAt(fmt::format("camera '{}'", set.name), ErrorCode::invalidInput,
+                          "the lens distortion folds the picture; k1 = {:g}, k2 = {:g}, k3 = {:g}, "
+                          "p1 = {:g}, p2 = {:g} cannot be undone",
+                          set.lens.k1, set.lens.k2, set.lens.k3, set.lens.p1, set.lens.p2);
+        const double shift = set.lens.largestShift(camera);
+        const char* what = !set.lens.distorts() ? "skew"
+                           : set.lens.skew != 0 ? "lens distortion and skew"
+                                                : "lens distortion";
+        job.note(fmt::format("view '{}': {} of up to {:.2f} pixels undone by resampling", set.name,
+                             what, shift));
+        auto [texture, depth] = undistort(stored.texture, stored.depth, camera, set.lens);
+        stored.texture = std::move(texture);
+        stored.depth = std::move(depth);
+        stored.alpha = true;  // what lies outside the real picture is transparent
+    }
+    STX_TRY(auto view, finish(set, set.name, camera, std::move(stored.texture),
+                              std::move(stored.depth), stored.alpha, options, job));
+    if (view.pointCount() == 0)
+        return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
+                      "every pixel with a valid depth is transparent or outside the picture");
+    views.push_back(std::move(view));
+    return views;
+}
+
+}  // namespace stx::imagesets

@@ -1,0 +1,256 @@
+#include "formats/imagesets/pictures.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+
+#include "formats/images/images.hpp"
+#include "formats/imagesets/messages.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+std::string_view textOf(ByteSpan bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// An OpenEXR's data window laid into its display window, which is the picture that the camera saw.
+void placeInDisplay(DecodedImage& image) {
+    auto* values = std::get_if<std::vector<float>>(&image.values);
+    const bool same = image.originX == 0 && image.originY == 0 &&
+                      image.displayWidth == image.width && image.displayHeight == image.height;
+    if (!values || same || image.displayWidth < 1 || image.displayHeight < 1) return;
+    const auto step = static_cast<std::size_t>(image.channels);
+    std::vector<float> placed(step * static_cast<std::size_t>(image.displayWidth) *
+                              static_cast<std::size_t>(image.displayHeight));
+    const int x0 = std::max(0, image.originX);
+    const int x1 = std::min(image.displayWidth, image.originX + image.width);
+    for (int y = std::max(0, image.originY);
+         y < std::min(image.displayHeight, image.originY + image.height) && x0 < x1; ++y) {
+        const auto row = static_cast<std::size_t>(y - image.originY) * image.width;
+        std::copy_n(values->data() + (row + static_cast<std::size_t>(x0 - image.originX)) * step,
+                    static_cast<std::size_t>(x1 - x0) * step,
+                    placed.data() + (static_cast<std::size_t>(y) * image.displayWidth + x0) * step);
+    }
+    image.values = std::move(placed);
+    image.width = image.displayWidth;
+    image.height = image.displayHeight;
+}
+
+Result<DecodedImage> decode(const PictureSource& source, Job& job) {
+    STX_TRY(const auto bytes, readFile(source.path, job.limits));
+    auto image = decodeImage(bytes, source.name, job.limits);
+    if (image) {
+        const auto pixels = static_cast<std::uint64_t>(std::max(0, image->displayWidth)) *
+                            static_cast<std::uint64_t>(std::max(0, image->displayHeight));
+        STX_CHECK(job.limits.checkAllocation(pixels, 8ull * image->channels, "an image"));
+        placeInDisplay(*image);
+    }
+    if (image && (image->width < 1 || image->height < 1))
+        return failAt(inQuotes(source.name), ErrorCode::invalidInput, "the image has no pixels");
+    return image;
+}
+
+/// The image's channel that holds depth: Z before other names, or the only one.
+Result<int> depthChannel(const DecodedImage& image, std::string_view name) {
+    const auto& names = image.channelNames;
+    const auto find = [&](auto matches) {
+        const auto it = std::find_if(names.begin(), names.end(), matches);
+        return it == names.end() ? -1 : static_cast<int>(it - names.begin());
+    };
+    int at = find([](const std::string& n) { return n == "Z"; });
+    if (at < 0) at = find([](const std::string& n) { return n.ends_with(".Z"); });
+    for (const char* other : {"depth", "Depth", "V", "Depth.V"})
+        if (at < 0) at = find([&](const std::string& n) { return n == other; });
+    if (at >= 0) return at;
+    if (image.channels <= 2) return 0;
+    // Blender and others write a depth three times, as grey.
+    const bool grey = std::visit(
+        [&](const auto& values) {
+            const std::size_t step = static_cast<std::size_t>(image.channels);
+            for (std::size_t i = 0; i + 2 < values.size(); i += step)
+                if (values[i] != values[i + 1] || values[i] != values[i + 2]) return false;
+            return true;
+        },
+        image.values);
+    if (grey) return 0;
+    return failAt(inQuotes(name), ErrorCode::invalidInput,
+                  "{} channels of different values; a depth image has one, or one named Z",
+                  image.channels);
+}
+
+Result<Image<float>> floatsFrom(ByteSpan bytes, int width, int height, bool littleEndian,
+                                int channels, std::string_view name) {
+    const std::uint64_t need = static_cast<std::uint64_t>(width) * height * channels * 4;
+    if (bytes.size() < need)
+        return failAt(inQuotes(name), ErrorCode::invalidInput,
+                      "{} bytes of pixels; {}x{} floats need {} (is the file cut short?)",
+                      bytes.size(), width, height, need);
+    Image<float> out(width, height);
+    const auto* from = reinterpret_cast<const std::uint8_t*>(bytes.data());
+    for (std::size_t i = 0; i < out.count(); ++i) {
+        const std::uint8_t* b = from + i * 4 * static_cast<std::size_t>(channels);
+        const std::uint32_t bits =
+            littleEndian ? b[0] | b[1] << 8 | b[2] << 16 | static_cast<std::uint32_t>(b[3]) << 24
+                         : b[3] | b[2] << 8 | b[1] << 16 | static_cast<std::uint32_t>(b[0]) << 24;
+        out.data()[i] = std::bit_cast<float>(bits);
+    }
+    return out;
+}
+
+Result<void> checkSide(double width, double height, std::string_view name, const Limits& limits) {
+    if (!(width >= 1 && height >= 1 && width <= limits.maxImageSide &&
+          height <= limits.maxImageSide))
+        return failAt(inQuotes(name), ErrorCode::invalidInput,
+                      "the image claims {}x{} pixels; each side must be 1 to {}", width, height,
+                      limits.maxImageSide);
+    return {};
+}
+
+}  // namespace
+
+Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour, Job& job) {
+    StoredColour out;
+    if (source.yuv) {
+        STX_TRY(auto image,
+                readYuvColour(source.path, *source.yuv, source.frame, colour, job.limits));
+        if (source.yuv->bits > 8)
+            job.note(fmt::format("colour of {} bits is rounded to 8", source.yuv->bits));
+        out.texture = std::move(image);
+        return out;
+    }
+    STX_TRY(auto image, decode(source, job));
+    const auto hasName = [&](std::string_view n) {
+        return std::find(image.channelNames.begin(), image.channelNames.end(), n) !=
+               image.channelNames.end();
+    };
+    out.alpha =
+        image.channelNames.empty() ? image.channels == 2 || image.channels == 4 : hasName("A");
+    if (image.bits() < 32) {
+        if (image.bits() == 16) job.note("colour of 16 bits is rounded to 8");
+        out.texture = rgba8From(image);
+        return out;
+    }
+    // Channels by their names: R G B, or one grey for all three.
+    const auto channel = [&](std::string_view n) {
+        const auto it = std::find(image.channelNames.begin(), image.channelNames.end(), n);
+        return it == image.channelNames.end() ? -1
+                                              : static_cast<int>(it - image.channelNames.begin());
+    };
+    int at[4] = {channel("R"), channel("G"), channel("B"), channel("A")};
+    if (at[0] < 0 && at[1] < 0 && at[2] < 0) {
+        const int grey = channel("Y") >= 0 ? channel("Y") : image.channels <= 2 ? 0 : -1;
+        if (grey < 0)
+            return failAt(inQuotes(source.name), ErrorCode::invalidInput,
+                          "there are no channels R, G, B or Y in it");
+        at[0] = at[1] = at[2] = grey;
+    }
+    const auto& values = std::get<std::vector<float>>(image.values);
+    RgbaFloatImage pixels(image.width, image.height);
+    for (std::size_t i = 0; i < pixels.count(); ++i) {
+        glm::vec4 p(0, 0, 0, 1);
+        for (int k = 0; k < 4; ++k) {
+            if (at[k] < 0) continue;
+            const float v = values[i * static_cast<std::size_t>(image.channels) +
+                                   static_cast<std::size_t>(at[k])];
+            if (!std::isfinite(v))
+                return failAt(inQuotes(source.name), ErrorCode::invalidInput,
+                              "a colour at column {}, row {} is not finite",
+                              i % static_cast<std::size_t>(image.width),
+                              i / static_cast<std::size_t>(image.width));
+            p[k] = v;
+        }
+        if (at[3] >= 0) {
+            p.a = std::clamp(p.a, 0.0f, 1.0f);
+            if (image.premultiplied && p.a > 0) p = glm::vec4(glm::vec3(p) / p.a, p.a);
+        }
+        pixels.data()[i] = p;
+    }
+    out.texture = std::move(pixels);
+    return out;
+}
+
+Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
+    StoredDepth out;
+    if (source.yuv) {
+        out.bits = source.yuv->bits;
+        STX_TRY(out.values, readYuvLuma(source.path, *source.yuv, source.frame, job.limits));
+        return out;
+    }
+    if (source.colmap || source.path.extension() == ".pfm") {
+        STX_TRY(const auto bytes, readFile(source.path, job.limits));
+        const auto parse = source.colmap ? parseColmapDepth : parsePfm;
+        STX_TRY(out.values, parse(bytes, source.name, job.limits));
+        return out;
+    }
+    STX_TRY(const auto image, decode(source, job));
+    out.bits = image.bits();
+    STX_TRY(const int channel, depthChannel(image, source.name));
+    out.values = Image<float>(image.width, image.height);
+    std::visit(
+        [&](const auto& values) {
+            for (std::size_t i = 0; i < out.values.count(); ++i)
+                out.values.data()[i] =
+                    static_cast<float>(values[i * static_cast<std::size_t>(image.channels) +
+                                              static_cast<std::size_t>(channel)]);
+        },
+        image.values);
+    return out;
+}
+
+Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name, const Limits& limits) {
+    const std::string_view text = textOf(bytes).substr(0, 200);
+    const auto complain = [&] {
+        return failAt(inQuotes(name), ErrorCode::invalidInput,
+                      "the header is no PFM's: 'Pf', width, height and scale are expected");
+    };
+    if (!text.starts_with("Pf") && !text.starts_with("PF")) return complain();
+    const int channels = text[1] == 'F' ? 3 : 1;
+    std::size_t at = 2;
+    double numbers[3];
+    for (double& number : numbers) {
+        while (at < text.size() &&
+               (text[at] == ' ' || text[at] == '\n' || text[at] == '\r' || text[at] == '\t'))
+            ++at;
+        const auto [next, error] =
+            std::from_chars(text.data() + at, text.data() + text.size(), number);
+        if (error != std::errc() || !std::isfinite(number)) return complain();
+        at = static_cast<std::size_t>(next - text.data());
+    }
+    if (at < text.size() && text[at] == '\r') ++at;
+    if (at >= text.size() || (text[at] != '\n' && text[at] != ' ')) return complain();
+    ++at;
+    STX_CHECK(checkSide(numbers[0], numbers[1], name, limits));
+    const int width = static_cast<int>(numbers[0]), height = static_cast<int>(numbers[1]);
+    if (width != numbers[0] || height != numbers[1] || numbers[2] == 0) return complain();
+    STX_TRY(auto upsideDown,
+            floatsFrom(bytes.subspan(at), width, height, numbers[2] < 0, channels, name));
+    for (int y = 0; y < height / 2; ++y)
+        std::swap_ranges(upsideDown.row(y).begin(), upsideDown.row(y).end(),
+                         upsideDown.row(height - 1 - y).begin());
+    return upsideDown;
+}
+
+Result<Image<float>> parseColmapDepth(ByteSpan bytes, std::string_view name, const Limits& limits) {
+    const std::string_view text = textOf(bytes).substr(0, 64);
+    std::size_t at = 0;
+    int numbers[3];
+    for (int& number : numbers) {
+        const auto [next, error] =
+            std::from_chars(text.data() + at, text.data() + text.size(), number);
+        const auto end = static_cast<std::size_t>(next - text.data());
+        if (error != std::errc() || end >= text.size() || text[end] != '&')
+            return failAt(inQuotes(name), ErrorCode::invalidInput,
+                          "the file does not begin with 'width&height&channels&' as COLMAP's depth "
+                          "maps do");
+        at = end + 1;
+    }
+    STX_CHECK(checkSide(numbers[0], numbers[1], name, limits));
+    if (numbers[2] != 1)
+        return failAt(inQuotes(name), ErrorCode::invalidInput,
+                      "{} channels; a depth map has 1 (is this a normal map?)", numbers[2]);
+    return floatsFrom(bytes.subspan(at), numbers[0], numbers[1], true, 1, name);
+}
+
+}  // namespace stx::imagesets

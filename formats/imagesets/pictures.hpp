@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+
+#include "formats/files/files.hpp"
+#include "formats/imagesets/set_view.hpp"
+
+namespace stx::imagesets {
+
+/// The colour of a source; `alpha` tells whether its alpha is the file's own.
+struct StoredColour {
+    Texture texture;
+    bool alpha = false;
+};
+[[nodiscard]] Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour,
+                                              Job& job);
+
+/// The values of a depth or disparity image as they are stored, and their bits (32 = floats).
+struct StoredDepth {
+    Image<float> values;
+    int bits = 32;
+};
+[[nodiscard]] Result<StoredDepth> readDepth(const PictureSource& source, Job& job);
+
+/// `PF`/`Pf` files: floats, rows from the bottom, a negative scale for little-endian.
+[[nodiscard]] Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name,
+                                            const Limits& limits);
+/// COLMAP's depth maps: `w&h&c&` in ASCII, then little-endian floats, x fastest, rows from the top.
+[[nodiscard]] Result<Image<float>> parseColmapDepth(ByteSpan bytes, std::string_view name,
+                                                    const Limits& limits);
+
+}  // namespace stx::imagesets

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/imagesets/image_sets.hpp"
+#include "formats/imagesets/lens.hpp"
+#include "formats/imagesets/panorama.hpp"
+#include "formats/imagesets/yuv.hpp"
+#include "lib/model/bundle.hpp"
+
+/// What the readers of the kinds hand to the common way from files to reference views.
+namespace stx::imagesets {
+
+/// Where an image's values lie.
+struct PictureSource {
+    std::filesystem::path path;
+    std::string name;              ///< for messages, not quoted
+    std::optional<YuvFormat> yuv;  ///< raw planes; else the file tells (images, PFM)
+    int frame = 0;                 ///< of raw planes
+    bool colmap = false;           ///< COLMAP's depth maps: `w&h&c&` and floats
+};
+
+/// Colour and depth of a view as they were stored, before anything is undone.
+struct StoredView {
+    Texture texture;
+    bool alpha = false;  ///< the texture's alpha is the set's own coverage
+    Image<float> depth;  ///< as stored; see SetView::distances
+    int depthBits = 32;  ///< of the stored values: 8, 16, or 32 for floats
+};
+
+/// One picture with depth of a set.
+struct SetView {
+    std::string name;
+    /// In our axes. Width 0: as large as the images, with angleX and angleY in place of fx fy cx
+    /// cy.
+    Camera camera;
+    double angleX = 0, angleY = 0;  ///< radians; angleY 0 = square pixels
+    Lens lens;
+    std::optional<Panorama> panorama;  ///< then `camera` tells position and orientation only
+
+    PictureSource texture, depth;
+    /// Reads both, for kinds whose images are not files of their own.
+    std::function<Result<StoredView>(const SetView&, Job&)> load;
+
+    /// Turns stored values into planar distances (panoramas: ray lengths) in scene units, kNoDepth
+    /// where unknown. The camera has the size of the image. Null: they are distances already.
+    std::function<Result<void>(Image<float>& values, const Camera& camera, int bits)> distances;
+
+    bool sensor = false;  ///< mixed pixels at depth edges are to be expected
+    /// Planes and code that an export of ours told; used when they hold all points.
+    std::optional<DepthCode> planes;
+    int depthBits = 0;  ///< with planes: 8, 16, 32
+};
+
+struct SetDescription {
+    std::string title;
+    std::vector<SetView> views;
+    int frames = 1;
+};
+
+/// Reads the images of one view and does what is common to all kinds: sizes, lens, mixed pixels,
+/// coverage, planes. A panorama gives its cube faces, others one view.
+[[nodiscard]] Result<std::vector<ReferenceView>> loadSetView(const SetView& set,
+                                                             const ImageSetOptions& options,
+                                                             Job& job);
+
+/// Distances that are floats in scene units: NaN, infinities, 0, negative and huge values (1e9 and
+/// more, Blender's "nothing") are none.
+void dropImpossible(Image<float>& distances);
+
+/// Distances of integers in steps of `unit`; 0 and `alsoNone` are none.
+[[nodiscard]] std::function<Result<void>(Image<float>&, const Camera&, int)> scaledIntegers(
+    double unit, float alsoNone = 0);
+
+}  // namespace stx::imagesets

@@ -1,0 +1,253 @@
+// transforms.json of NeRF, instant-ngp, nerfstudio and Blender's exporters: camera-to-world
+// matrices in our own axes, intrinsics for all frames or for each.
+
+#include <cmath>
+
+#include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/poses.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+constexpr double kMillimetre = 0.001;
+
+/// The key of a frame, else of the file.
+Result<std::optional<double>> find(const Json& file, const Json& frame, const char* key,
+                                   const std::string& where) {
+    STX_TRY(auto own, findNumber(frame, key, where));
+    if (own) return own;
+    return findNumber(file, key, where);
+}
+
+Result<std::string> cameraModel(const Json& file, const Json& frame, const std::string& where) {
+    STX_TRY(auto model, findText(frame, "camera_model", where));
+    if (!model) {
+        STX_TRY(model, findText(file, "camera_model", where));
+    }
+    for (const Json* from : {&frame, &file})
+        if (const auto it = from->find("is_fisheye"); it != from->end() && *it == Json(true))
+            model = "OPENCV_FISHEYE";
+    return model.value_or("OPENCV");
+}
+
+Result<void> setIntrinsics(const Json& file, const Json& frame, const std::string& where,
+                           SetView& view) {
+    const auto get = [&](const char* key) { return find(file, frame, key, where); };
+    STX_TRY(const std::string model, cameraModel(file, frame, where));
+    const bool panorama = model == "EQUIRECTANGULAR";
+    const bool orthographic = model == "ORTHOGRAPHIC";
+    if (panorama)
+        view.panorama = Panorama();
+    else if (!orthographic && model != "OPENCV" && model != "PINHOLE" &&
+             model != "SIMPLE_PINHOLE" && model != "SIMPLE_RADIAL" && model != "RADIAL")
+        return failAt(where, ErrorCode::invalidInput,
+                      "the camera_model is '{}'; OPENCV, PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
+                      "RADIAL, ORTHOGRAPHIC and EQUIRECTANGULAR are known",
+                      model);
+    Camera& c = view.camera;
+    c.orthographic = orthographic;
+    STX_TRY(const auto w, get("w"));
+    STX_TRY(const auto h, get("h"));
+    if (w.has_value() != h.has_value())
+        return failAt(where, ErrorCode::invalidInput, "'{}' is missing beside '{}'", w ? "h" : "w",
+                      w ? "w" : "h");
+    if (w) {
+        STX_TRY(c.width, imageSide(*w, "w", 65535, where));
+        STX_TRY(c.height, imageSide(*h, "h", 65535, where));
+    }
+    if (panorama) return {};
+    STX_TRY(const auto fx, get("fl_x"));
+    STX_TRY(const auto fy, get("fl_y"));
+    STX_TRY(const auto cx, get("cx"));
+    STX_TRY(const auto cy, get("cy"));
+    STX_TRY(const auto angleX, get("camera_angle_x"));
+    STX_TRY(const auto angleY, get("camera_angle_y"));
+    const std::pair<const char*, double*> lens[] = {{"k1", &view.lens.k1},
+                                                    {"k2", &view.lens.k2},
+                                                    {"k3", &view.lens.k3},
+                                                    {"p1", &view.lens.p1},
+                                                    {"p2", &view.lens.p2}};
+    for (const auto& [key, to] : lens) {
+        STX_TRY(const auto value, get(key));
+        *to = value.value_or(0);
+    }
+    STX_TRY(const auto k4, get("k4"));
+    if (k4.value_or(0) != 0)
+        return failAt(where, ErrorCode::invalidInput,
+                      "'k4' is {:g}; only k1 k2 k3 p1 p2 can be undone", *k4);
+    for (const auto& [angle, key] :
+         {std::pair{angleX, "camera_angle_x"}, std::pair{angleY, "camera_angle_y"}})
+        if (angle && !(*angle > 0 && *angle < 3.14159))
+            return failAt(where, ErrorCode::invalidInput,
+                          "'{}' is {:g}; an angle between 0 and pi is expected", key, *angle);
+    for (const auto& [focal, key] : {std::pair{fx, "fl_x"}, std::pair{fy, "fl_y"}})
+        if (focal && !(*focal > 0))
+            return failAt(where, ErrorCode::invalidInput, "'{}' is {:g}; it must be above 0", key,
+                          *focal);
+    if (!fx && !angleX)
+        return failAt(where, ErrorCode::invalidInput,
+                      "neither 'fl_x' nor 'camera_angle_x' is given");
+    if (c.width == 0) {
+        if (fx && cx && cy) {
+            // Old files leave out w and h where the principal point is the middle.
+            c.width = static_cast<int>(std::lround(*cx * 2));
+            c.height = static_cast<int>(std::lround(*cy * 2));
+            if (c.width < 1 || c.height < 1 || c.width > 65535 || c.height > 65535)
+                return failAt(where, ErrorCode::invalidInput, "'w' and 'h' are missing");
+        } else if (fx) {
+            return failAt(where, ErrorCode::invalidInput, "'w' and 'h' are missing beside 'fl_x'");
+        } else {
+            view.angleX = *angleX;
+            view.angleY = angleY.value_or(0);
+            return {};
+        }
+    }
+    c.fx = fx ? *fx : c.width * 0.5 / std::tan(*angleX * 0.5);
+    c.fy = fy ? *fy : angleY ? c.height * 0.5 / std::tan(*angleY * 0.5) : c.fx;
+    c.cx = cx.value_or(c.width * 0.5);
+    c.cy = cy.value_or(c.height * 0.5);
+    return {};
+}
+
+Result<void> setPose(const Json& frame, const std::string& where, SetView& view, Job& job) {
+    const auto it = frame.find("transform_matrix");
+    if (it == frame.end())
+        return failAt(where, ErrorCode::invalidInput, "'transform_matrix' is missing");
+    glm::dmat4 m(1.0);
+    const bool fine = [&] {
+        if (!it->is_array() || it->size() < 3 || it->size() > 4) return false;
+        for (std::size_t r = 0; r < it->size(); ++r) {
+            const Json& row = (*it)[r];
+            if (!row.is_array() || row.size() != 4) return false;
+            for (std::size_t k = 0; k < 4; ++k) {
+                if (!row[k].is_number() || !std::isfinite(row[k].get<double>())) return false;
+                m[static_cast<int>(k)][static_cast<int>(r)] = row[k].get<double>();
+            }
+        }
+        return true;
+    }();
+    if (!fine)
+        return failAt(where, ErrorCode::invalidInput,
+                      "'transform_matrix' must be 4 rows of 4 finite numbers");
+    if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1)
+        return failAt(where, ErrorCode::invalidInput,
+                      "the last row of 'transform_matrix' must be 0 0 0 1");
+    glm::dmat3 rotation(m);
+    // Some exporters leave the scale of a parent in it; depth is not scaled by that.
+    const double scale = std::cbrt(glm::determinant(rotation));
+    if (scale > 1e-3 && std::abs(scale - 1) > 1e-3) {
+        job.note(fmt::format("{}: the scale {:g} in 'transform_matrix' is left out", where, scale));
+        rotation /= scale;
+    }
+    STX_TRY(const glm::dmat3 r, repairRotation(rotation, std::max(view.camera.fx, 1.0),
+                                               where + ": 'transform_matrix'", job));
+    view.camera.orientation = glm::normalize(glm::quat_cast(r));
+    // What our own export wrote beside the matrix comes back to the bit.
+    STX_TRY(const auto exact, findNumbers(frame, "stx:quaternion", 4, where));
+    if (exact) {
+        const glm::dquat q((*exact)[3], (*exact)[0], (*exact)[1], (*exact)[2]);
+        if (std::abs(glm::dot(q, view.camera.orientation)) > 1 - 1e-9) view.camera.orientation = q;
+    }
+    view.camera.position = glm::dvec3(m[3]);
+    return {};
+}
+
+Result<void> setPlanes(const Json& frame, const std::string& where, SetView& view) {
+    STX_TRY(const auto nearPlane, findNumber(frame, "nearPlane", where));
+    STX_TRY(const auto farPlane, findNumber(frame, "farPlane", where));
+    STX_TRY(const auto bits, findNumber(frame, "depthBits", where));
+    if (!nearPlane || !farPlane || !bits) return {};
+    if (!(*farPlane > *nearPlane))
+        return failAt(where, ErrorCode::invalidInput,
+                      "'nearPlane' {:g} must be below 'farPlane' {:g}", *nearPlane, *farPlane);
+    view.planes = DepthCode{*nearPlane, *farPlane, *bits == 8 ? 255u : 65535u};
+    view.depthBits = *bits == 8 ? 8 : *bits == 32 ? 32 : 16;
+    return {};
+}
+
+std::string nameOfFrame(const std::string& filePath) {
+    return path(filePath).replace_extension().generic_string();
+}
+
+/// Integers are millimetres by convention, or what the file says; floats are scene units.
+auto distancesOf(double unit) {
+    return [unit](Image<float>& values, const Camera& camera, int bits) -> Result<void> {
+        if (bits == 32) return {};
+        if (bits != 16)
+            return fail(ErrorCode::invalidInput,
+                        "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
+        return scaledIntegers(unit)(values, camera, bits);
+    };
+}
+
+}  // namespace
+
+Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
+    const Json& frames = file["frames"];
+    STX_CHECK(checkViewCount(frames.size(), job.limits, "'frames'"));
+    std::vector<SetView> views;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const std::string where = fmt::format("frames[{}]", i);
+        const Json& frame = frames[i];
+        if (!frame.is_object())
+            return failAt(where, ErrorCode::invalidInput, "an object is expected");
+        SetView view;
+        STX_TRY(const auto name, findText(frame, "file_path", where));
+        view.name = name ? nameOfFrame(*name) : fmt::format("frame{:03}", i);
+        STX_TRY(const auto ownName, findText(frame, "stx:name", where));
+        if (ownName) view.name = *ownName;
+        STX_CHECK(setIntrinsics(file, frame, where, view));
+        STX_CHECK(setPose(frame, where, view, job));
+        STX_CHECK(setPlanes(frame, where, view));
+        if (view.camera.width > 0)
+            if (auto ok = view.camera.check(); !ok) return tl::unexpected(ok.error().at(where));
+        views.push_back(std::move(view));
+    }
+    return views;
+}
+
+Result<SetDescription> describeTransforms(const path& given, const ImageSetOptions&, Job& job) {
+    std::error_code ec;
+    const path file = std::filesystem::is_directory(given, ec) ? given / "transforms.json" : given;
+    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const std::string where = inQuotes(file.string());
+    STX_TRY(const Json json, readJson(file, job.limits));
+    if (jsonKindOf(json) != JsonKind::transforms)
+        return failAt(where, ErrorCode::invalidInput,
+                      "there is no list 'frames'; a transforms.json is expected");
+    SetDescription set;
+    STX_TRY(set.views, within(where, transformsViews(json, job)));
+    STX_TRY(const auto title, within(where, findText(json, "stx:title", "")));
+    set.title = title.value_or("");
+    STX_TRY(auto scale, within(where, findNumber(json, "integer_depth_scale", "")));
+    if (!scale) {
+        STX_TRY(scale, within(where, findNumber(json, "depth_unit_scale_factor", "")));
+    }
+    const double unit = scale.value_or(kMillimetre);
+    if (!(unit > 0))
+        return failAt(where, ErrorCode::invalidInput,
+                      "the depth's scale is {:g}; it must be above 0", unit);
+    for (std::size_t i = 0; i < set.views.size(); ++i) {
+        SetView& view = set.views[i];
+        const Json& frame = json["frames"][i];
+        const std::string place = fmt::format("{}: frames[{}]", where, i);
+        STX_TRY(const std::string texture, needText(frame, "file_path", place));
+        STX_TRY(view.texture,
+                sourceInside(folder, withImageEnding(folder, texture), place, job.limits));
+        STX_TRY(auto depth, findText(frame, "depth_file_path", place));
+        if (!depth) {
+            STX_TRY(depth, findText(frame, "depth_path", place));
+        }
+        if (!depth && view.texture.path.extension() == ".exr") depth = view.texture.name;
+        if (!depth)
+            return failAt(place, ErrorCode::invalidInput,
+                          "'depth_file_path' is missing; each frame needs its depth");
+        STX_TRY(view.depth,
+                sourceInside(folder, withImageEnding(folder, *depth), place, job.limits));
+        view.distances = distancesOf(unit);
+    }
+    return set;
+}
+
+}  // namespace stx::imagesets

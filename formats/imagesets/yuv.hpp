@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string_view>
+
+#include "formats/imagesets/image_sets.hpp"
+#include "lib/base/image.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx::imagesets {
+
+/// Raw planes of a .yuv file: Y, then Cb and Cr, rows from the top, without padding.
+struct YuvFormat {
+    int width = 0, height = 0;
+    int bits = 8;  ///< above 8 in two bytes, little-endian, in the low bits
+    int chromaShiftX = 1, chromaShiftY = 1;
+    bool chroma = true;
+
+    [[nodiscard]] std::uint64_t frameBytes() const;
+};
+
+/// Names as in FFmpeg: yuv420p, yuv420p10le, yuv422p, yuv444p16le, yuv400p, gray, gray16le...
+/// Width and height are left to the caller.
+[[nodiscard]] std::optional<YuvFormat> yuvFormatNamed(std::string_view name);
+
+/// Frames in a file. Errors when its size is no whole number of them, or it has none.
+[[nodiscard]] Result<int> yuvFrameCount(const std::filesystem::path& path, const YuvFormat& format);
+
+/// One frame as 8-bit RGB; chroma is interpolated, co-sited with luma on the left as MPEG has it.
+[[nodiscard]] Result<Rgba8Image> readYuvColour(const std::filesystem::path& path,
+                                               const YuvFormat& format, int frame,
+                                               const YuvColour& colour, const Limits& limits);
+
+/// The Y plane of one frame, as it is stored.
+[[nodiscard]] Result<Image<float>> readYuvLuma(const std::filesystem::path& path,
+                                               const YuvFormat& format, int frame,
+                                               const Limits& limits);
+
+}  // namespace stx::imagesets
