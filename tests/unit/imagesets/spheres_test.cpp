@@ -22,7 +22,7 @@ const ReferenceView& viewNamed(const Bundle& bundle, const std::string& name) {
 }
 
 TEST(SpheresMiv, PngIsReadBeforeYuvAndAllSourcesAreThere) {
-    REQUIRE_SHARED(set, "imagesets/spheres-miv");
+    REQUIRE_SHARED(set, "data/imagesets/spheres-miv");
     const auto kind = recogniseImageSet(set);
     ASSERT_TRUE(kind) << kind.error().text();
     EXPECT_EQ(*kind, "miv");
@@ -44,7 +44,7 @@ TEST(SpheresMiv, PngIsReadBeforeYuvAndAllSourcesAreThere) {
 }
 
 TEST(SpheresMiv, YuvEqualsPngToThePrecisionOfItsChroma) {
-    REQUIRE_SHARED(set, "imagesets/spheres-miv");
+    REQUIRE_SHARED(set, "data/imagesets/spheres-miv");
     Job job;
     const auto png = readImageSet(set, {}, job);
     ASSERT_TRUE(png) << png.error().text();
@@ -69,12 +69,12 @@ TEST(SpheresMiv, YuvEqualsPngToThePrecisionOfItsChroma) {
         std::printf("%s: YUV against PNG %.2f dB RGB, %.2f dB Y, worst %g\n", name.c_str(),
                     *same->psnrRgb, *same->psnrY, same->worst.difference);
         EXPECT_GT(*same->psnrY, 50.0);
-        EXPECT_GT(*same->psnrRgb, 40.0);
+        EXPECT_GT(*same->psnrRgb, 35.0);
     }
 }
 
 TEST(SpheresMiv, TheCenterViewIsRenderedAsWellAsTheDesignPromises) {
-    REQUIRE_SHARED(set, "imagesets/spheres-miv");
+    REQUIRE_SHARED(set, "data/imagesets/spheres-miv");
     Job job;
     const auto bundle = readImageSet(set, {}, job);
     ASSERT_TRUE(bundle) << bundle.error().text();
