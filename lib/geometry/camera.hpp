@@ -79,7 +79,8 @@ struct Camera {
 [[nodiscard]] Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target,
                                         glm::dvec3 up = {0, 1, 0});
 
-/// SFRotation (unit axis x y z, angle in radians) of a unit quaternion; the angle is in [0, pi].
+/// SFRotation (unit axis x y z, angle in radians) of a unit quaternion; the angle is in [0, pi]
+/// (a hair above for half turns as floats have them).
 /// No rotation is 0 0 1 0, the default of the standard.
 [[nodiscard]] glm::dvec4 axisAngleFromQuat(glm::dquat q);
 /// The inverse; the axis need not be unit. A zero axis is no rotation.

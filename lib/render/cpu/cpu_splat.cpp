@@ -11,6 +11,7 @@
 #include "lib/render/cpu/splat_plan.hpp"
 #include "lib/render/cpu/splat_view.hpp"
 #include "lib/render/pinholes.hpp"
+#include "lib/render/silhouettes.hpp"
 
 #if defined(__x86_64__)
 #include <cpuid.h>
@@ -38,7 +39,8 @@ class CpuSplatRenderer final : public Renderer {
           settings_(settings),
           limits_(job.limits),
           wantNormals_(settings.lighting.on()),
-          views_(prepareViews(bundle, wantNormals_)) {
+          views_(prepareViews(bundle, wantNormals_)),
+          silhouettes_(bundle) {
         for (const auto& v : views_) {
             for (const auto& b : v.blocks) opaque_ = opaque_ && b.opaque;
             blockCount_ += v.blocks.size();
@@ -72,6 +74,7 @@ class CpuSplatRenderer final : public Renderer {
     Limits limits_;
     bool wantNormals_;
     std::vector<ViewInfo> views_;
+    Silhouettes silhouettes_;
     bool opaque_ = true;
     std::size_t blockCount_ = 0;
 
@@ -185,7 +188,10 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
             bins_[b].push_back(static_cast<std::uint32_t>(i));
     }
     parallelFor(0, bands, [&](std::int64_t b) { drawBand(picture, static_cast<int>(b)); });
-    if (settings_.splat == SplatRule::data) closePinholes(picture.frame);
+    if (settings_.splat == SplatRule::data) {
+        closePinholes(picture.frame);
+        silhouettes_.carve(picture.frame, camera);
+    }
     picture.frame.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return std::move(picture.frame);
@@ -352,10 +358,6 @@ void CpuSplatRenderer::resolvePoints(Picture& picture, const Band& band) const {
 std::unique_ptr<Renderer> makeCpuSplatRenderer(const Bundle& bundle, const RenderSettings& settings,
                                                Job& job) {
     return std::make_unique<CpuSplatRenderer>(bundle, settings, job);
-}
-
-void closeSplatPinholes(Frame& frame) {
-    closePinholes(frame);
 }
 
 std::string cpuDeviceName() {

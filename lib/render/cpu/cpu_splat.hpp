@@ -25,10 +25,6 @@ namespace stx {
                                                              const RenderSettings& settings,
                                                              Job& job);
 
-/// Closes single open pixels that covered ones enclose, with what lies behind of those: the last
-/// step of a frame of SplatRule::data, on every backend.
-void closeSplatPinholes(Frame& frame);
-
 /// The processor's name and the SIMD target in use, such as "AMD EPYC (AVX3_ZEN4)".
 [[nodiscard]] std::string cpuDeviceName();
 

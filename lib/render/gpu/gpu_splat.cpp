@@ -4,13 +4,14 @@
 #include <map>
 
 #include "embedded_shaders.hpp"
-#include "lib/render/cpu/cpu_splat.hpp"
 #include "lib/render/cpu/splat_kernels.hpp"
 #include "lib/render/gpu/egl_context.hpp"
 #include "lib/render/gpu/gl_object.hpp"
 #include "lib/render/gpu/gpu_scene.hpp"
 #include "lib/render/gpu/shader_program.hpp"
 #include "lib/render/gpu/splat_frame.hpp"
+#include "lib/render/pinholes.hpp"
+#include "lib/render/silhouettes.hpp"
 
 namespace stx::gpu {
 namespace {
@@ -98,6 +99,7 @@ class GpuSplatRenderer final : public Renderer {
     Result<void> readPiece(glm::ivec2 at, glm::ivec2 size, Frame& frame);
 
     std::shared_ptr<EglContext> context_;
+    std::unique_ptr<Silhouettes> silhouettes_;  ///< shared with the processor's splat mode
     RenderSettings settings_;
     bool raster_;
     Limits limits_;
@@ -183,6 +185,7 @@ Result<void> GpuSplatRenderer::prepare(const Bundle& bundle, Job& job) {
     STX_TRY(auto current, context_->makeCurrent());
     resources_ = std::make_unique<Resources>();
     STX_TRY(resources_->scene, GpuScene::upload(bundle, *context_, lit(), job));
+    silhouettes_ = std::make_unique<Silhouettes>(bundle);
     resources_->noAttributes = GlVertexArray::create();
     resources_->uniforms = GlBuffer::create();
     glNamedBufferStorage(resources_->uniforms.get(), sizeof(FrameUniforms), nullptr,
@@ -449,7 +452,8 @@ Result<Frame> GpuSplatRenderer::render(const Camera& camera) {
     }
     if (settings_.splat == SplatRule::data) {
         const auto start = std::chrono::steady_clock::now();
-        closeSplatPinholes(frame);
+        closePinholes(frame);
+        silhouettes_->carve(frame, camera);
         frame.milliseconds +=
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
                 .count();

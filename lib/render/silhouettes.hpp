@@ -1,0 +1,42 @@
+#pragma once
+
+#include <vector>
+
+#include "lib/model/bundle.hpp"
+#include "lib/render/frame.hpp"
+
+namespace stx {
+
+/// Gives splatted pictures the silhouettes that the references saw. A splat at the rim of an object
+/// sticks out by part of a pixel and covers whole pixels; but each reference's alpha tells along
+/// which rays there is nothing at all. Pixels near the background get the share of their area that
+/// no reference sees through as coverage, so silhouettes are thin and smooth.
+class Silhouettes {
+  public:
+    /// The bundle must outlive this. Views whose alpha is full everywhere (full scenes) have no say
+    /// and cost nothing.
+    explicit Silhouettes(const Bundle& bundle);
+
+    /// Nothing to do for this bundle.
+    [[nodiscard]] bool none() const { return views_.empty(); }
+    /// Sets alpha, premultiplied colour and albedo of the pixels within two pixels of the
+    /// background; what is left with no coverage gets empty. The same on any number of threads.
+    void carve(Frame& frame, const Camera& camera) const;
+
+  private:
+    enum class Around : std::uint8_t { mixed, full, empty };
+    struct View {
+        Camera camera;
+        glm::dmat4 cameraFromWorld;
+        Image<std::uint8_t> alpha;  ///< coverage, 0..255
+        Image<Around> around;       ///< coverage of a pixel and what is next to it
+    };
+    [[nodiscard]] std::uint32_t freeSamples(const Camera& camera, const glm::dmat4& worldFromCamera,
+                                            int x, int y, double depth) const;
+    [[nodiscard]] float coverage(const Camera& camera, const glm::dmat4& worldFromCamera, int x,
+                                 int y, float depth) const;
+
+    std::vector<View> views_;
+};
+
+}  // namespace stx

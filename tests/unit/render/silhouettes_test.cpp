@@ -1,0 +1,101 @@
+#include "lib/render/silhouettes.hpp"
+
+#include <gtest/gtest.h>
+
+#include "lib/base/parallel.hpp"
+#include "lib/geometry/camera.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kSize = 64;
+
+/// A disc of radius 0.5 facing the camera, as one view sees it; coverage by 8x8 samples.
+Bundle discBundle() {
+    Bundle bundle;
+    ReferenceView view;
+    view.camera = Camera::fromFieldOfView({0, 0, 3}, {1, 0, 0, 0}, {0.5, 0.5}, false, kSize, kSize);
+    Rgba8Image texture(kSize, kSize);
+    view.depth = Image<float>(kSize, kSize, kNoDepth);
+    for (int y = 0; y < kSize; ++y) {
+        for (int x = 0; x < kSize; ++x) {
+            int inside = 0;
+            for (int k = 0; k < 64; ++k) {
+                const auto p =
+                    view.camera.unproject(x + (k % 8 + 0.5) / 8, y + (k / 8 + 0.5) / 8, 3.0);
+                inside += glm::length(glm::dvec2(p)) < 0.5;
+            }
+            texture.at(x, y) = {200, 100, 50, static_cast<std::uint8_t>(inside * 255 / 64)};
+            if (glm::length(glm::dvec2(view.camera.unproject(x + 0.5, y + 0.5, 3.0))) < 0.5)
+                view.depth.at(x, y) = 3.0f;
+        }
+    }
+    view.texture = Texture(std::move(texture));
+    view.nearPlane = 2.9;
+    view.farPlane = 3.1;
+    bundle.views.push_back(std::move(view));
+    return bundle;
+}
+
+/// The disc drawn too large, as splats do: whole pixels up to a pixel and a half outside.
+Frame fatFrame(const Camera& camera) {
+    Frame frame;
+    frame.colour = Image<glm::vec4>(kSize, kSize, glm::vec4(0));
+    frame.depth = Image<float>(kSize, kSize, kNoDepth);
+    const double pixel = camera.sampleSpacing(3.0).x;
+    for (int y = 0; y < kSize; ++y) {
+        for (int x = 0; x < kSize; ++x) {
+            if (glm::length(glm::dvec2(camera.unproject(x + 0.5, y + 0.5, 3.0))) >
+                0.5 + 1.5 * pixel)
+                continue;
+            frame.colour.at(x, y) = {0.8f, 0.4f, 0.2f, 1.0f};
+            frame.depth.at(x, y) = 3.0f;
+        }
+    }
+    return frame;
+}
+
+TEST(Silhouettes, FatEdgesGetTheCoverageThatTheReferenceSaw) {
+    const auto bundle = discBundle();
+    const auto& camera = bundle.views[0].camera;
+    auto frame = fatFrame(camera);
+    Silhouettes(bundle).carve(frame, camera);
+    double worst = 0;
+    for (int y = 0; y < kSize; ++y) {
+        for (int x = 0; x < kSize; ++x) {
+            const float truth = bundle.views[0].texture.at(x, y).w;
+            const auto c = frame.colour.at(x, y);
+            worst = std::max<double>(worst, std::abs(c.w - truth));
+            if (c.w > 0) EXPECT_NEAR(c.x / c.w, 0.8f, 1e-5f) << "straight colour stays";
+            EXPECT_EQ(hasPoint(frame.depth.at(x, y)), c.w > 0.0f);
+        }
+    }
+    EXPECT_LT(worst, 0.3) << "coverage is that of the disc to a fraction of a pixel";
+    EXPECT_EQ(frame.colour.at(kSize / 2, kSize / 2).w, 1.0f);
+}
+
+TEST(Silhouettes, FullScenesAreLeftAlone) {
+    auto bundle = discBundle();
+    for (auto& p : bundle.views[0].texture.rgba8()->pixels()) p.w = 255;
+    const Silhouettes silhouettes(bundle);
+    EXPECT_TRUE(silhouettes.none());
+    auto frame = fatFrame(bundle.views[0].camera);
+    const auto before = frame.colour;
+    silhouettes.carve(frame, bundle.views[0].camera);
+    EXPECT_TRUE(before == frame.colour);
+}
+
+TEST(Silhouettes, TheSameOnAnyNumberOfThreads) {
+    const auto bundle = discBundle();
+    Image<glm::vec4> first;
+    for (const int threads : {1, 3}) {
+        const ThreadLimit limit(threads);
+        auto frame = fatFrame(bundle.views[0].camera);
+        Silhouettes(bundle).carve(frame, bundle.views[0].camera);
+        if (first.empty()) first = frame.colour;
+        EXPECT_TRUE(first == frame.colour);
+    }
+}
+
+}  // namespace
+}  // namespace stx
