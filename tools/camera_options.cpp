@@ -167,4 +167,14 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     return out;
 }
 
+Result<int> checkCameraOptions(const CameraOptions& options, Program& program) {
+    CameraOptions o = options;
+    o.view = -1;  // needs the input
+    CameraContext standIn;
+    standIn.bounds.add(glm::dvec3(-1));
+    standIn.bounds.add(glm::dvec3(1));
+    STX_TRY(const auto cameras, makeCameras(o, standIn, program));
+    return static_cast<int>(cameras.size());
+}
+
 }  // namespace stx::tools

@@ -27,6 +27,10 @@ struct CameraOptions {
 
 void addCameraOptions(CLI::App& command, CameraOptions& options);
 
+/// The number of cameras asked for. Errors (usage, io) that need no input to be seen: so they come
+/// before an hour of loading.
+[[nodiscard]] Result<int> checkCameraOptions(const CameraOptions& options, Program& program);
+
 /// What the cameras are made for: the object and its reference views.
 struct CameraContext {
     Bounds bounds;              ///< of the object

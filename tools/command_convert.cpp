@@ -140,6 +140,7 @@ Result<int> convert(const ConvertOptions& o, Program& program) {
             !layout && !std::filesystem::exists(o.views, ec))
             return tl::unexpected(layout.error());
     }
+    STX_CHECK(parseSize(o.size, program.job.limits));
     STX_CHECK(containerOf(items[0].output));
     const BatchWork work = [&](const BatchItem& item, Program& p) {
         // Loading the image libraries takes 190 ms: let it happen while the model is read.

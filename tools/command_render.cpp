@@ -121,6 +121,10 @@ Result<int> render(const RenderOptions& o, Program& program) {
     STX_TRY(const auto settings, settingsOf(o));
     STX_TRY(const auto background, parseBackground(o.background));
     STX_CHECK(checkTarget(o.output, program));
+    STX_TRY(const int count, checkCameraOptions(o.camera, program));
+    if (count > 1 && !frameName(o.output, 0) && o.output != "-")
+        return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
+                    count);
     FrameWriter::Settings writing;
     writing.pattern = o.output;
     writing.background = background;
@@ -144,9 +148,6 @@ Result<int> render(const RenderOptions& o, Program& program) {
         points = bundle.pointCount();
     }
     STX_TRY(const auto cameras, makeCameras(o.camera, context, program));
-    if (cameras.size() > 1 && !frameName(o.output, 0) && o.output != "-")
-        return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
-                    cameras.size());
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         if (auto ok = cameras[i].check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera {}", i)));

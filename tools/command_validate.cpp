@@ -1,0 +1,85 @@
+#include "formats/atlas/atlas_files.hpp"
+#include "formats/images/images.hpp"
+#include "formats/mpeg4/validate.hpp"
+#include "formats/open.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+namespace {
+
+struct ValidateCommandOptions {
+    std::string input;
+    bool noPixels = false;
+    bool rules = false;
+};
+
+const char* wordOf(Rule::Severity severity) {
+    return severity == Rule::Severity::error ? "error" : "warning";
+}
+
+Result<int> printRules(Program& program) {
+    for (const auto& rule : ruleCatalogue())
+        program.print(fmt::format("{} {}: {} ({})\n", rule.number, wordOf(rule.severity), rule.summary, rule.clause));
+    return 0;
+}
+
+Result<std::vector<Finding>> findingsOf(const ValidateCommandOptions& o, Program& program) {
+    STX_TRY(const auto kind, recognise(o.input));
+    if (kind == FileKind::atlas) {
+        STX_TRY(const auto atlas, readAtlas(o.input, program.job));
+        return validate(atlas);
+    }
+    if (kind == FileKind::exr) {
+        STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
+        return validate(bundle);
+    }
+    if (kind == FileKind::mpeg4 || kind == FileKind::unknown) {
+        ValidateOptions options;
+        options.pixels = !o.noPixels;
+        options.folder = std::filesystem::path(o.input).parent_path();
+        return validateMpeg4File(o.input, options, program.job);
+    }
+    return fail(ErrorCode::invalidInput, "'{}' is {}; bundles (.mp4, .xmt, .bt, .exr) and atlases can be validated",
+                o.input, nameOf(kind));
+}
+
+Result<int> validateFile(const ValidateCommandOptions& o, Program& program) {
+    if (o.rules) return printRules(program);
+    if (o.input.empty()) return fail(ErrorCode::usage, "FILE is required. See 'stx validate --help'");
+    STX_TRY(const auto findings, findingsOf(o, program));
+    bool valid = true;
+    auto list = nlohmann::ordered_json::array();
+    for (const auto& f : findings) {
+        valid = valid && f.rule->severity != Rule::Severity::error;
+        list.push_back({{"rule", f.rule->number},
+                        {"severity", wordOf(f.rule->severity)},
+                        {"clause", f.rule->clause},
+                        {"where", f.where},
+                        {"message", f.rule->summary},
+                        {"found", f.found},
+                        {"expected", f.expected}});
+        if (program.common.format != "json") program.print(f.text() + "\n");
+    }
+    if (program.common.format == "json") {
+        program.print(nlohmann::ordered_json{{"$schema", "validate.schema.json"}, {"file", o.input}, {"valid", valid},
+                                             {"findings", list}}.dump(2) + "\n");
+    }
+    return findings.empty() ? 0 : static_cast<int>(ErrorCode::difference);
+}
+
+}  // namespace
+
+Command addValidate(CLI::App& app, Program& program) {
+    auto* c = app.add_subcommand("validate",
+                                 "Every rule that a file breaks, by number; silent, with exit code 0, when it breaks none\n\n"
+                                 "  stx validate model.mp4\n"
+                                 "  stx validate --rules");
+    auto o = std::make_shared<ValidateCommandOptions>();
+    c->add_option("FILE", o->input, "Bundle or atlas");
+    c->add_flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
+    c->add_flag("--rules", o->rules, "Print the catalogue of rules and stop");
+    addCommonOptions(*c, program, kFormat | kOutside);
+    return {c, [o](Program& p) { return validateFile(*o, p); }};
+}
+
+}  // namespace stx::tools
