@@ -1,13 +1,10 @@
 #include <chrono>
-#include <numbers>
-#include <optional>
 
 #include "formats/images/images.hpp"
-#include "formats/imagesets/camera_file.hpp"
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
-#include "lib/geometry/view_layout.hpp"
 #include "tools/batch.hpp"
+#include "tools/mesh_views.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -16,15 +13,7 @@ namespace {
 struct ConvertOptions {
     std::vector<std::string> inputs;
     std::string output;
-    std::string views = "sphere:16";
-    std::string size = "512x512";
-    std::string projection = "perspective";
-    std::optional<double> elevationDeg;
-    double fovDeg = 35.0;
-    int depthBits = 16;
-    bool depthBitsGiven = false;
-    int supersampling = 4;
-    std::string normals = "none";
+    std::shared_ptr<MeshViewOptions> mesh = std::make_shared<MeshViewOptions>();
     std::string colour = "png";
     int quality = 92;
     bool pointTexture = false;
@@ -40,61 +29,23 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     return save;
 }
 
-/// Cameras for a mesh: a named layout, or a camera file.
-Result<std::vector<Camera>> camerasFor(const Mesh& mesh, const ConvertOptions& o,
-                                       Program& program) {
-    std::error_code ec;
-    auto layout = parseViewLayout(o.views);
-    if (!layout) {
-        if (!std::filesystem::is_regular_file(o.views, ec)) return propagate(layout);
-        STX_TRY(const auto named, readCameraFile(o.views, program.job));
-        std::vector<Camera> cameras;
-        for (const auto& n : named) cameras.push_back(n.camera);
-        return cameras;
-    }
-    ViewFraming framing;
-    STX_TRY(const auto size, parseSize(o.size, program.job.limits));
-    framing.width = size.x;
-    framing.height = size.y;
-    // Six faces of a cube are orthographic by the standard's own example; others as asked.
-    framing.orthographic = o.projection == "orthographic" ||
-                           (o.projection.empty() && layout->kind == ViewLayout::Kind::cube);
-    framing.fovRad = o.fovDeg * std::numbers::pi / 180.0;
-    if (!(o.fovDeg > 0 && o.fovDeg < 170))
-        return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 170 degrees",
-                    o.fovDeg);
-    layout->elevationRad = o.elevationDeg.value_or(15.0) * std::numbers::pi / 180.0;
-
-    std::vector<glm::vec3> points;
-    points.reserve(mesh.positions.size());
-    for (const auto& t : mesh.triangles) {
-        for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[t[k]]);
-    }
-    for (const auto p : mesh.points) points.push_back(mesh.positions[p]);
-    return layoutCameras(*layout, framing, points);
-}
-
 Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptions& o,
                           Program& program) {
     STX_TRY(auto opened, openRenderable(input, o.open, program.job));
     if (auto* mesh = std::get_if<Mesh>(&opened)) {
-        STX_TRY(const auto cameras, camerasFor(*mesh, o, program));
-        CaptureSettings capture;
-        capture.supersampling = o.supersampling;
-        capture.depthBits = o.depthBits;
-        capture.meshNormals = o.normals == "mesh";
-        auto bundle = captureBundle(*mesh, cameras, capture, program.job);
+        auto bundle = captureMesh(*mesh, *o.mesh, program);
         if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", input.string())));
         bundle->title = input.stem().string();
         return bundle;
     }
     auto& bundle = std::get<Bundle>(opened);
-    if (o.depthBitsGiven) {
+    if (o.mesh->depthBitsGiven) {
         for (auto& view : bundle.views) {
-            if (view.depthBits == o.depthBits) continue;
-            view.depthBits = o.depthBits;
+            if (view.depthBits == o.mesh->depthBits) continue;
+            view.depthBits = o.mesh->depthBits;
             fitDepthRange(view);
         }
+        noteDepthLoss(bundle, program.job);
     }
     return std::move(bundle);
 }
@@ -108,8 +59,8 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     std::size_t views = 0;
     std::string sizes;
     std::int64_t points = 0;
-    STX_TRY(const bool passed,
-            convertDocument(input, target, saveOptions(o, program), o.depthBitsGiven, program.job));
+    STX_TRY(const bool passed, convertDocument(input, target, saveOptions(o, program),
+                                               o.mesh->depthBitsGiven, program.job));
     if (!passed) {
         STX_TRY(const auto bundle, makeBundle(input, o, program));
         STX_CHECK(program.job.checkCancelled());
@@ -134,13 +85,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
 Result<int> convert(const ConvertOptions& o, Program& program) {
     STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
     STX_TRY(const auto items, planBatch(inputs, o.output));
-    if (o.views.rfind("auto:", 0) != 0) {
-        std::error_code ec;
-        if (auto layout = parseViewLayout(o.views);
-            !layout && !std::filesystem::exists(o.views, ec))
-            return tl::unexpected(layout.error());
-    }
-    STX_CHECK(parseSize(o.size, program.job.limits));
+    STX_CHECK(checkMeshViewOptions(*o.mesh, program));
     STX_CHECK(containerOf(items[0].output));
     const BatchWork work = [&](const BatchItem& item, Program& p) {
         // Loading the image libraries takes 190 ms: let it happen while the model is read.
@@ -182,48 +127,11 @@ Command addConvert(CLI::App& app, Program& program) {
     c->add_option("-o,--output", o->output, "What to write; {stem} stands for an input's name")
         ->required()
         ->type_name("OUT");
-    const char* capture = "Views of a mesh";
-    c->add_option("--views", o->views,
-                  "cube, ring:N, sphere:N, octahedral:N or a camera file (default sphere:16)")
-        ->group(capture);
-    c->add_option("--size", o->size, "Size of each view (default 512x512)")
-        ->type_name("WxH")
-        ->group(capture);
-    o->projection.clear();
-    c->add_option("--projection", o->projection,
-                  "perspective or orthographic (default perspective; cube: orthographic)")
-        ->check(CLI::IsMember({"perspective", "orthographic"}))
-        ->group(capture);
-    c->add_option("--elevation", o->elevationDeg,
-                  "Of a ring above the horizon, in degrees (default 15)")
-        ->check(CLI::Range(-90.0, 90.0))
-        ->type_name("DEG")
-        ->group(capture);
-    c->add_option("--fov", o->fovDeg,
-                  "Angle that the whole object fills, in degrees: sets the distance (default 35)")
-        ->type_name("DEG")
-        ->group(capture);
-    c->add_option("--supersampling", o->supersampling,
-                  "Colour samples per pixel and axis, 1 to 8 (default 4)")
-        ->check(CLI::Range(1, 8))
-        ->group(capture);
-    c->add_option("--normals", o->normals,
-                  "mesh: keep the model's own normals (SimpleTextureV2); or none")
-        ->check(CLI::IsMember({"mesh", "none"}))
-        ->group(capture);
+    addMeshViewOptions(*c, o->mesh);
     c->add_option("--texture", o->open.texture, "Texture of a mesh that names none")
         ->type_name("IMAGE")
-        ->group(capture);
+        ->group("Views of a mesh");
     const char* coding = "Coding";
-    c->add_option_function<int>(
-         "--depth-bits",
-         [o](const int& bits) {
-             o->depthBits = bits;
-             o->depthBitsGiven = true;
-         },
-         "8, 16 or 32 (float, .exr only); default 16")
-        ->check(CLI::IsMember({8, 16, 32}))
-        ->group(coding);
     c->add_option("--colour", o->colour, "png (exact) or jpeg, in MPEG-4 containers (default png)")
         ->check(CLI::IsMember({"png", "jpeg"}))
         ->group(coding);

@@ -4,6 +4,7 @@
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "lib/packing/packing.hpp"
+#include "lib/packing/prune.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -13,14 +14,45 @@ struct PackOptions {
     std::string input, output;
     std::string layout = "grid";
     PackSettings settings;
+    bool prune = false;
+    std::string budget;
+    PruneSettings pruning;
 };
+
+/// "4M", "250k" or "1000000" pixels.
+Result<std::int64_t> parsePixels(const std::string& text) {
+    std::string number = text;
+    double factor = 1;
+    if (!number.empty() && (number.back() == 'M' || number.back() == 'k')) {
+        factor = number.back() == 'M' ? 1e6 : 1e3;
+        number.pop_back();
+    }
+    const auto value = parseNumbers(number, 1, "--budget");
+    if (!value || (*value)[0] * factor < 1 || (*value)[0] * factor > 1e15)
+        return fail(ErrorCode::usage,
+                    "--budget is '{}'; a number of pixels is expected, as in 4M or 250k", text);
+    return static_cast<std::int64_t>((*value)[0] * factor);
+}
 
 Result<int> packBundle(const PackOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs();
-    STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
+    PruneSettings pruning = o.pruning;
+    if (!o.budget.empty()) {
+        STX_TRY(pruning.budget, parsePixels(o.budget));
+    }
+    STX_TRY(auto bundle, openBundle(o.input, {}, program.job));
     PackSettings settings = o.settings;
+    std::string pruned;
+    if (o.prune || pruning.budget > 0 || pruning.minPsnr > 0) {
+        auto report = prune(bundle, pruning, program.job);
+        if (!report) return tl::unexpected(report.error().at(fmt::format("'{}'", o.input)));
+        settings.sourcePixels = report->sourcePixels;
+        pruned = fmt::format(", {:.1f} % of the object's pixels kept",
+                             100.0 * static_cast<double>(report->keptPixels) /
+                                 static_cast<double>(report->sourcePixels));
+    }
     settings.layout =
         o.layout == "tight" ? PackSettings::Layout::tight : PackSettings::Layout::grid;
     auto atlas = pack(bundle, settings, program.job);
@@ -31,10 +63,10 @@ Result<int> packBundle(const PackOptions& o, Program& program) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
     program.say(fmt::format(
-        "{} ({}) → {} ({}), {} views in {} textures {}x{}, {:.1f} % used, {:.2g} s",
+        "{} ({}) → {} ({}), {} views in {} textures {}x{}, {:.1f} % used{}, {:.2g} s",
         std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)), o.output,
         humanBytes(bytesOf(o.output)), atlas->views.size(), atlas->textureCount(), atlas->width(),
-        atlas->height(), atlas->used() * 100, seconds));
+        atlas->height(), atlas->used() * 100, pruned, seconds));
     STX_CHECK(program.writeReport(
         {{"$schema", "pack-report.schema.json"},
          {"input", o.input},
@@ -70,6 +102,19 @@ Command addPack(CLI::App& app, Program& program) {
         ->check(CLI::Range(0, 64));
     c->add_option("--max-size", o->settings.maxSize, "Largest side of a texture (default 16384)")
         ->check(CLI::Range(16, 65536));
+    const char* pruning = "Pruning";
+    c->add_flag("--prune", o->prune,
+                "Leave out pixels that another kept view shows as well or better")
+        ->group(pruning);
+    c->add_option("--budget", o->budget, "Keep at most so many object pixels, as in 4M")
+        ->type_name("PIXELS")
+        ->group(pruning);
+    c->add_option(
+         "--min-psnr", o->pruning.minPsnr,
+         "Prune only as far as the pixels that replace the others reach this (an estimate)")
+        ->type_name("DB")
+        ->check(CLI::Range(0.0, 200.0))
+        ->group(pruning);
     addCommonOptions(*c, program, kOutput | kOutside);
     return {c, [o](Program& p) { return packBundle(*o, p); }};
 }

@@ -3,6 +3,7 @@
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "lib/selection/selection.hpp"
+#include "tools/mesh_views.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -15,12 +16,31 @@ struct SelectOptions {
     bool shareGiven = false;
 };
 
+/// A mesh has no views to choose from: the best ones around it are captured.
+Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, Program& program) {
+    if (o.settings.count == 0)
+        return fail(ErrorCode::usage, "'{}' is a mesh; say how many views of it with --count N",
+                    o.input);
+    MeshViewOptions views;
+    views.views = fmt::format("auto:{}", o.settings.count);
+    views.plot = o.plot;
+    auto bundle = captureMesh(mesh, views, program);
+    if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", o.input)));
+    bundle->title = std::filesystem::path(o.input).stem().string();
+    SaveOptions save;
+    save.noClobber = program.common.noClobber;
+    STX_CHECK(saveBundle(*bundle, o.output, save, program.job));
+    return 0;
+}
+
 Result<int> select(const SelectOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs();
-    STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
+    STX_TRY(auto opened, openRenderable(o.input, {}, program.job));
+    if (const auto* mesh = std::get_if<Mesh>(&opened)) return selectAroundMesh(*mesh, o, program);
+    const auto& bundle = std::get<Bundle>(opened);
     SelectSettings settings = o.settings;
     settings.share = settings.count > 0 && !o.shareGiven ? 1.0 : o.sharePercent / 100.0;
     STX_TRY(const auto selection, selectViews(bundle, settings, program.job));
@@ -65,7 +85,8 @@ Command addSelect(CLI::App& app, Program& program) {
                            "  stx select model.exr -o fewer.exr --count 12\n"
                            "  stx select model.exr -o fewer.exr --share 98 --plot quality.svg");
     auto o = std::make_shared<SelectOptions>();
-    c->add_option("IN", o->input, "Bundle to choose from")->required();
+    c->add_option("IN", o->input, "Bundle to choose from, or a mesh to look at from all sides")
+        ->required();
     c->add_option("-o,--output", o->output, "Bundle to write")->required()->type_name("OUT");
     c->add_option("--count", o->settings.count, "Number of views to keep")
         ->check(CLI::Range(1, 65536))

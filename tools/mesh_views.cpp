@@ -1,0 +1,261 @@
+#include "tools/mesh_views.hpp"
+
+#include <charconv>
+#include <filesystem>
+#include <numbers>
+
+#include "formats/imagesets/camera_file.hpp"
+#include "lib/metrics/compare.hpp"
+#include "lib/render/renderer.hpp"
+#include "lib/selection/selection.hpp"
+
+namespace stx::tools {
+namespace {
+
+constexpr int kMostAutoViews = 64;  // that auto:DBdB may come to
+
+/// `auto:N`, or `auto:DBdB` with a quality in decibels.
+struct AutoViews {
+    int count = 0;
+    double decibels = 0;
+};
+
+Result<std::optional<AutoViews>> parseAuto(const std::string& text) {
+    if (text.rfind("auto", 0) != 0) return std::optional<AutoViews>();
+    const auto complain = [&] {
+        return fail(ErrorCode::usage,
+                    "--views is '{}'; auto:N for the N best views (1 to 4096) or auto:DBdB for the "
+                    "fewest that "
+                    "reach a quality, as in auto:38dB, is expected",
+                    text);
+    };
+    if (text.size() < 6 || text[4] != ':') return complain();
+    std::string_view number = std::string_view(text).substr(5);
+    AutoViews result;
+    if (number.size() > 2 && (number.ends_with("dB") || number.ends_with("db"))) {
+        number.remove_suffix(2);
+        const auto parsed =
+            std::from_chars(number.data(), number.data() + number.size(), result.decibels);
+        if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size() ||
+            !(result.decibels > 0 && result.decibels < 100))
+            return complain();
+        return std::optional<AutoViews>(result);
+    }
+    const auto parsed = std::from_chars(number.data(), number.data() + number.size(), result.count);
+    if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size() ||
+        result.count < 1 || result.count > 4096)
+        return complain();
+    return std::optional<AutoViews>(result);
+}
+
+Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& program) {
+    ViewFraming framing;
+    STX_TRY(const auto size, parseSize(o.size, program.job.limits));
+    framing.width = size.x;
+    framing.height = size.y;
+    // The six faces of a cube are orthographic in the standard's own example.
+    framing.orthographic = o.projection == "orthographic" || (o.projection.empty() && cube);
+    if (!(o.fovDeg > 0 && o.fovDeg < 170))
+        return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 170 degrees",
+                    o.fovDeg);
+    framing.fovRad = o.fovDeg * std::numbers::pi / 180.0;
+    return framing;
+}
+
+/// Vertices that are drawn: what the cameras frame.
+std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
+    std::vector<glm::vec3> points;
+    points.reserve(mesh.triangles.size() * 3 + mesh.points.size());
+    for (const auto& t : mesh.triangles) {
+        for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[t[k]]);
+    }
+    for (const auto p : mesh.points) points.push_back(mesh.positions[p]);
+    return points;
+}
+
+Image<glm::u8vec4> onBlack(const Frame& frame) {
+    Image<glm::u8vec4> out(frame.colour.width(), frame.colour.height());
+    for (std::size_t i = 0; i < out.count(); ++i) {
+        const glm::vec3 c = glm::clamp(glm::vec3(frame.colour.pixels()[i]), 0.0f, 1.0f);
+        out.pixels()[i] = glm::u8vec4(glm::u8vec3(c * 255.0f + 0.5f), 255);
+    }
+    return out;
+}
+
+/// Mean PSNR of views between the references against the mesh itself: what `auto:DBdB` asks for.
+Result<double> measureQuality(const Mesh& mesh, const std::vector<Camera>& cameras,
+                              const CaptureSettings& capture, Program& program) {
+    constexpr int kNovelViews = 6, kSide = 256;
+    Job quiet;  // the same notes again and again would help nobody
+    quiet.limits = program.job.limits;
+    STX_TRY(const auto bundle, captureBundle(mesh, cameras, capture, quiet));
+    STX_TRY(const auto renderer, makeRenderer(Backend::cpu, bundle, {}, -1, quiet));
+    const auto truth = makeMeshRenderer(mesh, {}, quiet);
+    ViewFraming framing;
+    framing.width = framing.height = kSide;
+    ViewLayout layout;
+    layout.count = kNovelViews;
+    STX_TRY(const auto novel, layoutCameras(layout, framing, drawnPoints(mesh)));
+    SequenceComparison total(255.0);
+    for (const auto& camera : novel) {
+        STX_CHECK(program.job.checkCancelled());
+        STX_TRY(const auto ours, renderer->render(camera));
+        STX_TRY(const auto theirs, truth->render(camera));
+        STX_TRY(const auto comparison, compare(onBlack(ours), onBlack(theirs)));
+        total.add(comparison);
+    }
+    return total.total().psnrRgb.value_or(100.0);
+}
+
+Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wanted,
+                                        const MeshViewOptions& o, const CaptureSettings& capture,
+                                        Program& program) {
+    MeshCandidates candidates;
+    STX_TRY(candidates.framing, framingOf(o, false, program));
+    SelectSettings select;
+    select.count = wanted.count > 0 ? wanted.count : kMostAutoViews;
+    candidates.directions = std::max(candidates.directions, std::min(4096, 2 * select.count));
+    STX_TRY(auto chosen, selectMeshViews(mesh, candidates, select, program.job));
+    auto& cameras = chosen.cameras;
+    if (wanted.count == 0) {
+        const auto most = static_cast<int>(cameras.size());
+        double reached = 0;
+        STX_TRY(const int count, leastViews(most, wanted.decibels, [&](int n) -> Result<double> {
+                    STX_TRY(reached, measureQuality(mesh, {cameras.begin(), cameras.begin() + n},
+                                                    capture, program));
+                    return reached;
+                }));
+        cameras.resize(count);
+        if (count == most)
+            program.job.note(
+                fmt::format("{} views are the most that are tried; {:g} dB may not be reached",
+                            most, wanted.decibels));
+    }
+    const auto& s = chosen.selection;
+    const auto n = cameras.size();
+    const double quality = n > 0 && n <= s.quality.size() ? s.quality[n - 1] : 0.0;
+    program.say(fmt::format(
+        "{} of {} candidate views: {:.1f} % of the quality of all, at least {:.1f} % of the best "
+        "possible choice; {:.1f} % of the surface is seen, {:.1f} % can never be",
+        n, candidates.directions, quality * 100, s.certificate * 100, s.coverage * 100,
+        s.neverSeen * 100));
+    if (!o.plot.empty()) {
+        const std::string svg = selectionPlotSvg(s, "quality against the number of views");
+        STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
+    }
+    return std::move(cameras);
+}
+
+Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions& o,
+                                         Program& program) {
+    std::error_code ec;
+    auto layout = parseViewLayout(o.views);
+    if (!layout) {
+        if (!std::filesystem::is_regular_file(o.views, ec)) return propagate(layout);
+        STX_TRY(const auto named, readCameraFile(o.views, program.job));
+        std::vector<Camera> cameras;
+        for (const auto& n : named) cameras.push_back(n.camera);
+        return cameras;
+    }
+    STX_TRY(const auto framing, framingOf(o, layout->kind == ViewLayout::Kind::cube, program));
+    layout->elevationRad = o.elevationDeg.value_or(15.0) * std::numbers::pi / 180.0;
+    return layoutCameras(*layout, framing, drawnPoints(mesh));
+}
+
+}  // namespace
+
+void addMeshViewOptions(CLI::App& command, const std::shared_ptr<MeshViewOptions>& o) {
+    const char* group = "Views of a mesh";
+    command
+        .add_option("--views", o->views,
+                    "cube, ring:N, sphere:N, octahedral:N, auto:N (the N best), auto:DBdB (the "
+                    "fewest that reach "
+                    "this PSNR) or a camera file (default sphere:16)")
+        ->group(group);
+    command.add_option("--size", o->size, "Size of each view (default 512x512)")
+        ->type_name("WxH")
+        ->group(group);
+    command
+        .add_option("--projection", o->projection,
+                    "perspective or orthographic (default perspective; cube: orthographic)")
+        ->check(CLI::IsMember({"perspective", "orthographic"}))
+        ->group(group);
+    command
+        .add_option("--elevation", o->elevationDeg,
+                    "Of a ring above the horizon, in degrees (default 15)")
+        ->check(CLI::Range(-90.0, 90.0))
+        ->type_name("DEG")
+        ->group(group);
+    command
+        .add_option("--fov", o->fovDeg,
+                    "Angle that the whole object fills, in degrees: sets the distance (default 35)")
+        ->type_name("DEG")
+        ->group(group);
+    command
+        .add_option("--supersampling", o->supersampling,
+                    "Colour samples per pixel and axis, 1 to 8 (default 4)")
+        ->check(CLI::Range(1, 8))
+        ->group(group);
+    command
+        .add_option("--normals", o->normals,
+                    "mesh: keep the model's own normals (SimpleTextureV2); or none (default none)")
+        ->check(CLI::IsMember({"mesh", "none"}))
+        ->group(group);
+    command.add_option("--plot", o->plot, "With auto: draw quality against the number of views")
+        ->type_name("FILE.svg")
+        ->group(group);
+    command
+        .add_option_function<int>(
+            "--depth-bits",
+            [o](const int& bits) {
+                o->depthBits = bits;
+                o->depthBitsGiven = true;
+            },
+            "8, 16 or 32 (float, .exr only); default 16")
+        ->check(CLI::IsMember({8, 16, 32}))
+        ->group("Coding");
+}
+
+Result<void> checkMeshViewOptions(const MeshViewOptions& o, Program& program) {
+    STX_TRY(const auto automatic, parseAuto(o.views));
+    std::error_code ec;
+    if (!automatic) {
+        if (auto layout = parseViewLayout(o.views);
+            !layout && !std::filesystem::exists(o.views, ec))
+            return tl::unexpected(layout.error());
+    }
+    STX_CHECK(framingOf(o, false, program));
+    return {};
+}
+
+Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& program) {
+    STX_CHECK(mesh.check());
+    CaptureSettings capture;
+    capture.supersampling = o.supersampling;
+    capture.depthBits = o.depthBits;
+    capture.meshNormals = o.normals == "mesh";
+    STX_TRY(const auto automatic, parseAuto(o.views));
+    std::vector<Camera> cameras;
+    if (automatic) {
+        STX_TRY(cameras, autoCameras(mesh, *automatic, o, capture, program));
+    } else {
+        STX_TRY(cameras, layoutOrFile(mesh, o, program));
+    }
+    STX_TRY(auto bundle, captureBundle(mesh, cameras, capture, program.job));
+    noteDepthLoss(bundle, program.job);
+    return std::move(bundle);
+}
+
+void noteDepthLoss(const Bundle& bundle, Job& job) {
+    double worst = 0;
+    for (const auto& view : bundle.views) {
+        if (view.depthBits == 8) worst = std::max(worst, view.depthCode().step() * 0.5);
+    }
+    if (worst > 0)
+        job.note(
+            fmt::format("depth in 8 bits is off by up to {:.3g} scene units; --depth-bits 16 is "
+                        "257 times finer",
+                        worst));
+}
+
+}  // namespace stx::tools

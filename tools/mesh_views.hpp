@@ -1,0 +1,40 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "lib/capture/capture.hpp"
+#include "lib/geometry/view_layout.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+
+/// How a mesh becomes reference views, as the command line says it.
+struct MeshViewOptions {
+    std::string views = "sphere:16";
+    std::string size = "512x512";
+    std::string projection;  ///< empty: perspective, except the faces of a cube
+    std::optional<double> elevationDeg;
+    double fovDeg = 35.0;
+    int depthBits = 16;
+    bool depthBitsGiven = false;
+    int supersampling = 4;
+    std::string normals = "none";
+    std::string plot;  ///< SVG of quality against the number of views, of --views auto
+};
+
+void addMeshViewOptions(CLI::App& command, const std::shared_ptr<MeshViewOptions>& options);
+
+/// Errors (usage) that can be told before a mesh is read.
+[[nodiscard]] Result<void> checkMeshViewOptions(const MeshViewOptions& options, Program& program);
+
+/// Captures a mesh by a layout, a camera file, or the best views (auto:N, auto:DBdB).
+[[nodiscard]] Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& options,
+                                         Program& program);
+
+/// Says what 8-bit depth costs, in scene units.
+void noteDepthLoss(const Bundle& bundle, Job& job);
+
+}  // namespace stx::tools
