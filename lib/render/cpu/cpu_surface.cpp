@@ -23,7 +23,7 @@ constexpr double kWhole = 0.9;
 
 /// What a quality means.
 struct Effort {
-    int samplesPerPixel = 2;  ///< along one side of a pixel
+    int samplesPerPixel = 3;  ///< along one side of a pixel
     int mostGeometry = 8;     ///< sources that one tile is built from, at most 32
     ShadeSettings shade;
 };

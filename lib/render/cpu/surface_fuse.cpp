@@ -19,6 +19,27 @@ std::uint32_t bitsOf(float q) {
     return std::bit_cast<std::uint32_t>(q) & 3u;
 }
 
+/// Least and greatest sample, and all remarks, of each pixel of a row, S x S samples in each.
+template <int S>
+void summarisePixels(const float* lines, int stride, float* low, float* high,
+                     std::uint32_t* remarks) {
+    for (int x = 0; x < kTile; ++x) {
+        float least = lines[x * S], most = least;
+        std::uint32_t bits = 0;
+        for (int j = 0; j < S; ++j) {
+            for (int i = 0; i < S; ++i) {
+                const float q = lines[j * stride + x * S + i];
+                least = std::min(least, q);
+                most = std::max(most, q);
+                bits |= std::bit_cast<std::uint32_t>(q);
+            }
+        }
+        low[x] = least;
+        high[x] = most;
+        remarks[x] = bits;
+    }
+}
+
 struct Fuser {
     std::span<const LocalSource> sources;
     const SampleGrid& grid;
@@ -73,7 +94,7 @@ struct Fuser {
 
     [[nodiscard]] bool rejected(const Candidate& c, float x, float y, int i, int j) const {
         const std::uint32_t bits = bitsOf(c.q);
-        const int enough = (bits & kExtensionBit) ? 1 : 2;
+        const int enough = (bits & kNearEdgeBit) ? 1 : 2;
         int votes = 0;
         for (int s = 0; s < static_cast<int>(sources.size()); ++s) {
             const LocalSource& local = sources[static_cast<std::size_t>(s)];
@@ -200,22 +221,12 @@ struct Fuser {
         std::array<std::array<std::uint32_t, kTile>, 32> remarks;
         for (std::size_t s = 0; s < sources.size(); ++s) {
             if (!sources[s].samples) continue;
-            low[s].fill(std::numeric_limits<float>::max());
-            high[s].fill(0.0f);
-            remarks[s].fill(0);
-            for (int j = 0; j < S; ++j) {
-                const float* line =
-                    sources[s].samples + static_cast<std::ptrdiff_t>(row * S + j) * grid.stride();
-                for (int x = 0; x < kTile; ++x) {
-                    for (int i = 0; i < S; ++i) {
-                        const float q = line[x * S + i];
-                        const auto k = static_cast<std::size_t>(x);
-                        low[s][k] = std::min(low[s][k], q);
-                        high[s][k] = std::max(high[s][k], q);
-                        remarks[s][k] |= std::bit_cast<std::uint32_t>(q);
-                    }
-                }
-            }
+            const float* lines =
+                sources[s].samples + static_cast<std::ptrdiff_t>(row) * S * grid.stride();
+            constexpr std::array summarise = {summarisePixels<1>, summarisePixels<2>,
+                                              summarisePixels<3>, summarisePixels<4>};
+            summarise[static_cast<std::size_t>(S - 1)](lines, grid.stride(), low[s].data(),
+                                                       high[s].data(), remarks[s].data());
         }
         for (int column = 0; column < columns; ++column) {
             const auto k = static_cast<std::size_t>(column);

@@ -30,7 +30,7 @@ struct Pieces {
 };
 
 /// Decides what each pixel of a tile shows: fuses the surfaces of the sources, checked against what
-/// the others see. At most 32 sources.
+/// the others see. At most 32 sources, at most 4 samples a side.
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
               int tileX, int tileY, int columns, int rows, Pieces& pieces);
 

@@ -18,7 +18,10 @@ enum class Opinion {
 inline constexpr float kFreeAlpha = 0.45f;
 
 /// A point this share of its depth in front of a surface is in front of it.
-inline constexpr float kClearlyBehind = 0.0005f;
+inline constexpr float kClearlyBehind = 0.0002f;
+
+/// And this share of the change of q over a pixel more, where the surface is steep.
+inline constexpr float kSlopeDoubt = 0.0625f;
 
 /// Bilinear alpha of a source at pixel position (u, v); 1 when the view has none.
 [[nodiscard]] inline float alphaAt(const Source& s, float u, float v) {
@@ -54,14 +57,14 @@ inline constexpr float kClearlyBehind = 0.0005f;
             if (!(there > 0.0f)) continue;
             any = true;
             // The cheap half of the test first: most surfaces are not behind the point at all.
-            const float margin =
-                kClearlyBehind * s.space.axis.whole(p) + s.step * s.space.axis.perUnit(p);
+            const float margin = (kClearlyBehind + s.noise) * s.space.axis.whole(p) +
+                                 s.step * s.space.axis.perUnit(p);
             const float reach = 4 * 0.03f * s.space.axis.whole(there);
             if (p < there + margin - reach) return Opinion::none;
             const glm::vec2 g = s.gradient(cx, cy);
             const float predicted = there + g.x * (u - 0.5f - static_cast<float>(cx)) +
                                     g.y * (v - 0.5f - static_cast<float>(cy));
-            if (p < predicted + margin + 0.125f * (std::abs(g.x) + std::abs(g.y)))
+            if (p < predicted + margin + kSlopeDoubt * (std::abs(g.x) + std::abs(g.y)))
                 return Opinion::none;
         }
     }

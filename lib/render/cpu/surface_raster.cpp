@@ -205,7 +205,7 @@ HWY_NOINLINE void drawExtensions(const Target& t, const Source& s, const Warp& w
     for (int j = 0; j < kBlock; ++j) {
         for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
             const int x = x0 + __builtin_ctz(left), y = y0 + j;
-            const float half = (s.info.at(x, y) & Source::kBesideBackground) ? 0.75f : 0.5f;
+            const float half = (s.info.at(x, y) & Source::kBesideBackground) ? 0.6f : 0.5f;
             const float q = s.q.at(x, y);
             const glm::vec2 g = s.gradient(x, y) * half;
             const float reach = 0.02f * s.space.axis.whole(q);

@@ -190,10 +190,11 @@ float unevenness(const Source& s) {
 }
 
 void findLeaves(Source& s) {
+    s.noise = std::min(unevenness(s), 0.01f);
     const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
     const double perPixel = 1.0 / (focal * (s.space.axis.inverse ? 1.0 : s.space.axis.unit));
-    s.flat = static_cast<float>(std::clamp<double>(1.5 * unevenness(s), kPlanarPixels * perPixel,
-                                                   3 * kPlanarPixels * perPixel));
+    s.flat = static_cast<float>(
+        std::clamp<double>(1.5 * s.noise, kPlanarPixels * perPixel, 3 * kPlanarPixels * perPixel));
     std::vector<std::vector<Leaf>> rows(static_cast<std::size_t>(s.blocksY));
     parallelFor(0, s.blocksY, [&](std::int64_t by) {
         auto& leaves = rows[static_cast<std::size_t>(by)];

@@ -84,6 +84,7 @@ struct Source {
     bool hasAlpha = false;  ///< some pixel is not fully covered
     float step = 0;         ///< scene units between neighbouring depth codes
     double told = 1.0;  ///< share of the pixels of the object (points, or full alpha) with depth
+    float noise = 0;    ///< how far, as a share of q, pixels stray from their neighbours
     float flat = 0;     ///< share of q by which pixels may leave the plane of a piece
     Image<float> q;     ///< 0 = no point
 

@@ -125,10 +125,10 @@ TEST(SurfaceSpheres, Draft) {
     hold({Quality::draft, 47.0, 46.6, 44.5, 23.5});
 }
 TEST(SurfaceSpheres, Normal) {
-    hold({Quality::normal, 49.6, 49.4, 47.3, 24.1});
+    hold({Quality::normal, 50.15, 50.0, 47.4, 24.1});
 }
 TEST(SurfaceSpheres, Best) {
-    hold({Quality::best, 50.1, 49.9, 47.5, 24.1});
+    hold({Quality::best, 50.3, 50.15, 47.5, 24.1});
 }
 
 TEST(SurfaceSpheres, ASourcesOwnPoseComesBackExactly) {
