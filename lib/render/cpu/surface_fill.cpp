@@ -134,17 +134,22 @@ void fillBackground(OpenFrame frame) {
         }
     }
     if (!any) return;
+    constexpr int kRays = 32;
+    std::array<glm::vec2, kRays> rays;
+    for (int k = 0; k < kRays; ++k) {
+        const float angle = static_cast<float>(k) * (6.2831853f / kRays);
+        rays[static_cast<std::size_t>(k)] = {std::cos(angle), std::sin(angle)};
+    }
     std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
     parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
                 if (frame.albedo.at(x, y).a >= kClosed) continue;
-                constexpr int kRays = 32;
                 std::array<Hit, kRays> hits;
                 int count = 0;
                 for (int k = 0; k < kRays; ++k) {
-                    const float angle = static_cast<float>(k) * (6.2831853f / kRays);
-                    const float dx = std::cos(angle), dy = std::sin(angle);
+                    const float dx = rays[static_cast<std::size_t>(k)].x;
+                    const float dy = rays[static_cast<std::size_t>(k)].y;
                     float along = 1;
                     Hit hit;
                     int averaged = 0;

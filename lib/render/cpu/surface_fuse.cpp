@@ -92,6 +92,19 @@ struct Fuser {
         return glm::vec2(along(1, 0), along(0, 1)) * static_cast<float>(grid.perPixel);
     }
 
+    /// The same of a pixel whose samples are all of one surface; (i, j) is its first.
+    [[nodiscard]] glm::vec2 slopeInside(int source, int i, int j) const {
+        const int S = grid.perPixel, stride = grid.stride();
+        const float* at = sources[static_cast<std::size_t>(source)].samples +
+                          static_cast<std::ptrdiff_t>(j) * stride + i;
+        const float scale = static_cast<float>(S) / static_cast<float>(S - 1);
+        const float* row = at + static_cast<std::ptrdiff_t>(S / 2) * stride;
+        const float* column = at + S / 2;
+        return glm::vec2(row[S - 1] - row[0],
+                         column[static_cast<std::ptrdiff_t>(S - 1) * stride] - column[0]) *
+               scale;
+    }
+
     [[nodiscard]] bool rejected(const Candidate& c, float x, float y, int i, int j) const {
         const std::uint32_t bits = bitsOf(c.q);
         const int enough = (bits & kNearEdgeBit) ? 1 : 2;
@@ -261,7 +274,8 @@ struct Fuser {
             if (count == 1 && sources.size() > 1 &&
                 rejected({q, first}, x, y, column * S + S / 2, row * S + S / 2))
                 continue;
-            const glm::vec2 g = slope(first, column * S + S / 2, row * S + S / 2);
+            const glm::vec2 g =
+                S > 1 ? slopeInside(first, column * S, row * S) : slope(first, column, row);
             pieces.add(x, y, q, g.x, g.y, 1.0f, present, row * kTile + column);
         }
     }
