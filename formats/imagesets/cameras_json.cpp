@@ -10,7 +10,7 @@
 namespace stx::imagesets {
 namespace {
 
-Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& where, Job& job) {
+Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& where) {
     SetView view;
     STX_TRY(const auto name, findText(c, "name", where));
     view.name = name.value_or(fmt::format("view{:03}", index));
@@ -74,8 +74,8 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
     STX_TRY(const auto quaternion, findNumbers(c, "quaternion", 4, where));
     if (quaternion) {
         const auto& q = *quaternion;
-        STX_TRY(const auto r, rotationFromQuaternion({q[0], q[1], q[2], q[3]}, where));
-        (void)r;
+        if (auto r = rotationFromQuaternion({q[0], q[1], q[2], q[3]}, where); !r)
+            return propagate(r);
         camera.orientation = glm::normalize(glm::dquat(q[3], q[0], q[1], q[2]));
     } else if (axisAngle) {
         const auto& a = *axisAngle;
@@ -88,7 +88,6 @@ Result<SetView> viewOf(const Json& c, std::size_t index, const std::string& wher
                       "given");
     }
     if (auto ok = camera.check(); !ok) return tl::unexpected(ok.error().at(where));
-    (void)job;
     return view;
 }
 
@@ -141,7 +140,7 @@ Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job) {
         const std::string where = fmt::format("cameras[{}]", i);
         if (!cameras[i].is_object())
             return failAt(where, ErrorCode::invalidInput, "an object is expected");
-        STX_TRY(auto view, viewOf(cameras[i], i, where, job));
+        STX_TRY(auto view, viewOf(cameras[i], i, where));
         views.push_back(std::move(view));
     }
     return views;

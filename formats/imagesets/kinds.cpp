@@ -1,6 +1,7 @@
 #include "formats/imagesets/kinds.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "formats/imagesets/messages.hpp"
 
@@ -25,6 +26,43 @@ JsonKind jsonKindOf(const Json& file) {
 Result<Json> readJson(const path& file, const Limits& limits) {
     STX_TRY(const auto bytes, readFile(file, limits));
     return within(inQuotes(file.string()), parseJson(bytes));
+}
+
+Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view) {
+    STX_TRY(const auto name, findText(camera, "stx:name", where));
+    view.exactName = name.value_or("");
+    STX_TRY(const auto q, findNumbers(camera, "stx:quaternion", 4, where));
+    if (q) {
+        const glm::dquat exact((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
+        if (std::abs(glm::length(exact) - 1) < 1e-6 &&
+            std::abs(glm::dot(exact, view.camera.orientation)) > 1 - 1e-9)
+            view.camera.orientation = exact;
+    }
+    STX_TRY(const auto window, findNumbers(camera, "stx:window", 4, where));
+    if (window) {
+        Camera& c = view.camera;
+        const double own[4] = {c.fx, c.fy, c.cx, c.cy};
+        bool same = true;
+        for (int i = 0; i < 4; ++i)
+            same &= std::abs((*window)[static_cast<std::size_t>(i)] - own[i]) <=
+                    1e-9 * (1 + std::abs(own[i]));
+        if (same) {
+            c.fx = (*window)[0];
+            c.fy = (*window)[1];
+            c.cx = (*window)[2];
+            c.cy = (*window)[3];
+        }
+    }
+    STX_TRY(const auto nearPlane, findNumber(camera, "nearPlane", where));
+    STX_TRY(const auto farPlane, findNumber(camera, "farPlane", where));
+    STX_TRY(const auto bits, findNumber(camera, "depthBits", where));
+    if (!nearPlane || !farPlane || !bits) return {};
+    if (!(*farPlane > *nearPlane))
+        return failAt(where, ErrorCode::invalidInput,
+                      "'nearPlane' {:g} must be below 'farPlane' {:g}", *nearPlane, *farPlane);
+    view.planes = DepthCode{*nearPlane, *farPlane, *bits == 8 ? 255u : 65535u};
+    view.depthBits = *bits == 8 ? 8 : *bits == 32 ? 32 : 16;
+    return {};
 }
 
 std::string firstThere(const path& folder, const std::vector<std::string>& names) {

@@ -8,6 +8,7 @@
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/patterns.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -135,39 +136,9 @@ Result<SetView> viewOf(const Json& c, const std::string& where) {
                                              quatFromAxisAngle({1, 0, 0, -r[1] * kRadian}) *
                                              quatFromAxisAngle({0, 0, 1, -r[2] * kRadian}));
     STX_CHECK(setProjection(c, where, view));
+    STX_CHECK(readOwnKeys(c, where, view));
     if (auto ok = view.camera.check(); !ok) return tl::unexpected(ok.error().at(where));
     return view;
-}
-
-struct Placeholders {
-    std::string name;
-    int width, height, frame;
-};
-
-/// The pattern with its placeholders filled in; {format} is left.
-std::string filled(std::string_view pattern, const Placeholders& p) {
-    std::string out;
-    while (!pattern.empty()) {
-        const std::pair<std::string_view, std::string> words[] = {
-            {"{name}", p.name},
-            {"{w}", std::to_string(p.width)},
-            {"{h}", std::to_string(p.height)},
-            {"{frame}", std::to_string(p.frame)},
-            {"{frame:03}", fmt::format("{:03}", p.frame)},
-            {"{frame:04}", fmt::format("{:04}", p.frame)}};
-        bool known = false;
-        for (const auto& [word, value] : words) {
-            if (!pattern.starts_with(word)) continue;
-            out += value;
-            pattern.remove_prefix(word.size());
-            known = true;
-            break;
-        }
-        if (known) continue;
-        out += pattern.front();
-        pattern.remove_prefix(1);
-    }
-    return out;
 }
 
 struct Search {
@@ -368,6 +339,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         STX_TRY(view.texture, within(place, sourceOf(texture, forTexture, frames, job.limits)));
         STX_TRY(view.depth, within(place, sourceOf(depth, forDepth, frames, job.limits)));
         view.distances = distancesOf(range, view.name, job);
+        if (!view.exactName.empty()) view.name = view.exactName;
         set.views.push_back(std::move(view));
     }
     if (set.views.empty())

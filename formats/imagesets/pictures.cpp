@@ -7,13 +7,10 @@
 
 #include "formats/images/images.hpp"
 #include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/text_lines.hpp"
 
 namespace stx::imagesets {
 namespace {
-
-std::string_view textOf(ByteSpan bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
 
 /// An OpenEXR's data window laid into its display window, which is the picture that the camera saw.
 void placeInDisplay(DecodedImage& image) {
@@ -197,6 +194,13 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
         },
         image.values);
     return out;
+}
+
+Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job) {
+    STX_TRY(const auto bytes, readFile(source.path, job.limits));
+    if (const auto info = probeImage(bytes)) return glm::ivec2(info->width, info->height);
+    STX_TRY(const auto image, decode(source, job));
+    return glm::ivec2(image.width, image.height);
 }
 
 Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name, const Limits& limits) {

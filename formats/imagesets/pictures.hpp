@@ -22,6 +22,9 @@ struct StoredDepth {
 };
 [[nodiscard]] Result<StoredDepth> readDepth(const PictureSource& source, Job& job);
 
+/// Width and height, from the header alone where that is possible (PNG, JPEG).
+[[nodiscard]] Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job);
+
 /// `PF`/`Pf` files: floats, rows from the bottom, a negative scale for little-endian.
 [[nodiscard]] Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name,
                                             const Limits& limits);

@@ -15,6 +15,17 @@ const std::vector<KindEntry>& entries() {
          describeTransforms},
         {{"miv", "camera list of MPEG's immersive video (TMIV) or RVS, with PNG or YUV files"},
          describeMiv},
+        {{"msr", "MSR 3D Video: calibParams-*.txt with camN/; needs the depth range"}, describeMsr},
+        {{"colmap", "COLMAP's dense workspace: sparse/, images/, stereo/depth_maps/"},
+         describeColmap},
+        {{"middlebury",
+          "Middlebury stereo: calib.txt with PFM, or older ones with focal length and "
+          "baseline"},
+         describeMiddlebury},
+        {{"tum", "TUM or ICL-NUIM RGB-D recording"}, describeRgbd},
+        {{"7scenes", "Microsoft's 7-Scenes recording"}, describeSevenScenes},
+        {{"exr", "OpenEXR pictures with Z: one part, several, several views"}, describeExr},
+        {{"panorama", "a folder with an equirectangular picture and its depth"}, describePanorama},
         {{"cameras", "a folder with our own cameras.json"}, describeCamerasJson},
     };
     return all;
@@ -70,6 +81,15 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
             const std::string kind = kindOfJson(path);
             if (!kind.empty()) return kind;
         }
+        const std::string name = path.filename().string();
+        if (path.extension() == ".txt") {
+            if (name.starts_with("calibParams")) return std::string("msr");
+            if (name == "calib.txt") return std::string("middlebury");
+            if (name == "groundtruth.txt" || name == "pose.txt" || name == "poses.txt")
+                return std::string("tum");
+        }
+        if (name.ends_with(".gt.freiburg")) return std::string("tum");
+        if (path.extension() == ".exr") return std::string("exr");
         return failAt(
             where, ErrorCode::invalidInput,
             "this is no image set: a .json with cameras, calib.txt, calibParams-*.txt, an "
@@ -82,6 +102,32 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
         const std::string kind = kindOfJson(path / name);
         if (kind == "miv" || (kind == "cameras" && name == "cameras.json")) return kind;
     }
+    for (const std::string& name : files)
+        if (name.starts_with("calibParams")) return std::string("msr");
+    const auto has = [&](const char* name) { return fs::exists(path / name, ec); };
+    if (has("sparse/cameras.bin") || has("sparse/cameras.txt") || has("sparse/0/cameras.bin") ||
+        has("sparse/0/cameras.txt") ||
+        ((has("cameras.bin") || has("cameras.txt")) && (has("images.bin") || has("images.txt"))))
+        return std::string("colmap");
+    if (has("calib.txt")) return std::string("middlebury");
+    if ((has("rgb.txt") && has("depth.txt")) || has("associations.txt") || has("associated.txt") ||
+        has("associate.txt") || ((has("color") || has("rgb")) && has("depth") && has("pose.txt")))
+        return std::string("tum");
+    int pictures = 0, exr = 0, disparities = 0, depths = 0;
+    for (const std::string& name : files) {
+        if (name.ends_with(".pose.txt")) return std::string("7scenes");
+        const std::string ending = fs::path(name).extension().string();
+        exr += ending == ".exr";
+        const bool picture = ending == ".png" || ending == ".jpg" || ending == ".exr" ||
+                             ending == ".pgm" || ending == ".ppm" || ending == ".pfm";
+        pictures += picture;
+        depths += picture && name.find("depth") != std::string::npos;
+        disparities += picture && (name.starts_with("disp1.") || name.starts_with("disp2.") ||
+                                   name.starts_with("disp5.") || name.starts_with("disp6."));
+    }
+    if (disparities > 0 && pictures > disparities) return std::string("middlebury");
+    if (pictures == 2 && depths == 1) return std::string("panorama");
+    if (exr > 0) return std::string("exr");
     return failAt(where, ErrorCode::invalidInput,
                   "no image set is recognised in this folder: transforms.json, cameras.json, "
                   "calib.txt, calibParams-*.txt, sparse/, pose.txt, groundtruth.txt or "

@@ -53,7 +53,8 @@ struct SetView {
     bool sensor = false;  ///< mixed pixels at depth edges are to be expected
     /// Planes and code that an export of ours told; used when they hold all points.
     std::optional<DepthCode> planes;
-    int depthBits = 0;  ///< with planes: 8, 16, 32
+    int depthBits = 0;      ///< with planes: 8, 16, 32
+    std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
 };
 
 struct SetDescription {

@@ -143,26 +143,7 @@ Result<void> setPose(const Json& frame, const std::string& where, SetView& view,
     STX_TRY(const glm::dmat3 r, repairRotation(rotation, std::max(view.camera.fx, 1.0),
                                                where + ": 'transform_matrix'", job));
     view.camera.orientation = glm::normalize(glm::quat_cast(r));
-    // What our own export wrote beside the matrix comes back to the bit.
-    STX_TRY(const auto exact, findNumbers(frame, "stx:quaternion", 4, where));
-    if (exact) {
-        const glm::dquat q((*exact)[3], (*exact)[0], (*exact)[1], (*exact)[2]);
-        if (std::abs(glm::dot(q, view.camera.orientation)) > 1 - 1e-9) view.camera.orientation = q;
-    }
     view.camera.position = glm::dvec3(m[3]);
-    return {};
-}
-
-Result<void> setPlanes(const Json& frame, const std::string& where, SetView& view) {
-    STX_TRY(const auto nearPlane, findNumber(frame, "nearPlane", where));
-    STX_TRY(const auto farPlane, findNumber(frame, "farPlane", where));
-    STX_TRY(const auto bits, findNumber(frame, "depthBits", where));
-    if (!nearPlane || !farPlane || !bits) return {};
-    if (!(*farPlane > *nearPlane))
-        return failAt(where, ErrorCode::invalidInput,
-                      "'nearPlane' {:g} must be below 'farPlane' {:g}", *nearPlane, *farPlane);
-    view.planes = DepthCode{*nearPlane, *farPlane, *bits == 8 ? 255u : 65535u};
-    view.depthBits = *bits == 8 ? 8 : *bits == 32 ? 32 : 16;
     return {};
 }
 
@@ -195,11 +176,10 @@ Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
         SetView view;
         STX_TRY(const auto name, findText(frame, "file_path", where));
         view.name = name ? nameOfFrame(*name) : fmt::format("frame{:03}", i);
-        STX_TRY(const auto ownName, findText(frame, "stx:name", where));
-        if (ownName) view.name = *ownName;
         STX_CHECK(setIntrinsics(file, frame, where, view));
         STX_CHECK(setPose(frame, where, view, job));
-        STX_CHECK(setPlanes(frame, where, view));
+        STX_CHECK(readOwnKeys(frame, where, view));
+        if (!view.exactName.empty()) view.name = view.exactName;
         if (view.camera.width > 0)
             if (auto ok = view.camera.check(); !ok) return tl::unexpected(ok.error().at(where));
         views.push_back(std::move(view));

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "formats/files/files.hpp"
+#include "formats/imagesets/lens.hpp"
+
+/// COLMAP's models, text and binary.
+namespace stx::imagesets {
+
+struct ColmapCamera {
+    int width = 0, height = 0;
+    double fx = 1, fy = 1, cx = 0, cy = 0;  ///< pixels; the first pixel's centre is (0.5, 0.5)
+    Lens lens;
+};
+
+struct ColmapImage {
+    std::string name;
+    std::uint32_t camera = 0;
+    glm::dvec4 rotation{0, 0, 0, 1};  ///< camera from world, x y z w
+    glm::dvec3 translation{0.0};
+};
+
+using ColmapCameras = std::map<std::uint32_t, ColmapCamera>;
+
+/// Errors name the line, or the camera or image and the byte. Lens models that cannot be undone
+/// (OPENCV_FISHEYE, FOV...) are errors.
+[[nodiscard]] Result<ColmapCameras> parseColmapCameras(ByteSpan bytes, bool binary,
+                                                       const Limits& limits);
+[[nodiscard]] Result<std::vector<ColmapImage>> parseColmapImages(ByteSpan bytes, bool binary,
+                                                                 const Limits& limits);
+
+}  // namespace stx::imagesets

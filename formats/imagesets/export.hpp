@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+
+#include "formats/files/files.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+
+namespace stx {
+
+struct ExportOptions {
+    enum class Kind {
+        transforms,  ///< transforms.json with images/ and depth/
+        miv,         ///< NAME.json of MIV with NAME_color and NAME_depth16 files
+    };
+    Kind kind = Kind::transforms;
+    /// Depth as OpenEXR floats, which come back exactly; else as 16-bit PNG: millimetres (or what
+    /// fits) in transforms.json, normalised disparity in MIV, with a note of the rounding.
+    bool floatDepth = true;
+    bool noClobber = false;
+};
+
+/// Writes a bundle as an image set: a folder that appears whole or not at all. Cameras are exact;
+/// 8-bit colour is PNG with its coverage, linear colour OpenEXR. Normals and splats are dropped
+/// with a note. readImageSet() gives the same bundle again. Errors: io; invalidInput for what the
+/// kind cannot say.
+[[nodiscard]] Result<void> exportImages(const Bundle& bundle, const std::filesystem::path& folder,
+                                        const ExportOptions& options, Job& job);
+
+}  // namespace stx

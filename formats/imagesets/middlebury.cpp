@@ -1,0 +1,200 @@
+// Middlebury's stereo sets: calib.txt with PFM disparities (2014 and later), and the older ones
+// with 8-bit disparities, whose focal length and baseline must be told. Cameras look along -Z of
+// our world and differ along +X.
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/middlebury.hpp"
+#include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/text_lines.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+/// Z = baseline f / (disparity / scale + offset). Floats: NaN and infinity are unknown; integers:
+/// 0.
+auto distancesOf(double baselineTimesFocal, double scale, double offset) {
+    return [=](Image<float>& values, const Camera&, int bits) -> Result<void> {
+        for (float& v : values.pixels()) {
+            const bool known = bits == 32 ? std::isfinite(v) : v != 0;
+            const double disparity = v / scale + offset;
+            v = known && disparity > 0 ? static_cast<float>(baselineTimesFocal / disparity)
+                                       : kNoDepth;
+        }
+        return {};
+    };
+}
+
+Camera cameraAt(double x, double f, double cx, double cy, int width, int height) {
+    Camera c;
+    c.position = {x, 0, 0};
+    c.fx = c.fy = f;
+    c.cx = cx;
+    c.cy = cy;
+    c.width = width;
+    c.height = height;
+    return c;
+}
+
+Result<SetDescription> describeCalibrated(const path& file, Job& job) {
+    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const std::string where = inQuotes(file.string());
+    STX_TRY(const auto bytes, readFile(file, job.limits));
+    STX_TRY(const auto calibration, within(where, parseMiddlebury(textOf(bytes), job.limits)));
+    SetDescription set;
+    for (int i = 0; i < 2; ++i) {
+        const std::string texture = withImageEnding(folder, fmt::format("im{}", i));
+        const std::string depth =
+            firstThere(folder, {fmt::format("disp{}.pfm", i), fmt::format("disp{}GT.pfm", i)});
+        if (depth.empty()) continue;
+        SetView view;
+        view.name = fmt::format("im{}", i);
+        STX_TRY(view.texture, sourceInside(folder, texture, where, job.limits));
+        STX_TRY(view.depth, sourceInside(folder, depth, where, job.limits));
+        // The principal points count from the first pixel's centre.
+        view.camera = cameraAt(i * calibration.baseline, calibration.f, calibration.cx[i] + 0.5,
+                               calibration.cy[i] + 0.5, calibration.width, calibration.height);
+        view.distances = distancesOf(calibration.baseline * calibration.f, 1, calibration.doffs);
+        set.views.push_back(std::move(view));
+    }
+    if (set.views.empty())
+        return failAt(where, ErrorCode::io, "there is neither disp0.pfm nor disp1.pfm beside it");
+    return set;
+}
+
+/// The number at the end of `stem` after `prefix`.
+std::optional<int> numberAfter(const std::string& stem, std::string_view prefix) {
+    if (!stem.starts_with(prefix)) return std::nullopt;
+    int value = 0;
+    const char* end = stem.data() + stem.size();
+    const auto [next, error] = std::from_chars(stem.data() + prefix.size(), end, value);
+    if (error != std::errc() || next != end || value < 0 || value > 99) return std::nullopt;
+    return value;
+}
+
+Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& options, Job& job) {
+    const std::string where = inQuotes(folder.string());
+    if (!(options.focal > 0 && options.baseline > 0))
+        return failAt(
+            where, ErrorCode::usage,
+            "this Middlebury set has no calib.txt; give the focal length in pixels and the "
+            "baseline with --focal and --baseline (sets of 2006 at full size: 3740, 160)");
+    if (!(options.disparityScale > 0))
+        return failAt(where, ErrorCode::usage, "the disparity scale is {:g}; it must be above 0",
+                      options.disparityScale);
+    double offset = options.disparityOffset;
+    std::error_code ec;
+    if (offset == 0 && std::filesystem::is_regular_file(folder / "dmin.txt", ec)) {
+        STX_TRY(const auto bytes, readFile(folder / "dmin.txt", job.limits));
+        const auto lines = linesOf(textOf(bytes));
+        const std::string place = inQuotes((folder / "dmin.txt").string());
+        if (lines.empty()) return failAt(place, ErrorCode::invalidInput, "the file is empty");
+        STX_TRY(const auto n, within(place, numbersOf(lines[0].words(), 0, 1, lines[0].where())));
+        offset = n[0];
+    }
+    SetDescription set;
+    const auto files = filesIn(folder);
+    // Views 1 to 5 (2005, 2006) or 2 to 6 (2001, 2003): the baseline spans four steps.
+    int first = 2;
+    for (const std::string& name : files) {
+        const auto stem = path(name).stem().string();
+        if (numberAfter(stem, "disp") == 1 || numberAfter(stem, "view") == 1) first = 1;
+    }
+    for (const std::string& name : files) {
+        const auto number = numberAfter(path(name).stem().string(), "disp");
+        if (!number) continue;
+        SetView view;
+        view.name = fmt::format("view{}", *number);
+        std::string texture = withImageEnding(folder, view.name);
+        if (texture == view.name) texture = withImageEnding(folder, fmt::format("im{}", *number));
+        STX_TRY(view.texture, sourceInside(folder, texture, where, job.limits));
+        STX_TRY(view.depth, sourceInside(folder, name, where, job.limits));
+        STX_TRY(const auto size, within(where, imageSizeOf(view.texture, job)));
+        view.camera = cameraAt(options.baseline * (*number - first) / 4.0, options.focal,
+                               size.x * 0.5, size.y * 0.5, size.x, size.y);
+        view.distances =
+            distancesOf(options.baseline * options.focal, options.disparityScale, offset);
+        set.views.push_back(std::move(view));
+    }
+    if (set.views.empty())
+        return failAt(where, ErrorCode::io,
+                      "there is no disparity image (disp1.png, disp5.png...)");
+    return set;
+}
+
+}  // namespace
+
+Result<MiddleburyCalibration> parseMiddlebury(std::string_view text, const Limits& limits) {
+    MiddleburyCalibration c;
+    bool camera[2] = {false, false};
+    std::optional<double> doffs, baseline, width, height;
+    for (const TextLine& line : linesOf(text)) {
+        const auto equals = line.text.find('=');
+        if (equals == std::string_view::npos)
+            return failAt(line.where(), ErrorCode::invalidInput, "'key=value' is expected");
+        const std::string_view key = line.text.substr(0, equals);
+        std::string value(line.text.substr(equals + 1));
+        if (key == "cam0" || key == "cam1") {
+            for (char& letter : value)
+                if (letter == '[' || letter == ']' || letter == ';') letter = ' ';
+            const TextLine words{line.number, value};
+            STX_TRY(const auto n, numbersOf(words.words(), 0, 9, line.where()));
+            const int i = key == "cam1";
+            if (!(n[0] > 0) || std::abs(n[0] - n[4]) > 1e-6 * n[0] || n[1] != 0 || n[3] != 0)
+                return failAt(line.where(), ErrorCode::invalidInput,
+                              "{} is no matrix of rows f 0 cx; 0 f cy; 0 0 1 with f above 0", key);
+            if (camera[1 - i] && c.f != n[0])
+                return failAt(line.where(), ErrorCode::invalidInput,
+                              "the focal lengths of cam0 and cam1 differ ({:g}, {:g}); the set is "
+                              "not rectified",
+                              c.f, n[0]);
+            c.f = n[0];
+            c.cx[i] = n[2];
+            c.cy[i] = n[5];
+            camera[i] = true;
+            continue;
+        }
+        for (auto& [name, to] :
+             std::initializer_list<std::pair<const char*, std::optional<double>*>>{
+                 {"doffs", &doffs},
+                 {"baseline", &baseline},
+                 {"width", &width},
+                 {"height", &height}}) {
+            if (key != name) continue;
+            const TextLine words{line.number, value};
+            STX_TRY(const auto n, numbersOf(words.words(), 0, 1, line.where()));
+            *to = n[0];
+        }
+    }
+    if (!camera[0] || !camera[1] || !doffs || !baseline || !width || !height)
+        return fail(ErrorCode::invalidInput,
+                    "'{}' is missing; cam0, cam1, doffs, baseline, width and height are needed",
+                    !camera[0]   ? "cam0"
+                    : !camera[1] ? "cam1"
+                    : !doffs     ? "doffs"
+                    : !baseline  ? "baseline"
+                    : !width     ? "width"
+                                 : "height");
+    if (!(*baseline > 0))
+        return fail(ErrorCode::invalidInput, "'baseline' is {:g}; it must be above 0", *baseline);
+    c.baseline = *baseline;
+    c.doffs = *doffs;
+    STX_TRY(c.width, imageSide(*width, "width", limits.maxImageSide, ""));
+    STX_TRY(c.height, imageSide(*height, "height", limits.maxImageSide, ""));
+    return c;
+}
+
+Result<SetDescription> describeMiddlebury(const path& given, const ImageSetOptions& options,
+                                          Job& job) {
+    std::error_code ec;
+    if (!std::filesystem::is_directory(given, ec)) return describeCalibrated(given, job);
+    if (std::filesystem::is_regular_file(given / "calib.txt", ec))
+        return describeCalibrated(given / "calib.txt", job);
+    return describeOlder(given, options, job);
+}
+
+}  // namespace stx::imagesets

@@ -1,0 +1,323 @@
+// TUM's RGB-D recordings and those of ICL-NUIM: 16-bit depth of 5000 steps a metre, poses camera to
+// world with y down and z forward.
+
+#include "formats/imagesets/rgbd.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/poses.hpp"
+#include "formats/imagesets/text_lines.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+constexpr double kMetre = 1.0 / 5000;
+/// What TUM's own tools take for the same moment, seconds.
+constexpr double kSameTime = 0.02;
+
+struct Intrinsics {
+    double fx, fy, cx, cy;
+    Lens lens;
+};
+
+Intrinsics intrinsicsOf(double fx, double fy, double cx, double cy) {
+    return {fx, fy, cx, cy, {}};
+}
+
+/// Given, else in a file, else those published for the recording, with a note.
+Result<Intrinsics> findIntrinsics(const path& folder, bool icl, const ImageSetOptions& options,
+                                  Job& job) {
+    const auto* g = options.intrinsics;
+    if (g[0] != 0) return intrinsicsOf(g[0], g[1], g[2], g[3]);
+    const std::string file = firstThere(folder, {"intrinsics.txt", "calibration.txt", "camera.txt",
+                                                 "camera_intrinsics.txt", "camera-intrinsics.txt"});
+    if (!file.empty()) {
+        const std::string where = inQuotes((folder / file).string());
+        STX_TRY(const auto bytes, readFile(folder / file, job.limits));
+        std::vector<double> n;
+        for (const TextLine& line : linesOf(textOf(bytes))) {
+            for (const auto word : line.words()) {
+                STX_TRY(const double value, within(where, numberOf(word, line.where())));
+                n.push_back(value);
+            }
+        }
+        if (n.size() == 9) return intrinsicsOf(n[0], n[4], n[2], n[5]);
+        if (n.size() == 4) return intrinsicsOf(n[0], n[1], n[2], n[3]);
+        return failAt(where, ErrorCode::invalidInput,
+                      "{} numbers; 'fx fy cx cy' or a 3x3 matrix is expected", n.size());
+    }
+    const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
+    const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
+    Intrinsics i = intrinsicsOf(525, 525, 319.5, 239.5);
+    const char* whose = "the usual Kinect's";
+    if (icl) {
+        i = intrinsicsOf(481.2, -480.0, 319.5, 239.5);
+        whose = "ICL-NUIM's";
+    } else if (has("freiburg1")) {
+        i = {517.3, 516.5, 318.6, 255.3, {0.2624, -0.9531, 1.1633, -0.0054, 0.0026, 0}};
+        whose = "TUM's freiburg1";
+    } else if (has("freiburg2")) {
+        i = {520.9, 521.0, 325.1, 249.7, {0.2312, -0.7849, 0.9172, -0.0033, -0.0001, 0}};
+        whose = "TUM's freiburg2";
+    } else if (has("freiburg3")) {
+        i = intrinsicsOf(535.4, 539.2, 320.1, 247.6);
+        whose = "TUM's freiburg3";
+    }
+    job.note(
+        fmt::format("the set does not tell its intrinsics; {} published ones are used (fx {:g}, "
+                    "fy {:g}, cx {:g}, cy {:g}); others with --intrinsics",
+                    whose, i.fx, i.fy, i.cx, i.cy));
+    return i;
+}
+
+struct TimedName {
+    double time;
+    std::string name;
+};
+
+Result<std::vector<TimedName>> readList(const path& folder, const std::string& file, Job& job) {
+    STX_TRY(const auto bytes, readFile(folder / file, job.limits));
+    const std::string where = inQuotes((folder / file).string());
+    std::vector<TimedName> out;
+    for (const TextLine& line : linesOf(textOf(bytes))) {
+        const auto words = line.words();
+        if (words.size() < 2)
+            return failAt(where + ": " + line.where(), ErrorCode::invalidInput,
+                          "'time file' is expected");
+        STX_TRY(const double time, within(where, numberOf(words[0], line.where())));
+        out.push_back({time, std::string(words[1])});
+    }
+    std::sort(out.begin(), out.end(), [](auto& a, auto& b) { return a.time < b.time; });
+    return out;
+}
+
+/// A view's files and pose before the images are looked at.
+struct Frame {
+    double time;
+    std::string texture, depth;
+    TimedPose pose;
+};
+
+/// The depth image nearest in time to each colour image, each used once at most.
+std::vector<Frame> associate(const std::vector<TimedName>& colours,
+                             const std::vector<TimedName>& depths) {
+    std::vector<Frame> frames;
+    std::size_t at = 0;
+    for (const TimedName& colour : colours) {
+        while (at + 1 < depths.size() && std::abs(depths[at + 1].time - colour.time) <=
+                                             std::abs(depths[at].time - colour.time))
+            ++at;
+        if (at >= depths.size() || std::abs(depths[at].time - colour.time) > kSameTime) continue;
+        frames.push_back({colour.time, colour.name, depths[at].name, {}});
+    }
+    return frames;
+}
+
+Result<std::vector<TimedPose>> readTrajectory(const path& folder, const std::string& file,
+                                              Job& job) {
+    STX_TRY(const auto bytes, readFile(folder / file, job.limits));
+    return within(inQuotes((folder / file).string()), parseTrajectory(textOf(bytes)));
+}
+
+/// Files named by a number (`17.png`), by that number.
+std::vector<std::pair<int, std::string>> numbered(const path& folder, const std::string& under) {
+    std::vector<std::pair<int, std::string>> out;
+    for (const std::string& name : filesIn(folder / under)) {
+        const std::string stem = path(name).stem().string();
+        int number = 0;
+        const auto [next, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
+        if (error == std::errc() && next == stem.data() + stem.size() && number >= 0)
+            out.emplace_back(number, fmt::format("{}/{}", under, name));
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+/// color/N, depth/N and a line for each in pose.txt.
+Result<std::vector<Frame>> framesByNumber(const path& folder, const std::string& colourFolder,
+                                          const std::string& trajectory, Job& job) {
+    STX_TRY(const auto poses, readTrajectory(folder, trajectory, job));
+    const auto colours = numbered(folder, colourFolder);
+    const auto depths = numbered(folder, "depth");
+    const std::string where = inQuotes(folder.string());
+    if (colours.empty() || depths.empty())
+        return failAt(where, ErrorCode::io, "there is no {}/N.png or no depth/N.png in it",
+                      colourFolder);
+    std::vector<Frame> frames;
+    for (const auto& [number, name] : colours) {
+        const auto depth = std::find_if(depths.begin(), depths.end(),
+                                        [&, n = number](auto& d) { return d.first == n; });
+        if (depth == depths.end())
+            return failAt(where, ErrorCode::io, "'{}' has no depth image of the same number", name);
+        const int line = number - colours.front().first;
+        if (line >= static_cast<int>(poses.size()))
+            return failAt(inQuotes((folder / trajectory).string()), ErrorCode::invalidInput,
+                          "{} poses, but there are images up to number {}", poses.size(),
+                          colours.back().first);
+        frames.push_back({static_cast<double>(number), name, depth->second,
+                          poses[static_cast<std::size_t>(line)]});
+    }
+    return frames;
+}
+
+Result<std::vector<Frame>> framesByTime(const path& folder, const std::string& trajectory,
+                                        Job& job) {
+    std::vector<Frame> frames;
+    const std::string list =
+        firstThere(folder, {"associations.txt", "associate.txt", "associated.txt"});
+    if (!list.empty()) {
+        STX_TRY(const auto bytes, readFile(folder / list, job.limits));
+        const std::string where = inQuotes((folder / list).string());
+        for (const TextLine& line : linesOf(textOf(bytes))) {
+            const auto words = line.words();
+            if (words.size() < 4)
+                return failAt(where + ": " + line.where(), ErrorCode::invalidInput,
+                              "'time colour time depth' is expected");
+            STX_TRY(const double time, within(where, numberOf(words[0], line.where())));
+            frames.push_back({time, std::string(words[1]), std::string(words[3]), {}});
+            // ICL-NUIM's list has them the other way round.
+            if (frames.back().texture.starts_with("depth"))
+                std::swap(frames.back().texture, frames.back().depth);
+        }
+    } else {
+        STX_TRY(const auto colours, readList(folder, "rgb.txt", job));
+        STX_TRY(const auto depths, readList(folder, "depth.txt", job));
+        frames = associate(colours, depths);
+        if (frames.size() < colours.size())
+            job.note(
+                fmt::format("{} of {} colour images have no depth within {} s and are left out",
+                            colours.size() - frames.size(), colours.size(), kSameTime));
+    }
+    STX_TRY(auto poses, readTrajectory(folder, trajectory, job));
+    std::sort(poses.begin(), poses.end(), [](auto& a, auto& b) { return a.time < b.time; });
+    std::vector<Frame> posed;
+    for (Frame& frame : frames) {
+        const auto pose = poseAt(poses, frame.time, kSameTime);
+        if (!pose) continue;
+        frame.pose = *pose;
+        posed.push_back(std::move(frame));
+    }
+    if (posed.size() < frames.size())
+        job.note(fmt::format("{} of {} images have no pose within {} s and are left out",
+                             frames.size() - posed.size(), frames.size(), kSameTime));
+    return posed;
+}
+
+}  // namespace
+
+Result<std::vector<TimedPose>> parseTrajectory(std::string_view text) {
+    std::vector<TimedPose> poses;
+    for (const TextLine& line : linesOf(text)) {
+        const auto words = line.words();
+        if (words.size() != 7 && words.size() != 8)
+            return failAt(
+                line.where(), ErrorCode::invalidInput,
+                "{} numbers; 't tx ty tz qx qy qz qw', or the same without t, is expected",
+                words.size());
+        const std::size_t first = words.size() - 7;
+        STX_TRY(const auto n, numbersOf(words, first, 7, line.where()));
+        TimedPose pose;
+        pose.time = static_cast<double>(poses.size());
+        if (first == 1) {
+            STX_TRY(pose.time, numberOf(words[0], line.where()));
+        }
+        pose.position = {n[0], n[1], n[2]};
+        const double length = std::hypot(std::hypot(n[3], n[4]), std::hypot(n[5], n[6]));
+        if (!(length > 0.9 && length < 1.1))
+            return failAt(line.where(), ErrorCode::invalidInput,
+                          "the quaternion has the length {:g}; 1 is expected", length);
+        pose.orientation = glm::normalize(glm::dquat(n[6], n[3], n[4], n[5]));
+        poses.push_back(pose);
+    }
+    return poses;
+}
+
+std::optional<TimedPose> poseAt(const std::vector<TimedPose>& poses, double time, double gap) {
+    const auto after = std::lower_bound(poses.begin(), poses.end(), time,
+                                        [](const TimedPose& p, double t) { return p.time < t; });
+    const TimedPose* b = after != poses.end() && after->time - time <= gap ? &*after : nullptr;
+    const TimedPose* a = after != poses.begin() && time - std::prev(after)->time <= gap
+                             ? &*std::prev(after)
+                             : nullptr;
+    if (!a && !b) return std::nullopt;
+    if (!a || !b) return a ? *a : *b;
+    const double span = b->time - a->time;
+    const double t = span > 0 ? (time - a->time) / span : 0;
+    return TimedPose{time, glm::mix(a->position, b->position, t),
+                     glm::slerp(a->orientation, b->orientation, t)};
+}
+
+Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& options, Job& job) {
+    std::error_code ec;
+    const bool isFolder = std::filesystem::is_directory(given, ec);
+    const path folder = isFolder                  ? given
+                        : given.has_parent_path() ? given.parent_path()
+                                                  : path(".");
+    const std::string where = inQuotes(given.string());
+    std::string trajectory = isFolder ? "" : given.filename().string();
+    if (trajectory.empty())
+        trajectory = firstThere(folder, {"groundtruth.txt", "pose.txt", "poses.txt",
+                                         "trajectory.txt", "CameraTrajectory.txt"});
+    if (trajectory.empty())
+        for (const std::string& name : filesIn(folder))
+            if (name.ends_with(".gt.freiburg")) trajectory = name;
+    if (trajectory.empty())
+        return failAt(where, ErrorCode::io,
+                      "there is no trajectory (groundtruth.txt, pose.txt, *.gt.freiburg) in it");
+    const bool timed =
+        !firstThere(folder, {"rgb.txt", "associations.txt", "associate.txt", "associated.txt"})
+             .empty();
+    const bool icl = !timed || trajectory.ends_with(".gt.freiburg");
+    const std::string colourFolder =
+        std::filesystem::is_directory(folder / "color", ec) ? "color" : "rgb";
+    STX_TRY(auto frames, timed ? framesByTime(folder, trajectory, job)
+                               : framesByNumber(folder, colourFolder, trajectory, job));
+    if (frames.empty())
+        return failAt(where, ErrorCode::invalidInput,
+                      "no colour image has both a depth image and a pose of its time");
+    STX_CHECK(
+        checkViewCount(frames.size() / static_cast<std::size_t>(options.every), job.limits, where));
+    STX_TRY(const Intrinsics k, findIntrinsics(folder, icl, options, job));
+    if (k.fx == 0 || k.fy == 0)
+        return failAt(where, ErrorCode::invalidInput, "the focal lengths are {:g} and {:g}", k.fx,
+                      k.fy);
+
+    SetDescription set;
+    std::optional<glm::ivec2> size;
+    for (const Frame& frame : frames) {
+        SetView view;
+        view.name = path(frame.texture).stem().string();
+        STX_TRY(view.texture, sourceInside(folder, frame.texture, where, job.limits));
+        STX_TRY(view.depth, sourceInside(folder, frame.depth, where, job.limits));
+        if (!size) {
+            STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
+        }
+        VisionCamera v;
+        v.worldFromCamera = glm::mat3_cast(frame.pose.orientation);
+        v.centre = frame.pose.position;
+        v.fx = k.fx;
+        v.fy = k.fy;
+        // These sets count from the first pixel's centre.
+        v.cx = k.cx + 0.5;
+        v.cy = k.cy + 0.5;
+        v.width = size->x;
+        v.height = size->y;
+        if (v.leftHanded())
+            job.note(
+                "the set's world is left-handed (fx or fy is negative); its z axis is negated");
+        view.camera = cameraFromVision(v);
+        view.lens = k.lens;
+        view.distances = scaledIntegers(kMetre);
+        view.sensor = true;
+        set.views.push_back(std::move(view));
+    }
+    return set;
+}
+
+}  // namespace stx::imagesets

@@ -1,0 +1,61 @@
+#include "formats/imagesets/text_lines.hpp"
+
+#include <charconv>
+#include <cmath>
+
+namespace stx::imagesets {
+
+std::vector<std::string_view> TextLine::words() const {
+    std::vector<std::string_view> out;
+    constexpr std::string_view kSpaces = " \t\r,";
+    for (std::size_t at = 0;;) {
+        const std::size_t from = text.find_first_not_of(kSpaces, at);
+        if (from == std::string_view::npos) return out;
+        at = std::min(text.find_first_of(kSpaces, from), text.size());
+        out.push_back(text.substr(from, at - from));
+    }
+}
+
+std::vector<TextLine> linesOf(std::string_view text, bool all) {
+    std::vector<TextLine> lines;
+    for (int number = 1; !text.empty(); ++number) {
+        const std::size_t end = std::min(text.find('\n'), text.size());
+        std::string_view line = text.substr(0, end);
+        text.remove_prefix(std::min(end + 1, text.size()));
+        if (line.ends_with('\r')) line.remove_suffix(1);
+        const std::size_t first = line.find_first_not_of(" \t");
+        const bool blank = first == std::string_view::npos || line[first] == '#';
+        if (all || !blank) lines.push_back({number, line});
+    }
+    return lines;
+}
+
+std::string_view textOf(ByteSpan bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Result<double> numberOf(std::string_view word, const std::string& where) {
+    double value = 0;
+    std::string_view digits = word;
+    if (digits.starts_with('+')) digits.remove_prefix(1);
+    const auto [next, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error != std::errc() || next != digits.data() + digits.size() || !std::isfinite(value))
+        return failAt(where, ErrorCode::invalidInput, "'{}' where a finite number is expected",
+                      word.substr(0, 40));
+    return value;
+}
+
+Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words, std::size_t first,
+                                      std::size_t count, const std::string& where) {
+    if (words.size() < first + count)
+        return failAt(where, ErrorCode::invalidInput, "{} values; {} are expected", words.size(),
+                      first + count);
+    std::vector<double> out;
+    for (std::size_t i = 0; i < count; ++i) {
+        STX_TRY(const double value, numberOf(words[first + i], where));
+        out.push_back(value);
+    }
+    return out;
+}
+
+}  // namespace stx::imagesets

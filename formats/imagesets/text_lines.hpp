@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/files/files.hpp"
+
+namespace stx::imagesets {
+
+/// A line of a text file that is neither empty nor a comment.
+struct TextLine {
+    int number = 0;  ///< from 1
+    std::string_view text;
+
+    [[nodiscard]] std::string where() const { return "line " + std::to_string(number); }
+    /// The words between spaces, tabs and commas.
+    [[nodiscard]] std::vector<std::string_view> words() const;
+};
+
+/// Lines without their ends; those that begin with # or are blank are left out, unless `all`.
+[[nodiscard]] std::vector<TextLine> linesOf(std::string_view text, bool all = false);
+
+[[nodiscard]] std::string_view textOf(ByteSpan bytes);
+
+/// A finite number that is the whole word.
+[[nodiscard]] Result<double> numberOf(std::string_view word, const std::string& where);
+/// `count` numbers that are the words [first, first + count).
+[[nodiscard]] Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words,
+                                                    std::size_t first, std::size_t count,
+                                                    const std::string& where);
+
+}  // namespace stx::imagesets
