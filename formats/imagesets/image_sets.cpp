@@ -87,13 +87,18 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
 
     const auto count = static_cast<std::int64_t>(set.views.size());
     std::vector<Result<std::vector<ReferenceView>>> loaded(set.views.size());
+    // Notes in the order of the views, whichever is ready first.
+    std::vector<Job> jobs(set.views.size());
     std::atomic<std::int64_t> done = 0;
     std::atomic<bool> failed = false;
     parallelFor(0, count, [&](std::int64_t i) {
         const auto at = static_cast<std::size_t>(i);
         if (failed) return;
+        Job& own = jobs[at];
+        own.limits = job.limits;
+        own.cancelled = job.cancelled.load();
         try {
-            loaded[at] = loadSetView(set.views[at], options, job);
+            loaded[at] = loadSetView(set.views[at], options, own);
         } catch (const std::bad_alloc&) {
             loaded[at] = fail(ErrorCode::failed, "view '{}': there is not enough memory",
                               set.views[at].name);
@@ -103,6 +108,8 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     });
     Bundle bundle;
     bundle.title = std::move(set.title);
+    for (Job& own : jobs)
+        for (std::string& note : own.takeNotes()) job.note(std::move(note));
     for (auto& views : loaded) {
         if (!views) return tl::unexpected(views.error().at(where));
         for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));

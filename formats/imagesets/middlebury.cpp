@@ -114,8 +114,10 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
         STX_TRY(view.texture, sourceInside(folder, texture, where, job.limits));
         STX_TRY(view.depth, sourceInside(folder, name, where, job.limits));
         STX_TRY(const auto size, within(where, imageSizeOf(view.texture, job)));
-        view.camera = cameraAt(options.baseline * (*number - first) / 4.0, options.focal,
-                               size.x * 0.5, size.y * 0.5, size.x, size.y);
+        // The pictures are cropped such that a disparity of `offset` is 0.
+        const double steps = (*number - first) / 4.0;
+        view.camera = cameraAt(options.baseline * steps, options.focal,
+                               size.x * 0.5 + offset * steps, size.y * 0.5, size.x, size.y);
         view.distances =
             distancesOf(options.baseline * options.focal, options.disparityScale, offset);
         set.views.push_back(std::move(view));

@@ -1,0 +1,93 @@
+// What a bundle exports comes back the same.
+
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "formats/imagesets/export.hpp"
+#include "formats/imagesets/image_sets.hpp"
+#include "tests/small_bundle.hpp"
+#include "tests/temporary_folder.hpp"
+
+using namespace stx;
+
+namespace {
+
+using Kind = ExportOptions::Kind;
+
+class Export : public ::testing::TestWithParam<std::tuple<Kind, int, bool>> {};
+
+TEST_P(Export, ComesBackEqualToTheBit) {
+    const auto [kind, depthBits, linear] = GetParam();
+    const Bundle bundle = smallBundle(4, depthBits, false, linear);
+    TemporaryFolder folder;
+    Job job;
+    ExportOptions options;
+    options.kind = kind;
+    const auto written = exportImages(bundle, folder / "set", options, job);
+    ASSERT_TRUE(written) << written.error().text();
+    const auto recognised = recogniseImageSet(folder / "set");
+    ASSERT_TRUE(recognised) << recognised.error().text();
+    EXPECT_EQ(*recognised, kind == Kind::miv ? "miv" : "transforms");
+    ImageSetOptions read;
+    read.depthBits = depthBits;
+    const auto back = readImageSet(folder / "set", read, job);
+    ASSERT_TRUE(back) << back.error().text();
+    EXPECT_EQ(differenceOf(bundle, *back), "");
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        const Camera &a = bundle.views[i].camera, &b = back->views[i].camera;
+        EXPECT_TRUE(a == b) << a.fx - b.fx << " " << a.cx - b.cx << " " << a.cy - b.cy;
+    }
+    // Again into the same folder: it is ours to replace.
+    EXPECT_TRUE(exportImages(bundle, folder / "set", options, job));
+    options.noClobber = true;
+    EXPECT_FALSE(exportImages(bundle, folder / "set", options, job));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Export,
+                         ::testing::Combine(::testing::Values(Kind::transforms, Kind::miv),
+                                            ::testing::Values(8, 16, 32), ::testing::Bool()));
+
+TEST(Export, IntegerDepthIsRoundedByNoMoreThanItsNoteSays) {
+    const Bundle bundle = smallBundle(2, 16, false, false);
+    for (const Kind kind : {Kind::transforms, Kind::miv}) {
+        TemporaryFolder folder;
+        Job job;
+        ExportOptions options;
+        options.kind = kind;
+        options.floatDepth = false;
+        ASSERT_TRUE(exportImages(bundle, folder / "set", options, job));
+        ASSERT_FALSE(job.takeNotes().empty());
+        ImageSetOptions read;
+        read.depthBits = 32;
+        const auto back = readImageSet(folder / "set", read, job);
+        ASSERT_TRUE(back) << back.error().text();
+        for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+            const auto& a = bundle.views[i];
+            const auto& b = back->views[i];
+            ASSERT_EQ(a.depth.size(), b.depth.size());
+            const double n = a.nearPlane, f = a.farPlane;
+            const double allowed =
+                kind == Kind::transforms ? 0.0005001 : f * f * (1 / n) / 65535 * 0.51;
+            for (std::size_t p = 0; p < a.depth.count(); ++p) {
+                const float d = a.depth.data()[p], e = b.depth.data()[p];
+                ASSERT_EQ(hasPoint(d), hasPoint(e));
+                if (hasPoint(d)) {
+                    ASSERT_NEAR(d, e, allowed);
+                }
+            }
+        }
+    }
+}
+
+TEST(Export, RefusesAForeignFolderAndLeavesItAlone) {
+    TemporaryFolder folder;
+    std::filesystem::create_directory(folder / "mine");
+    std::ofstream(folder / "mine/diary.txt") << "keep";
+    Job job;
+    EXPECT_FALSE(exportImages(smallBundle(1, 16, false, false), folder / "mine", {}, job));
+    EXPECT_TRUE(std::filesystem::exists(folder / "mine/diary.txt"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "mine/transforms.json"));
+}
+
+}  // namespace
