@@ -1,0 +1,202 @@
+#!/usr/bin/env python3
+"""Damaged files through every command that could be handed them.
+
+Every malformed mesh and image of the shared folder, and files of ours and of the reference folder
+cut short or with bytes changed (seeded). Each run must end by itself, without a signal, in little
+processor time and memory, with an exit code of the contract, one `stx: ` line when that is not 0,
+and no output but a whole one. `--samples N` cuts and changes each file N times.
+"""
+import collections
+import concurrent.futures
+import os
+import random
+import shutil
+import sys
+import tempfile
+
+from harness import arguments, commands_of, copy_into, must, quad, run, temporaries, write
+
+CODES = (0, 2, 3, 4, 5, 7)
+CPU_SECONDS = 10
+MEMORY_MIB = 512
+PEAK_MIB = 1024  # what a run may really take: twice the limit it was given
+
+CONVERT = ["-o", "OUT/a.mp4", "--views", "ring:2", "--size", "24x24", "--supersampling", "1"]
+RENDER = ["-o", "OUT/a.png", "--size", "24x24", "--backend", "cpu"]
+
+
+class Case:
+    """A command line in which IN is the damaged file and OUT a folder for outputs."""
+
+    def __init__(self, name, command, source=None, content=None, beside=()):
+        self.name, self.command = name, command
+        self.source, self.content, self.beside = source, content, beside
+
+
+def commands_for(name, have):
+    """What may be handed a model or a bundle."""
+    ending = os.path.splitext(name)[1].lower()
+    lines = [["info", "IN"], ["validate", "IN"], ["convert", "IN"] + CONVERT, ["render", "IN"] + RENDER]
+    if ending == ".json":
+        lines = [["info", "IN"], ["validate", "IN"], ["render", "IN"] + RENDER]
+    return [line for line in lines if line[0] in have]
+
+
+def malformed(shared, have, folder):
+    meshes = os.path.join(shared, "data/malformed/meshes")
+    for root, _, names in sorted(os.walk(meshes)):
+        for name in sorted(names):
+            if os.path.splitext(name)[1].lower() in (".bin", ".png", ".jpg"):
+                continue
+            for line in commands_for(name, have):
+                yield Case(f"mesh {name}", line, source=os.path.join(root, name))
+    model = quad(folder)
+    for root, _, names in sorted(os.walk(os.path.join(shared, "data/malformed/images"))):
+        for name in sorted(names):
+            path = os.path.join(root, name)
+            lines = [["convert", model, "--texture", "IN"] + CONVERT, ["info", "IN"]]
+            if "compare" in have:
+                lines.append(["compare", "IN", "IN"])
+            if name.endswith(".exr"):
+                lines += commands_for(name, have)
+            for line in lines:
+                yield Case(f"image {name}", line, source=path)
+
+
+def own_files(args, folder):
+    """Small files of each kind that we write."""
+    model = quad(folder)
+    made = []
+    for ending in ("mp4", "exr", "xmt", "bt"):
+        out = os.path.join(folder, f"own.{ending}")
+        must([args.stx, "convert", model, "-o", out, "--views", "ring:2", "--size", "24x24"], folder)
+        made.append(out)
+    must([args.stx, "bake", made[0], "-o", os.path.join(folder, "baked.mp4")], folder)
+    made.append(os.path.join(folder, "baked.mp4"))
+    must([args.stx, "pack", made[0], "-o", os.path.join(folder, "atlas")], folder)
+    made.append(os.path.join(folder, "atlas", "atlas.json"))
+    must([args.stx, "pack", made[0], "-o", os.path.join(folder, "atlas.exr")], folder)
+    made.append(os.path.join(folder, "atlas.exr"))
+    return made
+
+
+def references(shared):
+    for kind in ("mp4", "bt", "xmt"):
+        folder = os.path.join(shared, "reference", kind)
+        if not os.path.isdir(folder):
+            continue
+        for root, _, names in sorted(os.walk(folder)):
+            for name in sorted(names):
+                path = os.path.join(root, name)
+                if name.endswith("." + kind) and os.path.getsize(path) < 1 << 20:
+                    yield path
+
+
+def companions(path):
+    """The files that a text scene or an atlas names; a damaged copy needs them beside it."""
+    if not path.endswith((".xmt", ".bt", ".json")):
+        return []
+    folder, name = os.path.split(path)
+    stem = os.path.splitext(name)[0]
+    return [os.path.join(folder, other) for other in sorted(os.listdir(folder))
+            if other != name and (other.startswith(stem) or path.endswith(".json"))
+            and not other.endswith((".xmt", ".bt", ".mp4", ".exr"))]
+
+
+def damaged(path, have, samples, seed):
+    with open(path, "rb") as file:
+        whole = file.read()
+    rng = random.Random(f"{seed} {os.path.basename(path)}")
+    lines = commands_for(path, have)
+    for i in range(samples):
+        content = bytearray(whole)
+        if i % 2 == 0:
+            del content[rng.randrange(len(content)):]
+        else:
+            # Half of the changes go to the head, where the numbers stand.
+            span = len(content) if i % 4 == 1 else min(len(content), 2048)
+            for _ in range(rng.randint(1, 4)):
+                content[rng.randrange(span)] = rng.choice((0, 0x7F, 0x80, 0xFF, rng.randrange(256)))
+        yield Case(f"{os.path.basename(path)} damaged {i}", lines[i // 2 % len(lines)], content=bytes(content),
+                   source=path, beside=companions(path))
+
+
+def check(done, out):
+    problems = []
+    lines = done.err.decode("utf-8", "replace").splitlines()
+    errors = [line for line in lines if line.startswith("stx: ")]
+    left = sorted(os.listdir(out))
+    if done.code is None:
+        problems.append("did not end")
+    elif done.code < 0:
+        problems.append(f"ended by signal {-done.code}")
+    elif done.code not in CODES:
+        problems.append(f"exit code {done.code}")
+    if done.code and done.code > 0 and len(errors) != (1 if done.code != 7 else len(errors)):
+        problems.append(f"{len(errors)} lines that begin with 'stx: '")
+    if done.code == 0 and errors:
+        problems.append("says an error and ends with 0")
+    strange = [line for line in lines if not line.startswith(("stx: ", "note: ")) and " → " not in line]
+    if strange:
+        problems.append(f"a library speaks: {strange[0]!r}")
+    if any(len(line) > 2000 for line in errors):
+        problems.append("an error of more than 2000 characters")
+    if done.code != 0 and left:
+        problems.append(f"leaves {left}")
+    if temporaries(out):
+        problems.append(f"leaves {temporaries(out)}")
+    peak = done.usage.ru_maxrss >> 10 if done.usage else 0
+    if peak > PEAK_MIB:
+        problems.append(f"takes {peak} MiB at --max-memory {MEMORY_MIB}")
+    return problems
+
+
+def one(args, case, keep):
+    with tempfile.TemporaryDirectory(prefix="stx-hostile-") as folder:
+        out = os.path.join(folder, "out")
+        os.mkdir(out)
+        path = case.source
+        if case.content is not None:
+            for other in case.beside:
+                copy_into(other, folder)
+            path = os.path.join(folder, os.path.basename(case.source))
+            write(path, case.content)
+        command = [args.stx] + [word.replace("OUT", out) if word.startswith("OUT/") else path if word == "IN" else word
+                                for word in case.command]
+        done = run(command + ["--max-memory", str(MEMORY_MIB), "--threads", "1"], folder, timeout=100,
+                   cpu_seconds=CPU_SECONDS)
+        problems = check(done, out)
+        if problems and keep and case.content is not None:
+            shutil.copyfile(path, os.path.join(keep, case.name.replace(" ", "_") + os.path.splitext(path)[1]))
+        return case, done, problems
+
+
+def main():
+    args = arguments(__doc__, samples=24, seed="one", keep="", jobs=os.cpu_count() or 2)
+    have = commands_of(args.stx)
+    with tempfile.TemporaryDirectory(prefix="stx-hostile-own-") as folder:
+        cases = list(malformed(args.shared, have, folder))
+        count = len(cases)
+        for path in own_files(args, folder):
+            cases += damaged(path, have, args.samples, args.seed)
+        known = list(references(args.shared))
+        for path in known:
+            cases += damaged(path, have, max(2, args.samples // 6), args.seed)
+        codes, failed, slowest, peak = collections.Counter(), 0, 0.0, 0
+        with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
+            for case, done, problems in pool.map(lambda c: one(args, c, args.keep), cases):
+                codes[done.code] += 1
+                if done.usage:
+                    slowest = max(slowest, done.usage.ru_utime + done.usage.ru_stime)
+                    peak = max(peak, done.usage.ru_maxrss >> 10)
+                if problems:
+                    failed += 1
+                    print(f"{case.name}: {'; '.join(problems)}\n  {done}", flush=True)
+    print(f"{len(cases)} runs: {count} over malformed files, {len(cases) - count} over damaged ones of "
+          f"{len(known)} references and 7 of ours; exit codes {dict(sorted(codes.items(), key=str))}; "
+          f"at most {slowest:.1f} s of processor and {peak} MiB; {failed} failed")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
