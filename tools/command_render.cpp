@@ -114,6 +114,15 @@ Result<int> printDevices(Program& program) {
                 "for a software one");
 }
 
+/// Under --no-clobber: errors when one of the pictures exists.
+Result<void> checkFrames(const RenderOptions& o, int count, const Program& program) {
+    if (!program.common.noClobber || o.skipExisting) return {};
+    for (int i = 0; i < count; ++i) {
+        if (const auto name = frameName(o.output, i)) STX_CHECK(checkTarget(*name, program));
+    }
+    return {};
+}
+
 Result<int> render(const RenderOptions& o, Program& program) {
     if (o.listDevices) return printDevices(program);
     if (o.input.empty() || o.output.empty())
@@ -125,6 +134,7 @@ Result<int> render(const RenderOptions& o, Program& program) {
     if (count > 1 && !frameName(o.output, 0) && o.output != "-")
         return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
                     count);
+    STX_CHECK(checkFrames(o, count, program));
     FrameWriter::Settings writing;
     writing.pattern = o.output;
     writing.background = background;
@@ -148,6 +158,7 @@ Result<int> render(const RenderOptions& o, Program& program) {
         points = bundle.pointCount();
     }
     STX_TRY(const auto cameras, makeCameras(o.camera, context, program));
+    STX_CHECK(checkFrames(o, static_cast<int>(cameras.size()), program));
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         if (auto ok = cameras[i].check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera {}", i)));

@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <cstdio>
 
 #include "tools/program.hpp"
@@ -53,11 +55,10 @@ int mainProgram(int argc, char** argv) {
     app.footer(
         "Exit codes: 0 ok, 1 usage, 2 cannot read or write a file, 3 invalid input,\n"
         "4 failed while working, 5 not supported here, 7 a difference or a broken rule.");
-    const std::vector<Command> commands = {addConvert(app, program), addSelect(app, program),
-                                           addPack(app, program),    addBake(app, program),
-                                           addRender(app, program),  addInfo(app, program),
-                                           addValidate(app, program), addCompare(app, program),
-        addBench(app, program)};
+    const std::vector<Command> commands = {
+        addConvert(app, program),  addSelect(app, program),  addPack(app, program),
+        addBake(app, program),     addRender(app, program),  addInfo(app, program),
+        addValidate(app, program), addCompare(app, program), addBench(app, program)};
     for (const auto& command : commands)
         command.app->set_help_flag("-h,--help", "Print this help and stop");
 
@@ -88,5 +89,9 @@ int mainProgram(int argc, char** argv) {
 }  // namespace stx::tools
 
 int main(int argc, char** argv) {
-    return stx::tools::mainProgram(argc, argv);
+    const int code = stx::tools::mainProgram(argc, argv);
+    // Everything is written and closed. The destructors of the image libraries would only wait for
+    // their loading to end, and crash when another thread still does it.
+    std::fflush(nullptr);
+    _exit(code);
 }

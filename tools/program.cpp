@@ -29,6 +29,24 @@ Result<void> Program::writeReport(const nlohmann::ordered_json& report) const {
     return writeFile(common.report, std::as_bytes(std::span(text)));
 }
 
+namespace {
+
+/// Errors when the folder of `target` is not there or cannot be written.
+Result<void> checkFolderOf(const std::filesystem::path& target) {
+    std::error_code ec;
+    const auto folder =
+        target.parent_path().empty() ? std::filesystem::path(".") : target.parent_path();
+    if (!std::filesystem::is_directory(folder, ec))
+        return fail(ErrorCode::io, "cannot write '{}': there is no folder '{}'; create it first",
+                    target.string(), folder.string());
+    if (access(folder.c_str(), W_OK) != 0)
+        return fail(ErrorCode::io, "cannot write '{}': the folder '{}' is not writable",
+                    target.string(), folder.string());
+    return {};
+}
+
+}  // namespace
+
 int Program::run(const std::function<Result<int>()>& body) {
     job.limits.maxMemoryBytes = common.maxMemoryMiB << 20;
     job.limits.allowOutside = common.allowOutside;
@@ -49,7 +67,9 @@ int Program::run(const std::function<Result<int>()>& body) {
     const ThreadLimit threads(common.threads);
     Result<int> code = 0;
     try {
-        code = body();
+        // A report that cannot be written is told before the work, not after it.
+        const auto report = common.report.empty() ? Result<void>() : checkFolderOf(common.report);
+        code = report ? body() : tl::unexpected(report.error());
     } catch (const std::bad_alloc&) {
         code = fail(ErrorCode::failed, "out of memory; use smaller images or fewer --threads");
     } catch (const std::exception& e) {
@@ -203,15 +223,8 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
 
 Result<void> checkTarget(const std::filesystem::path& target, const Program& program) {
     if (target == "-") return {};
+    STX_CHECK(checkFolderOf(target));
     std::error_code ec;
-    const auto folder =
-        target.parent_path().empty() ? std::filesystem::path(".") : target.parent_path();
-    if (!std::filesystem::is_directory(folder, ec))
-        return fail(ErrorCode::io, "cannot write '{}': there is no folder '{}'; create it first",
-                    target.string(), folder.string());
-    if (access(folder.c_str(), W_OK) != 0)
-        return fail(ErrorCode::io, "cannot write '{}': the folder '{}' is not writable",
-                    target.string(), folder.string());
     if (program.common.noClobber &&
         std::filesystem::exists(std::filesystem::symlink_status(target, ec)))
         return fail(ErrorCode::io, "'{}' exists and --no-clobber forbids to replace it",

@@ -42,6 +42,7 @@ class OutputFile {
     [[nodiscard]] Result<void> commit();
 
   private:
+    friend class OutputFolder;
     struct Impl;
     explicit OutputFile(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
@@ -67,6 +68,9 @@ class OutputFolder {
     /// Where to put the files until commit().
     [[nodiscard]] const std::filesystem::path& temporaryPath() const;
     [[nodiscard]] Result<void> commit();
+    /// Commits this folder and a file that names what is in it. Two names cannot change in one
+    /// step, so the old file goes first: whenever this ends, no file names another run's folder.
+    [[nodiscard]] Result<void> commitWith(OutputFile& file);
 
   private:
     struct Impl;

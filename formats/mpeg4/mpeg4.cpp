@@ -100,8 +100,7 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
             STX_CHECK(writeFile(folder.temporaryPath() / allNames[next++], bytes));
         }
     }
-    STX_CHECK(folder.commit());
-    return file.commit();
+    return folder.commitWith(file);
 }
 
 }  // namespace

@@ -238,12 +238,12 @@ def stopping(args, inputs, folder):
         for batch in (False, True):
             work = tempfile.mkdtemp(dir=folder)
             names = []
-            for i in range(40):
+            for i in range(100):
                 names.append(f"m{i}.obj")
                 shutil.copyfile(inputs["mesh"], os.path.join(work, names[-1]))
             os.makedirs(os.path.join(work, "out"))
             write(os.path.join(work, "list.txt"), "\n".join(names))
-            words = (["@list.txt", "-o", "out/{stem}.exr", "--jobs", "3", "--views", "ring:4", "--size", "100x100",
+            words = (["@list.txt", "-o", "out/{stem}.exr", "--jobs", "3", "--views", "sphere:20", "--size", "512x512",
                       "--report", "r.jsonl"]
                      if batch else ["m0.obj", "-o", "out/m0.exr", "--views", "ring:64", "--size", "2048x2048"])
             process = subprocess.Popen([args.stx, "convert"] + words, cwd=work, stdin=subprocess.DEVNULL,
