@@ -6,6 +6,7 @@
 #include "lib/render/gl/gl_renderer.hpp"
 #include "lib/render/gpu/egl_context.hpp"
 #include "lib/render/gpu/gpu_splat.hpp"
+#include "lib/render/gpu/gpu_surface.hpp"
 #endif
 
 namespace stx {
@@ -21,8 +22,7 @@ Result<std::unique_ptr<Renderer>> makeCpu(const Bundle& bundle, const RenderSett
 Result<std::unique_ptr<Renderer>> makeGpu(const Bundle& bundle, const RenderSettings& settings,
                                           int device, Job& job) {
     if (settings.mode == RenderMode::surface)
-        return fail(ErrorCode::unsupported,
-                    "the gpu backend has no surface mode; use --mode splat or --backend cpu");
+        return gpu::makeGpuSurfaceRenderer(bundle, settings, device, job);
     return gpu::makeGpuSplatRenderer(bundle, settings, device, job);
 }
 
@@ -74,8 +74,7 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
         case Backend::automatic:
             break;
     }
-    // Where the GPU lacks the mode asked for, the CPU has it.
-    if (settings.mode == RenderMode::splat && hasHardware(device)) {
+    if (hasHardware(device)) {
         auto made = makeGpu(bundle, settings, device, job);
         if (made) return made;
         job.note(fmt::format("the gpu backend cannot be used ({}); the cpu backend draws instead",

@@ -8,6 +8,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/render/cpu/surface_fill.hpp"
 #include "lib/render/cpu/surface_fuse.hpp"
+#include "lib/render/cpu/surface_painter.hpp"
 #include "lib/render/cpu/surface_raster.hpp"
 #include "lib/render/cpu/surface_shade.hpp"
 #include "lib/render/cpu/surface_source.hpp"
@@ -20,13 +21,6 @@ using namespace surface;
 
 /// Views that tell less of the object than this are taken for pruned ones.
 constexpr double kWhole = 0.9;
-
-/// What a quality means.
-struct Effort {
-    int samplesPerPixel = 3;  ///< along one side of a pixel
-    int mostGeometry = 8;     ///< sources that one tile is built from, at most 32
-    ShadeSettings shade;
-};
 
 Effort effortOf(Quality quality) {
     Effort e;
@@ -46,20 +40,15 @@ Effort effortOf(Quality quality) {
     return e;
 }
 
-/// One source in one frame: its maps, and which of its blocks may show in which tile.
-struct FrameSource {
-    const Source* source = nullptr;
-    Warp sourceFromPixel;
-    glm::dmat4 pixelFromSource{1.0};
-    Ray fromEye{};
-    std::vector<std::uint32_t> tileBegin;  ///< tile t has blocks[tileBegin[t] .. tileBegin[t + 1])
-    std::vector<std::uint32_t> blocks;
-};
-
 class CpuSurfaceRenderer final : public Renderer {
   public:
-    CpuSurfaceRenderer(const Bundle& bundle, const RenderSettings& settings, Job& job)
-        : bundle_(bundle), settings_(settings), effort_(effortOf(settings.quality)), job_(job) {
+    CpuSurfaceRenderer(const Bundle& bundle, const RenderSettings& settings, Job& job,
+                       std::unique_ptr<TilePainter> painter = nullptr)
+        : bundle_(bundle),
+          settings_(settings),
+          effort_(effortOf(settings.quality)),
+          job_(job),
+          painter_(std::move(painter)) {
         sources_.resize(bundle.views.size());
         parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
             sources_[static_cast<std::size_t>(i)] =
@@ -80,9 +69,15 @@ class CpuSurfaceRenderer final : public Renderer {
     }
 
     [[nodiscard]] Result<Frame> render(const Camera& camera) override;
-    [[nodiscard]] std::string backend() const override { return "cpu"; }
+    [[nodiscard]] std::string backend() const override {
+        return painter_ ? painter_->backend() : "cpu";
+    }
     [[nodiscard]] std::string device() const override {
-        return fmt::format("CPU ({})", simdTarget());
+        return painter_ ? painter_->device() : fmt::format("CPU ({})", simdTarget());
+    }
+    /// Hands the sources to the painter.
+    [[nodiscard]] Result<void> preparePainter() {
+        return painter_->prepare(sources_, effort_, job_);
     }
 
   private:
@@ -92,8 +87,9 @@ class CpuSurfaceRenderer final : public Renderer {
     [[nodiscard]] glm::vec3 normalAt(std::size_t source, float u, float v) const;
     [[nodiscard]] FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX,
                                           int tilesY) const;
-    void drawTile(const PixelSpace& space, std::span<const FrameSource> all, int tilesX, int tile,
-                  Frame& frame, Image<float>& q) const;
+    void drawTile(const FrameWork& work, int tile, Frame& frame, Image<float>& q) const;
+    [[nodiscard]] Result<void> paintTiles(const FrameWork& work, Frame& frame,
+                                          Image<float>& q) const;
     [[nodiscard]] std::vector<int> chooseSources(const PixelSpace& space,
                                                  std::span<const FrameSource> all, int tile,
                                                  int tileX, int tileY) const;
@@ -110,6 +106,7 @@ class CpuSurfaceRenderer final : public Renderer {
     std::vector<Image<glm::vec3>> normals_;  ///< of views that bring none, while a light is on
     Bounds bounds_;
     bool fillsFrame_ = false;
+    std::unique_ptr<TilePainter> painter_;  ///< null = the processor paints
 };
 
 void CpuSurfaceRenderer::addBounds(const Source& s) {
@@ -276,9 +273,11 @@ std::vector<int> CpuSurfaceRenderer::chooseSources(const PixelSpace& space,
     return chosen;
 }
 
-void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const FrameSource> all,
-                                  int tilesX, int tile, Frame& frame, Image<float>& qImage) const {
-    const int tileX = tile % tilesX * kTile, tileY = tile / tilesX * kTile;
+void CpuSurfaceRenderer::drawTile(const FrameWork& work, int tile, Frame& frame,
+                                  Image<float>& qImage) const {
+    const PixelSpace& space = work.space;
+    const std::span<const FrameSource> all = work.sources;
+    const int tileX = tile % work.tilesX * kTile, tileY = tile / work.tilesX * kTile;
     const auto t = static_cast<std::size_t>(tile);
     if (std::all_of(all.begin(), all.end(),
                     [&](const FrameSource& f) { return f.tileBegin[t] == f.tileBegin[t + 1]; }))
@@ -290,17 +289,12 @@ void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const Frame
     static thread_local std::vector<std::int8_t> best;
     static thread_local std::vector<LocalSource> local;
     static thread_local std::vector<ShadeSource> shade;
-    const std::vector<int> chosen = chooseSources(space, all, tile, tileX, tileY);
+    const std::vector<int> chosen = work.chooseSources(tile);
     samples.resize(std::max(samples.size(), grid.count() * chosen.size()));
     local.clear();
     shade.clear();
-    // Samples from pixels: the tile's corner to the origin, S to the pixel, first sample at ½.
-    glm::dmat4 sampleFromPixel(1.0);
-    sampleFromPixel[0][0] = sampleFromPixel[1][1] = grid.perPixel;
-    sampleFromPixel[3][0] = -tileX * grid.perPixel - 0.5;
-    sampleFromPixel[3][1] = -tileY * grid.perPixel - 0.5;
-    const float qLimit = space.axis.inverse ? std::numeric_limits<float>::max()
-                                            : static_cast<float>(space.axis.q(0.0));
+    const glm::dmat4 sampleFromPixel = work.sampleFromPixel(tile);
+    const float qLimit = work.qLimit();
     for (std::size_t k = 0; k < chosen.size(); ++k) {
         const FrameSource& f = all[static_cast<std::size_t>(chosen[k])];
         float* mine = samples.data() + grid.count() * k;
@@ -332,6 +326,26 @@ void CpuSurfaceRenderer::drawTile(const PixelSpace& space, std::span<const Frame
                 normalAt(static_cast<std::size_t>(chosen[k]), h.x / h.w, h.y / h.w);
         }
     }
+}
+
+Result<void> CpuSurfaceRenderer::paintTiles(const FrameWork& work, Frame& frame,
+                                            Image<float>& q) const {
+    if (!painter_) {
+        parallelFor(0, static_cast<std::int64_t>(work.tilesX) * work.tilesY,
+                    [&](std::int64_t tile) {
+                        if (!job_.cancelled) drawTile(work, static_cast<int>(tile), frame, q);
+                    });
+        return {};
+    }
+    Image<glm::vec3> origin;
+    if (work.wantOrigin) origin = Image<glm::vec3>(q.width(), q.height(), glm::vec3(-1, 0, 0));
+    STX_CHECK(painter_->paint(work, {frame.colour, q, origin}));
+    for (std::size_t i = 0; i < origin.count(); ++i) {
+        const glm::vec3 from = origin.data()[i];
+        if (from.x >= 0)
+            frame.normal.data()[i] = normalAt(static_cast<std::size_t>(from.x), from.y, from.z);
+    }
+    return {};
 }
 
 int CpuSurfaceRenderer::viewAt(const Camera& camera) const {
@@ -424,10 +438,12 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
             placed[static_cast<std::size_t>(i)] =
                 placeSource(sources_[static_cast<std::size_t>(i)], space, tilesX, tilesY);
         });
-        parallelFor(0, static_cast<std::int64_t>(tilesX) * tilesY, [&](std::int64_t tile) {
-            if (job_.cancelled) return;
-            drawTile(space, placed, tilesX, static_cast<int>(tile), frame, q);
-        });
+        const FrameWork work{
+            space, placed, tilesX, tilesY, effort_, settings_.lighting.on(), [&](int tile) {
+                return chooseSources(space, placed, tile, tile % tilesX * kTile,
+                                     tile / tilesX * kTile);
+            }};
+        STX_CHECK(paintTiles(work, frame, q));
         STX_CHECK(job_.checkCancelled());
         if (fillsFrame_ && settings_.fill == Fill::background) {
             fillBackground({frame.colour, q, space});
@@ -450,6 +466,33 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
 }
 
 }  // namespace
+
+namespace surface {
+
+glm::dmat4 FrameWork::sampleFromPixel(int tile) const {
+    const int S = effort.samplesPerPixel;
+    glm::dmat4 m(1.0);
+    m[0][0] = m[1][1] = S;
+    m[3][0] = -(tile % tilesX * kTile) * S - 0.5;
+    m[3][1] = -(tile / tilesX * kTile) * S - 0.5;
+    return m;
+}
+
+float FrameWork::qLimit() const {
+    return space.axis.inverse ? std::numeric_limits<float>::max()
+                              : static_cast<float>(space.axis.q(0.0));
+}
+
+Result<std::unique_ptr<Renderer>> makePaintedSurfaceRenderer(const Bundle& bundle,
+                                                             const RenderSettings& settings,
+                                                             Job& job,
+                                                             std::unique_ptr<TilePainter> painter) {
+    auto renderer = std::make_unique<CpuSurfaceRenderer>(bundle, settings, job, std::move(painter));
+    STX_CHECK(renderer->preparePainter());
+    return std::unique_ptr<Renderer>(std::move(renderer));
+}
+
+}  // namespace surface
 
 std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const Bundle& bundle,
                                                  const RenderSettings& settings, Job& job) {

@@ -8,6 +8,7 @@
 #include "lib/render/gpu/egl_context.hpp"
 #include "lib/render/gpu/gl_object.hpp"
 #include "lib/render/gpu/gpu_scene.hpp"
+#include "lib/render/gpu/growing_buffer.hpp"
 #include "lib/render/gpu/shader_program.hpp"
 #include "lib/render/gpu/splat_frame.hpp"
 #include "lib/render/pinholes.hpp"
@@ -24,26 +25,6 @@ constexpr int kLargestPiece = 4096;
 enum class Sums { integers = 0, floats = 1, pairs = 2 };
 /// RULE of the shaders.
 enum class Rule { point = 0, uniform = 1, ellipse = 2, paper = 3, small = 4 };
-
-/// A buffer that grows to what a frame needs.
-struct GrowingBuffer {
-    GlBuffer buffer;
-    std::int64_t bytes = 0;
-
-    void reserve(std::int64_t wanted) {
-        wanted = std::max<std::int64_t>(wanted, 16);
-        if (buffer && bytes >= wanted) return;
-        buffer = GlBuffer::create();
-        glNamedBufferStorage(buffer.get(), wanted, nullptr, GL_DYNAMIC_STORAGE_BIT);
-        bytes = wanted;
-    }
-    template <class T>
-    void upload(const std::vector<T>& values) {
-        const auto size = static_cast<std::int64_t>(values.size() * sizeof(T));
-        reserve(size);
-        if (size > 0) glNamedBufferSubData(buffer.get(), 0, size, values.data());
-    }
-};
 
 /// Everything that lives in the context; destroyed while it is current.
 struct Resources {
