@@ -5,6 +5,7 @@
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/imagesets/image_sets.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "lib/packing/packing.hpp"
@@ -101,7 +102,8 @@ Result<Bundle> openBundle(const fs::path& path, const OpenOptions& options, Job&
 Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const OpenOptions& options,
                                                   Job& job) {
     using Opened = std::variant<Mesh, Bundle>;
-    STX_TRY(const auto kind, recognise(path));
+    STX_TRY(auto kind, recognise(path));
+    if (!options.set.from.empty()) kind = FileKind::imageSet;
     Result<Bundle> bundle = Bundle();
     switch (kind) {
         case FileKind::mesh: {
@@ -110,6 +112,9 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         }
         case FileKind::exr:
             bundle = readExrBundle(path, job);
+            // Colour and Z in parts of their own, or cameras in a file beside it.
+            if (!bundle && bundle.error().code == ErrorCode::invalidInput)
+                if (auto set = readImageSet(path, options.set, job)) bundle = std::move(set);
             break;
         case FileKind::mpeg4:
             bundle = readMpeg4Bundle(path, job);
@@ -120,6 +125,8 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
             break;
         }
         case FileKind::imageSet:
+            bundle = readImageSet(path, options.set, job);
+            break;
         case FileKind::image:
         case FileKind::unknown:
             return fail(ErrorCode::invalidInput,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/files/files.hpp"
+#include "formats/imagesets/image_sets.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
@@ -31,10 +32,7 @@ enum class FileKind {
 
 struct OpenOptions {
     std::string texture;  ///< texture of a mesh that names none; empty = none
-    std::string from;     ///< kind of image set, empty = recognise
-    int frame = 0;        ///< of image sets that have time
-    double depthMin = 0,
-           depthMax = 0;  ///< depth range that the set itself does not tell; 0 = not given
+    ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
 };
 
 /// Opens a bundle, an atlas (unpacked) or an image set as a Bundle. Meshes: error that says to use

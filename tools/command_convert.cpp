@@ -1,6 +1,10 @@
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 
+#include "formats/files/text_numbers.hpp"
 #include "formats/images/images.hpp"
+#include "formats/imagesets/patterns.hpp"
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "tools/batch.hpp"
@@ -18,8 +22,22 @@ struct ConvertOptions {
     int quality = 92;
     bool pointTexture = false;
     OpenOptions open;
+    std::string frames;  ///< A-B
     BatchOptions batch;
 };
+
+/// Writes the options of image sets that are texts into their numbers.
+Result<void> setTextOptions(const std::string& option, const std::string& text,
+                            std::vector<double*> to) {
+    std::string spaced = text;
+    std::replace(spaced.begin(), spaced.end(), ',', ' ');
+    const auto numbers = numbersFrom(spaced);
+    if (!numbers || numbers->size() != to.size())
+        return fail(ErrorCode::usage, "{} is '{}'; {} numbers with commas between are expected",
+                    option, text, to.size());
+    for (std::size_t i = 0; i < to.size(); ++i) *to[i] = (*numbers)[i];
+    return {};
+}
 
 SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     SaveOptions save;
@@ -31,7 +49,10 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
 
 Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptions& o,
                           Program& program) {
-    STX_TRY(auto opened, openRenderable(input, o.open, program.job));
+    OpenOptions open = o.open;
+    open.set.texturePattern = open.texture;
+    if (o.mesh->depthBitsGiven) open.set.depthBits = o.mesh->depthBits;
+    STX_TRY(auto opened, openRenderable(input, open, program.job));
     if (auto* mesh = std::get_if<Mesh>(&opened)) {
         auto bundle = captureMesh(*mesh, *o.mesh, program);
         if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", input.string())));
@@ -82,7 +103,41 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                                   {"bytes", bytesOf(target)}, {"seconds", seconds}};
 }
 
+/// One bundle for each frame `A-B` of one set; {frame} in the output's name is the frame.
+Result<int> convertFrames(const ConvertOptions& o, Program& program) {
+    const auto dash = o.frames.find('-');
+    double first = 0, last = 0;
+    STX_CHECK(setTextOptions("--frames",
+                             dash == std::string::npos
+                                 ? o.frames + "," + o.frames
+                                 : o.frames.substr(0, dash) + "," + o.frames.substr(dash + 1),
+                             {&first, &last}));
+    if (!(first >= 0 && first <= last && last < 1e6 && first == std::floor(first) &&
+          last == std::floor(last)))
+        return fail(ErrorCode::usage, "--frames is '{}'; A-B with 0 <= A <= B is expected",
+                    o.frames);
+    if (o.inputs.size() != 1 || o.inputs[0][0] == '@')
+        return fail(ErrorCode::usage, "--frames takes one image set, not {}", o.inputs.size());
+    if (first < last && o.output.find("{frame") == std::string::npos)
+        return fail(ErrorCode::usage,
+                    "'{}' would be written for each frame; put {{frame}} or {{frame:04}} into its "
+                    "name",
+                    o.output);
+    auto entries = nlohmann::ordered_json::array();
+    for (int frame = static_cast<int>(first); frame <= static_cast<int>(last); ++frame) {
+        ConvertOptions one = o;
+        one.open.set.frame = frame;
+        const auto target = imagesets::filled(o.output, {"", 0, 0, frame});
+        STX_TRY(auto entry, convertOne(o.inputs[0], target, one, program));
+        entries.push_back(std::move(entry));
+    }
+    STX_CHECK(program.writeReport(
+        {{"$schema", "convert-report.schema.json"}, {"conversions", std::move(entries)}}));
+    return 0;
+}
+
 Result<int> convert(const ConvertOptions& o, Program& program) {
+    if (!o.frames.empty()) return convertFrames(o, program);
     STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
     STX_TRY(const auto items, planBatch(inputs, o.output));
     STX_CHECK(checkMeshViewOptions(*o.mesh, program));
@@ -151,11 +206,72 @@ Command addConvert(CLI::App& app, Program& program) {
     c->add_flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
         ->group(many);
     const char* sets = "Image sets";
-    c->add_option("--from", o->open.from,
-                  "Kind of image set, when it cannot be told from the files")
+    std::vector<std::string> kinds;
+    for (const ImageSetKind& kind : imageSetKinds()) kinds.emplace_back(kind.name);
+    c->add_option("--from", o->open.set.from,
+                  "Kind of image set, when it cannot be told from the files: " +
+                      fmt::format("{}", fmt::join(kinds, ", ")))
+        ->check(CLI::IsMember(kinds))
         ->group(sets);
-    c->add_option("--frame", o->open.frame, "Frame of a set that has time, from 0 (default 0)")
+    c->add_option("--frame", o->open.set.frame, "Frame of a set that has time, from 0 (default 0)")
         ->check(CLI::NonNegativeNumber)
+        ->group(sets);
+    c->add_option("--frames", o->frames, "One bundle for each of them; OUT has {frame} in it")
+        ->type_name("A-B")
+        ->group(sets);
+    c->add_option("--every", o->open.set.every, "Take each N-th view of a recording (default 1)")
+        ->check(CLI::Range(1, 1000000))
+        ->type_name("N")
+        ->group(sets);
+    const auto numbers = [&](const char* name, const char* type, const char* help,
+                             std::vector<double*> to) {
+        c->add_option_function<std::string>(
+             name,
+             [name, to](const std::string& text) {
+                 if (auto ok = setTextOptions(name, text, to); !ok)
+                     throw CLI::ValidationError(name, ok.error().message);
+             },
+             help)
+            ->type_name(type)
+            ->group(sets);
+    };
+    auto& set = o->open.set;
+    numbers("--depth-range", "MIN,MAX", "What the depth of MSR 3D Video sets spans",
+            {&set.depthMin, &set.depthMax});
+    numbers("--intrinsics", "FX,FY,CX,CY", "Of TUM and 7-Scenes recordings that do not tell",
+            {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
+    c->add_option("--depth", set.depthPattern,
+                  "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
+                  "likewise")
+        ->type_name("PATTERN")
+        ->group(sets);
+    c->add_option("--focal", set.focal, "Focal length of older Middlebury sets, pixels")
+        ->check(CLI::PositiveNumber)
+        ->group(sets);
+    c->add_option("--baseline", set.baseline, "From the first to the last view of those sets")
+        ->check(CLI::PositiveNumber)
+        ->group(sets);
+    c->add_option("--disparity-offset", set.disparityOffset,
+                  "Added to their disparities (dmin of 2006; default 0)")
+        ->group(sets);
+    c->add_option("--disparity-scale", set.disparityScale,
+                  "Stored value of one pixel of disparity (default 1)")
+        ->check(CLI::PositiveNumber)
+        ->group(sets);
+    c->add_option("--mixed-pixels", set.mixedPixels,
+                  "Flying points at depth edges: auto (dropped from sensors' depth), drop, keep")
+        ->transform(CLI::CheckedTransformer(
+            std::map<std::string, MixedPixels>{{"auto", MixedPixels::automatic},
+                                               {"drop", MixedPixels::drop},
+                                               {"keep", MixedPixels::keep}}))
+        ->group(sets);
+    c->add_option_function<std::string>(
+         "--yuv",
+         [o](const std::string& text) {
+             o->open.set.yuv = {text.starts_with("bt601"), text.ends_with("full")};
+         },
+         "Colour of YUV files: bt709, bt601, bt709-full, bt601-full (default bt709)")
+        ->check(CLI::IsMember({"bt709", "bt601", "bt709-full", "bt601-full"}))
         ->group(sets);
     addCommonOptions(*c, program, kOutput | kOutside);
     return {c, [o](Program& p) { return convert(*o, p); }};
