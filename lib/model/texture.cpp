@@ -1,5 +1,6 @@
 #include "lib/model/texture.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace stx {
