@@ -96,7 +96,8 @@ Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
                              Program& program, int in, int out, int threads, pid_t parent) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(1);
-    watchStopSignals(program.job.cancelled);
+    // Less patient than the process that waits for this one.
+    watchStopSignals(program.job.cancelled, 400);
     program.job.onProgress = nullptr;
     const ThreadLimit limit(threads);
     std::uint32_t index = 0;
@@ -304,8 +305,10 @@ Result<int> Batch::run() {
             }
         }
     }
+    // What is done is told even when the workers take long to stop.
+    auto written = writeLines();
     stopWorkers();
-    STX_CHECK(writeLines());
+    if (!written) return propagate(written);
     STX_CHECK(program_.job.checkCancelled());
     const auto converted = done_ - skipped_ - failed_;
     const std::string counts = fmt::format("{} inputs: {} done, {} skipped, {} failed",

@@ -14,12 +14,9 @@
 namespace stx::tools {
 namespace {
 
-// How long the work may take to notice; with the removal of temporaries it stays below a second.
-constexpr timespec kPatience = {0, 700'000'000};
-
 std::atomic<int> signalThatCame = 0;
 
-void watch(sigset_t signals, std::atomic<bool>& cancelled) {
+void watch(sigset_t signals, std::atomic<bool>& cancelled, int patienceMs) {
     int signal = 0;
     while (sigwait(&signals, &signal) != 0) {
     }
@@ -27,7 +24,8 @@ void watch(sigset_t signals, std::atomic<bool>& cancelled) {
     cancelled = true;
     // Some work (a decoder of a library, a kernel over a whole picture) looks seldom or never.
     // sigtimedwait also returns at once when the signal comes a second time.
-    while (sigtimedwait(&signals, nullptr, &kPatience) < 0 && errno == EINTR) {
+    const timespec patience = {patienceMs / 1000, patienceMs % 1000 * 1'000'000L};
+    while (sigtimedwait(&signals, nullptr, &patience) < 0 && errno == EINTR) {
     }
     removeOwnTemporaries();
     _exit(128 + signal);
@@ -35,7 +33,7 @@ void watch(sigset_t signals, std::atomic<bool>& cancelled) {
 
 }  // namespace
 
-void watchStopSignals(std::atomic<bool>& cancelled) {
+void watchStopSignals(std::atomic<bool>& cancelled, int patienceMs) {
     struct sigaction action {};
     sigemptyset(&action.sa_mask);
     action.sa_handler = SIG_IGN;
@@ -52,7 +50,7 @@ void watchStopSignals(std::atomic<bool>& cancelled) {
         if (now.sa_handler != SIG_IGN) sigaddset(&signals, signal);
     }
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-    std::thread(watch, signals, std::ref(cancelled)).detach();
+    std::thread(watch, signals, std::ref(cancelled), patienceMs).detach();
 }
 
 int stopSignal() {

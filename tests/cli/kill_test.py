@@ -259,6 +259,10 @@ def stopping(args, inputs, folder):
             # Generous, for machines under load; an idle one takes well below a second.
             expect(seconds < 10, f"{what}: {seconds:.1f} s to stop")
             expect(not temporaries(work), f"{what}: leaves {temporaries(work)}")
+            if batch and code:
+                lines = open(os.path.join(work, "r.jsonl"), encoding="utf-8").read().splitlines()
+                done = len(os.listdir(os.path.join(work, "out")))
+                expect(0 < len(lines) <= done, f"{what}: reports {len(lines)} of {done} outputs")
             for name in os.listdir(os.path.join(work, "out")):
                 done = run([args.stx, "info", os.path.join("out", name)], work)
                 expect(done.code == 0, f"{what}: '{name}' is not whole", done)
