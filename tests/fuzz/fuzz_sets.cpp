@@ -44,9 +44,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             const auto json = imagesets::parseJson(bytes);
             checkError(json);
             if (!json) return 0;
-            if (data[0] % 11 == 0) checkViews(imagesets::transformsViews(*json, job));
-            if (data[0] % 11 == 1) checkViews(imagesets::mivViews(*json, job));
-            if (data[0] % 11 == 2) checkViews(imagesets::camerasJsonViews(*json, job));
+            // As the readers do: each kind knows its own keys.
+            const auto kind = imagesets::jsonKindOf(*json);
+            if (kind == imagesets::JsonKind::transforms)
+                checkViews(imagesets::transformsViews(*json, job));
+            if (kind == imagesets::JsonKind::miv) checkViews(imagesets::mivViews(*json, job));
+            if (kind == imagesets::JsonKind::cameras)
+                checkViews(imagesets::camerasJsonViews(*json, job));
             break;
         }
         case 3:
