@@ -185,6 +185,7 @@ Result<int> render(const RenderOptions& o, Program& program) {
         }
         STX_CHECK(program.job.checkCancelled());
         const auto start = std::chrono::steady_clock::now();
+        if (!o.skipExisting && i + 1 < cameras.size()) renderer->expect(cameras[i + 1]);
         auto frame = renderer->render(cameras[i]);
         if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
         const double milliseconds =

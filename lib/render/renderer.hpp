@@ -40,6 +40,10 @@ class Renderer {
     /// One frame of camera.width x camera.height. A camera that sees nothing gives an empty frame.
     /// Errors: a camera that fails check(), a lost device, memory.
     [[nodiscard]] virtual Result<Frame> render(const Camera& camera) = 0;
+    /// Says which camera render() will be asked for after its next call, so that a backend may draw
+    /// that frame while it reads back and finishes the one before. Only a hint: frames are the same
+    /// without it.
+    virtual void expect(const Camera& next) { (void)next; }
     /// "cpu", "gpu" or "gl".
     [[nodiscard]] virtual std::string backend() const = 0;
     /// GL_RENDERER, or the processor's name and the SIMD target in use.

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/cpu/surface_fill.hpp"
@@ -69,6 +70,9 @@ class CpuSurfaceRenderer final : public Renderer {
     }
 
     [[nodiscard]] Result<Frame> render(const Camera& camera) override;
+    void expect(const Camera& next) override {
+        if (painter_) expected_ = next;
+    }
     [[nodiscard]] std::string backend() const override {
         return painter_ ? painter_->backend() : "cpu";
     }
@@ -88,6 +92,17 @@ class CpuSurfaceRenderer final : public Renderer {
     [[nodiscard]] FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX,
                                           int tilesY) const;
     void drawTile(const FrameWork& work, int tile, Frame& frame, Image<float>& q) const;
+    /// Everything about a frame that comes before its samples.
+    [[nodiscard]] std::unique_ptr<FrameWork> planFrame(const Camera& camera) const;
+    /// The plan of a frame; with a painter the frame is under way, perhaps since the last call.
+    [[nodiscard]] Result<std::unique_ptr<FrameWork>> beginFrame(const Camera& camera);
+    /// Starts the frame that is expected next.
+    void beginExpected(const std::optional<Camera>& next);
+    [[nodiscard]] Result<void> checkSize(const Camera& camera) const {
+        STX_CHECK(camera.check());
+        return job_.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
+                                           sizeof(glm::vec4) + 2 * sizeof(float), "the frame");
+    }
     [[nodiscard]] Result<void> paintTiles(const FrameWork& work, Frame& frame,
                                           Image<float>& q) const;
     [[nodiscard]] std::vector<int> chooseSources(const PixelSpace& space,
@@ -96,7 +111,7 @@ class CpuSurfaceRenderer final : public Renderer {
     /// The view that stands exactly where the camera does, -1 = none.
     [[nodiscard]] int viewAt(const Camera& camera) const;
     [[nodiscard]] Frame copyOf(std::size_t index) const;
-    void light(const PixelSpace& space, Frame& frame) const;
+    void light(const Camera& camera, Frame& frame) const;
 
     const Bundle& bundle_;
     RenderSettings settings_;
@@ -106,6 +121,8 @@ class CpuSurfaceRenderer final : public Renderer {
     std::vector<Image<glm::vec3>> normals_;  ///< of views that bring none, while a light is on
     Bounds bounds_;
     bool fillsFrame_ = false;
+    std::optional<Camera> expected_;
+    std::unique_ptr<FrameWork> begun_;      ///< a frame under way before it was asked for
     std::unique_ptr<TilePainter> painter_;  ///< null = the processor paints
 };
 
@@ -339,7 +356,7 @@ Result<void> CpuSurfaceRenderer::paintTiles(const FrameWork& work, Frame& frame,
     }
     Image<glm::vec3> origin;
     if (work.wantOrigin) origin = Image<glm::vec3>(q.width(), q.height(), glm::vec3(-1, 0, 0));
-    STX_CHECK(painter_->paint(work, {frame.colour, q, origin}));
+    STX_CHECK(painter_->finish({frame.colour, q, origin}));
     for (std::size_t i = 0; i < origin.count(); ++i) {
         const glm::vec3 from = origin.data()[i];
         if (from.x >= 0)
@@ -386,24 +403,23 @@ Frame CpuSurfaceRenderer::copyOf(std::size_t index) const {
     return frame;
 }
 
-void CpuSurfaceRenderer::light(const PixelSpace& space, Frame& frame) const {
+void CpuSurfaceRenderer::light(const Camera& camera, Frame& frame) const {
     const int width = frame.colour.width(), height = frame.colour.height();
-    const Lighting lighting = lightsInWorld(settings_.lighting, space.camera.worldFromCamera());
+    const Lighting lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
     frame.albedo = frame.colour;
-    const glm::dmat3 worldFromCamera = glm::mat3_cast(space.camera.orientation);
+    const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.orientation);
     parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
                 const float dist = frame.depth.at(x, y);
                 glm::vec4& pixel = frame.colour.at(x, y);
                 if (!hasPoint(dist) || !(pixel.a > 0.0f)) continue;
-                const glm::vec3 toEye(-space.camera.viewDirection(x + 0.5, y + 0.5));
+                const glm::vec3 toEye(-camera.viewDirection(x + 0.5, y + 0.5));
                 glm::vec3& normal = frame.normal.at(x, y);
                 // What was filled has no normal of its own.
                 if (normal == glm::vec3(0.0f)) normal = toEye;
                 const glm::dvec3 world =
-                    space.camera.position +
-                    worldFromCamera * space.camera.unproject(x + 0.5, y + 0.5, dist);
+                    camera.position + worldFromCamera * camera.unproject(x + 0.5, y + 0.5, dist);
                 const glm::vec3 lit = shadePhong(lighting, glm::vec3(pixel) / pixel.a,
                                                  glm::vec3(world), normal, toEye);
                 pixel = glm::vec4(lit * pixel.a, pixel.a);
@@ -412,44 +428,71 @@ void CpuSurfaceRenderer::light(const PixelSpace& space, Frame& frame) const {
     });
 }
 
-Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
-    STX_CHECK(camera.check());
-    STX_CHECK(job_.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
-                                          sizeof(glm::vec4) + 2 * sizeof(float), "the frame"));
-    const auto start = std::chrono::steady_clock::now();
+std::unique_ptr<FrameWork> CpuSurfaceRenderer::planFrame(const Camera& camera) const {
     double farthest = 1.0;
     if (!bounds_.empty())
         farthest = std::max(
             1e-6 * bounds_.radius(),
             glm::dot(bounds_.centre() - camera.position, camera.forward()) + bounds_.radius());
-    const PixelSpace space(camera, farthest);
+    auto work = std::make_unique<FrameWork>();
+    FrameWork& w = *work;
+    w.space = PixelSpace(camera, farthest);
+    w.tilesX = (camera.width + kTile - 1) / kTile;
+    w.tilesY = (camera.height + kTile - 1) / kTile;
+    w.effort = effort_;
+    w.wantOrigin = settings_.lighting.on();
+    w.sources.resize(sources_.size());
+    parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
+        w.sources[static_cast<std::size_t>(i)] =
+            placeSource(sources_[static_cast<std::size_t>(i)], w.space, w.tilesX, w.tilesY);
+    });
+    w.chooseSources = [this, &w](int tile) {
+        return chooseSources(w.space, w.sources, tile, tile % w.tilesX * kTile,
+                             tile / w.tilesX * kTile);
+    };
+    return work;
+}
+
+Result<std::unique_ptr<FrameWork>> CpuSurfaceRenderer::beginFrame(const Camera& camera) {
+    if (auto begun = std::exchange(begun_, nullptr)) {
+        if (begun->space.camera == camera) return begun;
+        painter_->drop();
+    }
+    auto work = planFrame(camera);
+    if (painter_) STX_CHECK(painter_->begin(*work));
+    return work;
+}
+
+void CpuSurfaceRenderer::beginExpected(const std::optional<Camera>& next) {
+    if (!next || begun_ || !checkSize(*next) || viewAt(*next) >= 0) return;
+    auto work = planFrame(*next);
+    // What fails here fails again, and is told, when the frame is asked for.
+    if (painter_->begin(*work)) begun_ = std::move(work);
+}
+
+Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
+    const auto next = std::exchange(expected_, std::nullopt);
+    STX_CHECK(checkSize(camera));
+    const auto start = std::chrono::steady_clock::now();
     Frame frame;
     if (const int same = viewAt(camera); same >= 0) {
+        beginExpected(next);
         frame = copyOf(static_cast<std::size_t>(same));
     } else {
         frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
         Image<float> q(camera.width, camera.height, 0.0f);
         if (settings_.lighting.on())
             frame.normal = Image<glm::vec3>(camera.width, camera.height, glm::vec3(0.0f));
-        const int tilesX = (camera.width + kTile - 1) / kTile,
-                  tilesY = (camera.height + kTile - 1) / kTile;
-        std::vector<FrameSource> placed(sources_.size());
-        parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
-            placed[static_cast<std::size_t>(i)] =
-                placeSource(sources_[static_cast<std::size_t>(i)], space, tilesX, tilesY);
-        });
-        const FrameWork work{
-            space, placed, tilesX, tilesY, effort_, settings_.lighting.on(), [&](int tile) {
-                return chooseSources(space, placed, tile, tile % tilesX * kTile,
-                                     tile / tilesX * kTile);
-            }};
-        STX_CHECK(paintTiles(work, frame, q));
+        STX_TRY(const std::unique_ptr<FrameWork> work, beginFrame(camera));
+        const PixelSpace& space = work->space;
+        beginExpected(next);
+        STX_CHECK(paintTiles(*work, frame, q));
         STX_CHECK(job_.checkCancelled());
         if (fillsFrame_ && settings_.fill == Fill::background) {
             fillBackground({frame.colour, q, space});
         } else {
             std::vector<LocalSource> all;
-            for (const FrameSource& f : placed)
+            for (const FrameSource& f : work->sources)
                 all.push_back({f.source, f.sourceFromPixel, nullptr});
             fillUnseen({frame.colour, q, space}, all);
         }
@@ -459,7 +502,7 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
                 frame.depth.data()[i] = static_cast<float>(space.axis.dist(q.data()[i]));
     }
     frame.linear = bundle_.views[0].texture.isLinear();
-    if (settings_.lighting.on()) light(space, frame);
+    if (settings_.lighting.on()) light(camera, frame);
     frame.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return frame;

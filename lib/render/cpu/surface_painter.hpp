@@ -31,12 +31,12 @@ struct FrameSource {
     std::vector<std::uint32_t> blocks;
 };
 
-/// A frame to paint: tiles of kTile x kTile pixels, row by row.
+/// A frame to paint: tiles of kTile x kTile pixels, row by row. Not to be moved.
 struct FrameWork {
-    const PixelSpace& space;
-    std::span<const FrameSource> sources;
+    PixelSpace space;
+    std::vector<FrameSource> sources;
     int tilesX = 0, tilesY = 0;
-    const Effort& effort;
+    Effort effort;
     bool wantOrigin = false;
     /// The sources that a tile is built from, at most 32, in order.
     std::function<std::vector<int>(int tile)> chooseSources;
@@ -65,7 +65,12 @@ class TilePainter {
     /// Called once, before any frame. The sources outlive the painter.
     [[nodiscard]] virtual Result<void> prepare(std::span<const Source> sources,
                                                const Effort& effort, Job& job) = 0;
-    [[nodiscard]] virtual Result<void> paint(const FrameWork& work, PaintedFrame out) = 0;
+    /// Starts a frame; at most two are under way. The work must live until finish() or drop().
+    [[nodiscard]] virtual Result<void> begin(const FrameWork& work) = 0;
+    /// Completes the frame begun first of those under way, whether or not that succeeds.
+    [[nodiscard]] virtual Result<void> finish(PaintedFrame out) = 0;
+    /// Gives up the frame begun first of those under way.
+    virtual void drop() = 0;
     [[nodiscard]] virtual std::string backend() const = 0;
     [[nodiscard]] virtual std::string device() const = 0;
 };

@@ -1,7 +1,7 @@
 #include "lib/render/gpu/gpu_surface.hpp"
 
 #include <array>
-#include <bit>
+#include <deque>
 
 #include "embedded_shaders.hpp"
 #include "lib/base/parallel.hpp"
@@ -105,6 +105,14 @@ struct Resources {
     std::array<Returned, 2> returned;
 };
 
+/// A frame under way: its first batch is being drawn.
+struct Begun {
+    const FrameWork* work = nullptr;
+    std::vector<TilePlan> plans;
+    std::size_t drawn = 0;  ///< tiles so far
+    Returned* back = nullptr;
+};
+
 class GpuSurfacePainter final : public surface::TilePainter {
   public:
     explicit GpuSurfacePainter(std::shared_ptr<EglContext> context)
@@ -120,7 +128,9 @@ class GpuSurfacePainter final : public surface::TilePainter {
 
     Result<void> prepare(std::span<const Source> sources, const surface::Effort& effort,
                          Job& job) override;
-    Result<void> paint(const FrameWork& work, PaintedFrame out) override;
+    Result<void> begin(const FrameWork& work) override;
+    Result<void> finish(PaintedFrame out) override;
+    void drop() override;
     std::string backend() const override { return "gpu"; }
     std::string device() const override { return context_->device().name; }
 
@@ -131,6 +141,7 @@ class GpuSurfacePainter final : public surface::TilePainter {
     [[nodiscard]] std::size_t batchEnd(std::span<TilePlan> plans, std::size_t begin) const;
     [[nodiscard]] Batch fillBatch(const FrameWork& work, std::span<const TilePlan> plans) const;
     void uploadSources(const FrameWork& work);
+    Result<void> drawNext(Begun& frame, Returned& back);
     Result<void> draw(const FrameWork& work, std::span<const TilePlan> plans, Returned& back);
     Result<void> collect(const FrameWork& work, Returned& back, PaintedFrame out) const;
 
@@ -138,6 +149,7 @@ class GpuSurfacePainter final : public surface::TilePainter {
     int perPixel_ = 1, mostSources_ = 4;
     std::int64_t mostSlots_ = 0, mostTiles_ = 0;  ///< of a batch
     std::unique_ptr<Resources> resources_;
+    std::deque<Begun> begun_;
 };
 
 Result<GlProgram> GpuSurfacePainter::build(std::string_view name, std::string_view body,
@@ -271,6 +283,7 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
                                      Returned& back) {
     Resources& r = *resources_;
     const Batch batch = fillBatch(work, plans);
+    uploadSources(work);
     r.slots.upload(batch.slots);
     r.tasks.upload(batch.tasks);
     r.tiles.upload(batch.tiles);
@@ -384,21 +397,61 @@ Result<void> GpuSurfacePainter::collect(const FrameWork& work, Returned& back,
     return {};
 }
 
-Result<void> GpuSurfacePainter::paint(const FrameWork& work, PaintedFrame out) {
-    std::vector<TilePlan> plans = planTiles(work);
-    if (plans.empty()) return {};
-    STX_TRY(auto current, context_->makeCurrent());
-    uploadSources(work);
-    // One batch is drawn while the one before it arrives.
-    std::size_t which = 0;
-    for (std::size_t begin = 0; begin < plans.size(); ++which) {
-        const std::size_t end = batchEnd(plans, begin);
+/// Draws the next batch of a frame into `back`.
+Result<void> GpuSurfacePainter::drawNext(Begun& frame, Returned& back) {
+    const std::size_t end = batchEnd(frame.plans, frame.drawn);
+    const auto plans = std::span<const TilePlan>(frame.plans);
+    STX_CHECK(draw(*frame.work, plans.subspan(frame.drawn, end - frame.drawn), back));
+    frame.drawn = end;
+    return {};
+}
+
+Result<void> GpuSurfacePainter::begin(const FrameWork& work) {
+    Begun frame;
+    frame.work = &work;
+    frame.plans = planTiles(work);
+    if (!frame.plans.empty()) {
+        STX_TRY(auto current, context_->makeCurrent());
         auto& returned = resources_->returned;
-        STX_CHECK(draw(work, std::span(plans).subspan(begin, end - begin), returned[which % 2]));
-        STX_CHECK(collect(work, returned[(which + 1) % 2], out));
-        begin = end;
+        const bool taken = !begun_.empty() && begun_.front().back == &returned[0];
+        frame.back = &returned[taken ? 1 : 0];
+        STX_CHECK(drawNext(frame, *frame.back));
     }
-    return collect(work, resources_->returned[(which + 1) % 2], out);
+    begun_.push_back(std::move(frame));
+    return {};
+}
+
+Result<void> GpuSurfacePainter::finish(PaintedFrame out) {
+    Begun frame = std::move(begun_.front());
+    begun_.pop_front();
+    if (frame.plans.empty()) return {};
+    STX_TRY(auto current, context_->makeCurrent());
+    // While no other frame is under way, one batch is drawn while the one before it arrives.
+    auto& returned = resources_->returned;
+    Returned* other = &returned[frame.back == &returned[0] ? 1 : 0];
+    if (!begun_.empty()) other = nullptr;
+    while (frame.drawn < frame.plans.size()) {
+        if (other) {
+            STX_CHECK(drawNext(frame, *other));
+            STX_CHECK(collect(*frame.work, *frame.back, out));
+            std::swap(frame.back, other);
+        } else {
+            STX_CHECK(collect(*frame.work, *frame.back, out));
+            STX_CHECK(drawNext(frame, *frame.back));
+        }
+    }
+    return collect(*frame.work, *frame.back, out);
+}
+
+void GpuSurfacePainter::drop() {
+    const Begun frame = std::move(begun_.front());
+    begun_.pop_front();
+    if (!frame.back) return;
+    // Its memory is written in the order of the commands: the next frame overwrites it.
+    if (auto current = context_->makeCurrent()) {
+        if (frame.back->done) glDeleteSync(frame.back->done);
+    }
+    frame.back->done = nullptr;
 }
 
 }  // namespace

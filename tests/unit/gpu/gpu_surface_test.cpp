@@ -190,6 +190,36 @@ TEST_F(GpuSurface, IsTheSameEveryTimeAndFromAnotherThread) {
     EXPECT_EQ(here->depth, there->depth);
 }
 
+TEST_F(GpuSurface, FramesExpectedAreTheSame) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
+    Job job;
+    auto plain = gpu::makeGpuSurfaceRenderer(bundle, surfaceSettings(), -1, job);
+    auto told = gpu::makeGpuSurfaceRenderer(bundle, surfaceSettings(), -1, job);
+    ASSERT_TRUE(plain && told);
+    std::vector<Camera> cameras;
+    for (const double at : {0.2, 0.4, 1.0, 1.3, 2.6, 2.8})
+        cameras.push_back(analyticCamera(AnalyticScene::object, at, 4));
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        // Right, wrong (one is skipped), a reference's own pose, and one that makes no sense.
+        if (i == 3) {
+            (*told)->expect(cameras[5]);
+        } else if (i == 4) {
+            Camera none = cameras[5];
+            none.width = 0;
+            (*told)->expect(none);
+        } else if (i + 1 < cameras.size()) {
+            (*told)->expect(cameras[i + 1]);
+        }
+        const auto a = (*plain)->render(cameras[i]), b = (*told)->render(cameras[i]);
+        ASSERT_TRUE(a && b) << i;
+        EXPECT_EQ(a->colour, b->colour) << i;
+        EXPECT_EQ(a->depth, b->depth) << i;
+    }
+    // And a frame begun that nobody asks for.
+    (*told)->expect(cameras[0]);
+    EXPECT_TRUE((*told)->render(cameras[1]));
+}
+
 TEST_F(GpuSurface, IsWhatTheBackendGives) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 1);
     Job job;
