@@ -44,6 +44,8 @@ std::int64_t dropMixedPixels(Image<float>& distances) {
                         continue;
                     const float a2 = get(x - 2 * axis[0], y - 2 * axis[1]);
                     const float b2 = get(x + 2 * axis[0], y + 2 * axis[1]);
+                    // Without either surface beside it, a steep one is as likely.
+                    if (!hasPoint(a2) && !hasPoint(b2)) continue;
                     const float slopeA = hasPoint(a2) ? std::abs(a - a2) : 0.0f;
                     const float slopeB = hasPoint(b2) ? std::abs(b2 - b) : 0.0f;
                     mixed |= std::abs(stepA) > kBeyondSlope * slopeA &&
