@@ -195,7 +195,8 @@ void Batch::finish(std::size_t item, Json entry) {
     if (status == "error") {
         ++failed_;
         // Not hushed by --quiet: nothing else tells which input it was.
-        fmt::print(stderr, "error: '{}': {}\n", items_[item].input, entry.value("message", ""));
+        fmt::print(stderr, "error: '{}': {}\n", items_[item].input,
+                   oneLine(entry.value("message", "")));
     }
     entries_[item] = std::move(entry);
     program_.job.progress(static_cast<std::int64_t>(done_),

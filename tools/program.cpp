@@ -20,7 +20,7 @@ void Program::say(std::string_view line) const {
 
 void Program::sayNotes() {
     const std::string about = subject.empty() ? "" : fmt::format("'{}': ", subject);
-    for (const auto& note : job.takeNotes()) say("note: " + about + note);
+    for (const auto& note : job.takeNotes()) say("note: " + about + oneLine(note));
 }
 
 Result<void> Program::writeReport(const nlohmann::ordered_json& report) const {
@@ -79,7 +79,7 @@ int Program::run(const std::function<Result<int>()>& body) {
     job.onProgress = nullptr;
     sayNotes();
     if (!code) {
-        fmt::print(stderr, "stx: {}\n", code.error().text());
+        fmt::print(stderr, "stx: {}\n", oneLine(code.error().text()));
         return static_cast<int>(code.error().code);
     }
     if (outputFailed_) {
@@ -208,6 +208,13 @@ std::string nearestWord(std::string_view word, const std::vector<std::string>& w
         }
     }
     return best;
+}
+
+std::string oneLine(std::string text) {
+    for (char& c : text) {
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+    }
+    return text;
 }
 
 std::uint64_t bytesOf(const std::filesystem::path& path) {

@@ -97,6 +97,9 @@ Command addBench(CLI::App& app, Program& program);
 [[nodiscard]] std::string humanBytes(std::uint64_t bytes);
 /// The nearest of `words` to `word`, or empty when none is near.
 [[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
+/// The text with control characters as '?': names from a file can hold line ends and commands to
+/// the terminal.
+[[nodiscard]] std::string oneLine(std::string text);
 /// Size of a file, or of all files in a folder.
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
 /// Errors early when the target's folder is missing or not writable, or, under --no-clobber, when

@@ -202,6 +202,12 @@ Result<void> ExrReader::Impl::readHeaders(const Limits& limits) {
         char head[8] = {};
         if (!readAt(0, head, 8) || std::memcmp(head, "\x76\x2f\x31\x01", 4) != 0)
             return failAt(where, ErrorCode::invalidInput, "it is no OpenEXR file");
+        if (auto ok =
+                checkExrHeaders([this](std::uint64_t offset, void* to,
+                                       std::size_t count) { return readAt(offset, to, count); },
+                                size);
+            !ok)
+            return tl::unexpected(ok.error().at(where));
         // The table of offsets is rebuilt by nobody: a file without one is incomplete.
         file = std::make_unique<Imf::MultiPartInputFile>(*stream, 0, false);
         if (file->parts() < 1 || file->parts() > limits.maxViews)

@@ -128,6 +128,13 @@ class ExrWriter {
     std::unique_ptr<Impl> impl_;
 };
 
+/// Walks the headers and errors (invalidInput) when an attribute's size is not what its type takes
+/// or what the file has: OpenEXR would lose its place, take other bytes for a size, and allocate
+/// that. Needs no library.
+[[nodiscard]] Result<void> checkExrHeaders(
+    const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
+    std::uint64_t fileSize);
+
 /// Bytes of the pixels of each part, by the tables of offsets; empty when they cannot be told. Part
 /// of ExrReader, by itself because it needs no library.
 [[nodiscard]] std::vector<std::uint64_t> exrBytesPerPart(

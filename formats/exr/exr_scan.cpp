@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cstring>
+#include <string_view>
+#include <utility>
 
 #include "formats/exr/exr_file.hpp"
 
@@ -56,6 +58,7 @@ class Cursor {
                                           static_cast<std::uint32_t>(b[3]) << 24);
         return true;
     }
+    [[nodiscard]] std::uint64_t at() const { return at_; }
     bool readOffset(std::uint64_t& value) {
         unsigned char b[8];
         if (!read(b, 8)) return false;
@@ -82,7 +85,96 @@ std::uint64_t chunksOf(int compression, const std::int32_t (&window)[4], bool ti
     return static_cast<std::uint64_t>((height + kLines[compression] - 1) / kLines[compression]);
 }
 
+/// Bytes of a value of a type whose size is fixed, and which OpenEXR reads without a look at the
+/// size that the file states; 0 for others.
+std::uint64_t fixedSizeOf(std::string_view type) {
+    static constexpr std::pair<std::string_view, int> kSizes[] = {{"box2i", 16},
+                                                                  {"box2f", 16},
+                                                                  {"chromaticities", 32},
+                                                                  {"compression", 1},
+                                                                  {"deepImageState", 1},
+                                                                  {"double", 8},
+                                                                  {"envmap", 1},
+                                                                  {"float", 4},
+                                                                  {"int", 4},
+                                                                  {"keycode", 28},
+                                                                  {"lineOrder", 1},
+                                                                  {"m33f", 36},
+                                                                  {"m33d", 72},
+                                                                  {"m44f", 64},
+                                                                  {"m44d", 128},
+                                                                  {"rational", 8},
+                                                                  {"tiledesc", 9},
+                                                                  {"timecode", 8},
+                                                                  {"v2i", 8},
+                                                                  {"v2f", 8},
+                                                                  {"v2d", 16},
+                                                                  {"v3i", 12},
+                                                                  {"v3f", 12},
+                                                                  {"v3d", 24}};
+    for (const auto& [name, size] : kSizes) {
+        if (name == type) return static_cast<std::uint64_t>(size);
+    }
+    return 0;
+}
+
+/// Passes over a value whose length is in itself; false when that is not `size`.
+bool skipSelfDelimited(Cursor& cursor, std::string_view type, std::uint64_t size) {
+    const std::uint64_t end = cursor.at() + size;
+    if (type == "chlist") {
+        std::string channel;
+        for (;;) {
+            if (!cursor.readName(channel) || cursor.at() > end) return false;
+            if (channel.empty()) return cursor.at() == end;
+            if (!cursor.skip(16)) return false;  // its type, linearity and sampling
+        }
+    }
+    if (type == "preview") {
+        std::int32_t width = 0, height = 0;
+        if (size < 8 || !cursor.readInt(width) || !cursor.readInt(height) || width < 0 ||
+            height < 0 ||
+            static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) !=
+                (size - 8) / 4 ||
+            size % 4 != 0)
+            return false;
+        return cursor.skip(size - 8);
+    }
+    return cursor.skip(size);
+}
+
 }  // namespace
+
+Result<void> checkExrHeaders(
+    const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
+    std::uint64_t fileSize) {
+    Cursor cursor(readAt, fileSize);
+    const auto cutShort = [&] {
+        return fail(ErrorCode::invalidInput, "its header is cut short or damaged at byte {}",
+                    cursor.at());
+    };
+    std::int32_t magic = 0, version = 0;
+    if (!cursor.readInt(magic) || !cursor.readInt(version)) return cutShort();
+    const bool multi = version & 0x1000;
+    std::string name, type;
+    for (;;) {
+        if (!cursor.readName(name)) return cutShort();
+        if (name.empty()) return {};
+        while (!name.empty()) {
+            std::int32_t size = 0;
+            if (!cursor.readName(type) || !cursor.readInt(size)) return cutShort();
+            const std::uint64_t at = cursor.at(), fixed = fixedSizeOf(type);
+            const auto claimed = static_cast<std::uint64_t>(std::max(size, 0));
+            if (size < 0 || claimed > fileSize - at || (fixed != 0 && claimed != fixed) ||
+                !skipSelfDelimited(cursor, type, claimed))
+                return fail(ErrorCode::invalidInput,
+                            "its header has {} bytes for '{}' of type '{}' at byte {}, which is "
+                            "not what such a value takes",
+                            size, name, type, at);
+            if (!cursor.readName(name)) return cutShort();
+        }
+        if (!multi) return {};
+    }
+}
 
 std::vector<std::uint64_t> exrBytesPerPart(
     const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
