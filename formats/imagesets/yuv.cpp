@@ -143,13 +143,15 @@ Result<Rgba8Image> readYuvColour(const std::filesystem::path& path, const YuvFor
             const double l = (luma[static_cast<std::size_t>(y) * f.width + x] - yZero) * yScale;
             double c[2] = {0, 0};
             if (f.chroma) {
-                const int i0 = x >> f.chromaShiftX;
-                const bool between = f.chromaShiftX && (x & 1);
-                const int i1 = between ? std::min(i0 + 1, cw - 1) : i0;
+                // Horizontally, too: the tools around MIV and RVS average 2x2 pixels.
+                const float at = f.chromaShiftX ? (x + 0.5f) / 2 - 0.5f : static_cast<float>(x);
+                const int left = static_cast<int>(std::floor(at));
+                const float weight = at - static_cast<float>(left);
+                const auto i0 = static_cast<std::size_t>(std::clamp(left, 0, cw - 1));
+                const auto i1 = static_cast<std::size_t>(std::clamp(left + 1, 0, cw - 1));
                 for (int k = 0; k < 2; ++k) {
                     const auto& row = chromaRow[k];
-                    const double value = 0.5 * (row[static_cast<std::size_t>(i0)] +
-                                                row[static_cast<std::size_t>(i1)]);
+                    const double value = row[i0] + (row[i1] - row[i0]) * weight;
                     c[k] = (value - cZero) * cScale;
                 }
             }

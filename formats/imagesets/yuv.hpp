@@ -27,7 +27,7 @@ struct YuvFormat {
 /// Frames in a file. Errors when its size is no whole number of them, or it has none.
 [[nodiscard]] Result<int> yuvFrameCount(const std::filesystem::path& path, const YuvFormat& format);
 
-/// One frame as 8-bit RGB; chroma is interpolated, co-sited with luma on the left as MPEG has it.
+/// One frame as 8-bit RGB; chroma is interpolated, its samples in the middle of their pixels.
 [[nodiscard]] Result<Rgba8Image> readYuvColour(const std::filesystem::path& path,
                                                const YuvFormat& format, int frame,
                                                const YuvColour& colour, const Limits& limits);
