@@ -58,7 +58,7 @@ int mainProgram(int argc, char** argv) {
     const std::vector<Command> commands = {
         addConvert(app, program),  addSelect(app, program),  addPack(app, program),
         addBake(app, program),     addRender(app, program),  addInfo(app, program),
-        addValidate(app, program), addCompare(app, program), addBench(app, program)};
+        addExtract(app, program), addValidate(app, program), addCompare(app, program), addBench(app, program)};
     for (const auto& command : commands)
         command.app->set_help_flag("-h,--help", "Print this help and stop");
 

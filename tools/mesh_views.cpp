@@ -62,14 +62,23 @@ Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& prog
     return framing;
 }
 
-/// Vertices that are drawn: what the cameras frame.
+/// What is drawn, as points that the cameras frame.
 std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
     std::vector<glm::vec3> points;
     points.reserve(mesh.triangles.size() * 3 + mesh.points.size());
     for (const auto& t : mesh.triangles) {
         for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[t[k]]);
     }
-    for (const auto p : mesh.points) points.push_back(mesh.positions[p]);
+    // Loose points are drawn as discs, which must fit into the frame, too.
+    const float radius = pointRadius(mesh);
+    for (const auto p : mesh.points) {
+        for (int axis = 0; axis < 3; ++axis) {
+            glm::vec3 offset(0.0f);
+            offset[axis] = radius;
+            points.push_back(mesh.positions[p] + offset);
+            points.push_back(mesh.positions[p] - offset);
+        }
+    }
     return points;
 }
 
@@ -116,7 +125,7 @@ Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wante
     select.count = wanted.count > 0 ? wanted.count : kMostAutoViews;
     candidates.directions = std::max(candidates.directions, std::min(4096, 2 * select.count));
     STX_TRY(auto chosen, selectMeshViews(mesh, candidates, select, program.job));
-    auto& cameras = chosen.cameras;
+    auto cameras = std::move(chosen.cameras);
     if (wanted.count == 0) {
         const auto most = static_cast<int>(cameras.size());
         double reached = 0;
@@ -143,7 +152,7 @@ Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wante
         const std::string svg = selectionPlotSvg(s, "quality against the number of views");
         STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
     }
-    return std::move(cameras);
+    return cameras;
 }
 
 Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions& o,
@@ -243,7 +252,7 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     }
     STX_TRY(auto bundle, captureBundle(mesh, cameras, capture, program.job));
     noteDepthLoss(bundle, program.job);
-    return std::move(bundle);
+    return bundle;
 }
 
 void noteDepthLoss(const Bundle& bundle, Job& job) {

@@ -73,11 +73,12 @@ float pointRadius(const Mesh& mesh) {
         const double d = grid.nearest(mesh.points[i]);
         if (std::isfinite(d)) distances.push_back(d);
     }
-    if (distances.empty()) return static_cast<float>(guess * 0.5);
+    if (distances.empty()) return static_cast<float>(std::min(guess * 0.5, size * 0.02));
     // Irregular scans: most gaps are closed by the distance that nine in ten points stay under.
     const auto at = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
     std::nth_element(distances.begin(), at, distances.end());
-    return static_cast<float>(*at * std::numbers::sqrt2 * 0.75);
+    // A handful of points is no surface: they stay dots.
+    return static_cast<float>(std::min(*at * std::numbers::sqrt2 * 0.75, size * 0.02));
 }
 
 Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius) {

@@ -1,0 +1,128 @@
+#include <chrono>
+
+#include "formats/images/images.hpp"
+#include "formats/imagesets/export.hpp"
+#include "formats/meshes/meshes.hpp"
+#include "formats/open.hpp"
+#include "lib/base/parallel.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+namespace {
+
+struct ExtractOptions {
+    std::string input, output;
+    std::string cameras = "transforms";
+    std::string depth = "exr";
+    PointWriteOptions points;
+};
+
+/// All points of a bundle, view by view, as flat arrays.
+struct Points {
+    std::vector<glm::vec3> positions, normals;
+    std::vector<glm::u8vec4> colours;
+};
+
+glm::u8vec4 codedColour(const Texture& texture, int x, int y) {
+    if (const auto* image = texture.rgba8()) return image->at(x, y);
+    const glm::vec4 c = texture.at(x, y);
+    const auto coded = [](float v) {
+        return static_cast<std::uint8_t>(glm::clamp(srgbFromLinear(v), 0.0f, 1.0f) * 255.0f + 0.5f);
+    };
+    return {coded(c.x), coded(c.y), coded(c.z), 255};
+}
+
+Points pointsOf(const Bundle& bundle) {
+    bool normals = true;
+    for (const auto& view : bundle.views) normals = normals && view.hasNormals();
+    Points out;
+    for (const auto& view : bundle.views) {
+        for (int y = 0; y < view.depth.height(); ++y) {
+            for (int x = 0; x < view.depth.width(); ++x) {
+                if (!hasPoint(view.depth.at(x, y))) continue;
+                out.positions.emplace_back(view.worldPoint(x, y));
+                auto colour = codedColour(view.texture, x, y);
+                colour.w = 255;
+                out.colours.push_back(colour);
+                if (normals) out.normals.push_back(view.normal.at(x, y));
+            }
+        }
+    }
+    return out;
+}
+
+Result<int> extract(const ExtractOptions& o, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    STX_CHECK(checkTarget(o.output, program));
+    preloadCodecs();
+    STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
+    const auto ending = std::filesystem::path(o.output).extension();
+    std::string what;
+    if (ending == ".ply" || ending == ".drc") {
+        STX_CHECK(program.job.limits.checkAllocation(
+            static_cast<std::uint64_t>(bundle.pointCount()), 28, "the points"));
+        const auto points = pointsOf(bundle);
+        PointCloud cloud;
+        cloud.positions = points.positions;
+        cloud.colours = points.colours;
+        cloud.normals = points.normals;
+        PointWriteOptions options = o.points;
+        options.file.noClobber = program.common.noClobber;
+        STX_CHECK(writePoints(o.output, cloud, program.job, options));
+        what = fmt::format("{} points", points.positions.size());
+    } else if (ending.empty()) {
+        ExportOptions options;
+        options.kind =
+            o.cameras == "miv" ? ExportOptions::Kind::miv : ExportOptions::Kind::transforms;
+        options.noClobber = program.common.noClobber;
+        options.floatDepth = o.depth == "exr";
+        STX_CHECK(exportImages(bundle, o.output, options, program.job));
+        what = fmt::format("{} views", bundle.views.size());
+    } else {
+        return fail(ErrorCode::usage, "-o '{}' ends in '{}'; a folder, .ply or .drc is expected",
+                    o.output, ending.string());
+    }
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format(
+        "{} ({}) → {} ({}), {}, {:.2g} s", std::filesystem::path(o.input).filename().string(),
+        humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)), what, seconds));
+    STX_CHECK(program.writeReport({{"$schema", "extract-report.schema.json"},
+                                   {"input", o.input},
+                                   {"output", o.output},
+                                   {"views", bundle.views.size()},
+                                   {"points", bundle.pointCount()},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+}  // namespace
+
+Command addExtract(CLI::App& app, Program& program) {
+    auto* c = app.add_subcommand(
+        "extract",
+        "Images and cameras of a bundle as plain files, or its points as .ply or .drc\n\n"
+        "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
+        "  stx extract model.mp4 -o folder --cameras miv\n"
+        "  stx extract model.mp4 -o points.ply");
+    auto o = std::make_shared<ExtractOptions>();
+    c->add_option("BUNDLE", o->input, "Bundle or atlas")->required();
+    c->add_option("-o,--output", o->output, "Folder, points.ply or points.drc")
+        ->required()
+        ->type_name("OUT");
+    c->add_option("--cameras", o->cameras,
+                  "Camera file in the folder: transforms (nerfstudio) or miv (default transforms)")
+        ->check(CLI::IsMember({"transforms", "miv"}));
+    c->add_option("--depth", o->depth,
+                  "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
+        ->check(CLI::IsMember({"exr", "png"}));
+    c->add_option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats")
+        ->check(CLI::Range(0, 30));
+    c->add_option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats")
+        ->check(CLI::Range(0, 30));
+    addCommonOptions(*c, program, kOutput | kOutside);
+    return {c, [o](Program& p) { return extract(*o, p); }};
+}
+
+}  // namespace stx::tools
