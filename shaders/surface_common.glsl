@@ -14,10 +14,10 @@ struct Source {
 };
 layout(std430, binding = 0) readonly buffer SourceBuffer { Source sources[]; };
 layout(std140, binding = 0) uniform Frame {
-    vec4 axis;               // 1 = q is 1/dist, 1/unit, largest q, number of tasks
+    vec4 axis;               // 1 = q is 1/dist, 1/unit, largest q
     vec4 eyeX, eyeY, eyeZ;   // rows of the vector from the eye to a point of the frame
     vec4 fit;                // squared radius, ridge, colours are at most 1
-    ivec4 frameSize;         // width, height
+    ivec4 frameSize;         // width, height, blocks with cells, blocks with edges
 };
 // q, dq/dx, dq/dy as bits, and what the pixel is: see CellCode in gpu_surface_scene.hpp.
 layout(binding = 0) uniform usampler2DArray surfaces;

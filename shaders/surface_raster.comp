@@ -83,7 +83,7 @@ float depthAt(ivec2 p, int s) { return uintBitsToFloat(texelFetch(surfaces, ivec
 
 void main() {
     uint task = gl_WorkGroupID.y * 32768u + gl_WorkGroupID.x;
-    if (task >= uint(frameSize.z)) return;
+    if (task >= uint(EXTEND != 0 ? frameSize.w : frameSize.z)) return;
     slot = tasks[task].x;
     int s = slots[slot].source.x;
     int block = int(tasks[task].y), inRow = sources[s].size.w;

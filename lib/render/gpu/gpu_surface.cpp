@@ -63,16 +63,20 @@ struct FrameUniforms {
 struct TilePlan {
     int tile = 0;
     std::vector<int> sources;
-    std::uint32_t slots = 0, tasks = 0;
-    std::uint32_t firstLocal = 0, firstSlot = 0, firstTask = 0;  ///< in its batch
+    std::uint32_t slots = 0, meshes = 0, edges = 0;  ///< blocks with cells, with edges
+    std::uint32_t firstLocal = 0, firstSlot = 0, firstMesh = 0, firstEdge = 0;  ///< in its batch
 };
+
+bool hasCells(const surface::SourceBlock& block) {
+    return block.anyCell || block.leafBegin < block.leafEnd;
+}
 
 /// What a batch of tiles uploads.
 struct Batch {
     std::vector<TileEntry> tiles;
     std::vector<glm::uvec2> locals;
     std::vector<SlotEntry> slots;
-    std::vector<glm::uvec4> tasks;
+    std::vector<glm::uvec4> meshes, edges;  ///< tasks
 };
 
 /// Where a batch arrives on its way back: memory that the device writes and the processor reads.
@@ -100,7 +104,7 @@ struct Resources {
     GpuSurfaceScene scene;
     GlProgram mesh, extensions, fuse, shade, resolve, resolveWithOrigin;
     GlBuffer uniforms;
-    GrowingBuffer sources, slots, tasks, tiles, locals;
+    GrowingBuffer sources, slots, meshes, edges, tiles, locals;
     GrowingBuffer samples, pieces, ranges, counts, pieceColours, colour, depth, origin;
     std::array<Returned, 2> returned;
 };
@@ -202,28 +206,33 @@ std::vector<TilePlan> GpuSurfacePainter::planTiles(const FrameWork& work) const 
         plan.sources = work.chooseSources(plan.tile);
         for (const int k : plan.sources) {
             const FrameSource& f = work.sources[static_cast<std::size_t>(k)];
-            const std::uint32_t blocks = f.tileBegin[t + 1] - f.tileBegin[t];
-            plan.tasks += blocks;
-            plan.slots += blocks > 0;
+            plan.slots += f.tileBegin[t] < f.tileBegin[t + 1];
+            for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
+                const surface::SourceBlock& block = f.source->blocks[f.blocks[b]];
+                plan.meshes += hasCells(block);
+                plan.edges += block.anyEdge;
+            }
         }
     });
-    std::erase_if(plans, [](const TilePlan& plan) { return plan.tasks == 0; });
+    std::erase_if(plans, [](const TilePlan& plan) { return plan.slots == 0; });
     return plans;
 }
 
 /// The end of the batch that begins at a tile; tells its tiles where their parts begin.
 std::size_t GpuSurfacePainter::batchEnd(std::span<TilePlan> plans, std::size_t begin) const {
-    std::uint32_t locals = 0, slots = 0, tasks = 0;
+    std::uint32_t locals = 0, slots = 0, meshes = 0, edges = 0;
     std::size_t end = begin;
     for (; end < plans.size() && static_cast<std::int64_t>(end - begin) < mostTiles_; ++end) {
         TilePlan& plan = plans[end];
         if (end > begin && slots + plan.slots > mostSlots_) break;
         plan.firstLocal = locals;
         plan.firstSlot = slots;
-        plan.firstTask = tasks;
+        plan.firstMesh = meshes;
+        plan.firstEdge = edges;
         locals += static_cast<std::uint32_t>(plan.sources.size());
         slots += plan.slots;
-        tasks += plan.tasks;
+        meshes += plan.meshes;
+        edges += plan.edges;
     }
     return end;
 }
@@ -234,12 +243,14 @@ Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePl
     batch.tiles.resize(plans.size());
     batch.locals.resize(last.firstLocal + last.sources.size());
     batch.slots.resize(last.firstSlot + last.slots);
-    batch.tasks.resize(last.firstTask + last.tasks);
+    batch.meshes.resize(last.firstMesh + last.meshes);
+    batch.edges.resize(last.firstEdge + last.edges);
     parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
         const TilePlan& plan = plans[static_cast<std::size_t>(i)];
         const auto t = static_cast<std::size_t>(plan.tile);
         const glm::dmat4 sampleFromPixel = work.sampleFromPixel(plan.tile);
-        std::uint32_t local = plan.firstLocal, slot = plan.firstSlot, task = plan.firstTask;
+        std::uint32_t local = plan.firstLocal, slot = plan.firstSlot;
+        std::uint32_t mesh = plan.firstMesh, edge = plan.firstEdge;
         float step = 0;
         for (const int k : plan.sources) {
             const FrameSource& f = work.sources[static_cast<std::size_t>(k)];
@@ -251,9 +262,12 @@ Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePl
                                  glm::ivec4(k, 0, 0, 0)};
             const std::uint32_t firstLeaf =
                 resources_->scene.firstLeaf[static_cast<std::size_t>(k)];
-            for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b)
-                batch.tasks[task++] = {slot, f.blocks[b],
-                                       firstLeaf + f.source->blocks[f.blocks[b]].leafBegin, 0};
+            for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
+                const surface::SourceBlock& block = f.source->blocks[f.blocks[b]];
+                const glm::uvec4 task(slot, f.blocks[b], firstLeaf + block.leafBegin, 0);
+                if (hasCells(block)) batch.meshes[mesh++] = task;
+                if (block.anyEdge) batch.edges[edge++] = task;
+            }
             ++slot;
         }
         batch.tiles[static_cast<std::size_t>(i)] = {
@@ -285,7 +299,8 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     const Batch batch = fillBatch(work, plans);
     uploadSources(work);
     r.slots.upload(batch.slots);
-    r.tasks.upload(batch.tasks);
+    r.meshes.upload(batch.meshes);
+    r.edges.upload(batch.edges);
     r.tiles.upload(batch.tiles);
     r.locals.upload(batch.locals);
     const auto tiles = static_cast<std::int64_t>(plans.size());
@@ -309,12 +324,12 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     const surface::DepthAxis& axis = work.space.axis;
     const bool bytes = work.sources[0].source->view->texture.rgba8() != nullptr;
     const surface::ShadeSettings& shade = work.effort.shade;
-    const auto taskCount = static_cast<int>(batch.tasks.size());
     const FrameUniforms uniforms{
         glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, work.qLimit(), 0.0f),
         surface::rayFrom(work.space, work.space),
         glm::vec4(shade.kernel, shade.ridge, bytes ? 1.0f : 0.0f, 0.0f),
-        glm::ivec4(work.space.camera.width, work.space.camera.height, taskCount, 0)};
+        glm::ivec4(work.space.camera.width, work.space.camera.height, batch.meshes.size(),
+                   batch.edges.size())};
     glNamedBufferSubData(r.uniforms.get(), 0, sizeof(uniforms), &uniforms);
     const std::uint32_t zero = 0;
     glClearNamedBufferSubData(r.samples.buffer.get(), GL_R32UI, 0, sampleBytes, GL_RED_INTEGER,
@@ -324,7 +339,7 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     glBindTextureUnit(1, r.scene.colours.get());
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, r.uniforms.get());
     const std::array<GLuint, 14> storage{
-        r.sources.buffer.get(), r.slots.buffer.get(),        r.tasks.buffer.get(),
+        r.sources.buffer.get(), r.slots.buffer.get(),        r.meshes.buffer.get(),
         r.scene.leaves.get(),   r.samples.buffer.get(),      r.tiles.buffer.get(),
         r.locals.buffer.get(),  r.pieces.buffer.get(),       r.ranges.buffer.get(),
         r.counts.buffer.get(),  r.pieceColours.buffer.get(), r.colour.buffer.get(),
@@ -332,14 +347,18 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     for (GLuint i = 0; i < storage.size(); ++i)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, storage[i]);
 
-    // A dispatch has at most 65535 groups a side; the shader counts in rows of 32768.
-    const auto columns = static_cast<GLuint>(std::min(taskCount, 32768));
-    const auto rows = static_cast<GLuint>((taskCount + 32767) / 32768);
-    for (const GLuint program : {r.mesh.get(), r.extensions.get()}) {
+    const auto rasterise = [&](const GlProgram& program, const GrowingBuffer& tasks,
+                               std::size_t count) {
+        if (count == 0) return;
         glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-        glUseProgram(program);
-        glDispatchCompute(columns, rows, 1);
-    }
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, tasks.buffer.get());
+        glUseProgram(program.get());
+        // A dispatch has at most 65535 groups a side; the shader counts in rows of 32768.
+        glDispatchCompute(static_cast<GLuint>(std::min<std::size_t>(count, 32768)),
+                          static_cast<GLuint>((count + 32767) / 32768), 1);
+    };
+    rasterise(r.mesh, r.meshes, batch.meshes.size());
+    rasterise(r.extensions, r.edges, batch.edges.size());
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     glUseProgram(r.fuse.get());
     glDispatchCompute(static_cast<GLuint>(pixels / 256), 1, 1);
