@@ -6,25 +6,48 @@
 #include "lib/render/cpu/cpu_surface.hpp"
 #ifdef STX_WITH_GPU
 #include "lib/render/gl/gl_renderer.hpp"
+#include "lib/render/gpu/egl_context.hpp"
 #include "lib/render/gpu/gpu_splat.hpp"
+#include "lib/render/gpu/gpu_surface.hpp"
 #endif
 
 namespace stx {
 namespace {
 
-Result<std::unique_ptr<Renderer>> makePath(const std::string& path, const Bundle& bundle,
-                                           int device, Job& job) {
+#ifdef STX_WITH_GPU
+/// Surface mode takes a software driver so long that it is measured there only when asked for.
+Result<void> checkHardware(int device) {
+    std::vector<std::string> tried;
+    const auto devices = gpu::enumerateDevices(tried);
+    const auto at = static_cast<std::size_t>(std::max(device, 0));
+    if (at < devices.size() && devices[at].software)
+        return fail(ErrorCode::unsupported,
+                    "'{}' is a software driver, which is slow at it; name the path to measure it",
+                    devices[at].name);
+    return {};
+}
+#endif
+
+/// `named`: the path was asked for by name.
+Result<std::unique_ptr<Renderer>> makePath(const std::string& path, bool named,
+                                           const Bundle& bundle, int device, Job& job) {
     RenderSettings settings;
-    settings.mode = path == "surface" ? RenderMode::surface : RenderMode::splat;
+    settings.mode =
+        path == "surface" || path == "surface-gpu" ? RenderMode::surface : RenderMode::splat;
     settings.splat = path == "points" ? SplatRule::point : SplatRule::data;
     if (path == "surface") return makeCpuSurfaceRenderer(bundle, settings, job);
     if (path == "software" || path == "points") return makeCpuSplatRenderer(bundle, settings, job);
 #ifdef STX_WITH_GPU
+    if (path == "surface-gpu") {
+        if (!named) STX_CHECK(checkHardware(device));
+        return gpu::makeGpuSurfaceRenderer(bundle, settings, device, job);
+    }
     if (path == "gl") return gl::makeGlRenderer(bundle, settings, device, job);
     return gpu::makeGpuSplatRenderer(
         bundle, settings, device, job,
         path == "shader" ? gpu::Pipeline::raster : gpu::Pipeline::compute);
 #else
+    (void)named;
     (void)device;
     return fail(ErrorCode::unsupported, "this build has no GPU backends");
 #endif
@@ -46,8 +69,8 @@ Result<double> measure(Renderer& renderer, const Camera& camera, int repeats, Jo
 }  // namespace
 
 const std::vector<std::string>& benchPaths() {
-    static const std::vector<std::string> paths{"shader",  "gl",     "software",
-                                                "compute", "points", "surface"};
+    static const std::vector<std::string> paths{"shader", "gl",      "software",   "compute",
+                                                "points", "surface", "surface-gpu"};
     return paths;
 }
 
@@ -83,7 +106,7 @@ Result<BenchReport> runBench(const BenchSettings& settings, Job& job) {
         for (const auto& path : paths) {
             STX_CHECK(job.checkCancelled());
             job.progress(done++, total, path);
-            auto renderer = makePath(path, bundle, settings.device, job);
+            auto renderer = makePath(path, !settings.paths.empty(), bundle, settings.device, job);
             if (!renderer) {
                 // A wrong request is an error; what the machine lacks is a gap in the table.
                 if (renderer.error().code == ErrorCode::usage) return propagate(renderer);

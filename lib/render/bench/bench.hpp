@@ -24,8 +24,9 @@ struct BenchRow {
     std::int64_t points = 0;
     /// The paper's three: "shader" (vertex texture fetch), "gl" (conventional OpenGL) and
     /// "software" (splats on the processor). Ours beside them: "compute" (splats by atomics on the
-    /// GPU), "points" (one pixel each, on the processor), "surface" (surface mode on the
-    /// processor).
+    /// GPU), "points" (one pixel each, on the processor), "surface" and
+    /// "surface-gpu" (surface mode at normal quality on the processor and on the GPU, the time of
+    /// reading back and of filling holes included; on software drivers only when named).
     std::string path;
     double fps = 0;   ///< frames a second, of the median frame, without reading it back
     double mpps = 0;  ///< million points a second

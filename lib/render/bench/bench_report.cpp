@@ -85,8 +85,8 @@ std::string benchJson(const BenchReport& report) {
 
 std::string benchSvg(const BenchReport& report) {
     constexpr int kLeft = 210, kRight = 90, kBar = 16, kGap = 14, kTop = 64, kPlot = 560;
-    const std::vector<std::string> colours{"#3b6fb6", "#d98032", "#4f9d5d",
-                                           "#7a5fa8", "#8a8a8a", "#b0413e"};
+    const std::vector<std::string> colours{"#3b6fb6", "#d98032", "#4f9d5d", "#7a5fa8",
+                                           "#8a8a8a", "#b0413e", "#2f9c95"};
     const auto colourOf = [&](const std::string& path) -> const std::string& {
         const auto at = std::find(benchPaths().begin(), benchPaths().end(), path);
         return colours[static_cast<std::size_t>(at - benchPaths().begin()) % colours.size()];

@@ -33,6 +33,28 @@ TEST(Bench, MeasuresThePathsAskedFor) {
     EXPECT_EQ(report->rows[5].path, "points");
 }
 
+TEST(Bench, LeavesSurfacesOnSoftwareDriversToThoseWhoAsk) {
+    REQUIRE_GPU();
+    Job devices;
+    if (!listDevices(devices)[0].software) GTEST_SKIP() << "a hardware GPU is here";
+    BenchSettings settings;
+    settings.table2 = false;
+    settings.repeats = 1;
+    settings.paths = {"surface-gpu"};
+    Job job;
+    const auto named = runBench(settings, job);
+    ASSERT_TRUE(named) << named.error().text();
+    EXPECT_EQ(named->rows.size(), 3u);
+    settings.paths.clear();
+    const auto all = runBench(settings, job);
+    ASSERT_TRUE(all) << all.error().text();
+    for (const auto& row : all->rows) EXPECT_NE(row.path, "surface-gpu");
+    bool said = false;
+    for (const auto& note : job.takeNotes())
+        said = said || note.find("surface-gpu") != std::string::npos;
+    EXPECT_TRUE(said);
+}
+
 TEST(Bench, RefusesUnknownPaths) {
     BenchSettings settings;
     settings.paths = {"magic"};
