@@ -66,7 +66,9 @@ TEST(Silhouettes, FatEdgesGetTheCoverageThatTheReferenceSaw) {
             const float truth = bundle.views[0].texture.at(x, y).w;
             const auto c = frame.colour.at(x, y);
             worst = std::max<double>(worst, std::abs(c.w - truth));
-            if (c.w > 0) EXPECT_NEAR(c.x / c.w, 0.8f, 1e-5f) << "straight colour stays";
+            if (c.w > 0) {
+                EXPECT_NEAR(c.x / c.w, 0.8f, 1e-5f) << "straight colour stays";
+            }
             EXPECT_EQ(hasPoint(frame.depth.at(x, y)), c.w > 0.0f);
         }
     }
