@@ -43,7 +43,8 @@ Command addBench(CLI::App& app, Program& program) {
     c->add_option("--table", o->table, "Only table 1 (synthetic views) or 2 (full frames)")
         ->check(CLI::IsMember({1, 2}));
     c->add_option("--paths", o->settings.paths,
-                  "Only these paths: shader, gl, software, compute, points, surface")
+                  "Only these paths: shader, gl, software, compute, points, surface, "
+                  "surface-gpu")
         ->delimiter(',');
     c->add_option("--repeats", o->settings.repeats, "Frames measured for each row (default 5)")
         ->check(CLI::Range(1, 1000));

@@ -39,7 +39,8 @@ int main(int argc, char** argv) {
         ->check(CLI::IsMember({"text", "json"}));
     app.add_option("--table", table, "1 or 2; both by default")->check(CLI::Range(1, 2));
     app.add_option("--path", settings.paths,
-                   "only these: shader, gl, software, compute, points, surface");
+                   "only these: shader, gl, software, compute, points, surface, "
+                   "surface-gpu");
     app.add_option("--repeats", settings.repeats, "frames measured for each row")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
