@@ -49,6 +49,14 @@ Hit hitAt(const OpenFrame& frame, int x, int y, float distance) {
 constexpr std::array<std::array<int, 2>, 8> kDirections = {
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 
+/// Whether an opening is small enough to be an unseen part of a surface: surface in all directions
+/// but one, or in all but two opposite ones, as in the slits between a machine's cooling fins.
+bool enclosed(unsigned directionsMet) {
+    const unsigned open = ~directionsMet & 0xffu;
+    if ((open & (open - 1)) == 0) return true;
+    return open == 0x11u || open == 0x22u || open == 0x44u || open == 0x88u;
+}
+
 /// The depth of a hidden stretch of the ray through (x, y) between two depths, 0 = none.
 float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float qNear, float qFar) {
     constexpr int kSteps = 48;
@@ -80,9 +88,10 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
                 if (frame.albedo.at(x, y).a >= kClosed) continue;
                 std::array<Hit, 8> hits;
                 int count = 0;
+                unsigned met = 0;  // a bit for each direction
                 float nearest = 0, farthest = std::numeric_limits<float>::max();
                 for (std::size_t k = 0;
-                     k < kDirections.size() && count + 8 > static_cast<int>(k) + 6; ++k) {
+                     k < kDirections.size() && count + 8 > static_cast<int>(k) + 5; ++k) {
                     for (int step = 1; step <= kReach; ++step) {
                         const int nx = x + kDirections[k][0] * step,
                                   ny = y + kDirections[k][1] * step;
@@ -94,10 +103,11 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
                         nearest = std::max(nearest, hits[static_cast<std::size_t>(count)].q);
                         farthest = std::min(farthest, hits[static_cast<std::size_t>(count)].q);
                         ++count;
+                        met |= 1u << k;
                         break;
                     }
                 }
-                if (count < 7) continue;
+                if (!enclosed(met)) continue;
                 const float whole = frame.space.axis.whole(nearest);
                 const float q = hiddenDepth(sources, static_cast<float>(x) + 0.5f,
                                             static_cast<float>(y) + 0.5f, nearest + 0.02f * whole,

@@ -259,6 +259,39 @@ TEST(CpuSurface, SmallHolesThatNobodyLooksThroughAreFilled) {
     EXPECT_GT(psnr(frame, sheet, novel), 30.0);
 }
 
+TEST(CpuSurface, LongSlitsAreFilledUnlessSomebodyLooksThroughThem) {
+    const auto sheetWith = [](bool slit) -> Scene {
+        return [slit](glm::dvec3 from, glm::dvec3 along) {
+            return plane(
+                0,
+                [slit](double x, double y) {
+                    const bool inSlit = std::abs(x) < 0.03 && std::abs(y) < 0.6;
+                    return std::abs(x) < 0.9 && std::abs(y) < 0.9 && !(slit && inSlit);
+                },
+                from, along);
+        };
+    };
+    const std::vector<Camera> cameras = {at({0.3, 0, 3}), at({-0.3, 0.1, 3})};
+    const Camera novel = at({0, 0.1, 2.9});
+    const auto middle = glm::ivec2(
+        novel.project(glm::inverse(novel.orientation) * (glm::dvec3(0) - novel.position)));
+
+    Bundle untold = bundleOf(sheetWith(false), cameras);
+    for (ReferenceView& view : untold.views) {
+        for (int y = 0; y < view.camera.height; ++y) {
+            for (int x = 0; x < view.camera.width; ++x) {
+                if (!hasPoint(view.depth.at(x, y))) continue;
+                const auto p = view.worldPoint(x, y);
+                if (std::abs(p.x) < 0.03 && std::abs(p.y) < 0.6) view.depth.at(x, y) = kNoDepth;
+            }
+        }
+    }
+    EXPECT_GT(draw(untold, novel).colour.at(middle.x, middle.y).a, 0.99f) << "unseen: filled";
+
+    const Bundle open = bundleOf(sheetWith(true), cameras);
+    EXPECT_LT(draw(open, novel).colour.at(middle.x, middle.y).a, 0.05f) << "seen through: open";
+}
+
 TEST(CpuSurface, WhatNobodySawIsFilledFromTheBackground) {
     const Scene room = [](glm::dvec3 from, glm::dvec3 along) -> std::optional<Hit> {
         auto wall = plane(
