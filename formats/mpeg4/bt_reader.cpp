@@ -248,10 +248,16 @@ class BtReader {
             return FieldValue(std::move(node));
         }
         if (type == FieldType::MFNode) {
-            // A holder, so that the list is read as in a node.
+            // A holder, so that the list is read as in a node. An eventIn (addChildren) keeps no
+            // value: the field that it feeds does.
             NodePtr holder = std::make_shared<Node>(*target.node->info);
-            STX_CHECK(readNodeList(holder, target.field, 1, height, false));
-            return holder->value(target.field);
+            const int index = field.hasValue() ? target.field : holder->info->find("children");
+            if (index < 0 || holder->info->fields[index].type != FieldType::MFNode)
+                return failAt(target.where, ErrorCode::invalidInput,
+                              "{}.{} takes no nodes by a command", target.node->info->name,
+                              field.name);
+            STX_CHECK(readNodeList(holder, index, 1, height, false));
+            return holder->value(index);
         }
         return readFieldValue(lexer_, type, false);
     }
