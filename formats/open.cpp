@@ -79,10 +79,7 @@ Result<FileKind> recognise(const fs::path& path) {
         const auto reader = ExrReader::open(path, Limits());
         return reader && isExrAtlas(*reader) ? FileKind::atlas : FileKind::exr;
     }
-    if (startsWith(head, "ftyp", 4) || startsWith(head, "moov", 4) || startsWith(head, "mdat", 4) ||
-        ending == ".mp4" || ending == ".m4v" || ending == ".xmt" || ending == ".xmta" ||
-        ending == ".bt")
-        return FileKind::mpeg4;
+    if (mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path)) return FileKind::mpeg4;
     if (startsWith(head, "\x89PNG") || startsWith(head, "\xff\xd8\xff")) return FileKind::image;
     if (isMesh(path, head)) return FileKind::mesh;
     if (ending == ".json" || ending == ".txt") return FileKind::imageSet;
@@ -144,7 +141,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
 Result<FileKind> containerOf(const fs::path& target) {
     const auto ending = lowerExtension(target);
     if (ending == ".exr") return FileKind::exr;
-    if (ending == ".mp4" || ending == ".xmt" || ending == ".bt") return FileKind::mpeg4;
+    if (mpeg4ContainerOf(target)) return FileKind::mpeg4;
     return fail(ErrorCode::usage,
                 "'{}' ends in '{}'; a bundle is written as .exr, .mp4, .xmt or .bt",
                 target.string(), ending);

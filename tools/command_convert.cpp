@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "formats/files/text_numbers.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/open.hpp"
@@ -29,13 +28,8 @@ struct ConvertOptions {
 /// Writes the options of image sets that are texts into their numbers.
 Result<void> setTextOptions(const std::string& option, const std::string& text,
                             std::vector<double*> to) {
-    std::string spaced = text;
-    std::replace(spaced.begin(), spaced.end(), ',', ' ');
-    const auto numbers = numbersFrom(spaced);
-    if (!numbers || numbers->size() != to.size())
-        return fail(ErrorCode::usage, "{} is '{}'; {} numbers with commas between are expected",
-                    option, text, to.size());
-    for (std::size_t i = 0; i < to.size(); ++i) *to[i] = (*numbers)[i];
+    STX_TRY(const auto numbers, parseNumbers(text, to.size(), option));
+    for (std::size_t i = 0; i < to.size(); ++i) *to[i] = numbers[i];
     return {};
 }
 

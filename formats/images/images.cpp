@@ -143,6 +143,25 @@ int channelNamed(const DecodedImage& image, std::string_view name) {
     return -1;
 }
 
+struct ColourChannels {
+    int r = 0, g = 0, b = 0, a = -1;  ///< indices; a = -1: there is no alpha
+};
+
+/// Where an image's colour stands: by name, else by position.
+ColourChannels colourChannels(const DecodedImage& image) {
+    int r = channelNamed(image, "R"), g = channelNamed(image, "G"), b = channelNamed(image, "B");
+    int a = channelNamed(image, "A");
+    if (r < 0 || g < 0 || b < 0) {
+        const bool grey = image.channels < 3;
+        r = 0;
+        g = grey ? 0 : 1;
+        b = grey ? 0 : 2;
+        if (a < 0 && (image.channels == 2 || image.channels == 4)) a = image.channels - 1;
+        if (a == 0) a = -1;
+    }
+    return {r, g, b, a};
+}
+
 }  // namespace
 
 Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Limits& limits) {
@@ -188,16 +207,8 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
 
 Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
     Image<glm::u8vec4> out(image.width, image.height);
-    int r = channelNamed(image, "R"), g = channelNamed(image, "G"), b = channelNamed(image, "B");
-    int a = channelNamed(image, "A");
-    if (r < 0 || g < 0 || b < 0) {
-        const bool grey = image.channels < 3;
-        r = 0;
-        g = grey ? 0 : 1;
-        b = grey ? 0 : 2;
-        if (a < 0 && (image.channels == 2 || image.channels == 4)) a = image.channels - 1;
-        if (a == 0) a = -1;
-    }
+    const ColourChannels at = colourChannels(image);
+    const int r = at.r, g = at.g, b = at.b, a = at.a;
     const auto pixel = [&](const auto* values, const auto& coded) {
         parallelFor(0, image.height, [&](std::int64_t y) {
             const auto* p = values + static_cast<std::size_t>(y) * image.width * image.channels;
@@ -273,6 +284,28 @@ Result<Bytes> encodeJpeg(int width, int height, int channels, const std::uint8_t
     request.srgb = true;
     request.quality = quality;
     return encode(request, "JPEG");
+}
+
+Image<glm::vec4> rgbaFloatFrom(const DecodedImage& image) {
+    Image<glm::vec4> out(image.width, image.height);
+    const ColourChannels at = colourChannels(image);
+    const int r = at.r, g = at.g, b = at.b, a = at.a;
+    std::visit(
+        [&](const auto& values) {
+            using Value = typename std::decay_t<decltype(values)>::value_type;
+            constexpr float kScale = std::is_same_v<Value, std::uint8_t>    ? 1.0f / 255.0f
+                                     : std::is_same_v<Value, std::uint16_t> ? 1.0f / 65535.0f
+                                                                            : 1.0f;
+            const auto* p = values.data();
+            for (auto& q : out.pixels()) {
+                const float alpha = a < 0 ? 1.0f : static_cast<float>(p[a]) * kScale;
+                q = glm::vec4(p[r] * kScale, p[g] * kScale, p[b] * kScale, alpha);
+                if (image.premultiplied && alpha > 0.0f) q = glm::vec4(glm::vec3(q) / alpha, alpha);
+                p += image.channels;
+            }
+        },
+        image.values);
+    return out;
 }
 
 }  // namespace stx
