@@ -2,21 +2,12 @@
 
 #include <cstdint>
 
+#include "lib/render/cpu/splat_constants.hpp"
 #include "lib/render/cpu/splat_view.hpp"
 
 /// The inner loops of splat mode, compiled for each SIMD target and chosen at run time (Highway).
 
 namespace stx::splat {
-
-/// A splat closes its gaps within 2x2 pixels while no point of the surface is farther from a sample
-/// than this, squared.
-inline constexpr float kSmallCover2 = 0.9f;
-/// Sparse samples weigh less than dense ones, down to this share.
-inline constexpr float kLeastDensity = 1e-3f;
-/// Inside its splat a point's colour goes on as its neighbours' does, by this share of the
-/// gradient. Where samples are so dense that their mean matters more this fades out: all at twice
-/// kFadeTo output pixels per source pixel, nothing at kFadeTo.
-inline constexpr float kGradient = 0.75f, kFadeTo = 0.3f;
 
 /// Where the pixels of a source land: with (u, v) a pixel's index and z its depth,
 /// H = (a0 + au u + av v) z + (b0 + bu u + bv v), and then x = H.x / H.z, y = H.y / H.z (or H.x,
