@@ -255,14 +255,42 @@ struct alignas(64) ColourSum {
     float v[16];
 };
 
+/// The weights of the taps of all pieces of a group, as fetching wants them: the four of a row side
+/// by side.
+struct TapWeights {
+    /// v[row][l % 4] holds the row's taps of piece l from 4 (l / 4) on: what transposing blocks of
+    /// four pieces gives.
+    Lanes v[kTaps][4];
+
+    [[nodiscard]] const float* row(int j, int lane) const { return &v[j][lane & 3][lane & ~3]; }
+
+    /// Keeps four taps of a row for the pieces l and following, a vector of each.
+    template <class D, class V = hn::Vec<D>>
+    HWY_INLINE void store(D d, int j, int l, const V* taps) {
+#if HWY_TARGET == HWY_SCALAR
+        (void)d;
+        for (int i = 0; i < kTaps; ++i) v[j][l & 3][(l & ~3) + i] = hn::GetLane(taps[i]);
+#else
+        const V a = hn::InterleaveLower(d, taps[0], taps[2]);
+        const V b = hn::InterleaveUpper(d, taps[0], taps[2]);
+        const V e = hn::InterleaveLower(d, taps[1], taps[3]);
+        const V f = hn::InterleaveUpper(d, taps[1], taps[3]);
+        hn::StoreU(hn::InterleaveLower(d, a, e), d, &v[j][0][l]);
+        hn::StoreU(hn::InterleaveUpper(d, a, e), d, &v[j][1][l]);
+        hn::StoreU(hn::InterleaveLower(d, b, f), d, &v[j][2][l]);
+        hn::StoreU(hn::InterleaveUpper(d, b, f), d, &v[j][3][l]);
+#endif
+    }
+};
+
 /// Adds the weighted taps of one lane, one by one: at borders and of float textures.
-HWY_NOINLINE void fetchSlowly(const Source& source, int baseU, int baseV, const Lanes* weights,
+HWY_NOINLINE void fetchSlowly(const Source& source, int baseU, int baseV, const TapWeights& weights,
                               int lane, ColourSum& sum) {
     for (int j = 0; j < kTaps; ++j) {
         for (int i = 0; i < kTaps; ++i) {
             const int x = baseU + i, y = baseV + j;
             if (!source.q.contains(x, y)) continue;
-            const float w = weights[j * kTaps + i][lane];
+            const float w = weights.row(j, lane)[i];
             const glm::vec4 texel = source.view->texture.rgba8()
                                         ? glm::vec4(source.view->texture.rgba8()->at(x, y))
                                         : source.view->texture.rgbaFloat()->at(x, y);
@@ -271,31 +299,31 @@ HWY_NOINLINE void fetchSlowly(const Source& source, int baseU, int baseV, const 
     }
 }
 
-/// The same where all taps are inside an 8-bit texture: a row of four texels at a time.
-HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const Lanes* weights, int lane,
-                          ColourSum& sum) {
+/// The same where all taps are inside an 8-bit texture: as many texels of a row as a vector takes.
+HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const TapWeights& weights,
+                          int lane, ColourSum& sum) {
     const hn::CappedTag<float, 16> d;
     using V = hn::Vec<decltype(d)>;
     constexpr int kN = static_cast<int>(hn::MaxLanes(d));
     if constexpr (kN < 4) {
         for (int t = 0; t < kTaps * kTaps; ++t)
             for (int c = 0; c < 4; ++c)
-                sum.v[c] += weights[t][lane] * texels[t / kTaps * stride + t % kTaps][c];
+                sum.v[c] += weights.row(t / kTaps, lane)[t % kTaps] *
+                            static_cast<float>(texels[t / kTaps * stride + t % kTaps][c]);
     } else {
         constexpr int kTexels = kN / 4;  // in one vector
         const hn::Rebind<std::uint8_t, decltype(d)> d8;
         const hn::RebindToSigned<decltype(d)> d32;
-        const auto lanes = hn::Iota(d32, 0);
-        const auto spread = hn::ShiftRight<2>(lanes);
-        V w[kTaps * kTaps / kN];
-        for (int k = 0; k < kTaps * kTaps / kN; ++k)
-            w[k] = hn::GatherIndex(d, &weights[k * kN][lane], hn::ShiftLeft<4>(lanes));
+        const auto spread = hn::ShiftRight<2>(hn::Iota(d32, 0));
         V acc = hn::Load(d, sum.v);
-        for (int t = 0; t < kTaps * kTaps; t += kTexels) {
-            const auto* from = &texels[t / kTaps * stride + t % kTaps].x;
-            const V texel = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, from)));
-            const auto indices = hn::IndicesFromVec(d, hn::Add(spread, hn::Set(d32, t % kN)));
-            acc = hn::MulAdd(hn::TableLookupLanes(w[t / kN], indices), texel, acc);
+        for (int j = 0; j < kTaps; ++j) {
+            const V row = hn::LoadDup128(d, weights.row(j, lane));
+            for (int i = 0; i < kTaps; i += kTexels) {
+                const auto* from = &texels[j * stride + i].x;
+                const V texel = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, from)));
+                const auto indices = hn::IndicesFromVec(d, hn::Add(spread, hn::Set(d32, i)));
+                acc = hn::MulAdd(hn::TableLookupLanes(row, indices), texel, acc);
+            }
         }
         hn::Store(acc, d, sum.v);
     }
@@ -416,6 +444,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
 
     ColourSum sums[kGroup] = {};
     alignas(64) float total[kGroup] = {};
+    TapWeights weights;
     for (int k = 0; k < count; ++k) {
         const int s = list[k];
         const View& view = views[s];
@@ -428,6 +457,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             for (int i = 0; i < 6; ++i) row[i] = hn::LoadU(d, &rows[i][l]);
             V sum = hn::LoadU(d, &total[l]);
             for (int j = 0; j < kTaps; ++j) {
+                V taps[kTaps];
                 for (int i = 0; i < kTaps; ++i) {
                     const V fi = hn::Set(d, static_cast<float>(i)),
                             fj = hn::Set(d, static_cast<float>(j));
@@ -436,10 +466,10 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
                     const V linear = hn::MulAdd(row[1], dx, hn::MulAdd(row[2], dy, row[0]));
                     const V quadratic = hn::MulAdd(dx, hn::MulAdd(row[3], dx, hn::Mul(row[4], dy)),
                                                    hn::MulAdd(hn::Mul(row[5], dy), dy, linear));
-                    const V value = hn::Mul(hn::LoadU(d, &kernels[s][j * kTaps + i][l]), quadratic);
-                    hn::StoreU(value, d, &kernels[s][j * kTaps + i][l]);
-                    sum = hn::Add(sum, value);
+                    taps[i] = hn::Mul(hn::LoadU(d, &kernels[s][j * kTaps + i][l]), quadratic);
+                    sum = hn::Add(sum, taps[i]);
                 }
+                weights.store(d, j, l, taps);
             }
             hn::StoreU(sum, d, &total[l]);
         }
@@ -450,9 +480,9 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             if (bytes && baseU >= 0 && baseV >= 0 && baseU + kTaps <= source.width &&
                 baseV + kTaps <= source.height) {
                 fetchRows(bytes->data() + static_cast<std::ptrdiff_t>(baseV) * source.width + baseU,
-                          source.width, kernels[s], l, sums[l]);
+                          source.width, weights, l, sums[l]);
             } else {
-                fetchSlowly(source, baseU, baseV, kernels[s], l, sums[l]);
+                fetchSlowly(source, baseU, baseV, weights, l, sums[l]);
             }
         }
     }
