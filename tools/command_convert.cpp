@@ -259,6 +259,9 @@ Command addConvert(CLI::App& app, Program& program) {
                                                {"drop", MixedPixels::drop},
                                                {"keep", MixedPixels::keep}}))
         ->group(sets);
+    c->add_flag("--refine-poses", set.refinePoses,
+                "Move the cameras so that overlapping views agree in depth and colour")
+        ->group(sets);
     c->add_option_function<std::string>(
          "--yuv",
          [o](const std::string& text) {

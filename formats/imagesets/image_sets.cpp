@@ -1,5 +1,6 @@
 #include "formats/imagesets/image_sets.hpp"
 
+#include <algorithm>
 #include <set>
 
 #include "formats/images/images.hpp"
@@ -7,6 +8,7 @@
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/registration/refine_poses.hpp"
 
 namespace stx {
 namespace {
@@ -54,6 +56,35 @@ void makeNamesUnique(std::vector<ReferenceView>& views) {
         for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}_{}", view.name, i);
         view.name = std::move(name);
     }
+}
+
+/// A disagreement in depth worth a word, as a share of the distance: above what the depth of a
+/// sensor or 8 bits leave, below what shows as double edges.
+constexpr double kPosesDisagree = 0.005;
+
+/// Refines the poses, or says that they want it.
+Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
+                           const ImageSetOptions& options, Job& job) {
+    if (options.refinePoses) {
+        STX_TRY(const PoseRefinement done, refinePoses(bundle, {}, job));
+        if (done.before.pairs == 0) {
+            job.note("the poses stay as they are: no two views overlap");
+            return {};
+        }
+        job.note(fmt::format(
+            "poses refined: viewpoints moved by up to {:.3g} scene units, turned by up to {:.3g} "
+            "degrees; overlapping views disagreed by {:.2g} % of the distance, now by {:.2g} %",
+            done.maxShift, glm::degrees(done.maxTurn), 100 * done.before.relative,
+            100 * done.after.relative));
+    } else if (std::ranges::any_of(set.views, &SetView::sensor)) {
+        const DepthDisagreement found = measureDepthDisagreement(bundle);
+        if (found.relative > kPosesDisagree)
+            job.note(fmt::format(
+                "overlapping views disagree by {:.2g} % of the distance (median): edges may show "
+                "twice; --refine-poses aligns them",
+                100 * found.relative));
+    }
+    return {};
 }
 
 }  // namespace
@@ -115,6 +146,7 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
         for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));
     }
     makeNamesUnique(bundle.views);
+    STX_CHECK(attendToPoses(bundle, set, options, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
     bundle.bounds = bundle.computeBounds();
     return bundle;

@@ -42,6 +42,8 @@ struct ImageSetOptions {
     /// sets count them (the first pixel's centre is 0, 0); fx = 0: not given.
     double intrinsics[4] = {0, 0, 0, 0};
     MixedPixels mixedPixels = MixedPixels::automatic;
+    /// Moves the cameras so that views that overlap agree; see lib/registration.
+    bool refinePoses = false;
     YuvColour yuv;
     int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
 };

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+
+/// Registration: making views that overlap agree on where the surface is. Trackers, hand-measured
+/// rigs and files whose poses belong to the frame before or after leave errors of a degree or a
+/// centimetre; a renderer then shows everything twice.
+namespace stx {
+
+struct PoseRefinementSettings {
+    /// Two points are taken for the same surface when their distances differ by less than this
+    /// share at the start. The error of the poses must stay below it.
+    double overlapTolerance = 0.1;
+    /// Pairs with a smaller overlap, as a share of either image, are left out.
+    double minOverlap = 0.05;
+    /// Each view is compared with this many others at most, those it overlaps most with.
+    int neighbours = 8;
+    int iterations = 20;  ///< at each of three resolutions, at most
+};
+
+/// How far overlapping views disagree about the distance of what both see.
+struct DepthDisagreement {
+    int pairs = 0;        ///< that overlap
+    double overlap = 0;   ///< share of an image that its partner sees, mean over the pairs
+    double relative = 0;  ///< median of |difference| / distance, over the pairs
+};
+
+struct PoseRefinement {
+    DepthDisagreement before, after;
+    double maxShift = 0;  ///< of a viewpoint, scene units
+    double maxTurn = 0;   ///< of an orientation, radians
+};
+
+/// Measures, changes nothing. Views without points overlap with none.
+[[nodiscard]] DepthDisagreement measureDepthDisagreement(
+    const Bundle& bundle, const PoseRefinementSettings& settings = {});
+
+/// Moves the cameras so that overlapping views agree in depth and colour: Gauss-Newton over all
+/// poses together on both differences, from coarse to fine, robust against what only one view sees
+/// (projective data association as in Newcombe et al., KinectFusion, 2011; colour as in Kerl et
+/// al., Dense visual SLAM, 2013). The correction is the least that does it: views that overlap with
+/// none, and the frame of the whole, stay. Intrinsics and images stay. The same result on any
+/// number of threads. Errors: cancelled.
+[[nodiscard]] Result<PoseRefinement> refinePoses(Bundle& bundle,
+                                                 const PoseRefinementSettings& settings, Job& job);
+
+}  // namespace stx
