@@ -184,7 +184,7 @@ Command addConvert(CLI::App& app, Program& program) {
     c->add_option("--colour", o->colour, "png (exact) or jpeg, in MPEG-4 containers (default png)")
         ->check(CLI::IsMember({"png", "jpeg"}))
         ->group(coding);
-    c->add_option("--quality", o->quality, "Of JPEG, 1 to 100 (default 92)")
+    c->add_option("--quality", o->quality, "Of JPEG (default 92)")
         ->check(CLI::Range(1, 100))
         ->group(coding);
     c->add_flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)")
@@ -203,8 +203,7 @@ Command addConvert(CLI::App& app, Program& program) {
     std::vector<std::string> kinds;
     for (const ImageSetKind& kind : imageSetKinds()) kinds.emplace_back(kind.name);
     c->add_option("--from", o->open.set.from,
-                  "Kind of image set, when it cannot be told from the files: " +
-                      fmt::format("{}", fmt::join(kinds, ", ")))
+                  "Kind of image set, when it cannot be told from the files")
         ->check(CLI::IsMember(kinds))
         ->group(sets);
     c->add_option("--frame", o->open.set.frame, "Frame of a set that has time, from 0 (default 0)")
@@ -267,7 +266,7 @@ Command addConvert(CLI::App& app, Program& program) {
          [o](const std::string& text) {
              o->open.set.yuv = {text.starts_with("bt601"), text.ends_with("full")};
          },
-         "Colour of YUV files: bt709, bt601, bt709-full, bt601-full (default bt709)")
+         "Colour of YUV files (default bt709)")
         ->check(CLI::IsMember({"bt709", "bt601", "bt709-full", "bt601-full"}))
         ->group(sets);
     addCommonOptions(*c, program, kOutput | kOutside);

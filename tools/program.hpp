@@ -80,6 +80,7 @@ Command addInfo(CLI::App& app, Program& program);
 Command addValidate(CLI::App& app, Program& program);
 Command addCompare(CLI::App& app, Program& program);
 Command addBench(CLI::App& app, Program& program);
+Command addCompletion(CLI::App& app, Program& program);
 
 // ---- Values of options. All parse the C locale's numbers and refuse trailing text. ----
 
