@@ -13,7 +13,9 @@ std::string replaced(std::string text, std::string_view what, std::string_view b
 }
 
 /// The first line without its full stop: shells show one.
-std::string firstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
+std::string firstLine(const std::string& text) {
+    return text.substr(0, text.find('\n'));
+}
 
 std::string words(const std::vector<std::string>& list) {
     return fmt::format("{}", fmt::join(list, " "));
@@ -41,7 +43,8 @@ std::string bashCompletion(const std::vector<CommandRow>& table) {
             if (option.choices.empty()) continue;
             std::vector<std::string> patterns;
             for (const auto& name : option.names)
-                patterns.push_back(option.positional ? "" : fmt::format("'{} {}'", command.name, name));
+                patterns.push_back(option.positional ? ""
+                                                     : fmt::format("'{} {}'", command.name, name));
             if (option.positional) continue;
             choices += fmt::format("        {}) list='{}' ;;\n", fmt::join(patterns, "|"),
                                    words(option.choices));
@@ -51,8 +54,8 @@ std::string bashCompletion(const std::vector<CommandRow>& table) {
     for (const CommandRow& command : table)
         for (const OptionRow& option : command.options)
             if (option.positional && !option.choices.empty())
-                choices += fmt::format("        '{} {}') list='{}' ;;\n", command.name, command.name,
-                                       words(option.choices));
+                choices += fmt::format("        '{} {}') list='{}' ;;\n", command.name,
+                                       command.name, words(option.choices));
     return fmt::format(R"(# bash completion of stx
 _stx() {{
     local cur=${{COMP_WORDS[COMP_CWORD]}} prev=${{COMP_WORDS[COMP_CWORD-1]}} list=''
@@ -82,7 +85,8 @@ complete -o bashdefault -o default -F _stx stx
 
 std::string zshText(const std::string& text) {
     std::string out = replaced(firstLine(text), "\\", "\\\\");
-    for (const char* special : {"[", "]", ":"}) out = replaced(out, special, std::string("\\") + special);
+    for (const char* special : {"[", "]", ":"})
+        out = replaced(out, special, std::string("\\") + special);
     return replaced(out, "'", "'\\''");
 }
 
@@ -102,10 +106,11 @@ std::string zshCompletion(const std::vector<CommandRow>& table) {
             const std::string value =
                 option.value.empty() ? "" : fmt::format(":{}:{}", zshText(option.value), values);
             for (const auto& name : option.names)
-                specs += fmt::format(" \\\n                '({}){}[{}]{}'", words(option.names), name,
-                                     zshText(option.help), value);
+                specs += fmt::format(" \\\n                '({}){}[{}]{}'", words(option.names),
+                                     name, zshText(option.help), value);
         }
-        cases += fmt::format("            {})\n            _arguments -s{} ;;\n", command.name, specs);
+        cases +=
+            fmt::format("            {})\n            _arguments -s{} ;;\n", command.name, specs);
     }
     return fmt::format(R"(#compdef stx
 _stx() {{
@@ -136,8 +141,8 @@ std::string fishText(const std::string& text) {
 std::string fishCompletion(const std::vector<CommandRow>& table) {
     std::string out = "# fish completion of stx\n";
     for (const CommandRow& command : table)
-        out += fmt::format("complete -c stx -n __fish_use_subcommand -f -a {} -d '{}'\n", command.name,
-                           fishText(command.summary));
+        out += fmt::format("complete -c stx -n __fish_use_subcommand -f -a {} -d '{}'\n",
+                           command.name, fishText(command.summary));
     for (const CommandRow& command : table) {
         for (const OptionRow& option : command.options) {
             out += fmt::format("complete -c stx -n '__fish_seen_subcommand_from {}'", command.name);
@@ -146,7 +151,8 @@ std::string fishCompletion(const std::vector<CommandRow>& table) {
                 out += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
             }
             if (!option.choices.empty())
-                out += fmt::format("{} -a '{}'", option.positional ? " -f" : " -x", words(option.choices));
+                out += fmt::format("{} -a '{}'", option.positional ? " -f" : " -x",
+                                   words(option.choices));
             else if (!option.value.empty() && !option.positional)
                 out += " -r";
             else if (option.positional)

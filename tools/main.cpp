@@ -58,9 +58,9 @@ int mainProgram(int argc, char** argv) {
         "Exit codes: 0 ok, 1 usage, 2 cannot read or write a file, 3 invalid input,\n"
         "4 failed while working, 5 not supported here, 7 a difference or a broken rule.");
     const std::vector<Command> commands = {
-        addConvert(app, program), addSelect(app, program),   addPack(app, program),
-        addBake(app, program),    addRender(app, program),   addInfo(app, program),
-        addExtract(app, program), addValidate(app, program), addCompare(app, program),
+        addConvert(app, program), addSelect(app, program),    addPack(app, program),
+        addBake(app, program),    addRender(app, program),    addInfo(app, program),
+        addExtract(app, program), addValidate(app, program),  addCompare(app, program),
         addBench(app, program),   addCompletion(app, program)};
     for (const auto& command : commands)
         command.app->set_help_flag("-h,--help", "Print this help and stop");

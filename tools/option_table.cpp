@@ -63,7 +63,8 @@ std::vector<CommandRow> optionTable(const CLI::App& app) {
         const auto blank = text.find("\n\n");
         CommandRow row{command->get_name(), text.substr(0, blank), {}, {}};
         if (blank != std::string::npos) row.examples = text.substr(blank + 2);
-        for (const CLI::Option* option : command->get_options([](const CLI::Option*) { return true; }))
+        for (const CLI::Option* option :
+             command->get_options([](const CLI::Option*) { return true; }))
             row.options.push_back(optionRow(*option));
         table.push_back(std::move(row));
     }

@@ -75,13 +75,11 @@ std::vector<Pair> overlappingPairs(const Bundle& bundle, const PoseRefinementSet
         for (int j = 0; j < count; ++j) {
             if (j == i) continue;
             int common = 0;
-            const int points =
-                lookUp(from, bundle.views[static_cast<std::size_t>(j)],
-                       count < kMany ? kProbes : kProbesOfMany, settings.overlapTolerance,
-                       [&](double) { ++common; });
+            const int points = lookUp(from, bundle.views[static_cast<std::size_t>(j)],
+                                      count < kMany ? kProbes : kProbesOfMany,
+                                      settings.overlapTolerance, [&](double) { ++common; });
             const double overlap = points > 0 ? static_cast<double>(common) / points : 0;
-            if (overlap >= settings.minOverlap)
-                pairs.push_back({static_cast<int>(i), j, overlap});
+            if (overlap >= settings.minOverlap) pairs.push_back({static_cast<int>(i), j, overlap});
         }
         std::stable_sort(pairs.begin(), pairs.end(),
                          [](const Pair& a, const Pair& b) { return a.overlap > b.overlap; });
@@ -101,8 +99,7 @@ DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pa
         std::vector<double> differences;
         lookUp(bundle.views[static_cast<std::size_t>(pair.from)],
                bundle.views[static_cast<std::size_t>(pair.to)], kMeasured,
-               settings.overlapTolerance,
-               [&](double d) { differences.push_back(std::abs(d)); });
+               settings.overlapTolerance, [&](double d) { differences.push_back(std::abs(d)); });
         medians[static_cast<std::size_t>(i)] = median(differences);
     });
     DepthDisagreement result;

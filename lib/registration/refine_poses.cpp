@@ -39,7 +39,8 @@ Pyramid greyPyramid(const Texture& texture) {
         for (int x = 0; x < grey.width(); ++x) {
             const glm::vec4 c = texture.at(x, y);
             const float mean = (c.r + c.g + c.b) / 3;
-            grey.at(x, y) = texture.isLinear() ? srgbFromLinear(std::clamp(mean, 0.0f, 1.0f)) : mean;
+            grey.at(x, y) =
+                texture.isLinear() ? srgbFromLinear(std::clamp(mean, 0.0f, 1.0f)) : mean;
         }
     }
     levels.push_back(std::move(grey));
@@ -144,7 +145,7 @@ double medianOf(std::vector<double> values) {
 }
 
 /// Adds one kind of difference to a pair's equations, weighed by its robust spread.
-void accumulate(const std::vector<Comparison>& points, Residual Comparison::* kind, double bias,
+void accumulate(const std::vector<Comparison>& points, Residual Comparison::*kind, double bias,
                 double leastSpread, const PoseSystem& system, PairEquations& equations) {
     std::vector<double> sizes(points.size());
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -207,8 +208,8 @@ Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings&
         const Camera& now = bundle.views[i].camera;
         result.maxShift = std::max(result.maxShift, glm::length(now.position - given[i].position));
         result.maxTurn = std::max(
-            result.maxTurn, glm::angle(glm::normalize(now.orientation *
-                                                      glm::conjugate(given[i].orientation))));
+            result.maxTurn,
+            glm::angle(glm::normalize(now.orientation * glm::conjugate(given[i].orientation))));
     }
     bundle.bounds = bundle.computeBounds();
     return result;

@@ -14,7 +14,9 @@ namespace {
 
 /// A wavy, painted wall, 4 x 3 units, seen from in front. `phase` moves nothing: the same wall for
 /// every camera. Rays are followed to the surface z = height(x, y).
-double height(double x, double y) { return 0.25 * std::sin(1.7 * x) * std::cos(2.3 * y); }
+double height(double x, double y) {
+    return 0.25 * std::sin(1.7 * x) * std::cos(2.3 * y);
+}
 
 glm::vec3 paint(double x, double y) {
     const double a = 0.5 + 0.25 * std::sin(9 * x + 3 * std::sin(4 * y)) + 0.2 * std::sin(23 * y);
@@ -69,7 +71,8 @@ void disturb(Bundle& bundle, double turn, double shift) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> unit(-1, 1);
     for (ReferenceView& view : bundle.views) {
-        const glm::dvec3 axis = glm::normalize(glm::dvec3(unit(random), unit(random), unit(random)));
+        const glm::dvec3 axis =
+            glm::normalize(glm::dvec3(unit(random), unit(random), unit(random)));
         view.camera.orientation =
             glm::normalize(glm::angleAxis(turn, axis) * view.camera.orientation);
         view.camera.position +=
@@ -91,8 +94,8 @@ Difference relativeTo(const Bundle& truth, const Bundle& found) {
     for (std::size_t i = 1; i < truth.views.size(); ++i) {
         const glm::dmat4 a = relative(truth, i), b = relative(found, i);
         const glm::dmat3 r = glm::dmat3(a) * glm::transpose(glm::dmat3(b));
-        const double sine = 0.5 * glm::length(glm::dvec3(r[1][2] - r[2][1], r[2][0] - r[0][2],
-                                                         r[0][1] - r[1][0]));
+        const double sine =
+            0.5 * glm::length(glm::dvec3(r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]));
         worst.turn = std::max(worst.turn, std::asin(std::min(1.0, sine)));
         worst.shift = std::max(worst.shift, glm::length(glm::dvec3(a[3] - b[3])));
     }
