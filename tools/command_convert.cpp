@@ -261,6 +261,18 @@ Command addConvert(CLI::App& app, Program& program) {
     c->add_flag("--refine-poses", set.refinePoses,
                 "Move the cameras so that overlapping views agree in depth and colour")
         ->group(sets);
+    c->add_option("--dequantise", set.dequantise,
+                  "Smooth the stairs of depth stored in integers, within half a step: auto (8-bit "
+                  "depth), on, off")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, Dequantise>{
+            {"auto", Dequantise::automatic}, {"on", Dequantise::on}, {"off", Dequantise::off}}))
+        ->group(sets);
+    c->add_option("--align-edges", set.alignEdges,
+                  "Move depth edges to where the picture has them, by up to 2 pixels: auto (older "
+                  "Middlebury sets), on, off")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, AlignEdges>{
+            {"auto", AlignEdges::automatic}, {"on", AlignEdges::on}, {"off", AlignEdges::off}}))
+        ->group(sets);
     c->add_option_function<std::string>(
          "--yuv",
          [o](const std::string& text) {

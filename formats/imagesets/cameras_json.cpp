@@ -110,7 +110,7 @@ Result<void> setDepth(const Json& c, const std::string& where, SetView& view) {
         return failAt(where, ErrorCode::invalidInput,
                       "'nearPlane' {:g} must be below 'farPlane' {:g}", *nearPlane, *farPlane);
     if (!nearPlane && !unit) {
-        view.distances = [](Image<float>&, const Camera&, int bits) -> Result<void> {
+        view.distances = [](Image<float>&, const Camera&, int bits, Job&) -> Result<void> {
             if (bits == 32) return {};
             return fail(ErrorCode::invalidInput,
                         "the depth is stored as integers; 'depthUnit', or 'nearPlane' and "
@@ -119,12 +119,14 @@ Result<void> setDepth(const Json& c, const std::string& where, SetView& view) {
         return {};
     }
     view.distances = [unit, nearPlane, farPlane](Image<float>& values, const Camera& camera,
-                                                 int bits) -> Result<void> {
+                                                 int bits, Job& job) -> Result<void> {
         if (bits == 32) return {};
-        if (unit) return scaledIntegers(*unit)(values, camera, bits);
-        const DepthCode code{*nearPlane, *farPlane, bits == 8 ? 255u : 65535u};
+        if (unit) return scaledIntegers(*unit)(values, camera, bits, job);
+        const double last = bits == 8 ? 254 : 65534;
         for (float& v : values.pixels())
-            v = static_cast<float>(code.decode(static_cast<std::uint32_t>(v)));
+            v = v == 0 ? kNoDepth
+                       : static_cast<float>(*nearPlane +
+                                            (1 - (v - 1) / last) * (*farPlane - *nearPlane));
         return {};
     };
     return {};

@@ -18,6 +18,20 @@ enum class MixedPixels {
     keep,
 };
 
+/// What is done with depth stored in coarse integers: smoothDepthSteps() of lib/surface.
+enum class Dequantise {
+    automatic,  ///< depth in 8 bits
+    on,         ///< all integers
+    off,
+};
+
+/// Depth edges are moved to where the picture has them: alignDepthEdges() of lib/surface.
+enum class AlignEdges {
+    automatic,  ///< older Middlebury sets
+    on,
+    off,
+};
+
 /// How pictures stored as Y, Cb, Cr become RGB.
 struct YuvColour {
     bool bt601 = false;      ///< the matrix of BT.601 instead of BT.709
@@ -44,6 +58,8 @@ struct ImageSetOptions {
     MixedPixels mixedPixels = MixedPixels::automatic;
     /// Moves the cameras so that views that overlap agree; see lib/registration.
     bool refinePoses = false;
+    Dequantise dequantise = Dequantise::automatic;
+    AlignEdges alignEdges = AlignEdges::automatic;
     YuvColour yuv;
     int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
 };

@@ -2,11 +2,14 @@
 #include <atomic>
 #include <cmath>
 
+#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/mixed_pixels.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/resample.hpp"
 #include "formats/imagesets/set_view.hpp"
 #include "lib/capture/capture.hpp"
+#include "lib/surface/depth_edges.hpp"
+#include "lib/surface/depth_steps.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -123,9 +126,59 @@ void dropImpossible(Image<float>& distances) {
         if (!(d > 0 && d < 1e9f)) d = kNoDepth;
 }
 
-std::function<Result<void>(Image<float>&, const Camera&, int)> scaledIntegers(double unit,
-                                                                              float alsoNone) {
-    return [unit, alsoNone](Image<float>& values, const Camera&, int) -> Result<void> {
+namespace {
+
+/// Makes distances of the stored values, and smooths the stairs of coarse ones.
+Result<void> toDistances(const SetView& set, const ImageSetOptions& options, const Camera& camera,
+                         StoredView& stored, Job& job) {
+    const int bits = stored.depthBits;
+    // What we exported ourselves comes back as it was.
+    const bool smooth = set.distances && bits < 32 &&
+                        (options.dequantise == Dequantise::on ||
+                         (options.dequantise == Dequantise::automatic && bits == 8 && !set.planes));
+    Image<float> codes = smooth ? stored.depth : Image<float>();
+    if (set.distances) STX_CHECK(set.distances(stored.depth, camera, bits, job));
+    dropImpossible(stored.depth);
+    if (!smooth) return {};
+
+    for (std::size_t i = 0; i < codes.count(); ++i)
+        if (!hasPoint(stored.depth.data()[i])) codes.data()[i] = kNoDepth;
+    smoothDepthSteps(codes);
+    Job notesAgain;
+    STX_CHECK(set.distances(codes, camera, bits, notesAgain));
+    dropImpossible(codes);
+    double most = 0;
+    for (std::size_t i = 0; i < codes.count(); ++i) {
+        float& was = stored.depth.data()[i];
+        const float now = codes.data()[i];
+        if (!hasPoint(was) || !hasPoint(now)) continue;
+        most = std::max(most, std::abs(static_cast<double>(now) - was));
+        was = now;
+    }
+    job.note(
+        fmt::format("view '{}': the stairs of its {}-bit depth are smoothed within half a step, "
+                    "{:.3g} scene units at most",
+                    set.name, bits, most));
+    return {};
+}
+
+/// Moves the depth edges to the picture's.
+void align(const SetView& set, const ImageSetOptions& options, StoredView& stored, Job& job) {
+    if (options.alignEdges == AlignEdges::off ||
+        (options.alignEdges == AlignEdges::automatic && !set.measured))
+        return;
+    const std::int64_t moved = alignDepthEdges(stored.depth, stored.texture);
+    if (moved > 0)
+        job.note(fmt::format(
+            "view '{}': {} pixels ({:.2g} %) are taken to the surface in front, "
+            "whose colour they have",
+            set.name, moved, 100.0 * static_cast<double>(moved) / stored.depth.count()));
+}
+
+}  // namespace
+
+Distances scaledIntegers(double unit, float alsoNone) {
+    return [unit, alsoNone](Image<float>& values, const Camera&, int, Job&) -> Result<void> {
         for (float& v : values.pixels())
             v = v == 0 || v == alsoNone ? kNoDepth : static_cast<float>(v * unit);
         return {};
@@ -150,11 +203,8 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
         stored.texture = resizeTexture(stored.texture, dw, dh);
         camera = camera.resized(dw, dh);
     }
-    if (set.distances) {
-        if (auto ok = set.distances(stored.depth, camera, stored.depthBits); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("'{}'", set.depth.name)));
-    }
-    dropImpossible(stored.depth);
+    STX_CHECK(within(fmt::format("'{}'", set.depth.name),
+                     toDistances(set, options, camera, stored, job)));
     if (countPoints(stored.depth) == 0)
         return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                       "not one of its {}x{} pixels has a valid depth; at least one is needed", dw,
@@ -174,6 +224,8 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                 "all of its pixels look like noise at depth edges; keep them, if they are "
                 "not");
     }
+
+    align(set, options, stored, job);
 
     std::vector<ReferenceView> views;
     if (set.panorama) {

@@ -18,7 +18,7 @@ namespace {
 /// Z = baseline f / (disparity / scale + offset). Floats: NaN and infinity are unknown; integers:
 /// 0.
 auto distancesOf(double baselineTimesFocal, double scale, double offset) {
-    return [=](Image<float>& values, const Camera&, int bits) -> Result<void> {
+    return [=](Image<float>& values, const Camera&, int bits, Job&) -> Result<void> {
         for (float& v : values.pixels()) {
             const bool known = bits == 32 ? std::isfinite(v) : v != 0;
             const double disparity = v / scale + offset;
@@ -120,6 +120,7 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
                                size.x * 0.5 + offset * steps, size.y * 0.5, size.x, size.y);
         view.distances =
             distancesOf(options.baseline * options.focal, options.disparityScale, offset);
+        view.measured = true;
         set.views.push_back(std::move(view));
     }
     if (set.views.empty())

@@ -41,8 +41,8 @@ Result<MivDepth> depthOf(const Json& camera, const std::string& where) {
 }
 
 /// Normalised disparity: s = code / (2^bits - 1).
-auto distancesOf(MivDepth depth, Job& job) {
-    return [depth, &job](Image<float>& values, const Camera&, int bits) -> Result<void> {
+auto distancesOf(MivDepth depth) {
+    return [depth](Image<float>& values, const Camera&, int bits, Job& job) -> Result<void> {
         if (bits == 32) return {};
         const double largest = (1 << bits) - 1;
         const bool endless = depth.farthest >= kInfinity;
@@ -338,7 +338,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         STX_TRY(const MivDepth range, depthOf(camera, place));
         STX_TRY(view.texture, within(place, sourceOf(texture, forTexture, frames, job.limits)));
         STX_TRY(view.depth, within(place, sourceOf(depth, forDepth, frames, job.limits)));
-        view.distances = distancesOf(range, job);
+        view.distances = distancesOf(range);
         if (!view.exactName.empty()) view.name = view.exactName;
         set.views.push_back(std::move(view));
     }

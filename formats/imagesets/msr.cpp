@@ -58,28 +58,28 @@ Result<Placed> place(const MsrCamera& m, int width, int height, const std::strin
 
 /// Planar distance of each pixel whose stored value is the code of the world's Z.
 auto distancesOf(Placed placed, double minZ, double maxZ) {
-    return
-        [placed, minZ, maxZ](Image<float>& values, const Camera& camera, int bits) -> Result<void> {
-            if (bits != 8)
-                return fail(ErrorCode::invalidInput, "the depth has {} bits; 8 are expected", bits);
-            const VisionCamera& v = placed.vision;
-            const double right = v.fx < 0 ? -1 : 1, down = v.fy < 0 ? -1 : 1;
-            for (int y = 0; y < values.height(); ++y) {
-                for (int x = 0; x < values.width(); ++x) {
-                    const glm::dvec2 real(x + 0.5, y + 0.5);
-                    glm::dvec2 ideal = real;
-                    for (int i = 0; i < 6 && !placed.lens.ideal(); ++i)
-                        ideal += real - placed.lens.realFromIdeal(camera, ideal);
-                    const glm::dvec3 ray((ideal.x - camera.cx) / camera.fx * right,
-                                         (ideal.y - camera.cy) / camera.fy * down, 1.0);
-                    const double perUnit = (v.worldFromCamera * ray).z;
-                    const double z = msrWorldZ(values.at(x, y), minZ, maxZ);
-                    const double dist = (z - v.centre.z) / perUnit;
-                    values.at(x, y) = dist > 0 ? static_cast<float>(dist) : kNoDepth;
-                }
+    return [placed, minZ, maxZ](Image<float>& values, const Camera& camera, int bits,
+                                Job&) -> Result<void> {
+        if (bits != 8)
+            return fail(ErrorCode::invalidInput, "the depth has {} bits; 8 are expected", bits);
+        const VisionCamera& v = placed.vision;
+        const double right = v.fx < 0 ? -1 : 1, down = v.fy < 0 ? -1 : 1;
+        for (int y = 0; y < values.height(); ++y) {
+            for (int x = 0; x < values.width(); ++x) {
+                const glm::dvec2 real(x + 0.5, y + 0.5);
+                glm::dvec2 ideal = real;
+                for (int i = 0; i < 6 && !placed.lens.ideal(); ++i)
+                    ideal += real - placed.lens.realFromIdeal(camera, ideal);
+                const glm::dvec3 ray((ideal.x - camera.cx) / camera.fx * right,
+                                     (ideal.y - camera.cy) / camera.fy * down, 1.0);
+                const double perUnit = (v.worldFromCamera * ray).z;
+                const double z = msrWorldZ(values.at(x, y), minZ, maxZ);
+                const double dist = (z - v.centre.z) / perUnit;
+                values.at(x, y) = dist > 0 ? static_cast<float>(dist) : kNoDepth;
             }
-            return {};
-        };
+        }
+        return {};
+    };
 }
 
 }  // namespace

@@ -32,6 +32,11 @@ struct StoredView {
     int depthBits = 32;  ///< of the stored values: 8, 16, or 32 for floats
 };
 
+/// Turns stored values into planar distances (panoramas: ray lengths) in scene units, kNoDepth
+/// where unknown. The camera has the size of the image. Stored integers may come with a fraction.
+using Distances =
+    std::function<Result<void>(Image<float>& values, const Camera& camera, int bits, Job& job)>;
+
 /// One picture with depth of a set.
 struct SetView {
     std::string name;
@@ -46,11 +51,10 @@ struct SetView {
     /// Reads both, for kinds whose images are not files of their own.
     std::function<Result<StoredView>(const SetView&, Job&)> load;
 
-    /// Turns stored values into planar distances (panoramas: ray lengths) in scene units, kNoDepth
-    /// where unknown. The camera has the size of the image. Null: they are distances already.
-    std::function<Result<void>(Image<float>& values, const Camera& camera, int bits)> distances;
+    Distances distances;  ///< null: the stored values are distances already
 
-    bool sensor = false;  ///< mixed pixels at depth edges are to be expected
+    bool sensor = false;    ///< mixed pixels at depth edges are to be expected
+    bool measured = false;  ///< stereo's disparities, whose edges lie beside the picture's
     /// Planes and code that an export of ours told; used when they hold all points.
     std::optional<DepthCode> planes;
     int depthBits = 0;      ///< with planes: 8, 16, 32
@@ -74,7 +78,6 @@ struct SetDescription {
 void dropImpossible(Image<float>& distances);
 
 /// Distances of integers in steps of `unit`; 0 and `alsoNone` are none.
-[[nodiscard]] std::function<Result<void>(Image<float>&, const Camera&, int)> scaledIntegers(
-    double unit, float alsoNone = 0);
+[[nodiscard]] Distances scaledIntegers(double unit, float alsoNone = 0);
 
 }  // namespace stx::imagesets

@@ -153,12 +153,12 @@ std::string nameOfFrame(const std::string& filePath) {
 
 /// Integers are millimetres by convention, or what the file says; floats are scene units.
 auto distancesOf(double unit) {
-    return [unit](Image<float>& values, const Camera& camera, int bits) -> Result<void> {
+    return [unit](Image<float>& values, const Camera& camera, int bits, Job& job) -> Result<void> {
         if (bits == 32) return {};
         if (bits != 16)
             return fail(ErrorCode::invalidInput,
                         "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
-        return scaledIntegers(unit)(values, camera, bits);
+        return scaledIntegers(unit)(values, camera, bits, job);
     };
 }
 

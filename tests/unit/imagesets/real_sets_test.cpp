@@ -65,7 +65,9 @@ double share(const Image<std::uint8_t>& mask) {
 }
 
 /// One reference view drawn from another camera, compared with what was photographed there.
-Warped warp(const ReferenceView& from, const Camera& to, const Rgba8Image& truth) {
+/// The naive warp is that of `asStored`, the same view as the set has it.
+Warped warp(const ReferenceView& asStored, const ReferenceView& from, const Camera& to,
+            const Rgba8Image& truth) {
     Job job;
     Bundle bundle;
     bundle.views.push_back(from);
@@ -84,7 +86,7 @@ Warped warp(const ReferenceView& from, const Camera& to, const Rgba8Image& truth
         out.data()[i].a = 255;
     }
     Warped w;
-    const auto [naive, naiveMask] = naiveWarp(from, to);
+    const auto [naive, naiveMask] = naiveWarp(asStored, to);
     w.naive = psnr(naive, truth, naiveMask);
     w.naiveCovered = share(naiveMask);
     w.own = psnr(out, truth, mask);
@@ -142,8 +144,8 @@ TEST(IclNuim, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     for (const Pair pair : {Pair{1, 2, 32.1, 0.08, 0.25}, Pair{4, 5, 29.55, 0.35, 0.43}}) {
         const auto truth = picture(set / "color" / fmt::format("{}.png", pair.to));
         const auto between = [&](const Bundle& b) {
-            return warp(b.views[static_cast<std::size_t>(pair.from - 1)],
-                        b.views[static_cast<std::size_t>(pair.to - 1)].camera, truth);
+            const auto& from = b.views[static_cast<std::size_t>(pair.from - 1)];
+            return warp(from, from, b.views[static_cast<std::size_t>(pair.to - 1)].camera, truth);
         };
         const auto warped = between(*bundle);
         print(fmt::format("icl-nuim {} to {}", pair.from, pair.to).c_str(), warped);
@@ -170,27 +172,56 @@ TEST(MiddleburyAloe, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     options.focal = 3740;
     options.baseline = 160;
     options.disparityOffset = 270;
+    ImageSetOptions raw = options;
+    raw.dequantise = Dequantise::off;
+    raw.alignEdges = AlignEdges::off;
+    job.takeNotes();
+    const auto stored = readImageSet(set, raw, job);
+    ASSERT_TRUE(stored) << stored.error().text();
+    EXPECT_TRUE(job.takeNotes().empty());
     const auto bundle = readImageSet(set, options, job);
     ASSERT_TRUE(bundle) << bundle.error().text();
+    const auto notes = job.takeNotes();
+    for (const auto& note : notes) std::printf("  note: %s\n", note.c_str());
+    ASSERT_EQ(notes.size(), 2u);
+    EXPECT_NE(notes[0].find("within half a step"), std::string::npos) << notes[0];
+    EXPECT_NE(notes[1].find("surface in front"), std::string::npos) << notes[1];
     ASSERT_EQ(bundle->views.size(), 1u);
     const auto& view = bundle->views[0];
     EXPECT_EQ(view.name, "view1");
-    // Whole disparities make steps; a pixel of them is Z^2/(f B) deep.
     EXPECT_GT(view.nearPlane, 1000);
     EXPECT_LT(view.farPlane, 2217);
     for (const auto& [number, naive, gain] :
-         {std::tuple{3, 31.34, 1.0}, std::tuple{5, 29.16, 0.35}}) {
+         {std::tuple{3, 31.34, 2.0}, std::tuple{5, 29.16, 1.1}}) {
         Camera camera = view.camera;
         camera.position.x = 160.0 * (number - 1) / 4;
         // The pictures are cropped such that disparity 0 is at Z = f B / 270.
         camera.cx += 270.0 * (number - 1) / 4;
         const auto truth = picture(set / fmt::format("view{}.png", number));
-        const auto warped = warp(view, camera, truth);
+        const auto warped = warp(stored->views[0], view, camera, truth);
         print(fmt::format("aloe 1 to {}", number).c_str(), warped);
         EXPECT_NEAR(warped.naive, naive, 0.05);
         EXPECT_GE(warped.psnr, warped.naive + gain);
         EXPECT_GE(warped.covered, 0.84);
     }
+    // Whole disparities are got back by rounding, where no edge was moved.
+    raw.dequantise = Dequantise::automatic;
+    raw.depthBits = options.depthBits = 32;
+    const auto smooth = readImageSet(set, raw, job);
+    ASSERT_TRUE(smooth) << smooth.error().text();
+    raw.dequantise = Dequantise::off;
+    const auto exact = readImageSet(set, raw, job);
+    ASSERT_TRUE(exact) << exact.error().text();
+    std::int64_t points = 0;
+    for (std::size_t i = 0; i < exact->views[0].depth.count(); ++i) {
+        const float a = exact->views[0].depth.data()[i], b = smooth->views[0].depth.data()[i];
+        ASSERT_EQ(hasPoint(a), hasPoint(b));
+        if (!hasPoint(a)) continue;
+        const auto disparity = [](double z) { return std::lround(3740 * 160 / z - 270); };
+        ASSERT_EQ(disparity(a), disparity(b));
+        ++points;
+    }
+    EXPECT_GT(points, 1000000);
 }
 
 }  // namespace
