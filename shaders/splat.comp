@@ -6,6 +6,10 @@
 layout(local_size_x = 256) in;
 
 layout(std430, binding = 3) buffer FrontBuffer { uint front[]; };
+#if CULL && PASS == 2
+// splat_cull.comp: 0 where all of a task's splats lie behind what is in front.
+layout(std430, binding = 10) readonly buffer VisibleBuffer { uint visible[]; };
+#endif
 
 #if PASS == 2
 #define CHANNELS (4 + TRANSLUCENT + 3 * NORMALS)
@@ -49,7 +53,7 @@ Paint paintOf(Point p, Splat splat) {
     paint.across *= scales.y;
     paint.down *= scales.y;
     paint.quality = splat.quality * scales.x;
-    paint.tolerance = tasks[p.task].tolerance;
+    paint.tolerance = p.task.tolerance;
     return paint;
 }
 
@@ -121,6 +125,9 @@ void add(int at, float kernel, vec2 d, float depth, Paint paint) {
 void main() {
     uint task = gl_WorkGroupID.y * 32768u + gl_WorkGroupID.x;
     if (task >= uint(counts.y)) return;
+#if CULL && PASS == 2
+    if (visible[task + uint(counts.z)] == 0u) return;
+#endif
     Point p;
     if (!fetchPoint(task + uint(counts.z), gl_LocalInvocationIndex, p)) return;
     int stride = frameSize.z;  // buffers have a border of one pixel, so small splats need no clipping

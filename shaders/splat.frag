@@ -12,7 +12,7 @@ layout(location = 0) out vec4 colourSum;  // rgb * alpha * w, w
 #if TRANSLUCENT
 layout(location = 1) out float alphaSum;
 #endif
-layout(binding = 4) uniform sampler2D frontTexture;
+uniform sampler2D frontTexture;
 #else
 layout(location = 0) out float frontDistance;
 #endif

@@ -43,7 +43,7 @@ void main() {
     shape = vec4(splat.small ? 1.0 : 0.0, splat.core2, splat.slope);
 #if PASS == 2
     colour = pointColour(p);
-    weighing = vec2(splat.quality, tasks[p.task].tolerance);
+    weighing = vec2(splat.quality, p.task.tolerance);
 #if RULE != 0
     colourGradient(p, splat.steps, across, down);
 #endif

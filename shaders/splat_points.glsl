@@ -18,24 +18,36 @@ struct Task {
     float tolerance;       // relative distance behind the front that still blends
     float quality;         // weight among views
     float uAcross, vAcross, uDown, vDown;  // half the source pixels that go by per novel pixel
-    float pad0, pad1, pad2;
+    uint tilesFrom, tilesTo;  // column | row << 16 of the tiles of the frame that it may touch
+    float nearest;            // nothing of its splats is nearer to the camera
 };
+#if RASTER
+uniform usamplerBuffer taskBuffer;
+Task taskAt(uint i) {
+    int at = int(i) * 4;
+    uvec4 a = texelFetch(taskBuffer, at);
+    vec4 b = uintBitsToFloat(texelFetch(taskBuffer, at + 1));
+    vec4 c = uintBitsToFloat(texelFetch(taskBuffer, at + 2));
+    uvec4 d = texelFetch(taskBuffer, at + 3);
+    return Task(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, uintBitsToFloat(d.x),
+                d.y, d.z, uintBitsToFloat(d.w));
+}
+#else
 layout(std430, binding = 1) readonly buffer TaskBuffer { Task tasks[]; };
+Task taskAt(uint i) { return tasks[i]; }
+#endif
 
-layout(binding = 0) uniform sampler2DArray colourTexture;
-layout(binding = 1) uniform sampler2DArray depthTexture;
-layout(binding = 2) uniform sampler2DArray normalTexture;
-layout(binding = 3) uniform isampler2DArray slopeTexture;
+AT(0) uniform sampler2DArray colourTexture;
+AT(1) uniform sampler2DArray depthTexture;
+AT(2) uniform sampler2DArray normalTexture;
+AT(3) uniform isampler2DArray slopeTexture;
 
 const float kFarAway = 3.0e38;
-const float kNearest = 1.0e-12;
-const float kSlopeScale = 2048.0;
-const float kSigmaSource2 = SIGMA_SOURCE_2, kSigmaPixel2 = SIGMA_PIXEL_2;
-const float kReach2 = REACH_2, kCore2 = CORE_2, kLargest = LARGEST;
+const float kSigmaSource2 = kSigmaSource * kSigmaSource, kSigmaPixel2 = kSigmaPixel * kSigmaPixel;
 
 struct Point {
-    uint task;
-    uint view;
+    Task task;
+    View view;
     ivec3 texel;
     vec3 a, h;     // of its pixel; see View
     float source;  // distance in the reference view
@@ -45,18 +57,19 @@ struct Point {
 
 // False for background, points behind the novel camera and lanes past the end.
 bool fetchPoint(uint task, uint lane, out Point p) {
-    p.task = task;
+    Task t = taskAt(task);
     uint dx = lane & 15u, dy = lane >> 4u;
-    uint count = tasks[task].count;
-    if (dx >= (count & 0xffffu) || dy >= (count >> 16u)) return false;
-    uint atlas = tasks[task].atlasXY, viewLayer = tasks[task].viewLayer, uv = tasks[task].uv;
-    p.view = viewLayer & 0xfffffu;
+    if (dx >= (t.count & 0xffffu) || dy >= (t.count >> 16u)) return false;
+    uint atlas = t.atlasXY, viewLayer = t.viewLayer, uv = t.uv;
     p.texel = ivec3((atlas & 0xffffu) + dx, (atlas >> 16u) + dy, viewLayer >> 20u);
     p.source = texelFetch(depthTexture, p.texel, 0).r;
     if (!(p.source < kFarAway)) return false;
     float u = float((uv & 0xffffu) + dx), v = float((uv >> 16u) + dy);
-    p.a = views[p.view].a0.xyz + views[p.view].au.xyz * u + views[p.view].av.xyz * v;
-    p.h = p.a * p.source + (views[p.view].b0.xyz + views[p.view].bu.xyz * u + views[p.view].bv.xyz * v);
+    View view = viewAt(viewLayer & 0xfffffu);
+    p.task = t;
+    p.view = view;
+    p.a = view.a0.xyz + view.au.xyz * u + view.av.xyz * v;
+    p.h = p.a * p.source + (view.b0.xyz + view.bu.xyz * u + view.bv.xyz * v);
     p.dist = p.h.z;
     if (!(p.dist > kNearest)) return false;
 #if TRANSLUCENT
@@ -116,15 +129,15 @@ float kernelAt(Splat s, vec2 d, float q) {
 bool splatOf(Point p, out Splat s) {
 #if RULE <= 1
     s.small = true;
-    s.core2 = tasks[p.task].core2;
-    s.slope = vec2(tasks[p.task].slopeX, tasks[p.task].slopeY) * p.dist;
-    s.quality = tasks[p.task].quality;
-    s.steps = vec4(tasks[p.task].uAcross, tasks[p.task].vAcross, tasks[p.task].uDown,
-                   tasks[p.task].vDown);
+    s.core2 = p.task.core2;
+    s.slope = vec2(p.task.slopeX, p.task.slopeY) * p.dist;
+    s.quality = p.task.quality;
+    s.steps = vec4(p.task.uAcross, p.task.vAcross, p.task.uDown,
+                   p.task.vDown);
     return true;
 #elif RULE == 3
     float radius =
-        min(max(0.5, 0.5 * novelPosition.w * (novelAxisX.w != 0.0 ? 1.0 : 1.0 / p.dist)), LARGEST);
+        min(max(0.5, 0.5 * novelPosition.w * (novelAxisX.w != 0.0 ? 1.0 : 1.0 / p.dist)), kLargest);
     s.small = false;
     s.q = vec3(1.0, 0.0, 1.0) * (kReach2 / (radius * radius));
     s.reach = vec2(radius);
@@ -134,7 +147,7 @@ bool splatOf(Point p, out Splat s) {
     s.steps = vec4(0.0);
     return true;
 #else
-    View view = views[p.view];
+    View view = p.view;
     float inverse = novelAxisX.w != 0.0 ? 1.0 : 1.0 / p.h.z;
     float back = novelAxisX.w != 0.0 ? 0.0 : 1.0;
     ivec4 coded = texelFetch(slopeTexture, p.texel, 0);
@@ -154,18 +167,18 @@ bool splatOf(Point p, out Splat s) {
 #endif
     vec2 longer = eu + ev, other = eu - ev;
     float cover2 = size * size * 0.25 * max(dot(longer, longer), dot(other, other));
-    s.small = RULE == 4 || cover2 < SMALL_COVER_2;
+    s.small = RULE == 4 || cover2 < kSmallCover2;
     // The plane's distance per pixel; nearly edge-on it would run away.
     vec2 relative = vec2(hu.z * ev.y - hv.z * eu.y, hv.z * eu.x - hu.z * ev.x) / (det * p.h.z);
-    s.slope = clamp(relative, vec2(-STEEPEST), vec2(STEEPEST)) * p.dist;
+    s.slope = clamp(relative, vec2(-kSteepestPlane), vec2(kSteepestPlane)) * p.dist;
     float density = 1.0 / max(1.0, max(dot(eu, eu), dot(ev, ev)));
-    s.quality = tasks[p.task].quality * (linked ? 1.0 : EDGE_QUALITY) *
-                max(density * density, LEAST_DENSITY);
-    float fade = linked ? clamp(det / FADE_TO - 1.0, 0.0, 1.0) : 0.0;
-    s.steps = vec4(ev.y, -eu.y, -ev.x, eu.x) * (fade * 0.5 * GRADIENT / det);
+    s.quality = p.task.quality * (linked ? 1.0 : kEdgeQuality) *
+                max(density * density, kLeastDensity);
+    float fade = linked ? clamp(det / kFadeTo - 1.0, 0.0, 1.0) : 0.0;
+    s.steps = vec4(ev.y, -eu.y, -ev.x, eu.x) * (fade * 0.5 * kGradient / det);
     if (s.small) {
         // At its rim the surface ends within half a sample.
-        s.core2 = max(0.5, 1.08 * cover2) * (rim ? RIM_CORE_2 : 1.0);
+        s.core2 = max(0.5, 1.08 * cover2) * (rim ? kRimCore2 : 1.0);
         return true;
     }
     s.core2 = kCore2;

@@ -4,8 +4,6 @@
 layout(local_size_x = 16, local_size_y = 16) in;
 layout(std430, binding = 4) readonly buffer SampleBuffer { uint samples[]; };
 
-const float kSame = 0.002, kJump = 0.0015;
-
 Tile tile;
 ivec2 pixel;
 
@@ -28,7 +26,7 @@ float chooseSlope(bool hasA, float a, bool hasB, float b) {
 
 vec2 slope(uint k, int i, int j) {
     float here = uintBitsToFloat(sampleOf(k, i, j));
-    float limit = 0.03 * whole(axis, here);
+    float limit = kLinkedSamples * whole(axis, here);
     float left = i > 0 ? uintBitsToFloat(sampleOf(k, i - 1, j)) : 0.0;
     float right = i < SIDE - 1 ? uintBitsToFloat(sampleOf(k, i + 1, j)) : 0.0;
     float up = j > 0 ? uintBitsToFloat(sampleOf(k, i, j - 1)) : 0.0;
@@ -81,7 +79,7 @@ int opinionOf(int s, float x, float y, float q) {
         float there = uintBitsToFloat(texel.x);
         if (!(there > 0.0)) continue;
         any = true;
-        float reach = 4.0 * 0.03 * whole(ownAxis, there);
+        float reach = 4.0 * kLinkedSamples * whole(ownAxis, there);
         if (p < there + margin - reach) return 0;
         vec2 g = vec2(uintBitsToFloat(texel.y), uintBitsToFloat(texel.z));
         float predicted = there + dot(g, uv - 0.5 - vec2(c));
@@ -142,7 +140,7 @@ bool fuseSample(int i, int j, out float q, out uint seenBy) {
             float f = uintBitsToFloat(v);
             if (v == 0u || !after || (k != source && !(f > behind))) continue;
             bool extension = (v & EXTENSION) != 0u;
-            float weight = extension ? 0.01 : 1.0;
+            float weight = extension ? kExtensionWeight : 1.0;
             sum += weight * (f - front);
             weights += weight;
             if (extension) extensions |= 1u << k;
@@ -193,7 +191,7 @@ void main() {
             if (high == 0u) continue;
             any = true;
             float l = uintBitsToFloat(low), h = uintBitsToFloat(high);
-            if (low == 0u || (remarks & 3u) != 0u || h - l > 0.01 * whole(axis, h)) simple = false;
+            if (low == 0u || (remarks & 3u) != 0u || h - l > kOneSurface * whole(axis, h)) simple = false;
             float mean = 0.5 * (h + l);
             lowMean = min(lowMean, mean);
             highMean = max(highMean, mean);

@@ -13,8 +13,7 @@ layout(std430, binding = 2) readonly buffer TaskBuffer { uvec4 tasks[]; };  // s
 layout(std430, binding = 3) readonly buffer LeafBuffer { uvec4 leaves[]; };  // bits of q0, qx, qy; x | y << 16
 layout(std430, binding = 4) buffer SampleBuffer { uint samples[]; };
 
-const float kCrack = 0.004;
-const float kLeafGrow = 0.06 * float(S);
+const float kGrow = kLeafGrow * float(S);
 
 uint slot;
 
@@ -94,10 +93,10 @@ void main() {
     vec2 at = vec2(p) + 0.5;
 #if EXTEND
     if ((code & 32u) == 0u) return;
-    float half_ = (code & 64u) != 0u ? 0.6 : 0.5;
+    float half_ = (code & 64u) != 0u ? kHalfBesideBackground : kHalfInside;
     float q = uintBitsToFloat(here.x);
     vec2 g = vec2(uintBitsToFloat(here.y), uintBitsToFloat(here.z)) * half_;
-    float reach = 0.02 * whole(sources[s].axis, q);
+    float reach = kExtensionReach * whole(sources[s].axis, q);
     float plus = clamp(g.x + g.y, -reach, reach), minus = clamp(g.x - g.y, -reach, reach);
     fillQuad(project(at.x - half_, at.y - half_, q - plus), project(at.x + half_, at.y - half_, q + minus),
              project(at.x + half_, at.y + half_, q + plus), project(at.x - half_, at.y + half_, q - minus),
@@ -113,7 +112,7 @@ void main() {
         vec2 d = vec2(p - ivec2(found.w & 0xffffu, found.w >> 16));
         float first = leaf.x + leaf.y * d.x + leaf.z * d.y;
         q = vec4(first, first + leaf.y, first + leaf.y + leaf.z, first + leaf.z);
-        grow = kLeafGrow;
+        grow = kGrow;
     } else {
         q = vec4(uintBitsToFloat(here.x), depthAt(p + ivec2(1, 0), s), depthAt(p + ivec2(1, 1), s),
                  depthAt(p + ivec2(0, 1), s));

@@ -34,12 +34,12 @@ View place(int s) {
     vec3 a = vec3(dot(eyeX, p), dot(eyeY, p), dot(eyeZ, p));
     vec3 b = vec3(dot(sources[s].rayX, p), dot(sources[s].rayY, p), dot(sources[s].rayZ, p));
     float cosine = dot(a, b) / sqrt(dot(a, a) * dot(b, b));
-    float t = 3.0 * sqrt(max(2.0 - 2.0 * cosine, 0.0));
+    float t = kAngleFalloff * sqrt(max(2.0 - 2.0 * cosine, 0.0));
     float series = t * (t * (t / 6.0 + 0.5) + 1.0) + 1.0;
     uint code = texelFetch(surfaces, ivec3(min(ivec2(uv), sources[s].size.xy - 1), s), 0).w;
     float edge = float(code >> 8 & 7u);
-    view.weight = min(1.0, sqrt(max(det, 0.0))) / series * (0.01 + 0.99 * min(edge / 3.0, 1.0));
-    view.plain = edge >= 3.0;
+    view.weight = min(1.0, sqrt(max(det, 0.0))) / series * (kEdgeWeight + (1.0 - kEdgeWeight) * min(edge / kEdgeFade, 1.0));
+    view.plain = edge >= kEdgeFade;
     return view;
 }
 
@@ -53,13 +53,13 @@ uint maskTaps(int s, View view, ivec2 base) {
     float py = (mq.y + mq.z * piece.qy - p * wy) * inverse;
     vec2 g = px * view.jacobian.xy + py * view.jacobian.zw;
     float all = whole(sources[s].axis, p);
-    float allowed = 0.003 * all + 0.5 * min(abs(g.x) + abs(g.y), 0.02 * all);
+    float allowed = kOnSurface * all + kOnSlope * min(abs(g.x) + abs(g.y), kSteepestTap * all);
     uint mask = 0u;
     for (int k = 0; k < 16; ++k) {
         ivec2 c = base + ivec2(k & 3, k >> 2);
         if (!inside(s, c)) continue;
         float there = uintBitsToFloat(texelFetch(surfaces, ivec3(c, s), 0).x);
-        float predicted = p + clamp(dot(g, vec2(c) + 0.5 - view.uv), -0.04 * all, 0.04 * all);
+        float predicted = p + clamp(dot(g, vec2(c) + 0.5 - view.uv), -kFarthestTap * all, kFarthestTap * all);
         if (there > 0.0 && !(abs(there - predicted) > allowed)) mask |= 1u << k;
     }
     return mask;
@@ -67,9 +67,8 @@ uint maskTaps(int s, View view, ivec2 base) {
 
 // r² = x du² + y du dv + z dv² of offsets in the frame: a coarse source spreads.
 vec3 metricOf(vec4 j) {
-    const float own = 0.15;
-    float sxx = own * dot(j.xy, j.xy) + (1.0 - own), syy = own * dot(j.zw, j.zw) + (1.0 - own);
-    float sxy = own * dot(j.xy, j.zw);
+    float sxx = kOwn * dot(j.xy, j.xy) + (1.0 - kOwn), syy = kOwn * dot(j.zw, j.zw) + (1.0 - kOwn);
+    float sxy = kOwn * dot(j.xy, j.zw);
     float scale = 1.0 / (fit.x * max(sxx * syy - sxy * sxy, 1e-6));
     return vec3(syy, -2.0 * sxy, sxx) * scale;
 }

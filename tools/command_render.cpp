@@ -1,5 +1,6 @@
 #include <chrono>
 
+#include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
@@ -15,7 +16,7 @@ struct RenderOptions {
     std::string input, output;
     CameraOptions camera;
     std::string backend = "auto", mode = "surface", quality = "normal", splat = "data",
-                fill = "background";
+                fill = "background", pipeline = "auto";
     double splatCoefficient = 0;
     std::string background = "none";
     std::vector<std::string> lights;
@@ -85,6 +86,12 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
                                    : SplatRule::data;
     s.splatCoefficient = o.splatCoefficient;
     s.fill = o.fill == "none" ? Fill::none : Fill::background;
+    s.pipeline = o.pipeline == "compute"  ? GpuPipeline::compute
+                 : o.pipeline == "raster" ? GpuPipeline::raster
+                                          : GpuPipeline::automatic;
+    // What only OpenEXR can hold.
+    if (const auto format = frameFormat(o.output); format && *format == FrameFormat::exr)
+        s.normals = true;
     for (const auto& text : o.lights) {
         STX_TRY(const auto light, parseLight(text));
         s.lighting.lights.push_back(light);
@@ -236,6 +243,12 @@ Command addRender(CLI::App& app, Program& program) {
     c->add_option("--device", o->device, "Number of the GPU to use, see --list-devices")
         ->group(drawing);
     c->add_flag("--list-devices", o->listDevices, "Print the GPUs there are and stop")
+        ->group(drawing);
+    c->add_option(
+         "--pipeline", o->pipeline,
+         "Of splats on a GPU: auto, compute (atomics; OpenGL 4.5) or raster (vertex texture "
+         "fetch; OpenGL 3.3) (default auto: by what the device has)")
+        ->check(CLI::IsMember({"auto", "compute", "raster"}))
         ->group(drawing);
     c->add_option("--mode", o->mode, "surface: best pictures; splat: the paper's (default surface)")
         ->check(CLI::IsMember({"surface", "splat"}))

@@ -126,10 +126,8 @@ Result<Frame> MeshRenderer::render(const Camera& camera) {
     frame.colour = std::move(image.colour);
     frame.depth = std::move(image.depth);
     frame.normal = std::move(image.normal);
-    if (raster.lighting.on()) {
-        frame.albedo = std::move(frame.colour);
-        frame.colour = std::move(image.lit);
-    }
+    if (settings_.wantNormals()) frame.albedo = frame.colour;
+    if (raster.lighting.on()) frame.colour = std::move(image.lit);
     return frame;
 }
 

@@ -20,6 +20,13 @@ enum class SplatRule {
     paper,  ///< round, diameter in pixels = splatCoefficient / distance (Lee & Park, section 3)
     point,  ///< one pixel, nearest wins
 };
+/// How Backend::gpu gets splats into the frame.
+enum class GpuPipeline {
+    /// By what the device has, see gpu::choosePipeline().
+    automatic,
+    raster,   ///< Lee & Park's: points drawn with vertex texture fetch; OpenGL 3.3 will do
+    compute,  ///< atomic depth minimum, then weighted accumulation; needs OpenGL 4.5
+};
 /// What surface mode does with pixels of a full scene that no reference saw.
 enum class Fill { background, none };
 
@@ -28,8 +35,14 @@ struct RenderSettings {
     Quality quality = Quality::normal;
     SplatRule splat = SplatRule::data;
     double splatCoefficient = 0.0;  ///< for SplatRule::paper; 0 = fitted to the nearest view
+    GpuPipeline pipeline = GpuPipeline::automatic;  ///< of splat mode
+    bool cullHidden = true;  ///< leave out blocks that others hide; the picture is the same
+    /// Frames carry albedo and normals without lights, too. Not on Backend::gl.
+    bool normals = false;
     Fill fill = Fill::background;
     Lighting lighting;
+
+    [[nodiscard]] bool wantNormals() const { return normals || lighting.on(); }
 };
 
 /// Draws novel views of one bundle. Made once (uploads, per-view preparation), then asked for

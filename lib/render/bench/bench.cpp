@@ -43,9 +43,8 @@ Result<std::unique_ptr<Renderer>> makePath(const std::string& path, bool named,
         return gpu::makeGpuSurfaceRenderer(bundle, settings, device, job);
     }
     if (path == "gl") return gl::makeGlRenderer(bundle, settings, device, job);
-    return gpu::makeGpuSplatRenderer(
-        bundle, settings, device, job,
-        path == "shader" ? gpu::Pipeline::raster : gpu::Pipeline::compute);
+    settings.pipeline = path == "shader" ? GpuPipeline::raster : GpuPipeline::compute;
+    return gpu::makeGpuSplatRenderer(bundle, settings, device, job);
 #else
     (void)named;
     (void)device;

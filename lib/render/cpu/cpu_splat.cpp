@@ -38,7 +38,7 @@ class CpuSplatRenderer final : public Renderer {
         : bundle_(bundle),
           settings_(settings),
           limits_(job.limits),
-          wantNormals_(settings.lighting.on()),
+          wantNormals_(settings.wantNormals()),
           views_(prepareViews(bundle, wantNormals_)),
           silhouettes_(bundle) {
         for (const auto& v : views_) {
@@ -216,11 +216,9 @@ void findTileMax(const Band& band, std::vector<float>& tileMax) {
 bool hidden(const BlockTask& t, const Band& band, const std::vector<float>& tileMax) {
     const int across = (band.width + kTile - 1) / kTile;
     const int y0 = std::max(t.y0 - band.top, 0), y1 = std::min(t.y1 - band.top, band.rows - 1);
-    // The plane of a splat may reach a little before its nearest point.
-    const float nearest = 0.9f * t.zMin;
     for (int y = y0 / kTile; y <= y1 / kTile; ++y)
         for (int x = t.x0 / kTile; x <= t.x1 / kTile; ++x)
-            if (nearest <= tileMax[static_cast<std::size_t>(y) * across + x]) return false;
+            if (t.nearest <= tileMax[static_cast<std::size_t>(y) * across + x]) return false;
     return true;
 }
 
@@ -269,7 +267,7 @@ void CpuSplatRenderer::shade(Picture& picture, int x, int y, glm::vec3 normal) c
     frame.normal.at(x, y) = normal;
     const glm::vec4 albedo = frame.colour.at(x, y);
     frame.albedo.at(x, y) = albedo;
-    if (!(albedo.a > 0) || normal == glm::vec3(0)) return;
+    if (!settings_.lighting.on() || !(albedo.a > 0) || normal == glm::vec3(0)) return;
     const float depth = frame.depth.at(x, y);
     const glm::dvec3 position =
         camera.position +

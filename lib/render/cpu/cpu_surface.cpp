@@ -66,7 +66,7 @@ class CpuSurfaceRenderer final : public Renderer {
         if (told < 1)
             effort_.mostGeometry =
                 static_cast<int>(std::min(32.0, std::ceil(effort_.mostGeometry / told)));
-        if (settings.lighting.on()) findNormals();
+        if (settings.wantNormals()) findNormals();
     }
 
     [[nodiscard]] Result<Frame> render(const Camera& camera) override;
@@ -118,7 +118,7 @@ class CpuSurfaceRenderer final : public Renderer {
     Effort effort_;
     Job& job_;
     std::vector<Source> sources_;
-    std::vector<Image<glm::vec3>> normals_;  ///< of views that bring none, while a light is on
+    std::vector<Image<glm::vec3>> normals_;  ///< of views that bring none, when frames want them
     Bounds bounds_;
     bool fillsFrame_ = false;
     std::optional<Camera> expected_;
@@ -391,7 +391,7 @@ int CpuSurfaceRenderer::viewAt(const Camera& camera) const {
 Frame CpuSurfaceRenderer::copyOf(std::size_t index) const {
     const ReferenceView& view = bundle_.views[index];
     Frame frame;
-    if (settings_.lighting.on()) frame.normal = view.hasNormals() ? view.normal : normals_[index];
+    if (settings_.wantNormals()) frame.normal = view.hasNormals() ? view.normal : normals_[index];
     frame.colour = Image<glm::vec4>(view.camera.width, view.camera.height);
     frame.depth = view.depth;
     for (int y = 0; y < view.camera.height; ++y) {
@@ -406,7 +406,6 @@ Frame CpuSurfaceRenderer::copyOf(std::size_t index) const {
 void CpuSurfaceRenderer::light(const Camera& camera, Frame& frame) const {
     const int width = frame.colour.width(), height = frame.colour.height();
     const Lighting lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
-    frame.albedo = frame.colour;
     const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.orientation);
     parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
@@ -440,7 +439,7 @@ std::unique_ptr<FrameWork> CpuSurfaceRenderer::planFrame(const Camera& camera) c
     w.tilesX = (camera.width + kTile - 1) / kTile;
     w.tilesY = (camera.height + kTile - 1) / kTile;
     w.effort = effort_;
-    w.wantOrigin = settings_.lighting.on();
+    w.wantOrigin = settings_.wantNormals();
     w.sources.resize(sources_.size());
     parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
         w.sources[static_cast<std::size_t>(i)] =
@@ -481,7 +480,7 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
     } else {
         frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
         Image<float> q(camera.width, camera.height, 0.0f);
-        if (settings_.lighting.on())
+        if (settings_.wantNormals())
             frame.normal = Image<glm::vec3>(camera.width, camera.height, glm::vec3(0.0f));
         STX_TRY(const std::unique_ptr<FrameWork> work, beginFrame(camera));
         const PixelSpace& space = work->space;
@@ -502,6 +501,7 @@ Result<Frame> CpuSurfaceRenderer::render(const Camera& camera) {
                 frame.depth.data()[i] = static_cast<float>(space.axis.dist(q.data()[i]));
     }
     frame.linear = bundle_.views[0].texture.isLinear();
+    if (settings_.wantNormals()) frame.albedo = frame.colour;
     if (settings_.lighting.on()) light(camera, frame);
     frame.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

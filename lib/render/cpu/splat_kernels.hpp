@@ -46,7 +46,8 @@ struct BlockTask {
     float density = 1;        ///< weight by the density of samples
     /// If uniform: half the source pixels that go by per output pixel, to continue colours with.
     float uAcross = 0, vAcross = 0, uDown = 0, vDown = 0;
-    float zMin = 0;                               ///< nearest novel depth of its points
+    float zMin = 0;     ///< nearest novel depth of its points
+    float nearest = 0;  ///< its splats show nowhere that something nearer than this covers
     std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< output pixels it may touch, inclusive
 };
 

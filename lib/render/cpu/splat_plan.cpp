@@ -149,10 +149,11 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     task.slopeX = task.slopeY = 0;
     task.uAcross = task.vAcross = task.uDown = task.vDown = 0;
     if (const double d = middle.det(); smooth && d > 1e-3 * stretch2) {
+        constexpr double steepest = kSteepestPlane;
         task.slopeX = static_cast<float>(
-            std::clamp((middle.zu * middle.v.y - middle.zv * middle.u.y) / d, -0.05, 0.05));
+            std::clamp((middle.zu * middle.v.y - middle.zv * middle.u.y) / d, -steepest, steepest));
         task.slopeY = static_cast<float>(
-            std::clamp((middle.zv * middle.u.x - middle.zu * middle.v.x) / d, -0.05, 0.05));
+            std::clamp((middle.zv * middle.u.x - middle.zu * middle.v.x) / d, -steepest, steepest));
         const double half = 0.5 * kGradient * std::clamp(d / kFadeTo - 1.0, 0.0, 1.0) / d;
         task.uAcross = static_cast<float>(middle.v.y * half);
         task.uDown = static_cast<float>(-middle.v.x * half);
@@ -174,6 +175,13 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     const double cosAngle = glm::dot(directionFrom(c), directionFrom(novel));
     const double angle = std::max(0.0, cosAngle);
     task.quality = static_cast<float>(0.01 + angle * angle * angle * angle);
+
+    // The plane of a splat comes nearer than its point: by its slope over a pixel either way if
+    // small, else down to half (see the kernels). A little less for rounding.
+    const float least = task.uniform ? 1.0f - std::abs(task.slopeX) - std::abs(task.slopeY)
+                        : task.small ? 1.0f - 2 * kSteepestPlane
+                                     : 0.5f;
+    task.nearest = 0.999f * least * task.zMin / (1.0f + task.tolerance);
 
     if (crossing) {
         task.x0 = task.y0 = 0;

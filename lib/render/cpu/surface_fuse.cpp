@@ -10,11 +10,6 @@
 namespace stx::surface {
 namespace {
 
-/// Surfaces closer than this share of their depth are one.
-constexpr float kSame = 0.002f;
-/// Samples of one pixel are one piece until q jumps by more.
-constexpr float kJump = 0.0015f;
-
 std::uint32_t bitsOf(float q) {
     return std::bit_cast<std::uint32_t>(q) & 3u;
 }
@@ -71,7 +66,7 @@ struct Fuser {
     /// dq/dx, dq/dy per pixel of one source's surface at a sample.
     [[nodiscard]] glm::vec2 slope(int source, int i, int j) const {
         const float here = sampleOf(source, i, j);
-        const float limit = 0.03f * axis.whole(here);
+        const float limit = kLinkedSamples * axis.whole(here);
         const auto difference = [&](int di, int dj, float& out) {
             const int ni = i + di, nj = j + dj;
             if (ni < 0 || nj < 0 || ni >= grid.side() || nj >= grid.side()) return false;
@@ -168,7 +163,7 @@ struct Fuser {
             for (int o = c; o < count && candidates[static_cast<std::size_t>(o)].q > behind; ++o) {
                 const Candidate& other = candidates[static_cast<std::size_t>(o)];
                 const bool extension = bitsOf(other.q) & kExtensionBit;
-                const float weight = extension ? 0.01f : 1.0f;
+                const float weight = extension ? kExtensionWeight : 1.0f;
                 sum += weight * (other.q - front.q);
                 weights += weight;
                 (extension ? extensions : meshes) |= 1u << other.source;
@@ -251,7 +246,7 @@ struct Fuser {
                 if (!sources[s].samples || !(high[s][k] > 0.0f)) continue;
                 any = true;
                 if (!(low[s][k] > 0.0f) || (remarks[s][k] & 3u) ||
-                    high[s][k] - low[s][k] > 0.01f * axis.whole(high[s][k])) {
+                    high[s][k] - low[s][k] > kOneSurface * axis.whole(high[s][k])) {
                     simple = false;
                     break;
                 }

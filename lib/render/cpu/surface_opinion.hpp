@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "lib/render/cpu/surface_constants.hpp"
 #include "lib/render/cpu/surface_source.hpp"
 
 namespace stx::surface {
@@ -12,16 +13,6 @@ enum class Opinion {
     freeByAlpha,  ///< it sees background there
     freeByDepth,  ///< it sees a surface clearly behind the point
 };
-
-/// Bilinear alpha below which a point is outside the object. Points tangent to a silhouette sit at
-/// one half, so this is clearly less.
-inline constexpr float kFreeAlpha = 0.45f;
-
-/// A point this share of its depth in front of a surface is in front of it.
-inline constexpr float kClearlyBehind = 0.0002f;
-
-/// And this share of the change of q over a pixel more, where the surface is steep.
-inline constexpr float kSlopeDoubt = 0.0625f;
 
 /// Bilinear alpha of a source at pixel position (u, v); 1 when the view has none.
 [[nodiscard]] inline float alphaAt(const Source& s, float u, float v) {
@@ -59,7 +50,7 @@ inline constexpr float kSlopeDoubt = 0.0625f;
             // The cheap half of the test first: most surfaces are not behind the point at all.
             const float margin = (kClearlyBehind + s.noise) * s.space.axis.whole(p) +
                                  s.step * s.space.axis.perUnit(p);
-            const float reach = 4 * 0.03f * s.space.axis.whole(there);
+            const float reach = 4 * kLinkedSamples * s.space.axis.whole(there);
             if (p < there + margin - reach) return Opinion::none;
             const glm::vec2 g = s.gradient(cx, cy);
             const float predicted = there + g.x * (u - 0.5f - static_cast<float>(cx)) +

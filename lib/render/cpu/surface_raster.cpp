@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "lib/render/cpu/surface_constants.hpp"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lib/render/cpu/surface_raster.cpp"
 #include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
@@ -122,11 +124,6 @@ HWY_INLINE void fillPolygon(const Target& t, const Vertex* v, float grow, std::u
     }
 }
 
-/// Room that neighbouring pieces overlap by, in samples, so that rounding opens no crack.
-constexpr float kCrack = 0.004f;
-/// Leaves stand on fitted planes, a little beside their neighbours' corners.
-constexpr float kLeafGrow = 0.06f;
-
 HWY_INLINE void drawLeaf(const Target& t, const Warp& warp, const Leaf& leaf, float grow) {
     const float n = leaf.size;
     const float x = leaf.x + 0.5f, y = leaf.y + 0.5f;
@@ -205,10 +202,11 @@ HWY_NOINLINE void drawExtensions(const Target& t, const Source& s, const Warp& w
     for (int j = 0; j < kBlock; ++j) {
         for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
             const int x = x0 + __builtin_ctz(left), y = y0 + j;
-            const float half = (s.info.at(x, y) & Source::kBesideBackground) ? 0.6f : 0.5f;
+            const float half =
+                (s.info.at(x, y) & Source::kBesideBackground) ? kHalfBesideBackground : kHalfInside;
             const float q = s.q.at(x, y);
             const glm::vec2 g = s.gradient(x, y) * half;
-            const float reach = 0.02f * s.space.axis.whole(q);
+            const float reach = kExtensionReach * s.space.axis.whole(q);
             const auto at = [&](float sx, float sy) {
                 const float dq = std::clamp(g.x * sx + g.y * sy, -reach, reach);
                 return project(warp, static_cast<float>(x) + 0.5f + sx * half,

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "lib/render/cpu/surface_constants.hpp"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lib/render/cpu/surface_shade.cpp"
 #include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
@@ -77,8 +79,9 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         const V aa = hn::MulAdd(ax, ax, hn::MulAdd(ay, ay, hn::Mul(az, az)));
         const V bb = hn::MulAdd(bx, bx, hn::MulAdd(by, by, hn::Mul(bz, bz)));
         const V cosine = hn::Div(ab, hn::Sqrt(hn::Mul(aa, bb)));
-        const V t = hn::Mul(
-            c(3.0f), hn::Sqrt(hn::Max(hn::NegMulAdd(c(2.0f), cosine, c(2.0f)), hn::Zero(d))));
+        const V t =
+            hn::Mul(c(kAngleFalloff),
+                    hn::Sqrt(hn::Max(hn::NegMulAdd(c(2.0f), cosine, c(2.0f)), hn::Zero(d))));
         const V series =
             hn::MulAdd(t, hn::MulAdd(t, hn::MulAdd(t, c(1.0f / 6), c(0.5f)), one), one);
         V weight = hn::Div(hn::Min(one, hn::Sqrt(hn::Max(det, hn::Zero(d)))), series);
@@ -108,11 +111,11 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
     for (int l = 0; l < kGroup; ++l) edge[l] = info[pixel[l]] >> 4;
     int any = 0, rough = 0;
     for (int l = 0; l < kGroup; ++l) {
-        const float e = std::min(static_cast<float>(edge[l]) * (1.0f / 3.0f), 1.0f);
+        const float e = std::min(static_cast<float>(edge[l]) * (1.0f / kEdgeFade), 1.0f);
         const int on = out.weight[l] > 0.0f ? 1 : 0;
         any |= on;
-        rough |= on & (edge[l] < 3 ? 1 : 0);
-        out.weight[l] *= 0.01f + 0.99f * e;
+        rough |= on & (static_cast<float>(edge[l]) < kEdgeFade ? 1 : 0);
+        out.weight[l] *= kEdgeWeight + (1.0f - kEdgeWeight) * e;
     }
     out.active = any != 0;
     out.plain = rough == 0;
@@ -133,7 +136,7 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const float pv = px * view.xv[lane] + py * view.yv[lane];
     const float whole = source.space.axis.whole(p);
     const float allowed =
-        0.003f * whole + 0.5f * std::min(std::abs(pu) + std::abs(pv), 0.02f * whole);
+        kOnSurface * whole + kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * whole);
     for (int j = 0; j < kTaps; ++j) {
         for (int i = 0; i < kTaps; ++i) {
             const int cx = baseU + i, cy = baseV + j;
@@ -145,7 +148,7 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
             const float du = static_cast<float>(cx) + 0.5f - u,
                         dv = static_cast<float>(cy) + 0.5f - v;
             const float predicted =
-                p + std::clamp(pu * du + pv * dv, -0.04f * whole, 0.04f * whole);
+                p + std::clamp(pu * du + pv * dv, -kFarthestTap * whole, kFarthestTap * whole);
             if (std::abs(there - predicted) > allowed) continue;
             value = source.hasAlpha ? source.alpha(cx, cy) : 1.0f;
         }
@@ -178,8 +181,7 @@ struct Kernel {
         x0 = hn::MulAdd(xu, u0, hn::Mul(xv, v0));
         y0 = hn::MulAdd(yu, u0, hn::Mul(yv, v0));
         weight = hn::LoadU(d, &view.weight[l]);
-        // A sample covers its own pixel, so a coarse source spreads: (1-h) I + h J Jt, inverted.
-        constexpr float kOwn = 0.15f;
+        // (1-h) I + h J Jt, inverted.
         const V h = hn::Set(d, kOwn), rest = hn::Set(d, 1.0f - kOwn);
         const V sxx = hn::MulAdd(h, hn::MulAdd(xu, xu, hn::Mul(xv, xv)), rest);
         const V syy = hn::MulAdd(h, hn::MulAdd(yu, yu, hn::Mul(yv, yv)), rest);

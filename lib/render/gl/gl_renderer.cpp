@@ -251,6 +251,7 @@ Result<std::unique_ptr<Renderer>> makeGlRenderer(const Bundle& bundle,
     for (const auto& view : bundle.views) points += view.depth.count();
     STX_CHECK(job.limits.checkAllocation(points, 48, "the vertex arrays of the gl backend"));
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::compatibility));
+    STX_CHECK(context->requireModern("the gl backend", "--backend gpu or cpu"));
     return std::make_unique<GlRenderer>(std::move(context), bundle, settings, job.limits);
 }
 

@@ -11,6 +11,11 @@ namespace {
 constexpr const char* kPackages =
     "install Debian's libegl1, libopengl0 and libgl1-mesa-dri (for NVIDIA: libegl-nvidia0)";
 
+Faults& faults() {
+    static Faults f;
+    return f;
+}
+
 /// libepoxy ends the process when a library it needs is missing, so look before it does.
 bool canLoad(const char* name) {
     void* handle = dlopen(name, RTLD_LAZY | RTLD_LOCAL);
@@ -163,30 +168,32 @@ tl::expected<std::unique_ptr<EglContext::Impl>, std::string> open(const Candidat
         if (!eglChooseConfig(candidate.display, wanted, &config, 1, &count) || count < 1)
             return tl::unexpected(candidate.label + ": no configuration for OpenGL");
     }
-    std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,
-                                      4,
-                                      EGL_CONTEXT_MINOR_VERSION,
-                                      5,
-                                      EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                      profile == EglContext::Profile::core
-                                          ? EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT
-                                          : EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT};
-    const std::size_t plain = attributes.size();
+    // The newest of what we know how to use, and a context that says when its device was reset.
     const bool egl15 = major > 1 || minor >= 5;
-    if (egl15) {
-        attributes.push_back(EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY);
-        attributes.push_back(EGL_LOSE_CONTEXT_ON_RESET);
-    }
-    attributes.push_back(EGL_NONE);
-    impl->context = eglCreateContext(candidate.display, config, EGL_NO_CONTEXT, attributes.data());
-    if (impl->context == EGL_NO_CONTEXT && egl15) {
-        attributes.resize(plain);
-        attributes.push_back(EGL_NONE);
-        impl->context =
-            eglCreateContext(candidate.display, config, EGL_NO_CONTEXT, attributes.data());
+    constexpr std::array<std::array<EGLint, 2>, 2> kVersions{{{4, 5}, {3, 3}}};
+    for (const auto& version : kVersions) {
+        if (faults().onlyOld && version[0] > 3) continue;
+        for (const bool robust : {true, false}) {
+            if (impl->context != EGL_NO_CONTEXT || (robust && !egl15)) continue;
+            std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,
+                                              version[0],
+                                              EGL_CONTEXT_MINOR_VERSION,
+                                              version[1],
+                                              EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                              profile == EglContext::Profile::core
+                                                  ? EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT
+                                                  : EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT};
+            if (robust) {
+                attributes.push_back(EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY);
+                attributes.push_back(EGL_LOSE_CONTEXT_ON_RESET);
+            }
+            attributes.push_back(EGL_NONE);
+            impl->context =
+                eglCreateContext(candidate.display, config, EGL_NO_CONTEXT, attributes.data());
+        }
     }
     if (impl->context == EGL_NO_CONTEXT)
-        return tl::unexpected(candidate.label + ": no OpenGL 4.5 context (" +
+        return tl::unexpected(candidate.label + ": no OpenGL 3.3 context (" +
                               eglErrorText(eglGetError()) + ")");
     if (!eglMakeCurrent(candidate.display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl->context))
         return tl::unexpected(candidate.label + ": " + eglErrorText(eglGetError()));
@@ -199,20 +206,24 @@ tl::expected<std::unique_ptr<EglContext::Impl>, std::string> open(const Candidat
     impl->device.version = text(GL_VERSION);
     impl->device.platform = candidate.platform;
     impl->device.software = isSoftware(impl->device.name);
+    impl->abilities.modern = epoxy_gl_version() >= 45 && !faults().onlyOld;
     GLint value = 0;
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &value);
+    if (faults().maxTextureSize > 0) value = std::min(value, faults().maxTextureSize);
     impl->device.maxTextureSize = impl->abilities.maxTextureSize = value;
     glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &value);
     impl->abilities.maxTextureLayers = value;
     GLint64 bytes = 0;
-    glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
+    if (impl->abilities.modern) glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
     impl->abilities.maxStorageBytes = bytes;
     impl->abilities.atomicInt64 = epoxy_has_gl_extension("GL_NV_shader_atomic_int64") &&
                                   epoxy_has_gl_extension("GL_ARB_gpu_shader_int64");
     impl->abilities.atomicFloat = epoxy_has_gl_extension("GL_NV_shader_atomic_float");
-    GLint strategy = 0;
-    glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
-    impl->abilities.resetStatus = strategy == GL_LOSE_CONTEXT_ON_RESET;
+    if (impl->abilities.modern) {
+        GLint strategy = 0;
+        glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
+        impl->abilities.resetStatus = strategy == GL_LOSE_CONTEXT_ON_RESET;
+    }
     while (glGetError() != GL_NO_ERROR) {
     }
     eglMakeCurrent(candidate.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
@@ -252,7 +263,7 @@ Result<std::shared_ptr<EglContext>> EglContext::create(int device, Profile profi
     std::vector<std::string> tried;
     auto all = openAll(profile, tried);
     if (all.empty())
-        return fail(ErrorCode::unsupported, "no OpenGL 4.5 without a display here; tried: {}; {}",
+        return fail(ErrorCode::unsupported, "no OpenGL 3.3 without a display here; tried: {}; {}",
                     join(tried), kPackages);
     if (device >= static_cast<int>(all.size()) || device < -1)
         return fail(ErrorCode::usage, "device {} does not exist; there are {}, 0 to {}", device,
@@ -266,6 +277,16 @@ const Device& EglContext::device() const {
 }
 const ContextAbilities& EglContext::abilities() const {
     return impl_->abilities;
+}
+
+Result<void> EglContext::requireModern(std::string_view what, std::string_view instead) const {
+    if (impl_->abilities.modern) return {};
+    return fail(ErrorCode::unsupported, "{} needs OpenGL 4.5, and '{}' has {}; use {}", what,
+                impl_->device.name, impl_->device.version, instead);
+}
+
+void setFaultsForTests(const Faults& f) {
+    faults() = f;
 }
 
 Result<EglContext::Current> EglContext::makeCurrent() {
@@ -282,11 +303,15 @@ EglContext::Current::~Current() {
 }
 
 Result<void> EglContext::check(std::string_view doing) const {
-    if (impl_->abilities.resetStatus && glGetGraphicsResetStatus() != GL_NO_ERROR)
+    // errorAfter counts down to an error that stays while the test wants it.
+    const bool faulty = faults().errorAfter >= 0 && faults().errorAfter-- == 0;
+    const GLenum injected = faulty ? faults().error : GL_NO_ERROR;
+    if (injected == GL_CONTEXT_LOST ||
+        (impl_->abilities.resetStatus && glGetGraphicsResetStatus() != GL_NO_ERROR))
         return fail(ErrorCode::failed,
                     "'{}' was reset or lost while {}; make the renderer anew, or use --backend cpu",
                     impl_->device.name, doing);
-    const GLenum first = glGetError();
+    const GLenum first = injected != GL_NO_ERROR ? injected : glGetError();
     if (first == GL_NO_ERROR) return {};
     for (int i = 0; i < 64 && glGetError() != GL_NO_ERROR; ++i) {
     }

@@ -9,8 +9,9 @@
 
 namespace stx::gpu {
 
-/// What a context can do beyond OpenGL 4.5.
+/// What a context can do beyond OpenGL 3.3.
 struct ContextAbilities {
+    bool modern = false;  ///< OpenGL 4.5: compute shaders, storage buffers, direct state access
     bool atomicInt64 = false;  ///< GL_NV_shader_atomic_int64
     bool atomicFloat = false;  ///< GL_NV_shader_atomic_float
     bool resetStatus = false;  ///< glGetGraphicsResetStatus tells of a lost device
@@ -24,9 +25,9 @@ class EglContext {
   public:
     enum class Profile { core, compatibility };
 
-    /// A context of OpenGL 4.5 on one of listDevices(), -1 = the best: the first hardware device,
-    /// else the first. Errors: unsupported, with what was tried device by device and the package
-    /// that would help.
+    /// A context of OpenGL 4.5, or 3.3 where that is all there is, on one of listDevices(), -1 =
+    /// the best: the first hardware device, else the first. Errors: unsupported, with what was
+    /// tried device by device and the package that would help.
     [[nodiscard]] static Result<std::shared_ptr<EglContext>> create(int device, Profile profile);
     ~EglContext();
     EglContext(const EglContext&) = delete;
@@ -34,6 +35,9 @@ class EglContext {
 
     [[nodiscard]] const Device& device() const;
     [[nodiscard]] const ContextAbilities& abilities() const;
+    /// Errors (unsupported) where the context is older than OpenGL 4.5; `what` needs it, `instead`
+    /// does not.
+    [[nodiscard]] Result<void> requireModern(std::string_view what, std::string_view instead) const;
 
     /// Holds the context for the calling thread while it lives.
     class Current {
@@ -62,6 +66,17 @@ class EglContext {
     explicit EglContext(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
+
+/// Troubles that tests put into every context, to see how they end.
+struct Faults {
+    int maxTextureSize = 0;  ///< the device says so; 0 = what it has
+    bool onlyOld = false;    ///< nothing newer than OpenGL 3.3
+    /// EglContext::check() finds this error the n-th time it is asked from now on, -1 = never:
+    /// GL_OUT_OF_MEMORY, or GL_CONTEXT_LOST for a device that was reset.
+    int errorAfter = -1;
+    unsigned error = 0;
+};
+void setFaultsForTests(const Faults& faults);
 
 /// listDevices() of lib/render/renderer.hpp; `tried` receives a clause for each failure.
 [[nodiscard]] std::vector<Device> enumerateDevices(std::vector<std::string>& tried);

@@ -28,6 +28,8 @@ class GlObject {
     [[nodiscard]] static GlObject create(Args... args) {
         return GlObject(Traits::create(args...));
     }
+    /// A name that becomes an object when first bound: all that OpenGL 3.3 has.
+    [[nodiscard]] static GlObject generate() { return GlObject(Traits::generate()); }
     [[nodiscard]] GLuint get() const { return name_; }
     explicit operator bool() const { return name_ != 0; }
 
@@ -41,12 +43,22 @@ struct BufferTraits {
         glCreateBuffers(1, &n);
         return n;
     }
+    static GLuint generate() {
+        GLuint n = 0;
+        glGenBuffers(1, &n);
+        return n;
+    }
     static void destroy(GLuint n) { glDeleteBuffers(1, &n); }
 };
 struct TextureTraits {
     static GLuint create(GLenum target) {
         GLuint n = 0;
         glCreateTextures(target, 1, &n);
+        return n;
+    }
+    static GLuint generate() {
+        GLuint n = 0;
+        glGenTextures(1, &n);
         return n;
     }
     static void destroy(GLuint n) { glDeleteTextures(1, &n); }
@@ -57,12 +69,22 @@ struct FramebufferTraits {
         glCreateFramebuffers(1, &n);
         return n;
     }
+    static GLuint generate() {
+        GLuint n = 0;
+        glGenFramebuffers(1, &n);
+        return n;
+    }
     static void destroy(GLuint n) { glDeleteFramebuffers(1, &n); }
 };
 struct VertexArrayTraits {
     static GLuint create() {
         GLuint n = 0;
         glCreateVertexArrays(1, &n);
+        return n;
+    }
+    static GLuint generate() {
+        GLuint n = 0;
+        glGenVertexArrays(1, &n);
         return n;
     }
     static void destroy(GLuint n) { glDeleteVertexArrays(1, &n); }

@@ -42,14 +42,17 @@ Result<Layout> layOut(const Bundle& bundle, const EglContext& context) {
     return out;
 }
 
-GlTexture makeTexture(GLenum format, const Layout& layout) {
-    auto texture = GlTexture::create(GL_TEXTURE_2D_ARRAY);
-    glTextureStorage3D(texture.get(), 1, format, layout.cell.x * layout.grid.x,
-                       layout.cell.y * layout.grid.y, layout.layers);
-    glTextureParameteri(texture.get(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTextureParameteri(texture.get(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTextureParameteri(texture.get(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    glTextureParameteri(texture.get(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+/// `pixels` and `type` are what will be uploaded. OpenGL 3.3: the raster pipeline shares the scene.
+GlTexture makeTexture(GLenum format, GLenum pixels, GLenum type, const Layout& layout) {
+    auto texture = GlTexture::generate();
+    glBindTexture(GL_TEXTURE_2D_ARRAY, texture.get());
+    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, static_cast<GLint>(format), layout.cell.x * layout.grid.x,
+                 layout.cell.y * layout.grid.y, layout.layers, 0, pixels, type, nullptr);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
     return texture;
 }
 
@@ -71,10 +74,12 @@ Result<GpuScene> GpuScene::upload(const Bundle& bundle, const EglContext& contex
                                          static_cast<std::uint64_t>(bytesEach),
                                          "the textures of the reference views"));
     STX_CHECK(context.check("starting"));
-    scene.colour = makeTexture(scene.linear ? GL_RGBA16F : GL_RGBA8, layout);
-    scene.depth = makeTexture(GL_R32F, layout);
-    if (withNormals) scene.normal = makeTexture(GL_RGBA8_SNORM, layout);
-    scene.slope = makeTexture(scene.hasSizes ? GL_RGBA16I : GL_RG16I, layout);
+    scene.colour = scene.linear ? makeTexture(GL_RGBA16F, GL_RGBA, GL_FLOAT, layout)
+                                : makeTexture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, layout);
+    scene.depth = makeTexture(GL_R32F, GL_RED, GL_FLOAT, layout);
+    if (withNormals) scene.normal = makeTexture(GL_RGBA8_SNORM, GL_RGBA, GL_BYTE, layout);
+    scene.slope = scene.hasSizes ? makeTexture(GL_RGBA16I, GL_RGBA_INTEGER, GL_SHORT, layout)
+                                 : makeTexture(GL_RG16I, GL_RG_INTEGER, GL_SHORT, layout);
     STX_CHECK(context.check("making the textures of the reference views"));
 
     scene.views = splat::prepareViews(bundle, withNormals);
@@ -90,8 +95,9 @@ Result<GpuScene> GpuScene::upload(const Bundle& bundle, const EglContext& contex
         scene.cells.push_back(cell);
         const auto put = [&](const GlTexture& texture, GLenum format, GLenum type,
                              const void* pixels) {
-            glTextureSubImage3D(texture.get(), 0, cell.x, cell.y, cell.z, width, height, 1, format,
-                                type, pixels);
+            glBindTexture(GL_TEXTURE_2D_ARRAY, texture.get());
+            glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, cell.x, cell.y, cell.z, width, height, 1,
+                            format, type, pixels);
         };
         glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
         if (const auto* image = view.texture.rgba8()) {

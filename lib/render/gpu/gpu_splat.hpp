@@ -2,22 +2,28 @@
 
 #include <memory>
 
+#include "lib/render/gpu/egl_context.hpp"
+#include "lib/render/gpu/splat_pipeline.hpp"
 #include "lib/render/renderer.hpp"
 
 namespace stx::gpu {
 
-/// How splats get into the frame.
-enum class Pipeline {
-    automatic,  ///< compute: it is the faster one on llvmpipe and on data-centre GPUs
-    raster,  ///< the paper's: points drawn with vertex texture fetch, visibility pass, blended pass
-    compute,  ///< atomic depth minimum, then weighted accumulation
+/// Which pipeline a device gets when nobody asks for one, and why.
+struct PipelineChoice {
+    GpuPipeline pipeline = GpuPipeline::raster;
+    const char* reason = "";
 };
+[[nodiscard]] PipelineChoice choosePipeline(const Device& device,
+                                            const ContextAbilities& abilities);
 
 /// Splat mode on a GPU (RenderMode::splat, every SplatRule). The bundle's images are uploaded and
-/// not looked at again. Errors: unsupported (no device, with what was tried), a view larger than
-/// the device's textures, memory.
-[[nodiscard]] Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(
-    const Bundle& bundle, const RenderSettings& settings, int device, Job& job,
-    Pipeline pipeline = Pipeline::automatic);
+/// not looked at again. Errors: unsupported (no device, with what was tried; a pipeline that the
+/// device cannot run), a view larger than the device's textures, memory.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const Bundle& bundle,
+                                                                     const RenderSettings& settings,
+                                                                     int device, Job& job);
+
+/// Blocks of the frame drawn last, of a renderer that makeGpuSplatRenderer() made; zero of others.
+[[nodiscard]] SplatCounts lastSplatCounts(Renderer& renderer);
 
 }  // namespace stx::gpu

@@ -3,7 +3,6 @@
 #include <array>
 #include <deque>
 
-#include "embedded_shaders.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/render/cpu/surface_opinion.hpp"
 #include "lib/render/cpu/surface_painter.hpp"
@@ -11,7 +10,8 @@
 #include "lib/render/gpu/egl_context.hpp"
 #include "lib/render/gpu/gpu_surface_scene.hpp"
 #include "lib/render/gpu/growing_buffer.hpp"
-#include "lib/render/gpu/shader_program.hpp"
+#include "lib/render/gpu/returned_buffer.hpp"
+#include "lib/render/gpu/surface_shaders.hpp"
 
 namespace stx::gpu {
 namespace {
@@ -79,24 +79,10 @@ struct Batch {
     std::vector<glm::uvec4> meshes, edges;  ///< tasks
 };
 
-/// Where a batch arrives on its way back: memory that the device writes and the processor reads.
+/// Where a batch arrives on its way back.
 struct Returned {
-    GlBuffer buffer;
-    std::int64_t bytes = 0;
-    const std::byte* memory = nullptr;
-    GLsync done = nullptr;
+    ReturnedBuffer memory;
     std::span<const TilePlan> tiles;
-
-    void reserve(std::int64_t wanted) {
-        if (buffer && bytes >= wanted) return;
-        constexpr GLbitfield kAccess =
-            GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-        buffer = GlBuffer::create();
-        glNamedBufferStorage(buffer.get(), wanted, nullptr, kAccess | GL_CLIENT_STORAGE_BIT);
-        memory =
-            static_cast<const std::byte*>(glMapNamedBufferRange(buffer.get(), 0, wanted, kAccess));
-        bytes = memory ? wanted : 0;
-    }
 };
 
 /// Everything that lives in the context; destroyed while it is current.
@@ -139,8 +125,7 @@ class GpuSurfacePainter final : public surface::TilePainter {
     std::string device() const override { return context_->device().name; }
 
   private:
-    [[nodiscard]] Result<GlProgram> build(std::string_view name, std::string_view body,
-                                          int variant) const;
+    [[nodiscard]] Result<GlProgram> build(SurfaceProgram program) const;
     [[nodiscard]] std::vector<TilePlan> planTiles(const FrameWork& work) const;
     [[nodiscard]] std::size_t batchEnd(std::span<TilePlan> plans, std::size_t begin) const;
     [[nodiscard]] Batch fillBatch(const FrameWork& work, std::span<const TilePlan> plans) const;
@@ -156,18 +141,9 @@ class GpuSurfacePainter final : public surface::TilePainter {
     std::deque<Begun> begun_;
 };
 
-Result<GlProgram> GpuSurfacePainter::build(std::string_view name, std::string_view body,
-                                           int variant) const {
-    const std::string header = fmt::format(
-        "#define S {}\n#define TILE {}\n#define MOST {}\n#define EXTEND {}\n#define ORIGIN {}\n"
-        "const float kFreeAlpha = {:.9e}, kSlopeDoubt = {:.9e};\n",
-        perPixel_, kTile, mostSources_, variant, variant, surface::kFreeAlpha,
-        surface::kSlopeDoubt);
-    const std::array<ShaderStage, 1> stages{
-        {{GL_COMPUTE_SHADER,
-          name,
-          {shaders::surface_common_glsl, shaders::surface_tiles_glsl, body}}}};
-    return buildProgram(header, stages);
+Result<GlProgram> GpuSurfacePainter::build(SurfaceProgram program) const {
+    const std::array<ShaderStage, 1> stages{surfaceStage(program)};
+    return buildProgram(surfaceHeader({perPixel_, mostSources_}, program), stages);
 }
 
 Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
@@ -183,12 +159,12 @@ Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
     mostTiles_ = std::min({storage / (perTile * kPieceBytes), kMostGroups * kShadeGroup / perTile,
                            kMostGroups * kShadeGroup / kTilePixels});
     STX_TRY(r.scene, GpuSurfaceScene::upload(sources, *context_, job));
-    STX_TRY(r.mesh, build("surface_raster.comp", shaders::surface_raster_comp, 0));
-    STX_TRY(r.extensions, build("surface_raster.comp", shaders::surface_raster_comp, 1));
-    STX_TRY(r.fuse, build("surface_fuse.comp", shaders::surface_fuse_comp, 0));
-    STX_TRY(r.shade, build("surface_shade.comp", shaders::surface_shade_comp, 0));
-    STX_TRY(r.resolve, build("surface_resolve.comp", shaders::surface_resolve_comp, 0));
-    STX_TRY(r.resolveWithOrigin, build("surface_resolve.comp", shaders::surface_resolve_comp, 1));
+    STX_TRY(r.mesh, build(SurfaceProgram::mesh));
+    STX_TRY(r.extensions, build(SurfaceProgram::extensions));
+    STX_TRY(r.fuse, build(SurfaceProgram::fuse));
+    STX_TRY(r.shade, build(SurfaceProgram::shade));
+    STX_TRY(r.resolve, build(SurfaceProgram::resolve));
+    STX_TRY(r.resolveWithOrigin, build(SurfaceProgram::resolveWithOrigin));
     r.uniforms = GlBuffer::create();
     glNamedBufferStorage(r.uniforms.get(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
     return context_->check("preparing the renderer");
@@ -315,9 +291,9 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     r.depth.reserve(pixels * 4);
     if (work.wantOrigin) r.origin.reserve(pixels * 16);
     r.counts.upload(std::vector<std::uint32_t>{0, 1, 1, 0});
-    back.reserve(pixels * (work.wantOrigin ? 36 : 20));
+    back.memory.reserve(pixels * (work.wantOrigin ? 36 : 20));
     STX_CHECK(context_->check("making the frame's buffers"));
-    if (!back.memory)
+    if (!back.memory.memory)
         return fail(ErrorCode::failed, "'{}' gives no memory to read the frame back through",
                     context_->device().name);
 
@@ -371,34 +347,26 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     glDispatchCompute(static_cast<GLuint>(pixels / kShadeGroup), 1, 1);
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     const auto fetch = [&](const GrowingBuffer& from, std::int64_t at, std::int64_t each) {
-        glCopyNamedBufferSubData(from.buffer.get(), back.buffer.get(), 0, at * pixels,
+        glCopyNamedBufferSubData(from.buffer.get(), back.memory.buffer.get(), 0, at * pixels,
                                  each * pixels);
     };
     fetch(r.colour, 0, 16);
     fetch(r.depth, 16, 4);
     if (work.wantOrigin) fetch(r.origin, 20, 16);
-    glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
-    back.done = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
-    glFlush();
+    back.memory.fence();
     back.tiles = plans;
     return context_->check("drawing");
 }
 
 Result<void> GpuSurfacePainter::collect(const FrameWork& work, Returned& back,
                                         PaintedFrame out) const {
-    if (!back.done) return {};
-    constexpr GLuint64 kSecond = 1'000'000'000;
-    GLenum state = GL_TIMEOUT_EXPIRED;
-    while (state == GL_TIMEOUT_EXPIRED) state = glClientWaitSync(back.done, 0, kSecond);
-    glDeleteSync(back.done);
-    back.done = nullptr;
-    STX_CHECK(context_->check("drawing"));
-    if (state == GL_WAIT_FAILED)
-        return fail(ErrorCode::failed, "'{}' was lost while drawing", context_->device().name);
+    if (!back.memory.done) return {};
+    STX_CHECK(back.memory.wait(*context_));
+    const std::byte* memory = back.memory.memory;
     const std::int64_t pixels = static_cast<std::int64_t>(back.tiles.size()) * kTilePixels;
-    const auto* colour = reinterpret_cast<const glm::vec4*>(back.memory);
-    const auto* depth = reinterpret_cast<const float*>(back.memory + 16 * pixels);
-    const auto* origin = reinterpret_cast<const glm::vec4*>(back.memory + 20 * pixels);
+    const auto* colour = reinterpret_cast<const glm::vec4*>(memory);
+    const auto* depth = reinterpret_cast<const float*>(memory + 16 * pixels);
+    const auto* origin = reinterpret_cast<const glm::vec4*>(memory + 20 * pixels);
     parallelFor(0, static_cast<std::int64_t>(back.tiles.size()), [&](std::int64_t i) {
         const int tile = back.tiles[static_cast<std::size_t>(i)].tile;
         const int x0 = tile % work.tilesX * kTile, y0 = tile / work.tilesX * kTile;
@@ -467,10 +435,8 @@ void GpuSurfacePainter::drop() {
     begun_.pop_front();
     if (!frame.back) return;
     // Its memory is written in the order of the commands: the next frame overwrites it.
-    if (auto current = context_->makeCurrent()) {
-        if (frame.back->done) glDeleteSync(frame.back->done);
-    }
-    frame.back->done = nullptr;
+    if (auto current = context_->makeCurrent()) frame.back->memory.forget();
+    frame.back->memory.done = nullptr;
 }
 
 }  // namespace
@@ -479,6 +445,7 @@ Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(const Bundle& bundle,
                                                          const RenderSettings& settings, int device,
                                                          Job& job) {
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
+    STX_CHECK(context->requireModern("surface mode on the GPU", "--mode splat or --backend cpu"));
     return surface::makePaintedSurfaceRenderer(
         bundle, settings, job, std::make_unique<GpuSurfacePainter>(std::move(context)));
 }

@@ -17,11 +17,10 @@ std::string firstLines(std::string log) {
 Result<GlProgram> buildProgram(const std::string& header, std::span<const ShaderStage> stages) {
     auto program = GlProgram::create();
     std::vector<GlShader> shaders;
-    const std::string start = "#version 450 core\n" + header;
     for (const auto& stage : stages) {
         auto shader = GlShader::create(stage.type);
-        std::vector<const char*> texts{start.c_str()};
-        std::vector<GLint> lengths{static_cast<GLint>(start.size())};
+        std::vector<const char*> texts{header.c_str()};
+        std::vector<GLint> lengths{static_cast<GLint>(header.size())};
         for (const auto piece : stage.pieces) {
             texts.push_back(piece.data());
             lengths.push_back(static_cast<GLint>(piece.size()));
@@ -50,6 +49,23 @@ Result<GlProgram> buildProgram(const std::string& header, std::span<const Shader
                     firstLines(log.c_str()));
     }
     return program;
+}
+
+std::string shaderConstants(std::span<const ShaderConstant> constants) {
+    std::string out;
+    for (const auto& c : constants)
+        out += fmt::format("const float {} = {:.9e};\n", c.name, c.value);
+    return out;
+}
+
+ShaderText shaderText(std::string name, const std::string& header, const ShaderStage& stage) {
+    ShaderText out{std::move(name),
+                   stage.type == GL_VERTEX_SHADER     ? "vert"
+                   : stage.type == GL_FRAGMENT_SHADER ? "frag"
+                                                      : "comp",
+                   header};
+    for (const auto piece : stage.pieces) out.text += piece;
+    return out;
 }
 
 }  // namespace stx::gpu

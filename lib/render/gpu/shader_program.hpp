@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "lib/base/result.hpp"
 #include "lib/render/gpu/gl_object.hpp"
@@ -16,9 +17,26 @@ struct ShaderStage {
     std::vector<std::string_view> pieces;
 };
 
-/// Compiles and links; `header` (extensions and #defines) comes after #version in every stage.
-/// Errors: the driver's log, first line.
+/// Compiles and links; `header` (#version, extensions and #defines) begins every stage. Errors: the
+/// driver's log, first line.
 [[nodiscard]] Result<GlProgram> buildProgram(const std::string& header,
                                              std::span<const ShaderStage> stages);
+
+/// A number that shaders know by the name that C++ has for it.
+struct ShaderConstant {
+    const char* name;
+    float value;
+};
+/// "const float name = value;" for each, exactly.
+[[nodiscard]] std::string shaderConstants(std::span<const ShaderConstant> constants);
+
+/// The whole text of one shader as a driver would get it, for tools that check it offline.
+struct ShaderText {
+    std::string name;    ///< what it is, such as "splat.comp pass 1 rule 0"
+    std::string ending;  ///< "vert", "frag" or "comp"
+    std::string text;
+};
+[[nodiscard]] ShaderText shaderText(std::string name, const std::string& header,
+                                    const ShaderStage& stage);
 
 }  // namespace stx::gpu

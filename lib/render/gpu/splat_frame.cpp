@@ -2,6 +2,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/cpu/splat_plan.hpp"
+#include "lib/render/gpu/splat_shaders.hpp"
 
 namespace stx::gpu {
 namespace {
@@ -38,6 +39,11 @@ double density(const splat::ViewInfo& info, const splat::BlockInfo& block,
     const double source = c.orthographic ? 1.0 : block.zMin;
     const double target = novel.orthographic ? 1.0 : std::max(1e-9, double(task.zMin));
     return (c.fx * c.fy / (source * source)) * (target * target) / (novel.fx * novel.fy);
+}
+
+std::uint32_t tileOf(int x, int y) {
+    return static_cast<std::uint32_t>(x / kCullTile) | static_cast<std::uint32_t>(y / kCullTile)
+                                                           << 16;
 }
 
 FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, const Camera& novel,
@@ -118,7 +124,9 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                 t.vAcross,
                 t.uDown,
                 t.vDown,
-                {}};
+                tileOf(t.x0, t.y0),
+                tileOf(t.x1, t.y1),
+                t.nearest};
             const bool own = settings.splat == SplatRule::data && !t.uniform;
             (!own ? frame.tasks : t.small ? small : large).push_back(entry);
         }

@@ -30,7 +30,8 @@ struct TaskEntry {
     std::uint32_t uv, count, atlasXY, viewLayer;
     float slopeX, slopeY, core2, tolerance, quality;
     float uAcross, vAcross, uDown, vDown;
-    float pad[3];
+    std::uint32_t tilesFrom, tilesTo;  ///< tiles of kCullTile pixels that it may touch
+    float nearest;                     ///< splat::BlockTask::nearest
 };
 
 /// PhongLight of shaders/phong.glsl (std430).

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lib/render/gpu/shader_program.hpp"
+
+namespace stx::gpu {
+
+/// What is the same for all shaders of a renderer in surface mode.
+struct SurfaceVariant {
+    int samplesPerPixel = 3;  ///< along a side
+    int mostSources = 4;      ///< that a piece takes colours from
+};
+
+enum class SurfaceProgram { mesh, extensions, fuse, shade, resolve, resolveWithOrigin };
+
+[[nodiscard]] std::string surfaceHeader(const SurfaceVariant& variant, SurfaceProgram program);
+[[nodiscard]] ShaderStage surfaceStage(SurfaceProgram program);
+
+/// Every shader of surface mode in every variant that a Quality asks for.
+[[nodiscard]] std::vector<ShaderText> allSurfaceShaders();
+
+}  // namespace stx::gpu
