@@ -1,4 +1,5 @@
 #include <chrono>
+#include <cmath>
 
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
@@ -99,6 +100,16 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
     STX_TRY(s.lighting.ambient, parseGreyOrRgb(o.ambient, "--ambient"));
     STX_TRY(s.lighting.specular, parseGreyOrRgb(o.specular, "--specular"));
     s.lighting.shininess = static_cast<float>(o.shininess);
+    for (const auto& [option, value] : {std::pair{"--ambient", s.lighting.ambient},
+                                        std::pair{"--specular", s.lighting.specular}}) {
+        if (glm::any(glm::lessThan(value, glm::vec3(0.0f))))
+            return fail(ErrorCode::usage, "{} is negative; light is 0 or more", option);
+    }
+    for (const auto& [option, value] : {std::pair{"--shininess", o.shininess},
+                                        std::pair{"--splat-coefficient", o.splatCoefficient}}) {
+        if (!std::isfinite(value))
+            return fail(ErrorCode::usage, "{} is {}; a finite number is expected", option, value);
+    }
     return s;
 }
 

@@ -36,6 +36,7 @@ Result<std::unique_ptr<Renderer>> makeGl(const Bundle& bundle, const RenderSetti
 
 /// A hardware GPU among the devices, or the one asked for if it is.
 bool hasHardware(int device) {
+    if (!gpu::mayHaveHardware()) return false;
     std::vector<std::string> tried;
     const auto devices = gpu::enumerateDevices(tried);
     if (device >= 0)

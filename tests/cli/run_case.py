@@ -12,7 +12,7 @@
 In > and ! lines, {*} stands for any text within the line; a line {...} for any number of lines.
 $MODEL is the sample model, $SHARED the folder of real inputs, $SOURCE the checkout. A line
 `needs: path` skips the case (exit code 77) when the path under $SHARED is missing; `needs-program:
-name` when the program is not installed.
+name` when the program is not installed; `needs-gpu:` when stx finds no OpenGL without a display.
 """
 import os
 import re
@@ -36,7 +36,7 @@ def matches(expected, got):
 
 
 def parse(path):
-    steps, needs, programs = [], [], []
+    steps, needs, programs, gpu = [], [], [], False
     for number, raw in enumerate(open(path, encoding="utf-8"), 1):
         line = raw.rstrip("\n")
         if not line or line.startswith("#"):
@@ -47,6 +47,9 @@ def parse(path):
         if line.startswith("needs-program:"):
             programs.append(line[14:].strip())
             continue
+        if line.startswith("needs-gpu:"):
+            gpu = True
+            continue
         kind, text = line[0], line[2:]
         if kind == "$":
             steps.append({"command": text, "line": number, "code": 0, ">": [], "!": [], "=": [], "-": []})
@@ -56,12 +59,12 @@ def parse(path):
             steps[-1][kind].append(text)
         else:
             sys.exit(f"{path}:{number}: a line starts with $ ? > ! = or -, not '{kind}'")
-    return steps, needs, programs
+    return steps, needs, programs, gpu
 
 
 def main():
     case, stx, model, shared, source = sys.argv[1:6]
-    steps, needs, programs = parse(case)
+    steps, needs, programs, gpu = parse(case)
     for need in needs:
         if not os.path.exists(os.path.join(shared, need)):
             print(f"SKIPPED: needs {os.path.join(shared, need)}, which is not here")
@@ -70,6 +73,9 @@ def main():
         if not shutil.which(program):
             print(f"SKIPPED: needs the program {program}, which is not installed")
             return 77
+    if gpu and subprocess.run([stx, "render", "--list-devices"], capture_output=True).returncode:
+        print("SKIPPED: needs OpenGL without a display, which is not here")
+        return 77
     env = dict(os.environ, MODEL=model, SHARED=shared, SOURCE=source,
                PATH=os.path.dirname(stx) + ":" + os.environ["PATH"])
     failed = False

@@ -325,6 +325,23 @@ Result<void> EglContext::check(std::string_view doing) const {
                 impl_->device.name);
 }
 
+bool mayHaveHardware() {
+    if (!canLoad("libEGL.so.1")) return false;
+    const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+    // Where devices cannot be listed only opening them tells.
+    if (!hasWord(client, "EGL_EXT_platform_device") ||
+        !(hasWord(client, "EGL_EXT_device_enumeration") || hasWord(client, "EGL_EXT_device_base")))
+        return true;
+    std::array<EGLDeviceEXT, 64> devices{};
+    EGLint count = 0;
+    if (!eglQueryDevicesEXT(static_cast<EGLint>(devices.size()), devices.data(), &count))
+        return true;
+    return std::any_of(devices.begin(), devices.begin() + count, [](EGLDeviceEXT device) {
+        return !hasWord(eglQueryDeviceStringEXT(device, EGL_EXTENSIONS),
+                        "EGL_MESA_device_software");
+    });
+}
+
 std::vector<Device> enumerateDevices(std::vector<std::string>& tried) {
     std::vector<Device> out;
     for (const auto& impl : openAll(EglContext::Profile::core, tried)) out.push_back(impl->device);

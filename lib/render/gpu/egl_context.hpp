@@ -67,6 +67,11 @@ class EglContext {
     std::unique_ptr<Impl> impl_;
 };
 
+/// False where EGL says of each device that it is software, without opening any: opening one takes
+/// a tenth of a second, and Mesa's shader cache starts a thread of the lowest priority, which a
+/// busy machine lets end many seconds later. True is only a maybe.
+[[nodiscard]] bool mayHaveHardware();
+
 /// Troubles that tests put into every context, to see how they end.
 struct Faults {
     int maxTextureSize = 0;  ///< the device says so; 0 = what it has
