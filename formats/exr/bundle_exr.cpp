@@ -199,17 +199,24 @@ Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
     for (std::int64_t i = 0; i < count; ++i) {
         STX_CHECK(job.checkCancelled());
         const ReferenceView& view = bundle.views[i];
-        const Image<glm::vec4> colour = premultipliedLinear(view.texture);
-        const float* rgba = &colour.data()->x;
-        std::vector<ExrConstPixels> pixels = {{"R", rgba, 4},
-                                              {"G", rgba + 1, 4},
-                                              {"B", rgba + 2, 4},
-                                              {"A", rgba + 3, 4},
-                                              {"Z", view.depth.data(), 1}};
-        if (!view.normal.empty()) addVectorPixels(pixels, "N", &view.normal.data()->x);
-        if (!view.splatU.empty()) addVectorPixels(pixels, "splatU", &view.splatU.data()->x);
-        if (!view.splatV.empty()) addVectorPixels(pixels, "splatV", &view.splatV.data()->x);
-        STX_CHECK(writer.writePart(static_cast<int>(i), pixels));
+        // A whole view's colours as floats would be twice the view.
+        Image<glm::vec4> colour;
+        STX_CHECK(writer.writePart(static_cast<int>(i), [&](int y, int rows) {
+            colour = premultipliedLinear(view.texture, y, rows);
+            const float* rgba = &colour.data()->x;
+            std::vector<ExrConstPixels> pixels = {{"R", rgba, 4},
+                                                  {"G", rgba + 1, 4},
+                                                  {"B", rgba + 2, 4},
+                                                  {"A", rgba + 3, 4},
+                                                  {"Z", view.depth.row(y).data(), 1}};
+            const auto add = [&](const char* name, const Image<glm::vec3>& image) {
+                if (!image.empty()) addVectorPixels(pixels, name, &image.row(y).data()->x);
+            };
+            add("N", view.normal);
+            add("splatU", view.splatU);
+            add("splatV", view.splatV);
+            return pixels;
+        }));
         job.progress(i + 1, count, "writing views");
     }
     return writer.finish();

@@ -57,11 +57,15 @@ float linearFromSrgb8(std::uint8_t code) {
 }
 
 Image<glm::vec4> premultipliedLinear(const Texture& texture) {
-    Image<glm::vec4> out(texture.width(), texture.height());
+    return premultipliedLinear(texture, 0, texture.height());
+}
+
+Image<glm::vec4> premultipliedLinear(const Texture& texture, int top, int rows) {
+    Image<glm::vec4> out(texture.width(), rows);
     const SrgbTables& t = tables();
-    parallelFor(0, out.height(), [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
-        auto to = out.row(y);
+    parallelFor(0, rows, [&](std::int64_t row) {
+        auto to = out.row(static_cast<int>(row));
+        const int y = top + static_cast<int>(row);
         if (const auto* image = texture.rgba8()) {
             const auto from = image->row(y);
             for (std::size_t x = 0; x < to.size(); ++x) {

@@ -378,6 +378,15 @@ Result<ExrWriter> ExrWriter::create(OutputFile& file, const std::vector<ExrPart>
 }
 
 Result<void> ExrWriter::writePart(int index, const std::vector<ExrConstPixels>& pixels) {
+    const auto width = static_cast<std::size_t>(impl_->parts[index].width);
+    return writePart(index, [&](int y, int) {
+        auto rows = pixels;
+        for (auto& p : rows) p.values += static_cast<std::size_t>(y) * width * p.stride;
+        return rows;
+    });
+}
+
+Result<void> ExrWriter::writePart(int index, const Block& blockOf) {
     return adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
         const ExrPart& part = impl_->parts[index];
         Imf::OutputPart out(*impl_->file, index);
@@ -385,15 +394,16 @@ Result<void> ExrWriter::writePart(int index, const std::vector<ExrConstPixels>& 
         // In blocks of whole chunks, so that the halves need little memory.
         constexpr int kBlock = 256;
         const std::size_t width = static_cast<std::size_t>(part.width);
-        std::vector<std::vector<half>> halves(pixels.size());
+        std::vector<std::vector<half>> halves;
         for (int y = 0; y < part.height; y += kBlock) {
             const int rows = std::min(kBlock, part.height - y);
+            const auto pixels = blockOf(y, rows);
+            halves.resize(pixels.size());
             Imath::Box2i block = window;
             block.min.y = window.min.y + y;
             Imf::FrameBuffer buffer;
             for (std::size_t i = 0; i < pixels.size(); ++i) {
                 const auto& p = pixels[i];
-                const float* from = p.values + static_cast<std::size_t>(y) * width * p.stride;
                 const auto* channel = part.channel(p.channel);
                 if (!channel)
                     return failAt(impl_->where, ErrorCode::failed, "part {} has no channel '{}'",
@@ -404,12 +414,12 @@ Result<void> ExrWriter::writePart(int index, const std::vector<ExrConstPixels>& 
                     parallelForBlocks(0, static_cast<std::int64_t>(to.size()), 1 << 16,
                                       [&](std::int64_t begin, std::int64_t end) {
                                           for (auto k = begin; k < end; ++k)
-                                              to[k] = half(from[k * p.stride]);
+                                              to[k] = half(p.values[k * p.stride]);
                                       });
                     buffer.insert(p.channel, Imf::Slice::Make(Imf::HALF, to.data(), block,
                                                               sizeof(half), sizeof(half) * width));
                 } else {
-                    buffer.insert(p.channel, Imf::Slice::Make(Imf::FLOAT, from, block,
+                    buffer.insert(p.channel, Imf::Slice::Make(Imf::FLOAT, p.values, block,
                                                               p.stride * sizeof(float),
                                                               p.stride * sizeof(float) * width));
                 }

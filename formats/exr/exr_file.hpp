@@ -119,6 +119,10 @@ class ExrWriter {
 
     /// All channels of the next part. Channels of type half are rounded to nearest.
     [[nodiscard]] Result<void> writePart(int part, const std::vector<ExrConstPixels>& pixels);
+    /// The same for images that are made while they are written: `block(y, rows)` gives the values
+    /// of `rows` rows from `y` on, which must live until it is called again.
+    using Block = std::function<std::vector<ExrConstPixels>(int y, int rows)>;
+    [[nodiscard]] Result<void> writePart(int part, const Block& block);
     /// After the last part; then OutputFile::commit() is the caller's.
     [[nodiscard]] Result<void> finish();
 
