@@ -2,6 +2,7 @@
 
 #include "lib/render/cpu/cpu_splat.hpp"
 #include "lib/render/cpu/cpu_surface.hpp"
+#include "lib/render/footprint.hpp"
 #ifdef STX_WITH_GPU
 #include "lib/render/gl/gl_renderer.hpp"
 #include "lib/render/gpu/egl_context.hpp"
@@ -61,10 +62,16 @@ bool hasHardware(int) {
 
 }  // namespace
 
-Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
-                                               const RenderSettings& settings, int device,
-                                               Job& job) {
-    STX_CHECK(bundle.check());
+namespace {
+
+/// Points of one pixel, the paper's rule, drafts and conventional OpenGL stay what they are.
+bool averages(Backend backend, const RenderSettings& settings) {
+    if (settings.mode == RenderMode::surface) return settings.quality != Quality::draft;
+    return settings.splat == SplatRule::data && backend != Backend::gl;
+}
+
+Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const Bundle& bundle,
+                                            const RenderSettings& settings, int device, Job& job) {
     switch (backend) {
         case Backend::gpu:
             return makeGpu(bundle, settings, device, job);
@@ -82,6 +89,17 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
                              made.error().text()));
     }
     return makeCpu(bundle, settings, job);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
+                                               const RenderSettings& settings, int device,
+                                               Job& job) {
+    STX_CHECK(bundle.check());
+    STX_TRY(auto made, makePlain(backend, bundle, settings, device, job));
+    if (averages(backend, settings)) made = withFootprint(std::move(made), bundle);
+    return made;
 }
 
 std::vector<Device> listDevices(Job& job) {

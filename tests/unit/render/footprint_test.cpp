@@ -1,0 +1,86 @@
+#include "lib/render/footprint.hpp"
+
+#include <gtest/gtest.h>
+
+#include "lib/render/cpu/cpu_splat.hpp"
+#include "lib/render/cpu/cpu_surface.hpp"
+#include "tests/unit/gpu/gpu_fixture.hpp"
+
+namespace stx {
+namespace {
+
+Camera smallCamera(int divisor) {
+    const Camera c = analyticCamera(AnalyticScene::object, 0.5, 8);
+    return c.resized(c.width / divisor, c.height / divisor);
+}
+
+TEST(Footprint, CountsTheSamplesOfAPixel) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 8);
+    const Footprint footprint(bundle);
+    EXPECT_NEAR(footprint.samplesPerPixel(bundle.views[3].camera), 1.0, 0.15);
+    EXPECT_NEAR(footprint.samplesPerPixel(smallCamera(4)), 4.0, 0.6);
+    Camera away = smallCamera(4);
+    away.orientation = glm::normalize(away.orientation * glm::dquat(0, 0, 1, 0));
+    EXPECT_EQ(footprint.samplesPerPixel(away), 1.0);
+}
+
+TEST(Footprint, SmallPicturesAreAveraged) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 8, 2);
+    const Camera camera = smallCamera(4);
+    const auto truth = test::pictureOf(viewOfAnalyticScene(AnalyticScene::object, camera, 16));
+    Job job;
+    for (const auto mode : {RenderMode::surface, RenderMode::splat}) {
+        RenderSettings settings;
+        settings.mode = mode;
+        const auto plain = mode == RenderMode::surface
+                               ? makeCpuSurfaceRenderer(bundle, settings, job)
+                               : makeCpuSplatRenderer(bundle, settings, job);
+        const auto made = makeRenderer(Backend::cpu, bundle, settings, -1, job);
+        ASSERT_TRUE(made);
+        const auto a = plain->render(camera), b = (*made)->render(camera);
+        ASSERT_TRUE(a && b);
+        EXPECT_EQ(b->colour.size(), a->colour.size());
+        const double before = test::psnr(a->colour, truth), after = test::psnr(b->colour, truth);
+        RecordProperty(mode == RenderMode::surface ? "surface" : "splat",
+                       fmt::format("{:.1f} -> {:.1f} dB", before, after));
+        EXPECT_GT(after, before + 3.0);
+        EXPECT_GT(after, 33.0);
+    }
+}
+
+TEST(Footprint, LeavesPicturesAsLargeAsTheViewsAlone) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 8, 2);
+    const Camera camera = analyticCamera(AnalyticScene::object, 0.5, 8);
+    Job job;
+    const RenderSettings settings;
+    const auto plain = makeCpuSurfaceRenderer(bundle, settings, job)->render(camera);
+    const auto made = makeRenderer(Backend::cpu, bundle, settings, -1, job);
+    ASSERT_TRUE(made && plain);
+    EXPECT_EQ((*made)->render(camera)->colour, plain->colour);
+}
+
+TEST(Footprint, AveragesWhatIsThere) {
+    Frame large;
+    large.colour = Image<glm::vec4>(4, 2, glm::vec4(0.0f));
+    large.albedo = large.colour;
+    large.depth = Image<float>(4, 2, kNoDepth);
+    large.normal = Image<glm::vec3>(4, 2, glm::vec3(0.0f));
+    for (const auto& [x, y] : {std::pair{0, 0}, {1, 1}, {2, 0}}) {
+        large.colour.at(x, y) = glm::vec4(0.5f, 1.0f, 0.25f, 1.0f);
+        large.albedo.at(x, y) = glm::vec4(1.0f);
+        large.depth.at(x, y) = 3.0f;
+        large.normal.at(x, y) = glm::vec3(0, 0, 1);
+    }
+    const Frame small = minified(large, 2);
+    ASSERT_EQ(small.colour.size(), glm::ivec2(2, 1));
+    EXPECT_EQ(small.colour.at(0, 0), glm::vec4(0.25f, 0.5f, 0.125f, 0.5f));
+    EXPECT_EQ(small.albedo.at(0, 0), glm::vec4(0.5f));
+    EXPECT_EQ(small.normal.at(0, 0), glm::vec3(0, 0, 1));
+    EXPECT_EQ(small.depth.at(0, 0), 3.0f);
+    // A quarter covered: colour fades, and there is no depth to speak of.
+    EXPECT_EQ(small.colour.at(1, 0).a, 0.25f);
+    EXPECT_FALSE(hasPoint(small.depth.at(1, 0)));
+}
+
+}  // namespace
+}  // namespace stx
