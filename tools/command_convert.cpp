@@ -117,6 +117,16 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
                     "'{}' would be written for each frame; put {{frame}} or {{frame:04}} into its "
                     "name",
                     o.output);
+    // Before an hour's work, not after it.
+    OpenOptions open = o.open;
+    open.set.texturePattern = open.texture;
+    open.set.frame = static_cast<int>(first);
+    STX_TRY(const int count, imageSetFrameCount(o.inputs[0], open.set, program.job));
+    if (last >= count)
+        return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
+                      "frames {} are asked for, but the set has {} (0 to {})", o.frames, count,
+                      count - 1);
+    program.job.takeNotes();  // said again with each frame
     auto entries = nlohmann::ordered_json::array();
     for (int frame = static_cast<int>(first); frame <= static_cast<int>(last); ++frame) {
         ConvertOptions one = o;

@@ -235,14 +235,20 @@ std::vector<std::string> depthPatterns() {
             "{name}_depth.yuv"};
 }
 
+/// A file for each frame.
+bool isNumbered(const std::string& pattern) {
+    return pattern.find("{frame") != std::string::npos;
+}
+
 /// Resolves a file and finds out its planes and frame. Sets `frames` to the least of all.
-Result<PictureSource> sourceOf(const std::string& name, const Search& search, int& frames,
-                               const Limits& limits) {
+Result<PictureSource> sourceOf(const std::string& name, const Search& search, bool numbered,
+                               int& frames, const Limits& limits) {
     STX_TRY(auto source, sourceInside(search.folder, name, "", limits));
     if (source.path.extension() == ".yuv") {
         STX_TRY(source.yuv, formatOf(name, search));
-        source.frame = search.frame;
         STX_TRY(const int count, yuvFrameCount(source.path, *source.yuv));
+        if (numbered) return source;
+        source.frame = search.frame;
         frames = frames == 0 ? count : std::min(frames, count);
     }
     return source;
@@ -336,9 +342,24 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
                               : "");
         }
         STX_TRY(const MivDepth range, depthOf(camera, place));
-        STX_TRY(view.texture, within(place, sourceOf(texture, forTexture, frames, job.limits)));
-        STX_TRY(view.depth, within(place, sourceOf(depth, forDepth, frames, job.limits)));
+        STX_TRY(view.texture,
+                within(place, sourceOf(texture, forTexture, isNumbered(options.texturePattern),
+                                       frames, job.limits)));
+        STX_TRY(view.depth,
+                within(place, sourceOf(depth, forDepth, isNumbered(options.depthPattern), frames,
+                                       job.limits)));
         view.distances = distancesOf(range);
+        if (set.views.empty() &&
+            (isNumbered(options.texturePattern) || isNumbered(options.depthPattern))) {
+            Search nextTexture = forTexture, nextDepth = forDepth;
+            int count = options.frame + 1;
+            for (; count < 100000; ++count) {
+                nextTexture.frame = nextDepth.frame = count;
+                if (findFile(nextTexture, textures).empty() || findFile(nextDepth, depths).empty())
+                    break;
+            }
+            frames = frames == 0 ? count : std::min(frames, count);
+        }
         if (!view.exactName.empty()) view.name = view.exactName;
         set.views.push_back(std::move(view));
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "formats/imagesets/messages.hpp"
 
@@ -31,23 +32,22 @@ const std::vector<KindEntry>& entries() {
     return all;
 }
 
-/// The kind of a JSON file by its keys, from its beginning alone when that tells.
-std::string kindOfJson(const path& file) {
+/// The kind of a JSON file by its keys; empty when it is something else.
+Result<std::string> kindOfJson(const path& file) {
     Limits limits;
     limits.maxMemoryBytes = 256u << 20;
-    const auto json = readJson(file, limits);
-    if (!json) return {};
-    switch (jsonKindOf(*json)) {
+    STX_TRY(const Json json, readJson(file, limits));
+    switch (jsonKindOf(json)) {
         case JsonKind::transforms:
-            return "transforms";
+            return std::string("transforms");
         case JsonKind::miv:
-            return "miv";
+            return std::string("miv");
         case JsonKind::cameras:
-            return "cameras";
+            return std::string("cameras");
         case JsonKind::none:
             break;
     }
-    return {};
+    return std::string();
 }
 
 }  // namespace
@@ -78,7 +78,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
         return failAt(where, ErrorCode::io, "there is no such file or folder");
     if (!fs::is_directory(path, ec)) {
         if (path.extension() == ".json") {
-            const std::string kind = kindOfJson(path);
+            STX_TRY(const std::string kind, kindOfJson(path));
             if (!kind.empty()) return kind;
         }
         const std::string name = path.filename().string();
@@ -97,10 +97,13 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     }
     if (fs::is_regular_file(path / "transforms.json", ec)) return std::string("transforms");
     const std::vector<std::string> files = filesIn(path);
+    std::optional<Error> broken;
     for (const std::string& name : files) {
         if (fs::path(name).extension() != ".json") continue;
-        const std::string kind = kindOfJson(path / name);
-        if (kind == "miv" || (kind == "cameras" && name == "cameras.json")) return kind;
+        const auto kind = kindOfJson(path / name);
+        if (!kind && !broken) broken = kind.error();
+        if (kind && (*kind == "miv" || (*kind == "cameras" && name == "cameras.json")))
+            return *kind;
     }
     for (const std::string& name : files)
         if (name.starts_with("calibParams")) return std::string("msr");
@@ -128,6 +131,8 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     if (disparities > 0 && pictures > disparities) return std::string("middlebury");
     if (pictures == 2 && depths == 1) return std::string("panorama");
     if (exr > 0) return std::string("exr");
+    // A camera list that cannot be read is a likelier reason than none.
+    if (broken) return tl::unexpected(*broken);
     return failAt(where, ErrorCode::invalidInput,
                   "no image set is recognised in this folder: transforms.json, cameras.json, "
                   "calib.txt, calibParams-*.txt, sparse/, pose.txt, groundtruth.txt or "

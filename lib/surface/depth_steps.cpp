@@ -48,35 +48,42 @@ void smoothDepthSteps(Image<float>& codes) {
             }
         }
     });
+    // What a value has moved, not the value: where it is flat, rounding would add up.
+    Image<float> moved(w, h);
     // Red and black pixels in turn: those of one colour touch only those of the other, so that
     // neither threads nor order matter.
     for (int half = 0; half < 2 * kSweeps; ++half) {
         parallelForBlocks(0, h, 32, [&](std::int64_t from, std::int64_t to) {
             for (int y = static_cast<int>(from); y < to; ++y) {
-                float* row = codes.row(y).data();
-                const float* above = y > 0 ? codes.row(y - 1).data() : row;
-                const float* below = y + 1 < h ? codes.row(y + 1).data() : row;
-                const float* code = stored.row(y).data();
+                const int up = std::max(0, y - 1), down = std::min(h - 1, y + 1);
+                const float *code = stored.row(y).data(), *codeUp = stored.row(up).data(),
+                            *codeDown = stored.row(down).data();
+                float* row = moved.row(y).data();
+                const float *rowUp = moved.row(up).data(), *rowDown = moved.row(down).data();
                 const std::uint8_t* link = links.row(y).data();
                 for (int x = (y + half) & 1; x < w; x += 2) {
                     if (link[x] == 0) continue;
-                    float sum = kHold * code[x], weight = kHold;
+                    const float c = code[x];
+                    float sum = 0, weight = kHold;
                     if (link[x] == kAll) {
-                        sum += (row[x - 1] + row[x + 1]) + (above[x] + below[x]);
+                        sum = (code[x - 1] + code[x + 1] + codeUp[x] + codeDown[x] - 4 * c) +
+                              ((row[x - 1] + row[x + 1]) + (rowUp[x] + rowDown[x]));
                         weight += 4;
                     } else {
-                        if (link[x] & kLeft) sum += row[x - 1], weight += 1;
-                        if (link[x] & kRight) sum += row[x + 1], weight += 1;
-                        if (link[x] & kUp) sum += above[x], weight += 1;
-                        if (link[x] & kDown) sum += below[x], weight += 1;
+                        if (link[x] & kLeft) sum += code[x - 1] - c + row[x - 1], weight += 1;
+                        if (link[x] & kRight) sum += code[x + 1] - c + row[x + 1], weight += 1;
+                        if (link[x] & kUp) sum += codeUp[x] - c + rowUp[x], weight += 1;
+                        if (link[x] & kDown) sum += codeDown[x] - c + rowDown[x], weight += 1;
                     }
-                    const float moved = row[x] + kRelaxation * (sum / weight - row[x]);
-                    row[x] = std::clamp(moved, std::max(least, code[x] - kMostStepShift),
-                                        std::min(largest, code[x] + kMostStepShift));
+                    const float next = row[x] + kRelaxation * (sum / weight - row[x]);
+                    row[x] = std::clamp(next, std::max(least - c, -kMostStepShift),
+                                        std::min(largest - c, kMostStepShift));
                 }
             }
         });
     }
+    for (std::size_t i = 0; i < codes.count(); ++i)
+        if (hasPoint(stored.data()[i])) codes.data()[i] += moved.data()[i];
 }
 
 }  // namespace stx

@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/image_sets.hpp"
@@ -47,6 +48,49 @@ TEST_P(Export, ComesBackEqualToTheBit) {
 INSTANTIATE_TEST_SUITE_P(All, Export,
                          ::testing::Combine(::testing::Values(Kind::transforms, Kind::miv),
                                             ::testing::Values(8, 16, 32), ::testing::Bool()));
+
+/// What other programs see: the same points without the keys that only we know, for perspective
+/// and orthographic cameras with principal points off the middle, and for masks.
+TEST(Export, ComesBackWithoutOurOwnKeys) {
+    const Bundle bundle = smallBundle(4, 32, false, false);
+    for (const Kind kind : {Kind::transforms, Kind::miv}) {
+        TemporaryFolder folder;
+        Job job;
+        ExportOptions options;
+        options.kind = kind;
+        ASSERT_TRUE(exportImages(bundle, folder / "set", options, job));
+        std::filesystem::path file;
+        for (const auto& entry : std::filesystem::directory_iterator(folder / "set"))
+            if (entry.path().extension() == ".json") file = entry.path();
+        auto json = nlohmann::json::parse(std::ifstream(file));
+        for (auto& camera : json[kind == Kind::miv ? "cameras" : "frames"])
+            for (const char* key :
+                 {"stx:name", "stx:quaternion", "stx:window", "nearPlane", "farPlane", "depthBits"})
+                camera.erase(key);
+        std::ofstream(file) << json;
+        ImageSetOptions read;
+        read.depthBits = 32;
+        const auto back = readImageSet(folder / "set", read, job);
+        ASSERT_TRUE(back) << back.error().text();
+        ASSERT_EQ(back->views.size(), bundle.views.size());
+        int orthographic = 0;
+        for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+            const auto &a = bundle.views[i], &b = back->views[i];
+            ASSERT_EQ(a.depth.size(), b.depth.size());
+            EXPECT_EQ(a.camera.orthographic, b.camera.orthographic);
+            orthographic += b.camera.orthographic;
+            EXPECT_EQ(a.texture, b.texture);
+            for (int y = 0; y < a.depth.height(); ++y)
+                for (int x = 0; x < a.depth.width(); ++x) {
+                    ASSERT_EQ(hasPoint(a.depth.at(x, y)), hasPoint(b.depth.at(x, y)));
+                    if (!hasPoint(a.depth.at(x, y))) continue;
+                    ASSERT_LT(glm::length(a.worldPoint(x, y) - b.worldPoint(x, y)), 1e-9)
+                        << "view " << i << " at " << x << "," << y;
+                }
+        }
+        EXPECT_EQ(orthographic, 2);
+    }
+}
 
 TEST(Export, IntegerDepthIsRoundedByNoMoreThanItsNoteSays) {
     const Bundle bundle = smallBundle(2, 16, false, false);

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/exr/exr_file.hpp"
 #include "formats/files/files.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/image_sets.hpp"
@@ -129,6 +130,60 @@ inline void expectError(const Result<Bundle>& result, std::initializer_list<cons
     for (const char* part : parts)
         EXPECT_NE(text.find(part), std::string::npos) << part << " is missing in: " << text;
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+}
+
+using Planes = std::vector<std::pair<std::string, Image<float>>>;
+
+/// A single-part OpenEXR file of 32-bit floats.
+inline void writeExr(const std::filesystem::path& path, const Planes& planes) {
+    std::filesystem::create_directories(path.parent_path());
+    ExrPart part;
+    part.width = part.displayWidth = planes[0].second.width();
+    part.height = part.displayHeight = planes[0].second.height();
+    for (const auto& [name, image] : planes) part.channels.push_back({name});
+    auto file = OutputFile::create(path);
+    ASSERT_TRUE(file);
+    auto writer = ExrWriter::create(*file, {part});
+    ASSERT_TRUE(writer) << writer.error().text();
+    std::vector<ExrConstPixels> pixels;
+    for (const auto& [name, image] : planes) pixels.push_back({name, image.data(), 1});
+    ASSERT_TRUE(writer->writePart(0, pixels));
+    ASSERT_TRUE(writer->finish());
+    ASSERT_TRUE(file->commit());
+}
+
+template <class Value>
+Image<float> plane(int w, int h, const Value& value) {
+    Image<float> out(w, h);
+    for (int y = 0; y < h; ++y)
+        for (int x = 0; x < w; ++x) out.at(x, y) = static_cast<float>(value(x, y));
+    return out;
+}
+
+/// Red and green of each pixel are its own position: interpolation keeps that exactly.
+inline void writePositions(const std::filesystem::path& path, int w, int h) {
+    writeExr(path, {{"R", plane(w, h, [](int x, int) { return x + 0.5; })},
+                    {"G", plane(w, h, [](int, int y) { return y + 0.5; })},
+                    {"B", plane(w, h, [](int, int) { return 1; })}});
+}
+
+inline std::string rowsOf(const glm::dmat4& m) {
+    std::string rows;
+    for (int r = 0; r < 4; ++r)
+        rows += fmt::format("{}[{},{},{},{}]", r ? "," : "", m[0][r], m[1][r], m[2][r], m[3][r]);
+    return "[" + rows + "]";
+}
+
+inline std::string transformsFrame(const glm::dmat4& pose, const std::string& more) {
+    return fmt::format("{{\"file_path\":\"a.png\",\"transform_matrix\":{}{}}}", rowsOf(pose), more);
+}
+
+inline std::string mivJson(int w, int h, const std::string& range, int colourBits = 8) {
+    return fmt::format(
+        R"({{"cameras":[{{"Name":"a","Position":[0,0,0],"Rotation":[0,0,0],"Depth_range":{},)"
+        R"("Resolution":[{},{}],"BitDepthColor":{},"BitDepthDepth":16,)"
+        R"("Projection":"Perspective","Focal":[33,35],"Principle_point":[19,16]}}]}})",
+        range, w, h, colourBits);
 }
 
 }  // namespace sets
