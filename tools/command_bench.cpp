@@ -9,13 +9,14 @@ namespace {
 struct BenchCommandOptions {
     BenchSettings settings;
     int table = 0;
-    std::string plot;
+    std::string plot, splat = "data";
 };
 
 Result<int> bench(const BenchCommandOptions& o, Program& program) {
     BenchSettings settings = o.settings;
     settings.table1 = o.table != 2;
     settings.table2 = o.table != 1;
+    settings.splat = o.splat == "paper" ? SplatRule::paper : SplatRule::data;
     STX_TRY(const auto report, runBench(settings, program.job));
     if (program.common.format == "json") {
         nlohmann::ordered_json out = {{"$schema", "bench.schema.json"}};
@@ -46,6 +47,9 @@ Command addBench(CLI::App& app, Program& program) {
                   "Only these paths: shader, gl, software, compute, points, surface, "
                   "surface-gpu")
         ->delimiter(',');
+    c->add_option("--splat", o->splat,
+                  "Rule of the splats' size: data, or paper, Lee & Park's own (default data)")
+        ->check(CLI::IsMember({"data", "paper"}));
     c->add_option("--repeats", o->settings.repeats, "Frames measured for each row (default 5)")
         ->check(CLI::Range(1, 1000));
     c->add_option("--device", o->settings.device,

@@ -33,6 +33,7 @@ int main(int argc, char** argv) {
     stx::BenchSettings settings;
     std::string format = "text", svg;
     int table = 0, threads = 0;
+    std::string splat = "data";
     bool devices = false;
     app.set_version_flag("--version", STX_VERSION);
     app.add_option("--format", format, "text (default) or json")
@@ -41,6 +42,8 @@ int main(int argc, char** argv) {
     app.add_option("--path", settings.paths,
                    "only these: shader, gl, software, compute, points, surface, "
                    "surface-gpu");
+    app.add_option("--splat", splat, "rule of the splats' size: data or paper")
+        ->check(CLI::IsMember({"data", "paper"}));
     app.add_option("--repeats", settings.repeats, "frames measured for each row")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
@@ -68,6 +71,7 @@ int main(int argc, char** argv) {
         for (const auto& note : job.takeNotes()) fmt::print(stderr, "stx-bench: {}\n", note);
         return 0;
     }
+    settings.splat = splat == "paper" ? stx::SplatRule::paper : stx::SplatRule::data;
     settings.table1 = table != 2;
     settings.table2 = table != 1;
     const auto result = stx::runBench(settings, job);

@@ -30,11 +30,12 @@ Result<void> checkHardware(int device) {
 
 /// `named`: the path was asked for by name.
 Result<std::unique_ptr<Renderer>> makePath(const std::string& path, bool named,
-                                           const Bundle& bundle, int device, Job& job) {
+                                           const Bundle& bundle, SplatRule splat, int device,
+                                           Job& job) {
     RenderSettings settings;
     settings.mode =
         path == "surface" || path == "surface-gpu" ? RenderMode::surface : RenderMode::splat;
-    settings.splat = path == "points" ? SplatRule::point : SplatRule::data;
+    settings.splat = path == "points" ? SplatRule::point : splat;
     if (path == "surface") return makeCpuSurfaceRenderer(bundle, settings, job);
     if (path == "software" || path == "points") return makeCpuSplatRenderer(bundle, settings, job);
 #ifdef STX_WITH_GPU
@@ -50,6 +51,12 @@ Result<std::unique_ptr<Renderer>> makePath(const std::string& path, bool named,
     (void)device;
     return fail(ErrorCode::unsupported, "this build has no GPU backends");
 #endif
+}
+
+std::string ruleOf(const std::string& path, SplatRule splat) {
+    if (path == "surface" || path == "surface-gpu") return "";
+    if (path == "points") return "point";
+    return splat == SplatRule::paper ? "paper" : "data";
 }
 
 /// Milliseconds of the median frame.
@@ -76,6 +83,8 @@ const std::vector<std::string>& benchPaths() {
 Result<BenchReport> runBench(const BenchSettings& settings, Job& job) {
     if (settings.repeats < 1 || settings.repeats > 1000)
         return fail(ErrorCode::usage, "{} repeats; 1 to 1000 are possible", settings.repeats);
+    if (settings.splat == SplatRule::point)
+        return fail(ErrorCode::usage, "points are a path of their own; splats are data or paper");
     for (const auto& path : settings.paths) {
         if (std::find(benchPaths().begin(), benchPaths().end(), path) == benchPaths().end())
             return fail(ErrorCode::usage, "no path is called '{}'; there are {}", path,
@@ -105,7 +114,8 @@ Result<BenchReport> runBench(const BenchSettings& settings, Job& job) {
         for (const auto& path : paths) {
             STX_CHECK(job.checkCancelled());
             job.progress(done++, total, path);
-            auto renderer = makePath(path, !settings.paths.empty(), bundle, settings.device, job);
+            auto renderer = makePath(path, !settings.paths.empty(), bundle, settings.splat,
+                                     settings.device, job);
             if (!renderer) {
                 // A wrong request is an error; what the machine lacks is a gap in the table.
                 if (renderer.error().code == ErrorCode::usage) return propagate(renderer);
@@ -114,7 +124,8 @@ Result<BenchReport> runBench(const BenchSettings& settings, Job& job) {
             }
             if ((*renderer)->backend() != "cpu") report.device = (*renderer)->device();
             STX_TRY(const double milliseconds, measure(**renderer, camera, settings.repeats, job));
-            report.rows.push_back({one.table, one.references, points, path, 1000.0 / milliseconds,
+            report.rows.push_back({one.table, one.references, points, path,
+                                   ruleOf(path, settings.splat), 1000.0 / milliseconds,
                                    static_cast<double>(points) / milliseconds * 1e-3});
         }
     }

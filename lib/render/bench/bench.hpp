@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "lib/base/job.hpp"
+#include "lib/render/renderer.hpp"
 
 namespace stx {
 
@@ -13,6 +14,9 @@ struct BenchSettings {
     bool table2 = true;  ///< a full scene, 1024x768 views, 1, 4 and 8 references
     int repeats = 5;     ///< frames measured for each row, after a warm one; 1 to 1000
     int device = -1;     ///< of listDevices(), -1 = the best
+    /// Rule of the splats of shader, gl, software and compute: data, or paper (Lee & Park's own,
+    /// size inversely proportional to the distance).
+    SplatRule splat = SplatRule::data;
     /// Paths to measure; empty = all. Names as in BenchRow::path.
     std::vector<std::string> paths;
 };
@@ -28,8 +32,9 @@ struct BenchRow {
     /// "surface-gpu" (surface mode at normal quality on the processor and on the GPU, the time of
     /// reading back and of filling holes included; on software drivers only when named).
     std::string path;
-    double fps = 0;   ///< frames a second, of the median frame, without reading it back
-    double mpps = 0;  ///< million points a second
+    std::string splat;  ///< rule of its splats: "data", "paper" or "point"; empty in surface mode
+    double fps = 0;     ///< frames a second, of the median frame, without reading it back
+    double mpps = 0;    ///< million points a second
 };
 
 struct BenchReport {
@@ -48,7 +53,7 @@ struct BenchReport {
 
 /// The report as the paper's two tables, for people.
 [[nodiscard]] std::string benchText(const BenchReport& report);
-/// {"device","processor","threads","rows":[{"table","references","points","path","fps","mpps"}]}
+/// {"device","processor","threads","rows":[{"table","references","points","path","splat","fps","mpps"}]}
 [[nodiscard]] std::string benchJson(const BenchReport& report);
 /// A bar for each row, million points a second on a logarithmic scale, as an SVG picture.
 [[nodiscard]] std::string benchSvg(const BenchReport& report);

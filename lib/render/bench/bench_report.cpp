@@ -55,13 +55,13 @@ std::string benchText(const BenchReport& report) {
         if (first.table != table) {
             table = first.table;
             fmt::format_to(
-                to, "\nTable {}: {}\n{:>10} {:>10}  {:<10}{:>12}{:>14}\n", table,
+                to, "\nTable {}: {}\n{:>10} {:>10}  {:<12}{:<8}{:>12}{:>14}\n", table,
                 table == 1 ? "an object, views of 256x256" : "a full scene, views of 1024x768",
-                "references", "points", "path", "frames/s", "Mpoints/s");
+                "references", "points", "path", "splats", "frames/s", "Mpoints/s");
         }
         for (const BenchRow* row : scene)
-            fmt::format_to(to, "{:>10} {:>10}  {:<10}{:>12.2f}{:>14.2f}\n", row->references,
-                           row->points, row->path, row->fps, row->mpps);
+            fmt::format_to(to, "{:>10} {:>10}  {:<12}{:<8}{:>12.2f}{:>14.2f}\n", row->references,
+                           row->points, row->path, row->splat, row->fps, row->mpps);
     }
     return out;
 }
@@ -75,9 +75,11 @@ std::string benchJson(const BenchReport& report) {
         const BenchRow& row = report.rows[i];
         fmt::format_to(
             to,
-            "{}\n{{\"table\":{},\"references\":{},\"points\":{},\"path\":\"{}\",\"fps\":{:.3f},"
+            "{}\n{{\"table\":{},\"references\":{},\"points\":{},\"path\":\"{}\",\"splat\":\"{}\","
+            "\"fps\":{:.3f},"
             "\"mpps\":{:.3f}}}",
-            i ? "," : "", row.table, row.references, row.points, row.path, row.fps, row.mpps);
+            i ? "," : "", row.table, row.references, row.points, row.path, row.splat, row.fps,
+            row.mpps);
     }
     out += "\n]}\n";
     return out;
@@ -136,7 +138,8 @@ std::string benchSvg(const BenchReport& report) {
                            "<rect x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"{}\" fill=\"{}\"/>\n"
                            "<text x=\"{:.1f}\" y=\"{}\">{} {:.1f}</text>\n",
                            kLeft, y, std::max(1.0, x(row->mpps) - kLeft), kBar - 3,
-                           colourOf(row->path), x(row->mpps) + 5, y + 11, row->path, row->mpps);
+                           colourOf(row->path), x(row->mpps) + 5, y + 11,
+                           row->splat == "paper" ? row->path + " (paper)" : row->path, row->mpps);
             y += kBar;
         }
         y += kGap;

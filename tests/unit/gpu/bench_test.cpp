@@ -70,13 +70,15 @@ TEST(Bench, WritesTextJsonAndSvg) {
     report.device = "A \"GPU\" <1>";
     report.processor = "CPU";
     report.threads = 2;
-    report.rows = {{1, 4, 45000, "shader", 100.5, 4.5225}, {2, 1, 786432, "gl", 2, 1.572864}};
-    EXPECT_EQ(benchJson(report),
-              "{\"device\":\"A \\\"GPU\\\" <1>\",\"processor\":\"CPU\",\"threads\":2,\"rows\":[\n"
-              "{\"table\":1,\"references\":4,\"points\":45000,\"path\":\"shader\",\"fps\":100.500,"
-              "\"mpps\":4.522},\n"
-              "{\"table\":2,\"references\":1,\"points\":786432,\"path\":\"gl\",\"fps\":2.000,"
-              "\"mpps\":1.573}\n]}\n");
+    report.rows = {{1, 4, 45000, "shader", "data", 100.5, 4.5225},
+                   {2, 1, 786432, "gl", "paper", 2, 1.572864}};
+    EXPECT_EQ(
+        benchJson(report),
+        "{\"device\":\"A \\\"GPU\\\" <1>\",\"processor\":\"CPU\",\"threads\":2,\"rows\":[\n"
+        "{\"table\":1,\"references\":4,\"points\":45000,\"path\":\"shader\",\"splat\":\"data\","
+        "\"fps\":100.500,\"mpps\":4.522},\n"
+        "{\"table\":2,\"references\":1,\"points\":786432,\"path\":\"gl\",\"splat\":\"paper\","
+        "\"fps\":2.000,\"mpps\":1.573}\n]}\n");
     EXPECT_NE(benchText(report).find("Table 2"), std::string::npos);
     const std::string svg = benchSvg(report);
     EXPECT_EQ(svg.find("<svg"), 0u);
