@@ -36,6 +36,15 @@ bool startsWith(ByteSpan bytes, std::string_view text, std::size_t at = 0) {
     return std::equal(text.begin(), text.end(), reinterpret_cast<const char*>(bytes.data()) + at);
 }
 
+/// A part of it is a view that we wrote.
+bool isExrBundle(const fs::path& path) {
+    const auto reader = ExrReader::open(path, Limits());
+    return reader &&
+           std::any_of(reader->parts().begin(), reader->parts().end(), [](const ExrPart& part) {
+               return part.attribute<glm::dvec3>("stx:position");
+           });
+}
+
 Error notThere(const fs::path& path) {
     return {ErrorCode::io,
             fmt::format("cannot read '{}': there is no such file or folder", path.string()),
@@ -110,8 +119,10 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         case FileKind::exr:
             bundle = readExrBundle(path, job);
             // Colour and Z in parts of their own, or cameras in a file beside it.
-            if (!bundle && bundle.error().code == ErrorCode::invalidInput)
-                if (auto set = readImageSet(path, options.set, job)) bundle = std::move(set);
+            if (!bundle && bundle.error().code == ErrorCode::invalidInput) {
+                auto set = readImageSet(path, options.set, job);
+                if (set || !isExrBundle(path)) bundle = std::move(set);
+            }
             break;
         case FileKind::mpeg4:
             bundle = readMpeg4Bundle(path, job);

@@ -125,8 +125,8 @@ Camera shifted(Camera camera, const ExrPart& depth) {
 }
 
 Result<Camera> cameraOf(const ExrReader& reader, const ExrView& view,
-                        const std::vector<NamedCamera>& beside, std::size_t index,
-                        std::size_t count) {
+                        const std::vector<NamedCamera>& beside, const std::string& stem,
+                        std::size_t index, std::size_t count) {
     const ExrPart& depth = reader.parts()[static_cast<std::size_t>(view.depth.part)];
     const ExrPart& colour = reader.parts()[static_cast<std::size_t>(view.colour.part)];
     for (const ExrPart* part : {&depth, &colour}) {
@@ -148,7 +148,7 @@ Result<Camera> cameraOf(const ExrReader& reader, const ExrView& view,
             reader.where(), ErrorCode::invalidInput,
             "view '{}' has no camera: neither the attribute worldToCamera nor a camera of "
             "that name in a JSON file beside it ({}.json, cameras.json, transforms.json)",
-            view.name, "NAME");
+            view.name, stem);
     if (found->camera.width != depth.displayWidth || found->camera.height != depth.displayHeight)
         return failAt(reader.where(), ErrorCode::invalidInput,
                       "view '{}' is {}x{} (display window) but its camera has {}x{} pixels",
@@ -206,7 +206,8 @@ Result<SetDescription> describeExr(const path& given, const ImageSetOptions&, Jo
         SetView view;
         view.name = all[i].view.name;
         view.texture.name = view.depth.name = all[i].file.filename().string();
-        STX_TRY(view.camera, cameraOf(reader, all[i].view, beside, i, all.size()));
+        STX_TRY(view.camera,
+                cameraOf(reader, all[i].view, beside, all[i].file.stem().string(), i, all.size()));
         view.load = [found = all[i]](const SetView&, Job& inner) {
             return loadView(found.file, found.view, inner);
         };
