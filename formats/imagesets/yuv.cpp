@@ -144,9 +144,9 @@ Result<Rgba8Image> readYuvColour(const std::filesystem::path& path, const YuvFor
             double c[2] = {0, 0};
             if (f.chroma) {
                 // Horizontally, too: the tools around MIV and RVS average 2x2 pixels.
-                const float at = f.chromaShiftX ? (x + 0.5f) / 2 - 0.5f : static_cast<float>(x);
-                const int left = static_cast<int>(std::floor(at));
-                const float weight = at - static_cast<float>(left);
+                // Pixel x lies at (x + 0.5) / 2 - 0.5 among the samples.
+                const int left = f.chromaShiftX ? (x - 1) >> 1 : x;
+                const float weight = !f.chromaShiftX ? 0.0f : (x & 1) ? 0.25f : 0.75f;
                 const auto i0 = static_cast<std::size_t>(std::clamp(left, 0, cw - 1));
                 const auto i1 = static_cast<std::size_t>(std::clamp(left + 1, 0, cw - 1));
                 for (int k = 0; k < 2; ++k) {
@@ -159,7 +159,7 @@ Result<Rgba8Image> readYuvColour(const std::filesystem::path& path, const YuvFor
             const double b = l + 2 * (1 - kb) * c[0];
             const double g = (l - kr * r - kb * b) / kg;
             const auto byte = [](double v) {
-                return static_cast<std::uint8_t>(std::lround(std::clamp(v, 0.0, 1.0) * 255));
+                return static_cast<std::uint8_t>(std::clamp(v, 0.0, 1.0) * 255 + 0.5);
             };
             out.at(x, y) = {byte(r), byte(g), byte(b), 255};
         }
