@@ -15,12 +15,14 @@ constexpr int kGrid = 24;
 constexpr double kEnough = 1.5;
 constexpr int kMostFactor = 16;
 /// Pixels of the larger picture.
-constexpr double kMostPixels = 64e6;
+constexpr double kMostPixels = 16e6;
+/// Bytes of one of its pixels: colour, albedo, normal, depth, and what surface mode keeps beside.
+constexpr std::uint64_t kBytesEach = 64;
 
 class FootprintRenderer final : public Renderer {
   public:
-    FootprintRenderer(std::unique_ptr<Renderer> inner, const Bundle& bundle)
-        : inner_(std::move(inner)), footprint_(bundle) {}
+    FootprintRenderer(std::unique_ptr<Renderer> inner, const Bundle& bundle, const Limits& limits)
+        : inner_(std::move(inner)), footprint_(bundle), limits_(limits) {}
 
     Result<Frame> render(const Camera& camera) override {
         STX_CHECK(camera.check());
@@ -44,12 +46,18 @@ class FootprintRenderer final : public Renderer {
         if (!(ratio > kEnough)) return 1;
         int factor = static_cast<int>(std::lround(std::min(ratio, double{kMostFactor})));
         const double pixels = static_cast<double>(camera.width) * camera.height;
-        while (factor > 1 && pixels * factor * factor > kMostPixels) --factor;
+        const auto fits = [&] {
+            const double large = pixels * factor * factor;
+            return large <= kMostPixels &&
+                   limits_.checkAllocation(static_cast<std::uint64_t>(large), kBytesEach, "");
+        };
+        while (factor > 1 && !fits()) --factor;
         return factor;
     }
 
     std::unique_ptr<Renderer> inner_;
     Footprint footprint_;
+    Limits limits_;
 };
 
 }  // namespace
@@ -137,8 +145,9 @@ Frame minified(const Frame& large, int factor) {
     return out;
 }
 
-std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const Bundle& bundle) {
-    return std::make_unique<FootprintRenderer>(std::move(inner), bundle);
+std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const Bundle& bundle,
+                                        const Limits& limits) {
+    return std::make_unique<FootprintRenderer>(std::move(inner), bundle, limits);
 }
 
 }  // namespace stx

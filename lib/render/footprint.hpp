@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/render/renderer.hpp"
 
@@ -29,9 +30,9 @@ class Footprint {
 
 /// A renderer that draws pictures which are smaller than the reference views as large as those, and
 /// averages: the renderers of this library look at a handful of samples for each pixel and would
-/// alias. Cameras that see the samples at up to 1.5 to the pixel are left to `inner`. The bundle
-/// must outlive it.
+/// alias. Cameras that see the samples at up to 1.5 to the pixel are left to `inner`. Larger
+/// pictures are held to `limits` and to 16 million pixels. The bundle must outlive it.
 [[nodiscard]] std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner,
-                                                      const Bundle& bundle);
+                                                      const Bundle& bundle, const Limits& limits);
 
 }  // namespace stx

@@ -2,6 +2,7 @@
 
 #include "lib/render/cpu/cpu_splat.hpp"
 #include "lib/render/cpu/cpu_surface.hpp"
+#include "lib/render/fallback.hpp"
 #include "lib/render/footprint.hpp"
 #ifdef STX_WITH_GPU
 #include "lib/render/gl/gl_renderer.hpp"
@@ -84,7 +85,10 @@ Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const Bundle& bundl
     }
     if (hasHardware(device)) {
         auto made = makeGpu(bundle, settings, device, job);
-        if (made) return made;
+        if (made)
+            return withFallback(
+                std::move(*made),
+                [&bundle, settings, &job] { return makeCpu(bundle, settings, job); }, job);
         job.note(fmt::format("the gpu backend cannot be used ({}); the cpu backend draws instead",
                              made.error().text()));
     }
@@ -98,7 +102,7 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
                                                Job& job) {
     STX_CHECK(bundle.check());
     STX_TRY(auto made, makePlain(backend, bundle, settings, device, job));
-    if (averages(backend, settings)) made = withFootprint(std::move(made), bundle);
+    if (averages(backend, settings)) made = withFootprint(std::move(made), bundle, job.limits);
     return made;
 }
 
