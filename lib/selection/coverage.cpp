@@ -16,6 +16,12 @@ double spread(std::int64_t i, double step) {
     return x - std::floor(x);
 }
 
+/// What seeing a piece of surface is worth, by how finely it is sampled (1 = as wanted, head-on).
+float worthOf(double sampling) {
+    constexpr double kEnough = 0.4, kFiner = 0.1;
+    return static_cast<float>((1 - kFiner) * std::min(1.0, sampling / kEnough) + kFiner * sampling);
+}
+
 }  // namespace
 
 std::vector<SurfaceSample> sampleMesh(const Mesh& mesh, int count) {
@@ -176,7 +182,7 @@ CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
     for (std::size_t v = 0; v < seen.size(); ++v) {
         for (const auto& s : seen[v]) {
             const double rate = target > 0 ? std::min(1.0, s.density / target) : 1.0;
-            problem.views[v].push_back({s.sample, static_cast<float>(s.cosine * rate)});
+            problem.views[v].push_back({s.sample, worthOf(s.cosine * rate)});
         }
     }
     return problem;

@@ -50,7 +50,7 @@ struct Selection {
 /// Candidate directions around a mesh.
 struct MeshCandidates {
     int directions = 200;  ///< even on the sphere, 1..4096
-    int depthSize = 192;   ///< longer side of the depth images that tell what each sees, 16..2048
+    int depthSize = 384;   ///< longer side of the depth images that tell what each sees, 16..2048
     ViewFraming framing;   ///< of the views that will be captured; each drawn in to fill its frame
 };
 

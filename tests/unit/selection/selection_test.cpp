@@ -83,6 +83,33 @@ TEST(Coverage, SamplesOfABundleAddUpToItsSurface) {
     EXPECT_NEAR(area, 4 * 3.14159265, 0.05 * 4 * 3.14159265);
 }
 
+TEST(Coverage, SeeingASurfaceCountsForMostAndSeeingItBetterForTheRest) {
+    // A plane seen from four angles at the same distance: each view by itself.
+    const SurfaceSample sample{{0, 0, 0}, {0, 0, 1}, 1.0, false};
+    std::vector<Image<float>> depths;
+    std::vector<CandidateView> views;
+    depths.reserve(4);
+    for (const double degrees : {0.0, 60.0, 72.0, 84.0}) {
+        const double a = degrees * 3.14159265358979 / 180;
+        Camera camera = analytic::lookingAt({3 * std::sin(a), 0, 3 * std::cos(a)}, 63);
+        depths.emplace_back(63, 63, 3.0f);
+        views.push_back({camera, camera, &depths.back(), 0});
+    }
+    const auto p = coverProblem({sample}, views, 1e-3);
+    std::vector<float> quality;
+    for (const auto& v : p.views) {
+        ASSERT_EQ(v.size(), 1u);
+        quality.push_back(v[0].quality);
+    }
+    EXPECT_NEAR(quality[0], 1.0, 1e-6);
+    EXPECT_NEAR(quality[1], 0.95, 1e-6) << "60 degrees is seen well enough";
+    EXPECT_NEAR(quality[2], 0.9 * 0.309017 / 0.4 + 0.0309017, 1e-5);
+    EXPECT_LT(quality[3], 0.3) << "a glance along a surface is not worth a view";
+    const auto coarse = coverProblem({sample}, views, 4 / views[0].camera.sampleSpacing(3).x);
+    EXPECT_NEAR(coarse.views[0][0].quality, 0.9 * 0.25 / 0.4 + 0.025, 1e-5)
+        << "so is a surface with a quarter of the wanted samples";
+}
+
 TEST(Selection, FromABundleDropsWhatAddsNothing) {
     Bundle bundle;
     const std::vector<glm::dvec3> eyes = {{3, 0, 0},  {3, 0.1, 0}, {-3, 0, 0}, {0, 3, 0},
