@@ -77,6 +77,7 @@ int opinionOf(int s, float x, float y, float q) {
         if (!inside(s, c)) continue;
         uvec3 texel = texelFetch(surfaces, ivec3(c, s), 0).xyz;
         float there = uintBitsToFloat(texel.x);
+        if (there < 0.0) return 0;  // pruned
         if (!(there > 0.0)) continue;
         any = true;
         float reach = 4.0 * kLinkedSamples * whole(ownAxis, there);

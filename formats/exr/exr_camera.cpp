@@ -111,6 +111,7 @@ void setExrCamera(ExrPart& part, const ReferenceView& view) {
     a["stx:nearPlane"] = view.nearPlane;
     a["stx:farPlane"] = view.farPlane;
     a["stx:depthBits"] = std::int64_t{view.depthBits};
+    if (view.pruned) a["stx:pruned"] = std::int64_t{1};
 }
 
 Result<ReferenceView> exrCamera(const ExrPart& part) {
@@ -162,6 +163,8 @@ Result<ReferenceView> exrCamera(const ExrPart& part) {
     if (!bits) return missing("stx:depthBits");
     c.orthographic = *orthographic != 0;
     view.depthBits = static_cast<int>(*bits);
+    const auto* pruned = part.attribute<std::int64_t>("stx:pruned");
+    view.pruned = pruned && *pruned != 0;
     return view;
 }
 

@@ -24,6 +24,9 @@ struct ReferenceView {
     double farPlane = 100.0;
     /// How the depth is coded in MPEG-4 files: 8 or 16 bits; 32 = float distances, only in .exr.
     int depthBits = 16;
+    /// Pixels of full alpha without a depth were pruned: the object is there, other views tell its
+    /// distance. In other views they are what a sensor missed.
+    bool pruned = false;
 
     Texture texture;     ///< colour with coverage in alpha
     Image<float> depth;  ///< planar distance in scene units; kNoDepth where there is no point

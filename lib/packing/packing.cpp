@@ -252,6 +252,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
+        view.pruned = pruned;
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);

@@ -55,9 +55,10 @@ void giveAway(std::vector<PruneView>& views, const std::vector<int>& rank,
             for (int y = static_cast<int>(begin); y < end; ++y) {
                 for (int x = 0; x < from.kept.width(); ++x) {
                     if (!from.kept.at(x, y) || from.locked.at(x, y)) continue;
+                    const PrunePixel pixel(from, x, y);
                     for (const int j : from.partners) {
                         PruneView& to = views[j];
-                        const Replacement r = findReplacement(from, x, y, to, settings);
+                        const Replacement r = findReplacement(from, pixel, to, settings);
                         if (!r.found) continue;
                         for (int c = 0; c < 4; ++c)
                             std::atomic_ref(to.locked.at(r.x + (c & 1), r.y + (c >> 1)))
@@ -193,6 +194,7 @@ void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
         }
     }
     if (!any) return;
+    view.pruned = true;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             if (!kept.at(x, y)) continue;

@@ -92,16 +92,29 @@ Result<std::vector<PruneView>> preparePruning(const Bundle& bundle, const std::v
     return views;
 }
 
-Replacement findReplacement(const PruneView& from, int x, int y, const PruneView& to,
+PrunePixel::PrunePixel(const PruneView& view, int x, int y) {
+    const Camera& camera = view.view->camera;
+    const double w = view.surface.w.at(x, y);
+    const double dist = camera.orthographic ? w : 1.0 / w;
+    world = camera.position + view.worldFromCamera * camera.unproject(x + 0.5, y + 0.5, dist);
+    const PixelSteps steps = planeSteps(camera, x, y, w, view.surface.gradient.at(x, y));
+    // Along y runs down, so this faces the viewpoint.
+    const glm::dvec3 across = glm::cross(steps.alongY, steps.alongX);
+    const double area = glm::length(across);
+    if (area > 0) {
+        rate = 1.0 / area;
+        normal = view.worldFromCamera * (across * rate);
+    }
+    colour = view.view->texture.at(x, y);
+}
+
+Replacement findReplacement(const PruneView& from, const PrunePixel& source, const PruneView& to,
                             const PruneSettings& settings) {
     Replacement r;
-    const Camera& a = from.view->camera;
     const Camera& b = to.view->camera;
-    const double w = from.surface.w.at(x, y);
-    const double dist = a.orthographic ? w : 1.0 / w;
-    const glm::dvec3 world =
-        a.position + from.worldFromCamera * a.unproject(x + 0.5, y + 0.5, dist);
-    const glm::dvec3 inCamera = to.cameraFromWorld * (world - b.position);
+    const glm::dvec3 towards = b.orthographic ? -b.forward() : b.position - source.world;
+    if (!(glm::dot(source.normal, towards) > 0)) return r;
+    const glm::dvec3 inCamera = to.cameraFromWorld * (source.world - b.position);
     const double z = -inCamera.z;
     if (!b.orthographic && !(z > 0)) return r;
     const glm::dvec3 pixel = b.project(inCamera);
@@ -137,7 +150,7 @@ Replacement findReplacement(const PruneView& from, int x, int y, const PruneView
     const int nx = static_cast<int>(pixel.x), ny = static_cast<int>(pixel.y);
     if (rateAt(to, nx, ny, to.surface.w.at(nx, ny)) * settings.rateTolerance *
             settings.rateTolerance <
-        rateAt(from, x, y, w))
+        source.rate)
         return r;
     const auto tx = static_cast<float>(fx - x0), ty = static_cast<float>(fy - y0);
     const Texture& other = to.view->texture;
@@ -145,11 +158,10 @@ Replacement findReplacement(const PruneView& from, int x, int y, const PruneView
                                  other.at(x0 + 1, y0 + 1)};
     const glm::vec3 found =
         glm::mix(glm::mix(corner[0], corner[1], tx), glm::mix(corner[2], corner[3], tx), ty);
-    const glm::vec3 own = from.view->texture.at(x, y);
     const glm::vec3 contrast =
         glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3])) -
         glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3]));
-    const glm::vec3 difference = glm::abs(found - own);
+    const glm::vec3 difference = glm::abs(found - source.colour);
     if (glm::any(
             glm::greaterThan(difference, contrast + static_cast<float>(settings.colourTolerance))))
         return r;

@@ -34,8 +34,19 @@ struct Replacement {
 [[nodiscard]] Result<std::vector<PruneView>> preparePruning(const Bundle& bundle,
                                                             const std::vector<int>& rank, Job& job);
 
-/// Looks for pixel (x, y) of `from` in view `to`.
-[[nodiscard]] Replacement findReplacement(const PruneView& from, int x, int y, const PruneView& to,
-                                          const PruneSettings& settings);
+/// A pixel that others might replace.
+struct PrunePixel {
+    PrunePixel(const PruneView& view, int x, int y);
+
+    glm::dvec3 world{0.0};   ///< its point
+    glm::dvec3 normal{0.0};  ///< of its surface, towards its view; world, unit
+    double rate = 0;         ///< samples per area of its surface
+    glm::vec3 colour{0.0f};
+};
+
+/// Looks for a pixel of `from` in view `to`. A sheet that both see from opposite sides is two
+/// surfaces.
+[[nodiscard]] Replacement findReplacement(const PruneView& from, const PrunePixel& pixel,
+                                          const PruneView& to, const PruneSettings& settings);
 
 }  // namespace stx

@@ -20,8 +20,10 @@ namespace {
 
 using namespace surface;
 
-/// Views that tell less of the object than this are taken for pruned ones.
+/// Views that tell less of the object than this have no picture of their own to give back.
 constexpr double kWhole = 0.9;
+/// Sources that a tile can be built from.
+constexpr int kMostGeometry = 32;
 
 Effort effortOf(Quality quality) {
     Effort e;
@@ -35,7 +37,7 @@ Effort effortOf(Quality quality) {
             break;
         case Quality::best:
             e.samplesPerPixel = 4;
-            e.mostGeometry = 32;
+            e.mostGeometry = kMostGeometry;
             break;
     }
     return e;
@@ -59,13 +61,17 @@ class CpuSurfaceRenderer final : public Renderer {
         for (const Source& s : sources_) {
             border += borderCoverage(s) / static_cast<double>(sources_.size());
             told += s.told / static_cast<double>(sources_.size());
+            pruned_ = pruned_ || s.view->pruned;
             addBounds(s);
         }
         fillsFrame_ = border > 0.5;
-        // Of pruned views as many are needed as together show what the usual number would.
-        if (told < 1)
+        // Pruned views share the surface among them: each may be the only one left to show a piece
+        // of it. Of views with gaps as many are needed as together show what the usual number would.
+        if (pruned_)
+            effort_.mostGeometry = kMostGeometry;
+        else if (told < 1)
             effort_.mostGeometry =
-                static_cast<int>(std::min(32.0, std::ceil(effort_.mostGeometry / told)));
+                static_cast<int>(std::min<double>(kMostGeometry, std::ceil(effort_.mostGeometry / told)));
         if (settings.wantNormals()) findNormals();
     }
 
@@ -121,6 +127,7 @@ class CpuSurfaceRenderer final : public Renderer {
     std::vector<Image<glm::vec3>> normals_;  ///< of views that bring none, when frames want them
     Bounds bounds_;
     bool fillsFrame_ = false;
+    bool pruned_ = false;  ///< some view is
     std::optional<Camera> expected_;
     std::unique_ptr<FrameWork> begun_;      ///< a frame under way before it was asked for
     std::unique_ptr<TilePainter> painter_;  ///< null = the processor paints
@@ -280,9 +287,13 @@ std::vector<int> CpuSurfaceRenderer::chooseSources(const PixelSpace& space,
     };
     const glm::dvec3 look = towards(space.camera);
     std::vector<std::pair<double, int>> ranked;
-    for (int i = 0; i < count; ++i)
-        ranked.emplace_back(
-            -glm::dot(look, towards(all[static_cast<std::size_t>(i)].source->space.camera)), i);
+    for (int i = 0; i < count; ++i) {
+        const FrameSource& f = all[static_cast<std::size_t>(i)];
+        // Of many pruned views those come first that have something here.
+        const auto t = static_cast<std::size_t>(tile);
+        const double idle = pruned_ && f.tileBegin[t] == f.tileBegin[t + 1] ? 2.0 : 0.0;
+        ranked.emplace_back(idle - glm::dot(look, towards(f.source->space.camera)), i);
+    }
     std::nth_element(ranked.begin(), ranked.begin() + effort_.mostGeometry - 1, ranked.end());
     for (int i = 0; i < effort_.mostGeometry; ++i)
         chosen.push_back(ranked[static_cast<std::size_t>(i)].second);
@@ -370,8 +381,7 @@ int CpuSurfaceRenderer::viewAt(const Camera& camera) const {
         return std::abs(a - b) <= 1e-9 * std::max(1.0, std::abs(a));
     };
     for (std::size_t i = 0; i < bundle_.views.size(); ++i) {
-        // A view that has lost much to pruning has no picture of its own to give back.
-        if (sources_[i].told < kWhole) continue;
+        if (sources_[i].told < (bundle_.views[i].pruned ? 1.0 : kWhole)) continue;
         const Camera& c = bundle_.views[i].camera;
         if (c.width != camera.width || c.height != camera.height ||
             c.orthographic != camera.orthographic)

@@ -45,6 +45,8 @@ enum class Opinion {
             const int cx = x0 + i, cy = y0 + j;
             if (!s.q.contains(cx, cy)) continue;
             const float there = s.q.at(cx, cy);
+            // What was pruned from here may be the very surface that is asked about.
+            if (there < 0.0f) return Opinion::none;
             if (!(there > 0.0f)) continue;
             any = true;
             // The cheap half of the test first: most surfaces are not behind the point at all.

@@ -49,7 +49,7 @@ void findLinks(Source& s) {
                 if (linked(axis, s.step, at(x, y - 1), q, at(x, y + 1), at(x, y + 2)))
                     bits |= Source::kLinkDown;
                 const auto empty = [&](int nx, int ny) {
-                    return s.q.contains(nx, ny) && !(s.q.at(nx, ny) > 0.0f);
+                    return s.q.contains(nx, ny) && s.q.at(nx, ny) == 0.0f;
                 };
                 if (s.q.at(x, y) > 0.0f &&
                     (empty(x - 1, y) || empty(x + 1, y) || empty(x, y - 1) || empty(x, y + 1)))
@@ -71,7 +71,15 @@ void findEdges(Source& s) {
                 const bool all = point && s.linkRight(x, y) && s.linkDown(x, y) && x > 0 && y > 0 &&
                                  s.linkRight(x - 1, y) && s.linkDown(x, y - 1);
                 if (all && (!s.hasAlpha || s.alpha(x, y) >= 1.0f)) continue;
-                distance.at(x, y) = 0;
+                // Where pruning took the neighbour away the surface goes on: that is the border of
+                // what is told, but no edge.
+                const bool goesOn = point && x > 0 && y > 0 && x + 1 < s.width &&
+                                    y + 1 < s.height && (s.linkRight(x, y) || s.pruned(x + 1, y)) &&
+                                    (s.linkDown(x, y) || s.pruned(x, y + 1)) &&
+                                    (s.linkRight(x - 1, y) || s.pruned(x - 1, y)) &&
+                                    (s.linkDown(x, y - 1) || s.pruned(x, y - 1));
+                if (!s.pruned(x, y) && !(goesOn && (!s.hasAlpha || s.alpha(x, y) >= 1.0f)))
+                    distance.at(x, y) = 0;
                 if (!point || all) continue;
                 auto& block =
                     s.blocks[static_cast<std::size_t>(y / kBlock) * s.blocksX + x / kBlock];
@@ -179,6 +187,7 @@ float unevenness(const Source& s) {
         for (int x = 1; x + 1 < s.width; x += 3) {
             if (s.edgeDistance(x, y) < 3) continue;
             const float q = s.q.at(x, y);
+            if (!(q > 0 && s.q.at(x - 1, y) > 0 && s.q.at(x + 1, y) > 0)) continue;
             values.push_back(std::abs(s.q.at(x - 1, y) - 2 * q + s.q.at(x + 1, y)) /
                              s.space.axis.whole(q));
         }
@@ -325,6 +334,8 @@ Source prepareSource(const ReferenceView& view) {
                 const float dist = view.depth.at(x, y);
                 if (hasPoint(dist) && dist > 0.0f)
                     s.q.at(x, y) = static_cast<float>(s.space.axis.q(dist));
+                else if (view.pruned && s.alpha(x, y) >= 1.0f)
+                    s.q.at(x, y) = -1.0f;
                 if (s.alpha(x, y) < 1.0f) rowHasAlpha[static_cast<std::size_t>(y)] = 1;
             }
         }

@@ -86,7 +86,8 @@ struct Source {
     double told = 1.0;  ///< share of the pixels of the object (points, or full alpha) with depth
     float noise = 0;    ///< how far, as a share of q, pixels stray from their neighbours
     float flat = 0;     ///< share of q by which pixels may leave the plane of a piece
-    Image<float> q;     ///< 0 = no point
+    /// 0 = nothing here; below 0 = pruned: the object is here, other sources tell its distance.
+    Image<float> q;
 
     static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4;
     Image<std::uint8_t> info;  ///< the links, and the distance to the nearest edge << 4
@@ -98,6 +99,7 @@ struct Source {
     [[nodiscard]] int edgeDistance(int x, int y) const { return info.at(x, y) >> 4; }
     [[nodiscard]] bool linkRight(int x, int y) const { return info.at(x, y) & kLinkRight; }
     [[nodiscard]] bool linkDown(int x, int y) const { return info.at(x, y) & kLinkDown; }
+    [[nodiscard]] bool pruned(int x, int y) const { return q.at(x, y) < 0.0f; }
     /// Alpha 0..1 of a pixel.
     [[nodiscard]] float alpha(int x, int y) const {
         if (const auto* i = view->texture.rgba8()) return i->at(x, y).a * (1.0f / 255.0f);
