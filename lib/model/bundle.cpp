@@ -1,5 +1,7 @@
 #include "lib/model/bundle.hpp"
 
+#include <algorithm>
+
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -47,6 +49,11 @@ const char* Bundle::nodeKind() const {
         if (v.hasNormals() || v.hasSplats()) return "SimpleTextureV2";
     }
     return "SimpleTexture";
+}
+
+bool Bundle::pruned() const {
+    return std::any_of(views.begin(), views.end(),
+                       [](const ReferenceView& v) { return v.pruned; });
 }
 
 std::int64_t Bundle::pointCount() const {

@@ -18,6 +18,8 @@ struct Bundle {
     /// "SimpleTextureV2" when a view carries normals or splats, else "SimpleTexture".
     [[nodiscard]] const char* nodeKind() const;
     [[nodiscard]] std::int64_t pointCount() const;
+    /// Some view was pruned.
+    [[nodiscard]] bool pruned() const;
     /// The bounds of all points, computed from the pixels.
     [[nodiscard]] Bounds computeBounds() const;
     /// Each view's check(), with its index; at least one view; one colour space in all views.

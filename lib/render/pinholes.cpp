@@ -7,14 +7,17 @@
 
 namespace stx {
 
-void closePinholes(Frame& frame) {
+namespace {
+
+/// Closes pixels of whose eight neighbours at least `enclosing` have a depth.
+void closeEnclosed(Frame& frame, int enclosing) {
     struct Closed {
         int x = 0, y = 0;
         glm::vec4 colour{0.0f}, albedo{0.0f};
         glm::vec3 normal{0.0f};
         float depth = 0;
     };
-    constexpr int kEnclosing = 7, kRowsPerTask = 32;
+    constexpr int kRowsPerTask = 32;
     const int width = frame.depth.width(), height = frame.depth.height();
     const int tasks = (height + kRowsPerTask - 1) / kRowsPerTask;
     std::vector<std::vector<Closed>> closed(tasks);
@@ -28,7 +31,7 @@ void closePinholes(Frame& frame) {
                 farthest = std::max(farthest, frame.depth.at(i, j));
             }
         }
-        if (covered < kEnclosing) return;
+        if (covered < enclosing) return;
         // What opens between two surfaces belongs to the one behind.
         Closed c{x, y, {}, {}, {}, 0};
         float n = 0;
@@ -71,6 +74,14 @@ void closePinholes(Frame& frame) {
             frame.normal.at(c.x, c.y) = c.normal;
         }
     }
+}
+
+}  // namespace
+
+void closePinholes(Frame& frame, bool pruned) {
+    closeEnclosed(frame, 7);
+    if (!pruned) return;
+    for (int round = 0; round < 2; ++round) closeEnclosed(frame, 5);
 }
 
 }  // namespace stx

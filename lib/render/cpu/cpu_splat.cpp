@@ -189,7 +189,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     }
     parallelFor(0, bands, [&](std::int64_t b) { drawBand(picture, static_cast<int>(b)); });
     if (settings_.splat == SplatRule::data) {
-        closePinholes(picture.frame);
+        closePinholes(picture.frame, bundle_.pruned());
         silhouettes_.carve(picture.frame, camera);
     }
     picture.frame.milliseconds =

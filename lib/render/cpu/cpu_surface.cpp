@@ -61,10 +61,10 @@ class CpuSurfaceRenderer final : public Renderer {
         for (const Source& s : sources_) {
             border += borderCoverage(s) / static_cast<double>(sources_.size());
             told += s.told / static_cast<double>(sources_.size());
-            pruned_ = pruned_ || s.view->pruned;
             addBounds(s);
         }
         fillsFrame_ = border > 0.5;
+        pruned_ = bundle.pruned();
         // Pruned views share the surface among them: each may be the only one left to show a piece
         // of it. Of views with gaps as many are needed as together show what the usual number would.
         if (pruned_)
