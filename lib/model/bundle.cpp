@@ -52,8 +52,7 @@ const char* Bundle::nodeKind() const {
 }
 
 bool Bundle::pruned() const {
-    return std::any_of(views.begin(), views.end(),
-                       [](const ReferenceView& v) { return v.pruned; });
+    return std::any_of(views.begin(), views.end(), [](const ReferenceView& v) { return v.pruned; });
 }
 
 std::int64_t Bundle::pointCount() const {

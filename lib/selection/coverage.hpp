@@ -42,12 +42,13 @@ struct Sighting {
 [[nodiscard]] Sighting sight(const CandidateView& view, const SurfaceSample& sample);
 
 /// The problem of choosing among candidates. How finely a view samples a piece of surface is
-/// s = visible * cosine * min(1, density / target), and its quality 0.9 * min(1, s / 0.4) + 0.1 * s:
-/// a novel view loses little to a surface sampled at a slant and much to one that nobody saw, so
+/// s = visible * cosine * min(1, density / target), and its quality 0.9 * min(1, s / 0.4) + 0.1 *
+/// s: a novel view loses little to a surface sampled at a slant and much to one that nobody saw, so
 /// most of the worth is in seeing it well enough (up to 66 degrees at the wanted density), the rest
-/// in seeing it better. With s itself, views face the large surfaces and leave the narrow ones open:
-/// around a fox, eight views by s rendered 1.2 dB worse (mean over 40 random novel views) than these.
-/// `targetDensity` 0 = the median, over the surface seen, of the best density any candidate has.
+/// in seeing it better. With s itself, views face the large surfaces and leave the narrow ones
+/// open: around a fox, eight views by s rendered 1.2 dB worse (mean over 40 random novel views)
+/// than these. `targetDensity` 0 = the median, over the surface seen, of the best density any
+/// candidate has.
 [[nodiscard]] CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
                                         const std::vector<CandidateView>& candidates,
                                         double targetDensity);

@@ -66,12 +66,16 @@ class CpuSurfaceRenderer final : public Renderer {
         fillsFrame_ = border > 0.5;
         pruned_ = bundle.pruned();
         // Pruned views share the surface among them: each may be the only one left to show a piece
-        // of it. Of views with gaps as many are needed as together show what the usual number would.
-        if (pruned_)
+        // of it. Of views with gaps as many are needed as together show what the usual number
+        // would.
+        if (pruned_) {
             effort_.mostGeometry = kMostGeometry;
-        else if (told < 1)
-            effort_.mostGeometry =
-                static_cast<int>(std::min<double>(kMostGeometry, std::ceil(effort_.mostGeometry / told)));
+            effort_.freeAlpha = kFreeAlphaPruned;
+            for (Source& s : sources_) s.freeAlpha = kFreeAlphaPruned;
+        } else if (told < 1) {
+            effort_.mostGeometry = static_cast<int>(
+                std::min<double>(kMostGeometry, std::ceil(effort_.mostGeometry / told)));
+        }
         if (settings.wantNormals()) findNormals();
     }
 

@@ -112,7 +112,7 @@ struct Fuser {
                 if (alphaAt(*local.source,
                             std::clamp(h.x / h.w, 0.0f, static_cast<float>(local.source->width)),
                             std::clamp(h.y / h.w, 0.0f, static_cast<float>(local.source->height))) <
-                    kFreeAlpha)
+                    local.source->freeAlpha)
                     return true;
                 continue;
             }

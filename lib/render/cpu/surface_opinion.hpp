@@ -36,7 +36,7 @@ enum class Opinion {
     if (!(u >= 0.0f && v >= 0.0f && u < static_cast<float>(s.width) &&
           v < static_cast<float>(s.height) && p > 0.0f))
         return Opinion::none;
-    if (alphaAt(s, u, v) < kFreeAlpha) return Opinion::freeByAlpha;
+    if (alphaAt(s, u, v) < s.freeAlpha) return Opinion::freeByAlpha;
     const int x0 = static_cast<int>(std::floor(u - 0.5f)),
               y0 = static_cast<int>(std::floor(v - 0.5f));
     bool any = false;

@@ -18,6 +18,7 @@ namespace stx::surface {
 struct Effort {
     int samplesPerPixel = 3;  ///< along one side of a pixel
     int mostGeometry = 8;     ///< sources that one tile is built from, at most 32
+    float freeAlpha = kFreeAlpha;
     ShadeSettings shade;
 };
 

@@ -9,6 +9,7 @@
 #include "lib/base/image.hpp"
 #include "lib/geometry/camera.hpp"
 #include "lib/model/reference_view.hpp"
+#include "lib/render/cpu/surface_constants.hpp"
 
 namespace stx::surface {
 
@@ -82,7 +83,8 @@ struct Source {
     PixelSpace space;
     int width = 0, height = 0;
     bool hasAlpha = false;  ///< some pixel is not fully covered
-    float step = 0;         ///< scene units between neighbouring depth codes
+    float freeAlpha = kFreeAlpha;
+    float step = 0;     ///< scene units between neighbouring depth codes
     double told = 1.0;  ///< share of the pixels of the object (points, or full alpha) with depth
     float noise = 0;    ///< how far, as a share of q, pixels stray from their neighbours
     float flat = 0;     ///< share of q by which pixels may leave the plane of a piece

@@ -87,86 +87,9 @@ Result<void> GpuSplatRenderer::prepare(const Bundle& bundle, Job& job) {
     resources_ = std::make_unique<Resources>();
     STX_TRY(resources_->scene, GpuScene::upload(bundle, *context_, settings_.wantNormals(), job));
     silhouettes_ = std::make_unique<Silhouettes>(bundle);
-<<<<<<< HEAD
+    pruned_ = bundle.pruned();
     const auto make = pipeline == GpuPipeline::compute ? makeComputeSplats : makeRasterSplats;
     STX_TRY(resources_->pipeline, make(*context_, resources_->scene, settings_));
-=======
-    pruned_ = bundle.pruned();
-    resources_->noAttributes = GlVertexArray::create();
-    resources_->uniforms = GlBuffer::create();
-    glNamedBufferStorage(resources_->uniforms.get(), sizeof(FrameUniforms), nullptr,
-                         GL_DYNAMIC_STORAGE_BIT);
-    const auto& able = context_->abilities();
-    // Linear colours need a float's range; 8-bit ones sum exactly in integers, two to a 64-bit
-    // atomic where there is one.
-    if (resources_->scene.linear && able.atomicFloat)
-        sums_ = Sums::floats;
-    else if (able.atomicInt64)
-        sums_ = Sums::pairs;
-    if (auto built = buildPrograms(); !built) {
-        if (raster_ || sums_ == Sums::integers) return built;
-        // A driver that names the extension and then does not take it.
-        sums_ = Sums::integers;
-        resources_->programs.clear();
-        STX_CHECK(buildPrograms());
-    }
-    return context_->check("preparing the renderer");
-}
-
-void GpuSplatRenderer::bindScene() const {
-    const Resources& r = *resources_;
-    glBindTextureUnit(0, r.scene.colour.get());
-    glBindTextureUnit(1, r.scene.depth.get());
-    glBindTextureUnit(2, r.scene.normal.get());
-    glBindTextureUnit(3, r.scene.slope.get());
-    glBindBufferBase(GL_UNIFORM_BUFFER, 0, r.uniforms.get());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, r.views.buffer.get());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, r.tasks.buffer.get());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, r.lights.buffer.get());
-}
-
-void GpuSplatRenderer::setDraw(int firstTask, int tasks, FrameUniforms& uniforms) const {
-    uniforms.counts.y = tasks;
-    uniforms.counts.z = firstTask;
-    glNamedBufferSubData(resources_->uniforms.get(), 0, sizeof(FrameUniforms), &uniforms);
-}
-
-Result<void> GpuSplatRenderer::drawCompute(SplatFrame& frame) {
-    Resources& r = *resources_;
-    const std::int64_t padded =
-        static_cast<std::int64_t>(frame.uniforms.frameSize.z) * (frame.uniforms.frameSize.y + 2);
-    r.front.reserve(padded * 4);
-    r.sums.reserve(padded * 4 * channels());
-    STX_CHECK(context_->check("making the frame's buffers"));
-    const std::uint32_t nothing = 0x7f800000u, zero = 0;
-    glClearNamedBufferData(r.front.buffer.get(), GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT,
-                           &nothing);
-    glClearNamedBufferData(r.sums.buffer.get(), GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 3, r.front.buffer.get());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, r.sums.buffer.get());
-    const auto dispatch = [&](int pass, Rule rule, int first, int count) -> Result<void> {
-        if (count == 0) return {};
-        STX_TRY(const GLuint name, program("compute", pass, rule));
-        glUseProgram(name);
-        setDraw(first, count, frame.uniforms);
-        const int columns = std::min(count, 32768);
-        glDispatchCompute(static_cast<GLuint>(columns),
-                          static_cast<GLuint>((count + 32767) / 32768), 1);
-        return {};
-    };
-    const int large = frame.uniformTasks + frame.smallTasks;
-    const int all = static_cast<int>(frame.tasks.size());
-    const Rule first = settings_.splat == SplatRule::point   ? Rule::point
-                       : settings_.splat == SplatRule::paper ? Rule::paper
-                                                             : Rule::uniform;
-    for (const int pass : {1, 2}) {
-        glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-        STX_CHECK(dispatch(pass, first, 0, frame.uniformTasks));
-        STX_CHECK(dispatch(pass, Rule::small, frame.uniformTasks, frame.smallTasks));
-        STX_CHECK(dispatch(pass, Rule::ellipse, large, all - large));
-    }
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
->>>>>>> 7f8d57c (Splat mode: slits between samples of pruned views close)
     return {};
 }
 
@@ -263,13 +186,8 @@ Result<Frame> GpuSplatRenderer::render(const Camera& camera) {
                                      : renderPieces(camera, frame));
     }
     if (settings_.splat == SplatRule::data) {
-<<<<<<< HEAD
         const auto start = Clock::now();
-        closePinholes(frame);
-=======
-        const auto start = std::chrono::steady_clock::now();
         closePinholes(frame, pruned_);
->>>>>>> 7f8d57c (Splat mode: slits between samples of pruned views close)
         silhouettes_->carve(frame, camera);
         frame.milliseconds += millisecondsSince(start);
     }

@@ -136,6 +136,7 @@ class GpuSurfacePainter final : public surface::TilePainter {
 
     std::shared_ptr<EglContext> context_;
     int perPixel_ = 1, mostSources_ = 4;
+    float freeAlpha_ = surface::kFreeAlpha;
     std::int64_t mostSlots_ = 0, mostTiles_ = 0;  ///< of a batch
     std::unique_ptr<Resources> resources_;
     std::deque<Begun> begun_;
@@ -143,7 +144,7 @@ class GpuSurfacePainter final : public surface::TilePainter {
 
 Result<GlProgram> GpuSurfacePainter::build(SurfaceProgram program) const {
     const std::array<ShaderStage, 1> stages{surfaceStage(program)};
-    return buildProgram(surfaceHeader({perPixel_, mostSources_}, program), stages);
+    return buildProgram(surfaceHeader({perPixel_, mostSources_, freeAlpha_}, program), stages);
 }
 
 Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
@@ -153,6 +154,7 @@ Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
     Resources& r = *resources_;
     perPixel_ = effort.samplesPerPixel;
     mostSources_ = effort.shade.mostSources;
+    freeAlpha_ = effort.freeAlpha;
     const std::int64_t storage = context_->abilities().maxStorageBytes;
     const std::int64_t perTile = kTilePixels * perPixel_ * perPixel_;
     mostSlots_ = std::min(storage, kSampleBytes) / (perTile * 4);

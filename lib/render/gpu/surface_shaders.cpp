@@ -20,7 +20,7 @@ std::string surfaceHeader(const SurfaceVariant& v, SurfaceProgram program) {
                                ShaderConstant{"kOneSurface", kOneSurface},
                                ShaderConstant{"kLinkedSamples", kLinkedSamples},
                                ShaderConstant{"kExtensionWeight", kExtensionWeight},
-                               ShaderConstant{"kFreeAlpha", kFreeAlpha},
+                               ShaderConstant{"kFreeAlpha", v.freeAlpha},
                                ShaderConstant{"kSlopeDoubt", kSlopeDoubt},
                                ShaderConstant{"kAngleFalloff", kAngleFalloff},
                                ShaderConstant{"kEdgeFade", kEdgeFade},

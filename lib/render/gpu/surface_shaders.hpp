@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "lib/render/cpu/surface_constants.hpp"
 #include "lib/render/gpu/shader_program.hpp"
 
 namespace stx::gpu {
@@ -12,6 +13,7 @@ namespace stx::gpu {
 struct SurfaceVariant {
     int samplesPerPixel = 3;  ///< along a side
     int mostSources = 4;      ///< that a piece takes colours from
+    float freeAlpha = surface::kFreeAlpha;
 };
 
 enum class SurfaceProgram { mesh, extensions, fuse, shade, resolve, resolveWithOrigin };
