@@ -1,10 +1,11 @@
 #include <chrono>
+#include <cmath>
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "lib/packing/packing.hpp"
-#include "lib/packing/prune.hpp"
+#include "lib/packing/prune_quality.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -17,6 +18,7 @@ struct PackOptions {
     bool prune = false;
     std::string budget;
     PruneSettings pruning;
+    double minPsnr = 0;
 };
 
 /// "4M", "250k" or "1000000" pixels.
@@ -45,13 +47,16 @@ Result<int> packBundle(const PackOptions& o, Program& program) {
     STX_TRY(auto bundle, openBundle(o.input, {}, program.job));
     PackSettings settings = o.settings;
     std::string pruned;
-    if (o.prune || pruning.budget > 0 || pruning.minPsnr > 0) {
-        auto report = prune(bundle, pruning, program.job);
+    if (o.prune || pruning.budget > 0 || o.minPsnr > 0) {
+        auto report = o.minPsnr > 0 ? pruneToQuality(bundle, pruning, o.minPsnr, program.job)
+                                    : prune(bundle, pruning, program.job);
         if (!report) return tl::unexpected(report.error().at(fmt::format("'{}'", o.input)));
         settings.sourcePixels = report->sourcePixels;
         pruned = fmt::format(", {:.1f} % of the object's pixels kept",
                              100.0 * static_cast<double>(report->keptPixels) /
                                  static_cast<double>(report->sourcePixels));
+        if (o.minPsnr > 0 && std::isfinite(report->psnr))
+            pruned += fmt::format(", {:.1f} dB measured", report->psnr);
     }
     settings.layout =
         o.layout == "tight" ? PackSettings::Layout::tight : PackSettings::Layout::grid;
@@ -110,8 +115,9 @@ Command addPack(CLI::App& app, Program& program) {
         ->type_name("PIXELS")
         ->group(pruning);
     c->add_option(
-         "--min-psnr", o->pruning.minPsnr,
-         "Prune only as far as the pixels that replace the others reach this (an estimate)")
+         "--min-psnr", o->minPsnr,
+         "Prune only as far as pictures of what is kept reach this against pictures of all: RGB, "
+         "the worst of up to 8, rendered from poses of the views and half way between them")
         ->type_name("DB")
         ->check(CLI::Range(0.0, 200.0))
         ->group(pruning);

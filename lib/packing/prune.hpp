@@ -12,7 +12,8 @@ struct PruneSettings {
     /// Object pixels to keep at most; 0 = no limit. Without a limit and without minPsnr everything
     /// goes that another view shows at a finer or equal rate.
     std::int64_t budget = 0;
-    /// Estimated PSNR of the pruned pixels against what replaces them, dB; 0 = not asked for.
+    /// Estimated PSNR of the pruned pixels against what replaces them, dB; 0 = not asked for. Of
+    /// pictures it promises little: pruneToQuality() measures them.
     double minPsnr = 0;
     /// Pixels kept around each kept region, so that filters work across its border; 0..16. With a
     /// budget it grows as far as there is room.

@@ -3,11 +3,13 @@
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/metrics/compare.hpp"
 #include "lib/packing/packing.hpp"
-#include "lib/packing/prune.hpp"
+#include "lib/packing/prune_quality.hpp"
 #include "lib/render/renderer.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/packing/holes.hpp"
+#include "tests/unit/packing/spheres_miv.hpp"
 
 namespace stx {
 namespace {
@@ -85,6 +87,53 @@ TEST(PruneModels, TruckStaysClosed) {
 TEST(PruneModels, EngineStaysClosed) {
     REQUIRE_SHARED(folder, "data/meshes/gltf-draco/2CylinderEngine");
     expectNoHole(folder / "2CylinderEngine.gltf");
+}
+
+/// PSNR of RGB of two frames, where both are opaque or not, on black.
+double psnr(const Frame& a, const Frame& b) {
+    const auto difference = compare(a.colour, b.colour);
+    EXPECT_TRUE(difference);
+    return difference->psnrRgb.value_or(99);
+}
+
+/// Prunes to 40 dB and looks from poses that pruning did not measure.
+void expectFortyDecibels(const Bundle& before, const std::vector<Camera>& novel) {
+    Job job;
+    Bundle after = before;
+    const auto report = pruneToQuality(after, {}, 40, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_GE(report->psnr, 40);
+    EXPECT_LT(report->keptPixels, report->sourcePixels * 8 / 10);
+    EXPECT_EQ(report->keptPixels, after.pointCount());
+    const auto a = makeRenderer(Backend::cpu, before, {}, -1, job),
+               b = makeRenderer(Backend::cpu, after, {}, -1, job);
+    ASSERT_TRUE(a && b);
+    for (const Camera& camera : novel)
+        EXPECT_GE(psnr(*(*a)->render(camera), *(*b)->render(camera)), 39.5);
+}
+
+TEST(PruneModels, SpotReachesTheQualityAskedFor) {
+    REQUIRE_SHARED(folder, "data/meshes/obj/spot");
+    Job job;
+    auto opened = openRenderable((folder / "spot_triangulated.obj").string(), {}, job);
+    ASSERT_TRUE(opened) << opened.error().text();
+    const Mesh& mesh = std::get<Mesh>(*opened);
+    ViewFraming framing;
+    framing.width = framing.height = 256;
+    const auto cameras = layoutCameras({ViewLayout::Kind::sphere, 16, 0}, framing, mesh.positions);
+    const auto novel = layoutCameras({ViewLayout::Kind::ring, 3, 0.3}, framing, mesh.positions);
+    ASSERT_TRUE(cameras && novel);
+    const auto before = captureBundle(mesh, *cameras, {}, job);
+    ASSERT_TRUE(before);
+    expectFortyDecibels(*before, *novel);
+}
+
+TEST(PruneModels, SpheresReachTheQualityAskedFor) {
+    REQUIRE_SHARED(folder, "data/imagesets/spheres-miv");
+    Camera near, centre;
+    const auto bundle = spheres::load(folder, "gt_center", centre);
+    ASSERT_TRUE(bundle && spheres::load(folder, "gt_near", near));
+    expectFortyDecibels(*bundle, {centre, near});
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "lib/packing/prune.hpp"
+#include "lib/packing/prune_quality.hpp"
 
 #include <gtest/gtest.h>
 
@@ -147,6 +147,26 @@ TEST(Prune, BudgetsAndQualitiesAreKept) {
     EXPECT_EQ(c.error().code, ErrorCode::invalidInput);
     EXPECT_NE(c.error().message.find("a budget of 50 pixels is too small"), std::string::npos);
     EXPECT_EQ(tiny.pointCount(), before.pointCount()) << "nothing is touched on an error";
+}
+
+TEST(Prune, AQualityThatNothingReachesKeepsAll) {
+    Bundle bundle = torusViews();
+    bundle.views.resize(5);
+    const auto count = bundle.pointCount();
+    Job job;
+    const auto report = pruneToQuality(bundle, {}, 120, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_EQ(report->keptPixels, count);
+    EXPECT_EQ(bundle.pointCount(), count);
+    EXPECT_EQ(job.takeNotes(),
+              std::vector<std::string>{"nothing is pruned: 120 dB are reached by all pixels only"});
+    PruneSettings settings;
+    settings.budget = count * 9 / 10;
+    const auto both = pruneToQuality(bundle, settings, 120, job);
+    ASSERT_FALSE(both);
+    EXPECT_NE(both.error().message.find("cannot both be had"), std::string::npos);
+    EXPECT_EQ(bundle.pointCount(), count);
+    EXPECT_FALSE(pruneToQuality(bundle, {}, -3, job));
 }
 
 TEST(Prune, OneViewAndViewsThatShareNothingStayWhole) {

@@ -1,0 +1,139 @@
+#include "lib/packing/prune_quality.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lib/metrics/compare.hpp"
+#include "lib/render/cpu/cpu_surface.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kPoses = 4;
+constexpr int kMostSide = 1024;
+/// Estimates between which the search goes on, dB. The first gives nothing back.
+constexpr double kLeast = 1, kMost = 72, kNear = 1.5;
+
+Image<glm::u8vec4> pictureOf(const Frame& frame) {
+    Image<glm::u8vec4> out(frame.colour.width(), frame.colour.height());
+    for (std::size_t i = 0; i < out.count(); ++i) {
+        glm::vec3 c = glm::clamp(glm::vec3(frame.colour.pixels()[i]), 0.0f, 1.0f);
+        if (frame.linear) c = {srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)};
+        out.pixels()[i] = glm::u8vec4(glm::u8vec3(c * 255.0f + 0.5f), 255);
+    }
+    return out;
+}
+
+Camera pose(const Camera& camera) {
+    const double scale = static_cast<double>(kMostSide) / std::max(camera.width, camera.height);
+    if (scale >= 1) return camera;
+    const auto shrunk = [&](int side) {
+        return std::max(1, static_cast<int>(std::lround(side * scale)));
+    };
+    return camera.resized(shrunk(camera.width), shrunk(camera.height));
+}
+
+/// Own poses, and half way to the next view where that looks much the same way.
+std::vector<Camera> posesOf(const Bundle& bundle) {
+    const auto count = static_cast<int>(bundle.views.size());
+    std::vector<Camera> poses;
+    for (int k = 0; k < std::min(count, kPoses); ++k) {
+        const int i =
+            static_cast<int>(static_cast<std::int64_t>(k) * count / std::min(count, kPoses));
+        const Camera& own = bundle.views[i].camera;
+        poses.push_back(pose(own));
+        int nearest = -1;
+        double least = std::numeric_limits<double>::infinity();
+        for (int j = 0; j < count; ++j) {
+            const Camera& other = bundle.views[j].camera;
+            const double away = glm::length(own.position - other.position);
+            if (j == i || away >= least || glm::dot(own.forward(), other.forward()) < 0.2) continue;
+            least = away;
+            nearest = j;
+        }
+        if (nearest < 0) continue;
+        const Camera& other = bundle.views[nearest].camera;
+        Camera between = own;
+        between.position = 0.5 * (own.position + other.position);
+        between.orientation = glm::normalize(glm::slerp(own.orientation, other.orientation, 0.5));
+        poses.push_back(pose(between));
+    }
+    return poses;
+}
+
+}  // namespace
+
+Result<PruneQuality> PruneQuality::of(const Bundle& whole, Job& job) {
+    STX_CHECK(whole.check());
+    PruneQuality quality;
+    quality.cameras_ = posesOf(whole);
+    const auto renderer = makeCpuSurfaceRenderer(whole, {}, job);
+    for (const Camera& camera : quality.cameras_) {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(const auto frame, renderer->render(camera));
+        quality.pictures_.push_back(pictureOf(frame));
+    }
+    return quality;
+}
+
+Result<double> PruneQuality::measure(const Bundle& pruned, Job& job) const {
+    const auto renderer = makeCpuSurfaceRenderer(pruned, {}, job);
+    double worst = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(const auto frame, renderer->render(cameras_[i]));
+        STX_TRY(const auto difference, compare(pictureOf(frame), pictures_[i]));
+        if (difference.psnrRgb) worst = std::min(worst, *difference.psnrRgb);
+    }
+    return worst;
+}
+
+Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,
+                                   Job& job) {
+    if (!(wantedPsnr > 0) || std::isinf(wantedPsnr))
+        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be over 0", wantedPsnr);
+    STX_TRY(const auto quality, PruneQuality::of(bundle, job));
+    Bundle best;
+    PruneReport report;
+    const auto reaches = [&](double estimate) -> Result<bool> {
+        Bundle candidate = bundle;
+        PruneSettings now = settings;
+        now.minPsnr = estimate;
+        STX_TRY(auto pruned, prune(candidate, now, job));
+        STX_TRY(pruned.psnr, quality.measure(candidate, job));
+        if (!(pruned.psnr >= wantedPsnr)) return false;
+        best = std::move(candidate);
+        report = pruned;
+        return true;
+    };
+    STX_TRY(bool found, reaches(kLeast));
+    if (!found) {
+        double fails = kLeast, holds = kMost;
+        // What the estimate promises is seldom kept: the search starts there.
+        for (double middle = std::clamp(wantedPsnr, kLeast + kNear, kMost - kNear);
+             holds - fails > kNear; middle = 0.5 * (fails + holds)) {
+            STX_TRY(const bool good, reaches(middle));
+            found = found || good;
+            (good ? holds : fails) = middle;
+        }
+    }
+    if (!found) {
+        const auto pixels = bundle.pointCount();
+        if (settings.budget > 0 && settings.budget < pixels)
+            return fail(
+                ErrorCode::invalidInput,
+                "a budget of {} pixels and {:g} dB cannot both be had: allow more pixels or "
+                "ask for less",
+                settings.budget, wantedPsnr);
+        job.note(
+            fmt::format("nothing is pruned: {:g} dB are reached by all pixels only", wantedPsnr));
+        report.sourcePixels = report.keptPixels = pixels;
+        report.psnr = std::numeric_limits<double>::infinity();
+        return report;
+    }
+    bundle = std::move(best);
+    return report;
+}
+
+}  // namespace stx
