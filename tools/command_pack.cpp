@@ -102,8 +102,10 @@ Command addPack(CLI::App& app, Program& program) {
     c->add_option("--layout", o->layout,
                   "grid: equal cells in view order; tight: trimmed and packed (default grid)")
         ->check(CLI::IsMember({"grid", "tight"}));
-    c->add_option("--padding", o->settings.padding,
-                  "Pixels around each rectangle, filled from its edge (default 2)")
+    c->add_option(
+         "--padding", o->settings.padding,
+         "Pixels around each rectangle, filled from what surrounds it in its view; 1, 3, 7 keep "
+         "mip levels 1, 2, 3 clean (default 2)")
         ->check(CLI::Range(0, 64));
     c->add_option("--max-size", o->settings.maxSize, "Largest side of a texture (default 16384)")
         ->check(CLI::Range(16, 65536));

@@ -22,7 +22,8 @@ struct PackSettings {
         tight,
     };
     Layout layout = Layout::grid;
-    int padding = 2;      ///< pixels around each rectangle, 0..64
+    /// Pixels around each rectangle, 0..64. 2^L - 1 keep neighbours out of mip level L: 1, 3, 7.
+    int padding = 2;
     int maxSize = 16384;  ///< largest width and height of a texture: what a GPU takes; 1..65535
     /// Object pixels before pruning (PruneReport::sourcePixels), for Atlas::sourcePixels; 0 = the
     /// points and the pixels of full alpha without a depth.

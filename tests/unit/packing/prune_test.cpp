@@ -197,6 +197,21 @@ TEST(Prune, OnePixelObjectsAndEmptyViews) {
     EXPECT_EQ(report->emptiedViews, 1);
 }
 
+TEST(Prune, AThousandTinyViews) {
+    Bundle bundle;
+    for (int i = 0; i < 1000; ++i) {
+        const double a = 0.00628 * i;
+        bundle.views.push_back(analytic::capture(
+            analytic::sphere, analytic::lookingAt({3 * std::sin(a), 0.5, 3 * std::cos(a)}, 16),
+            16));
+    }
+    Job job;
+    const auto report = prune(bundle, {}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_EQ(report->keptPixels, bundle.pointCount());
+    EXPECT_TRUE(bundle.check());
+}
+
 TEST(Prune, SameOnAnyNumberOfThreads) {
     Bundle one = torusViews(), many = one;
     Job job;

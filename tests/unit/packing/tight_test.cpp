@@ -224,6 +224,43 @@ TEST(Tight, PaddingShowsTheNeighboursInTheView) {
     }
 }
 
+TEST(Tight, PaddingKeepsMipLevelsClean) {
+    // Views of one colour each: a texel of level L that touches a rectangle must show no other, nor
+    // the black of gaps, when the padding is 2^L - 1 or more.
+    Bundle bundle;
+    for (int i = 0; i < 12; ++i) {
+        bundle.views.push_back(blankView(90, 70));
+        paint(bundle.views.back(), 3 * i, 2 * i, 20 + 3 * i, 11 + 2 * i);
+        paint(bundle.views.back(), 3 * i, 2 * i, 5, 40);
+        for (auto& c : bundle.views.back().texture.rgba8()->pixels())
+            c = glm::u8vec4(20 * i + 10, 250 - 20 * i, 99, c.a);
+    }
+    for (const int level : {1, 2, 3}) {
+        PackSettings settings;
+        settings.layout = PackSettings::Layout::tight;
+        settings.padding = (1 << level) - 1;
+        Job job;
+        const auto atlas = pack(bundle, settings, job);
+        ASSERT_TRUE(atlas);
+        const auto& page = *atlas->pages[0].texture.rgba8();
+        int foreign = 0;
+        for (const auto& r : atlas->rectangles) {
+            const glm::u8vec3 own(20 * r.view + 10, 250 - 20 * r.view, 99);
+            for (int y = r.atlasY >> level << level; y < r.atlasY + r.atlasHeight();
+                 y += 1 << level) {
+                for (int x = r.atlasX >> level << level; x < r.atlasX + r.atlasWidth();
+                     x += 1 << level) {
+                    for (int k = 0; k < 1 << 2 * level; ++k) {
+                        const int px = x + (k & ((1 << level) - 1)), py = y + (k >> level);
+                        if (page.contains(px, py)) foreign += glm::u8vec3(page.at(px, py)) != own;
+                    }
+                }
+            }
+        }
+        EXPECT_EQ(foreign, 0) << "level " << level;
+    }
+}
+
 TEST(Tight, TenThousandTinyViews) {
     Bundle bundle;
     for (int i = 0; i < 10000; ++i) {
