@@ -5,6 +5,7 @@
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/open.hpp"
+#include "lib/base/printable.hpp"
 #include "lib/packing/packing.hpp"
 
 namespace stx {
@@ -218,7 +219,9 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
 }
 
 std::string describeAsText(const Json& info) {
-    const auto text = [](const Json& v) { return v.is_string() ? v.get<std::string>() : v.dump(); };
+    const auto text = [](const Json& v) {
+        return v.is_string() ? printable(v.get_ref<const std::string&>()) : v.dump();
+    };
     std::string out = fmt::format("{}: {}, {} bytes\n", text(info["file"]), text(info["container"]),
                                   text(info["bytes"]));
     for (const char* key :

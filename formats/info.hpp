@@ -19,7 +19,7 @@ struct InfoOptions {
 [[nodiscard]] Result<nlohmann::ordered_json> describe(const std::filesystem::path& path,
                                                       const InfoOptions& options, Job& job);
 
-/// The same for people.
+/// The same for people: lines in which names are printable().
 [[nodiscard]] std::string describeAsText(const nlohmann::ordered_json& info);
 
 }  // namespace stx

@@ -15,6 +15,7 @@
 
 #include "formats/files/temporaries.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/base/printable.hpp"
 #include "tools/stop_signals.hpp"
 
 namespace stx::tools {
@@ -195,8 +196,8 @@ void Batch::finish(std::size_t item, Json entry) {
     if (status == "error") {
         ++failed_;
         // Not hushed by --quiet: nothing else tells which input it was.
-        fmt::print(stderr, "error: '{}': {}\n", items_[item].input,
-                   oneLine(entry.value("message", "")));
+        fmt::print(stderr, "error: '{}': {}\n", printable(items_[item].input),
+                   printable(entry.value("message", "")));
     }
     entries_[item] = std::move(entry);
     program_.job.progress(static_cast<std::int64_t>(done_),

@@ -21,7 +21,7 @@ Result<int> bench(const BenchCommandOptions& o, Program& program) {
     if (program.common.format == "json") {
         nlohmann::ordered_json out = {{"$schema", "bench.schema.json"}};
         out.update(nlohmann::ordered_json::parse(benchJson(report)));
-        program.print(out.dump(2) + "\n");
+        program.printJson(out);
     } else {
         program.print(benchText(report));
     }

@@ -124,7 +124,7 @@ Result<int> compareImages(const CompareOptions& o, Program& program) {
             out["worst"]["frame"] = worstFrame;
             out["frames"] = perFrame;
         }
-        program.print(out.dump(2) + "\n");
+        program.printJson(out);
     } else if (total.identical()) {
         program.print("identical\n");
     } else {

@@ -11,7 +11,10 @@ struct InfoCommandOptions {
 
 Result<int> info(const InfoCommandOptions& o, Program& program) {
     STX_TRY(const auto found, describe(o.input, o.info, program.job));
-    program.print(program.common.format == "json" ? found.dump(2) + "\n" : describeAsText(found));
+    if (program.common.format == "json")
+        program.printJson(found);
+    else
+        program.print(describeAsText(found));
     return 0;
 }
 

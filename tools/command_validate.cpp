@@ -2,6 +2,7 @@
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/validate.hpp"
 #include "formats/open.hpp"
+#include "lib/base/printable.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -58,11 +59,10 @@ Result<int> validateFile(const ValidateCommandOptions& o, Program& program) {
                         {"message", f.rule->summary},
                         {"found", f.found},
                         {"expected", f.expected}});
-        if (program.common.format != "json") program.print(f.text() + "\n");
+        if (program.common.format != "json") program.print(printable(f.text()) + "\n");
     }
     if (program.common.format == "json") {
-        program.print(nlohmann::ordered_json{{"$schema", "validate.schema.json"}, {"file", o.input}, {"valid", valid},
-                                             {"findings", list}}.dump(2) + "\n");
+        program.printJson({{"$schema", "validate.schema.json"}, {"file", o.input}, {"valid", valid}, {"findings", list}});
     }
     return findings.empty() ? 0 : static_cast<int>(ErrorCode::difference);
 }

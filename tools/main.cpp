@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "lib/base/printable.hpp"
 #include "tools/option_table.hpp"
 #include "tools/program.hpp"
 #include "tools/stop_signals.hpp"
@@ -40,7 +41,7 @@ int usageError(const CLI::App& app, const CLI::ParseError& error, int argc, char
         if (!near.empty() && near != unknown) message += fmt::format(" (did you mean '{}'?)", near);
     }
     const std::string name = where == &app ? "stx" : "stx " + where->get_name();
-    fmt::print(stderr, "stx: {}. See '{} --help'.\n", message, name);
+    fmt::print(stderr, "stx: {}. See '{} --help'.\n", printable(message), name);
     return static_cast<int>(ErrorCode::usage);
 }
 

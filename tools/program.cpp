@@ -6,26 +6,44 @@
 #include <cstdio>
 
 #include "lib/base/parallel.hpp"
+#include "lib/base/printable.hpp"
 
 namespace stx::tools {
 
+namespace {
+
+/// Bytes of a name that are no UTF-8 become U+FFFD.
+std::string textOf(const nlohmann::ordered_json& json) {
+    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
 void Program::print(std::string_view text) {
+    write(printableLines(text));
+}
+
+void Program::printJson(const nlohmann::ordered_json& json) {
+    write(textOf(json));
+}
+
+void Program::write(std::string_view text) {
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
         outputFailed_ = true;
 }
 
 void Program::say(std::string_view line) const {
-    if (!common.quiet) fmt::print(stderr, "{}\n", line);
+    if (!common.quiet) fmt::print(stderr, "{}\n", printable(line));
 }
 
 void Program::sayNotes() {
     const std::string about = subject.empty() ? "" : fmt::format("'{}': ", subject);
-    for (const auto& note : job.takeNotes()) say("note: " + about + oneLine(note));
+    for (const auto& note : job.takeNotes()) say("note: " + about + note);
 }
 
 Result<void> Program::writeReport(const nlohmann::ordered_json& report) const {
     if (common.report.empty()) return {};
-    const std::string text = report.dump(2) + "\n";
+    const std::string text = textOf(report);
     return writeFile(common.report, std::as_bytes(std::span(text)));
 }
 
@@ -79,7 +97,7 @@ int Program::run(const std::function<Result<int>()>& body) {
     job.onProgress = nullptr;
     sayNotes();
     if (!code) {
-        fmt::print(stderr, "stx: {}\n", oneLine(code.error().text()));
+        fmt::print(stderr, "stx: {}\n", printable(code.error().text()));
         return static_cast<int>(code.error().code);
     }
     if (outputFailed_) {
@@ -208,13 +226,6 @@ std::string nearestWord(std::string_view word, const std::vector<std::string>& w
         }
     }
     return best;
-}
-
-std::string oneLine(std::string text) {
-    for (char& c : text) {
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-    }
-    return text;
 }
 
 std::uint64_t bytesOf(const std::filesystem::path& path) {

@@ -36,9 +36,12 @@ class Program {
     /// What notes are about, when there are many inputs; empty = they need no name.
     std::string subject;
 
-    /// A result for stdout. Errors of writing (a closed pipe, a full disk) become the exit code.
+    /// Lines of text for stdout, through printableLines(); names in them need printable() before.
+    /// Errors of writing (a closed pipe, a full disk) become the exit code.
     void print(std::string_view text);
-    /// One line for a person on stderr, unless --quiet.
+    /// The same for JSON: valid UTF-8, whatever the bytes of names in it are.
+    void printJson(const nlohmann::ordered_json& json);
+    /// One line for a person on stderr, unless --quiet; through printable().
     void say(std::string_view line) const;
     /// The notes of the job as lines on stderr, unless --quiet.
     void sayNotes();
@@ -51,6 +54,7 @@ class Program {
     [[nodiscard]] int run(const std::function<Result<int>()>& body);
 
   private:
+    void write(std::string_view text);
     bool outputFailed_ = false;
 };
 
@@ -98,9 +102,6 @@ Command addCompletion(CLI::App& app, Program& program);
 [[nodiscard]] std::string humanBytes(std::uint64_t bytes);
 /// The nearest of `words` to `word`, or empty when none is near.
 [[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
-/// The text with control characters as '?': names from a file can hold line ends and commands to
-/// the terminal.
-[[nodiscard]] std::string oneLine(std::string text);
 /// Size of a file, or of all files in a folder.
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
 /// Errors early when the target's folder is missing or not writable, or, under --no-clobber, when
