@@ -348,7 +348,7 @@ Result<void> checkMemory(const AtlasHeader& header, const std::string& where,
     return {};
 }
 
-fs::path folderOf(const fs::path& path) {
+fs::path setFolderOf(const fs::path& path) {
     return path.filename() == kIndexFile ? path.parent_path() : path;
 }
 
@@ -372,7 +372,7 @@ Result<AtlasHeader> exrHeader(const ExrReader& reader, const Limits& limits) {
 }
 
 Result<AtlasHeader> folderHeader(const fs::path& path, const Limits& limits) {
-    const fs::path index = folderOf(path) / kIndexFile;
+    const fs::path index = setFolderOf(path) / kIndexFile;
     STX_TRY(const auto bytes, readFile(index, limits));
     const auto where = fmt::format("'{}'", index.string());
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -388,7 +388,7 @@ Result<Atlas> checked(Atlas atlas, const std::string& where) {
 
 Result<Atlas> readFolder(const fs::path& path, Job& job) {
     STX_TRY(const auto header, folderHeader(path, job.limits));
-    const fs::path folder = folderOf(path);
+    const fs::path folder = setFolderOf(path);
     const auto where = fmt::format("'{}'", folder.string());
     STX_CHECK(checkMemory(header, where, job.limits));
     Atlas atlas = header.atlas;
@@ -461,7 +461,7 @@ Result<AtlasHeader> readAtlasHeader(const fs::path& path, const Limits& limits) 
     STX_TRY(auto header, folderHeader(path, limits));
     for (auto& t : header.textures) {
         std::error_code ec;
-        if (const auto file = resolveInside(folderOf(path), t.file, limits)) {
+        if (const auto file = resolveInside(setFolderOf(path), t.file, limits)) {
             const auto size = fs::file_size(*file, ec);
             t.bytes = ec ? 0 : size;
         }
@@ -471,7 +471,7 @@ Result<AtlasHeader> readAtlasHeader(const fs::path& path, const Limits& limits) 
 
 bool isAtlasFolder(const fs::path& path) {
     std::error_code ec;
-    return fs::is_regular_file(folderOf(path) / kIndexFile, ec) && isFolderPath(path);
+    return fs::is_regular_file(setFolderOf(path) / kIndexFile, ec) && isFolderPath(path);
 }
 
 bool isExrAtlas(const ExrReader& reader) {

@@ -26,6 +26,7 @@
 #include <system_error>
 
 #include "formats/exr/exr_streams.hpp"
+#include "formats/files/source_date.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -343,6 +344,10 @@ Imf::Header headerFrom(const ExrPart& part) {
             }
             header.insert(name, Imf::M44fAttribute(f));
         }
+    }
+    if (const auto seconds = sourceDate()) {
+        Imf::addCapDate(header, exrDate(*seconds));
+        Imf::addUtcOffset(header, 0.0f);
     }
     return header;
 }

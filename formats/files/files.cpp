@@ -89,11 +89,11 @@ Result<fs::path> throughLinks(const fs::path& target) {
     return real;
 }
 
-fs::path folderOf(const fs::path& target) {
-    return target.has_parent_path() ? target.parent_path() : fs::path(".");
-}
-
 }  // namespace
+
+fs::path folderOf(const fs::path& path) {
+    return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
 
 Result<Bytes> readFile(const fs::path& path, const Limits& limits) {
     if (path == "-") return readToEnd(STDIN_FILENO, "standard input", 0, limits);

@@ -78,6 +78,9 @@ class OutputFolder {
     std::unique_ptr<Impl> impl_;
 };
 
+/// The folder that a file lies in; "." for a bare name.
+[[nodiscard]] std::filesystem::path folderOf(const std::filesystem::path& path);
+
 /// The file that `name`, found inside a bundle, set or model in `folder`, stands for. Errors
 /// (invalidInput) when it is absolute, has a URL scheme, leaves the folder by `..` or a link, or is
 /// no regular file, unless limits.allowOutside; (io) when it does not exist.

@@ -58,7 +58,6 @@ Result<void> checkFrame(const Frame& frame) {
 }
 
 Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOptions& options) {
-    using Type = ExrChannel::Type;
     ExrPart part;
     part.width = part.displayWidth = frame.colour.width();
     part.height = part.displayHeight = frame.colour.height();
@@ -70,7 +69,7 @@ Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOpti
         setExrCamera(part, *options.camera, 0.0, 1.0);
     }
     std::vector<ExrConstPixels> pixels;
-    const auto add = [&](const std::string& name, Type type, const float* first,
+    const auto add = [&](const std::string& name, ExrChannel::Type type, const float* first,
                          std::size_t stride) {
         part.channels.push_back({name, type});
         pixels.push_back({name, first, stride});
@@ -78,19 +77,19 @@ Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOpti
     const auto colour =
         linearImage(frame.colour, frame.linear, inSpaceOf(frame, options.background));
     const char* rgba[] = {"R", "G", "B", "A"};
-    for (int c = 0; c < 4; ++c) add(rgba[c], Type::half, &colour.data()->x + c, 4);
+    for (int c = 0; c < 4; ++c) add(rgba[c], ExrChannel::Type::half, &colour.data()->x + c, 4);
     Image<glm::vec4> albedo;
     if (!frame.albedo.empty()) {
         albedo = linearImage(frame.albedo, frame.linear, {});
         for (int c = 0; c < 4; ++c)
-            add(std::string("albedo.") + rgba[c], Type::half, &albedo.data()->x + c, 4);
+            add(std::string("albedo.") + rgba[c], ExrChannel::Type::half, &albedo.data()->x + c, 4);
     }
-    if (!frame.depth.empty()) add("Z", Type::float32, frame.depth.data(), 1);
+    if (!frame.depth.empty()) add("Z", ExrChannel::Type::float32, frame.depth.data(), 1);
     if (!frame.normal.empty()) {
         const float* first = &frame.normal.data()->x;
-        add("N.X", Type::half, first, 3);
-        add("N.Y", Type::half, first + 1, 3);
-        add("N.Z", Type::half, first + 2, 3);
+        add("N.X", ExrChannel::Type::half, first, 3);
+        add("N.Y", ExrChannel::Type::half, first + 1, 3);
+        add("N.Z", ExrChannel::Type::half, first + 2, 3);
     }
     STX_TRY(auto writer, ExrWriter::create(file, {part}));
     STX_CHECK(writer.writePart(0, pixels));

@@ -1,16 +1,8 @@
 #include "formats/meshes/mtl_notes.hpp"
 
+#include "formats/meshes/text_encoding.hpp"
+
 namespace stx {
-namespace {
-
-std::string_view trimmed(std::string_view s) {
-    constexpr std::string_view blanks = " \t\r";
-    const auto first = s.find_first_not_of(blanks);
-    if (first == std::string_view::npos) return {};
-    return s.substr(first, s.find_last_not_of(blanks) - first + 1);
-}
-
-}  // namespace
 
 void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& materials) {
     MtlMaterial* current = nullptr;

@@ -4,6 +4,8 @@
 #include <optional>
 #include <string_view>
 
+#include "formats/meshes/text_encoding.hpp"
+
 namespace stx {
 namespace {
 
@@ -17,13 +19,6 @@ std::optional<PlyType> typeOf(std::string_view name) {
     if (name == "float" || name == "float32") return PlyType::float32;
     if (name == "double" || name == "float64") return PlyType::float64;
     return std::nullopt;
-}
-
-std::string_view trimmed(std::string_view text) {
-    constexpr std::string_view blanks = " \t\r\n\v\f";
-    const auto first = text.find_first_not_of(blanks);
-    if (first == std::string_view::npos) return {};
-    return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
 /// Takes the first word off a line.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 
 #include "formats/files/files.hpp"
 
@@ -9,5 +10,8 @@ namespace stx {
 /// The text as UTF-8 when it begins with a byte order mark (UTF-8, UTF-16 or UTF-32 of either byte
 /// order), the mark removed; nothing when it has none. Broken surrogates become U+FFFD.
 [[nodiscard]] std::optional<Bytes> utf8FromMarked(ByteSpan text);
+
+/// Without the blanks of ASCII at both ends.
+[[nodiscard]] std::string_view trimmed(std::string_view text);
 
 }  // namespace stx

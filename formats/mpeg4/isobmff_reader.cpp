@@ -6,11 +6,12 @@
 #include "formats/mpeg4/descriptors.hpp"
 #include "formats/mpeg4/isobmff.hpp"
 #include "formats/mpeg4/isobmff_track.hpp"
+#include "lib/base/printable.hpp"
 
 namespace stx::mpeg4 {
 namespace {
 
-using Kind = Mp4Departure::Kind;
+using Departure = Mp4Departure::Kind;
 
 /// Top-level boxes of a file; more are a way to keep us reading, not a file.
 constexpr int kMaxTopLevelBoxes = 1'000'000;
@@ -40,7 +41,7 @@ class Reader {
 
   private:
     Mp4Facts& facts() { return *document_.mp4; }
-    void depart(Kind kind, std::string text, std::string where) {
+    void depart(Departure kind, std::string text, std::string where) {
         if (facts().departures.size() < kMaxDepartures)
             facts().departures.push_back({kind, std::move(text), std::move(where)});
     }
@@ -156,7 +157,7 @@ class Reader {
             document_.iod = std::move(decoded->iod);
             initialTracks_ = std::move(decoded->trackIds);
         } else {
-            depart(Kind::noIods,
+            depart(Departure::noIods,
                    "the file has no initial object descriptor ('iods'); many readers find no scene "
                    "then",
                    "moov");
@@ -182,7 +183,7 @@ class Reader {
         for (const std::uint32_t id : initialTracks_) {
             Mp4Track* track = findTrack(id);
             if (track == nullptr) {
-                depart(Kind::streamNotFound,
+                depart(Departure::streamNotFound,
                        fmt::format("the IOD names track {}, which is not there", id), "moov/iods");
                 continue;
             }
@@ -196,7 +197,7 @@ class Reader {
             if (scene_ == nullptr && isScene(track)) {
                 scene_ = &track;
                 if (facts().hasIods)
-                    depart(Kind::sceneNotInIods, "the IOD does not name the scene track",
+                    depart(Departure::sceneNotInIods, "the IOD does not name the scene track",
                            track.path);
             } else if (&track != scene_ && isScene(track)) {
                 job_.note(fmt::format("scene track {} is passed over; the scene is in track {}",
@@ -213,12 +214,12 @@ class Reader {
         if (od_ != nullptr)
             document_.odStream = od_->stream;
         else
-            depart(Kind::noOdTrack,
+            depart(Departure::noOdTrack,
                    "the file has no object descriptor track; the scene cannot have images in it",
                    "moov");
         for (const Mp4Track* track : {scene_, od_})
             if (track != nullptr && track->facts.esIdInEsds != 0)
-                depart(Kind::esIdNotZero,
+                depart(Departure::esIdNotZero,
                        fmt::format("ES_ID in 'esds' is {}, not 0", track->facts.esIdInEsds),
                        track->path);
         return {};
@@ -249,7 +250,7 @@ class Reader {
         if (!stream.url.empty()) return {};
         Mp4Track* track = findTrack(stream.esId);
         if (track == nullptr) {
-            depart(Kind::streamNotFound,
+            depart(Departure::streamNotFound,
                    fmt::format("a descriptor names track {}, which is not there", stream.esId),
                    place);
             return {};
@@ -275,16 +276,16 @@ class Reader {
     void noteEntry(const Mp4Track& track) {
         const bool visual = track.stream.streamType == StreamType::visual;
         if (visual && track.facts.sampleEntry == "mp4s")
-            depart(Kind::imageInSystemsEntry,
+            depart(Departure::imageInSystemsEntry,
                    "an image stands in a sample entry 'mp4s'; 'mp4v' is expected", track.path);
         if (visual && !track.hasEsds)
-            depart(Kind::imageInNativeEntry,
+            depart(Departure::imageInNativeEntry,
                    fmt::format(
                        "an image stands in a sample entry '{}' without 'esds'; 'mp4v' is expected",
                        printable(track.facts.sampleEntry)),
                    track.path);
         if (track.facts.esIdInEsds != 0)
-            depart(Kind::esIdNotZero,
+            depart(Departure::esIdNotZero,
                    fmt::format("ES_ID in 'esds' is {}, not 0", track.facts.esIdInEsds), track.path);
     }
 
@@ -341,7 +342,7 @@ class Reader {
             auto commands = decoder.decode(bytes);
             if (!commands) return tl::unexpected(commands.error().at(place));
             if (decoder.bitsLeft() >= 8)
-                depart(Kind::trailingBytes,
+                depart(Departure::trailingBytes,
                        fmt::format("{} bits follow the last command", decoder.bitsLeft()), place);
             document_.frames.push_back({sample.time, std::move(*commands)});
         }

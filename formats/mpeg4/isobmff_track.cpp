@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "formats/mpeg4/descriptors.hpp"
+#include "lib/base/printable.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -162,17 +163,6 @@ Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) 
 }
 
 }  // namespace
-
-std::string printable(std::string_view type) {
-    std::string text;
-    for (const char c : type) {
-        if (c >= ' ' && c <= '~')
-            text += c;
-        else
-            text += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-    }
-    return text;
-}
 
 Result<std::vector<Box>> childBoxes(const Box& parent) {
     std::vector<Box> boxes;

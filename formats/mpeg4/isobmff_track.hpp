@@ -10,10 +10,6 @@
 /// Inside of the MP4 reader: boxes, and tracks as their tables tell them.
 namespace stx::mpeg4 {
 
-/// Four characters as they may stand in a message: others than ASCII letters, digits and marks as
-/// \xNN.
-[[nodiscard]] std::string printable(std::string_view type);
-
 /// A box inside a parent that is in memory.
 struct Box {
     std::string type;  ///< four characters

@@ -1,10 +1,9 @@
 #include "formats/mpeg4/movie_boxes.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cstdlib>
 #include <limits>
 
+#include "formats/files/source_date.hpp"
 #include "formats/mpeg4/descriptors.hpp"
 
 namespace stx::mpeg4 {
@@ -15,18 +14,11 @@ constexpr std::uint32_t kMovieTimescale = 600;
 /// Seconds from 1904 to 1970.
 constexpr std::uint64_t kEpochOffset = 2082844800;
 
-/// What SOURCE_DATE_EPOCH says, in the file's epoch; 0 without it, so that files are the same
-/// bytes.
+/// What SOURCE_DATE_EPOCH says, in the file's epoch; 0 without it, or behind 2040, where 32 bits end.
 std::uint64_t creationTime() {
-    const char* text = std::getenv("SOURCE_DATE_EPOCH");
-    if (text == nullptr) return 0;
-    std::uint64_t seconds = 0;
-    const std::string_view view(text);
-    const auto parsed = std::from_chars(view.data(), view.data() + view.size(), seconds);
-    if (parsed.ec != std::errc{} ||
-        seconds > std::numeric_limits<std::uint32_t>::max() - kEpochOffset)
-        return 0;
-    return seconds + kEpochOffset;
+    const auto seconds = sourceDate();
+    const std::uint64_t created = seconds.value_or(0) + kEpochOffset;
+    return seconds && created <= std::numeric_limits<std::uint32_t>::max() ? created : 0;
 }
 
 /// A box being written: the size is put in when it ends.

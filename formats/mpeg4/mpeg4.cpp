@@ -1,5 +1,6 @@
 #include "formats/mpeg4/mpeg4.hpp"
 
+#include "formats/files/files.hpp"
 #include "formats/mpeg4/bt.hpp"
 #include "formats/mpeg4/isobmff.hpp"
 #include "formats/mpeg4/text_descriptors.hpp"
@@ -17,11 +18,6 @@ std::string_view textOf(ByteSpan bytes) {
 }
 
 /// The folder of a path, "." where it has none.
-std::filesystem::path folderOf(const std::filesystem::path& path) {
-    auto folder = path.parent_path();
-    return folder.empty() ? std::filesystem::path(".") : folder;
-}
-
 std::string imagesFolderName(const std::filesystem::path& path) {
     return path.stem().string() + "_images";
 }

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "formats/mpeg4/node_rows.hpp"
+#include "formats/mpeg4/text_values.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -125,10 +126,6 @@ const Tables& tables() {
     return instance;
 }
 
-char lower(char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
-}
-
 }  // namespace
 
 std::string_view name(FieldType type) {
@@ -218,9 +215,7 @@ int NodeInfo::find(std::string_view fieldName) const {
 int NodeInfo::findIgnoringCase(std::string_view fieldName) const {
     if (const int exact = find(fieldName); exact >= 0) return exact;
     for (const FieldInfo& info : fields)
-        if (std::equal(info.name.begin(), info.name.end(), fieldName.begin(), fieldName.end(),
-                       [](char a, char b) { return lower(a) == lower(b); }))
-            return info.index;
+        if (equalNoCase(info.name, fieldName)) return info.index;
     return -1;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "formats/mpeg4/mpeg4.hpp"

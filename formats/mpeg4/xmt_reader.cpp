@@ -132,7 +132,7 @@ class XmtReader {
     /// URLs may name an object descriptor by its string id before the descriptor stands in the
     /// file.
     Result<void> collectIds(xml_node root) {
-        struct Walker : pugi::xml_tree_walker {
+        struct IdCollector : pugi::xml_tree_walker {
             std::vector<xml_node> found;
             bool for_each(xml_node& node) override {
                 const auto type = localName(node);

@@ -2,9 +2,10 @@
 """Damaged files through every command that could be handed them.
 
 Every malformed mesh and image of the shared folder, and files of ours and of the reference folder
-cut short or with bytes changed (seeded). Each run must end by itself, without a signal, in little
-processor time and memory, with an exit code of the contract, one `stx: ` line when that is not 0,
-and no output but a whole one. `--samples N` cuts and changes each file N times.
+cut short or with bytes changed (seeded); each file of image sets of all kinds likewise. Each run
+must end by itself, without a signal, in little processor time and memory, with an exit code of the
+contract, one `stx: ` line when that is not 0, and no output but a whole one. `--samples N` cuts and
+changes each file N times; `--every N` takes each N-th case only.
 """
 import collections
 import concurrent.futures
@@ -14,6 +15,7 @@ import shutil
 import sys
 import tempfile
 
+import image_sets
 from harness import arguments, commands_of, copy_into, must, quad, run, temporaries, write
 
 CODES = (0, 2, 3, 4, 5, 7)
@@ -23,13 +25,19 @@ PEAK_MIB = 1024  # what a run may really take: twice the limit it was given
 
 CONVERT = ["-o", "OUT/a.mp4", "--views", "ring:2", "--size", "24x24", "--supersampling", "1"]
 RENDER = ["-o", "OUT/a.png", "--size", "24x24", "--backend", "cpu"]
+# What reads bundles and atlases, with every kind of output.
+OTHERS = [["extract", "IN", "-o", "OUT/set"], ["extract", "IN", "-o", "OUT/points.ply"],
+          ["extract", "IN", "-o", "OUT/set", "--cameras", "miv", "--depth", "png"],
+          ["extract", "IN", "-o", "OUT/points.drc"], ["select", "IN", "-o", "OUT/a.exr", "--count", "1"],
+          ["bake", "IN", "-o", "OUT/a.mp4"], ["pack", "IN", "-o", "OUT/atlas"]]
 
 
 class Case:
-    """A command line in which IN is the damaged file and OUT a folder for outputs."""
+    """A command line in which IN is the damaged file and OUT a folder for outputs. With `inside`,
+    IN is a copy of the folder `source` in which this file has the content."""
 
-    def __init__(self, name, command, source=None, content=None, beside=()):
-        self.name, self.command = name, command
+    def __init__(self, name, command, source=None, content=None, beside=(), inside=None):
+        self.name, self.command, self.inside = name, command, inside
         self.source, self.content, self.beside = source, content, beside
 
 
@@ -39,6 +47,8 @@ def commands_for(name, have):
     lines = [["info", "IN"], ["validate", "IN"], ["convert", "IN"] + CONVERT, ["render", "IN"] + RENDER]
     if ending == ".json":
         lines = [["info", "IN"], ["validate", "IN"], ["render", "IN"] + RENDER]
+    if ending in (".json", ".mp4", ".exr", ".xmt", ".bt"):
+        lines += OTHERS
     return [line for line in lines if line[0] in have]
 
 
@@ -103,11 +113,11 @@ def companions(path):
             and not other.endswith((".xmt", ".bt", ".mp4", ".exr"))]
 
 
-def damaged(path, have, samples, seed):
+def damages(path, samples, seed):
+    """The file cut short and changed, in turns."""
     with open(path, "rb") as file:
         whole = file.read()
     rng = random.Random(f"{seed} {os.path.basename(path)}")
-    lines = commands_for(path, have)
     for i in range(samples):
         content = bytearray(whole)
         if i % 2 == 0:
@@ -117,8 +127,31 @@ def damaged(path, have, samples, seed):
             span = len(content) if i % 4 == 1 else min(len(content), 2048)
             for _ in range(rng.randint(1, 4)):
                 content[rng.randrange(span)] = rng.choice((0, 0x7F, 0x80, 0xFF, rng.randrange(256)))
-        yield Case(f"{os.path.basename(path)} damaged {i}", lines[i // 2 % len(lines)], content=bytes(content),
+        yield bytes(content)
+
+
+def damaged(path, have, samples, seed):
+    lines = commands_for(path, have)
+    for i, content in enumerate(damages(path, samples, seed)):
+        # A cut and a change for each command before the next.
+        yield Case(f"{os.path.basename(path)} damaged {i}", lines[i // 2 % len(lines)], content=content,
                    source=path, beside=companions(path))
+
+
+def damaged_sets(args, folder):
+    """Image sets of each kind, in which one file is damaged or missing."""
+    for kind, (root, options) in image_sets.write_all(folder, args.stx).items():
+        command = ["convert", "IN", "-o", "OUT/a.exr"] + options
+        names = sorted(os.path.relpath(os.path.join(top, name), root)
+                       for top, _, names in os.walk(root) for name in names)
+        for name in names:
+            # Cameras and poses have more to say than pictures, which all sets share.
+            picture = name.endswith((".png", ".yuv"))
+            samples = max(2, args.samples // 6) if picture else args.samples
+            for i, content in enumerate(damages(os.path.join(root, name), samples, args.seed)):
+                yield Case(f"{kind} set, {name} damaged {i}", command, source=root, content=content, inside=name)
+            yield Case(f"{kind} set, {name} empty", command, source=root, content=b"", inside=name)
+            yield Case(f"{kind} set, {name} missing", command, source=root, inside=name)
 
 
 def check(done, out):
@@ -156,7 +189,14 @@ def one(args, case, keep):
         out = os.path.join(folder, "out")
         os.mkdir(out)
         path = case.source
-        if case.content is not None:
+        if case.inside:
+            path = os.path.join(folder, os.path.basename(case.source))
+            shutil.copytree(case.source, path)
+            if case.content is None:
+                os.remove(os.path.join(path, case.inside))
+            else:
+                write(os.path.join(path, case.inside), case.content)
+        elif case.content is not None:
             for other in case.beside:
                 copy_into(other, folder)
             path = os.path.join(folder, os.path.basename(case.source))
@@ -167,21 +207,24 @@ def one(args, case, keep):
                    cpu_seconds=CPU_SECONDS)
         problems = check(done, out)
         if problems and keep and case.content is not None:
-            shutil.copyfile(path, os.path.join(keep, case.name.replace(" ", "_") + os.path.splitext(path)[1]))
+            kept = case.name.replace(" ", "_").replace("/", "_")
+            write(os.path.join(keep, kept + os.path.splitext(case.inside or path)[1]), case.content)
         return case, done, problems
 
 
 def main():
-    args = arguments(__doc__, samples=24, seed="one", keep="", jobs=os.cpu_count() or 2)
+    args = arguments(__doc__, samples=24, seed="one", keep="", jobs=os.cpu_count() or 2, every=1)
     have = commands_of(args.stx)
     with tempfile.TemporaryDirectory(prefix="stx-hostile-own-") as folder:
-        cases = list(malformed(args.shared, have, folder))
-        count = len(cases)
+        groups = {"over malformed files": list(malformed(args.shared, have, folder)), "over damaged ones of ours": [],
+                  "over damaged references": [], "over damaged image sets": []}
         for path in own_files(args, folder):
-            cases += damaged(path, have, args.samples, args.seed)
-        known = list(references(args.shared))
-        for path in known:
-            cases += damaged(path, have, max(2, args.samples // 6), args.seed)
+            groups["over damaged ones of ours"] += damaged(path, have, args.samples, args.seed)
+        for path in references(args.shared):
+            groups["over damaged references"] += damaged(path, have, max(2, args.samples // 6), args.seed)
+        groups["over damaged image sets"] += damaged_sets(args, os.path.join(folder, "sets"))
+        groups = {name: cases[::args.every] for name, cases in groups.items()}
+        cases = [case for group in groups.values() for case in group]
         codes, failed, slowest, peak = collections.Counter(), 0, 0.0, 0
         with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
             for case, done, problems in pool.map(lambda c: one(args, c, args.keep), cases):
@@ -192,8 +235,8 @@ def main():
                 if problems:
                     failed += 1
                     print(f"{case.name}: {'; '.join(problems)}\n  {done}", flush=True)
-    print(f"{len(cases)} runs: {count} over malformed files, {len(cases) - count} over damaged ones of "
-          f"{len(known)} references and 7 of ours; exit codes {dict(sorted(codes.items(), key=str))}; "
+    print(f"{len(cases)} runs: {', '.join(f'{len(group)} {name}' for name, group in groups.items())}; "
+          f"exit codes {dict(sorted(codes.items(), key=str))}; "
           f"at most {slowest:.1f} s of processor and {peak} MiB; {failed} failed")
     return 1 if failed else 0
 

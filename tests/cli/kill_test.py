@@ -43,6 +43,11 @@ def commands(inputs):
     yield Command("bake", ["bake", bundle, "-o", "t.mp4"], ["t.mp4"], ["--method", "paper"])
     yield Command("pack folder", ["pack", bundle, "-o", "t"], ["t"], ["--layout", "tight"])
     yield Command("pack exr", ["pack", bundle, "-o", "t.exr"], ["t.exr"], ["--layout", "tight"])
+    yield Command("select", ["select", bundle, "-o", "t.mp4"], ["t.mp4"], ["--count", "1"])
+    yield Command("extract transforms", ["extract", bundle, "-o", "t"], ["t"], ["--depth", "png"])
+    yield Command("extract miv", ["extract", bundle, "-o", "t", "--cameras", "miv"], ["t"], ["--depth", "png"])
+    yield Command("extract ply", ["extract", bundle, "-o", "t.ply"], ["t.ply"], ["extract", inputs["other"]])
+    yield Command("extract drc", ["extract", bundle, "-o", "t.drc"], ["t.drc"], ["--position-bits", "8"])
     yield Command("render png", ["render", bundle, "-o", "t.png", "--backend", "cpu", "--size", "400x400"], ["t.png"])
     yield Command("render sequence", ["render", atlas, "-o", "t_%04d.png", "--orbit", "6", "--backend", "cpu", "--size",
                                       "200x200"], [f"t_{i:04d}.png" for i in range(6)])
@@ -69,7 +74,7 @@ def states(folder, targets):
 
 
 def overridden(words, options):
-    """The command with options replaced or added; the last mention does not win by itself."""
+    """The command with options (or, behind its name, the input) replaced or added."""
     words = list(words)
     for key, value in zip(options[::2], options[1::2]):
         if key in words:
@@ -141,6 +146,12 @@ def full_disk(args, all_commands, folder):
         print("disk full: not run, mounting a tmpfs is not allowed here")
         return 0
     runs = 0
+    whole = {}
+    for command in all_commands:
+        if len(command.targets) > 1:
+            roomy = tempfile.mkdtemp(dir=folder)
+            must([args.stx] + command.words, roomy)
+            whole[command.name] = states(roomy, command.targets)
     for command in all_commands:
         for kilobytes in (4, 12, 40):
             subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "none", mounted], check=True)
@@ -159,10 +170,9 @@ def full_disk(args, all_commands, folder):
                 if len(command.targets) == 1:
                     expect(sorted(tree(mounted).items()) == ([(command.targets[0], old)] if old else []),
                            f"{name}: the old target is gone, or something else is there", sorted(tree(mounted)))
-                for target in command.targets[1:]:
-                    path = os.path.join(mounted, target)
-                    expect(not os.path.exists(path) or open(path, "rb").read()[-8:-4] == b"IEND",
-                           f"{name}: '{target}' is cut short")
+                for target in command.targets if len(command.targets) > 1 else []:
+                    now = state(mounted, target)
+                    expect(now in (None, b"old", whole[command.name][target]), f"{name}: '{target}' is cut short")
             finally:
                 subprocess.run(["umount", mounted], check=True)
     # A file system that may only be read.
@@ -279,12 +289,17 @@ def main():
         inputs = {"mesh": quad(folder), "bundle": os.path.join(folder, "in.mp4"), "atlas": os.path.join(folder, "in")}
         must([args.stx, "convert", inputs["mesh"], "-o", "in.mp4", "--views", "ring:4", "--size", "160x160"], folder)
         must([args.stx, "pack", "in.mp4", "-o", "in"], folder)
+        inputs["other"] = os.path.join(folder, "other.mp4")
+        must([args.stx, "convert", inputs["mesh"], "-o", "other.mp4", "--views", "ring:2", "--size", "20x20"], folder)
         all_commands = list(commands(inputs))
         kills = left = 0
         for command in all_commands:
             k, n = kill_moments(args, command, os.path.join(folder, command.name.replace(" ", "-")), args.kills, rng)
             kills, left = kills + k, left + n
-        full_disk(args, all_commands, os.path.join(folder, "mounts"))
+        batch = Command("batch", ["convert", inputs["bundle"], inputs["other"], inputs["mesh"], "-o", "t_{stem}.exr",
+                                  "--jobs", "2", "--keep-going", "--views", "ring:4", "--size", "160x160"],
+                        ["t_in.exr", "t_other.exr", "t_quad.exr"])
+        full_disk(args, all_commands + [batch], os.path.join(folder, "mounts"))
         size_limit(args, all_commands, folder)
         in_place(args, inputs, folder)
         no_clobber(args, all_commands, folder)

@@ -11,16 +11,6 @@ namespace {
 
 using nlohmann::json;
 
-void expectNear(glm::vec2 a, glm::vec2 b) {
-    EXPECT_NEAR(a.x, b.x, 1e-6f);
-    EXPECT_NEAR(a.y, b.y, 1e-6f);
-}
-void expectNear(glm::vec3 a, glm::vec3 b) {
-    EXPECT_NEAR(a.x, b.x, 1e-5f);
-    EXPECT_NEAR(a.y, b.y, 1e-5f);
-    EXPECT_NEAR(a.z, b.z, 1e-5f);
-}
-
 glm::vec3 faceNormal(const Mesh& mesh, std::size_t triangle) {
     const auto t = mesh.triangles.at(triangle);
     return glm::normalize(glm::cross(mesh.positions[t.y] - mesh.positions[t.x],

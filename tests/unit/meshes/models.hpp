@@ -138,4 +138,11 @@ class GltfText {
     std::vector<unsigned char> bytes_;
 };
 
+inline void expectNear(glm::vec3 a, glm::vec3 b, float tolerance = 1e-6f) {
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], tolerance) << "component " << k;
+}
+inline void expectNear(glm::vec2 a, glm::vec2 b, float tolerance = 1e-6f) {
+    for (int k = 0; k < 2; ++k) EXPECT_NEAR(a[k], b[k], tolerance) << "component " << k;
+}
+
 }  // namespace stx

@@ -8,15 +8,6 @@
 namespace stx {
 namespace {
 
-constexpr float kTolerance = 1e-6f;
-
-void expectNear(glm::vec3 a, glm::vec3 b, float tolerance = kTolerance) {
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], tolerance) << "component " << k;
-}
-void expectNear(glm::vec2 a, glm::vec2 b) {
-    for (int k = 0; k < 2; ++k) EXPECT_NEAR(a[k], b[k], kTolerance) << "component " << k;
-}
-
 bool hasColour(const Mesh& mesh, glm::vec3 colour) {
     for (const auto& c : mesh.colours) {
         if (glm::length(glm::vec3(c) - colour) < 1e-4f) return true;
@@ -33,7 +24,7 @@ TEST(RealGltf, CesiumMilkTruckHasItsWheelsTwiceAndItsColours) {
     EXPECT_EQ(mesh.textures[0].pixels.size(), glm::ivec2(2048, 2048));
     ASSERT_EQ(mesh.materials.size(), 4u);
     EXPECT_EQ(mesh.materials[1].name, "glass");
-    EXPECT_NEAR(mesh.materials[1].baseColour.g, 0.0405062996f, kTolerance);
+    EXPECT_NEAR(mesh.materials[1].baseColour.g, 0.0405062996f, 1e-6f);
     EXPECT_FALSE(mesh.materials[1].doubleSided);
     // The last node turns wheels by 190 degrees about z and moves them to x = -1.3523.
     Bounds wheels;
@@ -116,7 +107,7 @@ TEST(RealGltf, InterleavedBoxIsTheSameBox) {
     EXPECT_EQ(mesh.triangles.size(), 12u);
     expectNear(glm::vec3(mesh.bounds().min), glm::vec3(-0.5f));
     expectNear(glm::vec3(mesh.bounds().max), glm::vec3(0.5f));
-    for (const auto& n : mesh.normals) EXPECT_NEAR(glm::length(n), 1.0f, kTolerance);
+    for (const auto& n : mesh.normals) EXPECT_NEAR(glm::length(n), 1.0f, 1e-6f);
     EXPECT_NEAR(mesh.materials[0].baseColour.r, 0.8f, 1e-5f);
 }
 

@@ -74,7 +74,7 @@ Bytes written(const Document& document) {
     return bytes ? *bytes : Bytes();
 }
 
-std::string errorOf(const Bytes& bytes) {
+std::string fileErrorOf(const Bytes& bytes) {
     Job job;
     const auto document = readMp4(ByteSource::fromView(bytes), job);
     return document ? "read" : document.error().text();
@@ -122,6 +122,16 @@ TEST(IsobmffFile, WritesWhatItIsGivenAndNothingOfTheDay) {
     ::unsetenv("SOURCE_DATE_EPOCH");
     EXPECT_NE(bytes, dated);
     EXPECT_EQ(bytes.size(), dated.size());
+    // Creation and modification of the movie, each track and each medium: 1970 counted from 1904.
+    const auto timesOf = [](const Bytes& file, const char* box) {
+        const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
+        const auto at = text.find(box);
+        return at == text.npos ? std::string_view() : text.substr(at + 8, 8);
+    };
+    for (const char* box : {"mvhd", "tkhd", "mdhd"}) {
+        EXPECT_EQ(timesOf(bytes, box), std::string_view("\0\0\0\0\0\0\0\0", 8)) << box;
+        EXPECT_EQ(timesOf(dated, box), "\x7c\x25\xb0\x80\x7c\x25\xb0\x80") << box;
+    }
 }
 
 TEST(IsobmffFile, WritesTheJpegDescriptionOfTheOtherImplementation) {
@@ -313,12 +323,12 @@ TEST(IsobmffFile, SixtyFourBitSizesAndOffsetsAreRead) {
 
 TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     const Bytes good = written(sample());
-    EXPECT_EQ(errorOf(good), "read");
+    EXPECT_EQ(fileErrorOf(good), "read");
     const auto with = [&](std::string_view type, std::ptrdiff_t from, std::uint32_t value) {
         Bytes bad = good;
         put32(bad, static_cast<std::size_t>(static_cast<std::ptrdiff_t>(find(bad, type)) + from),
               value);
-        return errorOf(bad);
+        return fileErrorOf(bad);
     };
     EXPECT_NE(with("moov", -4, 0x7FFFFFFF).find("'moov' claims 2147483647 bytes"),
               std::string::npos);
@@ -331,12 +341,12 @@ TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     EXPECT_NE(with("mdhd", 16, 0).find("timescale is 0"), std::string::npos);
     EXPECT_NE(with("stsc", 12, 2).find("stsc"), std::string::npos);
     // A sample description of a scene with a code that no version has.
-    EXPECT_NE(errorOf(Bytes(good.begin(), good.begin() + 100)).find("byte 28"), std::string::npos);
-    EXPECT_NE(errorOf({}).find("no 'moov'"), std::string::npos);
-    EXPECT_NE(errorOf(unhex("ffd8ffe000104a46494600")).find("no MP4 file"), std::string::npos);
+    EXPECT_NE(fileErrorOf(Bytes(good.begin(), good.begin() + 100)).find("byte 28"), std::string::npos);
+    EXPECT_NE(fileErrorOf({}).find("no 'moov'"), std::string::npos);
+    EXPECT_NE(fileErrorOf(unhex("ffd8ffe000104a46494600")).find("no MP4 file"), std::string::npos);
     Bytes cut = good;
     cut.resize(good.size() - 1);
-    EXPECT_NE(errorOf(cut).find("'mdat' claims"), std::string::npos) << errorOf(cut);
+    EXPECT_NE(fileErrorOf(cut).find("'mdat' claims"), std::string::npos) << fileErrorOf(cut);
 }
 
 TEST(IsobmffFile, FragmentedAndEncryptedFilesAreRefusedByName) {
@@ -344,7 +354,7 @@ TEST(IsobmffFile, FragmentedAndEncryptedFilesAreRefusedByName) {
     const auto renamed = [&](std::string_view from, std::string_view to) {
         Bytes bad = good;
         std::memcpy(bad.data() + find(bad, from), to.data(), 4);
-        return errorOf(bad);
+        return fileErrorOf(bad);
     };
     // 'iods' holds nothing that is missed before mvex is.
     EXPECT_NE(renamed("iods", "mvex").find("fragmented"), std::string::npos)
@@ -362,9 +372,9 @@ TEST(IsobmffFile, UnknownBoxesArePassedOver) {
     strange.text("xyz?");
     strange.u32(42);
     bytes.insert(bytes.end(), strange.view().begin(), strange.view().end());
-    EXPECT_EQ(errorOf(bytes), "read");
+    EXPECT_EQ(fileErrorOf(bytes), "read");
     std::memcpy(bytes.data() + find(bytes, "mvhd"), "xyz?", 4);
-    EXPECT_EQ(errorOf(bytes), "read");
+    EXPECT_EQ(fileErrorOf(bytes), "read");
 }
 
 TEST(IsobmffFile, WhatHasNoCodeIsRefused) {

@@ -1,0 +1,39 @@
+#include "formats/files/source_date.hpp"
+
+#include <charconv>
+#include <chrono>
+#include <cstdlib>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace stx {
+namespace {
+
+constexpr std::uint64_t kEndOf9999 = 253402300799;
+
+}  // namespace
+
+std::optional<std::uint64_t> sourceDate() {
+    const char* text = std::getenv("SOURCE_DATE_EPOCH");
+    if (text == nullptr) return std::nullopt;
+    const std::string_view view(text);
+    std::uint64_t seconds = 0;
+    const auto parsed = std::from_chars(view.data(), view.data() + view.size(), seconds);
+    if (parsed.ec != std::errc{} || parsed.ptr != view.data() + view.size() || seconds > kEndOf9999)
+        return std::nullopt;
+    return seconds;
+}
+
+std::string exrDate(std::uint64_t seconds) {
+    using namespace std::chrono;
+    const sys_seconds moment{std::chrono::seconds(static_cast<std::int64_t>(seconds))};
+    const sys_days day = floor<days>(moment);
+    const year_month_day date(day);
+    const hh_mm_ss time(moment - day);
+    return fmt::format("{:04}:{:02}:{:02} {:02}:{:02}:{:02}", static_cast<int>(date.year()),
+                       static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+                       time.hours().count(), time.minutes().count(), time.seconds().count());
+}
+
+}  // namespace stx
