@@ -44,8 +44,9 @@ def commands(inputs):
     yield Command("pack folder", ["pack", bundle, "-o", "t"], ["t"], ["--layout", "tight"])
     yield Command("pack exr", ["pack", bundle, "-o", "t.exr"], ["t.exr"], ["--layout", "tight"])
     yield Command("select", ["select", bundle, "-o", "t.mp4"], ["t.mp4"], ["--count", "1"])
-    yield Command("extract transforms", ["extract", bundle, "-o", "t"], ["t"], ["--depth", "png"])
-    yield Command("extract miv", ["extract", bundle, "-o", "t", "--cameras", "miv"], ["t"], ["--depth", "png"])
+    yield Command("extract transforms", ["extract", bundle, "-o", "t"], ["t"], ["extract", inputs["other"]])
+    yield Command("extract miv", ["extract", bundle, "-o", "t", "--cameras", "miv"], ["t"],
+                  ["extract", inputs["other"]])
     yield Command("extract ply", ["extract", bundle, "-o", "t.ply"], ["t.ply"], ["extract", inputs["other"]])
     yield Command("extract drc", ["extract", bundle, "-o", "t.drc"], ["t.drc"], ["--position-bits", "8"])
     yield Command("render png", ["render", bundle, "-o", "t.png", "--backend", "cpu", "--size", "400x400"], ["t.png"])
