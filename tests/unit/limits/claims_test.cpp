@@ -1,8 +1,6 @@
 // Sizes in scenes, atlases and image sets that are 0, 1 or negative in 32 bits: refused, without the
 // memory that they ask for.
 
-#include <sys/resource.h>
-
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -15,16 +13,11 @@
 #include "lib/packing/packing.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/limits/peak_memory.hpp"
 
 using namespace stx;
 
 namespace {
-
-long peakMiB() {
-    rusage usage{};
-    ::getrusage(RUSAGE_SELF, &usage);
-    return usage.ru_maxrss >> 10;
-}
 
 /// 65,535 squared is 4,294,836,225, negative as an int; 65,536 squared is 0; 46,341 squared is the
 /// first above 2^31; 2^31 and 2^32 + 1 are themselves no int.
@@ -108,7 +101,8 @@ TEST_F(Claims, PagesAndRectanglesOfAtlases) {
     // Each number of each key, one after the other. A view may be long and narrow.
     for (const char* key : {"\"width\":", "\"height\":", "\"viewX\":", "\"atlasX\":", "\"atlasY\":",
                             "\"padding\":", "\"page\":", "\"view\":"}) {
-        for (auto at = text.find(key); at != text.npos; at = text.find(key, at + 1)) {
+        // The first is of the page or a texture, the last of a rectangle.
+        for (const auto at : {text.find(key), text.rfind(key)}) {
             for (const char* side : kSides) {
                 const auto from = text.find_first_of("0123456789-", at + std::strlen(key));
                 const auto to = text.find_first_not_of("0123456789", from);

@@ -1,8 +1,6 @@
 // Sizes that overflow 32 bits and numbers at the edge of floats, in files of a few bytes: an error
 // or a sound result, and never the memory that the file asks for.
 
-#include <sys/resource.h>
-
 #include <gtest/gtest.h>
 
 #include "formats/images/images.hpp"
@@ -13,17 +11,11 @@
 #include "lib/render/renderer.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/limits/peak_memory.hpp"
 
 using namespace stx;
 
 namespace {
-
-/// The most memory that this process has ever held, in MiB.
-long peakMiB() {
-    rusage usage{};
-    ::getrusage(RUSAGE_SELF, &usage);
-    return usage.ru_maxrss >> 10;
-}
 
 std::string bigEndian(std::uint64_t value, int bytes) {
     std::string text;

@@ -74,7 +74,7 @@ Bytes written(const Document& document) {
     return bytes ? *bytes : Bytes();
 }
 
-std::string fileErrorOf(const Bytes& bytes) {
+std::string errorOf(const Bytes& bytes) {
     Job job;
     const auto document = readMp4(ByteSource::fromView(bytes), job);
     return document ? "read" : document.error().text();
@@ -323,12 +323,12 @@ TEST(IsobmffFile, SixtyFourBitSizesAndOffsetsAreRead) {
 
 TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     const Bytes good = written(sample());
-    EXPECT_EQ(fileErrorOf(good), "read");
+    EXPECT_EQ(errorOf(good), "read");
     const auto with = [&](std::string_view type, std::ptrdiff_t from, std::uint32_t value) {
         Bytes bad = good;
         put32(bad, static_cast<std::size_t>(static_cast<std::ptrdiff_t>(find(bad, type)) + from),
               value);
-        return fileErrorOf(bad);
+        return errorOf(bad);
     };
     EXPECT_NE(with("moov", -4, 0x7FFFFFFF).find("'moov' claims 2147483647 bytes"),
               std::string::npos);
@@ -341,12 +341,12 @@ TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     EXPECT_NE(with("mdhd", 16, 0).find("timescale is 0"), std::string::npos);
     EXPECT_NE(with("stsc", 12, 2).find("stsc"), std::string::npos);
     // A sample description of a scene with a code that no version has.
-    EXPECT_NE(fileErrorOf(Bytes(good.begin(), good.begin() + 100)).find("byte 28"), std::string::npos);
-    EXPECT_NE(fileErrorOf({}).find("no 'moov'"), std::string::npos);
-    EXPECT_NE(fileErrorOf(unhex("ffd8ffe000104a46494600")).find("no MP4 file"), std::string::npos);
+    EXPECT_NE(errorOf(Bytes(good.begin(), good.begin() + 100)).find("byte 28"), std::string::npos);
+    EXPECT_NE(errorOf({}).find("no 'moov'"), std::string::npos);
+    EXPECT_NE(errorOf(unhex("ffd8ffe000104a46494600")).find("no MP4 file"), std::string::npos);
     Bytes cut = good;
     cut.resize(good.size() - 1);
-    EXPECT_NE(fileErrorOf(cut).find("'mdat' claims"), std::string::npos) << fileErrorOf(cut);
+    EXPECT_NE(errorOf(cut).find("'mdat' claims"), std::string::npos) << errorOf(cut);
 }
 
 TEST(IsobmffFile, FragmentedAndEncryptedFilesAreRefusedByName) {
@@ -354,7 +354,7 @@ TEST(IsobmffFile, FragmentedAndEncryptedFilesAreRefusedByName) {
     const auto renamed = [&](std::string_view from, std::string_view to) {
         Bytes bad = good;
         std::memcpy(bad.data() + find(bad, from), to.data(), 4);
-        return fileErrorOf(bad);
+        return errorOf(bad);
     };
     // 'iods' holds nothing that is missed before mvex is.
     EXPECT_NE(renamed("iods", "mvex").find("fragmented"), std::string::npos)
@@ -372,9 +372,9 @@ TEST(IsobmffFile, UnknownBoxesArePassedOver) {
     strange.text("xyz?");
     strange.u32(42);
     bytes.insert(bytes.end(), strange.view().begin(), strange.view().end());
-    EXPECT_EQ(fileErrorOf(bytes), "read");
+    EXPECT_EQ(errorOf(bytes), "read");
     std::memcpy(bytes.data() + find(bytes, "mvhd"), "xyz?", 4);
-    EXPECT_EQ(fileErrorOf(bytes), "read");
+    EXPECT_EQ(errorOf(bytes), "read");
 }
 
 TEST(IsobmffFile, WhatHasNoCodeIsRefused) {
