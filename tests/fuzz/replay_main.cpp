@@ -1,5 +1,6 @@
 // Runs a fuzz target over files without libFuzzer: each file as it is, cut at every length, and
-// with single bytes changed. The same runs each time.
+// with single bytes changed; those that a fuzzer has grown (grown_*) at a few lengths and with few
+// changes. The same runs each time.
 
 #include <algorithm>
 #include <cstdint>
@@ -20,6 +21,8 @@ using Input = std::vector<std::uint8_t>;
 /// Files up to this size are cut at every length; larger ones at that many lengths.
 constexpr std::size_t kCuts = 6000;
 constexpr int kFlips = 300;
+/// As many cuts and changes of a grown file: it is one of many changes already.
+constexpr int kOfGrown = 16;
 
 std::size_t runs = 0;
 
@@ -34,11 +37,12 @@ void replay(const std::filesystem::path& path) {
     std::ifstream in(path, std::ios::binary);
     Input bytes{std::istreambuf_iterator<char>(in), {}};
     run(bytes.data(), bytes.size());
-    const std::size_t step = bytes.size() / kCuts + 1;
+    const bool grown = path.filename().string().starts_with("grown_");
+    const std::size_t step = bytes.size() / (grown ? kOfGrown : kCuts) + 1;
     for (std::size_t length = 0; length < bytes.size(); length += step) run(bytes.data(), length);
     if (bytes.empty()) return;
     std::mt19937 random(static_cast<std::uint32_t>(bytes.size()));
-    for (int i = 0; i < kFlips; ++i) {
+    for (int i = 0; i < (grown ? kOfGrown : kFlips); ++i) {
         Input changed = bytes;
         const int changes = 1 + i % 3;
         for (int k = 0; k < changes; ++k) {
