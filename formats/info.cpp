@@ -138,6 +138,7 @@ Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
                             {"height", t.height},
                             {"page", t.page},
                             {"file", t.file},
+                            {"coding", t.coding},
                             {"bytes", t.bytes}});
     }
     out["nodeKind"] = second ? "SimpleTextureV2" : "SimpleTexture";
@@ -236,8 +237,11 @@ std::string describeAsText(const Json& info) {
                            text(info["pixels"]["source"]));
     if (info.contains("textures")) {
         for (const auto& t : info["textures"])
-            out += fmt::format("texture {}: {}x{}\n", text(t["attribute"]), text(t["width"]),
-                               text(t["height"]));
+            out += fmt::format(
+                "texture {}: {}x{}{}{}\n", text(t["attribute"]), text(t["width"]),
+                text(t["height"]), t.contains("coding") ? ", " + text(t["coding"]) : "",
+                t.contains("bytes") && t["bytes"] > 0 ? fmt::format(", {} bytes", text(t["bytes"]))
+                                                      : "");
     }
     if (info.contains("views")) {
         std::size_t i = 0;

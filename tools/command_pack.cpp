@@ -19,6 +19,8 @@ struct PackOptions {
     std::string budget;
     PruneSettings pruning;
     double minPsnr = 0;
+    std::string colour = "png";
+    int quality = 92;
 };
 
 /// "4M", "250k" or "1000000" pixels.
@@ -63,7 +65,10 @@ Result<int> packBundle(const PackOptions& o, Program& program) {
     auto atlas = pack(bundle, settings, program.job);
     if (!atlas) return tl::unexpected(atlas.error().at(fmt::format("'{}'", o.input)));
     STX_CHECK(program.job.checkCancelled());
-    STX_CHECK(writeAtlas(*atlas, o.output, program.job, program.outputOptions()));
+    AtlasSaveOptions save;
+    save.jpegQuality = o.colour == "jpeg" ? o.quality : 0;
+    save.output = program.outputOptions();
+    STX_CHECK(writeAtlas(*atlas, o.output, program.job, save));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
@@ -109,6 +114,10 @@ Command addPack(CLI::App& app, Program& program) {
         ->check(CLI::Range(0, 64));
     c->add_option("--max-size", o->settings.maxSize, "Largest side of a texture (default 16384)")
         ->check(CLI::Range(16, 65536));
+    c->add_option("--colour", o->colour,
+                  "png (exact) or jpeg, in a folder; alpha stays exact (default png)")
+        ->check(CLI::IsMember({"png", "jpeg"}));
+    c->add_option("--quality", o->quality, "Of JPEG (default 92)")->check(CLI::Range(1, 100));
     const char* pruning = "Pruning";
     c->add_flag("--prune", o->prune,
                 "Leave out pixels that another kept view shows as well or better")

@@ -18,6 +18,7 @@ namespace {
 using Type = ExrChannel::Type;
 
 constexpr const char* kIndexFile = "atlas.json";
+constexpr const char* kOpaque = "sRGB8-opaque";
 
 bool isExrName(const fs::path& path) {
     const std::string ending = path.extension().string();
@@ -31,17 +32,18 @@ std::vector<std::string> ownNames() {
         for (const char* ending : {".png", "_1.png", ".exr", "_1.exr"})
             names.push_back(std::string(attribute) + ending);
     }
+    names.insert(names.end(), {"colour.jpg", "colour_1.jpg"});
     return names;
 }
 
 std::string fileName(const AtlasTexture& t) {
-    const char* ending = t.coding == "float" ? "exr" : "png";
+    const char* ending = t.coding == "float" ? "exr" : t.coding == kOpaque ? "jpg" : "png";
     return t.page == 0 ? fmt::format("{}.{}", t.attribute, ending)
                        : fmt::format("{}_{}.{}", t.attribute, t.page, ending);
 }
 
-/// Everything but the pixels, and which textures there will be.
-AtlasHeader headerOf(const Atlas& atlas, bool inOneExr) {
+/// Everything but the pixels, and which textures there will be; `jpeg` in folders only.
+AtlasHeader headerOf(const Atlas& atlas, bool inOneExr, bool jpeg = false) {
     AtlasHeader header;
     Atlas& a = header.atlas;
     a.views = atlas.views;
@@ -73,18 +75,15 @@ AtlasHeader headerOf(const Atlas& atlas, bool inOneExr) {
             if (!inOneExr) t.file = fileName(t);
             return t;
         };
-        add("colour", header.linear || inOneExr ? "float" : "sRGB8");
+        add("colour", header.linear || inOneExr ? "float" : jpeg ? kOpaque : "sRGB8");
         add("depth", floats ? "float" : only8 ? "code8" : "code16");
+        if (jpeg) header.textures.back().addSecond();
         if (!page.normal.empty()) add("normal", floats ? "float" : "snorm16");
         if (!page.splatU.empty()) {
             AtlasTexture& t = add("splat", floats ? "float" : "snorm16");
             if (floats) continue;
             t.scale = std::max(largestComponent(page.splatU), largestComponent(page.splatV));
-            // Along the shorter side, to stay within what a GPU takes.
-            (t.width <= t.height ? t.splatVX : t.splatVY) =
-                t.width <= t.height ? t.width : t.height;
-            t.width += t.splatVX;
-            t.height += t.splatVY;
+            t.addSecond();
         }
     }
     return header;
@@ -137,8 +136,21 @@ Result<void> writeFloatImage(const AtlasHeader& header, const AtlasPage& page,
     return file.commit();
 }
 
-Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, Job& job) {
+Result<Bytes> encodeDepth(const Image<std::uint16_t>& codes, const AtlasTexture& t,
+                          const Rgba8Image& colour) {
+    const int bits = t.coding == "code16" ? 16 : 8;
+    Image<std::uint16_t> both;
+    if (t.hasSecond()) both = withAlpha(codes, colour, t, bits == 16 ? 257 : 1);
+    const auto values = (t.hasSecond() ? both : codes).pixels();
+    if (bits == 16) return encodePng(t.width, t.height, 1, 16, values.data(), false);
+    const std::vector<std::uint8_t> bytes(values.begin(), values.end());
+    return encodePng(t.width, t.height, 1, 8, bytes.data(), false);
+}
+
+Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, int jpegQuality, Job& job) {
     const AtlasPage& page = atlas.pages[t.page];
+    if (t.coding == kOpaque)
+        return encodeJpeg(t.width, t.height, 3, opaqueBytes(page.texture).data(), jpegQuality);
     if (t.attribute == "colour")
         return encodePng(t.width, t.height, 4, 8, page.texture.rgba8()->data(), true);
     if (t.attribute == "depth") {
@@ -146,25 +158,37 @@ Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, Job& job) {
         if (coded.outside) job.note("depth outside of all rectangles was dropped from the atlas");
         if (coded.clamped)
             job.note("depth beyond nearPlane or farPlane was clamped to them in the atlas");
-        if (t.coding == "code16")
-            return encodePng(t.width, t.height, 1, 16, coded.codes.data(), false);
-        std::vector<std::uint8_t> bytes(coded.codes.pixels().begin(), coded.codes.pixels().end());
-        return encodePng(t.width, t.height, 1, 8, bytes.data(), false);
+        return encodeDepth(coded.codes, t, *page.texture.rgba8());
     }
     std::vector<std::uint16_t> rgb(static_cast<std::size_t>(t.width) * t.height * 3);
     if (t.attribute == "normal") {
         codeVectors(page.normal, t.scale, 0, 0, t.width, rgb);
     } else {
         codeVectors(page.splatU, t.scale, 0, 0, t.width, rgb);
-        codeVectors(page.splatV, t.scale, t.splatVX, t.splatVY, t.width, rgb);
+        codeVectors(page.splatV, t.scale, t.secondX, t.secondY, t.width, rgb);
     }
     return encodePng(t.width, t.height, 3, 16, rgb.data(), false);
 }
 
+/// JPEG has neither floats nor OpenEXR's exact depth beside it.
+Result<void> checkJpeg(const AtlasHeader& header, const fs::path& path) {
+    const auto refuse = [&](const char* why) {
+        return failAt(fmt::format("'{}'", path.string()), ErrorCode::unsupported,
+                      "JPEG colour is not possible here, since {}; leave out --colour jpeg", why);
+    };
+    if (header.linear) return refuse("colour is linear light in floats");
+    for (const auto& t : header.textures) {
+        if (t.attribute == "depth" && t.coding == "float")
+            return refuse("depth has 32 bits, which OpenEXR alone holds");
+    }
+    return {};
+}
+
 Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
-                         OutputFile::Options options) {
-    const AtlasHeader header = headerOf(atlas, false);
-    STX_TRY(auto folder, OutputFolder::create(path, options, ownNames()));
+                         const AtlasSaveOptions& options) {
+    const AtlasHeader header = headerOf(atlas, false, options.jpegQuality > 0);
+    if (options.jpegQuality > 0) STX_CHECK(checkJpeg(header, path));
+    STX_TRY(auto folder, OutputFolder::create(path, options.output, ownNames()));
     const auto count = static_cast<std::int64_t>(header.textures.size());
     std::vector<Result<void>> done(header.textures.size());
     parallelFor(0, count, [&](std::int64_t i) {
@@ -174,7 +198,7 @@ Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
             done[i] = writeFloatImage(header, atlas.pages[t.page], t, file);
             return;
         }
-        const auto bytes = encodeImage(atlas, t, job);
+        const auto bytes = encodeImage(atlas, t, options.jpegQuality, job);
         done[i] = bytes ? writeFile(file, *bytes) : Result<void>(tl::unexpected(bytes.error()));
     });
     for (auto& result : done) {
@@ -269,9 +293,18 @@ Result<void> checkPartSize(const ExrReader& reader, int part, const AtlasHeader&
                   header.pageWidth, header.pageHeight);
 }
 
-/// One image of a folder into its page.
+/// The picture at (x0, y0) of an image that is `width` pixels wide; low bytes where `to` has those.
+template <class From, class To>
+void takePicture(const std::vector<From>& from, int width, int x0, int y0, Image<To>& to) {
+    for (int y = 0; y < to.height(); ++y) {
+        const auto* source = from.data() + static_cast<std::size_t>(y + y0) * width + x0;
+        for (To& value : to.row(y)) value = static_cast<To>(*source++);
+    }
+}
+
+/// One image of a folder into its page; alpha that stands in the depth texture into `coverage`.
 Result<void> readImage(const fs::path& file, const AtlasHeader& header, const AtlasTexture& t,
-                       AtlasPage& page, const Limits& limits) {
+                       AtlasPage& page, Image<std::uint8_t>& coverage, const Limits& limits) {
     STX_TRY(const auto bytes, readFile(file, limits));
     const auto where = fmt::format("'{}'", file.string());
     if (t.coding == "float") {
@@ -280,8 +313,8 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
         return readFloats(reader, 0, {t.attribute}, header.linear, page);
     }
     STX_TRY(auto image, decodeImage(bytes, file.string(), limits));
-    const int channels = t.attribute == "colour" ? 4 : t.attribute == "depth" ? 1 : 3;
-    const int bits = t.coding == "sRGB8" || t.coding == "code8" ? 8 : 16;
+    const int channels = t.attribute == "depth" ? 1 : t.coding == "sRGB8" ? 4 : 3;
+    const int bits = t.attribute == "colour" || t.coding == "code8" ? 8 : 16;
     if (image.width != t.width || image.height != t.height || image.channels != channels ||
         image.bits() != bits)
         return failAt(where, ErrorCode::invalidInput,
@@ -290,17 +323,17 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
                       image.width, image.height, image.channels, image.bits(), t.width, t.height,
                       channels, bits);
     if (t.attribute == "colour") {
-        Rgba8Image rgba(t.width, t.height);
-        const auto& from = std::get<0>(image.values);
-        for (std::size_t i = 0; i < rgba.count(); ++i)
-            rgba.pixels()[i] = {from[i * 4], from[i * 4 + 1], from[i * 4 + 2], from[i * 4 + 3]};
-        page.texture = Texture(std::move(rgba));
+        // The depth texture's alpha is put in when all images are read.
+        page.texture = Texture(rgba8From(image));
         return {};
     }
     if (t.attribute == "depth") {
-        Image<std::uint16_t> codes(t.width, t.height);
+        Image<std::uint16_t> codes(header.pageWidth, header.pageHeight);
+        if (t.hasSecond()) coverage = Image<std::uint8_t>(codes.width(), codes.height());
         const auto fill = [&](const auto& from) {
-            std::copy(from.begin(), from.end(), codes.pixels().begin());
+            takePicture(from, t.width, 0, 0, codes);
+            // 16-bit alpha is the 8-bit one twice.
+            if (t.hasSecond()) takePicture(from, t.width, t.secondX, t.secondY, coverage);
         };
         if (bits == 8) fill(std::get<0>(image.values));
         if (bits == 16) fill(std::get<1>(image.values));
@@ -314,7 +347,7 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
     if (t.attribute == "normal") page.normal = vectorsFromCodes(rgb, t.scale, 0, 0, t.width, size);
     if (t.attribute == "splat") {
         page.splatU = vectorsFromCodes(rgb, t.scale, 0, 0, t.width, size);
-        page.splatV = vectorsFromCodes(rgb, t.scale, t.splatVX, t.splatVY, t.width, size);
+        page.splatV = vectorsFromCodes(rgb, t.scale, t.secondX, t.secondY, t.width, size);
     }
     return {};
 }
@@ -393,15 +426,20 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
     STX_CHECK(checkMemory(header, where, job.limits));
     Atlas atlas = header.atlas;
     atlas.pages.resize(static_cast<std::size_t>(header.pages));
+    std::vector<Image<std::uint8_t>> coverage(atlas.pages.size());
     std::vector<Result<void>> done(header.textures.size());
     parallelFor(0, static_cast<std::int64_t>(done.size()), [&](std::int64_t i) {
         const AtlasTexture& t = header.textures[i];
         auto file = resolveInside(folder, t.file, job.limits);
-        done[i] = file ? readImage(*file, header, t, atlas.pages[t.page], job.limits)
-                       : Result<void>(tl::unexpected(file.error().at(where)));
+        done[i] =
+            file ? readImage(*file, header, t, atlas.pages[t.page], coverage[t.page], job.limits)
+                 : Result<void>(tl::unexpected(file.error().at(where)));
     });
     for (auto& result : done) {
         if (!result) return propagate(result);
+    }
+    for (std::size_t i = 0; i < coverage.size(); ++i) {
+        if (!coverage[i].empty()) setAlpha(*atlas.pages[i].texture.rgba8(), coverage[i]);
     }
     return checked(std::move(atlas), where);
 }
@@ -431,6 +469,12 @@ bool isFolderPath(const fs::path& path) {
 
 }  // namespace
 
+void AtlasTexture::addSecond() {
+    (width <= height ? secondX : secondY) = std::min(width, height);
+    width += secondX;
+    height += secondY;
+}
+
 double AtlasHeader::used() const {
     double covered = 0;
     for (const auto& r : atlas.rectangles) covered += static_cast<double>(r.width) * r.height;
@@ -438,11 +482,13 @@ double AtlasHeader::used() const {
 }
 
 Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,
-                        OutputFile::Options options) {
+                        const AtlasSaveOptions& options) {
     STX_CHECK(atlas.check());
-    auto ok = isExrName(path) ? writeExr(atlas, path, job, options)
-                              : writeFolder(atlas, path, job, options);
-    return ok;
+    if (!isExrName(path)) return writeFolder(atlas, path, job, options);
+    if (options.jpegQuality > 0)
+        return failAt(fmt::format("'{}'", path.string()), ErrorCode::unsupported,
+                      "an OpenEXR atlas holds no JPEG; name a folder instead of an .exr file");
+    return writeExr(atlas, path, job, options.output);
 }
 
 Result<Atlas> readAtlas(const fs::path& path, Job& job) {

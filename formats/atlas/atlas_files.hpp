@@ -18,15 +18,22 @@ struct AtlasTexture {
         attribute;  ///< "colour", "depth", "normal" or "splat" (splatU and splatV share one)
     int page = 0;
     std::string file;  ///< name in the folder; empty in an OpenEXR atlas
-    /// "sRGB8": 8-bit sRGB, straight alpha · "code8", "code16": the DepthImage codes of each
-    /// rectangle's view (its nearPlane, farPlane, depthBits) · "snorm16": 32768 + 32767 * v / scale
-    /// of each component · "float": OpenEXR, as in bundles.
+    /// "sRGB8": 8-bit sRGB, straight alpha · "sRGB8-opaque": the same without alpha, which is then
+    /// in the depth texture (JPEG) · "code8", "code16": the DepthImage codes of each rectangle's
+    /// view (its nearPlane, farPlane, depthBits) · "snorm16": 32768 + 32767 * v / scale of each
+    /// component · "float": OpenEXR, as in bundles.
     std::string coding;
-    int width = 0, height = 0;  ///< pixels of the image; splat images in snorm16 hold two
+    int width = 0, height = 0;  ///< pixels of the image, which may hold two pictures of the page
     double scale = 1.0;         ///< snorm16: the value of code 65535
-    /// snorm16 splats: where the pixel (0, 0) of splatV lies; splatU starts at (0, 0).
-    int splatVX = 0, splatVY = 0;
+    /// Where pixel (0, 0) of the second picture lies, beside or below the first, which starts at
+    /// (0, 0); both 0 = there is none. snorm16 splats: splatU, then splatV; depth: the codes, then
+    /// the colour's alpha where it is "sRGB8-opaque" (in 16 bits 257 times the alpha).
+    int secondX = 0, secondY = 0;
     std::uint64_t bytes = 0;  ///< as it lies in the file; 0 = not known
+
+    [[nodiscard]] bool hasSecond() const { return secondX > 0 || secondY > 0; }
+    /// Doubles the image along its shorter side, to stay within what a GPU takes.
+    void addSecond();
 };
 
 /// What an atlas says without its pixels.
@@ -41,15 +48,24 @@ struct AtlasHeader {
     [[nodiscard]] double used() const;
 };
 
+/// How an atlas is written.
+struct AtlasSaveOptions {
+    /// 1..100: colour of a folder is JPEG of this quality, colour.jpg, and its alpha goes without
+    /// loss into the depth texture; 0: PNG, exact.
+    int jpegQuality = 0;
+    OutputFile::Options output = {};
+};
+
 /// Writes an atlas: one multi-part OpenEXR file (a part for each page) when the name ends in .exr,
 /// else a folder of atlas.json (formats/atlas/atlas.schema.json) and at most four images:
 /// colour.png, depth.png, normal.png, splat.png, those of page k > 0 as colour_k.png and so on.
 /// 8- and 16-bit depth comes back to the code and normals to 1/32767; an atlas with a view of 32
 /// depth bits gets .exr images, and everything comes back to the bit. Linear colour is colour.exr.
 /// Depth that belongs to no rectangle or its padding is dropped with a note. Colours under alpha 0
-/// are bled anew when they come from OpenEXR. Errors: Atlas::check(), files.
+/// are bled anew when they come from OpenEXR or go to JPEG. Errors: Atlas::check(); files;
+/// unsupported: JPEG where OpenEXR is needed.
 [[nodiscard]] Result<void> writeAtlas(const Atlas& atlas, const std::filesystem::path& path,
-                                      Job& job, OutputFile::Options options = {});
+                                      Job& job, const AtlasSaveOptions& options = {});
 
 /// Reads what writeAtlas() wrote: a folder, its atlas.json, or an .exr file. The images' names
 /// resolve inside the folder only. The result passes Atlas::check().

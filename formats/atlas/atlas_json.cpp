@@ -47,6 +47,11 @@ Json jsonOf(const AtlasRectangle& r) {
             {"atlasX", r.atlasX}, {"atlasY", r.atlasY}, {"turned", r.turned}};
 }
 
+/// The second picture of a texture.
+const char* secondName(const AtlasTexture& t) {
+    return t.attribute == "splat" ? "splatV" : "alpha";
+}
+
 Json jsonOf(const AtlasTexture& t) {
     Json j = {{"attribute", t.attribute}, {"page", t.page}};
     if (!t.file.empty()) j["file"] = t.file;
@@ -54,8 +59,7 @@ Json jsonOf(const AtlasTexture& t) {
     j["width"] = t.width;
     j["height"] = t.height;
     if (t.coding == "snorm16") j["scale"] = t.scale;
-    if (t.coding == "snorm16" && t.attribute == "splat")
-        j["splatV"] = Json::array({t.splatVX, t.splatVY});
+    if (t.hasSecond()) j[secondName(t)] = Json::array({t.secondX, t.secondY});
     return j;
 }
 
@@ -90,6 +94,7 @@ class Reader {
         to = it->template get<T>();
         return {};
     }
+    [[nodiscard]] bool has(const char* name) const { return json_.contains(name); }
     Result<void> finite(const char* name, double& to) const {
         return number(name, to, -1e300, 1e300);
     }
@@ -189,24 +194,28 @@ Result<void> readTexture(const Reader& r, const Limits& limits, const AtlasHeade
     STX_CHECK(r.number("width", t.width, 1, limits.maxImageSide * 2.0));
     STX_CHECK(r.number("height", t.height, 1, limits.maxImageSide * 2.0));
     const bool vectors = t.attribute == "normal" || t.attribute == "splat";
-    const bool fits = t.coding == "float" || (t.attribute == "colour" && t.coding == "sRGB8") ||
-                      (t.attribute == "depth" && (t.coding == "code8" || t.coding == "code16")) ||
-                      (vectors && t.coding == "snorm16");
+    const auto is = [&](std::initializer_list<const char*> codings) {
+        return std::find(codings.begin(), codings.end(), t.coding) != codings.end();
+    };
+    const bool fits =
+        t.coding == "float" || (t.attribute == "colour" && is({"sRGB8", "sRGB8-opaque"})) ||
+        (t.attribute == "depth" && is({"code8", "code16"})) || (vectors && t.coding == "snorm16");
     if (!fits) return r.wrong("coding", fmt::format("is unknown for the {} texture", t.attribute));
     int width = header.pageWidth, height = header.pageHeight;
-    if (t.coding == "snorm16") {
-        STX_CHECK(r.number("scale", t.scale, 0, 1e30));
-        if (t.attribute == "splat") {
-            std::array<double, 2> start{};
-            STX_CHECK(r.vector("splatV", start));
-            const bool beside = start[0] == width && start[1] == 0;
-            const bool below = start[0] == 0 && start[1] == height;
-            if (!beside && !below) return r.wrong("splatV", "must be beside or below splatU");
-            t.splatVX = beside ? width : 0;
-            t.splatVY = beside ? 0 : height;
-            width += t.splatVX;
-            height += t.splatVY;
-        }
+    if (t.coding == "snorm16") STX_CHECK(r.number("scale", t.scale, 0, 1e30));
+    const char* second = secondName(t);
+    const bool codes = t.coding == "code8" || t.coding == "code16";
+    if ((t.coding == "snorm16" && t.attribute == "splat") || (codes && r.has(second))) {
+        std::array<double, 2> start{};
+        STX_CHECK(r.vector(second, start));
+        const bool beside = start[0] == width && start[1] == 0;
+        const bool below = start[0] == 0 && start[1] == height;
+        if (!beside && !below)
+            return r.wrong(second, "must be beside or below the first picture of its image");
+        t.secondX = beside ? width : 0;
+        t.secondY = beside ? 0 : height;
+        width += t.secondX;
+        height += t.secondY;
     }
     if (t.width != width || t.height != height)
         return r.wrong("width", fmt::format("and height are {}x{}, but the page needs {}x{}",
@@ -224,6 +233,16 @@ Result<void> checkTextures(const Reader& r, const AtlasHeader& header) {
                 return r.wrong("textures",
                                fmt::format("hold two of {} for page {}", attribute, page));
         }
+        int alpha = 0;  // colour without needs depth with it
+        for (const auto& t : header.textures) {
+            if (t.page != page) continue;
+            if (t.coding == "sRGB8-opaque") ++alpha;
+            if (t.attribute == "depth" && t.hasSecond()) --alpha;
+        }
+        if (alpha != 0)
+            return r.wrong("textures", fmt::format("need alpha with the colour or with the depth "
+                                                   "of page {}, not with both or none",
+                                                   page));
         for (const char* needed : {"colour", "depth"}) {
             if (count[needed] != 1)
                 return r.wrong("textures", fmt::format("lack the {} of page {}", needed, page));

@@ -91,6 +91,33 @@ Result<Image<float>> depthFromCodes(const Atlas& atlas, int page,
     return depth;
 }
 
+Image<std::uint16_t> withAlpha(const Image<std::uint16_t>& codes, const Rgba8Image& colour,
+                               const AtlasTexture& texture, int factor) {
+    Image<std::uint16_t> both(texture.width, texture.height);
+    for (int y = 0; y < codes.height(); ++y) {
+        const auto row = codes.row(y);
+        std::copy(row.begin(), row.end(), both.row(y).begin());
+        const auto alpha = both.row(y + texture.secondY).subspan(texture.secondX);
+        for (int x = 0; x < codes.width(); ++x)
+            alpha[x] = static_cast<std::uint16_t>(colour.at(x, y).a * factor);
+    }
+    return both;
+}
+
+std::vector<std::uint8_t> opaqueBytes(Texture texture) {
+    bleedColour(texture);
+    const Rgba8Image& rgba = *texture.rgba8();
+    std::vector<std::uint8_t> bytes(rgba.count() * 3);
+    for (std::size_t i = 0; i < rgba.count(); ++i) {
+        for (int c = 0; c < 3; ++c) bytes[i * 3 + c] = rgba.pixels()[i][c];
+    }
+    return bytes;
+}
+
+void setAlpha(Rgba8Image& colour, const Image<std::uint8_t>& alpha) {
+    for (std::size_t i = 0; i < colour.count(); ++i) colour.pixels()[i].a = alpha.pixels()[i];
+}
+
 double largestComponent(const Image<glm::vec3>& vectors) {
     float largest = 0.0f;
     for (const auto& v : vectors.pixels())

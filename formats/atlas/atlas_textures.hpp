@@ -21,6 +21,16 @@ struct DepthCodes {
 [[nodiscard]] Result<Image<float>> depthFromCodes(const Atlas& atlas, int page,
                                                   const Image<std::uint16_t>& codes);
 
+/// The depth texture with a second picture: codes and `factor` times the colour's alpha.
+[[nodiscard]] Image<std::uint16_t> withAlpha(const Image<std::uint16_t>& codes,
+                                             const Rgba8Image& colour, const AtlasTexture& texture,
+                                             int factor);
+/// Interleaved RGB without alpha, bled anew over all pixels of alpha 0, so that a lossy codec finds
+/// no edge beside the object. `texture` holds 8-bit sRGB.
+[[nodiscard]] std::vector<std::uint8_t> opaqueBytes(Texture texture);
+/// Puts alpha into a colour image of the same size.
+void setAlpha(Rgba8Image& colour, const Image<std::uint8_t>& alpha);
+
 /// Largest component of vectors, the scale of their codes; 1 when all are zero.
 [[nodiscard]] double largestComponent(const Image<glm::vec3>& vectors);
 /// 32768 + 32767 * v / scale of each component, into interleaved RGB at (x0, y0) of an image that

@@ -181,6 +181,60 @@ TEST(AtlasFolder, EightBitsStayEightAndMixedViewsKeepTheirOwn) {
     EXPECT_EQ(back.pages[0].depth, atlas.pages[0].depth);
 }
 
+TEST(AtlasFolder, JpegLosesColourOnly) {
+    for (const int bits : {8, 16}) {
+        SCOPED_TRACE(bits);
+        const TemporaryFolder folder;
+        const Atlas atlas = smallAtlas(4, bits, true, false);
+        Job job;
+        writtenAndRead(atlas, folder / "set");  // PNG first: its colour.png must go
+        ASSERT_TRUE(writeAtlas(atlas, folder / "set", job, {.jpegQuality = 95}));
+        EXPECT_EQ(namesIn(folder / "set"),
+                  (std::set<std::string>{"atlas.json", "colour.jpg", "depth.png", "normal.png",
+                                         "splat.png"}));
+        const auto back = readAtlas(folder / "set", job);
+        ASSERT_TRUE(back) << back.error().text();
+        EXPECT_EQ(headerDifference(atlas, *back), "");
+        const auto& a = *atlas.pages[0].texture.rgba8();
+        const auto& b = *back->pages[0].texture.rgba8();
+        EXPECT_EQ(atlas.pages[0].depth, back->pages[0].depth);
+        double squares = 0, count = 0;
+        for (std::size_t i = 0; i < a.count(); ++i) {
+            ASSERT_EQ(a.pixels()[i].a, b.pixels()[i].a) << i;
+            if (a.pixels()[i].a == 0) continue;
+            const glm::vec3 d = glm::vec3(a.pixels()[i]) - glm::vec3(b.pixels()[i]);
+            squares += glm::dot(d, d);
+            count += 3;
+        }
+        EXPECT_GT(count, 100);
+        // The small bundle's colours are noise, the worst that JPEG can get.
+        EXPECT_LT(std::sqrt(squares / count), 8.0);
+    }
+}
+
+TEST(AtlasFolder, JpegIsRefusedWhereOpenExrIsNeeded) {
+    const TemporaryFolder folder;
+    Job job;
+    const auto refused = [&](const Atlas& atlas, const char* name) {
+        const auto done = writeAtlas(atlas, folder / name, job, {.jpegQuality = 90});
+        EXPECT_FALSE(fs::exists(folder / name));
+        return !done && done.error().code == ErrorCode::unsupported;
+    };
+    EXPECT_TRUE(refused(smallAtlas(2, 32, false, false), "deep"));
+    EXPECT_TRUE(refused(smallAtlas(2, 16, false, true), "linear"));
+    EXPECT_TRUE(refused(smallAtlas(2, 16, false, false), "a.exr"));
+}
+
+TEST(AtlasFolder, AlphaStandsInOnePlace) {
+    const TemporaryFolder folder;
+    writtenAndRead(smallAtlas(2, 16, false, false), folder / "set");
+    std::string json = get(folder / "set/atlas.json");
+    json.replace(json.find("\"sRGB8\""), 7, "\"sRGB8-opaque\"");
+    const auto header = atlasFromJson(json, "'a'", Limits());
+    ASSERT_FALSE(header);
+    EXPECT_NE(header.error().text().find("not with both or none"), std::string::npos);
+}
+
 TEST(AtlasFolder, SaysWhatItDropsAndClamps) {
     const TemporaryFolder folder;
     Atlas atlas = smallAtlas(2, 16, false, false);
@@ -256,8 +310,8 @@ TEST(AtlasFiles, AnAtlasReplacesAnAtlasOnly) {
     Job job;
     EXPECT_FALSE(writeAtlas(smallAtlas(3, 16, false, false), folder / "set", job));
     EXPECT_EQ(get(folder / "set/notes.txt"), "mine");
-    EXPECT_FALSE(
-        writeAtlas(smallAtlas(3, 16, false, false), folder / "set", job, {.noClobber = true}));
+    EXPECT_FALSE(writeAtlas(smallAtlas(3, 16, false, false), folder / "set", job,
+                            {.output = {.noClobber = true}}));
 }
 
 TEST(AtlasFiles, NamesStayInsideTheFolder) {
