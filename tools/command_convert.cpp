@@ -126,7 +126,7 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
                       "frames {} are asked for, but the set has {} (0 to {})", o.frames, count,
                       count - 1);
-    program.job.takeNotes();  // said again with each frame
+    (void)program.job.takeNotes();  // said again with each frame
     auto entries = nlohmann::ordered_json::array();
     for (int frame = static_cast<int>(first); frame <= static_cast<int>(last); ++frame) {
         ConvertOptions one = o;

@@ -46,12 +46,12 @@ Result<SetDescription> describePanorama(const path& given, const ImageSetOptions
     STX_TRY(view.texture, sourceInside(given, texture, where, job.limits));
     STX_TRY(view.depth, sourceInside(given, depth, where, job.limits));
     view.distances = [](Image<float>& values, const Camera& camera, int bits,
-                        Job& job) -> Result<void> {
+                        Job& notes) -> Result<void> {
         if (bits == 32) return {};
         if (bits != 16)
             return fail(ErrorCode::invalidInput,
                         "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
-        return scaledIntegers(0.001)(values, camera, bits, job);
+        return scaledIntegers(0.001)(values, camera, bits, notes);
     };
     SetDescription set;
     set.views.push_back(std::move(view));

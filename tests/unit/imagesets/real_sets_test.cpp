@@ -175,7 +175,7 @@ TEST(MiddleburyAloe, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     ImageSetOptions raw = options;
     raw.dequantise = Dequantise::off;
     raw.alignEdges = AlignEdges::off;
-    job.takeNotes();
+    (void)job.takeNotes();
     const auto stored = readImageSet(set, raw, job);
     ASSERT_TRUE(stored) << stored.error().text();
     EXPECT_TRUE(job.takeNotes().empty());
