@@ -20,7 +20,8 @@ const char* wordOf(Rule::Severity severity) {
 
 Result<int> printRules(Program& program) {
     for (const auto& rule : ruleCatalogue())
-        program.print(fmt::format("{} {}: {} ({})\n", rule.number, wordOf(rule.severity), rule.summary, rule.clause));
+        program.print(fmt::format("{} {}: {} ({})\n", rule.number, wordOf(rule.severity),
+                                  rule.summary, rule.clause));
     return 0;
 }
 
@@ -40,13 +41,15 @@ Result<std::vector<Finding>> findingsOf(const ValidateCommandOptions& o, Program
         options.folder = std::filesystem::path(o.input).parent_path();
         return validateMpeg4File(o.input, options, program.job);
     }
-    return fail(ErrorCode::invalidInput, "'{}' is {}; bundles (.mp4, .xmt, .bt, .exr) and atlases can be validated",
-                o.input, nameOf(kind));
+    return fail(ErrorCode::invalidInput,
+                "'{}' is {}; bundles (.mp4, .xmt, .bt, .exr) and atlases can be validated", o.input,
+                nameOf(kind));
 }
 
 Result<int> validateFile(const ValidateCommandOptions& o, Program& program) {
     if (o.rules) return printRules(program);
-    if (o.input.empty()) return fail(ErrorCode::usage, "FILE is required. See 'stx validate --help'");
+    if (o.input.empty())
+        return fail(ErrorCode::usage, "FILE is required. See 'stx validate --help'");
     STX_TRY(const auto findings, findingsOf(o, program));
     bool valid = true;
     auto list = nlohmann::ordered_json::array();
@@ -62,7 +65,10 @@ Result<int> validateFile(const ValidateCommandOptions& o, Program& program) {
         if (program.common.format != "json") program.print(printable(f.text()) + "\n");
     }
     if (program.common.format == "json") {
-        program.printJson({{"$schema", "validate.schema.json"}, {"file", o.input}, {"valid", valid}, {"findings", list}});
+        program.printJson({{"$schema", "validate.schema.json"},
+                           {"file", o.input},
+                           {"valid", valid},
+                           {"findings", list}});
     }
     return findings.empty() ? 0 : static_cast<int>(ErrorCode::difference);
 }
@@ -71,7 +77,8 @@ Result<int> validateFile(const ValidateCommandOptions& o, Program& program) {
 
 Command addValidate(CLI::App& app, Program& program) {
     auto* c = app.add_subcommand("validate",
-                                 "Every rule that a file breaks, by number; silent, with exit code 0, when it breaks none\n\n"
+                                 "Every rule that a file breaks, by number; silent, with exit code "
+                                 "0, when it breaks none\n\n"
                                  "  stx validate model.mp4\n"
                                  "  stx validate --rules");
     auto o = std::make_shared<ValidateCommandOptions>();

@@ -10,7 +10,8 @@
 /// Our attributes, all exact. On each part: stx:position (v3d), stx:orientation (text: axis x y z
 /// and angle in radians), stx:quaternion (text: w x y z), stx:fieldOfView (v2d), stx:orthographic
 /// (int), stx:fx fy cx cy (double, pixels), stx:nearPlane, stx:farPlane (double), stx:depthBits
-/// (int), stx:points (double), and on pruned views stx:pruned (int, 1). On part 0: stx:version (int), stx:kind ("bundle"), stx:colour
+/// (int), stx:points (double), and on pruned views stx:pruned (int, 1). On part 0: stx:version
+/// (int), stx:kind ("bundle"), stx:colour
 /// ("sRGB8" or "linear"), stx:title (text), stx:boundsMin, stx:boundsMax (v3d).
 namespace stx {
 

@@ -33,7 +33,8 @@ struct ExrBundleHeader {
 /// Writes a bundle as one multi-part OpenEXR file, a part for each view (named as the view):
 /// - R G B A: linear Rec. 709, premultiplied; half for 8-bit sRGB textures, which come back to the
 ///   bit (bled colours under alpha 0 are bled anew), float32 for linear ones;
-/// - Z: planar distance, float32 exactly, +inf where there is no point (what OpenEXR's documents ask
+/// - Z: planar distance, float32 exactly, +inf where there is no point (what OpenEXR's documents
+/// ask
 ///   for; OpenImageIO's tools count it as Inf; Blender writes 1e10 instead, Nuke 1/z with 0);
 /// - N.X N.Y N.Z and splatU.X .. splatV.Z: world vectors, float32 exactly, where the view has them.
 /// Cameras stand in the standard attributes worldToCamera, worldToNDC, screenWindowCenter and

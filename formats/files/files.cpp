@@ -394,8 +394,8 @@ Result<void> OutputFolder::commit() {
 Result<void> OutputFolder::commitWith(OutputFile& file) {
     const auto& text = *file.impl_;
     const fs::path aside = impl_->temporary.string() + "-file";
-    const bool replaces = !text.direct && !text.options.noClobber &&
-                          ::rename(text.real.c_str(), aside.c_str()) == 0;
+    const bool replaces =
+        !text.direct && !text.options.noClobber && ::rename(text.real.c_str(), aside.c_str()) == 0;
     if (auto done = commit(); !done) {
         if (replaces) ::rename(aside.c_str(), text.real.c_str());
         return done;

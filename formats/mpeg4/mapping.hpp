@@ -32,8 +32,8 @@ struct SceneReadOptions {
     /// Images that the scene names by a string are looked for in here; empty: they are errors.
     std::filesystem::path folder;
     ImageDecoder decode = decodeImage;
-    /// Without pixels only headers are read: the views have cameras, planes and depthBits, but empty
-    /// images, and a PointTexture gives one view.
+    /// Without pixels only headers are read: the views have cameras, planes and depthBits, but
+    /// empty images, and a PointTexture gives one view.
     bool pixels = true;
 };
 
@@ -47,8 +47,8 @@ struct SceneReadOptions {
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
 
-/// What the scene's objects are: "SimpleTexture", "SimpleTextureV2", "PointTexture", "OctreeImage", or
-/// "none"; the richest where there are several.
+/// What the scene's objects are: "SimpleTexture", "SimpleTextureV2", "PointTexture", "OctreeImage",
+/// or "none"; the richest where there are several.
 [[nodiscard]] const char* nodeKindOf(const Document& document);
 
 struct SceneWriteOptions {

@@ -54,7 +54,8 @@ class BundleReader {
         if (options_.pixels) STX_CHECK(checkMemory(plans));
         parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
             const auto at = static_cast<std::size_t>(i);
-            if (!job_.cancelled) read[at] = options_.pixels ? readView(plans[at]) : readHeader(plans[at]);
+            if (!job_.cancelled)
+                read[at] = options_.pixels ? readView(plans[at]) : readHeader(plans[at]);
         });
         STX_CHECK(job_.checkCancelled());
         Bundle bundle;
@@ -368,8 +369,8 @@ Result<Bundle> bundleFromScene(const Document& document, const SceneReadOptions&
 }
 
 const char* nodeKindOf(const Document& document) {
-    static constexpr std::array<const char*, 4> kKinds = {"SimpleTexture", "PointTexture", "OctreeImage",
-                                                          "SimpleTextureV2"};
+    static constexpr std::array<const char*, 4> kKinds = {"SimpleTexture", "PointTexture",
+                                                          "OctreeImage", "SimpleTextureV2"};
     int best = -1;
     for (const auto& frame : document.frames) {
         for (const auto& command : frame.commands) {

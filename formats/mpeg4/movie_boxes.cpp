@@ -14,7 +14,8 @@ constexpr std::uint32_t kMovieTimescale = 600;
 /// Seconds from 1904 to 1970.
 constexpr std::uint64_t kEpochOffset = 2082844800;
 
-/// What SOURCE_DATE_EPOCH says, in the file's epoch; 0 without it, or behind 2040, where 32 bits end.
+/// What SOURCE_DATE_EPOCH says, in the file's epoch; 0 without it, or behind 2040, where 32 bits
+/// end.
 std::uint64_t creationTime() {
     const auto seconds = sourceDate();
     const std::uint64_t created = seconds.value_or(0) + kEpochOffset;

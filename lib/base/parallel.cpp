@@ -20,10 +20,18 @@ namespace {
 class LoopEdges {
   public:
 #ifdef STX_THREAD_SANITIZER
-    LoopEdges() { __tsan_release(&begin_); }
-    ~LoopEdges() { __tsan_acquire(&end_); }
-    void beginPiece() { __tsan_acquire(&begin_); }
-    void endPiece() { __tsan_release(&end_); }
+    LoopEdges() {
+        __tsan_release(&begin_);
+    }
+    ~LoopEdges() {
+        __tsan_acquire(&end_);
+    }
+    void beginPiece() {
+        __tsan_acquire(&begin_);
+    }
+    void endPiece() {
+        __tsan_release(&end_);
+    }
 
   private:
     char begin_ = 0, end_ = 0;

@@ -90,7 +90,8 @@ MaterialSampler::MaterialSampler(const Mesh& mesh) : mesh_(mesh) {
         seeThrough_.push_back(m.alpha != Material::Alpha::opaque);
         plainTexture_.push_back(mesh.colours.empty() && m.baseColour == glm::vec4(1.0f));
         constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0);
-        constantColour_.emplace_back(srgbFast(m.baseColour.x), srgbFast(m.baseColour.y), srgbFast(m.baseColour.z));
+        constantColour_.emplace_back(srgbFast(m.baseColour.x), srgbFast(m.baseColour.y),
+                                     srgbFast(m.baseColour.z));
     }
 }
 

@@ -30,7 +30,8 @@ class MaterialSampler {
     /// The uvs of a triangle whose colour is its texture alone, else null.
     [[nodiscard]] const std::vector<glm::vec2>* plainTextureUvs(std::uint32_t triangle) const {
         const auto material = mesh_.triangleMaterial[triangle];
-        const bool plain = plainTexture_[material] && mesh_.materials[material].baseColourTexture >= 0;
+        const bool plain =
+            plainTexture_[material] && mesh_.materials[material].baseColourTexture >= 0;
         return plain ? &mesh_.uvs : nullptr;
     }
     /// The base colour texture of a triangle that has one.

@@ -203,14 +203,16 @@ bool uniform(const std::uint32_t* ids, int samples, int stride) {
 }
 
 glm::vec4 Rasterizer::shadeUniform(const SetUp& s, int px, int py, int samples) const {
-    if (const auto* constant = sampler_.constantColour(s.triangle)) return glm::vec4(*constant, 1.0f);
+    if (const auto* constant = sampler_.constantColour(s.triangle))
+        return glm::vec4(*constant, 1.0f);
     // uv is (U / S, V / S) with U, V, S affine in the pixel: one division a sample.
     const auto* uvs = sampler_.plainTextureUvs(s.triangle);
     const double step = 1.0 / samples;
     glm::vec3 sum(0.0f);
     if (uvs == nullptr) {
         for (int k = 0; k < samples * samples; ++k) {
-            const auto b = barycentric(s, px + (k % samples + 0.5) * step, py + (k / samples + 0.5) * step);
+            const auto b =
+                barycentric(s, px + (k % samples + 0.5) * step, py + (k / samples + 0.5) * step);
             sum += glm::vec3(sampler_.colour(s.triangle, b));
         }
     } else {
@@ -229,8 +231,9 @@ glm::vec4 Rasterizer::shadeUniform(const SetUp& s, int px, int py, int samples) 
             for (int sx = 0; sx < samples; ++sx) {
                 const double x = px + (sx + 0.5) * step;
                 const double inverse = 1.0 / total.at(x, y);
-                sum += glm::vec3(sampleTexture(
-                    texture, {static_cast<float>(u.at(x, y) * inverse), static_cast<float>(v.at(x, y) * inverse)}));
+                sum +=
+                    glm::vec3(sampleTexture(texture, {static_cast<float>(u.at(x, y) * inverse),
+                                                      static_cast<float>(v.at(x, y) * inverse)}));
             }
         }
     }
@@ -248,7 +251,8 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
     for (int py = 0; py < y1; ++py) {
         for (int px = 0; px < x1; ++px) {
             glm::vec4 sum(0.0f), litSum(0.0f);
-            const auto* corner = ids.data() + static_cast<std::size_t>(py * samples) * side + px * samples;
+            const auto* corner =
+                ids.data() + static_cast<std::size_t>(py * samples) * side + px * samples;
             if (!settings.lighting.on() && uniform(corner, samples, side)) {
                 if (*corner == kNone) continue;
                 out.colour.at(tileX * kTile + px, tileY * kTile + py) =

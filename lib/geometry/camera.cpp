@@ -103,8 +103,8 @@ Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
 }
 
 glm::dvec4 axisAngleFromQuat(glm::dquat q) {
-    // The angle ends up in [0, pi]; half turns that float rounding put just past pi keep their axis,
-    // so that a field read from a file is written back as it was.
+    // The angle ends up in [0, pi]; half turns that float rounding put just past pi keep their
+    // axis, so that a field read from a file is written back as it was.
     if (q.w < -1e-6) q = -q;
     const glm::dvec3 v(q.x, q.y, q.z);
     const double s = glm::length(v);

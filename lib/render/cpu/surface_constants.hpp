@@ -28,8 +28,8 @@ inline constexpr float kLinkedSamples = 0.03f;
 /// What an extension counts beside a mesh.
 inline constexpr float kExtensionWeight = 0.01f;
 /// Bilinear alpha below which a point is outside the object. Points tangent to a silhouette sit at
-/// one half, so this is clearly less. Among pruned sources often only one is left to show a piece of
-/// surface, and none agrees with it where it touches another's silhouette: less still.
+/// one half, so this is clearly less. Among pruned sources often only one is left to show a piece
+/// of surface, and none agrees with it where it touches another's silhouette: less still.
 inline constexpr float kFreeAlpha = 0.45f, kFreeAlphaPruned = 0.36f;
 /// A point this share of its depth in front of a surface is in front of it.
 inline constexpr float kClearlyBehind = 0.0002f;

@@ -20,7 +20,8 @@ class SourceDate : public testing::Test {
 
 TEST_F(SourceDate, IsAWholeNumberOfSecondsOrNothing) {
     EXPECT_EQ(sourceDate(), std::nullopt);
-    for (const char* text : {"", "-1", "1.5", "12 ", "soon", "253402300800", "99999999999999999999"}) {
+    for (const char* text :
+         {"", "-1", "1.5", "12 ", "soon", "253402300800", "99999999999999999999"}) {
         ::setenv("SOURCE_DATE_EPOCH", text, 1);
         EXPECT_EQ(sourceDate(), std::nullopt) << text;
     }

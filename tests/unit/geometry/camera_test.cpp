@@ -45,7 +45,7 @@ TEST(Camera, LookAtPointsTheAxisAtTheTarget) {
 TEST(Camera, AxisAngleRoundTrips) {
     for (const glm::dvec4 r :
          {glm::dvec4(0, 0, 1, 0), glm::dvec4(0.6, 0, 0.8, 1.2), glm::dvec4(0, 1, 0, 3.1),
-                               glm::dvec4(0, 1, 0, static_cast<float>(3.14159265358979))}) {
+          glm::dvec4(0, 1, 0, static_cast<float>(3.14159265358979))}) {
         const auto back = axisAngleFromQuat(quatFromAxisAngle(r));
         EXPECT_LT(glm::length(back - r), 1e-12);
     }

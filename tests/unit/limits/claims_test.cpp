@@ -1,5 +1,5 @@
-// Sizes in scenes, atlases and image sets that are 0, 1 or negative in 32 bits: refused, without the
-// memory that they ask for.
+// Sizes in scenes, atlases and image sets that are 0, 1 or negative in 32 bits: refused, without
+// the memory that they ask for.
 
 #include <cstring>
 
@@ -65,11 +65,13 @@ TEST_F(Claims, TexturesInScenes) {
         for (const std::string& texture :
              {fmt::format("SimpleTexture {{ texture PixelTexture {{ image {0} {0} 4 0x01 }} }}",
                           side),
-              fmt::format("PointTexture {{ width {0} height {0} depth [1 5] color [1 0 0] }}", side),
+              fmt::format("PointTexture {{ width {0} height {0} depth [1 5] color [1 0 0] }}",
+                          side),
               fmt::format("PointTexture {{ width {0} height {0} }}", side),
-              fmt::format("PointTexture {{ width 1 height 1 depth [{} 5] color [1 0 0] }}", side)}) {
-            const auto path = write(
-                "a.bt", "Group { children [ DepthImage { diTexture " + texture + " } ] }\n");
+              fmt::format("PointTexture {{ width 1 height 1 depth [{} 5] color [1 0 0] }}",
+                          side)}) {
+            const auto path =
+                write("a.bt", "Group { children [ DepthImage { diTexture " + texture + " } ] }\n");
             Job job;
             job.limits.maxMemoryBytes = 1u << 30;
             (void)describe(path, {}, job);
@@ -135,13 +137,13 @@ TEST_F(Claims, ImageSets) {
                         side));
         (void)write("nerf/a.png", "no picture");
         (void)write("nerf/d.png", "no picture");
-        const auto miv = write(
-            "miv/list.json",
-            fmt::format(R"({{"cameras":[{{"Name":"a","Position":[0,0,0],"Rotation":[0,0,0],)"
-                        R"("Depth_range":[1,9],"Resolution":[{0},{0}],"BitDepthColor":8,)"
-                        R"("BitDepthDepth":16,"Projection":"Perspective","Focal":[9,9],)"
-                        R"("Principle_point":[1,1]}}]}})",
-                        side));
+        const auto miv =
+            write("miv/list.json",
+                  fmt::format(R"({{"cameras":[{{"Name":"a","Position":[0,0,0],"Rotation":[0,0,0],)"
+                              R"("Depth_range":[1,9],"Resolution":[{0},{0}],"BitDepthColor":8,)"
+                              R"("BitDepthDepth":16,"Projection":"Perspective","Focal":[9,9],)"
+                              R"("Principle_point":[1,1]}}]}})",
+                              side));
         (void)write(fmt::format("miv/a_texture_{0}x{0}_yuv420p.yuv", side), "abcdef");
         (void)write(fmt::format("miv/a_depth_{0}x{0}_yuv420p16le.yuv", side), "abcdef");
         (void)write("colmap/sparse/cameras.txt",
