@@ -29,10 +29,12 @@ for model in "$@"; do
     # shellcheck disable=SC2086
     echo "| $name | the model and its pictures | $(bytes "$model" $parts) | |"
     # draco_encoder takes OBJ, not glTF.
-    (cd "$work" && assimp export "$model" draco.obj && draco_encoder -i draco.obj -o draco.drc -cl 10) > "$work/log" 2>&1
-    pictures=$(find "$folder" -maxdepth 1 -name '*.png' -o -maxdepth 1 -name '*.jpg')
-    # shellcheck disable=SC2086
-    echo "| $name | .drc and its pictures | $(bytes "$work/draco.drc" $pictures) | |"
+    if (cd "$work" && assimp export "$model" draco.obj && draco_encoder -i draco.obj -o draco.drc -cl 10) > "$work/log" 2>&1
+    then
+        pictures=$(find "$folder" -maxdepth 1 -name '*.png' -o -maxdepth 1 -name '*.jpg')
+        # shellcheck disable=SC2086
+        echo "| $name | .drc and its pictures | $(bytes "$work/draco.drc" $pictures) | |"
+    fi
     # shellcheck disable=SC2086
     stx render "$model" -o "$work/truth_%04d.png" $view
     make() { stx convert "$model" --views sphere:16 --quiet "$@"; }
