@@ -23,3 +23,21 @@ for views in sphere auto; do
     stx render "$work/$views.exr" -o "$out/four_$views.png" $camera
     stx compare "$out/four_$views.png" "$work/truth.png" | head -1 || test $? = 7
 done
+
+# One budget of pixels: all of a few even views, and what is left of sixteen when they are pruned to as many.
+orbit="--orbit 8 --elevation 35 --size 512x512 --background 1,1,1 --quiet"
+# shellcheck disable=SC2086
+stx render "$model" -o "$work/truth_%d.png" $orbit
+stx convert "$model" -o "$work/sixteen.exr" --views sphere:16 --size 512x512 --quiet
+for count in 6 11 8; do
+    stx convert "$model" -o "$work/few.exr" --views "sphere:$count" --size 512x512 --quiet
+    stx pack "$work/few.exr" -o "$work/few" --layout tight --quiet
+    pixels=$(stx info "$work/few" --format json | python3 -c 'import json, sys; print(json.load(sys.stdin)["pixels"]["kept"])')
+    stx pack "$work/sixteen.exr" -o "$work/sixteen" --layout tight --budget "$pixels"
+    for atlas in few sixteen; do
+        # shellcheck disable=SC2086
+        stx render "$work/$atlas" -o "$work/${atlas}_%d.png" $orbit
+        stx compare "$work/${atlas}_%d.png" "$work/truth_%d.png" | head -1 || test $? = 7
+    done
+done
+for atlas in few sixteen; do oiiotool "$work/${atlas}_5.png" --cut 260x200+110+50 -o "$out/budget_$atlas.png"; done
