@@ -137,10 +137,10 @@ Result<void> writeFloatImage(const AtlasHeader& header, const AtlasPage& page,
 }
 
 Result<Bytes> encodeDepth(const Image<std::uint16_t>& codes, const AtlasTexture& t,
-                          const Rgba8Image& colour) {
+                          const Texture& colour) {
     const int bits = t.coding == "code16" ? 16 : 8;
     Image<std::uint16_t> both;
-    if (t.hasSecond()) both = withAlpha(codes, colour, t, bits == 16 ? 257 : 1);
+    if (t.hasSecond()) both = withAlpha(codes, *colour.rgba8(), t, bits == 16 ? 257 : 1);
     const auto values = (t.hasSecond() ? both : codes).pixels();
     if (bits == 16) return encodePng(t.width, t.height, 1, 16, values.data(), false);
     const std::vector<std::uint8_t> bytes(values.begin(), values.end());
@@ -158,7 +158,7 @@ Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, int jpegQua
         if (coded.outside) job.note("depth outside of all rectangles was dropped from the atlas");
         if (coded.clamped)
             job.note("depth beyond nearPlane or farPlane was clamped to them in the atlas");
-        return encodeDepth(coded.codes, t, *page.texture.rgba8());
+        return encodeDepth(coded.codes, t, page.texture);
     }
     std::vector<std::uint16_t> rgb(static_cast<std::size_t>(t.width) * t.height * 3);
     if (t.attribute == "normal") {

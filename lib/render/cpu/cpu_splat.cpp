@@ -10,6 +10,7 @@
 #include "lib/render/cpu/splat_kernels.hpp"
 #include "lib/render/cpu/splat_plan.hpp"
 #include "lib/render/cpu/splat_view.hpp"
+#include "lib/render/paper_rule.hpp"
 #include "lib/render/pinholes.hpp"
 #include "lib/render/silhouettes.hpp"
 
@@ -63,7 +64,6 @@ class CpuSplatRenderer final : public Renderer {
     };
 
     void planFrame(const Camera& camera);
-    float paperCoefficient(const Camera& camera) const;
     void drawBand(Picture& picture, int index);
     void resolveBlended(Picture& picture, const Band& band) const;
     void resolvePoints(Picture& picture, const Band& band) const;
@@ -127,26 +127,6 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
     }
 }
 
-// Lee & Park find the coefficient by hand; here the view nearest to the camera decides: its
-// samples, at their mean distance, just close (sqrt(2) spacings).
-float CpuSplatRenderer::paperCoefficient(const Camera& camera) const {
-    if (settings_.splatCoefficient > 0) return static_cast<float>(settings_.splatCoefficient);
-    double best = 1e300, coefficient = 1;
-    for (const auto& info : views_) {
-        const auto& c = info.view->camera;
-        const double distance =
-            glm::distance(c.position, camera.position) - glm::dot(c.forward(), camera.forward());
-        if (info.blocks.empty() || distance >= best) continue;
-        best = distance;
-        double mean = 0;
-        for (const auto& b : info.blocks)
-            mean += 0.5 * (b.zMin + b.zMax) / static_cast<double>(info.blocks.size());
-        const auto spacing = c.sampleSpacing(mean);
-        coefficient = std::sqrt(2.0) * std::max(spacing.x * camera.fx, spacing.y * camera.fy);
-    }
-    return static_cast<float>(coefficient);
-}
-
 Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     STX_CHECK(camera.check());
     const auto pixels =
@@ -167,7 +147,8 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
             }
         }
     });
-    if (settings_.splat == SplatRule::paper) picture.shape.coefficient = paperCoefficient(camera);
+    if (settings_.splat == SplatRule::paper)
+        picture.shape.coefficient = static_cast<float>(paperCoefficient(views_, settings_, camera));
 
     picture.bandRows = std::clamp(kBandBytes / (24 * camera.width), 16, 64);
     const int bands = (camera.height + picture.bandRows - 1) / picture.bandRows;

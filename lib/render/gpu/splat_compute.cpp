@@ -247,18 +247,7 @@ Result<void> ComputeSplats::draw(SplatFrame& frame, int slot) {
 Result<SplatPlanes> ComputeSplats::map(int slot) {
     Slot& from = slots_[static_cast<std::size_t>(slot)];
     STX_CHECK(from.back.wait(context_));
-    SplatPlanes out;
-    const std::byte* at = from.back.memory;
-    out.colour = reinterpret_cast<const glm::vec4*>(at);
-    at += 16 * from.pixels;
-    if (variant_.normals) {
-        out.albedo = reinterpret_cast<const glm::vec4*>(at);
-        at += 16 * from.pixels;
-    }
-    out.depth = reinterpret_cast<const float*>(at);
-    at += 4 * from.pixels;
-    if (variant_.normals) out.normal = reinterpret_cast<const glm::vec3*>(at);
-    return out;
+    return SplatPlanes::in(from.back.memory, from.pixels, variant_.normals);
 }
 
 SplatCounts ComputeSplats::counts() {

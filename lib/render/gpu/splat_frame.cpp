@@ -3,6 +3,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/render/cpu/splat_plan.hpp"
 #include "lib/render/gpu/splat_shaders.hpp"
+#include "lib/render/paper_rule.hpp"
 
 namespace stx::gpu {
 namespace {
@@ -10,27 +11,6 @@ namespace {
 /// Steps of a weight in the integer sums. A sparse view's weight may be a thousandth of this; where
 /// such views are alone the steps still have to tell them apart.
 constexpr double kLargestWeight = 1048576.0;
-
-/// Lee & Park find the coefficient by hand; here the view nearest to the camera decides: its
-/// samples, at their mean distance, just close.
-double paperCoefficient(const GpuScene& scene, const RenderSettings& settings,
-                        const Camera& novel) {
-    if (settings.splatCoefficient > 0) return settings.splatCoefficient;
-    double best = 1e300, coefficient = 1;
-    for (const auto& info : scene.views) {
-        const auto& c = info.view->camera;
-        const double distance =
-            glm::distance(c.position, novel.position) - glm::dot(c.forward(), novel.forward());
-        if (info.blocks.empty() || distance >= best) continue;
-        best = distance;
-        double mean = 0;
-        for (const auto& b : info.blocks)
-            mean += 0.5 * (b.zMin + b.zMax) / static_cast<double>(info.blocks.size());
-        const auto spacing = c.sampleSpacing(mean);
-        coefficient = std::sqrt(2.0) * std::max(spacing.x * novel.fx, spacing.y * novel.fy);
-    }
-    return coefficient;
-}
 
 /// Source pixels that fall on one novel pixel where the block is seen as its view saw it.
 double density(const splat::ViewInfo& info, const splat::BlockInfo& block,
@@ -57,7 +37,7 @@ FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, 
     u.novelAxisY = glm::vec4(axes[1], 0.0f);
     u.novelAxisZ = glm::vec4(axes[2], 0.0f);
     const double coefficient =
-        settings.splat == SplatRule::paper ? paperCoefficient(scene, settings, novel) : 0.0;
+        settings.splat == SplatRule::paper ? paperCoefficient(scene.views, settings, novel) : 0.0;
     u.novelPosition = glm::vec4(novel.position, coefficient);
     u.ambient = glm::vec4(settings.lighting.ambient, 0.0f);
     u.specular = glm::vec4(settings.lighting.specular, settings.lighting.shininess);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string_view>
 
@@ -19,6 +21,22 @@ struct SplatPlanes {
     const float* depth = nullptr;
     const glm::vec3* normal = nullptr;  ///< null when frames carry none
     const glm::vec4* albedo = nullptr;  ///< null when frames carry none
+
+    /// The planes as pipelines write them one after the other: colour, albedo, depth, normal; the
+    /// second and the last where frames carry `normals`.
+    [[nodiscard]] static SplatPlanes in(const std::byte* at, std::int64_t pixels, bool normals) {
+        SplatPlanes out;
+        out.colour = reinterpret_cast<const glm::vec4*>(at);
+        at += sizeof(glm::vec4) * pixels;
+        if (normals) {
+            out.albedo = reinterpret_cast<const glm::vec4*>(at);
+            at += sizeof(glm::vec4) * pixels;
+        }
+        out.depth = reinterpret_cast<const float*>(at);
+        at += sizeof(float) * pixels;
+        if (normals) out.normal = reinterpret_cast<const glm::vec3*>(at);
+        return out;
+    }
 };
 
 /// Blocks that reached a frame's second pass, and those of them that it left out.

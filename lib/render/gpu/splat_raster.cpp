@@ -312,17 +312,7 @@ Result<SplatPlanes> RasterSplats::map(int slot) {
     if (!at)
         return fail(ErrorCode::failed, "'{}' gives no memory to read the frame back through",
                     context_.device().name);
-    SplatPlanes out;
-    out.colour = reinterpret_cast<const glm::vec4*>(at);
-    at += 16 * from.pixels;
-    if (variant_.normals) {
-        out.albedo = reinterpret_cast<const glm::vec4*>(at);
-        at += 16 * from.pixels;
-    }
-    out.depth = reinterpret_cast<const float*>(at);
-    at += 4 * from.pixels;
-    if (variant_.normals) out.normal = reinterpret_cast<const glm::vec3*>(at);
-    return out;
+    return SplatPlanes::in(at, from.pixels, variant_.normals);
 }
 
 void RasterSplats::unmap(int slot) {
