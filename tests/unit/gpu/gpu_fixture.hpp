@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -61,6 +62,30 @@ inline Result<Frame> drawOn(Backend backend, const Bundle& bundle, const RenderS
     Job job;
     STX_TRY(auto renderer, makeRenderer(backend, bundle, settings, -1, job));
     return renderer->render(camera);
+}
+
+/// What the processor draws.
+inline Frame drawOnCpu(const Bundle& bundle, const RenderSettings& settings, const Camera& camera) {
+    auto frame = drawOn(Backend::cpu, bundle, settings, camera);
+    EXPECT_TRUE(frame) << (frame ? "" : frame.error().text());
+    return frame ? std::move(*frame) : Frame{};
+}
+
+/// Holds what a GPU drew against what the processor draws: colours to 45 dB, and which pixels are
+/// covered but for one in 2,000, or `strays`.
+inline void expectAgreement(const Result<Frame>& frame, const Frame& expected,
+                            const std::string& what, int strays = 0) {
+    ASSERT_TRUE(frame) << frame.error().text();
+    ASSERT_EQ(frame->colour.size(), expected.colour.size());
+    const double agreement = psnr(frame->colour, expected.colour);
+    testing::Test::RecordProperty(what, fmt::format("{:.1f} dB", agreement));
+    EXPECT_GT(agreement, 45.0) << what;
+    EXPECT_LE(coverageDifference(frame->depth, expected.depth),
+              std::max(strays, static_cast<int>(frame->depth.count() / 2000)))
+        << what;
+    int drawn = 0;
+    for (const float d : frame->depth.pixels()) drawn += hasPoint(d) ? 1 : 0;
+    EXPECT_GT(drawn, 100) << what;
 }
 
 /// A camera smaller than the scene's own, so that tests stay quick.

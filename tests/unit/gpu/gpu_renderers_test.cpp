@@ -8,6 +8,7 @@ namespace stx {
 namespace {
 
 using test::coverageDifference;
+using test::drawOnCpu;
 using test::psnr;
 
 struct Way {
@@ -30,27 +31,11 @@ class GpuRenderers : public testing::TestWithParam<Way> {
                               const Camera& camera) {
         return test::drawOn(Backend::gpu, bundle, settings, camera);
     }
-    static Frame drawOnCpu(const Bundle& bundle, const RenderSettings& settings,
-                           const Camera& camera) {
-        auto frame = test::drawOn(Backend::cpu, bundle, settings, camera);
-        EXPECT_TRUE(frame) << (frame ? "" : frame.error().text());
-        return frame ? std::move(*frame) : Frame{};
-    }
     /// Draws with both and holds one against the other.
     static void agree(const Bundle& bundle, const RenderSettings& settings, const Camera& camera,
                       const std::string& what) {
-        const auto frame = draw(bundle, settings, camera);
-        ASSERT_TRUE(frame) << frame.error().text();
-        const Frame expected = drawOnCpu(bundle, settings, camera);
-        const double agreement = psnr(frame->colour, expected.colour);
-        RecordProperty(what, fmt::format("{:.1f} dB", agreement));
-        EXPECT_GT(agreement, 45.0) << what;
-        EXPECT_LE(coverageDifference(frame->depth, expected.depth),
-                  std::max(4, static_cast<int>(frame->depth.count() / 2000)))
-            << what;
-        int drawn = 0;
-        for (const float d : frame->depth.pixels()) drawn += hasPoint(d) ? 1 : 0;
-        EXPECT_GT(drawn, 100) << what;
+        test::expectAgreement(draw(bundle, settings, camera), drawOnCpu(bundle, settings, camera),
+                              what, 4);
     }
 };
 

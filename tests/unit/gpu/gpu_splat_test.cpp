@@ -6,6 +6,7 @@ namespace stx {
 namespace {
 
 using test::coverageDifference;
+using test::drawOnCpu;
 using test::psnr;
 using test::splatSettings;
 
@@ -16,12 +17,6 @@ class GpuSplat : public testing::TestWithParam<GpuPipeline> {
     static Result<Frame> draw(const Bundle& bundle, RenderSettings settings, const Camera& camera) {
         settings.pipeline = GetParam();
         return test::drawOn(Backend::gpu, bundle, settings, camera);
-    }
-    static Frame drawOnCpu(const Bundle& bundle, const RenderSettings& settings,
-                           const Camera& camera) {
-        auto frame = test::drawOn(Backend::cpu, bundle, settings, camera);
-        EXPECT_TRUE(frame) << (frame ? "" : frame.error().text());
-        return frame ? std::move(*frame) : Frame{};
     }
 };
 
