@@ -99,6 +99,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
 
 /// One bundle for each frame `A-B` of one set; {frame} in the output's name is the frame.
 Result<int> convertFrames(const ConvertOptions& o, Program& program) {
+    preloadCodecs();
     const auto dash = o.frames.find('-');
     double first = 0, last = 0;
     STX_CHECK(setTextOptions("--frames",

@@ -64,7 +64,8 @@ struct DecodedImage {
                                        const std::uint8_t* values, int quality);
 
 /// Starts loading the codecs' libraries (190 ms) on another thread, while the caller does something
-/// else. More calls do nothing; errors show at the first image.
+/// else. More calls do nothing; errors show at the first image. For programs that decode, or end by
+/// _exit(): some of the libraries crash when a process runs their destructors while they load.
 void preloadCodecs();
 
 }  // namespace stx

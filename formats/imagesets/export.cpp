@@ -270,7 +270,6 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
                               ec.message());
         }
     }
-    preloadCodecs();
     std::vector<Result<void>> written(bundle.views.size());
     parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t index) {
         const auto i = static_cast<std::size_t>(index);

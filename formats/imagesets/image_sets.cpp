@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <set>
 
-#include "formats/images/images.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/recognise.hpp"
@@ -92,7 +91,6 @@ Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
 Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
                             Job& job) {
     STX_CHECK(checkOptions(options));
-    preloadCodecs();
     STX_TRY(SetDescription set, describe(path, options, job));
     const std::string where = inQuotes(path.string());
     if (options.every > 1) {
