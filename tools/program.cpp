@@ -1,6 +1,7 @@
 #include "tools/program.hpp"
 
 #include <unistd.h>
+#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cstdio>
@@ -28,8 +29,10 @@ void Program::printJson(const nlohmann::ordered_json& json) {
 }
 
 void Program::write(std::string_view text) {
-    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-        outputFailed_ = true;
+    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0)
+        return;
+    outputFailed_ = true;
+    outputUnwanted_ = errno == EPIPE;
 }
 
 void Program::say(std::string_view line) const {
@@ -101,7 +104,7 @@ int Program::run(const std::function<Result<int>()>& body) {
         return static_cast<int>(code.error().code);
     }
     if (outputFailed_) {
-        fmt::print(stderr, "stx: cannot write to stdout\n");
+        if (!outputUnwanted_) fmt::print(stderr, "stx: cannot write to stdout\n");
         return static_cast<int>(ErrorCode::io);
     }
     return *code;

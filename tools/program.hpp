@@ -56,6 +56,8 @@ class Program {
   private:
     void write(std::string_view text);
     bool outputFailed_ = false;
+    bool outputUnwanted_ =
+        false;  ///< its reader has closed the pipe, as head does: no error to tell
 };
 
 /// Which of the shared options a command has beside --threads, --max-memory, --quiet, -v.
