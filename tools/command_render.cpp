@@ -5,6 +5,7 @@
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "tools/camera_options.hpp"
 #include "tools/frame_writer.hpp"

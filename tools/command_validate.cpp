@@ -1,7 +1,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/images/images.hpp"
-#include "formats/mpeg4/validate.hpp"
 #include "formats/open.hpp"
+#include "formats/validate/validate.hpp"
 #include "lib/base/printable.hpp"
 #include "tools/program.hpp"
 

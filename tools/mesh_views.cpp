@@ -6,6 +6,7 @@
 
 #include "formats/imagesets/camera_file.hpp"
 #include "lib/metrics/compare.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "lib/selection/selection.hpp"
 

@@ -1,11 +1,11 @@
 #include "formats/mpeg4/mpeg4.hpp"
 
 #include "formats/files/files.hpp"
-#include "formats/mpeg4/bt.hpp"
-#include "formats/mpeg4/isobmff.hpp"
-#include "formats/mpeg4/text_descriptors.hpp"
-#include "formats/mpeg4/text_values.hpp"
-#include "formats/mpeg4/xmt.hpp"
+#include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/text/bt.hpp"
+#include "formats/mpeg4/text/text_descriptors.hpp"
+#include "formats/mpeg4/text/text_values.hpp"
+#include "formats/mpeg4/text/xmt.hpp"
 
 namespace stx {
 

@@ -4,9 +4,9 @@
 #include <string_view>
 
 #include "formats/files/files.hpp"
-#include "formats/mpeg4/bifs.hpp"
-#include "formats/mpeg4/document.hpp"
-#include "formats/mpeg4/mapping.hpp"
+#include "formats/mpeg4/bifs/bifs.hpp"
+#include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/scene/document.hpp"
 
 /// MPEG-4 presentations as files: .mp4, .bt and .xmt. Between these, convert documents and not
 /// bundles: images then keep their bytes.

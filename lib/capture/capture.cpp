@@ -99,43 +99,4 @@ Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& camera
     return bundle;
 }
 
-namespace {
-
-class MeshRenderer : public Renderer {
-  public:
-    MeshRenderer(const Mesh& mesh, const RenderSettings& settings, Job& job)
-        : mesh_(mesh), settings_(settings), job_(job) {}
-
-    Result<Frame> render(const Camera& camera) override;
-    [[nodiscard]] std::string backend() const override { return "cpu"; }
-    [[nodiscard]] std::string device() const override { return "rasteriser"; }
-
-  private:
-    const Mesh& mesh_;
-    RenderSettings settings_;
-    Job& job_;
-};
-
-Result<Frame> MeshRenderer::render(const Camera& camera) {
-    RasterSettings raster;
-    raster.supersampling = settings_.quality == Quality::draft ? 2 : 4;
-    raster.normals = true;
-    raster.lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
-    STX_TRY(auto image, rasterise(mesh_, camera, raster, job_));
-    Frame frame;
-    frame.colour = std::move(image.colour);
-    frame.depth = std::move(image.depth);
-    frame.normal = std::move(image.normal);
-    if (settings_.wantNormals()) frame.albedo = frame.colour;
-    if (raster.lighting.on()) frame.colour = std::move(image.lit);
-    return frame;
-}
-
-}  // namespace
-
-std::unique_ptr<Renderer> makeMeshRenderer(const Mesh& mesh, const RenderSettings& settings,
-                                           Job& job) {
-    return std::make_unique<MeshRenderer>(mesh, settings, job);
-}
-
 }  // namespace stx

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -8,7 +7,6 @@
 #include "lib/capture/rasterizer.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/mesh.hpp"
-#include "lib/render/renderer.hpp"
 
 namespace stx {
 
@@ -35,10 +33,5 @@ struct CaptureSettings {
 /// (the format's precision) that enclose them, and rounds the distances to their codes. Does
 /// nothing to a view without points. `depthBits` 32 keeps the distances.
 void fitDepthRange(ReferenceView& view);
-
-/// A renderer that rasterises the mesh itself: the truth to compare novel views with. Lighting is
-/// as in the other renderers. The mesh must outlive it.
-[[nodiscard]] std::unique_ptr<Renderer> makeMeshRenderer(const Mesh& mesh,
-                                                         const RenderSettings& settings, Job& job);
 
 }  // namespace stx

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "lib/metrics/compare.hpp"
-#include "lib/render/cpu/cpu_surface.hpp"
+#include "lib/render/surface/surface_renderer.hpp"
 
 namespace stx {
 namespace {

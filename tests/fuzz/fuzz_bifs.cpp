@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "formats/mpeg4/bifs.hpp"
+#include "formats/mpeg4/bifs/bifs.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;

@@ -1,7 +1,7 @@
 // BT: what reads, writes, and reads back the same; and the way from the scene to a bundle.
 
-#include "formats/mpeg4/bt.hpp"
-#include "formats/mpeg4/mapping.hpp"
+#include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/text/bt.hpp"
 #include "tests/fuzz/text_round_trip.hpp"
 
 using namespace stx;

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "formats/mpeg4/isobmff.hpp"
+#include "formats/mpeg4/container/isobmff.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;

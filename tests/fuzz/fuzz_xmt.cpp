@@ -1,6 +1,6 @@
 // XMT-A: what reads, writes, and reads back the same.
 
-#include "formats/mpeg4/xmt.hpp"
+#include "formats/mpeg4/text/xmt.hpp"
 #include "tests/fuzz/text_round_trip.hpp"
 
 using namespace stx;

@@ -3,9 +3,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "formats/mpeg4/byte_io.hpp"
-#include "formats/mpeg4/descriptors.hpp"
-#include "formats/mpeg4/isobmff.hpp"
+#include "formats/mpeg4/bifs/descriptors.hpp"
+#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/mpeg4/container/isobmff.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;

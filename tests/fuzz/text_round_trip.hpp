@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "formats/mpeg4/document.hpp"
+#include "formats/mpeg4/scene/document.hpp"
 #include "lib/base/job.hpp"
 
 namespace stx {

@@ -2,13 +2,13 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
-#include "lib/render/cpu/cpu_splat.hpp"
-#include "lib/render/cpu/cpu_surface.hpp"
+#include "lib/render/splat/cpu/cpu_splat.hpp"
+#include "lib/render/surface/surface_renderer.hpp"
 #ifdef STX_WITH_GPU
-#include "lib/render/gl/gl_renderer.hpp"
-#include "lib/render/gpu/egl_context.hpp"
-#include "lib/render/gpu/gpu_splat.hpp"
-#include "lib/render/gpu/gpu_surface.hpp"
+#include "lib/render/device/egl_context.hpp"
+#include "lib/render/splat/gl/gl_renderer.hpp"
+#include "lib/render/splat/gpu/gpu_splat.hpp"
+#include "lib/render/surface/gpu/gpu_surface.hpp"
 #endif
 
 namespace stx {

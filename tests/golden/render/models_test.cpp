@@ -9,6 +9,7 @@
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "tests/shared_data.hpp"
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/metrics/compare.hpp"
-#include "lib/render/cpu/cpu_splat.hpp"
+#include "lib/render/splat/cpu/cpu_splat.hpp"
 #include "tests/golden/render/spheres_miv.hpp"
 #include "tests/shared_data.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/mpeg4/descriptors.hpp"
+#include "formats/mpeg4/bifs/descriptors.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 
 namespace stx::mpeg4 {

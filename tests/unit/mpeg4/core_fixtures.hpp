@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/mpeg4/isobmff.hpp"
+#include "formats/mpeg4/container/isobmff.hpp"
 #include "tests/shared_data.hpp"
 
 /// The .mp4 files of a folder, by name.

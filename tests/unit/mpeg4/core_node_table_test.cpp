@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "formats/mpeg4/scene.hpp"
+#include "formats/mpeg4/scene/scene.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx::mpeg4 {

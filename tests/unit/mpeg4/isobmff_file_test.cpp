@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/mpeg4/byte_io.hpp"
-#include "formats/mpeg4/image_headers.hpp"
+#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/mpeg4/container/image_headers.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 
 namespace stx::mpeg4 {

@@ -1,8 +1,8 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "formats/mpeg4/bt.hpp"
-#include "formats/mpeg4/isobmff.hpp"
+#include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/text/bt.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
 

@@ -1,11 +1,11 @@
-#include "formats/mpeg4/mapping.hpp"
+#include "formats/mpeg4/mapping/mapping.hpp"
 
 #include <random>
 
-#include "formats/mpeg4/bt.hpp"
-#include "formats/mpeg4/octree.hpp"
-#include "formats/mpeg4/placement.hpp"
-#include "formats/mpeg4/texture_images.hpp"
+#include "formats/mpeg4/mapping/octree.hpp"
+#include "formats/mpeg4/mapping/texture_images.hpp"
+#include "formats/mpeg4/scene/placement.hpp"
+#include "formats/mpeg4/text/bt.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
 

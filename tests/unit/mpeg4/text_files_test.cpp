@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/mpeg4/bt.hpp"
-#include "formats/mpeg4/text_fields.hpp"
-#include "formats/mpeg4/text_values.hpp"
-#include "formats/mpeg4/xmt.hpp"
+#include "formats/mpeg4/text/bt.hpp"
+#include "formats/mpeg4/text/text_fields.hpp"
+#include "formats/mpeg4/text/text_values.hpp"
+#include "formats/mpeg4/text/xmt.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx::mpeg4 {

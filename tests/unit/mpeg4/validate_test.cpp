@@ -1,11 +1,11 @@
-#include "formats/mpeg4/validate.hpp"
+#include "formats/validate/validate.hpp"
 
 #include <fstream>
 #include <map>
 #include <set>
 
-#include "formats/mpeg4/bt.hpp"
-#include "formats/mpeg4/isobmff.hpp"
+#include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/text/bt.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
 

@@ -6,6 +6,7 @@
 #include "lib/metrics/compare.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune_quality.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/packing/holes.hpp"

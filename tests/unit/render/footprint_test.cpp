@@ -1,10 +1,10 @@
-#include "lib/render/footprint.hpp"
+#include "lib/render/finish/footprint.hpp"
 
 #include <gtest/gtest.h>
 
-#include "lib/render/cpu/cpu_splat.hpp"
-#include "lib/render/cpu/cpu_surface.hpp"
-#include "tests/unit/gpu/gpu_fixture.hpp"
+#include "lib/render/splat/cpu/cpu_splat.hpp"
+#include "lib/render/surface/surface_renderer.hpp"
+#include "tests/unit/render_gpu/gpu_fixture.hpp"
 
 namespace stx {
 namespace {

@@ -1,4 +1,4 @@
-#include "lib/render/silhouettes.hpp"
+#include "lib/render/finish/silhouettes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #ifdef STX_WITH_GPU
-#include "lib/render/gpu/splat_shaders.hpp"
-#include "lib/render/gpu/surface_shaders.hpp"
+#include "lib/render/splat/gpu/splat_shaders.hpp"
+#include "lib/render/surface/gpu/surface_shaders.hpp"
 #include "tests/temporary_folder.hpp"
 
 namespace stx {

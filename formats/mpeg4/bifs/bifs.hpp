@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "formats/mpeg4/scene/document.hpp"
+
+/// BIFS: the binary form of scenes (ISO/IEC 14496-11 clause 8; bifs.md section 4).
+namespace stx::mpeg4 {
+
+/// The decoder config of a BIFS stream from its DecoderSpecificInfo. The version is that of the
+/// objectTypeIndication; where the length does not come out, the other version is tried.
+[[nodiscard]] Result<BifsConfig> decodeBifsConfig(ByteSpan bytes,
+                                                  std::uint8_t objectTypeIndication);
+[[nodiscard]] Bytes encodeBifsConfig(const BifsConfig& config);
+
+/// Reads the access units of one stream in their order: later ones name the nodes of earlier ones.
+class BifsDecoder {
+  public:
+    BifsDecoder(BifsConfig config, const Limits& limits);
+    ~BifsDecoder();
+    BifsDecoder(BifsDecoder&&) noexcept;
+
+    /// The commands of one access unit. Errors (invalidInput, where = "bit N") on anything that the
+    /// syntax or the table does not have; (unsupported) on PROTO and predictive MF coding.
+    [[nodiscard]] Result<std::vector<Command>> decode(ByteSpan accessUnit);
+    /// Bits that the last access unit left after its last command (at most 7 in tidy files).
+    [[nodiscard]] std::uint64_t bitsLeft() const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Which of the forms that mean the same is written.
+struct BifsStyle {
+    /// Nodes as masks and MF fields as vectors, every set field written: what strict readers take.
+    static BifsStyle maskAndVector() { return {}; }
+    /// The choice of the other known encoder: the shorter of mask and list by its own rule, and
+    /// only fields that differ from their default.
+    static BifsStyle shortest() { return {.shorterOfMaskAndList = true, .omitDefaults = true}; }
+
+    bool shorterOfMaskAndList = false;
+    bool omitDefaults = false;
+};
+
+/// Writes the access units of one stream in their order, with the ids of assignNodeIds and a config
+/// that holds them (fitBifsConfig).
+class BifsEncoder {
+  public:
+    BifsEncoder(BifsConfig config, BifsStyle style, NodeIds ids);
+    ~BifsEncoder();
+    BifsEncoder(BifsEncoder&&) noexcept;
+
+    /// Errors (invalidInput) when a value has no code: an od id above 1023, an image above 4095
+    /// pixels, a node where it may not stand, a field without the id that a command needs.
+    [[nodiscard]] Result<Bytes> encode(const std::vector<Command>& commands);
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// `config` with the id widths raised to what the ids in use need (NULL is all ones).
+[[nodiscard]] BifsConfig fitBifsConfig(BifsConfig config, const NodeIds& ids);
+
+}  // namespace stx::mpeg4

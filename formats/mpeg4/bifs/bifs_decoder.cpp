@@ -1,0 +1,265 @@
+#include "formats/mpeg4/bifs/bifs.hpp"
+#include "formats/mpeg4/bifs/bifs_nodes.hpp"
+
+namespace stx::mpeg4 {
+
+/// The commands of access units (ISO/IEC 14496-11 clause 8).
+struct BifsDecoder::Impl : BifsNodeReader {
+    using BifsNodeReader::BifsNodeReader;
+
+    std::uint64_t bitsLeft = 0;
+
+    Result<NodePtr> readTarget() {
+        const std::uint32_t id = in.read(config.nodeIdBits) + 1;
+        STX_CHECK(check("a command"));
+        const auto known = defined.find(id);
+        if (known == defined.end())
+            return error(ErrorCode::invalidInput,
+                         "a command names node id {}, which is not defined", id);
+        return known->second.node;
+    }
+
+    Result<int> readFieldId(const NodeInfo& node, int bits, const std::vector<int>& fields,
+                            std::string_view mode) {
+        const std::uint32_t id = in.read(bits);
+        STX_CHECK(check("a command"));
+        if (id >= fields.size())
+            return error(ErrorCode::invalidInput, "{} has no field with {} id {}", node.name, mode,
+                         id);
+        return fields[id];
+    }
+    Result<int> readInField(const Node& node) {
+        return readFieldId(*node.info, node.info->inBits, node.info->inFields, "IN");
+    }
+
+    Result<Position> readPosition(int explicitBits) {
+        Position position;
+        switch (in.read(2)) {
+            case 0:
+                position.index = static_cast<int>(in.read(explicitBits));
+                break;
+            case 2:
+                position.index = 0;
+                break;
+            case 3:
+                position.index = Position::kLast;
+                break;
+            default:
+                return error(ErrorCode::invalidInput, "a position of kind 1, which is reserved");
+        }
+        STX_CHECK(check("a position"));
+        return position;
+    }
+
+    Result<void> readEnds(Route& route) {
+        STX_TRY(route.from, readTarget());
+        STX_TRY(route.fromField, readFieldId(*route.from->info, route.from->info->outBits,
+                                             route.from->info->outFields, "OUT"));
+        STX_TRY(route.to, readTarget());
+        STX_TRY(route.toField, readInField(*route.to));
+        return {};
+    }
+
+    Result<Route> readRoute() {
+        STX_CHECK(spend(sizeof(Route)));
+        Route route;
+        if (in.flag()) {
+            route.id = in.read(config.routeIdBits) + 1;
+            if (useNames) {
+                STX_TRY(route.name, readName());
+            }
+        }
+        STX_CHECK(readEnds(route));
+        return route;
+    }
+
+    Result<ReplaceScene> readScene() {
+        ReplaceScene scene;
+        in.read(6);
+        useNames = in.flag();
+        scene.useNames = useNames;
+        defined.clear();
+        if (in.flag())
+            return error(ErrorCode::unsupported,
+                         "the scene declares PROTOs, which are not supported");
+        int height = 0;
+        STX_TRY(scene.root, readNode(Ndt::SFTopNode, 1, height));
+        const bool hasRoutes = in.flag();
+        STX_CHECK(check("the scene"));
+        if (!hasRoutes) return scene;
+        if (in.flag()) {
+            do {
+                STX_TRY(Route route, readRoute());
+                scene.routes.push_back(std::move(route));
+            } while (in.flag());
+        } else {
+            const int bits = static_cast<int>(in.read(5));
+            const std::uint64_t count = in.read(bits);
+            for (std::uint64_t i = 0; i < count; ++i) {
+                // A route may take a single bit where ids have none.
+                if (in.failed() || count - i > in.left())
+                    return error(ErrorCode::invalidInput,
+                                 "{} routes do not fit into the {} bits left", count, in.left());
+                STX_TRY(Route route, readRoute());
+                scene.routes.push_back(std::move(route));
+            }
+        }
+        STX_CHECK(check("the routes"));
+        return scene;
+    }
+
+    Result<Command> readInsert() {
+        switch (in.read(2)) {
+            case 0: {
+                InsertNode c;
+                STX_TRY(c.target, readTarget());
+                const int children = c.target->info->find("children");
+                if (children < 0)
+                    return error(ErrorCode::invalidInput,
+                                 "a node is inserted into {}, which has no children",
+                                 c.target->info->name);
+                STX_TRY(c.position, readPosition(8));
+                int height = 0;
+                STX_TRY(
+                    c.node,
+                    readNode(c.target->info->fields[static_cast<std::size_t>(children)].nodeType, 1,
+                             height));
+                if (!c.node) return error(ErrorCode::invalidInput, "NULL is inserted as a child");
+                return c;
+            }
+            case 2: {
+                InsertIndexed c;
+                STX_CHECK(readIndexed(c, true));
+                return c;
+            }
+            case 3: {
+                STX_TRY(Route route, readRoute());
+                return InsertRoute{std::move(route)};
+            }
+            default:
+                return error(ErrorCode::unsupported,
+                             "an extended BIFS command, which is not supported");
+        }
+    }
+
+    template <class C>
+    Result<void> readIndexed(C& c, bool withValue) {
+        STX_TRY(c.target, readTarget());
+        STX_TRY(c.field, readInField(*c.target));
+        const FieldInfo& field = c.target->info->fields[static_cast<std::size_t>(c.field)];
+        if (!isMultiple(field.type))
+            return error(ErrorCode::invalidInput, "an index into {}.{}, which is {}",
+                         c.target->info->name, field.name, name(field.type));
+        STX_TRY(c.position, readPosition(16));
+        if constexpr (requires { c.value; }) {
+            if (withValue) {
+                STX_TRY(c.value, readSingle(*c.target->info, field, 1));
+                if (const NodePtr* node = std::get_if<NodePtr>(&c.value); node && !*node)
+                    return error(ErrorCode::invalidInput, "NULL is put into {}.{}",
+                                 c.target->info->name, field.name);
+            }
+        }
+        return {};
+    }
+
+    Result<Command> readDelete() {
+        switch (in.read(2)) {
+            case 0: {
+                STX_TRY(NodePtr target, readTarget());
+                return DeleteNode{std::move(target)};
+            }
+            case 2: {
+                DeleteIndexed c;
+                STX_CHECK(readIndexed(c, false));
+                return c;
+            }
+            case 3: {
+                DeleteRoute c{in.read(config.routeIdBits) + 1};
+                STX_CHECK(check("a command"));
+                return c;
+            }
+            default:
+                return error(ErrorCode::invalidInput,
+                             "a delete command of kind 1, which is reserved");
+        }
+    }
+
+    Result<Command> readReplace() {
+        switch (in.read(2)) {
+            case 0: {
+                ReplaceNode c;
+                STX_TRY(c.target, readTarget());
+                int height = 0;
+                STX_TRY(c.replacement, readNode(Ndt::SFWorldNode, 1, height));
+                return c;
+            }
+            case 1: {
+                ReplaceField c;
+                STX_TRY(c.target, readTarget());
+                STX_TRY(c.field, readInField(*c.target));
+                STX_TRY(c.value,
+                        readField(*c.target->info,
+                                  c.target->info->fields[static_cast<std::size_t>(c.field)], 1));
+                return c;
+            }
+            case 2: {
+                ReplaceIndexed c;
+                STX_CHECK(readIndexed(c, true));
+                return c;
+            }
+            default: {
+                ReplaceRoute c;
+                c.routeId = in.read(config.routeIdBits) + 1;
+                STX_CHECK(readEnds(c.route));
+                c.route.id = c.routeId;
+                return c;
+            }
+        }
+    }
+
+    Result<Command> readCommand() {
+        ++command;
+        deepest = 0;
+        STX_CHECK(spend(sizeof(Command)));
+        switch (in.read(2)) {
+            case 0:
+                return readInsert();
+            case 1:
+                return readDelete();
+            case 2:
+                return readReplace();
+            default: {
+                STX_TRY(ReplaceScene scene, readScene());
+                return scene;
+            }
+        }
+    }
+
+    Result<std::vector<Command>> decode(ByteSpan accessUnit) {
+        in = BitReader(accessUnit);
+        std::vector<Command> commands;
+        do {
+            STX_TRY(Command next, readCommand());
+            commands.push_back(std::move(next));
+            const bool more = in.flag();
+            STX_CHECK(check("a command"));
+            if (!more) break;
+        } while (true);
+        bitsLeft = in.left();
+        return commands;
+    }
+};
+
+BifsDecoder::BifsDecoder(BifsConfig config, const Limits& limits)
+    : impl_(std::make_unique<Impl>(config, limits)) {}
+BifsDecoder::~BifsDecoder() = default;
+BifsDecoder::BifsDecoder(BifsDecoder&&) noexcept = default;
+
+Result<std::vector<Command>> BifsDecoder::decode(ByteSpan accessUnit) {
+    return impl_->decode(accessUnit);
+}
+std::uint64_t BifsDecoder::bitsLeft() const {
+    return impl_->bitsLeft;
+}
+
+}  // namespace stx::mpeg4

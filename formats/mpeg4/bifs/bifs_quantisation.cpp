@@ -1,0 +1,261 @@
+#include "formats/mpeg4/bifs/bifs_quantisation.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace stx::mpeg4 {
+namespace {
+
+/// The fields of QuantizationParameter for a category: `prefix`Quant, Min, Max, NbBits.
+std::string_view prefixOf(Quantisation category) {
+    using enum Quantisation;
+    switch (category) {
+        case position3D:
+            return "position3D";
+        case position2D:
+            return "position2D";
+        case drawOrder:
+            return "drawOrder";
+        case color:
+            return "color";
+        case textureCoordinate:
+            return "textureCoordinate";
+        case angle:
+            return "angle";
+        case scale:
+            return "scale";
+        case key:
+            return "key";
+        case normal:
+        case rotation:
+            return "normal";
+        case size3D:
+        case size2D:
+            return "size";
+        default:
+            return {};
+    }
+}
+
+double component(const FieldValue& value, int i) {
+    if (const auto* f = std::get_if<float>(&value)) return *f;
+    if (const auto* v = std::get_if<glm::vec2>(&value)) return (*v)[std::min(i, 1)];
+    if (const auto* v = std::get_if<glm::vec3>(&value)) return (*v)[i];
+    return 0;
+}
+
+double steps(int bits) {
+    return static_cast<double>((std::uint64_t{1} << bits) - 1);
+}
+
+/// A number in [-1, 1] in one bit of sign and the rest of size, biased.
+float readSigned(BitReader& in, int bits) {
+    const std::int64_t half = std::int64_t{1} << (bits - 1);
+    const std::int64_t value = static_cast<std::int64_t>(in.read(bits)) - half;
+    return bits < 2 ? 0.0f : static_cast<float>(static_cast<double>(value) / steps(bits - 1));
+}
+
+void writeSigned(BitWriter& out, int bits, double value) {
+    const double half = static_cast<double>(std::int64_t{1} << (bits - 1));
+    const double coded =
+        bits < 2 ? half : half + std::round(std::clamp(value, -1.0, 1.0) * steps(bits - 1));
+    out.write(static_cast<std::uint32_t>(std::clamp(coded, 0.0, steps(bits))), bits);
+}
+
+constexpr double kQuarterPi = std::numbers::pi / 4;
+
+/// A unit vector of `count` + 1 numbers from its `count` angles against the largest of them.
+template <int Count>
+std::array<double, Count + 1> readOnSphere(BitReader& in, int bits, double direction) {
+    const int largest = static_cast<int>(in.read(2)) % (Count + 1);
+    std::array<double, Count> tangents{};
+    double length = 1;
+    for (double& tangent : tangents) {
+        tangent = std::tan(kQuarterPi * readSigned(in, bits));
+        length += tangent * tangent;
+    }
+    const double scale = direction / std::sqrt(length);
+    std::array<double, Count + 1> vector{};
+    vector[static_cast<std::size_t>(largest)] = scale;
+    for (int i = 0; i < Count; ++i)
+        vector[static_cast<std::size_t>((largest + i + 1) % (Count + 1))] =
+            tangents[static_cast<std::size_t>(i)] * scale;
+    return vector;
+}
+
+template <int Count>
+int largestOf(const std::array<double, Count + 1>& vector) {
+    int largest = 0;
+    // A later number must be clearly larger, so that rounding does not turn ties around.
+    for (int i = 1; i <= Count; ++i)
+        if (std::abs(vector[static_cast<std::size_t>(i)]) >
+            std::abs(vector[static_cast<std::size_t>(largest)]) + 1e-6)
+            largest = i;
+    return largest;
+}
+
+template <int Count>
+void writeOnSphere(BitWriter& out, int bits, const std::array<double, Count + 1>& vector,
+                   int largest) {
+    out.write(static_cast<std::uint32_t>(largest), 2);
+    for (int i = 0; i < Count; ++i) {
+        const double other = vector[static_cast<std::size_t>((largest + i + 1) % (Count + 1))];
+        const double base = vector[static_cast<std::size_t>(largest)];
+        writeSigned(out, bits, base == 0 ? 0 : std::atan(other / base) / kQuarterPi);
+    }
+}
+
+}  // namespace
+
+Result<std::optional<QuantisedCoding>> QuantisationScope::codingOf(const FieldInfo& field) const {
+    if (!active_ || field.quantisation == Quantisation::none) return std::nullopt;
+    using enum FieldType;
+    const FieldType item = itemType(field.type);
+    if (item != SFInt32 && item != SFFloat && item != SFVec2f && item != SFVec3f &&
+        item != SFColor && item != SFRotation)
+        return std::nullopt;
+
+    QuantisedCoding coding;
+    for (int i = 0; i < 3; ++i) {
+        coding.minimum[i] = field.minimum;
+        coding.maximum[i] = field.maximum;
+    }
+    if (field.quantisation == Quantisation::linear) {
+        coding.kind = QuantisedCoding::Kind::linearInt;
+        coding.bits = field.quantisationBits;
+        return coding;
+    }
+    if (field.quantisation == Quantisation::coordIndex)
+        return fail(ErrorCode::unsupported,
+                    "quantised {} is not supported; write it without a QuantizationParameter",
+                    field.name);
+
+    const std::string prefix(prefixOf(field.quantisation));
+    if (!active_->get<bool>(prefix + "Quant")) return std::nullopt;
+    coding.bits = active_->get<std::int32_t>(prefix + "NbBits");
+    if (coding.bits < 1 || coding.bits > 31)
+        return fail(ErrorCode::invalidInput,
+                    "QuantizationParameter.{}NbBits is {}; 1 to 31 are possible", prefix,
+                    coding.bits);
+    if (prefix == "normal") {
+        if (item == SFRotation)
+            coding.kind = QuantisedCoding::Kind::rotation;
+        else if (item == SFVec3f)
+            coding.kind = QuantisedCoding::Kind::normal;
+        else
+            return std::nullopt;
+        return coding;
+    }
+    if (item == SFRotation || item == SFInt32) return std::nullopt;
+    const FieldValue& minimum = active_->value(prefix + "Min");
+    const FieldValue& maximum = active_->value(prefix + "Max");
+    for (int i = 0; i < 3; ++i) {
+        coding.minimum[i] = std::max(coding.minimum[i], component(minimum, i));
+        coding.maximum[i] = std::min(coding.maximum[i], component(maximum, i));
+        if (!(coding.minimum[i] <= coding.maximum[i]))
+            return fail(ErrorCode::invalidInput, "QuantizationParameter: {0}Min is above {0}Max",
+                        prefix);
+    }
+    return coding;
+}
+
+void QuantisationScope::ListGuard::coded(const NodePtr& item) {
+    if (item && item->info->name == "QuantizationParameter") {
+        scope_.active_ = item;
+        local_ = item->get<bool>("isLocal");
+    } else if (local_) {
+        scope_.active_ = outer_;
+        local_ = false;
+    }
+}
+
+float readQuantised(BitReader& in, const QuantisedCoding& coding, int component) {
+    const double low = coding.minimum[component];
+    return static_cast<float>(low + (coding.maximum[component] - low) * in.read(coding.bits) /
+                                        steps(coding.bits));
+}
+
+void writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component, float value) {
+    const double low = coding.minimum[component];
+    const double range = coding.maximum[component] - low;
+    const double share = range > 0 ? (static_cast<double>(value) - low) / range : 0;
+    const double inside = std::isnan(share) ? 0 : std::clamp(share, 0.0, 1.0);
+    out.write(static_cast<std::uint32_t>(std::round(inside * steps(coding.bits))), coding.bits);
+}
+
+glm::vec3 readQuantisedNormal(BitReader& in, const QuantisedCoding& coding) {
+    const double direction = in.flag() ? -1 : 1;
+    const auto v = readOnSphere<2>(in, coding.bits, direction);
+    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+
+void writeQuantisedNormal(BitWriter& out, const QuantisedCoding& coding, const glm::vec3& normal) {
+    const std::array<double, 3> v = {normal.x, normal.y, normal.z};
+    const int largest = largestOf<2>(v);
+    out.flag(v[static_cast<std::size_t>(largest)] < 0);
+    writeOnSphere<2>(out, coding.bits, v, largest);
+}
+
+Rotation readQuantisedRotation(BitReader& in, const QuantisedCoding& coding) {
+    const auto q = readOnSphere<3>(in, coding.bits, 1);
+    const double halfSine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (halfSine < 1e-9) return {};
+    Rotation rotation;
+    rotation.axis = {static_cast<float>(q[1] / halfSine), static_cast<float>(q[2] / halfSine),
+                     static_cast<float>(q[3] / halfSine)};
+    rotation.angle = static_cast<float>(2 * std::atan2(halfSine, q[0]));
+    return rotation;
+}
+
+void writeQuantisedRotation(BitWriter& out, const QuantisedCoding& coding,
+                            const Rotation& rotation) {
+    const double length = std::sqrt(static_cast<double>(glm::dot(rotation.axis, rotation.axis)));
+    const double half = rotation.angle / 2.0;
+    const double scale = length > 0 ? std::sin(half) / length : 0;
+    const std::array<double, 4> q = {std::cos(half), rotation.axis.x * scale,
+                                     rotation.axis.y * scale, rotation.axis.z * scale};
+    writeOnSphere<3>(out, coding.bits, q, largestOf<3>(q));
+}
+
+float readEfficientFloat(BitReader& in) {
+    const int mantissaLength = static_cast<int>(in.read(4));
+    if (mantissaLength == 0) return 0;
+    const int exponentLength = static_cast<int>(in.read(3));
+    const std::uint32_t sign = in.read(1);
+    const std::uint32_t mantissa = in.read(mantissaLength - 1);
+    int exponent = 127;
+    if (exponentLength > 0) {
+        const bool negative = in.flag();
+        const int size =
+            static_cast<int>((1u << (exponentLength - 1)) | in.read(exponentLength - 1));
+        exponent += negative ? -size : size;
+    }
+    return std::bit_cast<float>(sign << 31 | (static_cast<std::uint32_t>(exponent) & 0xFF) << 23 |
+                                mantissa << 9);
+}
+
+void writeEfficientFloat(BitWriter& out, float value) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    const int exponent = static_cast<int>(bits >> 23 & 0xFF) - 127;
+    // Infinities have no code and become the largest number.
+    if (bits == 0) return out.write(0, 4);
+    if (exponent == 128)
+        return writeEfficientFloat(out, std::copysign(std::numeric_limits<float>::max(), value));
+    const std::uint32_t mantissa = (bits & 0x7FFFFF) >> 9;
+    const int mantissaBits = significantBits(mantissa);
+    const auto size = static_cast<std::uint32_t>(std::abs(exponent));
+    const int exponentBits = significantBits(size);
+    out.write(static_cast<std::uint32_t>(mantissaBits + 1), 4);
+    out.write(static_cast<std::uint32_t>(exponentBits), 3);
+    out.write(bits >> 31, 1);
+    out.write(mantissa, mantissaBits);
+    if (exponentBits > 0) {
+        out.flag(exponent < 0);
+        out.write(size, exponentBits - 1);
+    }
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "formats/mpeg4/bifs/bit_stream.hpp"
+#include "formats/mpeg4/scene/scene.hpp"
+
+/// Quantised values of BIFS (ISO/IEC 14496-11 8.4), which a QuantizationParameter node switches on
+/// for its later siblings and all below them.
+namespace stx::mpeg4 {
+
+/// How the numbers of one field are coded.
+struct QuantisedCoding {
+    enum class Kind { linearFloat, linearInt, normal, rotation } kind = Kind::linearFloat;
+    int bits = 0;                   ///< 1..31 for each number
+    double minimum[3] = {0, 0, 0};  ///< per component
+    double maximum[3] = {0, 0, 0};
+};
+
+/// The QuantizationParameter in force while a scene is coded.
+class QuantisationScope {
+  public:
+    /// The node in force; null for none. Changed by ListGuard only.
+    [[nodiscard]] const Node* active() const { return active_.get(); }
+    /// Whether floats without a quantisation of their own use the short form.
+    [[nodiscard]] bool usesEfficientFloats() const {
+        return active_ && active_->get<bool>("useEfficientCoding");
+    }
+    /// How a field is quantised now; nothing when it is coded in full. Errors (invalidInput) on a
+    /// number of bits that cannot be, (unsupported) on coordinate indices.
+    [[nodiscard]] Result<std::optional<QuantisedCoding>> codingOf(const FieldInfo& field) const;
+
+    /// Follows one list of nodes: put every item in after it was coded.
+    class ListGuard {
+      public:
+        explicit ListGuard(QuantisationScope& scope) : scope_(scope), outer_(scope.active_) {}
+        ListGuard(const ListGuard&) = delete;
+        ListGuard& operator=(const ListGuard&) = delete;
+        ~ListGuard() { scope_.active_ = std::move(outer_); }
+        void coded(const NodePtr& item);
+
+      private:
+        QuantisationScope& scope_;
+        NodePtr outer_;
+        bool local_ = false;
+    };
+
+  private:
+    NodePtr active_;
+};
+
+[[nodiscard]] float readQuantised(BitReader& in, const QuantisedCoding& coding, int component);
+void writeQuantised(BitWriter& out, const QuantisedCoding& coding, int component, float value);
+
+/// Two or three numbers on the unit sphere (normals and rotations).
+[[nodiscard]] glm::vec3 readQuantisedNormal(BitReader& in, const QuantisedCoding& coding);
+void writeQuantisedNormal(BitWriter& out, const QuantisedCoding& coding, const glm::vec3& normal);
+[[nodiscard]] Rotation readQuantisedRotation(BitReader& in, const QuantisedCoding& coding);
+void writeQuantisedRotation(BitWriter& out, const QuantisedCoding& coding,
+                            const Rotation& rotation);
+
+/// The short form of floats: 15 bits of mantissa at most.
+[[nodiscard]] float readEfficientFloat(BitReader& in);
+void writeEfficientFloat(BitWriter& out, float value);
+
+}  // namespace stx::mpeg4

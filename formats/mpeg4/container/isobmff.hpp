@@ -1,0 +1,32 @@
+#pragma once
+
+#include "formats/mpeg4/bifs/bifs.hpp"
+#include "formats/mpeg4/scene/document.hpp"
+
+/// The MP4 file format (ISO/IEC 14496-12 and -14) around a scene.
+namespace stx::mpeg4 {
+
+/// Whether these first bytes of a file look like an ISO base media file.
+[[nodiscard]] bool looksLikeMp4(ByteSpan head);
+
+/// Reads the headers, the object descriptors and the scene; the images stay where they are until
+/// someone loads their ranges. Unknown boxes, descriptors and tracks are passed over. Errors
+/// (invalidInput or unsupported, with the box path and byte offset) on damaged, fragmented and
+/// encrypted files and on files without a scene.
+[[nodiscard]] Result<Document> readMp4(const ByteSource& source, Job& job);
+
+struct Mp4WriteOptions {
+    BifsStyle style;  ///< mask and vector forms
+};
+
+/// Writes a document: ftyp, moov, mdat, with the conventions of bifs.md 5. Bytes depend on nothing
+/// but the document (and SOURCE_DATE_EPOCH, which sets the creation time; 0 without it). Media
+/// bytes are copied untouched. Gives nodes that need one an id, and streams without ES_ID a track.
+/// Does not commit `out`. Errors (invalidInput) when the document has something without a code.
+[[nodiscard]] Result<void> writeMp4(const Document& document, OutputFile& out, Job& job,
+                                    const Mp4WriteOptions& options = {});
+/// The same into memory.
+[[nodiscard]] Result<Bytes> writeMp4(const Document& document, Job& job,
+                                     const Mp4WriteOptions& options = {});
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,409 @@
+#include <algorithm>
+#include <array>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "formats/mpeg4/bifs/descriptors.hpp"
+#include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/container/isobmff_track.hpp"
+#include "lib/base/printable.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+using Departure = Mp4Departure::Kind;
+
+/// Top-level boxes of a file; more are a way to keep us reading, not a file.
+constexpr int kMaxTopLevelBoxes = 1'000'000;
+
+class Reader {
+  public:
+    Reader(const ByteSource& source, Job& job) : source_(source), job_(job) {
+        document_.mp4.emplace();
+    }
+
+    Result<Document> read() {
+        STX_CHECK(readTopLevel());
+        STX_CHECK(readMoov());
+        STX_CHECK(pickStreams());
+        STX_CHECK(readObjectDescriptors());
+        STX_CHECK(readScene());
+        for (Mp4Track& track : tracks_) {
+            if (!samples_.contains(track.facts.trackId)) sumSamples(track);
+            if (&track != scene_ && &track != od_ && !track.facts.referenced)
+                job_.note(
+                    fmt::format("track {} ('{}') is passed over: no object descriptor names it",
+                                track.facts.trackId, printable(track.facts.handler)));
+            facts().tracks.push_back(track.facts);
+        }
+        return std::move(document_);
+    }
+
+  private:
+    Mp4Facts& facts() { return *document_.mp4; }
+    void depart(Departure kind, std::string text, std::string where) {
+        if (facts().departures.size() < kMaxDepartures)
+            facts().departures.push_back({kind, std::move(text), std::move(where)});
+    }
+
+    // ---- boxes
+
+    Result<void> readTopLevel() {
+        const std::uint64_t size = source_.size();
+        facts().fileSize = size;
+        std::uint64_t at = 0;
+        bool mediaSeen = false;
+        for (int number = 0; at < size; ++number) {
+            const auto place = [&] { return fmt::format("byte {}", at); };
+            if (number == kMaxTopLevelBoxes)
+                return failAt(place(), ErrorCode::invalidInput, "the file has more than {} boxes",
+                              kMaxTopLevelBoxes);
+            if (size - at < 8)
+                return failAt(place(), ErrorCode::invalidInput,
+                              "{} bytes are left, too few for a box", size - at);
+            std::array<std::byte, 16> head{};
+            const auto headSize = static_cast<std::size_t>(std::min<std::uint64_t>(16, size - at));
+            STX_CHECK(source_.read(at, std::span<std::byte>(head).first(headSize)));
+            ByteReader in(ByteSpan(head).first(headSize), at);
+            std::uint64_t boxSize = in.u32();
+            const std::string type = in.text(4);
+            std::uint64_t header = 8;
+            if (boxSize == 1) {
+                boxSize = in.u64();
+                header = 16;
+            } else if (boxSize == 0) {
+                boxSize = size - at;
+            }
+            if (number == 0 && type != "ftyp" && type != "moov" && type != "mdat" &&
+                type != "free" && type != "skip" && type != "wide" && type != "pdin")
+                return failAt(place(), ErrorCode::invalidInput,
+                              "this is no MP4 file: it starts with a box '{}'", printable(type));
+            if (in.failed() || boxSize < header || boxSize > size - at)
+                return failAt(place(), ErrorCode::invalidInput,
+                              "the box '{}' claims {} bytes; {} are left in the file",
+                              printable(type), boxSize, size - at);
+            if (type == "moof" || type == "sidx")
+                return failAt(fmt::format("{} at byte {}", type, at), ErrorCode::unsupported,
+                              "the file is fragmented; rewrite it as one with a single 'moov'");
+            if (type == "mdat") mediaSeen = true;
+            if (type == "ftyp" || type == "moov")
+                STX_CHECK(keep(type, at + header, boxSize - header, mediaSeen));
+            at += boxSize;
+        }
+        if (moov_.type.empty())
+            return failAt(fmt::format("byte {}", at), ErrorCode::invalidInput,
+                          "the file has no 'moov' box");
+        return {};
+    }
+
+    Result<void> keep(const std::string& type, std::uint64_t offset, std::uint64_t size,
+                      bool mediaSeen) {
+        const std::string place = fmt::format("{} at byte {}", type, offset);
+        if (type == "ftyp") {
+            if (size > 4096 || size < 8)
+                return failAt(place, ErrorCode::invalidInput, "the box has {} bytes", size);
+            Bytes bytes(static_cast<std::size_t>(size));
+            STX_CHECK(source_.read(offset, bytes));
+            ByteReader in(bytes);
+            facts().majorBrand = in.text(4);
+            in.skip(4);
+            facts().brands.clear();
+            while (in.left() >= 4) facts().brands.push_back(in.text(4));
+            return {};
+        }
+        if (!moov_.type.empty())
+            return failAt(place, ErrorCode::invalidInput, "the file has a second 'moov' box");
+        facts().moovFirst = !mediaSeen;
+        // Boxes and tables made of it take a few times its size.
+        if (auto fits = job_.limits.checkAllocation(size, 4, "the box 'moov'"); !fits)
+            return tl::unexpected(fits.error().at(place));
+        moovBytes_.resize(static_cast<std::size_t>(size));
+        STX_CHECK(source_.read(offset, moovBytes_));
+        moov_ = {"moov", "moov", ByteReader(moovBytes_, offset)};
+        return {};
+    }
+
+    Result<void> readMoov() {
+        STX_TRY(const auto boxes, childBoxes(moov_));
+        if (const Box* mvex = findBox(boxes, "mvex"))
+            return failAt(mvex->place(), ErrorCode::unsupported,
+                          "the file is fragmented; rewrite it as one with a single 'moov'");
+        if (const Box* cmov = findBox(boxes, "cmov"))
+            return failAt(cmov->place(), ErrorCode::unsupported, "the 'moov' box is compressed");
+        if (const Box* mvhd = findBox(boxes, "mvhd")) {
+            ByteReader in = mvhd->body;
+            const bool wide = in.u8() == 1;
+            in.skip(wide ? 19 : 11);
+            facts().movieTimescale = in.u32();
+            facts().movieDuration = wide ? in.u64() : in.u32();
+            if (in.failed())
+                return failAt(mvhd->place(), ErrorCode::invalidInput, "the box is too short");
+        }
+        for (const Box& box : boxes) {
+            if (box.type != "trak") continue;
+            STX_TRY(Mp4Track track, readTrack(box));
+            if (!trackOf_.emplace(track.facts.trackId, tracks_.size()).second)
+                return failAt(box.place(), ErrorCode::invalidInput, "two tracks have id {}",
+                              track.facts.trackId);
+            tracks_.push_back(std::move(track));
+        }
+        if (const Box* iods = findBox(boxes, "iods")) {
+            facts().hasIods = true;
+            ByteReader in = iods->body;
+            in.skip(4);
+            const DescriptorContext context{{}, &facts().departures};
+            auto decoded = decodeIod(in.restView(), context);
+            if (!decoded) return tl::unexpected(decoded.error().at(iods->place()));
+            document_.iod = std::move(decoded->iod);
+            initialTracks_ = std::move(decoded->trackIds);
+        } else {
+            depart(Departure::noIods,
+                   "the file has no initial object descriptor ('iods'); many readers find no scene "
+                   "then",
+                   "moov");
+        }
+        return {};
+    }
+
+    Mp4Track* findTrack(std::uint32_t id) {
+        const auto found = trackOf_.find(id);
+        return found == trackOf_.end() ? nullptr : &tracks_[found->second];
+    }
+
+    // ---- streams
+
+    static bool isScene(const Mp4Track& t) {
+        return t.facts.handler == "sdsm" || t.stream.streamType == StreamType::sceneDescription;
+    }
+    static bool isOd(const Mp4Track& t) {
+        return t.facts.handler == "odsm" || t.stream.streamType == StreamType::objectDescriptor;
+    }
+
+    Result<void> pickStreams() {
+        for (const std::uint32_t id : initialTracks_) {
+            Mp4Track* track = findTrack(id);
+            if (track == nullptr) {
+                depart(Departure::streamNotFound,
+                       fmt::format("the IOD names track {}, which is not there", id), "moov/iods");
+                continue;
+            }
+            track->facts.inIods = true;
+            if (scene_ == nullptr && isScene(*track))
+                scene_ = track;
+            else if (od_ == nullptr && isOd(*track))
+                od_ = track;
+        }
+        for (Mp4Track& track : tracks_) {
+            if (scene_ == nullptr && isScene(track)) {
+                scene_ = &track;
+                if (facts().hasIods)
+                    depart(Departure::sceneNotInIods, "the IOD does not name the scene track",
+                           track.path);
+            } else if (&track != scene_ && isScene(track)) {
+                job_.note(fmt::format("scene track {} is passed over; the scene is in track {}",
+                                      track.facts.trackId, scene_->facts.trackId));
+            }
+            if (od_ == nullptr && isOd(track) && &track != scene_) od_ = &track;
+        }
+        if (scene_ == nullptr)
+            return failAt("moov", ErrorCode::invalidInput,
+                          "the file has no MPEG-4 scene: none of its {} tracks is a BIFS stream "
+                          "(handler 'sdsm')",
+                          tracks_.size());
+        document_.sceneStream = scene_->stream;
+        if (od_ != nullptr)
+            document_.odStream = od_->stream;
+        else
+            depart(Departure::noOdTrack,
+                   "the file has no object descriptor track; the scene cannot have images in it",
+                   "moov");
+        for (const Mp4Track* track : {scene_, od_})
+            if (track != nullptr && track->facts.esIdInEsds != 0)
+                depart(Departure::esIdNotZero,
+                       fmt::format("ES_ID in 'esds' is {}, not 0", track->facts.esIdInEsds),
+                       track->path);
+        return {};
+    }
+
+    /// The samples of a track. Each track is read once, however often it is named.
+    Result<const std::vector<Sample>*> samplesOf(Mp4Track& track) {
+        const auto known = samples_.find(track.facts.trackId);
+        if (known != samples_.end()) return &known->second;
+        STX_TRY(std::vector<Sample> samples, readSamples(track, source_, job_.limits));
+        track.facts.sampleCount = samples.size();
+        for (const Sample& sample : samples) track.facts.bytes += sample.data.size;
+        return &(samples_[track.facts.trackId] = std::move(samples));
+    }
+
+    /// Memory that the document takes by naming a track again and again.
+    Result<void> spend(std::uint64_t bytes, const std::string& place) {
+        spent_ += bytes;
+        if (spent_ > job_.limits.maxMemoryBytes)
+            return failAt(place, ErrorCode::invalidInput,
+                          "the streams need more than the {} bytes that are allowed",
+                          job_.limits.maxMemoryBytes);
+        return {};
+    }
+
+    Result<void> fill(ElementaryStream& stream, const std::string& place) {
+        STX_CHECK(spend(sizeof(ElementaryStream), place));
+        if (!stream.url.empty()) return {};
+        Mp4Track* track = findTrack(stream.esId);
+        if (track == nullptr) {
+            depart(Departure::streamNotFound,
+                   fmt::format("a descriptor names track {}, which is not there", stream.esId),
+                   place);
+            return {};
+        }
+        const bool first = !std::exchange(track->facts.referenced, true);
+        if (first) noteEntry(*track);
+        if (track->elsewhere) {
+            if (first)
+                job_.note(
+                    fmt::format("the data of track {} are in another file, which is not opened",
+                                track->facts.trackId));
+            stream = track->stream;
+            return {};
+        }
+        STX_TRY(const std::vector<Sample>* samples, samplesOf(*track));
+        STX_CHECK(spend(samples->size() * sizeof(Sample) + track->stream.decoderSpecificInfo.size(),
+                        place));
+        stream = track->stream;
+        stream.samples = *samples;
+        return {};
+    }
+
+    void noteEntry(const Mp4Track& track) {
+        const bool visual = track.stream.streamType == StreamType::visual;
+        if (visual && track.facts.sampleEntry == "mp4s")
+            depart(Departure::imageInSystemsEntry,
+                   "an image stands in a sample entry 'mp4s'; 'mp4v' is expected", track.path);
+        if (visual && !track.hasEsds)
+            depart(Departure::imageInNativeEntry,
+                   fmt::format(
+                       "an image stands in a sample entry '{}' without 'esds'; 'mp4v' is expected",
+                       printable(track.facts.sampleEntry)),
+                   track.path);
+        if (track.facts.esIdInEsds != 0)
+            depart(Departure::esIdNotZero,
+                   fmt::format("ES_ID in 'esds' is {}, not 0", track.facts.esIdInEsds), track.path);
+    }
+
+    Result<void> readObjectDescriptors() {
+        if (od_ == nullptr) return {};
+        STX_TRY(const std::vector<Sample>* samples, samplesOf(*od_));
+        document_.odStream.samples = *samples;
+        const DescriptorContext context{od_->mpod, &facts().departures};
+        for (std::size_t i = 0; i < samples->size(); ++i) {
+            const Sample& sample = (*samples)[i];
+            const std::string place =
+                fmt::format("OD access unit {} at byte {}", i + 1, sample.data.offset);
+            STX_TRY(const Bytes bytes, sample.data.load(job_.limits));
+            auto commands = decodeOdFrame(bytes, context);
+            if (!commands) return tl::unexpected(commands.error().at(place));
+            for (OdCommand& command : *commands) {
+                if (auto* update = std::get_if<UpdateObjectDescriptors>(&command))
+                    for (ObjectDescriptor& descriptor : update->descriptors)
+                        for (ElementaryStream& stream : descriptor.streams)
+                            STX_CHECK(fill(stream, place));
+                if (auto* update = std::get_if<UpdateStreams>(&command))
+                    for (ElementaryStream& stream : update->streams) STX_CHECK(fill(stream, place));
+                if (std::holds_alternative<OtherOdCommand>(command))
+                    job_.note(fmt::format("OD command {:#04x} is passed over",
+                                          std::get<OtherOdCommand>(command).tag));
+            }
+            document_.odFrames.push_back({sample.time, std::move(*commands)});
+        }
+        return {};
+    }
+
+    Result<void> readScene() {
+        if (scene_->elsewhere)
+            return failAt(scene_->path, ErrorCode::unsupported,
+                          "the scene is in another file, which is not opened");
+        if (!scene_->hasEsds)
+            return failAt(scene_->path, ErrorCode::invalidInput,
+                          "the scene track has no 'esds' box, so no BIFS config");
+        const std::uint8_t type = scene_->stream.objectTypeIndication;
+        if (type != oti::kSystemsV1 && type != oti::kSystemsV2 && type != 0xFF)
+            return failAt(scene_->path, ErrorCode::unsupported,
+                          "the scene has object type {:#04x}; BIFS is 0x01 or 0x02", type);
+        auto config = decodeBifsConfig(scene_->stream.decoderSpecificInfo, type);
+        if (!config) return tl::unexpected(config.error().at(scene_->path));
+        document_.bifsConfig = *config;
+        STX_TRY(const std::vector<Sample>* samples, samplesOf(*scene_));
+        document_.sceneStream.samples = *samples;
+        BifsDecoder decoder(*config, job_.limits);
+        for (std::size_t i = 0; i < samples->size(); ++i) {
+            const Sample& sample = (*samples)[i];
+            const std::string place =
+                fmt::format("BIFS access unit {} at byte {}", i + 1, sample.data.offset);
+            STX_TRY(const Bytes bytes, sample.data.load(job_.limits));
+            auto commands = decoder.decode(bytes);
+            if (!commands) return tl::unexpected(commands.error().at(place));
+            if (decoder.bitsLeft() >= 8)
+                depart(Departure::trailingBytes,
+                       fmt::format("{} bits follow the last command", decoder.bitsLeft()), place);
+            document_.frames.push_back({sample.time, std::move(*commands)});
+        }
+        return {};
+    }
+
+    const ByteSource& source_;
+    Job& job_;
+    Document document_;
+    Bytes moovBytes_;
+    Box moov_;
+    std::vector<Mp4Track> tracks_;
+    std::unordered_map<std::uint32_t, std::size_t> trackOf_;
+    std::unordered_map<std::uint32_t, std::vector<Sample>> samples_;
+    std::vector<std::uint32_t> initialTracks_;
+    Mp4Track* scene_ = nullptr;
+    Mp4Track* od_ = nullptr;
+    std::uint64_t spent_ = 0;
+};
+
+}  // namespace
+
+bool looksLikeMp4(ByteSpan head) {
+    ByteReader in(head);
+    in.skip(4);
+    const std::string type = in.text(4);
+    return type == "ftyp" || type == "moov" || type == "mdat" || type == "pdin";
+}
+
+Result<Document> readMp4(const ByteSource& source, Job& job) {
+    auto document = Reader(source, job).read();
+    if (!document && !source.name().empty())
+        return tl::unexpected(document.error().at(fmt::format("'{}'", source.name())));
+    return document;
+}
+
+std::vector<const ObjectDescriptor*> Document::objectDescriptors(std::uint64_t until) const {
+    std::array<const ObjectDescriptor*, 1024> current{};
+    for (const OdFrame& frame : odFrames) {
+        if (frame.time > until) continue;
+        for (const OdCommand& command : frame.commands) {
+            if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
+                for (const ObjectDescriptor& descriptor : update->descriptors)
+                    if (descriptor.id >= 0 && descriptor.id < 1024)
+                        current[static_cast<std::size_t>(descriptor.id)] = &descriptor;
+            } else if (const auto* removal = std::get_if<RemoveObjectDescriptors>(&command)) {
+                for (const int id : removal->ids)
+                    if (id >= 0 && id < 1024) current[static_cast<std::size_t>(id)] = nullptr;
+            }
+        }
+    }
+    std::vector<const ObjectDescriptor*> present;
+    for (const ObjectDescriptor* descriptor : current)
+        if (descriptor != nullptr) present.push_back(descriptor);
+    return present;
+}
+
+const ObjectDescriptor* Document::findObjectDescriptor(int id) const {
+    for (const ObjectDescriptor* descriptor : objectDescriptors())
+        if (descriptor->id == id) return descriptor;
+    return nullptr;
+}
+
+}  // namespace stx::mpeg4

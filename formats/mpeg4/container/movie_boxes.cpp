@@ -1,0 +1,281 @@
+#include "formats/mpeg4/container/movie_boxes.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "formats/files/source_date.hpp"
+#include "formats/mpeg4/bifs/descriptors.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+constexpr std::uint32_t kMovieTimescale = 600;
+
+/// Seconds from 1904 to 1970.
+constexpr std::uint64_t kEpochOffset = 2082844800;
+
+/// What SOURCE_DATE_EPOCH says, in the file's epoch; 0 without it, or behind 2040, where 32 bits
+/// end.
+std::uint64_t creationTime() {
+    const auto seconds = sourceDate();
+    const std::uint64_t created = seconds.value_or(0) + kEpochOffset;
+    return seconds && created <= std::numeric_limits<std::uint32_t>::max() ? created : 0;
+}
+
+/// A box being written: the size is put in when it ends.
+class BoxScope {
+  public:
+    BoxScope(ByteWriter& out, std::string_view type) : out_(out), start_(out.size()) {
+        out.u32(0);
+        out.text(type);
+    }
+    /// A full box.
+    BoxScope(ByteWriter& out, std::string_view type, std::uint8_t version, std::uint32_t flags)
+        : BoxScope(out, type) {
+        out.u8(version);
+        out.u24(flags);
+    }
+    BoxScope(const BoxScope&) = delete;
+    BoxScope& operator=(const BoxScope&) = delete;
+    ~BoxScope() { out_.patch32(start_, static_cast<std::uint32_t>(out_.size() - start_)); }
+
+  private:
+    ByteWriter& out_;
+    std::size_t start_;
+};
+
+bool isSystems(const Track& track) {
+    return track.stream.streamType != StreamType::visual;
+}
+
+std::uint64_t movieDuration(const Track& track) {
+    const std::uint64_t whole = track.duration / track.stream.timescale * kMovieTimescale;
+    return whole +
+           track.duration % track.stream.timescale * kMovieTimescale / track.stream.timescale;
+}
+
+/// Version 1 boxes carry times of 64 bits; version 0 is used where it suffices.
+void writeTimes(ByteWriter& out, bool wide, std::uint32_t between, bool reserved,
+                std::uint64_t duration) {
+    const std::uint64_t created = creationTime();
+    const auto time = [&](std::uint64_t value) {
+        if (wide)
+            out.u64(value);
+        else
+            out.u32(static_cast<std::uint32_t>(value));
+    };
+    time(created);
+    time(created);
+    out.u32(between);
+    if (reserved) out.u32(0);
+    time(duration);
+}
+bool needsWide(std::uint64_t duration) {
+    return duration > std::numeric_limits<std::uint32_t>::max();
+}
+
+void writeMatrix(ByteWriter& out) {
+    for (const std::uint32_t value : {0x10000u, 0u, 0u, 0u, 0x10000u, 0u, 0u, 0u, 0x40000000u})
+        out.u32(value);
+}
+
+void writeMovieHeader(ByteWriter& out, std::uint64_t duration, std::uint32_t highestId) {
+    const bool wide = needsWide(duration);
+    const BoxScope mvhd(out, "mvhd", wide ? 1 : 0, 0);
+    writeTimes(out, wide, kMovieTimescale, false, duration);
+    out.u32(0x10000);
+    out.u16(0x0100);
+    out.zeros(10);
+    writeMatrix(out);
+    out.zeros(24);
+    out.u32(highestId == std::numeric_limits<std::uint32_t>::max() ? highestId : highestId + 1);
+}
+
+Result<void> writeSampleEntry(ByteWriter& out, const Track& track) {
+    STX_TRY(const Bytes descriptor, encodeEsDescriptor(track.stream));
+    const BoxScope stsd(out, "stsd", 0, 0);
+    out.u32(1);
+    const bool visual = !isSystems(track);
+    const BoxScope entry(out, visual ? "mp4v" : track.handler == "soun" ? "mp4a" : "mp4s");
+    out.zeros(6);
+    out.u16(1);
+    if (visual) {
+        out.zeros(16);
+        out.u16(static_cast<std::uint16_t>(track.stream.width));
+        out.u16(static_cast<std::uint16_t>(track.stream.height));
+        out.u32(0x480000);
+        out.u32(0x480000);
+        out.u32(0);
+        out.u16(1);
+        out.zeros(32);
+        out.u16(0x18);
+        out.u16(0xFFFF);
+    } else if (track.handler == "soun") {
+        out.zeros(8);
+        out.u16(2);
+        out.u16(16);
+        out.zeros(4);
+        out.u32(track.stream.timescale << 16);
+    }
+    const BoxScope esds(out, "esds", 0, 0);
+    out.bytes(descriptor);
+    return {};
+}
+
+void writeRuns(ByteWriter& out, const std::vector<std::uint32_t>& values) {
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;
+    for (const std::uint32_t value : values) {
+        if (!runs.empty() && runs.back().second == value)
+            ++runs.back().first;
+        else
+            runs.emplace_back(1, value);
+    }
+    out.u32(static_cast<std::uint32_t>(runs.size()));
+    for (const auto& [count, value] : runs) {
+        out.u32(count);
+        out.u32(value);
+    }
+}
+
+void writeTables(ByteWriter& out, const Track& track, bool wide) {
+    const std::vector<Sample>& samples = track.stream.samples;
+    const auto count = static_cast<std::uint32_t>(samples.size());
+    std::vector<std::uint32_t> deltas;
+    std::vector<std::uint32_t> offsets;
+    std::vector<std::uint32_t> syncs;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        deltas.push_back(i + 1 < samples.size()
+                             ? static_cast<std::uint32_t>(samples[i + 1].time - samples[i].time)
+                             : samples[i].duration);
+        offsets.push_back(static_cast<std::uint32_t>(samples[i].compositionOffset));
+        if (samples[i].sync) syncs.push_back(static_cast<std::uint32_t>(i + 1));
+    }
+    {
+        const BoxScope stts(out, "stts", 0, 0);
+        writeRuns(out, deltas);
+    }
+    if (std::any_of(offsets.begin(), offsets.end(), [](std::uint32_t o) { return o != 0; })) {
+        const bool negative = std::any_of(offsets.begin(), offsets.end(),
+                                          [](std::uint32_t o) { return o >> 31 != 0; });
+        const BoxScope ctts(out, "ctts", negative ? 1 : 0, 0);
+        writeRuns(out, offsets);
+    }
+    if (syncs.size() != samples.size()) {
+        const BoxScope stss(out, "stss", 0, 0);
+        out.u32(static_cast<std::uint32_t>(syncs.size()));
+        for (const std::uint32_t number : syncs) out.u32(number);
+    }
+    {
+        const BoxScope stsc(out, "stsc", 0, 0);
+        out.u32(count > 0 ? 1 : 0);
+        if (count > 0) {
+            out.u32(1);
+            out.u32(count);
+            out.u32(1);
+        }
+    }
+    {
+        const bool same = std::all_of(samples.begin(), samples.end(), [&](const Sample& s) {
+            return s.data.size == samples.front().data.size;
+        });
+        const bool common = count > 0 && same && samples.front().data.size > 0;
+        const BoxScope stsz(out, "stsz", 0, 0);
+        out.u32(common ? static_cast<std::uint32_t>(samples.front().data.size) : 0);
+        out.u32(count);
+        if (!common)
+            for (const Sample& sample : samples)
+                out.u32(static_cast<std::uint32_t>(sample.data.size));
+    }
+    const BoxScope stco(out, wide ? "co64" : "stco", 0, 0);
+    out.u32(count > 0 ? 1 : 0);
+    if (count == 0) return;
+    if (wide)
+        out.u64(track.offset);
+    else
+        out.u32(static_cast<std::uint32_t>(track.offset));
+}
+
+Result<void> writeTrack(ByteWriter& out, const Track& track, bool wide) {
+    const BoxScope trak(out, "trak");
+    {
+        const std::uint64_t duration = movieDuration(track);
+        const BoxScope tkhd(out, "tkhd", needsWide(duration) ? 1 : 0, isSystems(track) ? 1 : 7);
+        writeTimes(out, needsWide(duration), track.id, true, duration);
+        out.zeros(16);
+        writeMatrix(out);
+        out.u32(static_cast<std::uint32_t>(track.stream.width) << 16);
+        out.u32(static_cast<std::uint32_t>(track.stream.height) << 16);
+    }
+    if (!track.mpod.empty()) {
+        const BoxScope tref(out, "tref");
+        const BoxScope mpod(out, "mpod");
+        for (const std::uint32_t id : track.mpod) out.u32(id);
+    }
+    const BoxScope mdia(out, "mdia");
+    {
+        const BoxScope mdhd(out, "mdhd", needsWide(track.duration) ? 1 : 0, 0);
+        writeTimes(out, needsWide(track.duration), track.stream.timescale, false, track.duration);
+        out.u16(0x55C4);  // language 'und'
+        out.u16(0);
+    }
+    {
+        const BoxScope hdlr(out, "hdlr", 0, 0);
+        out.u32(0);
+        out.text(track.handler);
+        out.zeros(12);
+        out.text(track.handlerName);
+        out.u8(0);
+    }
+    const BoxScope minf(out, "minf");
+    if (!isSystems(track)) {
+        const BoxScope vmhd(out, "vmhd", 0, 1);
+        out.zeros(8);
+    } else if (track.handler == "soun") {
+        const BoxScope smhd(out, "smhd", 0, 0);
+        out.zeros(4);
+    } else {
+        const BoxScope nmhd(out, "nmhd", 0, 0);
+    }
+    {
+        const BoxScope dinf(out, "dinf");
+        const BoxScope dref(out, "dref", 0, 0);
+        out.u32(1);
+        const BoxScope url(out, "url ", 0, 1);
+    }
+    const BoxScope stbl(out, "stbl");
+    STX_CHECK(writeSampleEntry(out, track));
+    writeTables(out, track, wide);
+    return {};
+}
+
+}  // namespace
+
+Result<void> writeMovieHead(ByteWriter& out, std::span<const Track> tracks,
+                            const InitialObjectDescriptor& iod, bool wide) {
+    {
+        const BoxScope ftyp(out, "ftyp");
+        out.text("mp42");
+        out.u32(1);
+        out.text("isommp42mp41");
+    }
+    const BoxScope moov(out, "moov");
+    std::uint64_t duration = 0;
+    std::uint32_t highest = 0;
+    for (const Track& track : tracks) {
+        duration = std::max(duration, movieDuration(track));
+        highest = std::max(highest, track.id);
+    }
+    writeMovieHeader(out, duration, highest);
+    {
+        const BoxScope iods(out, "iods", 0, 0);
+        std::vector<std::uint32_t> initial;
+        for (const Track& track : tracks)
+            if (track.handler == "sdsm" || track.handler == "odsm") initial.push_back(track.id);
+        STX_TRY(const Bytes descriptor, encodeIod(iod, initial));
+        out.bytes(descriptor);
+    }
+    for (const Track& track : tracks) STX_CHECK(writeTrack(out, track, wide));
+    return {};
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string_view>
+
+#include "formats/images/images.hpp"
+#include "formats/mpeg4/scene/document.hpp"
+#include "lib/model/bundle.hpp"
+
+/// Scenes and bundles (ISO/IEC 14496-16, 4.5.4; mpeg4-dibr.md).
+///
+/// Decisions that the standard leaves open, and that these functions take:
+/// - Pixel (i, j), row 0 on top, samples u = (i+1/2)/W*2-1, v = 1-(j+1/2)/H*2 of the window.
+/// - Rows of a PixelTexture and of a PointTexture run from the bottom to the top.
+/// - Beside a depth image, the alpha of the texture is coverage; without alpha, coverage is full
+/// where
+///   the depth has a point. Without a depth image, alpha is the depth code.
+/// - Normals: n = 2c/cmax - 1, in the frame of the DepthImage's parent; 0 0 0 is no normal.
+/// - splatU and splatV hold the half axes of the splat, each component scaled from [0, cmax] to
+///   [splatMinMax.x, splatMinMax.y], in the same frame. Where splatMinMax.x is 0 or more (as in the
+///   default) components could not be negative; then s = 2c/cmax - 1 gives the direction, and the
+///   length is splatMinMax.x + (splatMinMax.y - splatMinMax.x) * min(1, |s|). What is written has
+///   splatMinMax = (-L, L), L the largest component of the view.
+namespace stx::mpeg4 {
+
+/// Decodes an image file; the default is decodeImage().
+using ImageDecoder = std::function<Result<DecodedImage>(ByteSpan bytes, std::string_view name,
+                                                        const Limits& limits)>;
+
+struct SceneReadOptions {
+    /// Images that the scene names by a string are looked for in here; empty: they are errors.
+    std::filesystem::path folder;
+    ImageDecoder decode = decodeImage;
+    /// Without pixels only headers are read: the views have cameras, planes and depthBits, but
+    /// empty images, and a PointTexture gives one view.
+    bool pixels = true;
+};
+
+/// The object of a presentation as it stands at its first moment: a view for each DepthImage (and
+/// DepthImageV2) that is shown. Transforms are folded into the cameras; of a Switch only the chosen
+/// child counts; a node used twice gives two views. A PointTexture gives as many views with the
+/// same camera as a pixel has depths; an OctreeImage gives a view for each of its images, with the
+/// depths of the voxels that it sees first. Views are named by DEF name. Title and bounds come from
+/// WorldInfo. Errors (invalidInput) name the view and what is wrong; Transforms that scale
+/// unevenly, shear or mirror are refused. Notes tell what is left out.
+[[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
+                                             const SceneReadOptions& options, Job& job);
+
+/// What the scene's objects are: "SimpleTexture", "SimpleTextureV2", "PointTexture", "OctreeImage",
+/// or "none"; the richest where there are several.
+[[nodiscard]] const char* nodeKindOf(const Document& document);
+
+struct SceneWriteOptions {
+    enum class Texture { png, jpeg };
+    enum class Nodes { automatic, v1, v2 };  ///< automatic: V2 for views with normals or splats
+    Texture texture = Texture::png;
+    int jpegQuality = 92;  ///< 1..100
+    int depthBits = 0;     ///< 8 or 16; 0: as each view says (32 becomes 16)
+    int normalBits = 16;   ///< 8 or 16, of normal, splatU and splatV
+    Nodes nodes = Nodes::automatic;
+    bool pointTexture =
+        false;  ///< PointTexture instead of SimpleTexture; the colours stand in the scene
+};
+
+/// A presentation of a bundle: Group { WorldInfo, DepthImage... }, the WorldInfo with title and
+/// bounds (computed where the bundle has none). Field values are rounded to float, planes outwards.
+/// A principal point off the centre is mended by padding with pixels without a point (see
+/// placement.hpp) and noted; reading the scene back here undoes it. What is lossy is noted: float
+/// depth and 8 bits with the largest error, JPEG, linear colour, what V1 cannot hold. Errors:
+/// (unsupported) more images than MPEG-4 has object descriptors for, or images that padding makes
+/// too large; (usage) options out of range; what Bundle::check() says.
+[[nodiscard]] Result<Document> sceneFromBundle(const Bundle& bundle,
+                                               const SceneWriteOptions& options, Job& job);
+
+}  // namespace stx::mpeg4

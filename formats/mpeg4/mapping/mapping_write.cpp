@@ -1,0 +1,364 @@
+#include <cmath>
+#include <set>
+
+#include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/mapping/point_texture.hpp"
+#include "formats/mpeg4/mapping/texture_images.hpp"
+#include "formats/mpeg4/mapping/view_notes.hpp"
+#include "formats/mpeg4/text/text_fields.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// The nearest float that is not above (below) a value: planes must keep what lies between them.
+float floatBelow(double v) {
+    const float f = static_cast<float>(v);
+    return static_cast<double>(f) > v ? std::nextafter(f, -std::numeric_limits<float>::infinity())
+                                      : f;
+}
+float floatAbove(double v) {
+    const float f = static_cast<float>(v);
+    return static_cast<double>(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity())
+                                      : f;
+}
+
+/// The encoded images of one view.
+struct ViewImages {
+    Padding padding;
+    float nearPlane = 0, farPlane = 0;
+    float longestSplat = 0;
+    Bytes texture, depth, normal, splatU, splatV;
+    double worstDepth = 0;
+    bool clamped = false;
+    bool coverageLost = false;
+};
+
+class SceneWriter {
+  public:
+    SceneWriter(const Bundle& bundle, const SceneWriteOptions& options, Job& job)
+        : bundle_(bundle), options_(options), job_(job) {}
+
+    Result<Document> write() {
+        STX_CHECK(checkRequest());
+        std::vector<Result<ViewImages>> images(bundle_.views.size());
+        parallelFor(0, static_cast<std::int64_t>(bundle_.views.size()), [&](std::int64_t i) {
+            const auto at = static_cast<std::size_t>(i);
+            if (!job_.cancelled) images[at] = encode(bundle_.views[at]);
+        });
+        STX_CHECK(job_.checkCancelled());
+        NodeList children = {nullptr};  // WorldInfo, known at the end
+        ViewNotes notes;
+        notes.bounds = bundle_.bounds ? bundle_.bounds : bundle_.computeBounds();
+        for (std::size_t i = 0; i < bundle_.views.size(); ++i) {
+            if (!images[i]) return tl::unexpected(images[i].error().at(viewName(i)));
+            const std::size_t layers = options_.pointTexture ? layersFrom(i) : 1;
+            for (std::size_t k = 1; k < layers; ++k)
+                if (!images[i + k])
+                    return tl::unexpected(images[i + k].error().at(viewName(i + k)));
+            children.push_back(depthImage(i, layers, *images[i], notes));
+            for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
+            i += layers - 1;
+        }
+        sayTotals();
+        NodePtr worldInfo = makeNode("WorldInfo");
+        worldInfo->set("title", bundle_.title);
+        std::vector<std::string> info = notes.text();
+        info.insert(info.begin(), "made by stx");
+        worldInfo->set("info", std::move(info));
+        children[0] = worldInfo;
+
+        Document document;
+        NodePtr root = makeNode("Group");
+        root->set("children", std::move(children));
+        document.sceneStream.esId = 1;
+        document.sceneStream.streamType = StreamType::sceneDescription;
+        document.sceneStream.objectTypeIndication = oti::kSystemsV1;
+        document.bifsConfig.hasSize = true;
+        document.bifsConfig.pixelWidth = std::min(bundle_.views[0].camera.width, 65535);
+        document.bifsConfig.pixelHeight = std::min(bundle_.views[0].camera.height, 65535);
+        ReplaceScene scene;
+        scene.useNames = true;
+        scene.root = root;
+        CommandFrame frame;
+        frame.commands.emplace_back(std::move(scene));
+        document.frames.push_back(std::move(frame));
+        if (!update_.descriptors.empty()) {
+            document.odStream.esId = 2;
+            document.odStream.streamType = StreamType::objectDescriptor;
+            document.odStream.objectTypeIndication = oti::kSystemsV1;
+            OdFrame odFrame;
+            odFrame.commands.emplace_back(std::move(update_));
+            document.odFrames.push_back(std::move(odFrame));
+        }
+        return document;
+    }
+
+  private:
+    static constexpr int kFirstOd = 2;    ///< 1 is the IOD's
+    static constexpr int kLastOd = 1022;  ///< 1023 is forbidden
+
+    [[nodiscard]] std::string viewName(std::size_t i) const {
+        return fmt::format("view {} '{}'", i, bundle_.views[i].name);
+    }
+    [[nodiscard]] bool isV2(const ReferenceView& view) const {
+        if (options_.nodes == SceneWriteOptions::Nodes::automatic)
+            return view.hasNormals() || view.hasSplats();
+        return options_.nodes == SceneWriteOptions::Nodes::v2;
+    }
+    [[nodiscard]] int bitsOf(const ReferenceView& view) const {
+        if (options_.depthBits != 0) return options_.depthBits;
+        return view.depthBits == 8 ? 8 : 16;
+    }
+
+    Result<void> checkRequest() const {
+        if (options_.jpegQuality < 1 || options_.jpegQuality > 100)
+            return fail(ErrorCode::usage, "the JPEG quality is {}; 1 to 100 is possible",
+                        options_.jpegQuality);
+        if (options_.depthBits != 0 && options_.depthBits != 8 && options_.depthBits != 16)
+            return fail(ErrorCode::usage,
+                        "depth of {} bits has no place in MPEG-4; 8 or 16 is possible",
+                        options_.depthBits);
+        if (options_.normalBits != 8 && options_.normalBits != 16)
+            return fail(ErrorCode::usage, "normals of {} bits are not possible; 8 or 16",
+                        options_.normalBits);
+        STX_CHECK(bundle_.check());
+        if (options_.pointTexture) return {};
+        std::size_t count = 0;
+        for (const ReferenceView& view : bundle_.views) {
+            count += 2;
+            if (isV2(view)) count += (view.hasNormals() ? 1u : 0u) + (view.hasSplats() ? 2u : 0u);
+        }
+        if (count > kLastOd - kFirstOd + 1)
+            return fail(ErrorCode::unsupported,
+                        "the bundle has {} views with {} images; MPEG-4 has object descriptors for "
+                        "{} images "
+                        "(select fewer views, or write .exr)",
+                        bundle_.views.size(), count, kLastOd - kFirstOd + 1);
+        return {};
+    }
+
+    /// Views from `first` on that one PointTexture can hold.
+    [[nodiscard]] std::size_t layersFrom(std::size_t first) const {
+        std::size_t n = 1;
+        while (first + n < bundle_.views.size() &&
+               isLayerOf(bundle_.views[first + n], bundle_.views[first]))
+            ++n;
+        return n;
+    }
+
+    Result<ViewImages> encode(const ReferenceView& view) const {
+        ViewImages out;
+        STX_TRY(out.padding,
+                centringPadding(view.camera, std::min(job_.limits.maxImageSide, 65535)));
+        out.nearPlane = floatBelow(view.nearPlane);
+        out.farPlane = floatAbove(view.farPlane);
+        if (!std::isfinite(out.farPlane) || !(out.nearPlane < out.farPlane))
+            return fail(ErrorCode::unsupported,
+                        "nearPlane {:g} and farPlane {:g} do not fit 32-bit floats", view.nearPlane,
+                        view.farPlane);
+        const DepthCode code{out.nearPlane, out.farPlane, bitsOf(view) == 8 ? 255u : 65535u};
+        if (options_.pointTexture) {
+            for (const float d : view.depth.pixels())
+                if (hasPoint(d))
+                    out.worstDepth =
+                        std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
+            out.coverageLost =
+                !alphaFollowsDepth(rgba8FromTexture(view.texture, out.clamped), view.depth);
+            return out;
+        }
+        STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
+        const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
+        const bool alpha = !alphaFollowsDepth(colour, view.depth);
+        const Rgba8Image wide = padded(colour, out.padding);
+        if (options_.texture == SceneWriteOptions::Texture::jpeg) {
+            out.coverageLost = alpha;
+            STX_TRY(out.texture, colourJpeg(wide, options_.jpegQuality));
+        } else {
+            STX_TRY(out.texture, colourPng(wide, alpha));
+        }
+        if (!isV2(view)) return out;
+        if (view.hasNormals()) {
+            STX_TRY(out.normal, normalPng(view.normal, options_.normalBits, out.padding));
+        }
+        if (view.hasSplats()) {
+            out.longestSplat =
+                std::max(largestComponent(view.splatU), largestComponent(view.splatV));
+            if (!(out.longestSplat > 0)) out.longestSplat = 1;
+            STX_TRY(out.splatU,
+                    splatPng(view.splatU, out.longestSplat, options_.normalBits, out.padding));
+            STX_TRY(out.splatV,
+                    splatPng(view.splatV, out.longestSplat, options_.normalBits, out.padding));
+        }
+        return out;
+    }
+
+    /// A name that every text form can hold, and that no other view has.
+    std::string defNameOf(const ReferenceView& view, std::size_t i, ViewNotes& notes) {
+        std::string defName = view.name;
+        for (char& c : defName)
+            if (!isPlainName(std::string("a") + c)) c = '_';
+        // N12 would be taken for a number.
+        if (!isPlainName(defName) || idFromTextName(defName, 'N') != 0) defName = "view_" + defName;
+        if (view.name.empty()) defName = fmt::format("view{}", i);
+        const std::string base = defName;
+        for (int n = 1; !taken_.insert(defName).second; ++n)
+            defName = fmt::format("{}_{}", base, n);
+        if (defName != view.name && !view.name.empty()) notes.names[defName] = view.name;
+        return defName;
+    }
+
+    /// A texture node with a stream of its own behind it.
+    NodePtr textureNode(const std::string& defName, const char* role, Bytes bytes) {
+        const int id = kFirstOd + static_cast<int>(update_.descriptors.size());
+        const bool png = bytes.size() > 1 && bytes[0] == std::byte{0x89};
+        ElementaryStream stream;
+        stream.esId = static_cast<std::uint32_t>(id + 1);
+        stream.objectTypeIndication = png ? oti::kPng : oti::kJpeg;
+        stream.streamType = StreamType::visual;
+        stream.fileName = fmt::format("{}_{}.{}", defName, role, png ? "png" : "jpg");
+        Sample sample;
+        sample.duration = stream.timescale;
+        sample.data = ByteRange::of(std::move(bytes));
+        stream.samples.push_back(std::move(sample));
+        ObjectDescriptor od;
+        od.id = id;
+        od.streams.push_back(std::move(stream));
+        update_.descriptors.push_back(std::move(od));
+        NodePtr node = makeNode("ImageTexture");
+        Url url;
+        url.objectDescriptorId = id;
+        node->set("url", std::vector{url});
+        // Outside of the window there is nothing to repeat.
+        node->set("repeatS", false);
+        node->set("repeatT", false);
+        return node;
+    }
+
+    NodePtr depthImage(std::size_t i, std::size_t layers, ViewImages& images, ViewNotes& notes) {
+        const ReferenceView& view = bundle_.views[i];
+        const bool v2 = isV2(view);
+        NodePtr node = makeNode(v2 ? "DepthImageV2" : "DepthImage");
+        node->defName = defNameOf(view, i, notes);
+        const Camera& c = images.padding.camera;
+        const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
+        node->set("position", glm::vec3(c.position));
+        node->set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
+        node->set("fieldOfView", glm::vec2(c.fieldOfView()));
+        node->set("nearPlane", images.nearPlane);
+        node->set("farPlane", images.farPlane);
+        node->set("orthographic", c.orthographic);
+        if (v2) {
+            const glm::vec2 range = view.hasSplats() && !options_.pointTexture
+                                        ? glm::vec2(-images.longestSplat, images.longestSplat)
+                                        : std::get<glm::vec2>(node->value("splatMinMax"));
+            node->set("splatMinMax", range);
+        }
+        if (options_.pointTexture) {
+            std::vector<const ReferenceView*> list;
+            for (std::size_t k = 0; k < layers; ++k) list.push_back(&bundle_.views[i + k]);
+            const int bits = bitsOf(view);
+            const DepthCode code{images.nearPlane, images.farPlane, bits == 8 ? 255u : 65535u};
+            node->set("diTexture", paddedPointTexture(list, images.padding, code, bits, v2));
+        } else {
+            NodePtr texture = makeNode(v2 ? "SimpleTextureV2" : "SimpleTexture");
+            texture->set("texture",
+                         textureNode(node->defName, "texture", std::move(images.texture)));
+            texture->set("depth", textureNode(node->defName, "depth", std::move(images.depth)));
+            if (!images.normal.empty())
+                texture->set("normal",
+                             textureNode(node->defName, "normal", std::move(images.normal)));
+            if (!images.splatU.empty()) {
+                texture->set("splatU",
+                             textureNode(node->defName, "splatU", std::move(images.splatU)));
+                texture->set("splatV",
+                             textureNode(node->defName, "splatV", std::move(images.splatV)));
+            }
+            node->set("diTexture", texture);
+        }
+        if (!view.camera.orthographic && !view.camera.centred(0.0)) {
+            const Padding& p = images.padding;
+            notes.paddings[node->defName] = {p.left,   p.top,          p.right,
+                                             p.bottom, view.camera.cx, view.camera.cy};
+        }
+        return node;
+    }
+
+    static NodePtr paddedPointTexture(const std::vector<const ReferenceView*>& layers,
+                                      const Padding& padding, const DepthCode& code, int bits,
+                                      bool v2) {
+        NodePtr node = pointTextureFromViews(layers, code, bits, v2);
+        if (!padding.any()) return node;
+        // Pixels without a point are a count of 0 each; colours and vectors stay as they are.
+        const int width = layers[0]->depth.width(), height = layers[0]->depth.height();
+        const auto& counts = node->get<std::vector<std::int32_t>>("depth");
+        const int wide = width + padding.left + padding.right;
+        std::vector<std::int32_t> out(static_cast<std::size_t>(wide) * padding.bottom, 0);
+        std::size_t at = 0;
+        for (int y = 0; y < height; ++y) {
+            out.insert(out.end(), static_cast<std::size_t>(padding.left), 0);
+            for (int x = 0; x < width; ++x) {
+                const auto n = static_cast<std::size_t>(counts[at]) + 1;
+                out.insert(out.end(), counts.begin() + static_cast<std::ptrdiff_t>(at),
+                           counts.begin() + static_cast<std::ptrdiff_t>(at + n));
+                at += n;
+            }
+            out.insert(out.end(), static_cast<std::size_t>(padding.right), 0);
+        }
+        out.insert(out.end(), static_cast<std::size_t>(wide) * padding.top, 0);
+        node->set("width", wide);
+        node->set("height", height + padding.top + padding.bottom);
+        node->set("depth", std::move(out));
+        return node;
+    }
+
+    void sayWhatIsLost(std::size_t i, const ViewImages& images) {
+        const ReferenceView& view = bundle_.views[i];
+        const Padding& p = images.padding;
+        if (p.any() || p.shift > 1e-6)
+            job_.note(fmt::format(
+                "{}: its principal point is off the centre; padded by {} {} {} {} pixels (left, "
+                "top, right, bottom), the rest of {:.3g} pixels is moved",
+                viewName(i), p.left, p.top, p.right, p.bottom, p.shift));
+        const int bits = bitsOf(view);
+        if (view.depthBits == 32 || bits == 8 || bits < view.depthBits) {
+            worst_ = std::max(worst_, images.worstDepth);
+            lossyBits_ = lossyBits_ == 0 ? bits : std::min(lossyBits_, bits);
+        }
+        clamped_ = clamped_ || images.clamped;
+        coverageLost_ = coverageLost_ || images.coverageLost;
+        dropped_ = dropped_ || (!isV2(view) && (view.hasNormals() || view.hasSplats()));
+    }
+    void sayTotals() {
+        if (worst_ > 0)
+            job_.note(fmt::format("depth is rounded to {} bits: at most {:.4g} scene units off",
+                                  lossyBits_, worst_));
+        if (bundle_.views[0].texture.isLinear())
+            job_.note(clamped_ ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
+                               : "linear colour becomes 8-bit sRGB");
+        if (options_.texture == SceneWriteOptions::Texture::jpeg && !options_.pointTexture)
+            job_.note(
+                fmt::format("colour is JPEG of quality {}, which is lossy", options_.jpegQuality));
+        if (coverageLost_)
+            job_.note(fmt::format("{} has no alpha: soft edges of the coverage are lost",
+                                  options_.pointTexture ? "a PointTexture" : "JPEG"));
+        if (dropped_) job_.note("SimpleTexture (V1) has no normals and splats: they are left out");
+    }
+
+    const Bundle& bundle_;
+    const SceneWriteOptions& options_;
+    Job& job_;
+    UpdateObjectDescriptors update_;
+    std::set<std::string> taken_;
+    double worst_ = 0;
+    int lossyBits_ = 0;
+    bool clamped_ = false, coverageLost_ = false, dropped_ = false;
+};
+
+}  // namespace
+
+Result<Document> sceneFromBundle(const Bundle& bundle, const SceneWriteOptions& options, Job& job) {
+    return SceneWriter(bundle, options, job).write();
+}
+
+}  // namespace stx::mpeg4

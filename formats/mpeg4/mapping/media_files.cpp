@@ -1,0 +1,228 @@
+#include <map>
+#include <set>
+
+#include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
+#include "formats/mpeg4/text/text_descriptors.hpp"
+#include "formats/mpeg4/text/text_values.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// Calls body(stream, object descriptor's id) for each stream that an OD brings.
+template <class Doc, class Body>
+Result<void> forEachStream(Doc& document, Body body) {
+    for (auto& frame : document.odFrames) {
+        for (auto& command : frame.commands) {
+            if (auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
+                for (auto& od : update->descriptors)
+                    for (auto& stream : od.streams) STX_CHECK(body(stream, od.id));
+            } else if (auto* streams = std::get_if<UpdateStreams>(&command)) {
+                for (auto& stream : streams->streams)
+                    STX_CHECK(body(stream, streams->objectDescriptorId));
+            }
+        }
+    }
+    return {};
+}
+
+/// objectTypeIndication of a file's first bytes; 0 when it is neither JPEG nor PNG.
+std::uint8_t typeOf(ByteSpan head) {
+    const auto byte = [&](std::size_t i) { return std::to_integer<int>(head[i]); };
+    if (head.size() >= 3 && byte(0) == 0xFF && byte(1) == 0xD8 && byte(2) == 0xFF)
+        return oti::kJpeg;
+    if (head.size() >= 4 && byte(0) == 0x89 && byte(1) == 'P' && byte(2) == 'N' && byte(3) == 'G')
+        return oti::kPng;
+    return 0;
+}
+
+bool isPlainFileName(std::string_view name) {
+    if (name.empty() || name[0] == '.' || name.size() > 120) return false;
+    for (const char c : name) {
+        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                           (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+        if (!plain) return false;
+    }
+    return true;
+}
+
+std::string_view endingOf(const ElementaryStream& stream) {
+    switch (stream.objectTypeIndication) {
+        case oti::kJpeg:
+            return ".jpg";
+        case oti::kPng:
+            return ".png";
+        default:
+            return ".bin";
+    }
+}
+
+/// What the object descriptors of a scene are for: `front_depth` for the depth of DepthImage
+/// `front`.
+std::map<int, std::string> rolesOf(const Document& document) {
+    std::map<int, std::string> roles;
+    int count = 0;
+    const auto visit = [&](const NodePtr& node) {
+        const int index = node->info->find("diTexture");
+        if (index < 0) return;
+        const auto* texture = std::get_if<NodePtr>(&node->value(index));
+        const std::string base =
+            isPlainFileName(node->defName) ? node->defName : fmt::format("view{}", count);
+        ++count;
+        if (!texture || !*texture) return;
+        for (const Node::SetField& field : (*texture)->setFields) {
+            const auto* image = std::get_if<NodePtr>(&field.value);
+            const int url = image && *image ? (*image)->info->find("url") : -1;
+            if (url < 0) continue;
+            if (const auto* urls = std::get_if<std::vector<Url>>(&(*image)->value(url)))
+                for (const Url& one : *urls)
+                    if (one.objectDescriptorId != 0)
+                        roles.try_emplace(one.objectDescriptorId,
+                                          base + "_" + (*texture)->info->fields[field.index].name);
+        }
+    };
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands) forEachNode(command, visit);
+    return roles;
+}
+
+/// Files are opened, or, when there are many, read: a process may have a thousand files open.
+constexpr std::size_t kMostOpen = 256;
+
+class MediaLoader {
+  public:
+    MediaLoader(const std::filesystem::path& folder, bool many, Job& job)
+        : folder_(folder), many_(many), job_(job) {}
+
+    Result<void> load(ElementaryStream& stream, int odId) {
+        if (stream.fileName.empty()) return {};
+        auto ok = loadNamed(stream);
+        if (!ok) return tl::unexpected(ok.error().at(fmt::format("object descriptor {}", odId)));
+        return {};
+    }
+
+  private:
+    Result<void> loadNamed(ElementaryStream& stream) {
+        if (const auto hash = stream.fileName.rfind('#'); hash != std::string::npos)
+            return loadTrack(stream, stream.fileName.substr(0, hash),
+                             stream.fileName.substr(hash + 1));
+        const auto names = sampleFileNames(stream);
+        if (names.empty() || names.size() != stream.samples.size())
+            return fail(ErrorCode::invalidInput, "'{}' is no name of {} file(s)",
+                        excerpt(stream.fileName), stream.samples.size());
+        for (std::size_t i = 0; i < names.size(); ++i) {
+            STX_TRY(const auto path, resolveInside(folder_, names[i], job_.limits));
+            STX_TRY(stream.samples[i].data, open(path));
+        }
+        if (stream.samples.empty()) return {};
+        ByteRange head = stream.samples[0].data;
+        head.size = std::min<std::uint64_t>(head.size, 16);
+        STX_TRY(const auto bytes, head.load(job_.limits));
+        if (stream.objectTypeIndication == 0) stream.objectTypeIndication = typeOf(bytes);
+        if (stream.streamType == StreamType::none) stream.streamType = StreamType::visual;
+        return {};
+    }
+    Result<ByteRange> open(const std::filesystem::path& path) {
+        if (!many_) {
+            STX_TRY(auto source, ByteSource::open(path));
+            const auto size = source.size();
+            return ByteRange(std::move(source), 0, size);
+        }
+        STX_TRY(auto bytes, readFile(path, job_.limits));
+        total_ += bytes.size();
+        STX_CHECK(job_.limits.checkAllocation(total_, 1, "the images"));
+        return ByteRange::of(std::move(bytes));
+    }
+    Result<void> loadTrack(ElementaryStream& stream, const std::string& file,
+                           const std::string& track) {
+        const auto id = integerFromText(track);
+        if (!id || *id < 1)
+            return fail(ErrorCode::invalidInput, "'{}' names no track; expected FILE.mp4#NUMBER",
+                        excerpt(stream.fileName));
+        STX_TRY(const auto path, resolveInside(folder_, file, job_.limits));
+        STX_TRY(const auto source, ByteSource::open(path));
+        STX_TRY(const auto other, readMp4(source, job_));
+        const ElementaryStream* found = nullptr;
+        for (const ObjectDescriptor* od : other.objectDescriptors())
+            for (const ElementaryStream& candidate : od->streams)
+                if (candidate.esId == static_cast<std::uint32_t>(*id)) found = &candidate;
+        if (!found) return fail(ErrorCode::invalidInput, "'{}' has no media track {}", file, *id);
+        stream.samples = found->samples;
+        stream.timescale = found->timescale;
+        stream.width = found->width;
+        stream.height = found->height;
+        return {};
+    }
+
+    const std::filesystem::path& folder_;
+    bool many_;
+    Job& job_;
+    std::uint64_t total_ = 0;
+};
+
+}  // namespace
+
+Result<void> loadMedia(Document& document, const std::filesystem::path& folder, Job& job) {
+    std::size_t files = 0;
+    STX_CHECK(forEachStream(document, [&](ElementaryStream& stream, int) -> Result<void> {
+        files += stream.samples.size();
+        return {};
+    }));
+    MediaLoader loader(folder, files > kMostOpen, job);
+    return forEachStream(
+        document, [&](ElementaryStream& stream, int odId) { return loader.load(stream, odId); });
+}
+
+std::vector<std::string> mediaFileNames(const Document& document) {
+    std::vector<std::string> names;
+    std::set<std::string> taken;
+    const auto roles = rolesOf(document);
+    const auto added =
+        forEachStream(document, [&](const ElementaryStream& stream, int odId) -> Result<void> {
+            if (stream.samples.empty()) {
+                names.emplace_back();
+                return {};
+            }
+            // Another tool's handler name: "*color.jpg@TOOL-VERSION".
+            std::string name = stream.fileName.substr(0, stream.fileName.find('@'));
+            if (!name.empty() && name[0] == '*') name.erase(0, 1);
+            if (const auto slash = name.find_last_of("/\\"); slash != std::string::npos)
+                name.erase(0, slash + 1);
+            if (const auto percent = name.find('%'); percent != std::string::npos)
+                name = name.substr(0, percent) +
+                       name.substr(std::min(name.size(), name.find('.', percent)));
+            const std::string_view ending = endingOf(stream);
+            const auto dot = name.rfind('.');
+            const std::string_view own =
+                dot == std::string::npos ? "" : std::string_view(name).substr(dot);
+            const bool fits = equalNoCase(own, ending) ||
+                              (ending == ".jpg" && equalNoCase(own, ".jpeg")) ||
+                              (ending == ".bin" && !own.empty());
+            if (!isPlainFileName(name) || !fits) {
+                const auto role = roles.find(odId);
+                name = (role != roles.end() ? role->second : fmt::format("od{}", odId)) +
+                       std::string(ending);
+            }
+            const auto end = name.rfind('.');
+            const std::string stem = name.substr(0, end), tail = name.substr(end);
+            // Some file systems take A.png and a.png for one.
+            const auto key = [](std::string text) {
+                for (char& c : text)
+                    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+                return text;
+            };
+            for (int n = 1; !taken.insert(key(name)).second; ++n)
+                name = fmt::format("{}_od{}{}{}", stem, odId, n > 1 ? fmt::format("_{}", n) : "",
+                                   tail);
+            if (stream.samples.size() > 1) {
+                const auto at = name.rfind('.');
+                name.insert(at, "_%04d");
+            }
+            names.push_back(name);
+            return {};
+        });
+    (void)added;  // the body never fails
+    return names;
+}
+
+}  // namespace stx::mpeg4

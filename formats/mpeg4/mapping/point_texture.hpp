@@ -1,0 +1,30 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "formats/mpeg4/scene/scene.hpp"
+#include "lib/model/reference_view.hpp"
+
+/// PointTexture and PointTextureV2 (ISO/IEC 14496-16, 4.5.4): pixels from the lower left corner,
+/// left to right and then up; for each a count and as many depth codes of depthNbBits+1 bits; one
+/// colour (and normal, splatU, splatV) for each depth, in the same order.
+namespace stx::mpeg4 {
+
+/// The layers of a PointTexture: layer k holds the k-th depth of every pixel that has so many.
+/// `view` gives camera (its size is set here), planes and name; layers after the first are named
+/// name_1, ... Depths of 0 are no points. Colours are sRGB. A node without any depth gives one
+/// empty layer. Errors: sizes, bits, counts or lists that do not fit each other.
+[[nodiscard]] Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
+                                                                       const ReferenceView& view,
+                                                                       const Limits& limits);
+
+/// Whether a view can be a further layer of one: camera and planes are the same.
+[[nodiscard]] bool isLayerOf(const ReferenceView& view, const ReferenceView& first);
+
+/// A PointTexture (or V2, which has normals and splats in scene units) of layers that isLayerOf()
+/// holds for; codes of `bits` (8 or 16) with the planes of `code`. Coverage has no place in it.
+[[nodiscard]] NodePtr pointTextureFromViews(std::span<const ReferenceView* const> layers,
+                                            const DepthCode& code, int bits, bool v2);
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,105 @@
+#include "formats/mpeg4/mapping/view_notes.hpp"
+
+#include <cmath>
+
+#include "formats/mpeg4/text/text_values.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// The words of a string, at most `most`; the last holds all the rest.
+std::vector<std::string_view> words(std::string_view text, std::size_t most) {
+    std::vector<std::string_view> list;
+    while (!text.empty() && list.size() + 1 < most) {
+        const auto end = text.find(' ');
+        list.push_back(text.substr(0, end));
+        text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    }
+    if (!text.empty()) list.push_back(text);
+    return list;
+}
+
+template <class T>
+Image<T> cropped(const Image<T>& image, int left, int top, int width, int height) {
+    if (image.empty()) return image;
+    Image<T> out(width, height);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) out.at(x, y) = image.at(x + left, y + top);
+    return out;
+}
+
+}  // namespace
+
+ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
+    ViewNotes notes;
+    for (const std::string& line : info) {
+        if (line.starts_with("bounds ")) {
+            const auto w = words(line, 8);
+            glm::dvec3 corners[2];
+            bool good = w.size() == 7;
+            for (int i = 0; good && i < 6; ++i) {
+                const auto value = doubleFromText(w[static_cast<std::size_t>(i) + 1]);
+                good = value && std::isfinite(*value);
+                if (good) corners[i / 3][i % 3] = *value;
+            }
+            if (!good) continue;
+            Bounds bounds;
+            bounds.add(corners[0]);
+            bounds.add(corners[1]);
+            notes.bounds = bounds;
+        } else if (line.starts_with("name ")) {
+            const auto w = words(line, 3);
+            if (w.size() == 3) notes.names[std::string(w[1])] = w[2];
+        } else if (line.starts_with("padding ")) {
+            const auto w = words(line, 9);
+            if (w.size() != 8) continue;
+            Pad pad;
+            int* const sides[] = {&pad.left, &pad.top, &pad.right, &pad.bottom};
+            bool good = true;
+            for (std::size_t i = 0; i < 4; ++i) {
+                const auto value = integerFromText(w[i + 2]);
+                good = good && value && *value >= 0 && *value <= 1 << 20;
+                if (good) *sides[i] = static_cast<int>(*value);
+            }
+            const auto cx = doubleFromText(w[6]), cy = doubleFromText(w[7]);
+            if (!good || !cx || !cy) continue;
+            pad.cx = *cx;
+            pad.cy = *cy;
+            notes.paddings[std::string(w[1])] = pad;
+        }
+    }
+    return notes;
+}
+
+std::vector<std::string> ViewNotes::text() const {
+    std::vector<std::string> info;
+    if (bounds && !bounds->empty())
+        info.push_back(fmt::format("bounds {} {} {} {} {} {}", bounds->min.x, bounds->min.y,
+                                   bounds->min.z, bounds->max.x, bounds->max.y, bounds->max.z));
+    for (const auto& [defName, own] : names)
+        info.push_back(fmt::format("name {} {}", defName, own));
+    for (const auto& [defName, pad] : paddings)
+        info.push_back(fmt::format("padding {} {} {} {} {} {} {}", defName, pad.left, pad.top,
+                                   pad.right, pad.bottom, pad.cx, pad.cy));
+    return info;
+}
+
+void removePadding(ReferenceView& view, const ViewNotes::Pad& pad) {
+    Camera& c = view.camera;
+    const int width = c.width - pad.left - pad.right, height = c.height - pad.top - pad.bottom;
+    if (width < 1 || height < 1 || !(std::abs(pad.cx + pad.left - c.cx) <= 0.5 + 1e-6) ||
+        !(std::abs(pad.cy + pad.top - c.cy) <= 0.5 + 1e-6))
+        return;
+    view.depth = cropped(view.depth, pad.left, pad.top, width, height);
+    if (const Rgba8Image* image = view.texture.rgba8())
+        view.texture = cropped(*image, pad.left, pad.top, width, height);
+    view.normal = cropped(view.normal, pad.left, pad.top, width, height);
+    view.splatU = cropped(view.splatU, pad.left, pad.top, width, height);
+    view.splatV = cropped(view.splatV, pad.left, pad.top, width, height);
+    c.width = width;
+    c.height = height;
+    c.cx = pad.cx;
+    c.cy = pad.cy;
+}
+
+}  // namespace stx::mpeg4

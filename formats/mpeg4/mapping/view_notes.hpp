@@ -1,0 +1,38 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/mpeg4/scene/placement.hpp"
+#include "lib/geometry/bounds.hpp"
+
+/// What our scenes say in WorldInfo.info beyond the nodes' fields, so that a bundle comes back
+/// whole:
+///     "bounds minX minY minZ maxX maxY maxZ"
+///     "name DEFNAME the view's own name"
+///     "padding DEFNAME left top right bottom cx cy"   (pixels; the principal point without
+///     padding)
+/// Other strings are left alone.
+namespace stx::mpeg4 {
+
+struct ViewNotes {
+    std::optional<Bounds> bounds;
+    std::map<std::string, std::string> names;  ///< by DEF name
+    struct Pad {
+        int left = 0, top = 0, right = 0, bottom = 0;
+        double cx = 0, cy = 0;
+    };
+    std::map<std::string, Pad> paddings;  ///< by DEF name
+
+    /// Strings that are not ours, or do not parse, are passed over.
+    [[nodiscard]] static ViewNotes parse(const std::vector<std::string>& info);
+    [[nodiscard]] std::vector<std::string> text() const;
+};
+
+/// Takes the padding off a view again: images are cropped, the principal point goes back to where
+/// it was. Does nothing when the padding does not fit the view.
+void removePadding(ReferenceView& view, const ViewNotes::Pad& pad);
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,224 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "formats/mpeg4/container/byte_source.hpp"
+#include "formats/mpeg4/scene/scene.hpp"
+
+/// A whole MPEG-4 presentation in memory: what an .mp4, .bt or .xmt file says. The readers of all
+/// three make a Document, the writers of all three take one:
+///
+///     isobmff.hpp   Result<Document> readMp4(ByteSource, Job&);   writeMp4(document, OutputFile&,
+///     Job&) bifs.hpp      decodeBifs / encodeBifs      one access unit <-> commands
+///     descriptors.hpp   decodeObjectDescriptors / encode...        OD access units, IOD
+///
+/// An image is reached thus: ImageTexture.url -> Url::objectDescriptorId -> findObjectDescriptor ->
+/// streams[0] -> samples[0].data.load(limits): a whole JPEG or PNG file.
+namespace stx::mpeg4 {
+
+/// objectTypeIndication (ISO/IEC 14496-1 table 5) of the streams we know.
+namespace oti {
+inline constexpr std::uint8_t kSystemsV1 = 0x01;  ///< BIFS with a v1 config, and OD streams
+inline constexpr std::uint8_t kSystemsV2 = 0x02;  ///< BIFS with a v2 config
+inline constexpr std::uint8_t kJpeg = 0x6C;
+inline constexpr std::uint8_t kPng = 0x6D;
+}  // namespace oti
+
+/// streamType (ISO/IEC 14496-1 table 6).
+enum class StreamType : std::uint8_t {
+    none = 0x00,
+    objectDescriptor = 0x01,
+    clockReference = 0x02,
+    sceneDescription = 0x03,
+    visual = 0x04,
+    audio = 0x05,
+    mpeg7 = 0x06,
+    ipmp = 0x07,
+    objectContentInfo = 0x08,
+    mpegJ = 0x09,
+    interaction = 0x0A,
+};
+
+/// The decoder config of a BIFS stream (bifs.md 4.1).
+struct BifsConfig {
+    int version = 1;               ///< 1, or 2 (OTI 2)
+    bool use3DMeshCoding = false;  ///< v2
+    bool usePredictiveMFField =
+        false;           ///< v2: a flag before each MF field; coding itself is refused
+    int nodeIdBits = 0;  ///< 0..31; writers raise these to what the scene needs
+    int routeIdBits = 0;
+    int protoIdBits = 0;  ///< v2
+    bool isCommandStream = true;
+    bool pixelMetric = false;  ///< false: metres
+    bool hasSize = false;
+    int pixelWidth = 0;  ///< 0..65535
+    int pixelHeight = 0;
+    bool operator==(const BifsConfig&) const = default;
+};
+
+/// One access unit of a media stream.
+struct Sample {
+    ByteRange data;
+    std::uint64_t time = 0;         ///< decoding time in the stream's timescale
+    std::uint32_t duration = 1000;  ///< one second at the usual timescale
+    std::int32_t compositionOffset = 0;
+    bool sync = true;
+};
+
+/// An ES_Descriptor and the stream it describes.
+struct ElementaryStream {
+    std::uint32_t esId = 0;  ///< ES_ID of the text forms = track_ID in the file; 0: writers choose
+    std::string url;         ///< ES URL: a remote stream; then there are no samples
+    std::optional<std::uint16_t> dependsOnEsId;
+    std::optional<std::uint16_t> ocrEsId;
+    std::uint8_t streamPriority = 0;  ///< 0..31
+
+    std::uint8_t objectTypeIndication = 0;  ///< 0: not known (no DecoderConfigDescriptor)
+    StreamType streamType = StreamType::none;
+    bool upStream = false;
+    std::uint32_t bufferSizeDB = 0;  ///< bytes; 0: writers take the largest sample
+    std::uint32_t maxBitrate = 0;
+    std::uint32_t avgBitrate = 0;
+    Bytes decoderSpecificInfo;  ///< JPEG: 7 bytes, which the writer makes when they are missing
+
+    std::uint32_t timescale = 1000;  ///< ticks a second, at least 1
+    std::vector<Sample> samples;
+    int width =
+        0;  ///< of a visual track as its sample entry says; 0: the writer looks into the image
+    int height = 0;
+    /// The name of the file that the stream came from or goes to: MuxInfo.fileName, StreamSource
+    /// url, or the track's handler name. Never opened by readMp4 or writeMp4.
+    std::string fileName;
+};
+
+struct ObjectDescriptor {
+    int id = 0;       ///< 1..1022
+    std::string url;  ///< remote descriptor; then there are no streams
+    std::vector<ElementaryStream> streams;
+};
+
+/// OD commands (ISO/IEC 14496-1 7.2.5).
+struct UpdateObjectDescriptors {
+    std::vector<ObjectDescriptor> descriptors;
+};
+struct RemoveObjectDescriptors {
+    std::vector<int> ids;
+};
+struct UpdateStreams {  ///< ES_DescriptorUpdate
+    int objectDescriptorId = 0;
+    std::vector<ElementaryStream> streams;
+};
+struct RemoveStreams {  ///< ES_DescriptorRemove
+    int objectDescriptorId = 0;
+    std::vector<std::uint32_t> esIds;
+};
+/// IPMP and unknown commands: passed over by readers of the scene, kept for writing back.
+struct OtherOdCommand {
+    std::uint8_t tag = 0;
+    Bytes body;
+};
+using OdCommand = std::variant<UpdateObjectDescriptors, RemoveObjectDescriptors, UpdateStreams,
+                               RemoveStreams, OtherOdCommand>;
+struct OdFrame {
+    std::uint64_t time = 0;  ///< in odStream.timescale
+    std::vector<OdCommand> commands;
+};
+
+struct InitialObjectDescriptor {
+    int id = 1;
+    bool includeInlineProfileLevel = false;
+    std::string url;
+    std::uint8_t odProfileLevel = 0x01;
+    std::uint8_t sceneProfileLevel = 0xFE;  ///< 0xFE: none specified, 0xFF: none required
+    std::uint8_t audioProfileLevel = 0xFE;
+    std::uint8_t visualProfileLevel = 0xFE;
+    std::uint8_t graphicsProfileLevel = 0xFE;
+};
+
+/// A track as it stands in an .mp4, for `info` and `validate`.
+struct TrackFacts {
+    std::uint32_t trackId = 0;
+    std::string handler;      ///< four characters: sdsm, odsm, vide, ...
+    std::string sampleEntry;  ///< four characters: mp4s, mp4v, ...
+    std::string handlerName;
+    std::uint8_t objectTypeIndication = 0;
+    std::uint8_t streamType = 0;
+    std::size_t sampleCount = 0;
+    std::uint64_t bytes = 0;
+    bool inIods = false;
+    bool referenced = false;  ///< from an OD
+    std::uint32_t esIdInEsds = 0;
+};
+
+/// What a file departs in from what strict readers take; nothing here kept us from reading it.
+struct Mp4Departure {
+    enum class Kind {
+        noIods,  ///< no IOD: many readers find no scene then
+        sceneNotInIods,
+        imageInSystemsEntry,  ///< mp4s where mp4v is expected
+        imageInNativeEntry,   ///< 'jpeg'/'png ' without esds
+        fullEsdInOd,          ///< ES_Descriptor where the file form has ES_ID_Ref
+        mpodMissing,          ///< ES_ID_Ref that tref/mpod does not resolve
+        streamNotFound,       ///< a descriptor names a track that is not there
+        streamOdTag,          ///< tag 0x01 or 0x02 where the file form is 0x11 or 0x10
+        noOdTrack,
+        esIdNotZero,
+        trailingBytes,  ///< after the last command of an access unit
+        other,
+    };
+    Kind kind = Kind::other;
+    std::string text;   ///< a sentence
+    std::string where;  ///< box path and byte offset
+};
+
+/// Departures beyond these are not told.
+inline constexpr std::size_t kMaxDepartures = 1000;
+
+struct Mp4Facts {
+    std::string majorBrand;  ///< four characters; empty when there is no ftyp
+    std::vector<std::string> brands;
+    std::uint64_t fileSize = 0;
+    bool moovFirst = true;
+    bool hasIods = false;
+    std::uint32_t movieTimescale = 600;
+    std::uint64_t movieDuration = 0;
+    std::vector<TrackFacts> tracks;
+    std::vector<Mp4Departure> departures;
+};
+
+/// A presentation.
+struct Document {
+    InitialObjectDescriptor iod;
+
+    /// The scene: its stream's descriptor, config and commands. readMp4 leaves the access units as
+    /// they stand in the file in `samples`; writers take `frames` and look at nothing else.
+    ElementaryStream sceneStream;
+    BifsConfig bifsConfig;
+    std::vector<CommandFrame> frames;
+
+    /// The object descriptor stream, likewise.
+    ElementaryStream odStream;
+    std::vector<OdFrame> odFrames;
+
+    /// How the file looked, when it was an .mp4.
+    std::optional<Mp4Facts> mp4;
+
+    /// All object descriptors as they stand after the frames with time <= `until` (ticks of the OD
+    /// stream): updates replace, removals remove. In order of their ids. Pointers into this
+    /// document.
+    [[nodiscard]] std::vector<const ObjectDescriptor*> objectDescriptors(
+        std::uint64_t until = ~std::uint64_t{0}) const;
+    /// One of them, null when there is none of that id.
+    [[nodiscard]] const ObjectDescriptor* findObjectDescriptor(int id) const;
+};
+
+}  // namespace stx::mpeg4
+
+namespace stx {
+using Mpeg4Document = mpeg4::Document;
+}  // namespace stx

@@ -1,0 +1,243 @@
+#include "formats/mpeg4/scene/node_table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <unordered_map>
+
+#include "formats/mpeg4/scene/node_rows.hpp"
+#include "formats/mpeg4/text/text_values.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+constexpr std::array<std::string_view, 22> kTypeNames = {
+    "SFBool",  "SFInt32",    "SFFloat", "SFTime",  "SFString",   "SFURL",   "SFVec2f", "SFVec3f",
+    "SFColor", "SFRotation", "SFImage", "SFNode",  "MFInt32",    "MFFloat", "MFTime",  "MFString",
+    "MFURL",   "MFVec2f",    "MFVec3f", "MFColor", "MFRotation", "MFNode"};
+
+constexpr std::array<std::string_view, 23> kNdtNames = {"none",
+                                                        "SFWorldNode",
+                                                        "SF3DNode",
+                                                        "SF2DNode",
+                                                        "SFTopNode",
+                                                        "SFTextureNode",
+                                                        "SFDepthImageNode",
+                                                        "SFDepthTextureNode",
+                                                        "SFNormalNode",
+                                                        "SFAppearanceNode",
+                                                        "SFGeometryNode",
+                                                        "SFMaterialNode",
+                                                        "SFTextureTransformNode",
+                                                        "SFViewpointNode",
+                                                        "SFNavigationInfoNode",
+                                                        "SFBackground3DNode",
+                                                        "SFStreamingNode",
+                                                        "SFColorNode",
+                                                        "SFCoordinateNode",
+                                                        "SFTextureCoordinateNode",
+                                                        "SFFogNode",
+                                                        "SFBackground2DNode",
+                                                        "SFViewportNode"};
+
+// Bits of the codes in versions 1 to 10 of each table. They follow from the highest code of the
+// standard's tables, of which ours hold only a part.
+constexpr std::array<std::array<std::uint8_t, kNdtVersions>, 21> kCodeBits = {{
+    {},                              // none
+    {7, 4, 2, 3, 6, 4, 4, 2, 3, 3},  // SFWorldNode
+    {6, 3, 2, 3, 5, 3, 3, 1, 3, 3},  // SF3DNode
+    {5, 2, 2, 3, 4, 3, 2, 1, 0, 3},  // SF2DNode
+    {3, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFTopNode
+    {3, 1, 0, 1, 1, 2, 1, 0, 0, 1},  // SFTextureNode
+    {0, 1, 0, 0, 1, 0, 1, 0, 0, 0},  // SFDepthImageNode
+    {0, 1, 0, 0, 2, 0, 2, 0, 0, 0},  // SFDepthTextureNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFNormalNode
+    {1, 1, 0, 0, 1, 0, 0, 0, 0, 0},  // SFAppearanceNode
+    {5, 2, 0, 0, 4, 2, 0, 0, 3, 0},  // SFGeometryNode
+    {2, 2, 0, 0, 0, 0, 0, 0, 0, 0},  // SFMaterialNode
+    {1, 1, 0, 0, 0, 1, 0, 0, 0, 0},  // SFTextureTransformNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFViewpointNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFNavigationInfoNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFBackground3DNode
+    {3, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFStreamingNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFColorNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFCoordinateNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFTextureCoordinateNode
+    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFFogNode
+}};
+
+int idBits(std::size_t count) {
+    return count < 2 ? 0 : static_cast<int>(std::bit_width(count - 1));
+}
+
+NodeInfo makeNodeInfo(const NodeRow& row) {
+    NodeInfo node;
+    node.name = row.name;
+    node.codes = row.codes;
+    int dynamicFields = 0;
+    for (const FieldRow& fieldRow : row.fields) {
+        FieldInfo info = fieldRow.info;
+        info.index = static_cast<int>(node.fields.size());
+        const bool exposedField = info.kind == FieldKind::exposedField;
+        if (exposedField || info.kind == FieldKind::field) {
+            info.defId = static_cast<int>(node.defFields.size());
+            node.defFields.push_back(info.index);
+        }
+        if (exposedField || info.kind == FieldKind::eventIn) {
+            info.inId = static_cast<int>(node.inFields.size());
+            node.inFields.push_back(info.index);
+            if (info.isDynamic) info.dynId = dynamicFields++;
+        }
+        if (exposedField || info.kind == FieldKind::eventOut) {
+            info.outId = static_cast<int>(node.outFields.size());
+            node.outFields.push_back(info.index);
+        }
+        node.fields.push_back(std::move(info));
+    }
+    node.defBits = idBits(node.defFields.size());
+    node.inBits = idBits(node.inFields.size());
+    node.outBits = idBits(node.outFields.size());
+    return node;
+}
+
+std::uint32_t codeKey(Ndt type, int version, int code) {
+    return static_cast<std::uint32_t>(type) << 16 | static_cast<std::uint32_t>(version) << 8 |
+           static_cast<std::uint32_t>(code);
+}
+
+struct Tables {
+    std::vector<NodeInfo> nodes;
+    std::unordered_map<std::string_view, const NodeInfo*> byName;
+    std::unordered_map<std::uint32_t, const NodeInfo*> byCode;
+
+    Tables() {
+        for (const NodeRow& row : makeNodeRows()) nodes.push_back(makeNodeInfo(row));
+        for (const NodeInfo& info : nodes) {
+            byName.emplace(info.name, &info);
+            for (const NodeCode& code : info.codes)
+                byCode.emplace(codeKey(code.type, code.version, code.code), &info);
+        }
+    }
+};
+
+const Tables& tables() {
+    static const Tables instance;
+    return instance;
+}
+
+}  // namespace
+
+std::string_view name(FieldType type) {
+    return kTypeNames[static_cast<std::size_t>(type)];
+}
+std::string_view name(Ndt type) {
+    return kNdtNames[static_cast<std::size_t>(type)];
+}
+std::string_view name(FieldKind kind) {
+    constexpr std::array<std::string_view, 4> kNames = {"field", "exposedField", "eventIn",
+                                                        "eventOut"};
+    return kNames[static_cast<std::size_t>(kind)];
+}
+
+bool isMultiple(FieldType type) {
+    return type >= FieldType::MFInt32;
+}
+
+FieldType itemType(FieldType type) {
+    using enum FieldType;
+    switch (type) {
+        case MFInt32:
+            return SFInt32;
+        case MFFloat:
+            return SFFloat;
+        case MFTime:
+            return SFTime;
+        case MFString:
+            return SFString;
+        case MFURL:
+            return SFURL;
+        case MFVec2f:
+            return SFVec2f;
+        case MFVec3f:
+            return SFVec3f;
+        case MFColor:
+            return SFColor;
+        case MFRotation:
+            return SFRotation;
+        case MFNode:
+            return SFNode;
+        default:
+            return type;
+    }
+}
+
+FieldType listType(FieldType type) {
+    using enum FieldType;
+    switch (type) {
+        case SFInt32:
+            return MFInt32;
+        case SFFloat:
+            return MFFloat;
+        case SFTime:
+            return MFTime;
+        case SFString:
+            return MFString;
+        case SFURL:
+            return MFURL;
+        case SFVec2f:
+            return MFVec2f;
+        case SFVec3f:
+            return MFVec3f;
+        case SFColor:
+            return MFColor;
+        case SFRotation:
+            return MFRotation;
+        case SFNode:
+            return MFNode;
+        default:
+            return type;
+    }
+}
+
+std::optional<int> codeBits(Ndt type, int version) {
+    const auto row = static_cast<std::size_t>(type);
+    if (row == 0 || row >= kCodeBits.size() || version < 1 || version > kNdtVersions) return {};
+    return kCodeBits[row][static_cast<std::size_t>(version - 1)];
+}
+
+int NodeInfo::find(std::string_view fieldName) const {
+    for (const FieldInfo& info : fields)
+        if (info.name == fieldName) return info.index;
+    return -1;
+}
+
+int NodeInfo::findIgnoringCase(std::string_view fieldName) const {
+    if (const int exact = find(fieldName); exact >= 0) return exact;
+    for (const FieldInfo& info : fields)
+        if (equalNoCase(info.name, fieldName)) return info.index;
+    return -1;
+}
+
+const NodeCode* NodeInfo::codeIn(Ndt type) const {
+    for (const NodeCode& code : codes)
+        if (code.type == type) return &code;
+    return nullptr;
+}
+
+std::span<const NodeInfo> allNodes() {
+    return tables().nodes;
+}
+
+const NodeInfo* findNode(std::string_view name) {
+    const auto found = tables().byName.find(name);
+    return found == tables().byName.end() ? nullptr : found->second;
+}
+
+const NodeInfo* findNode(Ndt type, int version, int code) {
+    if (code < 1 || code > 255) return nullptr;
+    const auto found = tables().byCode.find(codeKey(type, version, code));
+    return found == tables().byCode.end() ? nullptr : found->second;
+}
+
+}  // namespace stx::mpeg4

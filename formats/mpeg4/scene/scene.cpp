@@ -1,0 +1,194 @@
+#include "formats/mpeg4/scene/scene.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <charconv>
+#include <unordered_map>
+
+namespace stx::mpeg4 {
+namespace {
+
+/// The numbers and quoted strings of a default in the table.
+std::vector<std::string> tokens(std::string_view text) {
+    std::vector<std::string> out;
+    std::size_t i = 0;
+    while (i < text.size()) {
+        const char c = text[i];
+        if (c == ' ' || c == ',' || c == '[' || c == ']') {
+            ++i;
+        } else if (c == '"') {
+            const std::size_t end = text.find('"', i + 1);
+            out.emplace_back(text.substr(i + 1, end - i - 1));
+            i = end + 1;
+        } else {
+            const std::size_t end = std::min(text.find_first_of(" ,]", i), text.size());
+            out.emplace_back(text.substr(i, end - i));
+            i = end;
+        }
+    }
+    return out;
+}
+
+template <class T>
+T number(std::string_view text) {
+    if constexpr (std::is_same_v<T, float>) {
+        if (text == "+I") return std::numeric_limits<float>::max();
+        if (text == "-I") return -std::numeric_limits<float>::max();
+    }
+    T value{};
+    [[maybe_unused]] const auto parsed =
+        std::from_chars(text.data(), text.data() + text.size(), value);
+    assert(parsed.ec == std::errc{});
+    return value;
+}
+
+FieldValue parseDefault(const FieldInfo& info) {
+    using enum FieldType;
+    const std::vector<std::string> t = tokens(info.defaultText);
+    if (t.empty() || t[0] == "NULL") return emptyValue(info.type);
+    const auto f = [&](std::size_t i) { return number<float>(t.at(i)); };
+    switch (info.type) {
+        case SFBool:
+            return t[0] == "TRUE";
+        case SFInt32:
+            return number<std::int32_t>(t[0]);
+        case SFFloat:
+            return f(0);
+        case SFTime:
+            return number<double>(t[0]);
+        case SFString:
+            return t[0];
+        case SFVec2f:
+            return glm::vec2(f(0), f(1));
+        case SFVec3f:
+            return glm::vec3(f(0), f(1), f(2));
+        case SFColor:
+            return Color{f(0), f(1), f(2)};
+        case SFRotation:
+            return Rotation{{f(0), f(1), f(2)}, f(3)};
+        case MFFloat: {
+            std::vector<float> values;
+            for (const std::string& token : t) values.push_back(number<float>(token));
+            return values;
+        }
+        case MFString:
+            return t;
+        case MFColor: {
+            std::vector<Color> values;
+            for (std::size_t i = 0; i + 2 < t.size(); i += 3)
+                values.push_back({f(i), f(i + 1), f(i + 2)});
+            return values;
+        }
+        default:
+            return emptyValue(info.type);
+    }
+}
+
+template <std::size_t... I>
+FieldValue makeEmpty(std::size_t index, std::index_sequence<I...>) {
+    FieldValue value;
+    ((index == I ? static_cast<void>(value.emplace<I>()) : static_cast<void>(0)), ...);
+    return value;
+}
+
+}  // namespace
+
+FieldValue emptyValue(FieldType type) {
+    return makeEmpty(static_cast<std::size_t>(type),
+                     std::make_index_sequence<std::variant_size_v<FieldValue>>{});
+}
+
+const FieldValue& defaultValue(const NodeInfo& node, int fieldIndex) {
+    static const auto* const defaults = [] {
+        auto* all = new std::unordered_map<const NodeInfo*, std::vector<FieldValue>>;
+        for (const NodeInfo& info : allNodes()) {
+            std::vector<FieldValue>& values = (*all)[&info];
+            for (const FieldInfo& field : info.fields) values.push_back(parseDefault(field));
+        }
+        return all;
+    }();
+    return defaults->at(&node).at(static_cast<std::size_t>(fieldIndex));
+}
+
+std::size_t itemCount(const FieldValue& value) {
+    return std::visit(
+        [](const auto& v) -> std::size_t {
+            if constexpr (kIsList<std::decay_t<decltype(v)>>)
+                return v.size();
+            else
+                return 1;
+        },
+        value);
+}
+
+Node::~Node() {
+    // Children are handed to a list of the outermost destructor, which lets them go one by one.
+    thread_local std::vector<NodePtr>* pending = nullptr;
+    std::vector<NodePtr> mine;
+    const bool outermost = pending == nullptr;
+    if (outermost) pending = &mine;
+    for (SetField& field : setFields) {
+        if (NodePtr* child = std::get_if<NodePtr>(&field.value); child && *child)
+            pending->push_back(std::move(*child));
+        if (NodeList* list = std::get_if<NodeList>(&field.value))
+            for (NodePtr& child : *list)
+                if (child) pending->push_back(std::move(child));
+    }
+    if (!outermost) return;
+    while (!mine.empty()) {
+        const NodePtr next = std::move(mine.back());
+        mine.pop_back();
+    }
+    pending = nullptr;
+}
+
+const Node::SetField* Node::findSet(int fieldIndex) const {
+    const auto at = std::lower_bound(setFields.begin(), setFields.end(), fieldIndex,
+                                     [](const SetField& s, int i) { return s.index < i; });
+    return at != setFields.end() && at->index == fieldIndex ? &*at : nullptr;
+}
+
+const FieldValue& Node::value(int fieldIndex) const {
+    if (const SetField* found = findSet(fieldIndex)) return found->value;
+    return defaultValue(*info, fieldIndex);
+}
+
+bool Node::set(int fieldIndex, FieldValue newValue) {
+    if (fieldIndex < 0 || fieldIndex >= static_cast<int>(info->fields.size())) return false;
+    const FieldInfo& field = info->fields[static_cast<std::size_t>(fieldIndex)];
+    if (!field.hasValue() || field.type != typeOf(newValue)) return false;
+    const auto at = std::lower_bound(setFields.begin(), setFields.end(), fieldIndex,
+                                     [](const SetField& s, int i) { return s.index < i; });
+    if (at != setFields.end() && at->index == fieldIndex)
+        at->value = std::move(newValue);
+    else
+        setFields.insert(at, SetField{fieldIndex, std::move(newValue)});
+    return true;
+}
+
+FieldValue& Node::edit(int fieldIndex) {
+    if (findSet(fieldIndex) == nullptr) {
+        [[maybe_unused]] const bool done = set(fieldIndex, defaultValue(*info, fieldIndex));
+        assert(done);
+    }
+    return const_cast<SetField*>(findSet(fieldIndex))->value;
+}
+
+void Node::clear(int fieldIndex) {
+    std::erase_if(setFields, [&](const SetField& s) { return s.index == fieldIndex; });
+}
+
+NodePtr makeNode(const NodeInfo& type) {
+    return std::make_shared<Node>(type);
+}
+
+NodePtr makeNode(std::string_view typeName) {
+    const NodeInfo* info = findNode(typeName);
+    return info == nullptr ? nullptr : makeNode(*info);
+}
+
+bool mayStandIn(const Node* node, Ndt expected) {
+    return node == nullptr || node->info->codeIn(expected) != nullptr;
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,283 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "formats/mpeg4/scene/node_table.hpp"
+#include "lib/base/job.hpp"
+
+/// The MPEG-4 scene graph: nodes with typed field values, routes and commands. How to use it:
+///
+///     NodePtr view = makeNode("DepthImage");                     // null only for unknown names
+///     view->set("position", glm::vec3(0, 0, 10));                // types are checked
+///     view->set("diTexture", makeNode("SimpleTexture"));
+///     const glm::vec2 fov = view->get<glm::vec2>("fieldOfView"); // the default when not set
+///     group->edit<NodeList>("children").push_back(view);
+///     view->defName = "VIEW0";                                   // DEF; sharing the NodePtr is
+///     USE
+///
+/// `Document` (document.hpp) holds commands over such nodes with their times, and the streams.
+namespace stx::mpeg4 {
+
+struct Node;
+/// A node, shared by all its USEs; null is NULL. Graphs have no cycles: readers refuse a node that
+/// USEs one it stands in, and who builds scenes must not make one.
+using NodePtr = std::shared_ptr<Node>;
+using NodeList = std::vector<NodePtr>;
+
+/// SFColor: RGB in [0, 1].
+struct Color {
+    float r = 0, g = 0, b = 0;
+    bool operator==(const Color&) const = default;
+};
+
+/// SFRotation: an axis, as written (not necessarily of length 1), and an angle in radians.
+struct Rotation {
+    glm::vec3 axis = {0, 0, 1};
+    float angle = 0;
+    bool operator==(const Rotation&) const = default;
+};
+
+/// SFURL: an object descriptor of the presentation, or a string.
+struct Url {
+    int objectDescriptorId = 0;  ///< 1..1023; 0: `text` holds
+    std::string text;
+    bool operator==(const Url&) const = default;
+};
+
+/// SFImage. Rows in the order of the file; mpeg4 and VRML both put row 0 at the bottom.
+struct PixelImage {
+    int width = 0;                     ///< 0..4095
+    int height = 0;                    ///< 0..4095
+    int components = 1;                ///< 1 grey, 2 grey alpha, 3 RGB, 4 RGBA
+    std::vector<std::uint8_t> pixels;  ///< width*height*components
+    bool operator==(const PixelImage&) const = default;
+};
+
+/// The value of a field; alternatives in the order of FieldType. double is SFTime.
+using FieldValue =
+    std::variant<bool, std::int32_t, float, double, std::string, Url, glm::vec2, glm::vec3, Color,
+                 Rotation, PixelImage, NodePtr, std::vector<std::int32_t>, std::vector<float>,
+                 std::vector<double>, std::vector<std::string>, std::vector<Url>,
+                 std::vector<glm::vec2>, std::vector<glm::vec3>, std::vector<Color>,
+                 std::vector<Rotation>, NodeList>;
+
+/// Whether T is the C++ type of an MF value.
+template <class T>
+inline constexpr bool kIsList = false;
+template <class T>
+inline constexpr bool kIsList<std::vector<T>> = true;
+
+[[nodiscard]] inline FieldType typeOf(const FieldValue& value) {
+    return static_cast<FieldType>(value.index());
+}
+/// A value of a type: FALSE, 0, "", [], NULL.
+[[nodiscard]] FieldValue emptyValue(FieldType type);
+/// The default of a field that has one; emptyValue for events. Lives forever.
+[[nodiscard]] const FieldValue& defaultValue(const NodeInfo& node, int fieldIndex);
+/// Items of an MF value; 1 for an SF value.
+[[nodiscard]] std::size_t itemCount(const FieldValue& value);
+
+/// A node of the scene. Only fields that were set are stored; the others have their defaults.
+struct Node {
+    explicit Node(const NodeInfo& type) : info(&type) {}
+    Node(const Node&) = default;
+    Node& operator=(const Node&) = default;
+    ~Node();  ///< takes no stack for deep graphs
+
+    const NodeInfo* info;
+    /// DEF: the id in BIFS, 1-based; 0 where none was coded. Writers give free ids to nodes that
+    /// need one (a name, several uses, a route or a command that names them): see assignNodeIds.
+    std::uint32_t defId = 0;
+    std::string defName;  ///< DEF name of the text forms and of BIFS with USENAMES; may be empty
+
+    struct SetField {
+        int index;  ///< into info->fields
+        FieldValue value;
+    };
+    std::vector<SetField> setFields;  ///< ascending by index, each once
+
+    [[nodiscard]] bool is(std::string_view typeName) const { return info->name == typeName; }
+
+    /// Whether a value was given, be it the default's.
+    [[nodiscard]] bool isSet(int fieldIndex) const { return findSet(fieldIndex) != nullptr; }
+    [[nodiscard]] bool isSet(std::string_view fieldName) const {
+        return isSet(info->find(fieldName));
+    }
+
+    /// The value, or the default where none was given. The index must be in the table.
+    [[nodiscard]] const FieldValue& value(int fieldIndex) const;
+    [[nodiscard]] const FieldValue& value(std::string_view fieldName) const {
+        return value(info->find(fieldName));
+    }
+    /// The same as a C++ type. A wrong name or type is a mistake of the program (assertion).
+    template <class T>
+    [[nodiscard]] const T& get(std::string_view fieldName) const {
+        return std::get<T>(value(fieldName));
+    }
+
+    /// Sets a field. Returns false, changing nothing, when there is no such field with a value or
+    /// its type is another. `set("farPlane", 3.0f)`: the type must match exactly.
+    bool set(int fieldIndex, FieldValue newValue);
+    bool set(std::string_view fieldName, FieldValue newValue) {
+        return set(info->find(fieldName), std::move(newValue));
+    }
+    /// For changes in place; the default is copied in first where no value was set.
+    [[nodiscard]] FieldValue& edit(int fieldIndex);
+    template <class T>
+    [[nodiscard]] T& edit(std::string_view fieldName) {
+        return std::get<T>(edit(info->find(fieldName)));
+    }
+    /// Back to the default.
+    void clear(int fieldIndex);
+
+  private:
+    [[nodiscard]] const SetField* findSet(int fieldIndex) const;
+};
+
+/// A node of a type; null when the table has none of that name.
+[[nodiscard]] NodePtr makeNode(std::string_view typeName);
+[[nodiscard]] NodePtr makeNode(const NodeInfo& type);
+
+/// Whether `node` may stand in a field that takes `expected` (null may stand in any).
+[[nodiscard]] bool mayStandIn(const Node* node, Ndt expected);
+
+/// ROUTE: from an eventOut (or exposedField) to an eventIn (or exposedField). Fields are indices
+/// into the nodes' info->fields.
+struct Route {
+    std::uint32_t id = 0;  ///< DEF id of the route, 1-based; 0: none
+    std::string name;      ///< DEF name
+    NodePtr from;
+    int fromField = 0;
+    NodePtr to;
+    int toField = 0;
+};
+
+/// Where an item goes or is: an index from 0, or the end.
+struct Position {
+    static constexpr int kLast = -1;
+    int index = kLast;
+    bool operator==(const Position&) const = default;
+};
+
+/// Commands of BIFS-Command (ISO/IEC 14496-11 8.6). Targets are the very nodes they change, as they
+/// were when the command was read: nothing is applied until composeScene() does it.
+struct ReplaceScene {
+    bool useNames = false;  ///< DEF names are coded beside the ids
+    NodePtr root;           ///< an SFTopNode; may be null
+    std::vector<Route> routes;
+};
+struct ReplaceNode {
+    NodePtr target;
+    NodePtr replacement;
+};
+struct ReplaceField {
+    NodePtr target;
+    int field = 0;
+    FieldValue value;
+};
+struct ReplaceIndexed {
+    NodePtr target;
+    int field = 0;  ///< an MF field
+    Position position;
+    FieldValue value;  ///< one item: of the SF type
+};
+struct ReplaceRoute {
+    std::uint32_t routeId = 0;
+    Route route;
+};
+struct InsertNode {
+    NodePtr target;  ///< a grouping node: `node` goes into its `children`
+    Position position;
+    NodePtr node;
+};
+struct InsertIndexed {
+    NodePtr target;
+    int field = 0;
+    Position position;
+    FieldValue value;
+};
+struct InsertRoute {
+    Route route;
+};
+struct DeleteNode {
+    NodePtr target;
+};
+struct DeleteIndexed {
+    NodePtr target;
+    int field = 0;
+    Position position;
+};
+struct DeleteRoute {
+    std::uint32_t routeId = 0;
+};
+using Command =
+    std::variant<ReplaceScene, ReplaceNode, ReplaceField, ReplaceIndexed, ReplaceRoute, InsertNode,
+                 InsertIndexed, InsertRoute, DeleteNode, DeleteIndexed, DeleteRoute>;
+
+/// One access unit of the scene stream: commands that take effect together.
+struct CommandFrame {
+    std::uint64_t time = 0;  ///< in units of the stream's timescale
+    std::vector<Command> commands;
+};
+
+/// A scene at one moment.
+struct Scene {
+    NodePtr root;
+    std::vector<Route> routes;
+    bool useNames = false;
+};
+
+/// Calls `visit` for each node reachable from `root` once, parents before children, in field order.
+void forEachNode(const NodePtr& root, const std::function<void(const NodePtr&)>& visit);
+/// The same for every node in a command: targets, values, both ends of routes.
+void forEachNode(const Command& command, const std::function<void(const NodePtr&)>& visit);
+
+/// What else than types, sharing and values counts in a comparison.
+struct SameOptions {
+    bool ids = true;    ///< DEF ids of nodes and routes
+    bool names = true;  ///< DEF names of nodes and routes
+};
+/// Whether two graphs are the same. Values are compared bit for bit; a field set to its default is
+/// the same as one not set.
+[[nodiscard]] bool sameNode(const NodePtr& a, const NodePtr& b, SameOptions options = {});
+[[nodiscard]] bool sameFrames(const std::vector<CommandFrame>& a,
+                              const std::vector<CommandFrame>& b, SameOptions options = {});
+/// Compares everything but node-valued fields bit for bit.
+[[nodiscard]] bool sameValue(const FieldValue& a, const FieldValue& b);
+
+/// The longest way down from `root` in nodes, 0 for null. Errors (invalidInput) when a node
+/// contains itself.
+[[nodiscard]] Result<int> nestingDepth(const NodePtr& root);
+
+/// A deep copy that shares where the original shares.
+[[nodiscard]] NodePtr cloneNode(const NodePtr& node);
+
+/// The scene after the commands of all frames with time <= `until` on copies of their nodes. Errors
+/// (invalidInput) when a command does not fit the scene it meets: an index out of range, a node
+/// that is not there, or a cycle.
+[[nodiscard]] Result<Scene> composeScene(const std::vector<CommandFrame>& frames,
+                                         std::uint64_t until = ~std::uint64_t{0});
+
+/// The ids that nodes and routes are coded with.
+struct NodeIds {
+    std::unordered_map<const Node*, std::uint32_t> nodes;  ///< 1-based
+    std::unordered_map<std::string, std::uint32_t> routesByName;
+    std::uint32_t highestNode = 0;
+    std::uint32_t highestRoute = 0;
+};
+/// An id for every node that needs one (a defId, a DEF name, more than one use, an end of a route,
+/// the target of a command): its defId where it has one, else one that no other node has, in order
+/// of appearance. The same for routes with a name.
+[[nodiscard]] NodeIds assignNodeIds(const std::vector<CommandFrame>& frames);
+
+}  // namespace stx::mpeg4

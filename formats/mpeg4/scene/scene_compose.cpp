@@ -1,0 +1,300 @@
+#include <algorithm>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "formats/mpeg4/scene/scene.hpp"
+
+// Commands applied to copies of their nodes.
+
+namespace stx::mpeg4 {
+namespace {
+
+/// Node visits that all commands together may cost, so that a small hostile file cannot keep us
+/// busy: a scene of 10,000 nodes may be restructured some thousand times.
+constexpr std::uint64_t kMaxVisits = 20'000'000;
+
+class Composer {
+  public:
+    Result<Scene> run(const std::vector<CommandFrame>& frames, std::uint64_t until) {
+        std::vector<Command> commands;
+        for (const CommandFrame& frame : frames)
+            if (frame.time <= until)
+                commands.insert(commands.end(), frame.commands.begin(), frame.commands.end());
+        copyAll(commands);
+        for (std::size_t i = 0; i < commands.size(); ++i) {
+            auto done = std::visit([&](auto& command) { return apply(command); }, commands[i]);
+            if (!done) return tl::unexpected(done.error().at(fmt::format("command {}", i + 1)));
+        }
+        return std::move(scene_);
+    }
+
+  private:
+    // ---- copies
+
+    void relink(NodePtr& node) const {
+        if (node) node = copies_.at(node.get());
+    }
+    void relink(FieldValue& value) const {
+        if (NodePtr* child = std::get_if<NodePtr>(&value)) relink(*child);
+        if (NodeList* list = std::get_if<NodeList>(&value))
+            for (NodePtr& child : *list) relink(child);
+    }
+    void relink(Route& route) const {
+        relink(route.from);
+        relink(route.to);
+    }
+
+    void copyAll(std::vector<Command>& commands) {
+        for (const Command& command : commands)
+            forEachNode(command, [&](const NodePtr& node) {
+                if (!copies_.contains(node.get())) {
+                    copies_.emplace(node.get(), std::make_shared<Node>(*node));
+                }
+            });
+        for (auto& [original, copy] : copies_)
+            for (Node::SetField& field : copy->setFields) relink(field.value);
+        for (Command& command : commands)
+            std::visit(
+                [&](auto& c) {
+                    if constexpr (requires { c.target; }) relink(c.target);
+                    if constexpr (requires { c.root; }) {
+                        relink(c.root);
+                        for (Route& r : c.routes) relink(r);
+                    }
+                    if constexpr (requires { c.replacement; }) relink(c.replacement);
+                    if constexpr (requires { c.node; }) relink(c.node);
+                    if constexpr (requires { c.value; }) relink(c.value);
+                    if constexpr (requires { c.route; }) relink(c.route);
+                },
+                command);
+    }
+
+    // ---- checks
+
+    Result<void> spend(std::uint64_t visits) {
+        visits_ += visits;
+        if (visits_ > kMaxVisits)
+            return fail(ErrorCode::unsupported,
+                        "the commands restructure the scene too often (more than {} node visits)",
+                        kMaxVisits);
+        return {};
+    }
+
+    Result<std::unordered_set<const Node*>> below(const FieldValue& value) {
+        std::unordered_set<const Node*> nodes;
+        const auto collect = [&](const NodePtr& root) {
+            forEachNode(root, [&](const NodePtr& node) { nodes.insert(node.get()); });
+        };
+        if (const NodePtr* node = std::get_if<NodePtr>(&value)) collect(*node);
+        if (const NodeList* list = std::get_if<NodeList>(&value))
+            for (const NodePtr& node : *list) collect(node);
+        STX_CHECK(spend(nodes.size()));
+        return nodes;
+    }
+
+    Result<void> checkNotInside(const NodePtr& target, const FieldValue& value) {
+        STX_TRY(const auto nodes, below(value));
+        if (nodes.contains(target.get()))
+            return fail(ErrorCode::invalidInput,
+                        "the value put into {} '{}' contains that node itself", target->info->name,
+                        target->defName);
+        return {};
+    }
+
+    static Result<void> checkField(const NodePtr& target, int field) {
+        if (!target) return fail(ErrorCode::invalidInput, "the command has no target");
+        if (field < 0 || field >= static_cast<int>(target->info->fields.size()) ||
+            !target->info->fields[static_cast<std::size_t>(field)].hasValue())
+            return fail(ErrorCode::invalidInput, "{} has no field {} that holds a value",
+                        target->info->name, field);
+        return {};
+    }
+
+    // ---- commands
+
+    Result<void> apply(ReplaceScene& c) {
+        scene_.root = c.root;
+        scene_.routes = c.routes;
+        scene_.useNames = c.useNames;
+        return {};
+    }
+
+    /// Puts `replacement` wherever `target` stands; null takes it out of lists.
+    Result<void> exchange(const NodePtr& target, const NodePtr& replacement) {
+        STX_TRY(const auto inside, below(replacement));
+        std::vector<std::pair<NodePtr, int>> places;
+        std::uint64_t visits = 0;
+        Result<void> fits;
+        forEachNode(scene_.root, [&](const NodePtr& node) {
+            ++visits;
+            for (const Node::SetField& field : node->setFields) {
+                bool here = false;
+                if (const NodePtr* child = std::get_if<NodePtr>(&field.value))
+                    here = *child == target;
+                if (const NodeList* list = std::get_if<NodeList>(&field.value))
+                    here = std::find(list->begin(), list->end(), target) != list->end();
+                if (!here) continue;
+                places.emplace_back(node, field.index);
+                const FieldInfo& info = node->info->fields[static_cast<std::size_t>(field.index)];
+                if (inside.contains(node.get()))
+                    fits = fail(ErrorCode::invalidInput,
+                                "the node that replaces {} '{}' contains its parent",
+                                target->info->name, target->defName);
+                else if (!mayStandIn(replacement.get(), info.nodeType))
+                    fits = fail(ErrorCode::invalidInput, "{} may not stand in {}.{}",
+                                replacement->info->name, node->info->name, info.name);
+            }
+        });
+        STX_CHECK(fits);
+        STX_CHECK(spend(visits));
+        if (scene_.root == target) {
+            if (!mayStandIn(replacement.get(), Ndt::SFTopNode))
+                return fail(ErrorCode::invalidInput, "{} may not be the root of a scene",
+                            replacement->info->name);
+            scene_.root = replacement;
+        } else if (places.empty()) {
+            return fail(ErrorCode::invalidInput,
+                        "the command names {} '{}' (id {}), which is not in the scene",
+                        target->info->name, target->defName, target->defId);
+        }
+        for (auto& [node, index] : places) {
+            FieldValue& value = node->edit(index);
+            if (NodePtr* child = std::get_if<NodePtr>(&value)) *child = replacement;
+            if (NodeList* list = std::get_if<NodeList>(&value)) {
+                if (replacement)
+                    std::replace(list->begin(), list->end(), target, replacement);
+                else
+                    std::erase(*list, target);
+            }
+        }
+        // Routes stay where the new node has the same fields.
+        const bool keeps = replacement && replacement->info == target->info;
+        std::erase_if(scene_.routes, [&](Route& r) {
+            if (r.from != target && r.to != target) return false;
+            if (!keeps) return true;
+            if (r.from == target) r.from = replacement;
+            if (r.to == target) r.to = replacement;
+            return false;
+        });
+        return {};
+    }
+
+    Result<void> apply(ReplaceNode& c) { return exchange(c.target, c.replacement); }
+    Result<void> apply(DeleteNode& c) { return exchange(c.target, nullptr); }
+
+    Result<void> apply(ReplaceField& c) {
+        // An event into the scene (addChildren, set_bind) leaves no value behind.
+        if (c.target && c.field >= 0 && c.field < static_cast<int>(c.target->info->fields.size()) &&
+            !c.target->info->fields[static_cast<std::size_t>(c.field)].hasValue())
+            return applyEvent(c);
+        STX_CHECK(checkField(c.target, c.field));
+        STX_CHECK(checkNotInside(c.target, c.value));
+        if (!c.target->set(c.field, c.value))
+            return fail(ErrorCode::invalidInput, "{}.{} does not take this value",
+                        c.target->info->name,
+                        c.target->info->fields[static_cast<std::size_t>(c.field)].name);
+        return {};
+    }
+
+    Result<void> applyEvent(ReplaceField& c) {
+        const std::string& event = c.target->info->fields[static_cast<std::size_t>(c.field)].name;
+        const int children = c.target->info->find("children");
+        const NodeList* nodes = std::get_if<NodeList>(&c.value);
+        if (children < 0 || nodes == nullptr) return {};
+        if (event == "addChildren") {
+            STX_CHECK(checkNotInside(c.target, c.value));
+            NodeList& list = std::get<NodeList>(c.target->edit(children));
+            list.insert(list.end(), nodes->begin(), nodes->end());
+        } else if (event == "removeChildren") {
+            std::erase_if(std::get<NodeList>(c.target->edit(children)), [&](const NodePtr& node) {
+                return std::find(nodes->begin(), nodes->end(), node) != nodes->end();
+            });
+        }
+        return {};
+    }
+
+    Result<void> apply(InsertNode& c) {
+        const int field = c.target ? c.target->info->find("children") : -1;
+        if (field < 0)
+            return fail(ErrorCode::invalidInput,
+                        "a node is inserted into one that has no children");
+        return change(c.target, field, c.position, FieldValue(c.node), Change::insert);
+    }
+    Result<void> apply(InsertIndexed& c) {
+        return change(c.target, c.field, c.position, c.value, Change::insert);
+    }
+    Result<void> apply(ReplaceIndexed& c) {
+        return change(c.target, c.field, c.position, c.value, Change::replace);
+    }
+    Result<void> apply(DeleteIndexed& c) {
+        return change(c.target, c.field, c.position, FieldValue(false), Change::remove);
+    }
+
+    enum class Change { insert, replace, remove };
+
+    Result<void> change(const NodePtr& target, int field, Position position, const FieldValue& item,
+                        Change what) {
+        STX_CHECK(checkField(target, field));
+        STX_CHECK(checkNotInside(target, item));
+        const FieldInfo& info = target->info->fields[static_cast<std::size_t>(field)];
+        if (!isMultiple(info.type) ||
+            (what != Change::remove && typeOf(item) != itemType(info.type)))
+            return fail(ErrorCode::invalidInput, "{}.{} is {}, which does not take this item",
+                        target->info->name, info.name, name(info.type));
+        if (const NodePtr* node = std::get_if<NodePtr>(&item);
+            node && !mayStandIn(node->get(), info.nodeType))
+            return fail(ErrorCode::invalidInput, "{} may not stand in {}.{}", (*node)->info->name,
+                        target->info->name, info.name);
+        return std::visit(
+            [&](auto& list) -> Result<void> {
+                if constexpr (kIsList<std::decay_t<decltype(list)>>) {
+                    using Item = typename std::decay_t<decltype(list)>::value_type;
+                    const auto size = static_cast<std::int64_t>(list.size());
+                    const std::int64_t last = what == Change::insert ? size : size - 1;
+                    const std::int64_t at =
+                        position.index == Position::kLast ? last : position.index;
+                    if (at < 0 || at > last)
+                        return fail(ErrorCode::invalidInput,
+                                    "index {} is outside {}.{}, which has {} items", at,
+                                    target->info->name, info.name, size);
+                    if (what == Change::remove)
+                        list.erase(list.begin() + at);
+                    else if (what == Change::insert)
+                        list.insert(list.begin() + at, std::get<Item>(item));
+                    else
+                        list[static_cast<std::size_t>(at)] = std::get<Item>(item);
+                }
+                return {};
+            },
+            target->edit(field));
+    }
+
+    Result<void> apply(InsertRoute& c) {
+        STX_CHECK(spend(1));
+        scene_.routes.push_back(c.route);
+        return {};
+    }
+    Result<void> apply(DeleteRoute& c) {
+        STX_CHECK(spend(scene_.routes.size()));
+        std::erase_if(scene_.routes, [&](const Route& r) { return r.id == c.routeId; });
+        return {};
+    }
+    Result<void> apply(ReplaceRoute& c) {
+        STX_CHECK(spend(scene_.routes.size()));
+        for (Route& route : scene_.routes)
+            if (route.id == c.routeId) route = c.route;
+        return {};
+    }
+
+    Scene scene_;
+    std::unordered_map<const Node*, NodePtr> copies_;
+    std::uint64_t visits_ = 0;
+};
+
+}  // namespace
+
+Result<Scene> composeScene(const std::vector<CommandFrame>& frames, std::uint64_t until) {
+    return Composer().run(frames, until);
+}
+
+}  // namespace stx::mpeg4

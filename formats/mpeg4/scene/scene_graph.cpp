@@ -1,0 +1,367 @@
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "formats/mpeg4/scene/scene.hpp"
+
+// Walking, comparing, copying and numbering. Nothing here recurses: graphs may be deep.
+
+namespace stx::mpeg4 {
+namespace {
+
+using Visit = std::function<void(const NodePtr&)>;
+
+/// Calls `take` with each node of a value, NULLs included.
+template <class Take>
+void eachChild(const FieldValue& value, const Take& take) {
+    if (const NodePtr* node = std::get_if<NodePtr>(&value)) take(*node);
+    if (const NodeList* list = std::get_if<NodeList>(&value))
+        for (const NodePtr& node : *list) take(node);
+}
+
+template <class Take>
+void eachChild(const Node& node, const Take& take) {
+    for (const Node::SetField& field : node.setFields) eachChild(field.value, take);
+}
+
+/// Calls `take` with the nodes that a command names directly, in the order they are coded.
+template <class Take>
+void eachRoot(const Command& command, const Take& take) {
+    const auto route = [&](const Route& r) {
+        take(r.from);
+        take(r.to);
+    };
+    std::visit(
+        [&](const auto& c) {
+            if constexpr (requires { c.target; }) take(c.target);
+            if constexpr (requires { c.root; }) {
+                take(c.root);
+                for (const Route& r : c.routes) route(r);
+            }
+            if constexpr (requires { c.replacement; }) take(c.replacement);
+            if constexpr (requires { c.node; }) take(c.node);
+            if constexpr (requires { c.value; }) eachChild(c.value, take);
+            if constexpr (requires { c.route; }) route(c.route);
+        },
+        command);
+}
+
+class Walk {
+  public:
+    explicit Walk(const Visit& visit) : visit_(visit) {}
+
+    void from(const NodePtr& root) {
+        push(root);
+        while (!stack_.empty()) {
+            const NodePtr* node = stack_.back();
+            stack_.pop_back();
+            if (!seen_.insert(node->get()).second) continue;
+            visit_(*node);
+            // Reversed, so that the first child is on top of the stack.
+            const std::size_t bottom = stack_.size();
+            eachChild(**node, [&](const NodePtr& child) { push(child); });
+            std::reverse(stack_.begin() + static_cast<std::ptrdiff_t>(bottom), stack_.end());
+        }
+    }
+
+  private:
+    void push(const NodePtr& node) {
+        if (node && !seen_.contains(node.get())) stack_.push_back(&node);
+    }
+
+    const Visit& visit_;
+    std::vector<const NodePtr*> stack_;
+    std::unordered_set<const Node*> seen_;
+};
+
+template <class T>
+bool sameBits(const T& a, const T& b) {
+    if constexpr (std::is_same_v<T, float> || std::is_same_v<T, double> ||
+                  std::is_same_v<T, glm::vec2> || std::is_same_v<T, glm::vec3> ||
+                  std::is_same_v<T, Color> || std::is_same_v<T, Rotation>) {
+        return std::memcmp(&a, &b, sizeof(T)) == 0;
+    } else {
+        return a == b;
+    }
+}
+
+template <class T>
+bool sameBits(const std::vector<T>& a, const std::vector<T>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](const T& x, const T& y) { return sameBits(x, y); });
+}
+
+/// Compares two sets of graphs pair by pair, remembering which node answers to which.
+class Comparison {
+  public:
+    explicit Comparison(SameOptions options) : options_(options) {}
+
+    bool nodes(const NodePtr& a, const NodePtr& b) {
+        if (!pair(a, b)) return false;
+        while (!open_.empty()) {
+            const auto [x, y] = open_.back();
+            open_.pop_back();
+            if (!contents(*x, *y)) return false;
+        }
+        return true;
+    }
+
+    bool values(const FieldValue& a, const FieldValue& b) {
+        if (!shallow(a, b)) return false;
+        return nodes(nullptr, nullptr);
+    }
+
+    bool routes(const Route& a, const Route& b) {
+        return (!options_.ids || a.id == b.id) && (!options_.names || a.name == b.name) &&
+               a.fromField == b.fromField && a.toField == b.toField && nodes(a.from, b.from) &&
+               nodes(a.to, b.to);
+    }
+
+  private:
+    bool pair(const NodePtr& a, const NodePtr& b) {
+        if (!a || !b) return !a && !b;
+        const auto [forth, fresh] = bOfA_.emplace(a.get(), b.get());
+        const auto [back, freshBack] = aOfB_.emplace(b.get(), a.get());
+        if (forth->second != b.get() || back->second != a.get()) return false;
+        if (fresh) open_.emplace_back(a.get(), b.get());
+        return true;
+    }
+
+    bool shallow(const FieldValue& a, const FieldValue& b) {
+        if (a.index() != b.index()) return false;
+        if (const NodePtr* node = std::get_if<NodePtr>(&a))
+            return pair(*node, std::get<NodePtr>(b));
+        if (const NodeList* list = std::get_if<NodeList>(&a)) {
+            const NodeList& other = std::get<NodeList>(b);
+            return std::equal(list->begin(), list->end(), other.begin(), other.end(),
+                              [&](const NodePtr& x, const NodePtr& y) { return pair(x, y); });
+        }
+        return sameValue(a, b);
+    }
+
+    bool contents(const Node& a, const Node& b) {
+        if (a.info != b.info || (options_.ids && a.defId != b.defId) ||
+            (options_.names && a.defName != b.defName))
+            return false;
+        for (const int index : a.info->defFields)
+            if ((a.isSet(index) || b.isSet(index)) && !shallow(a.value(index), b.value(index)))
+                return false;
+        return true;
+    }
+
+    SameOptions options_;
+    std::unordered_map<const Node*, const Node*> bOfA_;
+    std::unordered_map<const Node*, const Node*> aOfB_;
+    std::vector<std::pair<const Node*, const Node*>> open_;
+};
+
+template <class C>
+bool sameCommand(const C& a, const C& b, Comparison& compare, SameOptions options) {
+    if constexpr (requires { a.target; })
+        if (!compare.nodes(a.target, b.target)) return false;
+    if constexpr (requires { a.field; })
+        if (a.field != b.field) return false;
+    if constexpr (requires { a.position; })
+        if (a.position != b.position) return false;
+    if constexpr (requires { a.routeId; })
+        if (options.ids && a.routeId != b.routeId) return false;
+    if constexpr (requires { a.root; }) {
+        if (!compare.nodes(a.root, b.root) || a.routes.size() != b.routes.size()) return false;
+        for (std::size_t i = 0; i < a.routes.size(); ++i)
+            if (!compare.routes(a.routes[i], b.routes[i])) return false;
+        if (options.names && a.useNames != b.useNames) return false;
+    }
+    if constexpr (requires { a.replacement; })
+        if (!compare.nodes(a.replacement, b.replacement)) return false;
+    if constexpr (requires { a.node; })
+        if (!compare.nodes(a.node, b.node)) return false;
+    if constexpr (requires { a.value; })
+        if (!compare.values(a.value, b.value)) return false;
+    if constexpr (requires { a.route; })
+        if (!compare.routes(a.route, b.route)) return false;
+    return true;
+}
+
+}  // namespace
+
+void forEachNode(const NodePtr& root, const Visit& visit) {
+    Walk(visit).from(root);
+}
+
+void forEachNode(const Command& command, const Visit& visit) {
+    Walk walk(visit);
+    eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
+}
+
+bool sameValue(const FieldValue& a, const FieldValue& b) {
+    if (a.index() != b.index()) return false;
+    return std::visit(
+        [&](const auto& x) {
+            using T = std::decay_t<decltype(x)>;
+            if constexpr (std::is_same_v<T, NodePtr> || std::is_same_v<T, NodeList>)
+                return true;
+            else
+                return sameBits(x, std::get<T>(b));
+        },
+        a);
+}
+
+bool sameNode(const NodePtr& a, const NodePtr& b, SameOptions options) {
+    return Comparison(options).nodes(a, b);
+}
+
+bool sameFrames(const std::vector<CommandFrame>& a, const std::vector<CommandFrame>& b,
+                SameOptions options) {
+    Comparison compare(options);
+    if (a.size() != b.size()) return false;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        if (a[i].time != b[i].time || a[i].commands.size() != b[i].commands.size()) return false;
+        for (std::size_t k = 0; k < a[i].commands.size(); ++k) {
+            const Command& x = a[i].commands[k];
+            const Command& y = b[i].commands[k];
+            if (x.index() != y.index()) return false;
+            const bool same = std::visit(
+                [&](const auto& c) {
+                    return sameCommand(c, std::get<std::decay_t<decltype(c)>>(y), compare, options);
+                },
+                x);
+            if (!same) return false;
+        }
+    }
+    return true;
+}
+
+Result<int> nestingDepth(const NodePtr& root) {
+    // Post-order: a node is met once to open it (depth 0 in the map) and once more to close it.
+    std::unordered_map<const Node*, int> depths;
+    std::vector<const Node*> stack;
+    if (root) stack.push_back(root.get());
+    int deepest = 0;
+    while (!stack.empty()) {
+        const Node* node = stack.back();
+        const auto [entry, fresh] = depths.emplace(node, 0);
+        if (fresh) {
+            bool cyclic = false;
+            eachChild(*node, [&](const NodePtr& child) {
+                if (!child) return;
+                const auto known = depths.find(child.get());
+                if (known == depths.end())
+                    stack.push_back(child.get());
+                else if (known->second == 0)
+                    cyclic = true;
+            });
+            if (cyclic)
+                return fail(ErrorCode::invalidInput, "a node inside {} '{}' is that node itself",
+                            node->info->name, node->defName);
+            continue;
+        }
+        stack.pop_back();
+        if (entry->second != 0) continue;  // reached a second time before it was opened
+        int below = 0;
+        bool cyclic = false;
+        eachChild(*node, [&](const NodePtr& child) {
+            if (!child) return;
+            const int depth = depths.at(child.get());
+            cyclic |= depth == 0;
+            below = std::max(below, depth);
+        });
+        if (cyclic)
+            return fail(ErrorCode::invalidInput, "{} '{}' contains itself", node->info->name,
+                        node->defName);
+        depths[node] = below + 1;
+        deepest = std::max(deepest, below + 1);
+    }
+    return deepest;
+}
+
+NodePtr cloneNode(const NodePtr& node) {
+    std::unordered_map<const Node*, NodePtr> copies;
+    forEachNode(node,
+                [&](const NodePtr& n) { copies.emplace(n.get(), std::make_shared<Node>(*n)); });
+    const auto relink = [&](NodePtr& n) {
+        if (n) n = copies.at(n.get());
+    };
+    for (auto& [original, copy] : copies)
+        for (Node::SetField& field : copy->setFields) {
+            if (NodePtr* child = std::get_if<NodePtr>(&field.value)) relink(*child);
+            if (NodeList* list = std::get_if<NodeList>(&field.value))
+                for (NodePtr& child : *list) relink(child);
+        }
+    return node ? copies.at(node.get()) : nullptr;
+}
+
+NodeIds assignNodeIds(const std::vector<CommandFrame>& frames) {
+    NodeIds ids;
+    std::vector<const Node*> inOrder;
+    std::unordered_map<const Node*, int> uses;
+    std::unordered_set<const Node*> named;  // by a route or as a target
+    std::vector<const Route*> routes;
+    const std::function<void(const NodePtr&)> visit = [&](const NodePtr& node) {
+        inOrder.push_back(node.get());
+        eachChild(*node, [&](const NodePtr& child) {
+            if (child) ++uses[child.get()];
+        });
+    };
+    Walk walk(visit);
+    for (const CommandFrame& frame : frames) {
+        for (const Command& command : frame.commands) {
+            eachRoot(command, [&](const NodePtr& root) { walk.from(root); });
+            std::visit(
+                [&](const auto& c) {
+                    if constexpr (requires { c.target; }) named.insert(c.target.get());
+                    if constexpr (requires { c.root; }) {
+                        if (c.root) ++uses[c.root.get()];
+                        for (const Route& r : c.routes) routes.push_back(&r);
+                    }
+                    if constexpr (requires { c.route; }) routes.push_back(&c.route);
+                    if constexpr (requires { c.replacement; })
+                        if (c.replacement) ++uses[c.replacement.get()];
+                    if constexpr (requires { c.node; })
+                        if (c.node) ++uses[c.node.get()];
+                    if constexpr (requires { c.value; })
+                        eachChild(c.value, [&](const NodePtr& n) {
+                            if (n) ++uses[n.get()];
+                        });
+                },
+                command);
+        }
+    }
+    std::unordered_set<std::uint32_t> takenRoutes;
+    for (const Route* route : routes) {
+        named.insert(route->from.get());
+        named.insert(route->to.get());
+        if (route->id != 0) takenRoutes.insert(route->id);
+        if (route->id != 0 && !route->name.empty())
+            ids.routesByName.emplace(route->name, route->id);
+        ids.highestRoute = std::max(ids.highestRoute, route->id);
+    }
+
+    std::unordered_set<std::uint32_t> taken;
+    for (const Node* node : inOrder)
+        if (node->defId != 0) {
+            taken.insert(node->defId);
+            ids.nodes.emplace(node, node->defId);
+        }
+    std::uint32_t next = 1;
+    for (const Node* node : inOrder) {
+        if (node->defId != 0 || (node->defName.empty() && uses[node] < 2 && !named.contains(node)))
+            continue;
+        while (taken.contains(next)) ++next;
+        ids.nodes.emplace(node, next++);
+    }
+    for (const auto& [node, id] : ids.nodes) ids.highestNode = std::max(ids.highestNode, id);
+
+    std::uint32_t nextRoute = 1;
+    for (const Route* route : routes) {
+        if (route->id != 0 || route->name.empty() || ids.routesByName.contains(route->name))
+            continue;
+        while (takenRoutes.contains(nextRoute)) ++nextRoute;
+        ids.highestRoute = std::max(ids.highestRoute, nextRoute);
+        ids.routesByName.emplace(route->name, nextRoute++);
+    }
+    return ids;
+}
+
+}  // namespace stx::mpeg4

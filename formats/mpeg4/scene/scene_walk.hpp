@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/mpeg4/scene/placement.hpp"
+#include "formats/mpeg4/scene/scene.hpp"
+
+namespace stx::mpeg4 {
+
+/// A DepthImage or OctreeImage that is shown, and where.
+struct ShownNode {
+    NodePtr node;                    ///< DepthImage, DepthImageV2 or OctreeImage
+    glm::dmat4 worldFromLocal{1.0};  ///< of all Transforms above it
+    int parent = 0;                  ///< the same for nodes under the very same grouping node's use
+};
+
+/// What a scene shows, from top to bottom: all children of grouping nodes, only the chosen one of a
+/// Switch; a node that is used twice appears twice. Errors when that is more than `limits` allow.
+struct ShownScene {
+    std::vector<ShownNode> nodes;
+    std::string title;              ///< of the first WorldInfo with one
+    std::vector<std::string> info;  ///< of all WorldInfo
+    bool hasShapes = false;         ///< there is a Shape, which is no view
+};
+[[nodiscard]] Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits);
+
+[[nodiscard]] inline glm::dvec4 axisAngle(const Rotation& r) {
+    return {r.axis.x, r.axis.y, r.axis.z, r.angle};
+}
+
+}  // namespace stx::mpeg4

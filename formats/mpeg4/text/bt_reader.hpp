@@ -1,0 +1,134 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/mpeg4/text/bt.hpp"
+#include "formats/mpeg4/text/bt_lexer.hpp"
+#include "formats/mpeg4/text/scene_text.hpp"
+#include "formats/mpeg4/text/text_descriptors.hpp"
+#include "formats/mpeg4/text/text_values.hpp"
+
+namespace stx::mpeg4 {
+
+/// Reads a BT document by descent, a token ahead. Structure, nodes and descriptors stand in
+/// bt_reader.cpp, the commands of `AT time { ... }` in bt_commands.cpp.
+class BtReader {
+  public:
+    BtReader(std::string_view text, const std::string& fileName, Job& job)
+        : lexer_(text, fileName), job_(job), names_(job.limits) {}
+
+    Result<Document> read();
+
+  private:
+    // ---- Tokens
+    tl::unexpected<Error> unexpected(std::string_view expected) {
+        return failAt(lexer_.where(), ErrorCode::invalidInput, "found {}, expected {}",
+                      lexer_.peek().describe(), expected);
+    }
+    bool isWord(std::string_view word) const {
+        return lexer_.peek().kind == BtToken::Kind::word && equalNoCase(lexer_.peek().text, word);
+    }
+    Result<bool> takeIf(std::string_view word) {
+        if (!isWord(word)) return false;
+        STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
+        return true;
+    }
+    Result<void> take(BtToken::Kind kind, std::string_view expected) {
+        if (lexer_.peek().kind != kind) return unexpected(expected);
+        STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
+        return {};
+    }
+    Result<void> takeWord(std::string_view word) {
+        STX_TRY(const bool taken, takeIf(word));
+        if (!taken) return unexpected(fmt::format("{}", word));
+        return {};
+    }
+    Result<std::string> takeName(std::string_view expected) {
+        if (lexer_.peek().kind != BtToken::Kind::word) return unexpected(expected);
+        STX_TRY(const auto token, lexer_.take());
+        return std::string(token.text);
+    }
+
+    // ---- Structure
+    Result<void> readTopLevel();
+
+    Result<void> readTopNode(const std::string& defName, const std::string& where);
+
+    Result<void> readSceneRoute(const std::string& defName);
+
+    /// `A.x TO B.y`, with ROUTE already taken.
+    Result<Route> readRoute(const std::string& defName);
+    Result<void> readRouteEnd(NodePtr& node, int& field, FieldUse use);
+
+    /// [RAP] AT time [IN stream] { commands }
+    Result<void> readBlock();
+
+    // ---- Commands
+    Result<void> readCommand(std::uint64_t time);
+
+    /// NODE, NODE.field or NODE.field[position], as the target of a command.
+    struct Target {
+        NodePtr node;
+        int field = -1;
+        std::optional<Position> position;
+        std::string where;
+    };
+    Result<Target> readTarget();
+
+    /// A value for a field that a command sets; one item of it when `item`.
+    Result<FieldValue> readCommandValue(const Target& target, bool item);
+
+    Result<void> readReplace(std::uint64_t time);
+
+    Result<void> readInsert(std::uint64_t time, bool atEnd);
+
+    Result<void> readDelete(std::uint64_t time);
+
+    Result<std::uint32_t> readRouteName();
+
+    // ---- Object descriptors
+    Result<void> readOdUpdate(std::uint64_t time);
+    Result<void> readOdRemove(std::uint64_t time);
+
+    /// `Type { field value ... }`; values are words, strings, descriptors or lists of these.
+    Result<TextDescriptor> readDescriptor(int depth);
+    Result<void> readDescriptorValue(TextDescriptor& descriptor, const std::string& fieldName,
+                                     const std::string& where, int depth);
+    /// A descriptor that has no place in the document: passed over, and said.
+    Result<void> skipBraces(const std::string& type, const std::string& where);
+
+    Result<void> readDescriptors();
+
+    // ---- Nodes
+    /// NULL, USE name, or [DEF name] Type { ... }. With an owner, a USE of a name that comes later
+    /// is remembered for its field; null is given then.
+    Result<NodePtr> readNode(int depth, int& height, NodePtr owner, int field, int item);
+
+    Result<NodePtr> readNodeBody(const std::string& defName, const std::string& where, int depth,
+                                 int& height);
+
+    Result<void> readNodeList(const NodePtr& owner, int index, int depth, int& height, bool waits);
+
+    struct OdUpdate {
+        std::uint64_t time;
+        std::vector<TextDescriptor> descriptors;
+        RemoveObjectDescriptors remove;
+    };
+
+    BtLexer lexer_;
+    Job& job_;
+    NodeNames names_;
+    Document document_;
+    std::optional<TextDescriptor> iod_;
+    std::vector<OdUpdate> odUpdates_;
+    std::map<std::string, std::uint32_t> routeIds_;
+    std::uint64_t lastTime_ = 0;
+    bool haveScene_ = false;
+    bool inCommand_ = false;
+};
+
+}  // namespace stx::mpeg4

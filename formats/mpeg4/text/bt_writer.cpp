@@ -1,0 +1,354 @@
+#include <iterator>
+
+#include "formats/mpeg4/text/bt.hpp"
+#include "formats/mpeg4/text/scene_text.hpp"
+#include "formats/mpeg4/text/text_descriptors.hpp"
+#include "formats/mpeg4/text/text_values.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+class BtWriter {
+  public:
+    BtWriter(const Document& document, TextNames names)
+        : document_(document), names_(std::move(names)) {}
+
+    Result<std::string> write() {
+        writeInitialDescriptor();
+        // A scene that replaces all at the start is written bare, as people write it.
+        bool bare = true;
+        std::size_t od = 0;
+        for (const CommandFrame& frame : document_.frames) {
+            std::size_t first = 0;
+            if (bare && frame.time == 0 && !frame.commands.empty()) {
+                if (const auto* scene = std::get_if<ReplaceScene>(&frame.commands[0]);
+                    scene && scene->root) {
+                    line("");
+                    indent();
+                    writeNode(scene->root);
+                    out_ += '\n';
+                    for (const Route& route : scene->routes) {
+                        indent();
+                        writeRouteName(route);
+                        out_ += "ROUTE ";
+                        writeRoute(route);
+                        out_ += '\n';
+                    }
+                    first = 1;
+                }
+            }
+            bare = false;
+            for (; od < document_.odFrames.size() && odTime(od) <= sceneTime(frame); ++od)
+                STX_CHECK(writeOdFrame(document_.odFrames[od]));
+            if (first == frame.commands.size()) continue;
+            line("");
+            line("AT {} {{", frame.time);
+            ++depth_;
+            for (std::size_t i = first; i < frame.commands.size(); ++i)
+                STX_CHECK(writeCommand(frame.commands[i]));
+            --depth_;
+            line("}}");
+        }
+        for (; od < document_.odFrames.size(); ++od)
+            STX_CHECK(writeOdFrame(document_.odFrames[od]));
+        return std::move(out_);
+    }
+
+  private:
+    // ---- Lines
+    void indent() { out_.append(static_cast<std::size_t>(depth_), ' '); }
+    template <class... Args>
+    void line(fmt::format_string<Args...> format, Args&&... args) {
+        const std::size_t before = out_.size();
+        indent();
+        fmt::format_to(std::back_inserter(out_), format, std::forward<Args>(args)...);
+        if (out_.size() == before + static_cast<std::size_t>(depth_)) out_.resize(before);
+        out_ += '\n';
+    }
+    double odTime(std::size_t i) const {
+        return static_cast<double>(document_.odFrames[i].time) / document_.odStream.timescale;
+    }
+    double sceneTime(const CommandFrame& frame) const {
+        return static_cast<double>(frame.time) / document_.sceneStream.timescale;
+    }
+
+    // ---- Nodes
+    void writeNode(const NodePtr& node) {
+        if (!node) {
+            out_ += "NULL";
+            return;
+        }
+        if (const std::string* defName = names_.find(*node)) {
+            if (!names_.firstTime(*node)) {
+                out_ += "USE " + *defName;
+                return;
+            }
+            out_ += "DEF " + *defName + ' ';
+        }
+        out_ += node->info->name;
+        if (node->setFields.empty()) {
+            out_ += " { }";
+            return;
+        }
+        out_ += " {\n";
+        ++depth_;
+        for (const Node::SetField& field : node->setFields) {
+            indent();
+            out_ += node->info->fields[field.index].name;
+            out_ += ' ';
+            writeValue(field.value);
+            out_ += '\n';
+        }
+        --depth_;
+        indent();
+        out_ += '}';
+    }
+    void writeValue(const FieldValue& value) {
+        if (const auto* node = std::get_if<NodePtr>(&value)) {
+            writeNode(*node);
+        } else if (const auto* list = std::get_if<NodeList>(&value)) {
+            out_ += '[';
+            ++depth_;
+            for (const NodePtr& item : *list) {
+                out_ += '\n';
+                indent();
+                writeNode(item);
+            }
+            --depth_;
+            if (!list->empty()) {
+                out_ += '\n';
+                indent();
+            }
+            out_ += ']';
+        } else {
+            appendFieldValue(out_, value, TextStyle::bt);
+        }
+    }
+
+    // ---- Commands
+    [[nodiscard]] std::string nameOf(const NodePtr& node) const {
+        const std::string* found = node ? names_.find(*node) : nullptr;
+        return found ? *found : "NULL";
+    }
+    [[nodiscard]] std::string fieldOf(const NodePtr& node, int field) const {
+        return nameOf(node) + '.' + node->info->fields[field].name;
+    }
+    static std::string indexText(Position position) {
+        return position.index == Position::kLast ? "[LAST]" : fmt::format("[{}]", position.index);
+    }
+    void writeRouteName(const Route& route) {
+        if (const std::string text = textNameOf(route); !text.empty()) out_ += "DEF " + text + ' ';
+    }
+    void writeRoute(const Route& route) {
+        out_ += fieldOf(route.from, route.fromField) + " TO " + fieldOf(route.to, route.toField);
+    }
+    void beginCommand(std::string_view words) {
+        indent();
+        out_ += words;
+    }
+    Result<void> writeCommand(const Command& command) {
+        std::visit([&](const auto& c) { write(c); }, command);
+        out_ += '\n';
+        return {};
+    }
+    void write(const ReplaceScene& c) {
+        beginCommand("REPLACE SCENE BY ");
+        writeNode(c.root);
+        for (const Route& route : c.routes) {
+            out_ += '\n';
+            indent();
+            writeRouteName(route);
+            out_ += "ROUTE ";
+            writeRoute(route);
+        }
+    }
+    void write(const ReplaceNode& c) {
+        beginCommand("REPLACE " + nameOf(c.target) + " BY ");
+        writeNode(c.replacement);
+    }
+    void write(const ReplaceField& c) {
+        beginCommand("REPLACE " + fieldOf(c.target, c.field) + " BY ");
+        writeValue(c.value);
+    }
+    void write(const ReplaceIndexed& c) {
+        beginCommand("REPLACE " + fieldOf(c.target, c.field) + indexText(c.position) + " BY ");
+        writeValue(c.value);
+    }
+    void write(const ReplaceRoute& c) {
+        beginCommand(fmt::format("REPLACE ROUTE R{} BY ", c.routeId - 1));
+        writeRoute(c.route);
+    }
+    void writeInsert(const std::string& target, Position position) {
+        if (position.index == Position::kLast) {
+            beginCommand("APPEND TO " + target + ' ');
+        } else {
+            beginCommand("INSERT AT " + target + indexText(position) + ' ');
+        }
+    }
+    void write(const InsertNode& c) {
+        writeInsert(nameOf(c.target) + ".children", c.position);
+        writeNode(c.node);
+    }
+    void write(const InsertIndexed& c) {
+        writeInsert(fieldOf(c.target, c.field), c.position);
+        writeValue(c.value);
+    }
+    void write(const InsertRoute& c) {
+        beginCommand("INSERT ");
+        writeRouteName(c.route);
+        out_ += "ROUTE ";
+        writeRoute(c.route);
+    }
+    void write(const DeleteNode& c) { beginCommand("DELETE " + nameOf(c.target)); }
+    void write(const DeleteIndexed& c) {
+        beginCommand("DELETE " + fieldOf(c.target, c.field) + indexText(c.position));
+    }
+    void write(const DeleteRoute& c) {
+        beginCommand(fmt::format("DELETE ROUTE R{}", c.routeId - 1));
+    }
+
+    // ---- Descriptors
+    template <class T>
+    void number(std::string_view name, T value, T unless) {
+        if (value != unless) line("{} {}", name, static_cast<std::uint64_t>(value));
+    }
+    template <class Inner>
+    void block(std::string_view head, Inner inner, std::string_view open = "{",
+               std::string_view close = "}") {
+        line("{} {}", head, open);
+        ++depth_;
+        inner();
+        --depth_;
+        line("{}", close);
+    }
+    void writeConfigInfo(const BifsConfig& config) {
+        if (config.version == 2) {
+            if (config.use3DMeshCoding) line("use3DMeshCoding true");
+            if (config.usePredictiveMFField) line("usePredictiveMFField true");
+        }
+        number("nodeIDbits", config.nodeIdBits, 0);
+        number("routeIDbits", config.routeIdBits, 0);
+        if (config.version == 2) number("protoIDbits", config.protoIdBits, 0);
+        line("isCommandStream {}", config.isCommandStream);
+        line("pixelMetric {}", config.pixelMetric);
+        if (config.hasSize) {
+            line("pixelWidth {}", config.pixelWidth);
+            line("pixelHeight {}", config.pixelHeight);
+        }
+    }
+    void writeStream(const ElementaryStream& stream, const BifsConfig* config) {
+        block("ES_Descriptor", [&] {
+            number("ES_ID", stream.esId, 0u);
+            if (stream.dependsOnEsId) line("dependsOn_ES_ID {}", *stream.dependsOnEsId);
+            if (stream.ocrEsId) line("OCR_ES_ID {}", *stream.ocrEsId);
+            number<int>("streamPriority", stream.streamPriority, 0);
+            if (!stream.url.empty()) line("URLstring {}", quotedText(stream.url));
+            block("decConfigDescr DecoderConfigDescriptor", [&] {
+                number<int>("objectTypeIndication", stream.objectTypeIndication, 0);
+                line("streamType {}", static_cast<int>(stream.streamType));
+                if (stream.upStream) line("upStream true");
+                number("bufferSizeDB", stream.bufferSizeDB, 0u);
+                number("maxBitrate", stream.maxBitrate, 0u);
+                number("avgBitrate", stream.avgBitrate, 0u);
+                if (config) {
+                    block(config->version == 2 ? "decSpecificInfo BIFSv2Config"
+                                               : "decSpecificInfo BIFSConfig",
+                          [&] { writeConfigInfo(*config); });
+                } else if (!stream.decoderSpecificInfo.empty()) {
+                    block("decSpecificInfo DecoderSpecificInfo",
+                          [&] { line("info {}", percentText(stream.decoderSpecificInfo)); });
+                }
+            });
+            if (stream.timescale != 1000) {
+                block("slConfigDescr SLConfigDescriptor", [&] {
+                    line("useAccessUnitStartFlag true");
+                    line("useAccessUnitEndFlag true");
+                    line("useTimeStampsFlag true");
+                    line("timeStampResolution {}", stream.timescale);
+                    line("timeStampLength 32");
+                });
+            }
+            if (!stream.fileName.empty() && !stream.samples.empty()) {
+                block("muxInfo MuxInfo", [&] {
+                    line("fileName {}", quotedText(stream.fileName));
+                    const MuxTimes times = muxTimes(stream);
+                    if (times.startMs != 0) line("startTime {}", times.startMs);
+                    if (times.frameRate != 0) line("frameRate {}", times.frameRate);
+                    if (times.durationMs != 1000 || times.frameRate != 0)
+                        line("duration {}", times.durationMs);
+                });
+            }
+        });
+    }
+    void writeInitialDescriptor() {
+        const InitialObjectDescriptor& iod = document_.iod;
+        block("InitialObjectDescriptor", [&] {
+            line("objectDescriptorID {}", iod.id);
+            if (iod.includeInlineProfileLevel) line("includeInlineProfileLevelFlag true");
+            if (!iod.url.empty()) line("URLstring {}", quotedText(iod.url));
+            line("ODProfileLevelIndication {}", iod.odProfileLevel);
+            line("sceneProfileLevelIndication {}", iod.sceneProfileLevel);
+            line("audioProfileLevelIndication {}", iod.audioProfileLevel);
+            line("visualProfileLevelIndication {}", iod.visualProfileLevel);
+            line("graphicsProfileLevelIndication {}", iod.graphicsProfileLevel);
+            block(
+                "esDescr",
+                [&] {
+                    writeStream(sceneStreamForText(document_), &document_.bifsConfig);
+                    if (hasOdStream(document_)) writeStream(odStreamForText(document_), nullptr);
+                },
+                "[", "]");
+        });
+    }
+    Result<void> writeOdFrame(const OdFrame& frame) {
+        line("");
+        line("AT {} {{", frame.time);
+        ++depth_;
+        for (const OdCommand& command : frame.commands) {
+            if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
+                block(
+                    "UPDATE OD",
+                    [&] {
+                        for (const ObjectDescriptor& od : update->descriptors) writeOd(od);
+                    },
+                    "[", "]");
+            } else if (const auto* remove = std::get_if<RemoveObjectDescriptors>(&command)) {
+                line("REMOVE OD [{}]", fmt::join(remove->ids, " "));
+            } else {
+                return fail(ErrorCode::unsupported,
+                            "the object descriptors change single streams or carry IPMP, which the "
+                            "text forms here do not have; keep this presentation as .mp4");
+            }
+        }
+        --depth_;
+        line("}}");
+        return {};
+    }
+    void writeOd(const ObjectDescriptor& od) {
+        block("ObjectDescriptor", [&] {
+            line("objectDescriptorID {}", od.id);
+            if (!od.url.empty()) line("URLstring {}", quotedText(od.url));
+            if (od.streams.empty()) return;
+            block(
+                "esDescr",
+                [&] {
+                    for (const ElementaryStream& stream : od.streams) writeStream(stream, nullptr);
+                },
+                "[", "]");
+        });
+    }
+
+    const Document& document_;
+    TextNames names_;
+    std::string out_;
+    int depth_ = 0;
+};
+
+}  // namespace
+
+Result<std::string> writeBt(const Document& document, Job& job) {
+    STX_TRY(auto names, TextNames::make(document, job.limits));
+    return BtWriter(document, std::move(names)).write();
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,147 @@
+#include "formats/mpeg4/text/scene_text.hpp"
+
+#include "formats/mpeg4/text/text_values.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+template <class Frame, class Item>
+void addTo(std::vector<Frame>& frames, std::uint64_t time, Item item) {
+    auto at = frames.end();
+    while (at != frames.begin() && (at - 1)->time > time) --at;
+    if (at == frames.begin() || (at - 1)->time != time) {
+        Frame frame;
+        frame.time = time;
+        at = frames.insert(at, std::move(frame)) + 1;
+    }
+    (at - 1)->commands.push_back(std::move(item));
+}
+
+}  // namespace
+
+void addCommand(std::vector<CommandFrame>& frames, std::uint64_t time, Command command) {
+    addTo(frames, time, std::move(command));
+}
+void addCommand(std::vector<OdFrame>& frames, std::uint64_t time, OdCommand command) {
+    addTo(frames, time, std::move(command));
+}
+
+Result<int> fieldOfCommand(const Node& node, std::string_view fieldName, FieldUse use,
+                           const std::string& where) {
+    int index = node.info->findIgnoringCase(fieldName);
+    // VRML's other spellings of an exposedField: set_translation, translation_changed.
+    if (index < 0 && use == FieldUse::in && fieldName.starts_with("set_"))
+        index = node.info->findIgnoringCase(fieldName.substr(4));
+    if (index < 0 && use == FieldUse::out && fieldName.ends_with("_changed"))
+        index = node.info->findIgnoringCase(fieldName.substr(0, fieldName.size() - 8));
+    if (index < 0)
+        return failAt(where, ErrorCode::invalidInput, "{} has no field '{}'", node.info->name,
+                      excerpt(fieldName));
+    const FieldInfo& field = node.info->fields[index];
+    if (use == FieldUse::in && field.inId < 0)
+        return failAt(
+            where, ErrorCode::invalidInput,
+            "{}.{} is a plain {}: no command or ROUTE can change it; replace the whole node",
+            node.info->name, field.name, name(field.kind));
+    if (use == FieldUse::out && field.outId < 0)
+        return failAt(where, ErrorCode::invalidInput,
+                      "{}.{} is a plain {} and no source of a ROUTE", node.info->name, field.name,
+                      name(field.kind));
+    return index;
+}
+
+Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view owner,
+                            std::string_view fieldName, const std::string& where) {
+    if (mayStandIn(child, expected)) return {};
+    return failAt(where, ErrorCode::invalidInput, "{} may not stand in {}.{}, which takes {}",
+                  child->info->name, owner, fieldName, name(expected));
+}
+
+Result<void> finishDocument(Document& document, NodeNames& names) {
+    STX_CHECK(names.resolve());
+    for (CommandFrame& frame : document.frames)
+        for (Command& command : frame.commands)
+            if (auto* replace = std::get_if<ReplaceScene>(&command))
+                replace->useNames = names.anyNames();
+    ElementaryStream& scene = document.sceneStream;
+    scene.streamType = StreamType::sceneDescription;
+    // The config that is written is told by its version, whatever number the text asks for.
+    scene.objectTypeIndication =
+        document.bifsConfig.version == 2 ? oti::kSystemsV2 : oti::kSystemsV1;
+    ElementaryStream& od = document.odStream;
+    if (!document.odFrames.empty() || od.esId != 0) {
+        od.streamType = StreamType::objectDescriptor;
+        if (od.objectTypeIndication == 0) od.objectTypeIndication = oti::kSystemsV1;
+    }
+    return {};
+}
+
+Result<TextNames> TextNames::make(const Document& document, const Limits& limits) {
+    TextNames result;
+    for (const CommandFrame& frame : document.frames) {
+        for (const Command& command : frame.commands) {
+            Result<void> fits;
+            const auto check = [&](const NodePtr& root) {
+                if (!fits) return;
+                auto depth = nestingDepth(root);
+                if (!depth) {
+                    fits = propagate(depth);
+                } else if (*depth > limits.maxNesting) {
+                    fits =
+                        fail(ErrorCode::invalidInput, "nodes nest {} deep; at most {} are written",
+                             *depth, limits.maxNesting);
+                }
+            };
+            if (const auto* scene = std::get_if<ReplaceScene>(&command)) check(scene->root);
+            if (const auto* replace = std::get_if<ReplaceNode>(&command))
+                check(replace->replacement);
+            if (const auto* insert = std::get_if<InsertNode>(&command)) check(insert->node);
+            std::visit(
+                [&](const auto& c) {
+                    if constexpr (requires { c.value; }) {
+                        if (const auto* node = std::get_if<NodePtr>(&c.value)) check(*node);
+                        if (const auto* list = std::get_if<NodeList>(&c.value))
+                            for (const NodePtr& node : *list) check(node);
+                    }
+                },
+                command);
+            STX_CHECK(fits);
+        }
+    }
+    const NodeIds ids = assignNodeIds(document.frames);
+    std::unordered_map<std::string, int> taken;
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands)
+            forEachNode(command, [&](const NodePtr& node) {
+                if (result.names_.contains(node.get())) return;
+                std::string text = textNameOf(*node);
+                if (text.empty()) {
+                    const auto id = ids.nodes.find(node.get());
+                    if (id == ids.nodes.end()) return;
+                    text = fmt::format("N{}", id->second - 1);
+                }
+                // A name that would not read back as itself: other characters give way to '_'.
+                if (!isPlainName(text)) {
+                    for (char& c : text)
+                        if (!isPlainName(std::string("a") + c)) c = '_';
+                    if (!isPlainName(text)) text = fmt::format("_{}", text);
+                }
+                const std::string base = text;
+                // Two nodes of one name stand for different nodes only when commands replaced one.
+                while (taken.contains(text)) text = fmt::format("{}_{}", base, ++taken[base]);
+                taken[text] = 1;
+                result.names_[node.get()] = text;
+            });
+    return result;
+}
+
+const std::string* TextNames::find(const Node& node) const {
+    const auto found = names_.find(&node);
+    return found == names_.end() ? nullptr : &found->second;
+}
+
+bool TextNames::firstTime(const Node& node) {
+    return written_.insert(&node).second;
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "formats/mpeg4/scene/document.hpp"
+#include "formats/mpeg4/text/text_fields.hpp"
+
+/// Steps that the readers of BT and XMT-A share.
+namespace stx::mpeg4 {
+
+/// Adds a command to the frame of its time, keeping frames in order of time and commands of one
+/// time in order of the text.
+void addCommand(std::vector<CommandFrame>& frames, std::uint64_t time, Command command);
+void addCommand(std::vector<OdFrame>& frames, std::uint64_t time, OdCommand command);
+
+/// The field that a command, or one end of a ROUTE, names. Errors when the node has no such field
+/// or it is not of the kind: a target of commands (`in`), the source (`out`) of a ROUTE.
+enum class FieldUse { in, out };
+[[nodiscard]] Result<int> fieldOfCommand(const Node& node, std::string_view fieldName, FieldUse use,
+                                         const std::string& where);
+
+/// Errors with where, the owner's field and what may stand there when `child` may not.
+[[nodiscard]] Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view owner,
+                                          std::string_view fieldName, const std::string& where);
+
+/// What every text ends with: names resolved, streams and ids filled in as writers need them.
+[[nodiscard]] Result<void> finishDocument(Document& document, NodeNames& names);
+
+/// The DEF names that a writer gives: each node that has a name or id, or needs one, has one, and
+/// no two nodes have the same.
+class TextNames {
+  public:
+    /// Errors when nodes nest too deeply or contain themselves.
+    [[nodiscard]] static Result<TextNames> make(const Document& document, const Limits& limits);
+
+    /// Null: the node has no name.
+    [[nodiscard]] const std::string* find(const Node& node) const;
+    /// Whether a node is met for the first time, and is written as DEF; later ones are USE.
+    [[nodiscard]] bool firstTime(const Node& node);
+
+  private:
+    std::unordered_map<const Node*, std::string> names_;
+    std::unordered_set<const Node*> written_;
+};
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,401 @@
+#include "formats/mpeg4/text/text_fields.hpp"
+
+#include <charconv>
+#include <cstdio>
+
+#include "formats/mpeg4/text/text_values.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+using Kind = BtToken::Kind;
+
+/// One item (of an SF type) at a time.
+class ItemReader {
+  public:
+    explicit ItemReader(BtLexer& lexer) : lexer_(lexer) {}
+
+    Result<BtToken> word(std::string_view expected) {
+        if (lexer_.peek().kind != Kind::word) return unexpected(expected);
+        return lexer_.take();
+    }
+    tl::unexpected<Error> unexpected(std::string_view expected) {
+        return failAt(lexer_.where(), ErrorCode::invalidInput, "found {}, expected {}",
+                      lexer_.peek().describe(), expected);
+    }
+    template <class T, class Parse>
+    Result<T> parsed(Parse parse, std::string_view expected) {
+        if (lexer_.peek().kind != Kind::word) return unexpected(expected);
+        const auto value = parse(lexer_.peek().text);
+        if (!value) return unexpected(expected);
+        STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
+        return *value;
+    }
+
+    Result<void> read(bool& v) {
+        STX_TRY(v, parsed<bool>(boolFromText, "TRUE or FALSE"));
+        return {};
+    }
+    Result<void> read(std::int32_t& v) {
+        STX_TRY(v, parsed<std::int32_t>(int32FromText, "an integer of 32 bits"));
+        return {};
+    }
+    Result<void> read(float& v) {
+        STX_TRY(v, parsed<float>(floatFromText, "a number"));
+        return {};
+    }
+    Result<void> read(double& v) {
+        STX_TRY(v, parsed<double>(doubleFromText, "a time in seconds"));
+        return {};
+    }
+    Result<void> read(std::string& v) {
+        if (lexer_.peek().kind != Kind::string && lexer_.peek().kind != Kind::word)
+            return unexpected("a string in quotes");
+        STX_TRY(auto token, lexer_.take());
+        v = token.kind == Kind::string ? std::move(token.value) : std::string(token.text);
+        return {};
+    }
+    Result<void> read(Url& v) {
+        std::string text;
+        if (lexer_.peek().kind != Kind::string && lexer_.peek().kind != Kind::word)
+            return unexpected("a URL: od:ID or a string in quotes");
+        const std::string where = lexer_.where();
+        if (auto ok = read(text); !ok) return ok;
+        if (const auto id = odFromUrl(text)) {
+            v.objectDescriptorId = *id;
+        } else {
+            v.text = std::move(text);
+        }
+        return {};
+    }
+    Result<void> read(glm::vec2& v) { return readAll(v.x, v.y); }
+    Result<void> read(glm::vec3& v) { return readAll(v.x, v.y, v.z); }
+    Result<void> read(Color& v) {
+        // The reference encoder's own spelling: $RRGGBB.
+        const BtToken& token = lexer_.peek();
+        if (token.kind == Kind::word && token.text.size() == 7 && token.text[0] == '$') {
+            const auto rgb = integerFromText("0x" + std::string(token.text.substr(1)));
+            if (!rgb) return unexpected("a colour");
+            v = {(*rgb >> 16 & 255) / 255.0f, (*rgb >> 8 & 255) / 255.0f, (*rgb & 255) / 255.0f};
+            STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
+            return {};
+        }
+        return readAll(v.r, v.g, v.b);
+    }
+    Result<void> read(Rotation& v) { return readAll(v.axis.x, v.axis.y, v.axis.z, v.angle); }
+    Result<void> read(PixelImage& image) {
+        const std::string where = lexer_.where();
+        if (auto ok = readAll(image.width, image.height, image.components); !ok) return ok;
+        // An empty image is written 0 0 0.
+        if ((image.width == 0 || image.height == 0) && image.components == 0) image.components = 1;
+        if (image.width < 0 || image.height < 0 || image.width > 4095 || image.height > 4095 ||
+            image.components < 1 || image.components > 4)
+            return failAt(where, ErrorCode::invalidInput,
+                          "the image is {}x{} with {} components; at most 4095x4095 with 1 to 4 is "
+                          "possible",
+                          image.width, image.height, image.components);
+        const std::size_t count = static_cast<std::size_t>(image.width) * image.height;
+        if (count > (lexer_.remaining() + 64) / 2 + 64)
+            return failAt(where, ErrorCode::invalidInput,
+                          "the image says {}x{}, but only {} bytes of text follow", image.width,
+                          image.height, lexer_.remaining());
+        image.pixels.reserve(count * image.components);
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto fits = [&](std::string_view text) -> std::optional<std::uint32_t> {
+                const auto value = integerFromText(text);
+                if (!value || *value < 0 || *value >> (8 * image.components) != 0) return {};
+                return static_cast<std::uint32_t>(*value);
+            };
+            Result<std::uint32_t> pixel = parsed<std::uint32_t>(
+                fits,
+                fmt::format("pixel {} of {}, an integer of {} bytes", i, count, image.components));
+            if (!pixel) return propagate(pixel);
+            for (int c = image.components - 1; c >= 0; --c)
+                image.pixels.push_back(static_cast<std::uint8_t>(*pixel >> (8 * c)));
+        }
+        return {};
+    }
+    Result<void> read(NodePtr&) { return unexpected("a value without nodes"); }
+
+  private:
+    template <class... T>
+    Result<void> readAll(T&... values) {
+        Result<void> result;
+        (void)((result = read(values), result.has_value()) && ...);
+        return result;
+    }
+
+    BtLexer& lexer_;
+};
+
+void append(std::string& out, bool v, TextStyle style) {
+    if (style == TextStyle::bt) {
+        out += v ? "TRUE" : "FALSE";
+    } else {
+        out += v ? "true" : "false";
+    }
+}
+void append(std::string& out, std::int32_t v, TextStyle) {
+    fmt::format_to(std::back_inserter(out), "{}", v);
+}
+void append(std::string& out, float v, TextStyle) {
+    fmt::format_to(std::back_inserter(out), "{}", v);
+}
+void append(std::string& out, double v, TextStyle) {
+    fmt::format_to(std::back_inserter(out), "{}", v);
+}
+void append(std::string& out, const std::string& v, TextStyle) {
+    out += quotedText(v);
+}
+void append(std::string& out, const Url& v, TextStyle style) {
+    if (v.objectDescriptorId == 0) {
+        out += quotedText(v.text);
+    } else if (style == TextStyle::bt) {
+        fmt::format_to(std::back_inserter(out), "od:{}", v.objectDescriptorId);
+    } else {
+        fmt::format_to(std::back_inserter(out), "\"od:{}\"", v.objectDescriptorId);
+    }
+}
+template <class... T>
+void appendAll(std::string& out, TextStyle style, const T&... values) {
+    bool first = true;
+    (((first ? void() : void(out += ' ')), first = false, append(out, values, style)), ...);
+}
+void append(std::string& out, glm::vec2 v, TextStyle s) {
+    appendAll(out, s, v.x, v.y);
+}
+void append(std::string& out, glm::vec3 v, TextStyle s) {
+    appendAll(out, s, v.x, v.y, v.z);
+}
+void append(std::string& out, Color v, TextStyle s) {
+    appendAll(out, s, v.r, v.g, v.b);
+}
+void append(std::string& out, const Rotation& v, TextStyle s) {
+    appendAll(out, s, v.axis.x, v.axis.y, v.axis.z, v.angle);
+}
+void append(std::string& out, const PixelImage& image, TextStyle) {
+    fmt::format_to(std::back_inserter(out), "{} {} {}", image.width, image.height,
+                   image.components);
+    static constexpr char kDigits[] = "0123456789ABCDEF";
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+        if (i % image.components == 0) out += " 0x";
+        out += kDigits[image.pixels[i] >> 4];
+        out += kDigits[image.pixels[i] & 15];
+    }
+}
+void append(std::string&, const NodePtr&, TextStyle) {}
+
+}  // namespace
+
+Result<FieldValue> readFieldValue(BtLexer& lexer, FieldType type, bool wholeText) {
+    FieldValue value = emptyValue(type);
+    ItemReader reader(lexer);
+    const auto readValue = [&](auto& v) -> Result<void> {
+        using T = std::decay_t<decltype(v)>;
+        if constexpr (std::is_same_v<T, NodeList>) {
+            return reader.unexpected("a value without nodes");
+        } else if constexpr (kIsList<T>) {
+            const bool brackets = lexer.peek().kind == Kind::openBracket;
+            if (brackets) {
+                if (auto taken = lexer.take(); !taken) return propagate(taken);
+            }
+            if (!brackets && !wholeText) {
+                if (auto ok = reader.read(v.emplace_back()); !ok) return ok;
+                return {};
+            }
+            for (;;) {
+                const Kind kind = lexer.peek().kind;
+                if (brackets && kind == Kind::closeBracket) {
+                    if (auto taken = lexer.take(); !taken) return propagate(taken);
+                    return {};
+                }
+                if (kind == Kind::end) {
+                    if (!brackets) return {};
+                    return reader.unexpected("']' behind the items");
+                }
+                if (auto ok = reader.read(v.emplace_back()); !ok) return ok;
+            }
+        } else {
+            return reader.read(v);
+        }
+    };
+    // Items are read into a variable of their type; vector<bool> does not occur.
+    if (auto ok = std::visit(readValue, value); !ok) return propagate(ok);
+    return value;
+}
+
+void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style) {
+    std::visit(
+        [&](const auto& v) {
+            using T = std::decay_t<decltype(v)>;
+            if constexpr (kIsList<T>) {
+                if (style == TextStyle::bt) out += '[';
+                bool first = true;
+                for (const auto& item : v) {
+                    if (!first) out += ' ';
+                    first = false;
+                    append(out, item, style);
+                }
+                if (style == TextStyle::bt) out += ']';
+            } else {
+                append(out, v, style);
+            }
+        },
+        value);
+}
+
+std::string textNameOf(const Node& node) {
+    if (!node.defName.empty()) return node.defName;
+    return node.defId > 0 ? fmt::format("N{}", node.defId - 1) : std::string();
+}
+
+std::string textNameOf(const Route& route) {
+    if (!route.name.empty()) return route.name;
+    return route.id > 0 ? fmt::format("R{}", route.id - 1) : std::string();
+}
+
+std::uint32_t idFromTextName(std::string_view name, char letter) {
+    if (name.size() < 2 || name.size() > 10 || name[0] != letter) return 0;
+    if (name[1] == '0' && name.size() > 2) return 0;
+    std::uint32_t number = 0;
+    const auto [at, error] = std::from_chars(name.data() + 1, name.data() + name.size(), number);
+    return error == std::errc() && at == name.data() + name.size() ? number + 1 : 0;
+}
+
+bool isPlainName(std::string_view name) {
+    if (name.empty() || (name[0] >= '0' && name[0] <= '9') || name[0] == '-' || name[0] == '+')
+        return false;
+    for (const char c : name) {
+        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                           (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+                           static_cast<unsigned char>(c) >= 0x80;
+        if (!plain) return false;
+    }
+    return !equalNoCase(name, "NULL") && !equalNoCase(name, "DEF") && !equalNoCase(name, "USE");
+}
+
+Result<void> NodeNames::define(const std::string& name, const NodePtr& node,
+                               const std::string& where, bool again) {
+    const auto [entry, isNew] = byName_.try_emplace(name, Entry{node, where});
+    if (!isNew && again) {
+        entry->second = Entry{node, where};
+    } else if (!isNew)
+        return failAt(where, ErrorCode::invalidInput,
+                      "DEF '{}' names a second node; the first stands at {}", excerpt(name),
+                      entry->second.where);
+    if (const std::uint32_t id = idFromTextName(name, 'N')) {
+        node->defId = id;
+    } else {
+        node->defName = name;
+        anyNames_ = true;
+    }
+    return {};
+}
+
+void NodeNames::closed(const NodePtr& node, int height) {
+    heights_[node.get()] = height;
+}
+
+Result<NodePtr> NodeNames::use(const std::string& name, int depth, const std::string& where,
+                               int& height) const {
+    height = 0;
+    const auto found = byName_.find(name);
+    if (found == byName_.end()) return NodePtr();
+    const auto known = heights_.find(found->second.node.get());
+    if (known == heights_.end())
+        return failAt(where, ErrorCode::invalidInput,
+                      "USE '{}' stands inside the node of that name, which would hold itself",
+                      excerpt(name));
+    height = known->second;
+    if (depth + height > limits_.maxNesting)
+        return failAt(where, ErrorCode::invalidInput, "nodes nest deeper than {} here",
+                      limits_.maxNesting);
+    return found->second.node;
+}
+
+void NodeNames::useLater(std::string name, NodePtr owner, int field, int item, std::string where) {
+    pending_.push_back({std::move(name), std::move(owner), field, item, std::move(where)});
+}
+
+Result<NodePtr> NodeNames::target(const std::string& name, const std::string& where) const {
+    const auto found = byName_.find(name);
+    if (found == byName_.end())
+        return failAt(where, ErrorCode::invalidInput, "no node has the DEF name '{}'",
+                      excerpt(name));
+    return found->second.node;
+}
+
+Result<void> NodeNames::countNode() {
+    // A node is a few hundred bytes, a few characters of text are enough to ask for one.
+    return limits_.checkAllocation(++count_, 256, "the nodes of the scene");
+}
+
+Result<int> NodeNames::heightOf(const NodePtr& node, int depth,
+                                std::unordered_map<const Node*, int>& known) const {
+    if (!node) return 0;
+    if (const auto found = known.find(node.get()); found != known.end()) {
+        depth += found->second;
+        if (depth <= limits_.maxNesting) return found->second;
+    }
+    if (depth > limits_.maxNesting)
+        return fail(ErrorCode::invalidInput,
+                    "nodes nest deeper than {}, or a node holds itself through a USE",
+                    limits_.maxNesting);
+    int below = 0;
+    for (const Node::SetField& field : node->setFields) {
+        if (const auto* child = std::get_if<NodePtr>(&field.value)) {
+            STX_TRY(const int height, heightOf(*child, depth + 1, known));
+            below = std::max(below, height);
+        } else if (const auto* list = std::get_if<NodeList>(&field.value)) {
+            for (const NodePtr& item : *list) {
+                STX_TRY(const int height, heightOf(item, depth + 1, known));
+                below = std::max(below, height);
+            }
+        }
+    }
+    known[node.get()] = below + 1;
+    return below + 1;
+}
+
+Result<void> NodeNames::resolve() {
+    const auto put = [](const Pending& p, const NodePtr& node) {
+        FieldValue& value = p.owner->edit(p.field);
+        if (p.item < 0) {
+            value = node;
+        } else {
+            std::get<NodeList>(value)[p.item] = node;
+        }
+    };
+    Result<void> result;
+    for (const Pending& p : pending_) {
+        auto node = target(p.name, p.where);
+        if (!node) {
+            result = propagate(node);
+            break;
+        }
+        const FieldInfo& field = p.owner->info->fields[p.field];
+        if (!mayStandIn(node->get(), field.nodeType)) {
+            result = failAt(p.where, ErrorCode::invalidInput,
+                            "{} '{}' may not stand in {}.{}, which takes {}", (*node)->info->name,
+                            excerpt(p.name), p.owner->info->name, field.name, name(field.nodeType));
+            break;
+        }
+        put(p, *node);
+    }
+    if (result) {
+        std::unordered_map<const Node*, int> known;
+        for (const Pending& p : pending_) {
+            if (auto height = heightOf(p.owner, 1, known); !height) {
+                result = tl::unexpected(height.error().at(p.where));
+                break;
+            }
+        }
+    }
+    // A cycle of owners would never be freed; and trees that nest too deeply must not be walked.
+    if (!result)
+        for (const Pending& p : pending_) put(p, nullptr);
+    pending_.clear();
+    return result;
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "formats/mpeg4/scene/document.hpp"
+
+/// XMT-A, the XML form of BIFS (ISO/IEC 14496-11 annex; bifs.md section 6.2).
+namespace stx::mpeg4 {
+
+/// Reads a presentation: Header with InitialObjectDescriptor (may be missing), Body with Replace,
+/// Insert, Delete, ObjectDescriptorUpdate and `par begin="seconds"`. DEF names like N12 stand for
+/// node ids. Streams get their file names, not their bytes: see loadMedia() in mpeg4.hpp. DTDs are
+/// passed over: no entity but the five of XML is known, none is expanded. `name` is for errors,
+/// which are at `'name':line:column`. Errors (invalidInput): no well-formed XML, what the schema or
+/// the node table does not have, with what was found and what expected.
+[[nodiscard]] Result<Document> readXmt(std::string_view text, const std::string& name, Job& job);
+
+/// The text of a presentation: well-formed XML in UTF-8; readXmt() gives it back, floats to the
+/// bit. Errors (invalidInput) when nodes nest deeper than the job allows. Characters that XML
+/// cannot hold are replaced, with a note.
+[[nodiscard]] Result<std::string> writeXmt(const Document& document, Job& job);
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,469 @@
+#include <iterator>
+
+#include "formats/mpeg4/text/scene_text.hpp"
+#include "formats/mpeg4/text/text_descriptors.hpp"
+#include "formats/mpeg4/text/text_values.hpp"
+#include "formats/mpeg4/text/xmt.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// Bytes of the UTF-8 character at the start of `text` that XML can hold; 0: none.
+int xmlCharacter(std::string_view text) {
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+    const unsigned char first = byte(0);
+    if (first < 0x80) return first >= 32 || first == '\t' || first == '\n' || first == '\r' ? 1 : 0;
+    const int length = first >= 0xF0 && first < 0xF5 ? 4
+                       : first >= 0xE0               ? 3
+                       : first >= 0xC2               ? 2
+                                                     : 0;
+    if (length == 0 || first >= 0xF5 || text.size() < static_cast<std::size_t>(length)) return 0;
+    std::uint32_t code = first & (0x7F >> length);
+    for (int i = 1; i < length; ++i) {
+        if ((byte(i) & 0xC0) != 0x80) return 0;
+        code = code << 6 | (byte(i) & 0x3F);
+    }
+    const std::uint32_t least = length == 2 ? 0x80 : length == 3 ? 0x800 : 0x10000;
+    if (code < least || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000) || code == 0xFFFE ||
+        code == 0xFFFF)
+        return 0;
+    return length;
+}
+
+class XmtWriter {
+  public:
+    XmtWriter(const Document& document, TextNames names, Job& job)
+        : document_(document), names_(std::move(names)), job_(job) {}
+
+    Result<std::string> write() {
+        out_ = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
+        open("XMT-A", {{"xmlns", "urn:mpeg:mpeg4:xmta:schema:2002"}});
+        open("Header");
+        writeInitialDescriptor();
+        close("Header");
+        open("Body");
+        std::size_t od = 0;
+        for (const CommandFrame& frame : document_.frames) {
+            const double seconds =
+                static_cast<double>(frame.time) / document_.sceneStream.timescale;
+            const auto isDue = [&](double limit, bool including) {
+                if (od >= document_.odFrames.size()) return false;
+                const double time =
+                    static_cast<double>(document_.odFrames[od].time) / document_.odStream.timescale;
+                return time < limit || (including && time == limit);
+            };
+            while (isDue(seconds, false)) STX_CHECK(writeOdFrame(document_.odFrames[od++]));
+            beginTime(seconds);
+            for (const Command& command : frame.commands)
+                std::visit([&](const auto& c) { write(c); }, command);
+            endTime(seconds);
+            while (isDue(seconds, true)) STX_CHECK(writeOdFrame(document_.odFrames[od++]));
+        }
+        while (od < document_.odFrames.size()) STX_CHECK(writeOdFrame(document_.odFrames[od++]));
+        close("Body");
+        close("XMT-A");
+        if (replaced_)
+            job_.note("characters that XML cannot hold were replaced in strings of the scene");
+        return std::move(out_);
+    }
+
+  private:
+    // ---- XML
+    struct Attribute {
+        std::string_view name;
+        std::string value;
+    };
+    using Attributes = std::vector<Attribute>;
+
+    void escape(std::string_view text) {
+        while (!text.empty()) {
+            const int length = xmlCharacter(text);
+            if (length == 0) {
+                out_ += "\xEF\xBF\xBD";
+                replaced_ = true;
+                text.remove_prefix(1);
+                continue;
+            }
+            const std::string_view character = text.substr(0, static_cast<std::size_t>(length));
+            switch (character[0]) {
+                case '&':
+                    out_ += "&amp;";
+                    break;
+                case '<':
+                    out_ += "&lt;";
+                    break;
+                case '>':
+                    out_ += "&gt;";
+                    break;
+                case '"':
+                    out_ += "&quot;";
+                    break;
+                case '\n':
+                    out_ += "&#10;";
+                    break;
+                case '\r':
+                    out_ += "&#13;";
+                    break;
+                case '\t':
+                    out_ += "&#9;";
+                    break;
+                default:
+                    out_ += character;
+            }
+            text.remove_prefix(static_cast<std::size_t>(length));
+        }
+    }
+    void begin(std::string_view tag, const Attributes& attributes) {
+        out_.append(static_cast<std::size_t>(depth_), ' ');
+        out_ += '<';
+        out_ += tag;
+        for (const Attribute& attribute : attributes) {
+            out_ += ' ';
+            out_ += attribute.name;
+            out_ += "=\"";
+            escape(attribute.value);
+            out_ += '"';
+        }
+    }
+    void open(std::string_view tag, const Attributes& attributes = {}) {
+        begin(tag, attributes);
+        out_ += ">\n";
+        ++depth_;
+    }
+    void close(std::string_view tag) {
+        --depth_;
+        out_.append(static_cast<std::size_t>(depth_), ' ');
+        out_ += "</";
+        out_ += tag;
+        out_ += ">\n";
+    }
+    void empty(std::string_view tag, const Attributes& attributes = {}) {
+        begin(tag, attributes);
+        out_ += "/>\n";
+    }
+    void beginTime(double seconds) {
+        if (seconds != 0) open("par", {{"begin", textFromDouble(seconds)}});
+    }
+    void endTime(double seconds) {
+        if (seconds != 0) close("par");
+    }
+
+    // ---- Nodes
+    static std::string valueText(const FieldValue& value) {
+        // Single strings and URLs stand as they are, lists of them in quotes.
+        if (const auto* text = std::get_if<std::string>(&value)) return *text;
+        if (const auto* url = std::get_if<Url>(&value); url && url->objectDescriptorId != 0)
+            return fmt::format("od:{}", url->objectDescriptorId);
+        std::string out;
+        appendFieldValue(out, value, TextStyle::xmt);
+        return out;
+    }
+    void writeNode(const NodePtr& node) {
+        if (!node) {
+            empty("NULL");
+            return;
+        }
+        const std::string& type = node->info->name;
+        Attributes attributes;
+        if (const std::string* defName = names_.find(*node)) {
+            if (!names_.firstTime(*node)) {
+                empty(type, {{"USE", *defName}});
+                return;
+            }
+            attributes.push_back({"DEF", *defName});
+        }
+        bool hasNodes = false;
+        for (const Node::SetField& field : node->setFields) {
+            if (std::holds_alternative<NodePtr>(field.value) ||
+                std::holds_alternative<NodeList>(field.value))
+                hasNodes = true;
+            else
+                attributes.push_back(
+                    {node->info->fields[field.index].name, valueText(field.value)});
+        }
+        if (!hasNodes) {
+            empty(type, attributes);
+            return;
+        }
+        open(type, attributes);
+        for (const Node::SetField& field : node->setFields) {
+            const std::string& fieldName = node->info->fields[field.index].name;
+            if (const auto* child = std::get_if<NodePtr>(&field.value)) {
+                open(fieldName);
+                writeNode(*child);
+                close(fieldName);
+            } else if (const auto* list = std::get_if<NodeList>(&field.value)) {
+                if (list->empty()) {
+                    empty(fieldName);
+                    continue;
+                }
+                open(fieldName);
+                for (const NodePtr& item : *list) writeNode(item);
+                close(fieldName);
+            }
+        }
+        close(type);
+    }
+
+    // ---- Commands
+    [[nodiscard]] std::string nameOf(const NodePtr& node) const {
+        const std::string* found = node ? names_.find(*node) : nullptr;
+        return found ? *found : "";
+    }
+    static std::string positionText(Position position) {
+        return position.index == Position::kLast ? "END" : fmt::format("{}", position.index);
+    }
+    static std::string fieldName(const NodePtr& node, int field) {
+        return node->info->fields[field].name;
+    }
+    void writeRoute(const Route& route) {
+        Attributes attributes;
+        if (std::string text = textNameOf(route); !text.empty())
+            attributes.push_back({"DEF", std::move(text)});
+        attributes.push_back({"fromNode", nameOf(route.from)});
+        attributes.push_back({"fromField", fieldName(route.from, route.fromField)});
+        attributes.push_back({"toNode", nameOf(route.to)});
+        attributes.push_back({"toField", fieldName(route.to, route.toField)});
+        empty("ROUTE", attributes);
+    }
+    void writeWithValue(std::string_view tag, Attributes attributes, const FieldValue& value) {
+        if (const auto* node = std::get_if<NodePtr>(&value)) {
+            open(tag, attributes);
+            writeNode(*node);
+            close(tag);
+        } else if (const auto* list = std::get_if<NodeList>(&value)) {
+            open(tag, attributes);
+            for (const NodePtr& item : *list) writeNode(item);
+            close(tag);
+        } else {
+            attributes.push_back({"value", valueText(value)});
+            empty(tag, attributes);
+        }
+    }
+    void write(const ReplaceScene& c) {
+        open("Replace");
+        open("Scene");
+        if (c.root) writeNode(c.root);
+        for (const Route& route : c.routes) writeRoute(route);
+        close("Scene");
+        close("Replace");
+    }
+    void write(const ReplaceNode& c) {
+        writeWithValue("Replace", {{"atNode", nameOf(c.target)}}, FieldValue(c.replacement));
+    }
+    void write(const ReplaceField& c) {
+        writeWithValue("Replace",
+                       {{"atNode", nameOf(c.target)}, {"atField", fieldName(c.target, c.field)}},
+                       c.value);
+    }
+    void write(const ReplaceIndexed& c) {
+        writeWithValue("Replace",
+                       {{"atNode", nameOf(c.target)},
+                        {"atField", fieldName(c.target, c.field)},
+                        {"position", positionText(c.position)}},
+                       c.value);
+    }
+    void write(const ReplaceRoute& c) {
+        open("Replace", {{"atRoute", fmt::format("R{}", c.routeId - 1)}});
+        writeRoute(c.route);
+        close("Replace");
+    }
+    void write(const InsertNode& c) {
+        writeWithValue("Insert",
+                       {{"atNode", nameOf(c.target)}, {"position", positionText(c.position)}},
+                       FieldValue(c.node));
+    }
+    void write(const InsertIndexed& c) {
+        writeWithValue("Insert",
+                       {{"atNode", nameOf(c.target)},
+                        {"atField", fieldName(c.target, c.field)},
+                        {"position", positionText(c.position)}},
+                       c.value);
+    }
+    void write(const InsertRoute& c) {
+        open("Insert");
+        writeRoute(c.route);
+        close("Insert");
+    }
+    void write(const DeleteNode& c) { empty("Delete", {{"atNode", nameOf(c.target)}}); }
+    void write(const DeleteIndexed& c) {
+        empty("Delete", {{"atNode", nameOf(c.target)},
+                         {"atField", fieldName(c.target, c.field)},
+                         {"position", positionText(c.position)}});
+    }
+    void write(const DeleteRoute& c) {
+        empty("Delete", {{"atRoute", fmt::format("R{}", c.routeId - 1)}});
+    }
+
+    // ---- Descriptors
+    template <class T>
+    static void add(Attributes& attributes, std::string_view name, T value, T unless) {
+        if (value != unless) attributes.push_back({name, fmt::format("{}", value)});
+    }
+    void writeConfig(const BifsConfig& config) {
+        const bool v2 = config.version == 2;
+        const std::string_view type = v2 ? "BIFSv2Config" : "BIFSConfig";
+        Attributes attributes;
+        if (v2) {
+            add(attributes, "use3DMeshCoding", config.use3DMeshCoding, false);
+            add(attributes, "usePredictiveMFField", config.usePredictiveMFField, false);
+        }
+        add(attributes, "nodeIDbits", config.nodeIdBits, 0);
+        add(attributes, "routeIDbits", config.routeIdBits, 0);
+        if (v2) add(attributes, "protoIDbits", config.protoIdBits, 0);
+        open("decSpecificInfo");
+        open(type, attributes);
+        const Attributes metric = {{"pixelMetric", config.pixelMetric ? "true" : "false"}};
+        if (config.hasSize) {
+            open("commandStream", metric);
+            empty("size", {{"pixelWidth", fmt::format("{}", config.pixelWidth)},
+                           {"pixelHeight", fmt::format("{}", config.pixelHeight)}});
+            close("commandStream");
+        } else {
+            empty("commandStream", metric);
+        }
+        close(type);
+        close("decSpecificInfo");
+    }
+    void writeStream(const ElementaryStream& stream, const BifsConfig* config) {
+        Attributes attributes;
+        if (stream.esId != 0)
+            attributes = {{"ES_ID", fmt::format("es{}", stream.esId)},
+                          {"binaryID", fmt::format("{}", stream.esId)}};
+        if (stream.dependsOnEsId)
+            attributes.push_back({"dependsOn_ES_ID", fmt::format("es{}", *stream.dependsOnEsId)});
+        if (stream.ocrEsId)
+            attributes.push_back({"OCR_ES_ID", fmt::format("es{}", *stream.ocrEsId)});
+        add<int>(attributes, "streamPriority", stream.streamPriority, 0);
+        if (!stream.url.empty()) attributes.push_back({"URLstring", stream.url});
+        open("ES_Descriptor", attributes);
+
+        Attributes decoder;
+        add<int>(decoder, "objectTypeIndication", stream.objectTypeIndication, 0);
+        decoder.push_back({"streamType", fmt::format("{}", static_cast<int>(stream.streamType))});
+        add(decoder, "upStream", stream.upStream, false);
+        add(decoder, "bufferSizeDB", stream.bufferSizeDB, 0u);
+        add(decoder, "maxBitrate", stream.maxBitrate, 0u);
+        add(decoder, "avgBitrate", stream.avgBitrate, 0u);
+        open("decConfigDescr");
+        if (config || !stream.decoderSpecificInfo.empty()) {
+            open("DecoderConfigDescriptor", decoder);
+            if (config) {
+                writeConfig(*config);
+            } else {
+                open("decSpecificInfo");
+                empty("DecoderSpecificInfo",
+                      {{"type", "auto"},
+                       {"src", "data:application/octet-string," +
+                                   percentText(stream.decoderSpecificInfo)}});
+                close("decSpecificInfo");
+            }
+            close("DecoderConfigDescriptor");
+        } else {
+            empty("DecoderConfigDescriptor", decoder);
+        }
+        close("decConfigDescr");
+        if (stream.timescale != 1000) {
+            open("slConfigDescr");
+            open("SLConfigDescriptor");
+            empty("custom", {{"useAccessUnitStartFlag", "true"},
+                             {"useAccessUnitEndFlag", "true"},
+                             {"timeStampResolution", fmt::format("{}", stream.timescale)},
+                             {"timeStampLength", "32"}});
+            close("SLConfigDescriptor");
+            close("slConfigDescr");
+        }
+        if (!stream.fileName.empty() && !stream.samples.empty()) {
+            const MuxTimes times = muxTimes(stream);
+            Attributes mux = {{"url", stream.fileName}};
+            add(mux, "startTime", times.startMs, 0.0);
+            add(mux, "frameRate", times.frameRate, 0.0);
+            if (times.frameRate != 0 || times.durationMs != 1000)
+                mux.push_back({"duration", textFromDouble(times.durationMs)});
+            empty("StreamSource", mux);
+        }
+        close("ES_Descriptor");
+    }
+    void writeInitialDescriptor() {
+        const InitialObjectDescriptor& iod = document_.iod;
+        Attributes attributes = {{"objectDescriptorID", fmt::format("od{}", iod.id)},
+                                 {"binaryID", fmt::format("{}", iod.id)}};
+        if (!iod.url.empty()) attributes.push_back({"URLstring", iod.url});
+        open("InitialObjectDescriptor", attributes);
+        Attributes profiles;
+        add(profiles, "includeInlineProfileLevelFlag", iod.includeInlineProfileLevel, false);
+        profiles.push_back({"ODProfileLevelIndication", fmt::format("{}", iod.odProfileLevel)});
+        profiles.push_back(
+            {"sceneProfileLevelIndication", fmt::format("{}", iod.sceneProfileLevel)});
+        profiles.push_back(
+            {"audioProfileLevelIndication", fmt::format("{}", iod.audioProfileLevel)});
+        profiles.push_back(
+            {"visualProfileLevelIndication", fmt::format("{}", iod.visualProfileLevel)});
+        profiles.push_back(
+            {"graphicsProfileLevelIndication", fmt::format("{}", iod.graphicsProfileLevel)});
+        empty("Profiles", profiles);
+        open("Descr");
+        open("esDescr");
+        writeStream(sceneStreamForText(document_), &document_.bifsConfig);
+        if (hasOdStream(document_)) writeStream(odStreamForText(document_), nullptr);
+        close("esDescr");
+        close("Descr");
+        close("InitialObjectDescriptor");
+    }
+    void writeOd(const ObjectDescriptor& od) {
+        Attributes attributes = {{"objectDescriptorID", fmt::format("od{}", od.id)},
+                                 {"binaryID", fmt::format("{}", od.id)}};
+        if (!od.url.empty()) attributes.push_back({"URLstring", od.url});
+        if (od.streams.empty()) {
+            empty("ObjectDescriptor", attributes);
+            return;
+        }
+        open("ObjectDescriptor", attributes);
+        open("Descr");
+        open("esDescr");
+        for (const ElementaryStream& stream : od.streams) writeStream(stream, nullptr);
+        close("esDescr");
+        close("Descr");
+        close("ObjectDescriptor");
+    }
+    Result<void> writeOdFrame(const OdFrame& frame) {
+        const double seconds = static_cast<double>(frame.time) / document_.odStream.timescale;
+        beginTime(seconds);
+        for (const OdCommand& command : frame.commands) {
+            if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
+                open("ObjectDescriptorUpdate");
+                open("OD");
+                for (const ObjectDescriptor& od : update->descriptors) writeOd(od);
+                close("OD");
+                close("ObjectDescriptorUpdate");
+            } else if (const auto* remove = std::get_if<RemoveObjectDescriptors>(&command)) {
+                std::string ids;
+                for (const int id : remove->ids)
+                    ids += fmt::format("{}od{}", ids.empty() ? "" : " ", id);
+                empty("ObjectDescriptorRemove", {{"objectDescriptorID", ids}});
+            } else {
+                return fail(ErrorCode::unsupported,
+                            "the object descriptors change single streams or carry IPMP, which the "
+                            "text forms here do not have; keep this presentation as .mp4");
+            }
+        }
+        endTime(seconds);
+        return {};
+    }
+
+    const Document& document_;
+    TextNames names_;
+    Job& job_;
+    std::string out_;
+    int depth_ = 0;
+    bool replaced_ = false;
+};
+
+}  // namespace
+
+Result<std::string> writeXmt(const Document& document, Job& job) {
+    STX_TRY(auto names, TextNames::make(document, job.limits));
+    return XmtWriter(document, std::move(names), job).write();
+}
+
+}  // namespace stx::mpeg4

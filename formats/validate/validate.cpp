@@ -1,0 +1,544 @@
+#include "formats/validate/validate.hpp"
+
+#include <cassert>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "formats/mpeg4/mapping/octree.hpp"
+#include "formats/mpeg4/mapping/point_texture.hpp"
+#include "formats/mpeg4/mapping/stream_images.hpp"
+#include "formats/mpeg4/mapping/texture_images.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
+#include "formats/mpeg4/scene/scene_walk.hpp"
+#include "formats/validate/validate_findings.hpp"
+
+namespace stx {
+
+using namespace mpeg4;
+
+namespace {
+
+class DocumentValidator {
+  public:
+    DocumentValidator(const Document& document, const ValidateOptions& options, Job& job)
+        : document_(document), options_(options), job_(job) {}
+
+    std::vector<Finding> run() {
+        checkContainer();
+        checkDescriptors();
+        checkScene();
+        return std::move(findings_.list);
+    }
+
+  private:
+    void add(int rule, std::string where, std::string found, std::string expected) {
+        findings_.add(rule, std::move(where), std::move(found), std::move(expected));
+    }
+
+    // ---- Container
+    static int ruleOf(Mp4Departure::Kind kind) {
+        using Kind = Mp4Departure::Kind;
+        switch (kind) {
+            case Kind::noIods:
+                return 2001;
+            case Kind::sceneNotInIods:
+                return 2002;
+            case Kind::imageInSystemsEntry:
+                return 2003;
+            case Kind::imageInNativeEntry:
+                return 2004;
+            case Kind::fullEsdInOd:
+                return 2005;
+            case Kind::mpodMissing:
+                return 2006;
+            case Kind::streamNotFound:
+                return 2007;
+            case Kind::streamOdTag:
+                return 2008;
+            case Kind::noOdTrack:
+                return 2009;
+            case Kind::esIdNotZero:
+                return 2010;
+            case Kind::trailingBytes:
+                return 2011;
+            case Kind::other:
+                break;
+        }
+        return 2012;
+    }
+    void checkContainer() {
+        if (!document_.mp4) return;
+        for (const Mp4Departure& departure : document_.mp4->departures) {
+            const int rule = ruleOf(departure.kind);
+            add(rule, departure.where, departure.text, findRule(rule)->summary);
+        }
+    }
+
+    // ---- Descriptors
+    static std::string odName(int id) { return fmt::format("object descriptor {}", id); }
+    void checkDescriptors() {
+        std::set<std::uint32_t> esIds;
+        const auto checkEsId = [&](const ElementaryStream& stream, const std::string& where) {
+            if (stream.esId != 0 && !esIds.insert(stream.esId).second)
+                add(2028, where, fmt::format("ES_ID {} a second time", stream.esId),
+                    "an ES_ID of its own");
+        };
+        checkEsId(document_.sceneStream, "scene stream");
+        checkEsId(document_.odStream, "OD stream");
+        const int oti = document_.sceneStream.objectTypeIndication;
+        if (oti != 0 && oti != document_.bifsConfig.version)
+            add(2027, "scene stream",
+                fmt::format("objectTypeIndication {} with a config of version {}", oti,
+                            document_.bifsConfig.version),
+                fmt::format("objectTypeIndication {}", document_.bifsConfig.version));
+
+        std::set<int> named;
+        for (const CommandFrame& frame : document_.frames)
+            for (const Command& command : frame.commands) {
+                forEachNode(command, [&](const NodePtr& node) {
+                    for (const Node::SetField& field : node->setFields)
+                        collectUrls(field.value, named);
+                });
+                std::visit(
+                    [&](const auto& c) {
+                        if constexpr (requires { c.value; }) collectUrls(c.value, named);
+                    },
+                    command);
+            }
+        std::set<int> present;
+        for (const OdFrame& frame : document_.odFrames) {
+            for (const OdCommand& command : frame.commands) {
+                const auto* update = std::get_if<UpdateObjectDescriptors>(&command);
+                if (!update) continue;
+                std::set<int> inUpdate;
+                for (const ObjectDescriptor& od : update->descriptors) {
+                    if (od.id < 1 || od.id > 1022)
+                        add(2021, odName(od.id), fmt::format("the id {}", od.id), "1 to 1022");
+                    if (!inUpdate.insert(od.id).second)
+                        add(2022, odName(od.id), "the id twice in one update", "each id once");
+                    present.insert(od.id);
+                    for (const ElementaryStream& stream : od.streams) {
+                        checkEsId(stream, odName(od.id));
+                        checkImageStream(od, stream);
+                    }
+                }
+            }
+        }
+        for (const int id : named)
+            if (!present.contains(id))
+                add(2020, odName(id), "no such object descriptor", "one, since the scene names it");
+        for (const int id : present)
+            if (!named.contains(id))
+                add(2024, odName(id), "no node that names it", "a url of a texture");
+    }
+    static void collectUrls(const FieldValue& value, std::set<int>& ids) {
+        if (const auto* url = std::get_if<Url>(&value); url && url->objectDescriptorId != 0)
+            ids.insert(url->objectDescriptorId);
+        if (const auto* urls = std::get_if<std::vector<Url>>(&value))
+            for (const Url& url : *urls)
+                if (url.objectDescriptorId != 0) ids.insert(url.objectDescriptorId);
+    }
+    void checkImageStream(const ObjectDescriptor& od, const ElementaryStream& stream) {
+        if (stream.streamType != StreamType::visual && stream.streamType != StreamType::none)
+            return;
+        if (stream.url.empty() && (stream.samples.empty() || stream.samples[0].data.size == 0)) {
+            add(2023, odName(od.id), "a stream without a picture", "a JPEG or PNG file in it");
+            return;
+        }
+        if (stream.samples.empty()) return;
+        if (stream.objectTypeIndication != oti::kJpeg && stream.objectTypeIndication != oti::kPng) {
+            add(2026, odName(od.id),
+                fmt::format("objectTypeIndication 0x{:02X}", stream.objectTypeIndication),
+                "0x6C (JPEG) or 0x6D (PNG)");
+            return;
+        }
+        ByteRange head = stream.samples[0].data;
+        head.size = std::min<std::uint64_t>(head.size, 4);
+        const auto bytes = head.load(job_.limits);
+        if (!bytes || bytes->size() < 3) return;
+        const bool jpeg = (*bytes)[0] == std::byte{0xFF} && (*bytes)[1] == std::byte{0xD8};
+        const bool png = (*bytes)[0] == std::byte{0x89} && (*bytes)[1] == std::byte{'P'};
+        const bool saysJpeg = stream.objectTypeIndication == oti::kJpeg;
+        if ((saysJpeg && !jpeg) || (!saysJpeg && !png))
+            add(2025, odName(od.id),
+                jpeg  ? "a JPEG"
+                : png ? "a PNG"
+                      : "neither JPEG nor PNG",
+                saysJpeg ? "a JPEG (0x6C)" : "a PNG (0x6D)");
+    }
+
+    // ---- Scene
+    void checkScene() {
+        const bool hasScene =
+            !document_.frames.empty() && !document_.frames[0].commands.empty() &&
+            std::holds_alternative<ReplaceScene>(document_.frames[0].commands[0]) &&
+            std::get<ReplaceScene>(document_.frames[0].commands[0]).root;
+        if (!hasScene) {
+            add(2030, "scene", "no scene in the first command",
+                "a command that replaces the scene");
+            return;
+        }
+        if (const auto last = composeScene(document_.frames); !last)
+            add(2031, "scene", last.error().text(), "commands that fit");
+        const auto scene = composeScene(document_.frames, document_.frames[0].time);
+        if (!scene) return;
+        const auto shown = shownScene(scene->root, job_.limits);
+        if (!shown) {
+            add(2031, "scene", shown.error().text(), "a scene that can be walked");
+            return;
+        }
+        auto images = StreamImages::make(document_, options_.folder, job_.limits);
+        if (!images) return;
+        images_ = &*images;
+        int index = 0;
+        for (const ShownNode& node : shown->nodes) {
+            const auto world = similarityFrom(node.worldFromLocal);
+            const std::string where = nameOf(*node.node, index);
+            if (!world) add(3006, where, world.error().message, "one scale above 0 for all axes");
+            if (node.node->is("OctreeImage")) {
+                checkOctree(*node.node, where);
+                for (const NodePtr& image : node.node->get<NodeList>("images"))
+                    if (image) checkDepthImage(*image, nameOf(*image, index++), true);
+            } else {
+                checkDepthImage(*node.node, where, false);
+                ++index;
+            }
+        }
+        if (index == 0) add(4014, "scene", "no DepthImage that is shown", "one at least");
+        checkObject(*shown);
+        if (options_.pixels && decoded_ > 0 && decoded_ == emptyViews_)
+            add(4007, "scene", "no point in any view", "points (depth codes above 0)");
+    }
+    static std::string nameOf(const Node& node, int index) {
+        const std::string kind = node.is("OctreeImage") ? "OctreeImage" : "view";
+        return node.defName.empty() ? fmt::format("{} {}", kind, index)
+                                    : fmt::format("{} {} '{}'", kind, index, node.defName);
+    }
+
+    void checkObject(const ShownScene& shown) {
+        std::map<int, int> perGroup;
+        std::set<std::pair<const Node*, std::string>> places;
+        for (const ShownNode& node : shown.nodes) {
+            if (!node.node->is("OctreeImage")) ++perGroup[node.parent];
+            std::string place;
+            for (int c = 0; c < 4; ++c)
+                for (int r = 0; r < 4; ++r) place += fmt::format("{} ", node.worldFromLocal[c][r]);
+            if (!places.insert({node.node.get(), place}).second)
+                add(4021, nameOf(*node.node, 0), "the same node twice in one place", "it once");
+        }
+        bool oneEach = perGroup.size() > 1;
+        for (const auto& [group, count] : perGroup) oneEach = oneEach && count == 1;
+        if (oneEach)
+            add(4020, "scene",
+                fmt::format("{} grouping nodes with one DepthImage each", perGroup.size()),
+                "the views of an object together under one (points of one group are united)");
+    }
+
+    void checkOctree(const Node& node, const std::string& where) {
+        const auto octree = Octree::parse(node.get<std::vector<std::int32_t>>("octree"),
+                                          node.get<std::int32_t>("octreeResolution"), job_.limits);
+        if (!octree) {
+            add(4013, where, octree.error().message, "a whole octree");
+        } else if (octree->unusedBytes() > 0) {
+            add(4013, where, fmt::format("{} bytes behind the octree", octree->unusedBytes()),
+                "none");
+        }
+        for (const NodePtr& image : node.get<NodeList>("images"))
+            if (image && !image->get<bool>("orthographic"))
+                add(4013, where, "an image with orthographic FALSE", "orthographic images");
+    }
+
+    void checkCamera(const Node& node, const std::string& where, bool inOctree) {
+        const auto position = node.get<glm::vec3>("position");
+        const auto orientation = node.get<Rotation>("orientation");
+        const auto fov = node.get<glm::vec2>("fieldOfView");
+        const float nearPlane = node.get<float>("nearPlane"),
+                    farPlane = node.get<float>("farPlane");
+        bool finite = true;
+        for (const float v :
+             {position.x, position.y, position.z, orientation.axis.x, orientation.axis.y,
+              orientation.axis.z, orientation.angle, fov.x, fov.y, nearPlane, farPlane})
+            finite = finite && std::isfinite(v);
+        if (!finite) {
+            add(3005, where, "a value that is not finite in its camera", "finite numbers");
+            return;
+        }
+        const bool orthographic = node.get<bool>("orthographic");
+        if (!inOctree) {  // there, depth is not used
+            if (!(nearPlane < farPlane))
+                add(3001, where, fmt::format("nearPlane {} and farPlane {}", nearPlane, farPlane),
+                    "nearPlane < farPlane");
+            if (nearPlane < 0)
+                add(3002, where, fmt::format("nearPlane {}", nearPlane), "0 or more");
+            if (nearPlane == 0 && !orthographic) add(3007, where, "nearPlane 0", "more than 0");
+        }
+        const float highest = orthographic ? std::numeric_limits<float>::max() : 3.1415927f;
+        if (!(fov.x > 0 && fov.y > 0 && fov.x < highest && fov.y < highest))
+            add(3003, where,
+                fmt::format("fieldOfView {} {} with orthographic {}", fov.x, fov.y, orthographic),
+                orthographic ? "sides above 0" : "angles between 0 and 3.1415927");
+        const float length = glm::length(orientation.axis);
+        if (std::abs(length - 1.0f) > 1e-3f && orientation.angle != 0)
+            add(3004, where, fmt::format("an axis of length {:.6g} in orientation", length),
+                "length 1");
+        if (!inOctree && !node.isSet("orthographic") && !node.isSet("fieldOfView"))
+            add(3008, where,
+                fmt::format("orthographic TRUE and fieldOfView {} {} by default", fov.x, fov.y),
+                "one of them given");
+    }
+
+    void checkDepthImage(const Node& node, const std::string& where, bool inOctree) {
+        checkCamera(node, where, inOctree);
+        const NodePtr& texture = node.get<NodePtr>("diTexture");
+        if (!texture) {
+            add(4009, where, "diTexture NULL", "a SimpleTexture or PointTexture");
+            return;
+        }
+        if (texture->info->find("depthNbBits") >= 0) {
+            checkPointTexture(node, *texture, where);
+        } else {
+            checkSimpleTexture(node, *texture, where, inOctree);
+        }
+    }
+
+    void checkPointTexture(const Node& node, const Node& texture, const std::string& where) {
+        ReferenceView view;
+        view.nearPlane = node.get<float>("nearPlane");
+        view.farPlane = node.get<float>("farPlane");
+        if (texture.get<std::vector<std::int32_t>>("depth").empty()) {
+            add(4009, where, "a PointTexture without points", "points");
+            return;
+        }
+        const auto views = viewsFromPointTexture(texture, view, job_.limits);
+        if (!views) {
+            add(4012, where, views.error().message, "lists that fit");
+            return;
+        }
+        ++decoded_;
+        std::int64_t points = 0;
+        for (const ReferenceView& layer : *views) points += layer.pointCount();
+        if (points == 0) countEmpty(where);
+    }
+    void countEmpty(const std::string& where) {
+        ++emptyViews_;
+        add(4006, where, "no point (all depth codes are 0)", "one point at least");
+    }
+
+    std::optional<ImageInfo> infoOf(const NodePtr& node, const std::string& where,
+                                    std::string_view what) {
+        auto info = images_->probe(*node);
+        if (info) return *info;
+        // An image that is not there is told by the rules on descriptors.
+        const ElementaryStream* stream = images_->stream(*node);
+        const bool told = stream && (stream->samples.empty() || stream->samples[0].data.size == 0);
+        bool missing = false;
+        if (const int url = node->info->find("url"); url >= 0 && !stream)
+            if (const auto* urls = std::get_if<std::vector<Url>>(&node->value(url)))
+                missing = !urls->empty() && urls->front().objectDescriptorId != 0;
+        if (!told && !missing)
+            add(4005, where, fmt::format("{}: {}", what, info.error().message), "an image");
+        return {};
+    }
+
+    void checkSimpleTexture(const Node& node, const Node& texture, const std::string& where,
+                            bool inOctree) {
+        const NodePtr& colour = texture.get<NodePtr>("texture");
+        const NodePtr& depth = texture.get<NodePtr>("depth");
+        if (!colour && !depth) {
+            add(4009, where, "a texture without images", "texture and depth");
+            return;
+        }
+        const auto colourInfo = colour ? infoOf(colour, where, "texture") : std::nullopt;
+        const auto depthInfo = depth ? infoOf(depth, where, "depth") : std::nullopt;
+        const bool hasAlpha =
+            colourInfo && (colourInfo->channels == 2 || colourInfo->channels == 4);
+        if (!depth && !inOctree && colourInfo && !hasAlpha)
+            add(4003, where,
+                fmt::format("depth NULL and a texture with {} channels", colourInfo->channels),
+                "a depth image, or alpha");
+        if (depthInfo) {
+            if (colourInfo &&
+                (colourInfo->width != depthInfo->width || colourInfo->height != depthInfo->height))
+                add(4001, where,
+                    fmt::format("depth {} and texture {}",
+                                sizeText(depthInfo->width, depthInfo->height),
+                                sizeText(colourInfo->width, colourInfo->height)),
+                    "one size");
+            if (depthInfo->format == "jpeg" && !inOctree) add(4004, where, "depth as JPEG", "PNG");
+            if (depthInfo->channels >= 3)
+                add(4002, where, fmt::format("a depth image with {} channels", depthInfo->channels),
+                    "1");
+            if (depthInfo->channels == 2) add(4008, where, "a depth image with alpha", "grey only");
+            if (depthInfo->bits != 8 && depthInfo->bits != 16)
+                add(4011, where, fmt::format("depth of {} bits", depthInfo->bits), "8 or 16");
+        }
+        const auto& size = depthInfo ? depthInfo : colourInfo;
+        checkVectorImages(node, texture, where, size);
+        if (options_.pixels && !inOctree) checkPixels(node, texture, where);
+    }
+
+    void checkVectorImages(const Node& node, const Node& texture, const std::string& where,
+                           const std::optional<ImageInfo>& size) {
+        if (!texture.is("SimpleTextureV2")) return;
+        for (const char* field : {"normal", "splatU", "splatV"}) {
+            const NodePtr& image = texture.get<NodePtr>(field);
+            const auto info = image ? infoOf(image, where, field) : std::nullopt;
+            if (!info) continue;
+            if (size && (info->width != size->width || info->height != size->height))
+                add(6001, where,
+                    fmt::format("{} {} and depth {}", field, sizeText(info->width, info->height),
+                                sizeText(size->width, size->height)),
+                    "one size");
+            if (info->channels < 3)
+                add(6002, where, fmt::format("{} with {} channel(s)", field, info->channels),
+                    "RGB");
+        }
+        const bool u = texture.get<NodePtr>("splatU") != nullptr,
+                   v = texture.get<NodePtr>("splatV") != nullptr;
+        if (u != v)
+            add(6003, where, u ? "splatU without splatV" : "splatV without splatU",
+                "both or neither");
+        if (!u && !v) return;
+        const int minMax = node.info->find("splatMinMax");
+        if (minMax < 0) {
+            add(6006, where, "splats in a DepthImage, which has no splatMinMax", "a DepthImageV2");
+            return;
+        }
+        if (!node.isSet(minMax))
+            add(6004, where, "splatMinMax by default", "the range of the splats");
+        const glm::vec2 range = std::get<glm::vec2>(node.value(minMax));
+        if (!(range.x < range.y) || !std::isfinite(range.x) || !std::isfinite(range.y))
+            add(6005, where, fmt::format("splatMinMax {} {}", range.x, range.y), "a range");
+    }
+
+    void checkPixels(const Node& node, const Node& texture, const std::string& where) {
+        const auto decode = [&](const NodePtr& image,
+                                std::string_view what) -> std::optional<DecodedImage> {
+            if (!images_->probe(*image)) return {};  // told already
+            auto decoded = images_->decode(*image, options_.decode, job_.limits);
+            if (decoded) return std::move(*decoded);
+            add(4005, where, fmt::format("{}: {}", what, decoded.error().text()),
+                "an image that can be decoded");
+            return {};
+        };
+        const NodePtr& colourNode = texture.get<NodePtr>("texture");
+        const NodePtr& depthNode = texture.get<NodePtr>("depth");
+        std::optional<DecodedImage> depth, colour;
+        if (colourNode) colour = decode(colourNode, "texture");
+        if (depthNode) depth = decode(depthNode, "depth");
+        const DecodedImage* codes = depth ? &*depth : !depthNode && colour ? &*colour : nullptr;
+        if (!codes) return;
+        const bool alpha = codes->channels == 2 || codes->channels == 4;
+        if (!depth && !alpha) return;
+        const int channel = depth ? 0 : codes->channels - 1;
+        std::uint32_t highest = 0;
+        std::visit(
+            [&](const auto& values) {
+                for (std::size_t i = static_cast<std::size_t>(channel); i < values.size();
+                     i += static_cast<std::size_t>(codes->channels))
+                    highest = std::max(highest, static_cast<std::uint32_t>(values[i]));
+            },
+            codes->values);
+        ++decoded_;
+        if (highest == 0) countEmpty(where);
+        if (codes->bits() == 16 && highest > 0 && highest <= 255)
+            add(4010, where, fmt::format("16-bit depth codes that end at {}", highest),
+                "codes up to 65535: all of it lies at the far plane");
+        if (!texture.is("SimpleTextureV2")) return;
+        const NodePtr& normalNode = texture.get<NodePtr>("normal");
+        const float nearPlane = node.get<float>("nearPlane"),
+                    farPlane = node.get<float>("farPlane");
+        const glm::vec2 fov = node.get<glm::vec2>("fieldOfView");
+        if (!normalNode || !(nearPlane < farPlane) || !(fov.x > 0 && fov.y > 0)) return;
+        const auto normals = decode(normalNode, "normal");
+        if (!normals || normals->width != codes->width || normals->height != codes->height ||
+            normals->channels < 3)
+            return;
+        ReferenceView view;
+        const auto distances = depthFromImage(*codes, channel, nearPlane, farPlane);
+        if (!distances) return;
+        view.depth = *distances;
+        const auto vectors = normalsFromImage(*normals, view.depth);
+        if (!vectors) return;
+        view.normal = *vectors;
+        checkNormalLengths(*normals, view.depth, where);
+        view.camera = Camera::fromFieldOfView(
+            glm::dvec3(node.get<glm::vec3>("position")),
+            quatFromAxisAngle(axisAngle(node.get<Rotation>("orientation"))), glm::dvec2(fov),
+            node.get<bool>("orthographic"), codes->width, codes->height);
+        checkVectors(view, where, findings_);
+    }
+    void checkNormalLengths(const DecodedImage& image, const Image<float>& depth,
+                            const std::string& where) {
+        std::int64_t count = 0, off = 0;
+        std::visit(
+            [&](const auto& values) {
+                const double cmax = image.bits() == 8 ? 255.0 : 65535.0;
+                for (std::size_t i = 0; i < depth.count(); ++i) {
+                    if (!hasPoint(depth.pixels()[i])) continue;
+                    glm::dvec3 n;
+                    bool zero = true;
+                    for (int c = 0; c < 3; ++c) {
+                        const auto code = values[i * static_cast<std::size_t>(image.channels) + c];
+                        zero = zero && code == 0;
+                        n[c] = 2.0 * static_cast<double>(code) / cmax - 1.0;
+                    }
+                    if (zero) continue;  // no normal
+                    ++count;
+                    if (std::abs(glm::length(n) - 1.0) > 0.05) ++off;
+                }
+            },
+            image.values);
+        if (off * 100 > count)
+            add(6007, where, fmt::format("{} of {} normals with another length", off, count),
+                "length 1");
+    }
+
+    const Document& document_;
+    const ValidateOptions& options_;
+    Job& job_;
+    Findings findings_;
+    const StreamImages* images_ = nullptr;
+    int decoded_ = 0;
+    int emptyViews_ = 0;
+};
+
+}  // namespace
+
+std::vector<Finding> validate(const Mpeg4Document& document, const ValidateOptions& options,
+                              Job& job) {
+    return DocumentValidator(document, options, job).run();
+}
+
+Result<std::vector<Finding>> validateMpeg4File(const std::filesystem::path& path,
+                                               const ValidateOptions& options, Job& job) {
+    ValidateOptions here = options;
+    if (here.folder.empty()) here.folder = path.has_parent_path() ? path.parent_path() : ".";
+    const auto document = readMpeg4(path, job);
+    Findings findings;
+    if (!document) {
+        if (document.error().code == ErrorCode::io && !std::filesystem::exists(path))
+            return tl::unexpected(document.error());
+        findings.add(1001, "", document.error().text(), "a presentation that can be read");
+        return findings.list;
+    }
+    if (path != "-") {
+        const auto source = ByteSource::open(path);
+        Bytes head(source ? static_cast<std::size_t>(std::min<std::uint64_t>(source->size(), 4096))
+                          : 0);
+        if (source && source->read(0, head)) {
+            const auto content = mpeg4ContainerOf(ByteSpan(head)), ending = mpeg4ContainerOf(path);
+            if (content && ending && *content != *ending)
+                findings.add(1002, "", fmt::format("the ending '{}'", path.extension().string()),
+                             *content == Mpeg4Container::mp4  ? ".mp4"
+                             : *content == Mpeg4Container::bt ? ".bt"
+                                                              : ".xmt");
+        }
+    }
+    auto rest = validate(*document, here, job);
+    findings.list.insert(findings.list.end(), rest.begin(), rest.end());
+    return findings.list;
+}
+
+}  // namespace stx

@@ -1,0 +1,153 @@
+#include "lib/render/finish/footprint.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+/// Points that are looked at in each view, along a side.
+constexpr int kGrid = 24;
+/// Below this renderers do well by themselves.
+constexpr double kEnough = 1.5;
+constexpr int kMostFactor = 16;
+/// Pixels of the larger picture.
+constexpr double kMostPixels = 16e6;
+/// Bytes of one of its pixels: colour, albedo, normal, depth, and what surface mode keeps beside.
+constexpr std::uint64_t kBytesEach = 64;
+
+class FootprintRenderer final : public Renderer {
+  public:
+    FootprintRenderer(std::unique_ptr<Renderer> inner, const Bundle& bundle, const Limits& limits)
+        : inner_(std::move(inner)), footprint_(bundle), limits_(limits) {}
+
+    Result<Frame> render(const Camera& camera) override {
+        STX_CHECK(camera.check());
+        const int factor = factorOf(camera);
+        if (factor == 1) return inner_->render(camera);
+        STX_TRY(const Frame large, inner_->render(enlarged(camera, factor)));
+        return minified(large, factor);
+    }
+    void expect(const Camera& next) override {
+        if (next.check()) inner_->expect(enlarged(next, factorOf(next)));
+    }
+    std::string backend() const override { return inner_->backend(); }
+    std::string device() const override { return inner_->device(); }
+
+  private:
+    static Camera enlarged(const Camera& camera, int factor) {
+        return factor == 1 ? camera : camera.resized(camera.width * factor, camera.height * factor);
+    }
+    [[nodiscard]] int factorOf(const Camera& camera) const {
+        const double ratio = footprint_.samplesPerPixel(camera);
+        if (!(ratio > kEnough)) return 1;
+        int factor = static_cast<int>(std::lround(std::min(ratio, double{kMostFactor})));
+        const double pixels = static_cast<double>(camera.width) * camera.height;
+        const auto fits = [&] {
+            const double large = pixels * factor * factor;
+            return large <= kMostPixels &&
+                   limits_.checkAllocation(static_cast<std::uint64_t>(large), kBytesEach, "");
+        };
+        while (factor > 1 && !fits()) --factor;
+        return factor;
+    }
+
+    std::unique_ptr<Renderer> inner_;
+    Footprint footprint_;
+    Limits limits_;
+};
+
+}  // namespace
+
+Footprint::Footprint(const Bundle& bundle) {
+    for (const auto& view : bundle.views) {
+        const Camera& c = view.camera;
+        for (int j = 0; j < kGrid; ++j) {
+            for (int i = 0; i < kGrid; ++i) {
+                const int x = (2 * i + 1) * c.width / (2 * kGrid);
+                const int y = (2 * j + 1) * c.height / (2 * kGrid);
+                const float depth = view.depth.at(x, y);
+                if (!hasPoint(depth)) continue;
+                const glm::dvec2 spacing = c.sampleSpacing(depth);
+                points_.push_back(
+                    {c.position + c.orientation * c.unproject(x + 0.5, y + 0.5, depth),
+                     0.5 * (spacing.x + spacing.y)});
+            }
+        }
+    }
+}
+
+double Footprint::samplesPerPixel(const Camera& camera) const {
+    const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
+    std::vector<double> ratios;
+    for (const Point& p : points_) {
+        const glm::dvec3 at(cameraFromWorld * glm::dvec4(p.world, 1.0));
+        const double dist = -at.z;
+        if (!(dist > 0)) continue;
+        const double scale = camera.orthographic ? 1.0 : 1.0 / dist;
+        const double x = camera.cx + camera.fx * at.x * scale;
+        const double y = camera.cy - camera.fy * at.y * scale;
+        if (!(x >= 0 && y >= 0 && x < camera.width && y < camera.height)) continue;
+        const glm::dvec2 spacing = camera.sampleSpacing(dist);
+        ratios.push_back(0.5 * (spacing.x + spacing.y) / p.spacing);
+    }
+    if (ratios.empty()) return 1.0;
+    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+    std::nth_element(ratios.begin(), middle, ratios.end());
+    return *middle;
+}
+
+Frame minified(const Frame& large, int factor) {
+    const int width = large.colour.width() / factor, height = large.colour.height() / factor;
+    Frame out;
+    out.linear = large.linear;
+    out.milliseconds = large.milliseconds;
+    out.colour = Image<glm::vec4>(width, height);
+    out.depth = Image<float>(width, height, kNoDepth);
+    if (!large.albedo.empty()) out.albedo = Image<glm::vec4>(width, height);
+    if (!large.normal.empty()) out.normal = Image<glm::vec3>(width, height);
+    const float share = 1.0f / static_cast<float>(factor * factor);
+    const auto pixel = [&](int x, int y) {
+        glm::vec4 colour(0.0f), albedo(0.0f);
+        glm::vec3 normal(0.0f);
+        float depth = kNoDepth;
+        int covered = 0, nearest = 4 * factor * factor;
+        for (int j = 0; j < factor; ++j) {
+            for (int i = 0; i < factor; ++i) {
+                const int sx = x * factor + i, sy = y * factor + j;
+                colour += large.colour.at(sx, sy);
+                if (!large.albedo.empty()) albedo += large.albedo.at(sx, sy);
+                if (!large.normal.empty()) normal += large.normal.at(sx, sy);
+                const float d = large.depth.at(sx, sy);
+                if (!hasPoint(d)) continue;
+                ++covered;
+                // Twice the offset from the centre, squared.
+                const int dx = 2 * i + 1 - factor, dy = 2 * j + 1 - factor;
+                if (const int at = dx * dx + dy * dy; at < nearest) {
+                    nearest = at;
+                    depth = d;
+                }
+            }
+        }
+        out.colour.at(x, y) = colour * share;
+        if (2 * covered >= factor * factor) out.depth.at(x, y) = depth;
+        if (!out.albedo.empty()) out.albedo.at(x, y) = albedo * share;
+        if (const float length = glm::length(normal); !out.normal.empty() && length > 1e-6f)
+            out.normal.at(x, y) = normal / length;
+    };
+    parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y)
+            for (int x = 0; x < width; ++x) pixel(x, y);
+    });
+    return out;
+}
+
+std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const Bundle& bundle,
+                                        const Limits& limits) {
+    return std::make_unique<FootprintRenderer>(std::move(inner), bundle, limits);
+}
+
+}  // namespace stx

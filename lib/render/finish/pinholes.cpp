@@ -1,0 +1,87 @@
+#include "lib/render/finish/pinholes.hpp"
+
+#include <vector>
+
+#include "lib/base/parallel.hpp"
+#include "lib/geometry/depth_code.hpp"
+
+namespace stx {
+
+namespace {
+
+/// Closes pixels of whose eight neighbours at least `enclosing` have a depth.
+void closeEnclosed(Frame& frame, int enclosing) {
+    struct Closed {
+        int x = 0, y = 0;
+        glm::vec4 colour{0.0f}, albedo{0.0f};
+        glm::vec3 normal{0.0f};
+        float depth = 0;
+    };
+    constexpr int kRowsPerTask = 32;
+    const int width = frame.depth.width(), height = frame.depth.height();
+    const int tasks = (height + kRowsPerTask - 1) / kRowsPerTask;
+    std::vector<std::vector<Closed>> closed(tasks);
+    const auto find = [&](int x, int y, std::vector<Closed>& out) {
+        int covered = 0;
+        float farthest = 0;
+        for (int j = y - 1; j <= y + 1; ++j) {
+            for (int i = x - 1; i <= x + 1; ++i) {
+                if (!hasPoint(frame.depth.at(i, j))) continue;
+                ++covered;
+                farthest = std::max(farthest, frame.depth.at(i, j));
+            }
+        }
+        if (covered < enclosing) return;
+        // What opens between two surfaces belongs to the one behind.
+        Closed c{x, y, {}, {}, {}, 0};
+        float n = 0;
+        for (int j = y - 1; j <= y + 1; ++j) {
+            for (int i = x - 1; i <= x + 1; ++i) {
+                const float depth = frame.depth.at(i, j);
+                if (!hasPoint(depth) || depth < 0.97f * farthest) continue;
+                n += 1;
+                c.depth += depth;
+                c.colour += frame.colour.at(i, j);
+                if (frame.normal.empty()) continue;
+                c.albedo += frame.albedo.at(i, j);
+                c.normal += frame.normal.at(i, j);
+            }
+        }
+        c.depth /= n;
+        c.colour /= n;
+        c.albedo /= n;
+        if (const float length = glm::length(c.normal); length > 0) c.normal /= length;
+        out.push_back(c);
+    };
+    parallelFor(0, tasks, [&](std::int64_t t) {
+        const int from = std::max(1, static_cast<int>(t) * kRowsPerTask);
+        const int to = std::min(height - 1, (static_cast<int>(t) + 1) * kRowsPerTask);
+        for (int y = from; y < to; ++y) {
+            const auto row = frame.depth.row(y);
+            for (int x = 1; x + 1 < width; ++x) {
+                if (!hasPoint(row[x]) && (hasPoint(row[x - 1]) || hasPoint(row[x + 1])))
+                    find(x, y, closed[t]);
+            }
+        }
+    });
+    // Only now, so that one closed pixel does not enclose the next.
+    for (const auto& list : closed) {
+        for (const auto& c : list) {
+            frame.depth.at(c.x, c.y) = c.depth;
+            frame.colour.at(c.x, c.y) = c.colour;
+            if (frame.normal.empty()) continue;
+            frame.albedo.at(c.x, c.y) = c.albedo;
+            frame.normal.at(c.x, c.y) = c.normal;
+        }
+    }
+}
+
+}  // namespace
+
+void closePinholes(Frame& frame, bool pruned) {
+    closeEnclosed(frame, 7);
+    if (!pruned) return;
+    for (int round = 0; round < 2; ++round) closeEnclosed(frame, 5);
+}
+
+}  // namespace stx

@@ -1,0 +1,171 @@
+#include "lib/render/finish/silhouettes.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kReach = 2;    // pixels from the background that are looked at
+constexpr int kSamples = 4;  // per pixel and axis
+constexpr std::uint32_t kAllSamples = (1u << (kSamples * kSamples)) - 1;
+/// Points that touch a silhouette have an alpha of one half there; below this a ray passes by.
+constexpr float kFree = 0.43f * 255.0f;
+
+std::uint8_t alphaAt(const Texture& texture, int x, int y) {
+    if (const auto* image = texture.rgba8()) return image->at(x, y).w;
+    return static_cast<std::uint8_t>(std::clamp(texture.at(x, y).w, 0.0f, 1.0f) * 255.0f + 0.5f);
+}
+
+/// Bilinear coverage at a pixel position; full outside the image, where nothing is known.
+float alphaBilinear(const Image<std::uint8_t>& alpha, double x, double y) {
+    const double px = x - 0.5, py = y - 0.5;
+    const double bx = std::floor(px), by = std::floor(py);
+    if (!(bx >= 0 && by >= 0 && bx < alpha.width() - 1 && by < alpha.height() - 1)) return 255.0f;
+    const int ix = static_cast<int>(bx), iy = static_cast<int>(by);
+    const auto fx = static_cast<float>(px - bx), fy = static_cast<float>(py - by);
+    const float top = alpha.at(ix, iy) * (1 - fx) + alpha.at(ix + 1, iy) * fx;
+    const float bottom = alpha.at(ix, iy + 1) * (1 - fx) + alpha.at(ix + 1, iy + 1) * fx;
+    return top * (1 - fy) + bottom * fy;
+}
+
+/// 1 where some pixel of the row lies within kReach of an empty one, in the row.
+void markRow(const Image<float>& depth, int y, std::vector<std::uint8_t>& near) {
+    const auto row = depth.row(y);
+    const int w = depth.width();
+    std::fill(near.begin(), near.end(), std::uint8_t{0});
+    for (int x = 0; x < w; ++x) {
+        if (hasPoint(row[x])) continue;
+        const int to = std::min(w - 1, x + kReach);
+        for (int i = std::max(0, x - kReach); i <= to; ++i) near[i] = 1;
+    }
+}
+
+}  // namespace
+
+Silhouettes::Silhouettes(const Bundle& bundle) {
+    std::vector<View> all(bundle.views.size());
+    parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
+        const auto& source = bundle.views[n];
+        const int w = source.camera.width, h = source.camera.height;
+        View view{source.camera, source.camera.cameraFromWorld(), Image<std::uint8_t>(w, h), {}};
+        bool partial = false;
+        for (int y = 0; y < h; ++y) {
+            for (int x = 0; x < w; ++x) {
+                view.alpha.at(x, y) = alphaAt(source.texture, x, y);
+                partial = partial || view.alpha.at(x, y) < 255;
+            }
+        }
+        if (!partial) return;
+        view.around = Image<Around>(w, h, Around::mixed);
+        for (int y = kReach; y + kReach < h; ++y) {
+            for (int x = kReach; x + kReach < w; ++x) {
+                std::uint8_t least = 255, most = 0;
+                for (int j = -kReach; j <= kReach; ++j) {
+                    for (int i = -kReach; i <= kReach; ++i) {
+                        least = std::min(least, view.alpha.at(x + i, y + j));
+                        most = std::max(most, view.alpha.at(x + i, y + j));
+                    }
+                }
+                view.around.at(x, y) = least == 255 ? Around::full
+                                       : most == 0  ? Around::empty
+                                                    : Around::mixed;
+            }
+        }
+        all[n] = std::move(view);
+    });
+    for (auto& view : all) {
+        if (!view.around.empty()) views_.push_back(std::move(view));
+    }
+}
+
+std::uint32_t Silhouettes::freeSamples(const Camera& camera, const glm::dmat4& worldFromCamera,
+                                       int x, int y, double depth) const {
+    std::uint32_t free = 0;  // a bit for each sample
+    static_assert(kSamples * kSamples <= 32);
+    const auto project = [&](const View& view, double px, double py) {
+        const glm::dvec3 world(worldFromCamera * glm::dvec4(camera.unproject(px, py, depth), 1.0));
+        return view.camera.project(glm::dvec3(view.cameraFromWorld * glm::dvec4(world, 1.0)));
+    };
+    for (const auto& view : views_) {
+        const auto centre = project(view, x + 0.5, y + 0.5);
+        if (!(centre.z > 0 && centre.x >= 0 && centre.y >= 0 && centre.x < view.camera.width &&
+              centre.y < view.camera.height))
+            continue;
+        const auto around = view.around.at(static_cast<int>(centre.x), static_cast<int>(centre.y));
+        if (around == Around::full) continue;
+        if (around == Around::empty) return kAllSamples;
+        // Within a pixel the way into a reference is as good as affine.
+        const auto right = project(view, x + 1.5, y + 0.5) - centre;
+        const auto down = project(view, x + 0.5, y + 1.5) - centre;
+        for (int k = 0; k < kSamples * kSamples; ++k) {
+            const double dx = (k % kSamples + 0.5) / kSamples - 0.5;
+            const double dy = (k / kSamples + 0.5) / kSamples - 0.5;
+            const auto p = centre + right * dx + down * dy;
+            if (alphaBilinear(view.alpha, p.x, p.y) < kFree) free |= 1u << k;
+        }
+        if (free == kAllSamples) break;
+    }
+    return free;
+}
+
+float Silhouettes::coverage(const Camera& camera, const glm::dmat4& worldFromCamera, int x, int y,
+                            float depth) const {
+    // At a silhouette the surface runs along the ray, so the splat's depth is the least certain
+    // thing there is (half a pixel aside is 17 pixels deep on a ball of 300): a ray passes by only
+    // if nothing around that depth is solid for all references.
+    const auto spacing = camera.sampleSpacing(depth);
+    const double pixel = std::max(spacing.x, spacing.y);
+    std::uint32_t free = kAllSamples;
+    for (const int k : {0, 1, 3, -2, 5, 8, -5, 12, 17, -10, 24, 32, -18, 44}) {
+        const double at = depth + k * pixel;
+        if (!camera.orthographic && at <= 0) continue;
+        free &= freeSamples(camera, worldFromCamera, x, y, at);
+        if (free == 0) break;
+    }
+    return 1.0f - static_cast<float>(std::popcount(free)) / (kSamples * kSamples);
+}
+
+void Silhouettes::carve(Frame& frame, const Camera& camera) const {
+    if (none()) return;
+    constexpr int kRowsPerTask = 16;
+    const int w = frame.depth.width(), h = frame.depth.height();
+    const auto worldFromCamera = camera.worldFromCamera();
+    // Whether a pixel is looked at depends on depths that carving changes: look first, carve then.
+    Image<float> covered(w, h, -1.0f);
+    parallelFor(0, (h + kRowsPerTask - 1) / kRowsPerTask, [&](std::int64_t task) {
+        std::vector<std::uint8_t> rowMark(w), mark(w);
+        const int from = static_cast<int>(task) * kRowsPerTask,
+                  to = std::min(h, from + kRowsPerTask);
+        for (int y = from; y < to; ++y) {
+            std::fill(mark.begin(), mark.end(), std::uint8_t{0});
+            for (int j = std::max(0, y - kReach); j <= std::min(h - 1, y + kReach); ++j) {
+                markRow(frame.depth, j, rowMark);
+                for (int x = 0; x < w; ++x) mark[x] |= rowMark[x];
+            }
+            for (int x = 0; x < w; ++x) {
+                const float depth = frame.depth.at(x, y);
+                if (mark[x] && hasPoint(depth))
+                    covered.at(x, y) = coverage(camera, worldFromCamera, x, y, depth);
+            }
+        }
+    });
+    parallelFor(0, h, [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < w; ++x) {
+            const float share = covered.at(x, y);
+            if (share < 0.0f) continue;
+            const auto scaled = [share](glm::vec4 c) { return c.w > 0.0f ? c * (share / c.w) : c; };
+            frame.colour.at(x, y) = scaled(frame.colour.at(x, y));
+            if (!frame.albedo.empty()) frame.albedo.at(x, y) = scaled(frame.albedo.at(x, y));
+            if (share > 0.0f) continue;
+            frame.depth.at(x, y) = kNoDepth;
+            if (!frame.normal.empty()) frame.normal.at(x, y) = glm::vec3(0.0f);
+        }
+    });
+}
+
+}  // namespace stx

@@ -1,0 +1,125 @@
+// Where points land in the picture. Compiled for each SIMD target: included by splat_kernels.cpp
+// once for each.
+
+#if defined(STX_SPLAT_LAND_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef STX_SPLAT_LAND_INL_HPP
+#undef STX_SPLAT_LAND_INL_HPP
+#else
+#define STX_SPLAT_LAND_INL_HPP
+#endif
+
+#include <limits>
+
+#include <hwy/highway.h>
+
+#include "lib/render/splat/cpu/kernels.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::splat::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using DF = hn::CappedTag<float, kBlock>;
+using DI = hn::RebindToSigned<DF>;
+using VF = hn::Vec<DF>;
+using VI = hn::Vec<DI>;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// A row of a block: H = (a + i au) z + (b + i bu) for its i-th pixel.
+struct RowMap {
+    float a[3], au[3], av[3], b[3], bu[3], bv[3];
+    RowMap(const PixelMap& m, int u, int v) {
+        const glm::dvec3 rowA = m.a0 + m.au * double(u) + m.av * double(v);
+        const glm::dvec3 rowB = m.b0 + m.bu * double(u) + m.bv * double(v);
+        for (int k = 0; k < 3; ++k) {
+            a[k] = static_cast<float>(rowA[k]);
+            au[k] = static_cast<float>(m.au[k]);
+            av[k] = static_cast<float>(m.av[k]);
+            bv[k] = static_cast<float>(m.bv[k]);
+            b[k] = static_cast<float>(rowB[k]);
+            bu[k] = static_cast<float>(m.bu[k]);
+        }
+    }
+};
+
+// Depths of `count` pixels, infinity after them.
+HWY_INLINE VF loadDepth(DF d, const float* from, int count) {
+    if (count >= static_cast<int>(hn::Lanes(d))) return hn::LoadU(d, from);
+    HWY_ALIGN float padded[kBlock];
+    for (int i = 0; i < kBlock; ++i) padded[i] = i < count ? from[i] : kInfinity;
+    return hn::Load(d, padded);
+}
+
+// Points of a row and where they land: the pixel to the upper left of each (only where `inside`
+// the band), how far into the next it lies (0..1), its novel depth.
+struct Landed {
+    VI offset;
+    VF x, y, fx, fy, z;
+    VF a[3], inverse;  // H = a z + ..., and 1 / H.z (1 when orthographic)
+    hn::Mask<DF> inFront, inside;
+};
+
+HWY_INLINE Landed land(DF d, const RowMap& m, int i, VF z, const Band& band) {
+    const VF index = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(i)));
+    Landed out;
+    const auto h = [&](int k) HWY_ATTR {
+        out.a[k] = hn::MulAdd(index, hn::Set(d, m.au[k]), hn::Set(d, m.a[k]));
+        const VF b = hn::MulAdd(index, hn::Set(d, m.bu[k]), hn::Set(d, m.b[k]));
+        return hn::MulAdd(out.a[k], z, b);
+    };
+    out.x = h(0);
+    out.y = h(1);
+    out.z = h(2);
+    out.inverse = hn::Set(d, 1.0f);
+    if (!band.orthographic) {
+        out.inverse = hn::Div(out.inverse, out.z);
+        out.x = hn::Mul(out.x, out.inverse);
+        out.y = hn::Mul(out.y, out.inverse);
+    }
+    const VF x0 = hn::Floor(out.x), y0 = hn::Floor(out.y);
+    // Comparisons with NaN are false, which takes care of pixels without a point.
+    out.inFront = hn::And(hn::Gt(out.z, hn::Set(d, kNearest)), hn::Lt(z, hn::Set(d, kInfinity)));
+    out.inside = hn::And(
+        hn::And(hn::And(hn::Ge(x0, hn::Set(d, -1.0f)), hn::Lt(x0, hn::Set(d, float(band.width)))),
+                hn::And(hn::Ge(y0, hn::Set(d, float(band.top - 1))),
+                        hn::Lt(y0, hn::Set(d, float(band.top + band.rows))))),
+        out.inFront);
+    const DI di;
+    // Zero where outside, so that conversions and gathers stay in range.
+    const VF xs = hn::IfThenElseZero(out.inside, x0);
+    const VF ys = hn::IfThenElse(out.inside, y0, hn::Set(d, float(band.top)));
+    const VI row = hn::Sub(hn::ConvertTo(di, ys), hn::Set(di, band.top - 1));
+    out.offset = hn::Add(hn::Mul(row, hn::Set(di, band.stride)),
+                         hn::Add(hn::ConvertTo(di, xs), hn::Set(di, 1)));
+    out.fx = hn::Sub(out.x, x0);
+    out.fy = hn::Sub(out.y, y0);
+    return out;
+}
+
+// Which of the lanes have alpha above a threshold of 0..255.
+HWY_INLINE hn::Mask<DF> alphaAbove(DF d, const Source& s, std::size_t pixel, int count,
+                                   int threshold) {
+    HWY_ALIGN float alpha[kBlock];
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (int i = 0; i < lanes; ++i) {
+        if (i >= count)
+            alpha[i] = 0;
+        else if (s.rgba8)
+            alpha[i] = s.rgba8[4 * (pixel + i) + 3];
+        else
+            alpha[i] = s.rgbaFloat[4 * (pixel + i) + 3] * 255.0f;
+    }
+    return hn::Gt(hn::Load(d, alpha), hn::Set(d, static_cast<float>(threshold)));
+}
+
+HWY_INLINE std::uint32_t bitsOf(DF d, hn::Mask<DF> mask) {
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, mask, bytes);
+    return bytes[0] | (bytes[1] << 8);
+}
+
+}  // namespace stx::splat::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

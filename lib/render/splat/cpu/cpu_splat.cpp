@@ -1,0 +1,360 @@
+#include "lib/render/splat/cpu/cpu_splat.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/finish/pinholes.hpp"
+#include "lib/render/finish/silhouettes.hpp"
+#include "lib/render/splat/cpu/kernels.hpp"
+#include "lib/render/splat/paper_rule.hpp"
+#include "lib/render/splat/plan.hpp"
+#include "lib/render/splat/view.hpp"
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
+namespace stx {
+namespace {
+
+using namespace splat;
+
+constexpr int kTile = 16;
+// A band's buffers should stay in the second-level cache.
+constexpr int kBandBytes = 1 << 20;
+
+// One thread's buffers for a band.
+struct Scratch {
+    std::vector<float> depth, colour, missing, normals, tileMax;
+    std::vector<std::uint64_t> points;
+};
+
+class CpuSplatRenderer final : public Renderer {
+  public:
+    CpuSplatRenderer(const Bundle& bundle, const RenderSettings& settings, Job& job)
+        : bundle_(bundle),
+          settings_(settings),
+          limits_(job.limits),
+          wantNormals_(settings.wantNormals()),
+          views_(prepareViews(bundle, wantNormals_)),
+          silhouettes_(bundle) {
+        for (const auto& v : views_) {
+            for (const auto& b : v.blocks) opaque_ = opaque_ && b.opaque;
+            blockCount_ += v.blocks.size();
+        }
+        tasks_.resize(blockCount_);
+        seen_.resize(blockCount_);
+    }
+
+    Result<Frame> render(const Camera& camera) override;
+    std::string backend() const override { return "cpu"; }
+    std::string device() const override { return cpuDeviceName(); }
+
+  private:
+    struct Picture {
+        const Camera& camera;
+        Lighting lighting;
+        Shape shape;
+        Frame frame;
+        int bandRows = 0;
+    };
+
+    void planFrame(const Camera& camera);
+    void drawBand(Picture& picture, int index);
+    void resolveBlended(Picture& picture, const Band& band) const;
+    void resolvePoints(Picture& picture, const Band& band) const;
+    void shade(Picture& picture, int x, int y, glm::vec3 normal) const;
+
+    const Bundle& bundle_;
+    RenderSettings settings_;
+    Limits limits_;
+    bool wantNormals_;
+    std::vector<ViewInfo> views_;
+    Silhouettes silhouettes_;
+    bool opaque_ = true;
+    std::size_t blockCount_ = 0;
+
+    // Of the frame being drawn.
+    std::vector<Source> sources_;
+    std::vector<BlockTask> tasks_;
+    std::vector<std::uint8_t> seen_;
+    std::vector<std::vector<std::uint32_t>> bins_;  // tasks of each band, in order
+    tbb::enumerable_thread_specific<Scratch> scratch_;
+};
+
+Source sourceOf(const ViewInfo& info, const Camera& novel) {
+    const ReferenceView& v = *info.view;
+    Source s;
+    s.depth = v.depth.data();
+    if (const auto* image = v.texture.rgba8())
+        s.rgba8 = reinterpret_cast<const std::uint8_t*>(image->data());
+    if (const auto* image = v.texture.rgbaFloat())
+        s.rgbaFloat = reinterpret_cast<const float*>(image->data());
+    s.slopes = info.slopes.data();
+    s.normals =
+        info.normals.empty() ? nullptr : reinterpret_cast<const std::int8_t*>(info.normals.data());
+    s.sizes = info.sizes.empty() ? nullptr : info.sizes.data();
+    s.firstPoint = info.firstPoint;
+    s.width = v.camera.width;
+    s.orthographic = v.camera.orthographic;
+    s.fx = static_cast<float>(v.camera.fx);
+    s.fy = static_cast<float>(v.camera.fy);
+    s.map = pixelMap(v.camera, novel);
+    return s;
+}
+
+void CpuSplatRenderer::planFrame(const Camera& camera) {
+    sources_.clear();
+    for (const auto& v : views_) sources_.push_back(sourceOf(v, camera));
+    std::size_t first = 0;
+    for (std::size_t k = 0; k < views_.size(); ++k) {
+        const auto& info = views_[k];
+        parallelForBlocks(0, static_cast<std::int64_t>(info.blocks.size()), 512,
+                          [&](std::int64_t from, std::int64_t to) {
+                              for (auto i = from; i < to; ++i) {
+                                  BlockTask& task = tasks_[first + i];
+                                  task.source = static_cast<std::uint16_t>(k);
+                                  seen_[first + i] =
+                                      planBlock(info, info.blocks[i], sources_[k], camera,
+                                                settings_.splat == SplatRule::data, task);
+                              }
+                          });
+        first += info.blocks.size();
+    }
+}
+
+Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
+    STX_CHECK(camera.check());
+    const auto pixels =
+        static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
+    STX_CHECK(limits_.checkAllocation(pixels, wantNormals_ ? 48 : 20, "the frame"));
+    const auto start = std::chrono::steady_clock::now();
+    Picture picture{camera, lightsInWorld(settings_.lighting, camera.worldFromCamera()), {}, {}, 0};
+    picture.frame.linear = bundle_.views[0].texture.isLinear();
+    parallelFor(0, 2, [&](std::int64_t part) {
+        if (part == 0) {
+            planFrame(camera);
+        } else {
+            picture.frame.colour = Image<glm::vec4>(camera.width, camera.height);
+            picture.frame.depth = Image<float>(camera.width, camera.height);
+            if (wantNormals_) {
+                picture.frame.albedo = Image<glm::vec4>(camera.width, camera.height);
+                picture.frame.normal = Image<glm::vec3>(camera.width, camera.height);
+            }
+        }
+    });
+    if (settings_.splat == SplatRule::paper)
+        picture.shape.coefficient = static_cast<float>(paperCoefficient(views_, settings_, camera));
+
+    picture.bandRows = std::clamp(kBandBytes / (24 * camera.width), 16, 64);
+    const int bands = (camera.height + picture.bandRows - 1) / picture.bandRows;
+    bins_.resize(bands);
+    for (auto& b : bins_) b.clear();
+    for (std::size_t i = 0; i < tasks_.size(); ++i) {
+        if (!seen_[i]) continue;
+        int y0 = tasks_[i].y0, y1 = tasks_[i].y1;
+        if (picture.shape.coefficient > 0) {
+            // Round splats may be larger than the plan, which follows the data.
+            const double z = std::max(1e-9f, tasks_[i].zMin);
+            const double radius =
+                std::min(300.0, 1 + picture.shape.coefficient / (camera.orthographic ? 1.0 : z));
+            y0 = std::max(0, y0 - static_cast<int>(radius));
+            y1 = std::min(camera.height - 1, y1 + static_cast<int>(radius));
+        }
+        for (int b = y0 / picture.bandRows; b <= y1 / picture.bandRows; ++b)
+            bins_[b].push_back(static_cast<std::uint32_t>(i));
+    }
+    parallelFor(0, bands, [&](std::int64_t b) { drawBand(picture, static_cast<int>(b)); });
+    if (settings_.splat == SplatRule::data) {
+        closePinholes(picture.frame, bundle_.pruned());
+        silhouettes_.carve(picture.frame, camera);
+    }
+    picture.frame.milliseconds =
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    return std::move(picture.frame);
+}
+
+// The farthest depth in each tile of a band: what lies behind is hidden.
+void findTileMax(const Band& band, std::vector<float>& tileMax) {
+    const int across = (band.width + kTile - 1) / kTile, down = (band.rows + kTile - 1) / kTile;
+    tileMax.assign(static_cast<std::size_t>(across) * down, 0.0f);
+    for (int y = 0; y < band.rows; ++y) {
+        const float* row = band.depth + static_cast<std::size_t>(y + 1) * band.stride + 1;
+        float* out = tileMax.data() + static_cast<std::size_t>(y / kTile) * across;
+        for (int t = 0; t < across; ++t) {
+            const int end = std::min(band.width, (t + 1) * kTile);
+            float m = out[t];
+            for (int x = t * kTile; x < end; ++x) m = row[x] > m ? row[x] : m;
+            out[t] = m;
+        }
+    }
+}
+
+bool hidden(const BlockTask& t, const Band& band, const std::vector<float>& tileMax) {
+    const int across = (band.width + kTile - 1) / kTile;
+    const int y0 = std::max(t.y0 - band.top, 0), y1 = std::min(t.y1 - band.top, band.rows - 1);
+    for (int y = y0 / kTile; y <= y1 / kTile; ++y)
+        for (int x = t.x0 / kTile; x <= t.x1 / kTile; ++x)
+            if (t.nearest <= tileMax[static_cast<std::size_t>(y) * across + x]) return false;
+    return true;
+}
+
+void CpuSplatRenderer::drawBand(Picture& picture, int index) {
+    const Camera& camera = picture.camera;
+    Scratch& scratch = scratch_.local();
+    Band band;
+    band.width = camera.width;
+    band.top = index * picture.bandRows;
+    band.rows = std::min(picture.bandRows, camera.height - band.top);
+    band.stride = camera.width + 2;
+    band.orthographic = camera.orthographic;
+    // Vectors may read a little past the last row.
+    const std::size_t count = static_cast<std::size_t>(band.rows + 2) * band.stride + 64;
+    if (settings_.splat == SplatRule::point) {
+        scratch.points.assign(count, ~std::uint64_t{0});
+        band.points = scratch.points.data();
+        for (const auto i : bins_[index]) drawPoints(sources_[tasks_[i].source], tasks_[i], band);
+        resolvePoints(picture, band);
+        return;
+    }
+    scratch.depth.assign(count, kNoDepth);
+    scratch.colour.assign(4 * count, 0.0f);
+    scratch.missing.assign(count, 0.0f);
+    band.depth = scratch.depth.data();
+    band.colour = scratch.colour.data();
+    band.missing = scratch.missing.data();
+    if (wantNormals_) {
+        scratch.normals.assign(4 * count, 0.0f);
+        band.normals = scratch.normals.data();
+    }
+    for (const auto i : bins_[index])
+        drawDepth(sources_[tasks_[i].source], tasks_[i], picture.shape, band);
+    findTileMax(band, scratch.tileMax);
+    for (const auto i : bins_[index]) {
+        const BlockTask& task = tasks_[i];
+        if (picture.shape.coefficient <= 0 && hidden(task, band, scratch.tileMax)) continue;
+        drawColour(sources_[task.source], task, picture.shape, band);
+    }
+    resolveBlended(picture, band);
+}
+
+void CpuSplatRenderer::shade(Picture& picture, int x, int y, glm::vec3 normal) const {
+    Frame& frame = picture.frame;
+    const Camera& camera = picture.camera;
+    frame.normal.at(x, y) = normal;
+    const glm::vec4 albedo = frame.colour.at(x, y);
+    frame.albedo.at(x, y) = albedo;
+    if (!settings_.lighting.on() || !(albedo.a > 0) || normal == glm::vec3(0)) return;
+    const float depth = frame.depth.at(x, y);
+    const glm::dvec3 position =
+        camera.position +
+        camera.orientation * camera.unproject(x + 0.5, y + 0.5, hasPoint(depth) ? depth : 1.0);
+    const glm::vec3 toEye(-camera.viewDirection(x + 0.5, y + 0.5));
+    const glm::vec3 lit = shadePhong(picture.lighting, glm::vec3(albedo) / albedo.a,
+                                     glm::vec3(position), normal, toEye);
+    frame.colour.at(x, y) = glm::vec4(lit * albedo.a, albedo.a);
+}
+
+void CpuSplatRenderer::resolveBlended(Picture& picture, const Band& band) const {
+    Frame& frame = picture.frame;
+    for (int row = 0; row < band.rows; ++row) {
+        const int y = band.top + row;
+        const std::size_t start = static_cast<std::size_t>(row + 1) * band.stride + 1;
+        const auto depthOut = frame.depth.row(y);
+        const auto colourOut = frame.colour.row(y);
+        for (int x = 0; x < band.width; ++x) {
+            const std::size_t i = start + x;
+            const float* sums = band.colour + 4 * i;
+            const float total = sums[3] + band.missing[i];
+            float depth = band.depth[i];
+            glm::vec4 colour(0.0f);
+            if (total > 0) {
+                const float scale = 1.0f / total;
+                colour = glm::vec4(sums[0], sums[1], sums[2], sums[3]) * scale;
+                // Continued colours may leave what a picture holds.
+                colour = glm::max(colour, glm::vec4(0.0f));
+                if (!frame.linear) colour = glm::min(colour, glm::vec4(colour.a));
+            }
+            if (!opaque_ && !hasPoint(depth)) {
+                // Only faint splats of a silhouette reach here, or only the skirts of full ones.
+                if (!(colour.a < 0.5f)) colour = glm::vec4(0.0f);
+                if (colour.a > 0)
+                    for (const int step : {-1, 1, -band.stride, band.stride})
+                        depth = std::min(depth, band.depth[i + step]);
+            } else if (!hasPoint(depth)) {
+                colour = glm::vec4(0.0f);
+            }
+            depthOut[x] = depth;
+            colourOut[x] = colour;
+        }
+        if (!wantNormals_) continue;
+        for (int x = 0; x < band.width; ++x) {
+            const float* n = band.normals + 4 * (start + x);
+            const glm::vec3 sum(n[0], n[1], n[2]);
+            const float length = glm::length(sum);
+            shade(picture, x, y,
+                  length > 0 && frame.colour.at(x, y).a > 0 ? sum / length : glm::vec3(0.0f));
+        }
+    }
+}
+
+void CpuSplatRenderer::resolvePoints(Picture& picture, const Band& band) const {
+    Frame& frame = picture.frame;
+    for (int row = 0; row < band.rows; ++row) {
+        const int y = band.top + row;
+        const std::uint64_t* keys =
+            band.points + static_cast<std::size_t>(row + 1) * band.stride + 1;
+        std::size_t k = 0;
+        for (int x = 0; x < band.width; ++x) {
+            const std::uint64_t key = keys[x];
+            if (key == ~std::uint64_t{0}) {
+                frame.depth.at(x, y) = kNoDepth;
+                continue;
+            }
+            const auto bits = static_cast<std::uint32_t>(key >> 32);
+            const auto point = static_cast<std::uint32_t>(key);
+            while (point < views_[k].firstPoint) --k;
+            while (k + 1 < views_.size() && point >= views_[k + 1].firstPoint) ++k;
+            const ReferenceView& v = *views_[k].view;
+            const std::uint32_t pixel = point - views_[k].firstPoint;
+            glm::vec4 c = v.texture.rgba8()
+                              ? glm::vec4(v.texture.rgba8()->pixels()[pixel]) * (1.0f / 255.0f)
+                              : v.texture.rgbaFloat()->pixels()[pixel];
+            std::memcpy(&frame.depth.at(x, y), &bits, sizeof(float));
+            frame.colour.at(x, y) = {c.r * c.a, c.g * c.a, c.b * c.a, c.a};
+            if (wantNormals_)
+                shade(picture, x, y, glm::vec3(views_[k].normals[pixel]) * (1.0f / 127.0f));
+        }
+    }
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> makeCpuSplatRenderer(const Bundle& bundle, const RenderSettings& settings,
+                                               Job& job) {
+    return std::make_unique<CpuSplatRenderer>(bundle, settings, job);
+}
+
+std::string cpuDeviceName() {
+    std::string name = "CPU";
+#if defined(__x86_64__)
+    unsigned words[12] = {};
+    bool ok = true;
+    for (unsigned i = 0; i < 3; ++i)
+        ok = ok && __get_cpuid(0x80000002u + i, &words[4 * i], &words[4 * i + 1], &words[4 * i + 2],
+                               &words[4 * i + 3]);
+    if (ok) {
+        char text[49] = {};
+        std::memcpy(text, words, 48);
+        name = text;
+        while (!name.empty() && name.back() == ' ') name.pop_back();
+    }
+#endif
+    return fmt::format("{} ({})", name, simdTarget());
+}
+
+}  // namespace stx

@@ -1,0 +1,349 @@
+#include "lib/render/splat/cpu/kernels.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lib/render/splat/cpu/kernels.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.
+#include <hwy/highway.h>
+
+#include "lib/render/splat/cpu/accumulate-inl.hpp"
+#include "lib/render/splat/cpu/paint-inl.hpp"
+#include "lib/render/splat/cpu/shape-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::splat::HWY_NAMESPACE {
+
+HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Band& band) {
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
+        float* row = band.depth + static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
+        for (int x = x0; x <= x1; x += lanes) {
+            const Across a = across(d, e, x, x1, y);
+            const auto core = hn::And(a.in, hn::Le(a.q, hn::Set(d, e.core2)));
+            const VF old = hn::LoadU(d, row + x);
+            hn::StoreU(hn::IfThenElse(core, hn::Min(old, a.z), old), d, row + x);
+        }
+    });
+}
+
+HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const Paint& paint, float tolerance,
+                              bool normals, const Band& band) {
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    HWY_ALIGN float weights[kBlock];
+    forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
+        const std::size_t start = static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
+        for (int x = x0; x <= x1; x += lanes) {
+            const Across a = across(d, e, x, x1, y);
+            const VF front = hn::LoadU(d, band.depth + start + x);
+            const auto near = hn::And(hn::And(a.in, hn::Lt(a.q, hn::Set(d, kReach2))),
+                                      hn::Le(a.z, hn::Mul(front, hn::Set(d, 1.0f + tolerance))));
+            std::uint32_t bits = bitsOf(d, near);
+            if (!bits) continue;
+            // Falls off like a Gaussian and reaches zero at kReach2.
+            const VF fall = hn::MulAdd(a.q, hn::Set(d, -1.0f / kReach2), hn::Set(d, 1.0f));
+            hn::Store(hn::Mul(hn::Mul(fall, fall), hn::Mul(fall, hn::Set(d, e.quality))), d,
+                      weights);
+            while (bits) {
+                const int k = __builtin_ctz(bits);
+                bits &= bits - 1;
+                const std::size_t at = start + x + k;
+                const Four colour =
+                    plus(plus(paint.colour, x + k - e.x, paint.across), y - e.y, paint.down);
+                addTo(band.colour + 4 * at, weights[k], colour);
+                band.missing[at] += weights[k] * paint.missing;
+                if (normals) addTo(band.normals + 4 * at, weights[k], paint.normal);
+            }
+        }
+    });
+}
+
+template <bool kUniform>
+void depthBlock(const Source& s, const BlockTask& t, const Band& band) {
+    const DF d;
+    const DI di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const VF one = hn::Set(d, 1.0f), infinity = hn::Set(d, kInfinity);
+    HWY_ALIGN std::int32_t offset[kBlock];
+    HWY_ALIGN float above[2 * kBlock], below[2 * kBlock];
+    for (int v = t.v0; v < t.v1; ++v) {
+        const RowMap map(s.map, t.u0, v);
+        for (int i = 0; i < t.u1 - t.u0; i += lanes) {
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
+            const int count = t.u1 - t.u0 - i;
+            Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
+            if (!t.opaque) {
+                const auto solid = alphaAbove(d, s, pixel, count, 127);
+                p.small = hn::And(p.small, solid);
+                p.large = hn::And(p.large, solid);
+            }
+            if (!kUniform) {
+                if (const std::uint32_t large = bitsOf(d, p.large))
+                    forLarge(d, p, large,
+                             [&](int, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
+            }
+            std::uint32_t bits = bitsOf(d, p.small);
+            if (!bits) continue;
+            hn::Store(p.at.offset, di, offset);
+            const VF fx = p.at.fx, fy = p.at.fy;
+            const VF gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
+            const VF fx2 = hn::Mul(fx, fx), gx2 = hn::Mul(gx, gx);
+            const VF fy2 = hn::Mul(fy, fy), gy2 = hn::Mul(gy, gy);
+            // The plane of the splat at the four pixel centres.
+            const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
+            const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
+            const auto core = [&](VF x2, VF y2, VF depth) HWY_ATTR {
+                return hn::IfThenElse(hn::Le(hn::Add(x2, y2), p.core2), depth, infinity);
+            };
+            storePairs(d, core(fx2, fy2, z), core(gx2, fy2, hn::Add(z, zx)), above);
+            storePairs(d, core(fx2, gy2, hn::Add(z, zy)),
+                       core(gx2, gy2, hn::Add(hn::Add(z, zx), zy)), below);
+            forBits(bits, [&](int k) HWY_ATTR {
+                float* to = band.depth + offset[k];
+                leastOfPair(to, above + 2 * k);
+                leastOfPair(to + band.stride, below + 2 * k);
+            });
+        }
+    }
+}
+
+// The low-pass filter over an output pixel: close to a Gaussian of sigma 0.35, zero from 1 on.
+HWY_INLINE VF lowPass(DF d, VF x2) {
+    const VF a = hn::Sub(hn::Set(d, 1.0f), x2);
+    const VF b = hn::Mul(a, a);
+    return hn::Mul(b, b);
+}
+
+template <bool kUniform, bool kOpaque, bool kNormals>
+void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
+    const DF d;
+    const DI di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const VF one = hn::Set(d, 1.0f);
+    const VF tolerance = hn::Set(d, 1.0f + t.tolerance);
+    const VI stride = hn::Set(di, band.stride), nextPixel = hn::Set(di, 1);
+    HWY_ALIGN std::int32_t offset[kBlock];
+    HWY_ALIGN float w00[kBlock], w10[kBlock], w01[kBlock], w11[kBlock];
+    HWY_ALIGN float fractionX[kBlock], fractionY[kBlock];
+    HWY_ALIGN float uAcross[kBlock], vAcross[kBlock], uDown[kBlock], vDown[kBlock];
+    if (kUniform) {
+        // The same for all pixels.
+        for (int i = 0; i < kBlock; ++i) {
+            uAcross[i] = t.uAcross;
+            vAcross[i] = t.vAcross;
+            uDown[i] = t.uDown;
+            vDown[i] = t.vDown;
+        }
+    }
+    for (int v = t.v0; v < t.v1; ++v) {
+        const RowMap map(s.map, t.u0, v);
+        for (int i = 0; i < t.u1 - t.u0; i += lanes) {
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
+            const int count = t.u1 - t.u0 - i;
+            Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
+            if (!kOpaque) {
+                const auto any = alphaAbove(d, s, pixel, count, 0);
+                p.small = hn::And(p.small, any);
+                p.large = hn::And(p.large, any);
+            }
+            if (!kUniform) {
+                if (const std::uint32_t large = bitsOf(d, p.large))
+                    forLarge(d, p, large, [&](int k, const Ellipse& e) HWY_ATTR {
+                        Paint paint = paintOf(s, pixel + k, kOpaque);
+                        if (e.uAcross != 0 || e.vDown != 0)
+                            addGradient(s, pixel + k, e.uAcross, e.vAcross, e.uDown, e.vDown,
+                                        paint);
+                        colourEllipse(d, e, paint, t.tolerance, kNormals, band);
+                    });
+            }
+            if (hn::AllFalse(d, p.small)) continue;
+            const VF fx = p.at.fx, fy = p.at.fy;
+            const VF gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
+            const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
+            const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
+            const auto weigh = [&](VF wx, VF wy, VF depth, VI at, float* to) HWY_ATTR {
+                const VF front = hn::GatherIndex(d, band.depth, at);
+                const auto near = hn::And(p.small, hn::Le(depth, hn::Mul(front, tolerance)));
+                hn::Store(hn::IfThenElseZero(near, hn::Mul(wx, wy)), d, to);
+                return near;
+            };
+            const VF x0 = hn::Mul(p.quality, lowPass(d, hn::Mul(fx, fx)));
+            const VF x1 = hn::Mul(p.quality, lowPass(d, hn::Mul(gx, gx)));
+            const VF y0 = lowPass(d, hn::Mul(fy, fy)), y1 = lowPass(d, hn::Mul(gy, gy));
+            const VI below = hn::Add(p.at.offset, stride);
+            const VF zRight = hn::Add(z, zx);
+            const auto any =
+                hn::Or(hn::Or(weigh(x0, y0, z, p.at.offset, w00),
+                              weigh(x1, y0, zRight, hn::Add(p.at.offset, nextPixel), w10)),
+                       hn::Or(weigh(x0, y1, hn::Add(z, zy), below, w01),
+                              weigh(x1, y1, hn::Add(zRight, zy), hn::Add(below, nextPixel), w11)));
+            std::uint32_t bits = bitsOf(d, any);
+            hn::Store(p.at.offset, di, offset);
+            hn::Store(fx, d, fractionX);
+            hn::Store(fy, d, fractionY);
+            if (!kUniform) {
+                hn::Store(p.uAcross, d, uAcross);
+                hn::Store(p.vAcross, d, vAcross);
+                hn::Store(p.uDown, d, uDown);
+                hn::Store(p.vDown, d, vDown);
+            }
+            forBits(bits, [&](int k) HWY_ATTR {
+                Paint paint = paintOf(s, pixel + k, kOpaque);
+                if (uAcross[k] != 0 || vDown[k] != 0)
+                    addGradient(s, pixel + k, uAcross[k], vAcross[k], uDown[k], vDown[k], paint);
+                const Four c00 = plus(plus(paint.colour, -fractionX[k], paint.across),
+                                      -fractionY[k], paint.down);
+                const Four c01 = plus(c00, paint.down);
+                const std::size_t at = static_cast<std::size_t>(offset[k]);
+                const std::size_t under = at + static_cast<std::size_t>(band.stride);
+                addToPair(band.colour + 4 * at, w00[k], c00, w10[k], plus(c00, paint.across));
+                addToPair(band.colour + 4 * under, w01[k], c01, w11[k], plus(c01, paint.across));
+                if (!kOpaque) {
+                    band.missing[at] += w00[k] * paint.missing;
+                    band.missing[at + 1] += w10[k] * paint.missing;
+                    band.missing[under] += w01[k] * paint.missing;
+                    band.missing[under + 1] += w11[k] * paint.missing;
+                }
+                if (kNormals) {
+                    addToPair(band.normals + 4 * at, w00[k], paint.normal, w10[k], paint.normal);
+                    addToPair(band.normals + 4 * under, w01[k], paint.normal, w11[k], paint.normal);
+                }
+            });
+        }
+    }
+}
+
+// --- SplatRule::paper ------------------------------------------------------------------------
+
+// Calls draw(pixel, splat) for each point of a block as a round splat.
+template <class F>
+HWY_INLINE void forRound(const Source& s, const BlockTask& t, const Shape& shape, const Band& band,
+                         int alphaThreshold, const F& draw) {
+    for (int v = t.v0; v < t.v1; ++v) {
+        const RowMap map(s.map, t.u0, v);
+        for (int u = t.u0; u < t.u1; ++u) {
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + u;
+            const float alpha =
+                s.rgba8 ? s.rgba8[4 * pixel + 3] : s.rgbaFloat[4 * pixel + 3] * 255.0f;
+            if (!(s.depth[pixel] < kInfinity) || !(alpha > alphaThreshold)) continue;
+            float h[3];
+            for (int k = 0; k < 3; ++k) {
+                const float i = static_cast<float>(u - t.u0);
+                h[k] = (map.a[k] + i * map.au[k]) * s.depth[pixel] + (map.b[k] + i * map.bu[k]);
+            }
+            if (!(h[2] > kNearest)) continue;
+            const float inverse = band.orthographic ? 1.0f : 1.0f / h[2];
+            const float radius =
+                std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), kLargest);
+            const float q = kReach2 / (radius * radius);
+            draw(pixel, Ellipse{h[0] * inverse, h[1] * inverse, h[2], 0, 0, q, 0, q, radius, radius,
+                                kReach2, 1.0f, 0, 0, 0, 0});
+        }
+    }
+}
+
+// --- Points of one pixel ---------------------------------------------------------------------
+
+void pointsImpl(const Source& s, const BlockTask& t, const Band& band) {
+    const DF d;
+    const DI di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    HWY_ALIGN std::int32_t offset[kBlock];
+    HWY_ALIGN std::uint32_t depth[kBlock];
+    const VF half = hn::Set(d, 0.5f);
+    const VI one = hn::Set(di, 1), stride = hn::Set(di, band.stride);
+    for (int v = t.v0; v < t.v1; ++v) {
+        const RowMap map(s.map, t.u0, v);
+        for (int i = 0; i < t.u1 - t.u0; i += lanes) {
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
+            const int count = t.u1 - t.u0 - i;
+            Landed p = land(d, map, i, loadDepth(d, s.depth + pixel, count), band);
+            if (!t.opaque) p.inside = hn::And(p.inside, alphaAbove(d, s, pixel, count, 0));
+            std::uint32_t bits = bitsOf(d, p.inside);
+            if (!bits) continue;
+            // The nearest of the four pixels.
+            VI at = p.offset;
+            at = hn::Add(at, hn::IfThenElseZero(hn::RebindMask(di, hn::Ge(p.fx, half)), one));
+            at = hn::Add(at, hn::IfThenElseZero(hn::RebindMask(di, hn::Ge(p.fy, half)), stride));
+            hn::Store(at, di, offset);
+            // Positive floats sort as their bits do.
+            hn::Store(hn::BitCast(hn::RebindToUnsigned<DF>(), p.z), hn::RebindToUnsigned<DF>(),
+                      depth);
+            const std::uint32_t first = s.firstPoint + static_cast<std::uint32_t>(pixel);
+            while (bits) {
+                const int k = __builtin_ctz(bits);
+                bits &= bits - 1;
+                const std::uint64_t key = (std::uint64_t{depth[k]} << 32) | (first + k);
+                std::uint64_t& to = band.points[offset[k]];
+                to = key < to ? key : to;
+            }
+        }
+    }
+}
+
+void depthImpl(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
+    const DF d;
+    if (shape.coefficient > 0) {
+        forRound(s, t, shape, band, 127,
+                 [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
+    } else if (t.uniform) {
+        depthBlock<true>(s, t, band);
+    } else {
+        depthBlock<false>(s, t, band);
+    }
+}
+
+template <bool kUniform>
+void colourOfBlock(const Source& s, const BlockTask& t, const Band& band) {
+    if (t.opaque && !s.normals)
+        colourBlock<kUniform, true, false>(s, t, band);
+    else if (t.opaque)
+        colourBlock<kUniform, true, true>(s, t, band);
+    else if (!s.normals)
+        colourBlock<kUniform, false, false>(s, t, band);
+    else
+        colourBlock<kUniform, false, true>(s, t, band);
+}
+
+void colourImpl(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
+    const DF d;
+    if (shape.coefficient > 0) {
+        forRound(s, t, shape, band, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
+            colourEllipse(d, e, paintOf(s, pixel, t.opaque), t.tolerance, s.normals, band);
+        });
+    } else if (t.uniform) {
+        colourOfBlock<true>(s, t, band);
+    } else {
+        colourOfBlock<false>(s, t, band);
+    }
+}
+
+const char* targetImpl() {
+    return hwy::TargetName(HWY_TARGET);
+}
+
+}  // namespace stx::splat::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stx::splat {
+
+HWY_EXPORT(depthImpl);
+HWY_EXPORT(colourImpl);
+HWY_EXPORT(pointsImpl);
+HWY_EXPORT(targetImpl);
+
+void drawDepth(const Source& source, const BlockTask& task, const Shape& shape, const Band& band) {
+    HWY_DYNAMIC_DISPATCH(depthImpl)(source, task, shape, band);
+}
+void drawColour(const Source& source, const BlockTask& task, const Shape& shape, const Band& band) {
+    HWY_DYNAMIC_DISPATCH(colourImpl)(source, task, shape, band);
+}
+void drawPoints(const Source& source, const BlockTask& task, const Band& band) {
+    HWY_DYNAMIC_DISPATCH(pointsImpl)(source, task, band);
+}
+const char* simdTarget() {
+    return HWY_DYNAMIC_DISPATCH(targetImpl)();
+}
+
+}  // namespace stx::splat
+#endif

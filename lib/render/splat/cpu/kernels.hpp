@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+
+#include "lib/render/splat/constants.hpp"
+#include "lib/render/splat/view.hpp"
+
+/// The inner loops of splat mode, compiled for each SIMD target and chosen at run time (Highway).
+
+namespace stx::splat {
+
+/// Where the pixels of a source land: with (u, v) a pixel's index and z its depth,
+/// H = (a0 + au u + av v) z + (b0 + bu u + bv v), and then x = H.x / H.z, y = H.y / H.z (or H.x,
+/// H.y when the novel camera is orthographic), novel depth H.z. Pixel centres are whole numbers.
+struct PixelMap {
+    glm::dvec3 a0, au, av, b0, bu, bv;
+};
+
+/// The images of a source, as the loops read them.
+struct Source {
+    const float* depth = nullptr;
+    const std::uint8_t* rgba8 = nullptr;  ///< one of rgba8 and rgbaFloat
+    const float* rgbaFloat = nullptr;
+    const Slope* slopes = nullptr;
+    const std::int8_t* normals = nullptr;  ///< four to a pixel; null when not needed
+    const std::uint8_t* sizes = nullptr;   ///< null: all 1
+    std::uint32_t firstPoint = 0;
+    int width = 0;
+    bool orthographic = false;
+    float fx = 1, fy = 1;
+    PixelMap map;
+};
+
+/// A block of source pixels in one frame.
+struct BlockTask {
+    std::uint16_t u0 = 0, v0 = 0, u1 = 0, v1 = 0;
+    std::uint16_t source = 0;
+    bool small = true;    ///< every splat closes its gaps within 2x2 pixels
+    bool uniform = true;  ///< small, and all share a tilt and go on in colour
+    bool opaque = true;
+    float slopeX = 0,
+          slopeY = 0;         ///< relative change of novel depth per output pixel; 0 if not smooth
+    float core2 = 0.5f;       ///< squared radius in which a splat hides what is behind, if small
+    float tolerance = 0.01f;  ///< relative depth behind the front that still blends
+    float quality = 1;        ///< weight among views by the angle between them
+    float density = 1;        ///< weight by the density of samples
+    /// If uniform: half the source pixels that go by per output pixel, to continue colours with.
+    float uAcross = 0, vAcross = 0, uDown = 0, vDown = 0;
+    float zMin = 0;     ///< nearest novel depth of its points
+    float nearest = 0;  ///< its splats show nowhere that something nearer than this covers
+    std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< output pixels it may touch, inclusive
+};
+
+/// The rows of the output that one thread owns, with a border of one pixel all around, which is
+/// thrown away. Element (x, y) of the output is number (y - top + 1) * stride + x + 1.
+struct Band {
+    int width = 0;  ///< pixels of the output
+    int top = 0;    ///< first row
+    int rows = 0;
+    int stride = 0;             ///< width + 2
+    bool orthographic = false;  ///< the novel camera
+    float* depth = nullptr;     ///< nearest novel depth; infinity = nothing
+    float* colour = nullptr;   ///< four a pixel: weighted sums of R, G, B times alpha, and of alpha
+    float* missing = nullptr;  ///< weighted sum of 1 - alpha
+    float* normals = nullptr;  ///< four a pixel; null when not needed
+    std::uint64_t* points =
+        nullptr;  ///< SplatRule::point: depth's bits above, number of the point below
+};
+
+/// SplatRule::paper: every splat is round, this many pixels wide at distance 1 (times 1 when the
+/// novel camera is orthographic); 0 = SplatRule::data.
+struct Shape {
+    float coefficient = 0;
+};
+
+/// First pass: nearest depth.
+void drawDepth(const Source& source, const BlockTask& task, const Shape& shape, const Band& band);
+/// Second pass: sums of weighted colours (and normals) near the front.
+void drawColour(const Source& source, const BlockTask& task, const Shape& shape, const Band& band);
+/// SplatRule::point in one pass.
+void drawPoints(const Source& source, const BlockTask& task, const Band& band);
+
+/// Name of the SIMD target in use, such as "AVX2".
+[[nodiscard]] const char* simdTarget();
+
+}  // namespace stx::splat

@@ -1,0 +1,219 @@
+// The size and shape of splats in the picture. Included by splat_kernels.cpp once for each SIMD
+// target.
+
+#if defined(STX_SPLAT_SHAPE_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef STX_SPLAT_SHAPE_INL_HPP
+#undef STX_SPLAT_SHAPE_INL_HPP
+#else
+#define STX_SPLAT_SHAPE_INL_HPP
+#endif
+
+#include <cmath>
+#include <cstring>
+
+#include <hwy/highway.h>
+
+#include "lib/render/splat/cpu/accumulate-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::splat::HWY_NAMESPACE {
+
+// The splats of some neighbouring pixels.
+struct Splats {
+    Landed at;
+    hn::Mask<DF> small, large;
+    VF slopeX, slopeY;  // of novel depth, relative, per pixel
+    VF core2;           // of small ones, squared pixels
+    VF quality;
+    VF qxx, qxy, qyy;  // of large ones: squared deviations = qxx dx^2 + 2 qxy dx dy + qyy dy^2
+    VF halfX, halfY;   // of their bounding boxes
+    // Half the source pixels that go by per output pixel; zero where colour must not be continued.
+    VF uAcross, vAcross, uDown, vDown;
+};
+
+// Slopes, sizes and links of up to a vector of pixels.
+HWY_INLINE void loadShape(DF d, const Source& s, std::size_t pixel, int count, VF& u, VF& v,
+                          VF& size, hn::Mask<DF>& linked, hn::Mask<DF>& rim) {
+    const DI di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
+    VI packed;
+    if (count >= lanes) {
+        packed = hn::LoadU(di, reinterpret_cast<const std::int32_t*>(s.slopes + pixel));
+    } else {
+        HWY_ALIGN std::int32_t padded[kBlock] = {};
+        std::memcpy(padded, s.slopes + pixel, static_cast<std::size_t>(count) * sizeof(Slope));
+        packed = hn::Load(di, padded);
+    }
+    u = hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
+    v = hn::ConvertTo(d, hn::ShiftRight<16>(packed));
+    linked = hn::RebindMask(d, hn::TestBit(packed, hn::Set(di, Slope::kLinked)));
+    rim = hn::RebindMask(d, hn::TestBit(packed, hn::Set(di, Slope::kRim << 16)));
+    size = hn::Set(d, 1.0f);
+    if (s.sizes) {
+        HWY_ALIGN float sizes[kBlock];
+        for (int i = 0; i < lanes; ++i)
+            sizes[i] = i < count ? s.sizes[pixel + i] * (1.0f / 64.0f) : 1.0f;
+        size = hn::Load(d, sizes);
+    }
+}
+
+// kUniform: all points of the block are small and share its tilt.
+template <bool kUniform>
+HWY_INLINE Splats splatsOf(DF d, const Source& s, const BlockTask& t, const RowMap& map, int i,
+                           std::size_t pixel, int count, const Band& band) {
+    Splats out;
+    const VF depth = loadDepth(d, s.depth + pixel, count);
+    out.at = land(d, map, i, depth, band);
+    const VF one = hn::Set(d, 1.0f);
+    if (kUniform) {
+        out.small = out.at.inside;
+        out.large = hn::Lt(one, one);
+        out.slopeX = hn::Set(d, t.slopeX);
+        out.slopeY = hn::Set(d, t.slopeY);
+        out.core2 = hn::Set(d, t.core2);
+        out.quality = hn::Set(d, t.quality * t.density);
+        out.uAcross = hn::Set(d, t.uAcross);
+        out.vAcross = hn::Set(d, t.vAcross);
+        out.uDown = hn::Set(d, t.uDown);
+        out.vDown = hn::Set(d, t.vDown);
+        return out;
+    }
+    VF su, sv, size;
+    hn::Mask<DF> linked, rim;
+    loadShape(d, s, pixel, count, su, sv, size, linked, rim);
+    const VF spacing = s.orthographic ? one : depth;
+    const VF du = hn::Mul(su, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fx))));
+    const VF dv = hn::Mul(sv, hn::Mul(spacing, hn::Set(d, 1.0f / (kSlopeScale * s.fy))));
+    // Derivatives of H and then of the pixel by u and v.
+    const auto hu = [&](int k) HWY_ATTR {
+        return hn::MulAdd(hn::Set(d, map.au[k]), depth,
+                          hn::MulAdd(out.at.a[k], du, hn::Set(d, map.bu[k])));
+    };
+    const auto hv = [&](int k) HWY_ATTR {
+        return hn::MulAdd(hn::Set(d, map.av[k]), depth,
+                          hn::MulAdd(out.at.a[k], dv, hn::Set(d, map.bv[k])));
+    };
+    const VF zu = hu(2), zv = hv(2);
+    VF xu = hu(0), yu = hu(1), xv = hv(0), yv = hv(1);
+    if (!band.orthographic) {
+        xu = hn::Mul(hn::NegMulAdd(out.at.x, zu, xu), out.at.inverse);
+        yu = hn::Mul(hn::NegMulAdd(out.at.y, zu, yu), out.at.inverse);
+        xv = hn::Mul(hn::NegMulAdd(out.at.x, zv, xv), out.at.inverse);
+        yv = hn::Mul(hn::NegMulAdd(out.at.y, zv, yv), out.at.inverse);
+    }
+    const VF det = hn::Sub(hn::Mul(xu, yv), hn::Mul(xv, yu));
+    const auto square = [](VF x, VF y) HWY_ATTR { return hn::MulAdd(x, x, hn::Mul(y, y)); };
+    const VF cover2 = hn::Mul(hn::Mul(hn::Mul(size, size), hn::Set(d, 0.25f)),
+                              hn::Max(square(hn::Add(xu, xv), hn::Add(yu, yv)),
+                                      square(hn::Sub(xu, xv), hn::Sub(yu, yv))));
+    // Those with a determinant that is not positive face away.
+    const auto seen = hn::And(out.at.inFront, hn::Gt(det, hn::Zero(d)));
+    const auto fits = hn::Lt(cover2, hn::Set(d, kSmallCover2));
+    out.small = hn::And(hn::And(seen, fits), out.at.inside);
+    out.large = hn::AndNot(fits, seen);
+    // At its rim the surface ends within half a sample; beside any edge colours are mixed.
+    out.core2 = hn::Mul(hn::Max(hn::Set(d, 0.5f), hn::Mul(cover2, hn::Set(d, 1.08f))),
+                        hn::IfThenElse(rim, hn::Set(d, kRimCore2), one));
+    const VF limit = hn::Set(d, kSteepestPlane);
+    const VF perPixel = hn::Div(one, hn::Mul(det, out.at.z));
+    const auto limited = [&](VF v) HWY_ATTR { return hn::Min(hn::Max(v, hn::Neg(limit)), limit); };
+    out.slopeX = limited(hn::Mul(hn::Sub(hn::Mul(zu, yv), hn::Mul(zv, yu)), perPixel));
+    out.slopeY = limited(hn::Mul(hn::Sub(hn::Mul(zv, xu), hn::Mul(zu, xv)), perPixel));
+    const VF density = hn::Div(one, hn::Max(one, hn::Max(square(xu, yu), square(xv, yv))));
+    out.quality = hn::Mul(
+        hn::Mul(hn::Set(d, t.quality), hn::IfThenElse(linked, one, hn::Set(d, kEdgeQuality))),
+        hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
+    const VF fade = hn::IfThenElseZero(
+        linked, hn::Min(one, hn::Max(hn::Zero(d),
+                                     hn::MulAdd(det, hn::Set(d, 1 / kFadeTo), hn::Set(d, -1.0f)))));
+    const VF half =
+        hn::Div(hn::Mul(fade, hn::Set(d, 0.5f * kGradient)), hn::IfThenElse(seen, det, one));
+    out.uAcross = hn::Mul(yv, half);
+    out.uDown = hn::Neg(hn::Mul(xv, half));
+    out.vAcross = hn::Neg(hn::Mul(yu, half));
+    out.vDown = hn::Mul(xu, half);
+    if (!hn::AllFalse(d, out.large)) {
+        // The lattice's Gaussian carried into the picture, and the low-pass filter added.
+        const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
+        const VF low = hn::Set(d, kSigmaPixel * kSigmaPixel);
+        const VF vxx = hn::MulAdd(k, square(xu, xv), low), vyy = hn::MulAdd(k, square(yu, yv), low);
+        const VF vxy = hn::Mul(k, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
+        const VF scale = hn::Div(one, hn::NegMulAdd(vxy, vxy, hn::Mul(vxx, vyy)));
+        out.qxx = hn::Mul(vyy, scale);
+        out.qyy = hn::Mul(vxx, scale);
+        out.qxy = hn::Neg(hn::Mul(vxy, scale));
+        const VF reach = hn::Set(d, kReach2), largest = hn::Set(d, kLargest);
+        out.halfX = hn::Min(hn::Sqrt(hn::Mul(reach, vxx)), largest);
+        out.halfY = hn::Min(hn::Sqrt(hn::Mul(reach, vyy)), largest);
+    }
+    return out;
+}
+
+struct Ellipse {
+    float x, y, z;
+    float slopeX, slopeY;
+    float qxx, qxy, qyy;
+    float halfX, halfY;
+    float core2;
+    float quality;
+    float uAcross, vAcross, uDown, vDown;
+};
+
+// The large splats among some neighbouring pixels, one by one: draw(pixel, ellipse).
+template <class F>
+HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const F& draw) {
+    constexpr int kValues = 15;
+    HWY_ALIGN float v[kValues][kBlock];
+    const VF all[kValues] = {p.at.x,    p.at.y,    p.at.z,    p.slopeX, p.slopeY,
+                             p.qxx,     p.qxy,     p.qyy,     p.halfX,  p.halfY,
+                             p.quality, p.uAcross, p.vAcross, p.uDown,  p.vDown};
+    for (int k = 0; k < kValues; ++k) hn::Store(all[k], d, v[k]);
+    while (bits) {
+        const int k = __builtin_ctz(bits);
+        bits &= bits - 1;
+        draw(k,
+             Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
+                     v[8][k], v[9][k], kCore2, v[10][k], v[11][k], v[12][k], v[13][k], v[14][k]});
+    }
+}
+
+// Calls row(first x, last x, y) for the part of the ellipse's box that lies in the band.
+template <class F>
+HWY_INLINE void forRows(const Ellipse& e, const Band& band, const F& row) {
+    // Off-screen coordinates may be beyond what an int holds.
+    if (!(e.x + e.halfX >= 0 && e.x - e.halfX <= band.width - 1 && e.y + e.halfY >= band.top &&
+          e.y - e.halfY <= band.top + band.rows - 1))
+        return;
+    const int x0 = static_cast<int>(std::ceil(std::max(e.x - e.halfX, 0.0f)));
+    const int x1 = static_cast<int>(std::floor(std::min(e.x + e.halfX, band.width - 1.0f)));
+    const int y0 = static_cast<int>(std::ceil(std::max(e.y - e.halfY, float(band.top))));
+    const int y1 =
+        static_cast<int>(std::floor(std::min(e.y + e.halfY, band.top + band.rows - 1.0f)));
+    if (x0 > x1) return;
+    for (int y = y0; y <= y1; ++y) row(x0, x1, y);
+}
+
+// Lanes of one row of an ellipse: squared deviations and depth of the plane there.
+struct Across {
+    VF q, z;
+    hn::Mask<DF> in;
+};
+
+HWY_INLINE Across across(DF d, const Ellipse& e, int x, int x1, int y) {
+    Across out;
+    const VF dx = hn::Sub(hn::Add(hn::Iota(d, 0), hn::Set(d, float(x))), hn::Set(d, e.x));
+    const float dy = y - e.y;
+    out.q = hn::MulAdd(dx, hn::MulAdd(dx, hn::Set(d, e.qxx), hn::Set(d, 2 * e.qxy * dy)),
+                       hn::Set(d, e.qyy * dy * dy));
+    out.z = hn::MulAdd(dx, hn::Set(d, e.slopeX * e.z), hn::Set(d, e.z * (1 + e.slopeY * dy)));
+    // A plane that runs through the viewpoint must not hide all.
+    out.z = hn::Max(out.z, hn::Set(d, 0.5f * e.z));
+    out.in = hn::Le(hn::Iota(d, 0), hn::Set(d, float(x1 - x)));
+    return out;
+}
+
+}  // namespace stx::splat::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

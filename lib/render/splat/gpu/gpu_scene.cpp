@@ -1,0 +1,133 @@
+#include "lib/render/splat/gpu/gpu_scene.hpp"
+
+namespace stx::gpu {
+namespace {
+
+struct Layout {
+    glm::ivec2 cell{1};
+    glm::ivec2 grid{1};
+    int layers = 1;
+};
+
+/// A grid of equal cells, as square as the views allow, in as few layers as the device needs.
+Result<Layout> layOut(const Bundle& bundle, const EglContext& context) {
+    Layout out;
+    for (const auto& view : bundle.views)
+        out.cell = glm::max(out.cell, glm::ivec2(view.camera.width, view.camera.height));
+    const int limit = std::min(context.abilities().maxTextureSize, 65535);
+    if (out.cell.x > limit || out.cell.y > limit)
+        return fail(
+            ErrorCode::unsupported,
+            "the views are up to {}x{} pixels, more than '{}' takes ({}x{}); use smaller views "
+            "or --backend cpu",
+            out.cell.x, out.cell.y, context.device().name, limit, limit);
+    const int count = static_cast<int>(bundle.views.size());
+    // Width near height: columns * cell.x ~ rows * cell.y.
+    const double side = std::sqrt(static_cast<double>(count) * out.cell.x * out.cell.y);
+    out.grid.x = std::clamp(static_cast<int>(std::ceil(side / out.cell.x)), 1,
+                            std::min(count, limit / out.cell.x));
+    out.grid.y =
+        std::clamp((count + out.grid.x - 1) / out.grid.x, 1, std::max(1, limit / out.cell.y));
+    if (out.grid.x * out.grid.y < count)
+        out.grid = glm::ivec2(limit / out.cell.x, limit / out.cell.y);
+    const int perLayer = out.grid.x * out.grid.y;
+    out.layers = (count + perLayer - 1) / perLayer;
+    if (out.layers > context.abilities().maxTextureLayers)
+        return fail(
+            ErrorCode::unsupported,
+            "{} views of {}x{} need {} texture layers, more than '{}' takes ({}); use fewer "
+            "views or --backend cpu",
+            count, out.cell.x, out.cell.y, out.layers, context.device().name,
+            context.abilities().maxTextureLayers);
+    return out;
+}
+
+/// `pixels` and `type` are what will be uploaded. OpenGL 3.3: the raster pipeline shares the scene.
+GlTexture makeTexture(GLenum format, GLenum pixels, GLenum type, const Layout& layout) {
+    auto texture = GlTexture::generate();
+    glBindTexture(GL_TEXTURE_2D_ARRAY, texture.get());
+    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, static_cast<GLint>(format), layout.cell.x * layout.grid.x,
+                 layout.cell.y * layout.grid.y, layout.layers, 0, pixels, type, nullptr);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    return texture;
+}
+
+}  // namespace
+
+Result<GpuScene> GpuScene::upload(const Bundle& bundle, const EglContext& context, bool withNormals,
+                                  Job& job) {
+    STX_TRY(const Layout layout, layOut(bundle, context));
+    GpuScene scene;
+    scene.linear = bundle.views.front().texture.isLinear();
+    scene.hasSizes = std::any_of(bundle.views.begin(), bundle.views.end(),
+                                 [](const auto& v) { return v.hasSplats(); });
+    const int bytesEach =
+        (scene.linear ? 8 : 4) + 4 + (withNormals ? 4 : 0) + (scene.hasSizes ? 8 : 4);
+    const std::int64_t texels = static_cast<std::int64_t>(layout.cell.x) * layout.grid.x *
+                                layout.cell.y * layout.grid.y * layout.layers;
+    scene.textureBytes = texels * bytesEach;
+    STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(texels),
+                                         static_cast<std::uint64_t>(bytesEach),
+                                         "the textures of the reference views"));
+    STX_CHECK(context.check("starting"));
+    scene.colour = scene.linear ? makeTexture(GL_RGBA16F, GL_RGBA, GL_FLOAT, layout)
+                                : makeTexture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, layout);
+    scene.depth = makeTexture(GL_R32F, GL_RED, GL_FLOAT, layout);
+    if (withNormals) scene.normal = makeTexture(GL_RGBA8_SNORM, GL_RGBA, GL_BYTE, layout);
+    scene.slope = scene.hasSizes ? makeTexture(GL_RGBA16I, GL_RGBA_INTEGER, GL_SHORT, layout)
+                                 : makeTexture(GL_RG16I, GL_RG_INTEGER, GL_SHORT, layout);
+    STX_CHECK(context.check("making the textures of the reference views"));
+
+    scene.views = splat::prepareViews(bundle, withNormals);
+    const int perLayer = layout.grid.x * layout.grid.y;
+    const int count = static_cast<int>(bundle.views.size());
+    for (int i = 0; i < count; ++i) {
+        STX_CHECK(job.checkCancelled());
+        const ReferenceView& view = bundle.views[static_cast<std::size_t>(i)];
+        splat::ViewInfo& info = scene.views[static_cast<std::size_t>(i)];
+        const int width = view.camera.width, height = view.camera.height;
+        const glm::ivec3 cell((i % perLayer % layout.grid.x) * layout.cell.x,
+                              (i % perLayer / layout.grid.x) * layout.cell.y, i / perLayer);
+        scene.cells.push_back(cell);
+        const auto put = [&](const GlTexture& texture, GLenum format, GLenum type,
+                             const void* pixels) {
+            glBindTexture(GL_TEXTURE_2D_ARRAY, texture.get());
+            glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, cell.x, cell.y, cell.z, width, height, 1,
+                            format, type, pixels);
+        };
+        glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+        if (const auto* image = view.texture.rgba8()) {
+            put(scene.colour, GL_RGBA, GL_UNSIGNED_BYTE, image->data());
+        } else if (const auto* floats = view.texture.rgbaFloat()) {
+            put(scene.colour, GL_RGBA, GL_FLOAT, floats->data());
+            for (const auto& p : floats->pixels())
+                scene.maxColour = std::max({scene.maxColour, p.r, p.g, p.b});
+        }
+        put(scene.depth, GL_RED, GL_FLOAT, view.depth.data());
+        if (withNormals) put(scene.normal, GL_RGBA, GL_BYTE, info.normals.data());
+        if (!scene.hasSizes) {
+            put(scene.slope, GL_RG_INTEGER, GL_SHORT, info.slopes.data());
+        } else {
+            std::vector<glm::i16vec4> coded(info.slopes.size());
+            for (std::size_t k = 0; k < coded.size(); ++k)
+                coded[k] = {info.slopes[k].u, info.slopes[k].v,
+                            info.sizes.empty() ? 64 : info.sizes[k], 0};
+            put(scene.slope, GL_RGBA_INTEGER, GL_SHORT, coded.data());
+        }
+        for (const auto& block : info.blocks)
+            scene.translucent = scene.translucent || !block.opaque;
+        scene.points += view.pointCount();
+        info.slopes = {};
+        info.normals = {};
+        info.sizes = {};
+        STX_CHECK(context.check("uploading the reference views"));
+        job.progress(i + 1, count, "uploading views");
+    }
+    return scene;
+}
+
+}  // namespace stx::gpu

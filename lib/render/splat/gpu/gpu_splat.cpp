@@ -1,0 +1,231 @@
+#include "lib/render/splat/gpu/gpu_splat.hpp"
+
+#include <chrono>
+#include <cstring>
+#include <optional>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/finish/pinholes.hpp"
+#include "lib/render/finish/silhouettes.hpp"
+#include "lib/render/splat/gpu/gpu_scene.hpp"
+
+namespace stx::gpu {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double millisecondsSince(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// Everything that lives in the context; destroyed while it is current.
+struct Resources {
+    GpuScene scene;
+    std::unique_ptr<SplatPipeline> pipeline;
+};
+
+/// A frame under way.
+struct Begun {
+    Camera camera;
+    int slot = 0;
+    double milliseconds = 0;
+};
+
+class GpuSplatRenderer final : public Renderer {
+  public:
+    GpuSplatRenderer(std::shared_ptr<EglContext> context, RenderSettings settings, Limits limits)
+        : context_(std::move(context)), settings_(std::move(settings)), limits_(limits) {}
+
+    ~GpuSplatRenderer() override {
+        if (!resources_) return;
+        // Where the context cannot be bound any more its objects are gone with it.
+        if (auto current = context_->makeCurrent())
+            resources_.reset();
+        else
+            (void)resources_.release();
+    }
+
+    Result<void> prepare(const Bundle& bundle, Job& job);
+    Result<Frame> render(const Camera& camera) override;
+    void expect(const Camera& next) override { expected_ = next; }
+    std::string backend() const override { return "gpu"; }
+    std::string device() const override { return context_->device().name; }
+    SplatCounts counts();
+
+  private:
+    [[nodiscard]] Result<void> checkSize(const Camera& camera) const;
+    [[nodiscard]] bool inOnePiece(const Camera& camera) const {
+        const int most = resources_->pipeline->largestPiece();
+        return camera.width <= most && camera.height <= most;
+    }
+    [[nodiscard]] Frame emptyFrame(const Camera& camera) const;
+    Result<Begun> begin(const Camera& camera, int slot);
+    /// Begins the frame that is expected next, in a slot.
+    void beginExpected(const std::optional<Camera>& next, int slot);
+    /// Waits for a piece of the frame and copies it to where it belongs.
+    Result<void> finish(const Begun& begun, glm::ivec2 at, Frame& frame);
+    Result<void> renderWhole(const Camera& camera, const std::optional<Camera>& next, Frame& frame);
+    Result<void> renderPieces(const Camera& camera, Frame& frame);
+
+    std::shared_ptr<EglContext> context_;
+    std::unique_ptr<Silhouettes> silhouettes_;  ///< shared with the processor's splat mode
+    bool pruned_ = false;                       ///< some view is
+    RenderSettings settings_;
+    Limits limits_;
+    std::unique_ptr<Resources> resources_;
+    std::optional<Camera> expected_;
+    std::optional<Begun> begun_;  ///< a frame under way before it was asked for
+};
+
+Result<void> GpuSplatRenderer::prepare(const Bundle& bundle, Job& job) {
+    auto pipeline = settings_.pipeline;
+    if (pipeline == GpuPipeline::compute)
+        STX_CHECK(context_->requireModern("the compute pipeline", "--pipeline raster"));
+    if (pipeline == GpuPipeline::automatic)
+        pipeline = choosePipeline(context_->device(), context_->abilities()).pipeline;
+    STX_TRY(auto current, context_->makeCurrent());
+    resources_ = std::make_unique<Resources>();
+    STX_TRY(resources_->scene, GpuScene::upload(bundle, *context_, settings_.wantNormals(), job));
+    silhouettes_ = std::make_unique<Silhouettes>(bundle);
+    pruned_ = bundle.pruned();
+    const auto make = pipeline == GpuPipeline::compute ? makeComputeSplats : makeRasterSplats;
+    STX_TRY(resources_->pipeline, make(*context_, resources_->scene, settings_));
+    return {};
+}
+
+Result<void> GpuSplatRenderer::checkSize(const Camera& camera) const {
+    STX_CHECK(camera.check());
+    return limits_.checkAllocation(
+        static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height),
+        settings_.wantNormals() ? 48 : 20, "the frame");
+}
+
+Frame GpuSplatRenderer::emptyFrame(const Camera& camera) const {
+    Frame frame;
+    frame.linear = resources_->scene.linear;
+    frame.colour = Image<glm::vec4>(camera.width, camera.height);
+    frame.depth = Image<float>(camera.width, camera.height);
+    if (settings_.wantNormals()) {
+        frame.normal = Image<glm::vec3>(camera.width, camera.height);
+        frame.albedo = Image<glm::vec4>(camera.width, camera.height);
+    }
+    return frame;
+}
+
+Result<Begun> GpuSplatRenderer::begin(const Camera& camera, int slot) {
+    const auto start = Clock::now();
+    SplatFrame frame =
+        planSplatFrame(resources_->scene, settings_, camera, resources_->pipeline->margin());
+    STX_CHECK(resources_->pipeline->draw(frame, slot));
+    return Begun{camera, slot, millisecondsSince(start)};
+}
+
+void GpuSplatRenderer::beginExpected(const std::optional<Camera>& next, int slot) {
+    if (!next || !checkSize(*next) || !inOnePiece(*next)) return;
+    // What fails here fails again, and is told, when the frame is asked for.
+    if (auto begun = begin(*next, slot)) begun_ = std::move(*begun);
+}
+
+Result<void> GpuSplatRenderer::finish(const Begun& begun, glm::ivec2 at, Frame& frame) {
+    const auto start = Clock::now();
+    STX_TRY(const SplatPlanes planes, resources_->pipeline->map(begun.slot));
+    frame.milliseconds += begun.milliseconds + millisecondsSince(start);
+    const int width = begun.camera.width;
+    const auto copy = [&](const auto* from, auto& image, int y) {
+        std::copy_n(from + static_cast<std::size_t>(y) * width, width,
+                    image.row(at.y + y).data() + at.x);
+    };
+    parallelForBlocks(0, begun.camera.height, 32, [&](std::int64_t first, std::int64_t end) {
+        for (int y = static_cast<int>(first); y < end; ++y) {
+            copy(planes.colour, frame.colour, y);
+            copy(planes.depth, frame.depth, y);
+            if (!planes.normal) continue;
+            copy(planes.normal, frame.normal, y);
+            copy(planes.albedo, frame.albedo, y);
+        }
+    });
+    resources_->pipeline->unmap(begun.slot);
+    return context_->check("reading the frame back");
+}
+
+Result<void> GpuSplatRenderer::renderWhole(const Camera& camera, const std::optional<Camera>& next,
+                                           Frame& frame) {
+    auto begun = std::exchange(begun_, std::nullopt);
+    // A frame that nobody asks for is overwritten, in the order of the commands.
+    if (!begun || begun->camera != camera) {
+        STX_TRY(begun, begin(camera, 0));
+    }
+    beginExpected(next, 1 - begun->slot);
+    return finish(*begun, {0, 0}, frame);
+}
+
+Result<void> GpuSplatRenderer::renderPieces(const Camera& camera, Frame& frame) {
+    begun_.reset();
+    const int piece = resources_->pipeline->largestPiece();
+    for (int y = 0; y < camera.height; y += piece) {
+        for (int x = 0; x < camera.width; x += piece) {
+            Camera part = camera;
+            part.width = std::min(piece, camera.width - x);
+            part.height = std::min(piece, camera.height - y);
+            part.cx -= x;
+            part.cy -= y;
+            STX_TRY(const Begun begun, begin(part, 0));
+            STX_CHECK(finish(begun, {x, y}, frame));
+        }
+    }
+    return {};
+}
+
+Result<Frame> GpuSplatRenderer::render(const Camera& camera) {
+    const auto next = std::exchange(expected_, std::nullopt);
+    STX_CHECK(checkSize(camera));
+    Frame frame = emptyFrame(camera);
+    {
+        STX_TRY(auto current, context_->makeCurrent());
+        STX_CHECK(inOnePiece(camera) ? renderWhole(camera, next, frame)
+                                     : renderPieces(camera, frame));
+    }
+    if (settings_.splat == SplatRule::data) {
+        const auto start = Clock::now();
+        closePinholes(frame, pruned_);
+        silhouettes_->carve(frame, camera);
+        frame.milliseconds += millisecondsSince(start);
+    }
+    return frame;
+}
+
+SplatCounts GpuSplatRenderer::counts() {
+    if (auto current = context_->makeCurrent()) return resources_->pipeline->counts();
+    return {};
+}
+
+}  // namespace
+
+PipelineChoice choosePipeline(const Device& device, const ContextAbilities& abilities) {
+    if (!abilities.modern)
+        return {GpuPipeline::raster, "no compute shaders: vertex texture fetch needs OpenGL 3.3"};
+    if (device.software)
+        return {GpuPipeline::compute,
+                "a software driver sets up every point as a primitive; atomics skip that"};
+    if (abilities.atomicInt64 || abilities.atomicFloat)
+        return {GpuPipeline::compute,
+                "atomics of 64 bits or floats outrun the rasteriser's tiny primitives"};
+    return {GpuPipeline::raster,
+            "the blending units add four sums at once; 32-bit atomics take one each"};
+}
+
+Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const Bundle& bundle,
+                                                       const RenderSettings& settings, int device,
+                                                       Job& job) {
+    STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
+    auto renderer = std::make_unique<GpuSplatRenderer>(std::move(context), settings, job.limits);
+    STX_CHECK(renderer->prepare(bundle, job));
+    return std::unique_ptr<Renderer>(std::move(renderer));
+}
+
+SplatCounts lastSplatCounts(Renderer& renderer) {
+    if (auto* ours = dynamic_cast<GpuSplatRenderer*>(&renderer)) return ours->counts();
+    return {};
+}
+
+}  // namespace stx::gpu

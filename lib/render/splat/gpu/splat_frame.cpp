@@ -1,0 +1,134 @@
+#include "lib/render/splat/gpu/splat_frame.hpp"
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/splat/gpu/splat_shaders.hpp"
+#include "lib/render/splat/paper_rule.hpp"
+#include "lib/render/splat/plan.hpp"
+
+namespace stx::gpu {
+namespace {
+
+/// Steps of a weight in the integer sums. A sparse view's weight may be a thousandth of this; where
+/// such views are alone the steps still have to tell them apart.
+constexpr double kLargestWeight = 1048576.0;
+
+/// Source pixels that fall on one novel pixel where the block is seen as its view saw it.
+double density(const splat::ViewInfo& info, const splat::BlockInfo& block,
+               const splat::BlockTask& task, const Camera& novel) {
+    const auto& c = info.view->camera;
+    const double source = c.orthographic ? 1.0 : block.zMin;
+    const double target = novel.orthographic ? 1.0 : std::max(1e-9, double(task.zMin));
+    return (c.fx * c.fy / (source * source)) * (target * target) / (novel.fx * novel.fy);
+}
+
+std::uint32_t tileOf(int x, int y) {
+    return static_cast<std::uint32_t>(x / kCullTile) | static_cast<std::uint32_t>(y / kCullTile)
+                                                           << 16;
+}
+
+FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, const Camera& novel,
+                         int margin) {
+    FrameUniforms u;
+    u.frameSize = {novel.width, novel.height, novel.width + 2, margin};
+    u.counts = {static_cast<int>(scene.views.size()), 0, 0, 0};
+    u.novelLens = {1.0 / novel.fx, 1.0 / novel.fy, novel.cx, novel.cy};
+    const glm::mat3 axes = glm::mat3_cast(glm::quat(novel.orientation));
+    u.novelAxisX = glm::vec4(axes[0], novel.orthographic ? 1.0f : 0.0f);
+    u.novelAxisY = glm::vec4(axes[1], 0.0f);
+    u.novelAxisZ = glm::vec4(axes[2], 0.0f);
+    const double coefficient =
+        settings.splat == SplatRule::paper ? paperCoefficient(scene.views, settings, novel) : 0.0;
+    u.novelPosition = glm::vec4(novel.position, coefficient);
+    u.ambient = glm::vec4(settings.lighting.ambient, 0.0f);
+    u.specular = glm::vec4(settings.lighting.specular, settings.lighting.shininess);
+    return u;
+}
+
+}  // namespace
+
+SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
+                          const Camera& novel, int margin) {
+    SplatFrame frame;
+    frame.uniforms = uniformsOf(scene, settings, novel, margin);
+    std::vector<TaskEntry> small, large;
+    double crowd = 0;  // points that may meet in one pixel, all views together
+    struct Planned {
+        splat::BlockTask task;
+        double density = 0;
+        bool seen = false;
+    };
+    std::vector<Planned> planned;
+    for (std::size_t k = 0; k < scene.views.size(); ++k) {
+        const splat::ViewInfo& info = scene.views[k];
+        const Camera& c = info.view->camera;
+        splat::Source source;
+        source.orthographic = c.orthographic;
+        source.fx = static_cast<float>(c.fx);
+        source.fy = static_cast<float>(c.fy);
+        source.map = splat::pixelMap(c, novel);
+        const splat::PixelMap& m = source.map;
+        frame.views.push_back({glm::vec4(m.a0, c.orthographic ? 1.0f : 0.0f), glm::vec4(m.au, c.fx),
+                               glm::vec4(m.av, c.fy), glm::vec4(m.b0, 0), glm::vec4(m.bu, 0),
+                               glm::vec4(m.bv, 0)});
+        planned.assign(info.blocks.size(), {});
+        parallelForBlocks(0, static_cast<std::int64_t>(planned.size()), 512,
+                          [&](std::int64_t from, std::int64_t to) {
+                              for (auto i = from; i < to; ++i) {
+                                  Planned& p = planned[i];
+                                  p.seen =
+                                      splat::planBlock(info, info.blocks[i], source, novel,
+                                                       settings.splat == SplatRule::data, p.task);
+                                  if (p.seen)
+                                      p.density = density(info, info.blocks[i], p.task, novel);
+                              }
+                          });
+        double densest = 0;
+        const glm::ivec3 cell = scene.cells[k];
+        for (const Planned& p : planned) {
+            if (!p.seen) continue;
+            const splat::BlockTask& t = p.task;
+            densest = std::max(densest, p.density);
+            const TaskEntry entry{
+                static_cast<std::uint32_t>(t.u0) | static_cast<std::uint32_t>(t.v0) << 16,
+                static_cast<std::uint32_t>(t.u1 - t.u0) | static_cast<std::uint32_t>(t.v1 - t.v0)
+                                                              << 16,
+                static_cast<std::uint32_t>(cell.x + t.u0) |
+                    static_cast<std::uint32_t>(cell.y + t.v0) << 16,
+                static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(cell.z) << 20,
+                t.slopeX,
+                t.slopeY,
+                t.core2,
+                t.tolerance,
+                t.quality * (t.uniform ? t.density : 1.0f),
+                t.uAcross,
+                t.vAcross,
+                t.uDown,
+                t.vDown,
+                tileOf(t.x0, t.y0),
+                tileOf(t.x1, t.y1),
+                t.nearest};
+            const bool own = settings.splat == SplatRule::data && !t.uniform;
+            (!own ? frame.tasks : t.small ? small : large).push_back(entry);
+        }
+        crowd += std::max(1.0, densest);
+    }
+    frame.uniformTasks = static_cast<int>(frame.tasks.size());
+    frame.smallTasks = static_cast<int>(small.size());
+    frame.tasks.insert(frame.tasks.end(), small.begin(), small.end());
+    frame.tasks.insert(frame.tasks.end(), large.begin(), large.end());
+    // 32-bit sums: colour steps * weight * crowd must stay below 2^31. Four for what a tilt and
+    // the kernel's four pixels add.
+    const double steps = 255.0;
+    const double weight = std::clamp(2147483647.0 / (steps * 4.0 * crowd), 1.0, kLargestWeight);
+    frame.uniforms.scales = glm::vec4(std::floor(weight), steps / scene.maxColour, 0, 0);
+
+    const Lighting lighting = lightsInWorld(settings.lighting, novel.worldFromCamera());
+    for (const auto& light : lighting.lights)
+        frame.lights.push_back(
+            {glm::vec4(light.vector, light.kind == Light::Kind::point ? 1.0f : 0.0f),
+             glm::vec4(light.colour, 0.0f)});
+    frame.uniforms.counts.w = static_cast<int>(frame.lights.size());
+    return frame;
+}
+
+}  // namespace stx::gpu

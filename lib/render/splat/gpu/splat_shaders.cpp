@@ -1,0 +1,126 @@
+#include "lib/render/splat/gpu/splat_shaders.hpp"
+
+#include <array>
+
+#include "embedded_shaders.hpp"
+#include "lib/render/splat/constants.hpp"
+#include "lib/render/splat/view.hpp"
+
+namespace stx::gpu {
+namespace {
+
+std::string splatConstants() {
+    using namespace splat;
+    const std::array constants{ShaderConstant{"kNearest", kNearest},
+                               ShaderConstant{"kSlopeScale", kSlopeScale},
+                               ShaderConstant{"kSigmaSource", kSigmaSource},
+                               ShaderConstant{"kSigmaPixel", kSigmaPixel},
+                               ShaderConstant{"kReach2", kReach2},
+                               ShaderConstant{"kCore2", kCore2},
+                               ShaderConstant{"kLargest", kLargest},
+                               ShaderConstant{"kSteepestPlane", kSteepestPlane},
+                               ShaderConstant{"kRimCore2", kRimCore2},
+                               ShaderConstant{"kEdgeQuality", kEdgeQuality},
+                               ShaderConstant{"kSmallCover2", kSmallCover2},
+                               ShaderConstant{"kLeastDensity", kLeastDensity},
+                               ShaderConstant{"kGradient", kGradient},
+                               ShaderConstant{"kFadeTo", kFadeTo}};
+    return shaderConstants(constants);
+}
+
+}  // namespace
+
+std::string splatHeader(const SplatVariant& v, int pass, Rule rule) {
+    // The raster pipeline is for devices without compute shaders: OpenGL 3.3 has all it needs.
+    std::string text = v.raster ? "#version 330 core\n" : "#version 450 core\n";
+    if (!v.raster && v.sums == Sums::pairs)
+        text +=
+            "#extension GL_ARB_gpu_shader_int64 : require\n"
+            "#extension GL_NV_shader_atomic_int64 : require\n";
+    if (!v.raster && v.sums == Sums::floats)
+        text += "#extension GL_NV_shader_atomic_float : require\n";
+    const auto define = [&](const char* name, int value) {
+        text += fmt::format("#define {} {}\n", name, value);
+    };
+    define("PASS", pass);
+    define("RULE", static_cast<int>(rule));
+    define("ACCUMULATE", static_cast<int>(v.sums));
+    define("TRANSLUCENT", v.translucent);
+    define("NORMALS", v.normals);
+    define("LIT", v.lit);
+    define("SIZES", v.sizes);
+    define("RASTER", v.raster);
+    define("LINEAR", v.linear);
+    define("CULL", v.cull);
+    define("TILE", kCullTile);
+    return text + splatConstants();
+}
+
+std::vector<ShaderStage> splatStages(bool raster, SplatProgram program) {
+    using namespace shaders;
+    const auto compute = [](std::string_view name, std::vector<std::string_view> pieces) {
+        return std::vector<ShaderStage>{{GL_COMPUTE_SHADER, name, std::move(pieces)}};
+    };
+    if (raster && program == SplatProgram::splats)
+        return {
+            {GL_VERTEX_SHADER, "splat.vert", {splat_frame_glsl, splat_points_glsl, splat_vert}},
+            {GL_FRAGMENT_SHADER, "splat.frag", {splat_frame_glsl, splat_points_glsl, splat_frag}}};
+    if (raster)
+        return {{GL_VERTEX_SHADER, "screen.vert", {screen_vert}},
+                {GL_FRAGMENT_SHADER,
+                 "resolve.frag",
+                 {splat_frame_glsl, phong_glsl, resolve_glsl, resolve_frag}}};
+    switch (program) {
+        case SplatProgram::splats:
+            return compute("splat.comp", {splat_frame_glsl, splat_points_glsl, splat_comp});
+        case SplatProgram::resolve:
+            return compute("resolve.comp",
+                           {splat_frame_glsl, phong_glsl, resolve_glsl, resolve_comp});
+        case SplatProgram::tiles:
+            return compute("splat_tiles.comp", {splat_frame_glsl, splat_tiles_comp});
+        case SplatProgram::cull:
+            break;
+    }
+    return compute("splat_cull.comp", {splat_frame_glsl, splat_points_glsl, splat_cull_comp});
+}
+
+std::vector<ShaderText> allSplatShaders() {
+    std::vector<ShaderText> out;
+    const auto add = [&](const SplatVariant& v, SplatProgram program, int pass, Rule rule) {
+        for (const auto& stage : splatStages(v.raster, program))
+            out.push_back(shaderText(
+                fmt::format("{} pass {} rule {} sums {}{}{}{}{}{}{}", stage.name, pass,
+                            static_cast<int>(rule), static_cast<int>(v.sums),
+                            v.translucent ? " translucent" : "", v.normals ? " normals" : "",
+                            v.lit ? " lit" : "", v.sizes ? " sizes" : "", v.linear ? " linear" : "",
+                            v.cull ? " cull" : ""),
+                splatHeader(v, pass, rule), stage));
+    };
+    for (const bool raster : {false, true}) {
+        for (const Sums sums : {Sums::integers, Sums::floats, Sums::pairs}) {
+            if (raster && sums != Sums::integers) continue;
+            // Bits: translucent, normals, and sizes of the splats or light of the picture.
+            for (int bits = 0; bits < 8; ++bits) {
+                SplatVariant v;
+                v.raster = raster;
+                v.sums = sums;
+                v.translucent = bits & 1;
+                v.normals = bits & 2;
+                v.sizes = v.cull = bits & 4;
+                v.cull = v.cull && !raster;
+                for (const Rule rule :
+                     {Rule::point, Rule::uniform, Rule::ellipse, Rule::paper, Rule::small})
+                    for (const int pass : {1, 2}) add(v, SplatProgram::splats, pass, rule);
+                v.sizes = v.cull = false;
+                v.lit = v.normals && (bits & 4);
+                v.linear = bits & 1;
+                add(v, SplatProgram::resolve, 0, Rule::point);
+            }
+        }
+    }
+    add({}, SplatProgram::tiles, 0, Rule::point);
+    add({}, SplatProgram::cull, 0, Rule::point);
+    return out;
+}
+
+}  // namespace stx::gpu

@@ -1,0 +1,205 @@
+#include "lib/render/splat/plan.hpp"
+
+#include <cmath>
+
+namespace stx::splat {
+namespace {
+
+// Relative depth behind the front that still belongs to it (Lee & Park blend all; 1 to 3 % is known
+// to be good): for blocks whose tilt is known, and for others.
+constexpr float kTolerance = 0.01f, kToleranceRough = 0.02f;
+
+// How the picture of a source pixel's cell is spanned.
+struct Cell {
+    glm::dvec2 u, v;        // pixels per source pixel
+    double zu = 0, zv = 0;  // relative change of novel depth per source pixel
+
+    [[nodiscard]] double det() const { return u.x * v.y - u.y * v.x; }
+    // Squared distance from a lattice point that closes the lattice: half the longer diagonal.
+    [[nodiscard]] double cover2() const {
+        const glm::dvec2 a = u + v, b = u - v;
+        return 0.25 * std::max(glm::dot(a, a), glm::dot(b, b));
+    }
+};
+
+Cell cellAt(const Source& s, double u, double v, double z, double slopeU, double slopeV,
+            bool orthographic) {
+    const PixelMap& m = s.map;
+    const glm::dvec3 a = m.a0 + m.au * u + m.av * v;
+    const glm::dvec3 h = a * z + m.b0 + m.bu * u + m.bv * v;
+    const double spacing = s.orthographic ? 1.0 : z;
+    const glm::dvec3 hu = m.au * z + m.bu + a * (slopeU * spacing / s.fx);
+    const glm::dvec3 hv = m.av * z + m.bv + a * (slopeV * spacing / s.fy);
+    Cell c;
+    const double w = 1.0 / h.z;
+    if (orthographic) {
+        c.u = {hu.x, hu.y};
+        c.v = {hv.x, hv.y};
+    } else {
+        const double x = h.x * w, y = h.y * w;
+        c.u = {(hu.x - x * hu.z) * w, (hu.y - y * hu.z) * w};
+        c.v = {(hv.x - x * hv.z) * w, (hv.y - y * hv.z) * w};
+    }
+    c.zu = hu.z * w;
+    c.zv = hv.z * w;
+    return c;
+}
+
+}  // namespace
+
+PixelMap pixelMap(const Camera& source, const Camera& novel) {
+    const glm::dmat4 novelFromSource = novel.cameraFromWorld() * source.worldFromCamera();
+    const glm::dmat3 r(novelFromSource);
+    const glm::dvec3 t(novelFromSource[3]);
+    // H of a point q in the novel camera's space; half a pixel makes centres whole numbers.
+    const double cx = novel.cx - 0.5, cy = novel.cy - 0.5;
+    const auto image = [&](glm::dvec3 q) {
+        const double centre = novel.orthographic ? 0.0 : -q.z;
+        return glm::dvec3(novel.fx * q.x + cx * centre, -novel.fy * q.y + cy * centre, -q.z);
+    };
+    const glm::dvec3 offset =
+        image(t) + (novel.orthographic ? glm::dvec3(cx, cy, 0) : glm::dvec3(0));
+    const glm::dvec3 du = image(r * glm::dvec3(1 / source.fx, 0, 0));
+    const glm::dvec3 dv = image(r * glm::dvec3(0, -1 / source.fy, 0));
+    const glm::dvec3 origin = du * (0.5 - source.cx) + dv * (0.5 - source.cy);
+    const glm::dvec3 axis = image(r * glm::dvec3(0, 0, -1));
+    PixelMap m{};
+    if (source.orthographic) {
+        m.a0 = axis;
+        m.b0 = origin + offset;
+        m.bu = du;
+        m.bv = dv;
+    } else {
+        m.a0 = origin + axis;
+        m.au = du;
+        m.av = dv;
+        m.b0 = offset;
+    }
+    return m;
+}
+
+bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, const Camera& novel,
+               bool cullBackFaces, BlockTask& task) {
+    task.u0 = block.u0;
+    task.v0 = block.v0;
+    task.u1 = block.u1;
+    task.v1 = block.v1;
+    task.opaque = block.opaque;
+    const PixelMap& m = s.map;
+
+    // Where its corners land. All in front of the camera, they bound the block.
+    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, zMin = 1e300, zMax = -1e300;
+    for (int corner = 0; corner < 4; ++corner) {
+        const double u = (corner & 1) ? block.u1 - 1 : block.u0,
+                     v = (corner & 2) ? block.v1 - 1 : block.v0;
+        const glm::dvec3 a = m.a0 + m.au * u + m.av * v, b = m.b0 + m.bu * u + m.bv * v;
+        for (const float z : {block.zMin, block.zMax}) {
+            const glm::dvec3 h = a * double(z) + b;
+            zMin = std::min(zMin, h.z);
+            zMax = std::max(zMax, h.z);
+            const double w = novel.orthographic ? 1.0 : 1.0 / h.z;
+            x0 = std::min(x0, h.x * w);
+            x1 = std::max(x1, h.x * w);
+            y0 = std::min(y0, h.y * w);
+            y1 = std::max(y1, h.y * w);
+        }
+    }
+    if (!(zMax > 0)) return false;
+    const bool crossing = !(zMin > 1e-6 * zMax);
+    task.zMin = crossing ? 0.0f : static_cast<float>(zMin);
+
+    // The cells of the block: one where the surface is smooth, else the corners of what occurs.
+    const double uc = 0.5 * (block.u0 + block.u1 - 1), vc = 0.5 * (block.v0 + block.v1 - 1);
+    const float unit = 1.0f / kSlopeScale;
+    const float su0 = block.slopeMin.u * unit, su1 = block.slopeMax.u * unit;
+    const float sv0 = block.slopeMin.v * unit, sv1 = block.slopeMax.v * unit;
+    const bool smooth = su1 - su0 < 0.35f && sv1 - sv0 < 0.35f && block.zMax < 1.2f * block.zMin;
+    double cover2 = 0, det = -1e300, stretch2 = 0;
+    Cell middle = cellAt(s, uc, vc, 0.5 * (block.zMin + block.zMax), 0.5 * (su0 + su1),
+                         0.5 * (sv0 + sv1), novel.orthographic);
+    if (crossing) {
+        cover2 = 1e300;
+        det = 1;
+        stretch2 = 1;
+    } else {
+        const auto consider = [&](const Cell& c) {
+            cover2 = std::max(cover2, c.cover2());
+            det = std::max(det, c.det());
+            stretch2 = std::max({stretch2, glm::dot(c.u, c.u), glm::dot(c.v, c.v)});
+        };
+        for (int corner = 0; corner < 4; ++corner) {
+            const double su = (corner & 1) ? su1 : su0, sv = (corner & 2) ? sv1 : sv0;
+            // Smooth blocks need only half of the eight combinations.
+            const bool first = corner == 0 || corner == 3;
+            if (first || !smooth)
+                consider(cellAt(s, uc, vc, block.zMin, su, sv, novel.orthographic));
+            if (!first || !smooth)
+                consider(cellAt(s, uc, vc, block.zMax, su, sv, novel.orthographic));
+        }
+        // The block's corners differ a little from its middle.
+        cover2 *= 1.08;
+    }
+    if (cullBackFaces && !(det > 0)) return false;
+    cover2 *= block.size * block.size;
+    task.small = cover2 < kSmallCover2;
+    task.uniform = task.small && smooth && block.linked;
+    task.core2 = static_cast<float>(std::max(0.5, 1.08 * cover2));
+
+    task.tolerance = smooth ? kTolerance : kToleranceRough;
+    task.slopeX = task.slopeY = 0;
+    task.uAcross = task.vAcross = task.uDown = task.vDown = 0;
+    if (const double d = middle.det(); smooth && d > 1e-3 * stretch2) {
+        constexpr double steepest = kSteepestPlane;
+        task.slopeX = static_cast<float>(
+            std::clamp((middle.zu * middle.v.y - middle.zv * middle.u.y) / d, -steepest, steepest));
+        task.slopeY = static_cast<float>(
+            std::clamp((middle.zv * middle.u.x - middle.zu * middle.v.x) / d, -steepest, steepest));
+        const double half = 0.5 * kGradient * std::clamp(d / kFadeTo - 1.0, 0.0, 1.0) / d;
+        task.uAcross = static_cast<float>(middle.v.y * half);
+        task.uDown = static_cast<float>(-middle.v.x * half);
+        task.vAcross = static_cast<float>(-middle.u.y * half);
+        task.vDown = static_cast<float>(middle.u.x * half);
+    }
+
+    // Views that saw the surface close (dense samples) and head-on count more, and those that saw
+    // it from about where we stand, since looks change with the angle.
+    const double density = 1.0 / std::max(1.0, stretch2);
+    task.density = std::max(static_cast<float>(density * density), kLeastDensity);
+    const auto& c = view.view->camera;
+    const glm::dvec3 point =
+        c.position +
+        c.orientation * c.unproject(uc + 0.5, vc + 0.5, 0.5 * (block.zMin + block.zMax));
+    const auto directionFrom = [&](const Camera& camera) {
+        return camera.orthographic ? camera.forward() : glm::normalize(point - camera.position);
+    };
+    const double cosAngle = glm::dot(directionFrom(c), directionFrom(novel));
+    const double angle = std::max(0.0, cosAngle);
+    task.quality = static_cast<float>(0.01 + angle * angle * angle * angle);
+
+    // The plane of a splat comes nearer than its point: by its slope over a pixel either way if
+    // small, else down to half (see the kernels). A little less for rounding.
+    const float least = task.uniform ? 1.0f - std::abs(task.slopeX) - std::abs(task.slopeY)
+                        : task.small ? 1.0f - 2 * kSteepestPlane
+                                     : 0.5f;
+    task.nearest = 0.999f * least * task.zMin / (1.0f + task.tolerance);
+
+    if (crossing) {
+        task.x0 = task.y0 = 0;
+        task.x1 = novel.width - 1;
+        task.y1 = novel.height - 1;
+        return true;
+    }
+    const double reach = task.small ? 1.0 : 2.0 + 2.4 * std::sqrt(cover2);
+    x0 -= reach;
+    y0 -= reach;
+    x1 += reach;
+    y1 += reach;
+    if (!(x1 >= 0 && y1 >= 0 && x0 <= novel.width - 1 && y0 <= novel.height - 1)) return false;
+    task.x0 = static_cast<int>(std::max(0.0, std::floor(x0)));
+    task.y0 = static_cast<int>(std::max(0.0, std::floor(y0)));
+    task.x1 = static_cast<int>(std::min(novel.width - 1.0, std::ceil(x1)));
+    task.y1 = static_cast<int>(std::min(novel.height - 1.0, std::ceil(y1)));
+    return true;
+}
+
+}  // namespace stx::splat

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "lib/geometry/camera.hpp"
+#include "lib/render/splat/cpu/kernels.hpp"
+
+namespace stx::splat {
+
+/// Where the pixels of `source` land in the picture of `novel`.
+[[nodiscard]] PixelMap pixelMap(const Camera& source, const Camera& novel);
+
+/// What to do for one block in one frame. False when nothing of it can be seen: it lies outside, or
+/// all of it faces away (only where `cullBackFaces`).
+[[nodiscard]] bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& source,
+                             const Camera& novel, bool cullBackFaces, BlockTask& task);
+
+}  // namespace stx::splat

@@ -1,0 +1,266 @@
+#include "lib/render/surface/cpu/raster.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "lib/render/surface/constants.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lib/render/surface/cpu/raster.cpp"
+#include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::surface::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+struct Vertex {
+    float x, y, q;
+    bool front;
+};
+
+HWY_INLINE Vertex project(const Warp& w, float x, float y, float q) {
+    const auto& m = w.m;
+    const float d = m[12] * x + m[13] * y + m[14] * q + m[15];
+    const float inverse = 1.0f / d;
+    return {(m[0] * x + m[1] * y + m[2] * q + m[3]) * inverse,
+            (m[4] * x + m[5] * y + m[6] * q + m[7]) * inverse,
+            (m[8] * x + m[9] * y + m[10] * q + m[11]) * inverse, d > 0.0f};
+}
+
+struct Target {
+    float* samples;
+    int side, stride;
+    float qLimit;
+};
+
+/// Fills a convex polygon that turns the right way. `grow` moves its edges out, in samples; with
+/// kExtend only samples that no mesh holds are written.
+template <int kCorners, bool kExtend>
+HWY_INLINE void fillPolygon(const Target& t, const Vertex* v, float grow, std::uint32_t bits) {
+    for (int i = 0; i < kCorners; ++i)
+        if (!v[i].front) return;
+    float xMin = v[0].x, xMax = v[0].x, yMin = v[0].y, yMax = v[0].y, qMin = v[0].q, qMax = v[0].q;
+    for (int i = 1; i < kCorners; ++i) {
+        xMin = std::min(xMin, v[i].x);
+        xMax = std::max(xMax, v[i].x);
+        yMin = std::min(yMin, v[i].y);
+        yMax = std::max(yMax, v[i].y);
+        qMin = std::min(qMin, v[i].q);
+        qMax = std::max(qMax, v[i].q);
+    }
+    const auto last = static_cast<float>(t.side - 1);
+    const float fx0 = std::max(xMin - grow, 0.0f), fx1 = std::min(xMax + grow, last);
+    const float fy0 = std::max(yMin - grow, 0.0f), fy1 = std::min(yMax + grow, last);
+    if (!(fx0 <= fx1 && fy0 <= fy1) || !(qMin > 0.0f) || !(qMax <= t.qLimit)) return;
+    const int x0 = static_cast<int>(std::ceil(fx0)), x1 = static_cast<int>(fx1);
+    const int y0 = static_cast<int>(std::ceil(fy0)), y1 = static_cast<int>(fy1);
+    if (x0 > x1 || y0 > y1) return;
+
+    // Diagonals (or two sides) span the plane; its z component is twice the signed area.
+    const Vertex& a = v[kCorners == 4 ? 2 : 1];
+    const Vertex& b = v[kCorners == 4 ? 3 : 2];
+    const Vertex& bBase = v[kCorners == 4 ? 1 : 0];
+    const float ax = a.x - v[0].x, ay = a.y - v[0].y, aq = a.q - v[0].q;
+    const float bx = b.x - bBase.x, by = b.y - bBase.y, bq = b.q - bBase.q;
+    const float area = ax * by - ay * bx;
+    if (!(area > 0.0f)) return;
+    const float inverseArea = 1.0f / area;
+    const float px = (aq * by - ay * bq) * inverseArea, py = (ax * bq - aq * bx) * inverseArea;
+    float cx = 0, cy = 0, cq = 0;
+    for (int i = 0; i < kCorners; ++i) {
+        cx += v[i].x;
+        cy += v[i].y;
+        cq += v[i].q;
+    }
+    constexpr float kShare = 1.0f / kCorners;
+    const float p0 = cq * kShare - px * cx * kShare - py * cy * kShare;
+
+    float ex[kCorners], ey[kCorners], e0[kCorners];
+    for (int i = 0; i < kCorners; ++i) {
+        const Vertex& from = v[i];
+        const Vertex& to = v[(i + 1) % kCorners];
+        ex[i] = from.y - to.y;
+        ey[i] = to.x - from.x;
+        e0[i] = -(ex[i] * from.x + ey[i] * from.y) + grow * (std::abs(ex[i]) + std::abs(ey[i]));
+    }
+
+    const hn::ScalableTag<float> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    using V = hn::Vec<decltype(d)>;
+    const int n = static_cast<int>(hn::Lanes(d));
+    const V steps = hn::ConvertTo(d, hn::Iota(hn::RebindToSigned<decltype(d)>(), 0));
+    const V low = hn::Set(d, qMin), high = hn::Set(d, qMax), zero = hn::Zero(d);
+    const auto tag = hn::BitCast(d, hn::Set(du, bits));
+    const auto clean = hn::BitCast(d, hn::Set(du, ~3u));
+    for (int x = x0; x <= x1; x += n) {
+        const V vx = hn::Add(hn::Set(d, static_cast<float>(x)), steps);
+        const auto inColumns = hn::Le(vx, hn::Set(d, static_cast<float>(x1)));
+        V edge[kCorners];
+        for (int i = 0; i < kCorners; ++i)
+            edge[i] = hn::MulAdd(hn::Set(d, ex[i]), vx, hn::Set(d, e0[i]));
+        const V plane = hn::MulAdd(hn::Set(d, px), vx, hn::Set(d, p0));
+        for (int y = y0; y <= y1; ++y) {
+            const V vy = hn::Set(d, static_cast<float>(y));
+            V inside = hn::MulAdd(hn::Set(d, ey[0]), vy, edge[0]);
+            for (int i = 1; i < kCorners; ++i)
+                inside = hn::Min(inside, hn::MulAdd(hn::Set(d, ey[i]), vy, edge[i]));
+            auto mask = hn::And(hn::Ge(inside, zero), inColumns);
+            V q = hn::MulAdd(hn::Set(d, py), vy, plane);
+            q = hn::Min(hn::Max(q, low), high);
+            q = hn::Or(hn::And(q, clean), tag);
+            float* out = t.samples + static_cast<std::ptrdiff_t>(y) * t.stride + x;
+            const V old = hn::LoadU(d, out);
+            mask = hn::And(mask, hn::Gt(q, old));
+            if (kExtend) {
+                const auto oldBits = hn::BitCast(du, old);
+                const auto extension = hn::MaskFromVec(hn::BitCast(
+                    d, hn::VecFromMask(du, hn::TestBit(oldBits, hn::Set(du, kExtensionBit)))));
+                mask = hn::And(mask, hn::Or(hn::Eq(old, zero), extension));
+            }
+            hn::StoreU(hn::IfThenElse(mask, q, old), d, out);
+        }
+    }
+}
+
+HWY_INLINE void drawLeaf(const Target& t, const Warp& warp, const Leaf& leaf, float grow) {
+    const float n = leaf.size;
+    const float x = leaf.x + 0.5f, y = leaf.y + 0.5f;
+    const Vertex v[4] = {project(warp, x, y, leaf.q0),
+                         project(warp, x + n, y, leaf.q0 + n * leaf.qx),
+                         project(warp, x + n, y + n, leaf.q0 + n * (leaf.qx + leaf.qy)),
+                         project(warp, x, y + n, leaf.q0 + n * leaf.qy)};
+    fillPolygon<4, false>(t, v, grow, 0);
+}
+
+HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
+                            const SourceBlock& block, int x0, int y0) {
+    constexpr int kSide = kBlock + 1;
+    Vertex grid[kSide][kSide];
+    const int xEnd = std::min(x0 + kBlock, s.width - 1), yEnd = std::min(y0 + kBlock, s.height - 1);
+    std::uint32_t needed[kSide] = {};
+    for (int j = 0; j < kBlock; ++j) {
+        needed[j] |= block.cells[j];
+        needed[j + 1] |= block.cells[j];
+    }
+    for (int y = y0; y <= yEnd; ++y) {
+        if (!needed[y - y0]) continue;
+        const float* q = &s.q.at(x0, y);
+        for (int x = 0; x <= xEnd - x0; ++x)
+            grid[y - y0][x] = project(warp, static_cast<float>(x0 + x) + 0.5f,
+                                      static_cast<float>(y) + 0.5f, q[x]);
+    }
+    for (int j = 0; j < kBlock; ++j) {
+        for (std::uint32_t left = block.cells[j]; left; left &= left - 1) {
+            const int i = __builtin_ctz(left);
+            const int x = x0 + i, y = y0 + j;
+            const Vertex &v00 = grid[j][i], &v10 = grid[j][i + 1];
+            const Vertex &v01 = grid[j + 1][i], &v11 = grid[j + 1][i + 1];
+            const bool top = s.linkRight(x, y), bottom = s.linkRight(x, y + 1);
+            const bool leftLink = s.linkDown(x, y), rightLink = s.linkDown(x + 1, y);
+            const int edge =
+                std::min(std::min(s.edgeDistance(x, y), s.edgeDistance(x + 1, y)),
+                         std::min(s.edgeDistance(x, y + 1), s.edgeDistance(x + 1, y + 1)));
+            const std::uint32_t bits = edge < 3 ? kNearEdgeBit : 0;
+            const int links = top + bottom + leftLink + rightLink;
+            if (links >= 3) {
+                const float q00 = s.q.at(x, y), q10 = s.q.at(x + 1, y);
+                const float q01 = s.q.at(x, y + 1), q11 = s.q.at(x + 1, y + 1);
+                if (links == 4 &&
+                    std::abs(q00 + q11 - q10 - q01) <= 2 * s.flat * s.space.axis.whole(q00)) {
+                    const Vertex quad[4] = {v00, v10, v11, v01};
+                    fillPolygon<4, false>(t, quad, kCrack, bits);
+                } else if (std::abs(q00 - q11) < std::abs(q10 - q01)) {
+                    const Vertex a[3] = {v00, v10, v11}, b[3] = {v00, v11, v01};
+                    fillPolygon<3, false>(t, a, kCrack, bits);
+                    fillPolygon<3, false>(t, b, kCrack, bits);
+                } else {
+                    const Vertex a[3] = {v00, v10, v01}, b[3] = {v10, v11, v01};
+                    fillPolygon<3, false>(t, a, kCrack, bits);
+                    fillPolygon<3, false>(t, b, kCrack, bits);
+                }
+            } else if (top && leftLink) {
+                const Vertex a[3] = {v00, v10, v01};
+                fillPolygon<3, false>(t, a, kCrack, bits);
+            } else if (top && rightLink) {
+                const Vertex a[3] = {v10, v11, v00};
+                fillPolygon<3, false>(t, a, kCrack, bits);
+            } else if (bottom && rightLink) {
+                const Vertex a[3] = {v11, v01, v10};
+                fillPolygon<3, false>(t, a, kCrack, bits);
+            } else if (bottom && leftLink) {
+                const Vertex a[3] = {v01, v00, v11};
+                fillPolygon<3, false>(t, a, kCrack, bits);
+            }
+        }
+    }
+}
+
+HWY_NOINLINE void drawExtensions(const Target& t, const Source& s, const Warp& warp,
+                                 const SourceBlock& block, int x0, int y0) {
+    for (int j = 0; j < kBlock; ++j) {
+        for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
+            const int x = x0 + __builtin_ctz(left), y = y0 + j;
+            const float half =
+                (s.info.at(x, y) & Source::kBesideBackground) ? kHalfBesideBackground : kHalfInside;
+            const float q = s.q.at(x, y);
+            const glm::vec2 g = s.gradient(x, y) * half;
+            const float reach = kExtensionReach * s.space.axis.whole(q);
+            const auto at = [&](float sx, float sy) {
+                const float dq = std::clamp(g.x * sx + g.y * sy, -reach, reach);
+                return project(warp, static_cast<float>(x) + 0.5f + sx * half,
+                               static_cast<float>(y) + 0.5f + sy * half, q + dq);
+            };
+            const Vertex v[4] = {at(-1, -1), at(1, -1), at(1, 1), at(-1, 1)};
+            fillPolygon<4, true>(t, v, kCrack, kExtensionBit | kNearEdgeBit);
+        }
+    }
+}
+
+void RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uint32_t> blocks,
+                     const SampleGrid& grid, float qLimit, float* samples) {
+    std::memset(samples, 0, grid.count() * sizeof(float));
+    const Target t{samples, grid.side(), grid.stride(), qLimit};
+    const float leafGrow = kLeafGrow * static_cast<float>(grid.perPixel);
+    for (const std::uint32_t index : blocks) {
+        const SourceBlock& block = s.blocks[index];
+        for (std::uint32_t i = block.leafBegin; i < block.leafEnd; ++i)
+            drawLeaf(t, warp, s.leaves[i], leafGrow);
+        if (block.anyCell)
+            drawCells(t, s, warp, block, static_cast<int>(index % s.blocksX) * kBlock,
+                      static_cast<int>(index / s.blocksX) * kBlock);
+    }
+    for (const std::uint32_t index : blocks) {
+        const SourceBlock& block = s.blocks[index];
+        if (block.anyEdge)
+            drawExtensions(t, s, warp, block, static_cast<int>(index % s.blocksX) * kBlock,
+                           static_cast<int>(index / s.blocksX) * kBlock);
+    }
+}
+
+const char* SimdTarget() {
+    return hwy::TargetName(HWY_TARGET);
+}
+
+}  // namespace stx::surface::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stx::surface {
+
+HWY_EXPORT(RasteriseSource);
+HWY_EXPORT(SimdTarget);
+
+void rasteriseSource(const Source& source, const Warp& sampleFromSource,
+                     std::span<const std::uint32_t> blocks, const SampleGrid& grid, float qLimit,
+                     float* samples) {
+    HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, qLimit, samples);
+}
+
+const char* simdTarget() {
+    return HWY_DYNAMIC_DISPATCH(SimdTarget)();
+}
+
+}  // namespace stx::surface
+#endif

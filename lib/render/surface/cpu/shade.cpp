@@ -1,0 +1,576 @@
+#include "lib/render/surface/cpu/shade.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "lib/render/surface/constants.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lib/render/surface/cpu/shade.cpp"
+#include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::surface::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Pieces are shaded in groups of this many, whatever the vector length.
+constexpr int kGroup = 16;
+constexpr int kTaps = 4;
+constexpr int kMoments = 15;
+
+struct alignas(64) Lanes {
+    float v[kGroup];
+    float& operator[](int i) { return v[i]; }
+    const float& operator[](int i) const { return v[i]; }
+};
+
+/// One source under a group of pieces.
+struct View {
+    Lanes u, v;            ///< position in the source, pixels
+    Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
+    Lanes weight;
+    bool active = false;
+    bool plain = true;  ///< all taps of all lanes lie on one surface, fully covered
+};
+
+struct Group {
+    const float* x;
+    const float* y;
+    const float* q;
+    const float* qx;
+    const float* qy;
+    const std::uint32_t* sources;
+    int count;
+};
+
+/// Positions, Jacobians and weights of one source for a group.
+HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, std::uint32_t bit,
+                      View& out) {
+    const hn::ScalableTag<float> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    using V = hn::Vec<decltype(d)>;
+    const int n = static_cast<int>(hn::Lanes(d));
+    const auto& m = s.sourceFromPixel.m;
+    const auto c = [&](float value) { return hn::Set(d, value); };
+    const V one = c(1.0f);
+    for (int l = 0; l < kGroup; l += n) {
+        const V x = hn::LoadU(d, g.x + l), y = hn::LoadU(d, g.y + l), q = hn::LoadU(d, g.q + l);
+        const V qx = hn::LoadU(d, g.qx + l), qy = hn::LoadU(d, g.qy + l);
+        const auto row = [&](const float* r) {
+            return hn::MulAdd(c(r[0]), x, hn::MulAdd(c(r[1]), y, hn::MulAdd(c(r[2]), q, c(r[3]))));
+        };
+        const V w = row(&m[12]);
+        const V inverse = hn::Div(one, w);
+        const V u = hn::Mul(row(&m[0]), inverse), v = hn::Mul(row(&m[4]), inverse);
+        // Along the tangent plane the denominator and the numerators change with q as well.
+        const V wx = hn::MulAdd(c(m[14]), qx, c(m[12])), wy = hn::MulAdd(c(m[14]), qy, c(m[13]));
+        const V ux = hn::Mul(hn::NegMulAdd(u, wx, hn::MulAdd(c(m[2]), qx, c(m[0]))), inverse);
+        const V uy = hn::Mul(hn::NegMulAdd(u, wy, hn::MulAdd(c(m[2]), qy, c(m[1]))), inverse);
+        const V vx = hn::Mul(hn::NegMulAdd(v, wx, hn::MulAdd(c(m[6]), qx, c(m[4]))), inverse);
+        const V vy = hn::Mul(hn::NegMulAdd(v, wy, hn::MulAdd(c(m[6]), qy, c(m[5]))), inverse);
+        const V det = hn::NegMulAdd(uy, vx, hn::Mul(ux, vy));
+        const V inverseDet = hn::Div(one, hn::Max(det, c(1e-4f)));
+        // exp(-3 angle), as one over the first terms of exp(3 angle).
+        const V ax = row(&fromEye[0]), ay = row(&fromEye[4]), az = row(&fromEye[8]);
+        const V bx = row(&s.fromEye[0]), by = row(&s.fromEye[4]), bz = row(&s.fromEye[8]);
+        const V ab = hn::MulAdd(ax, bx, hn::MulAdd(ay, by, hn::Mul(az, bz)));
+        const V aa = hn::MulAdd(ax, ax, hn::MulAdd(ay, ay, hn::Mul(az, az)));
+        const V bb = hn::MulAdd(bx, bx, hn::MulAdd(by, by, hn::Mul(bz, bz)));
+        const V cosine = hn::Div(ab, hn::Sqrt(hn::Mul(aa, bb)));
+        const V t =
+            hn::Mul(c(kAngleFalloff),
+                    hn::Sqrt(hn::Max(hn::NegMulAdd(c(2.0f), cosine, c(2.0f)), hn::Zero(d))));
+        const V series =
+            hn::MulAdd(t, hn::MulAdd(t, hn::MulAdd(t, c(1.0f / 6), c(0.5f)), one), one);
+        V weight = hn::Div(hn::Min(one, hn::Sqrt(hn::Max(det, hn::Zero(d)))), series);
+        const auto inFrame = hn::And(
+            hn::And(hn::Ge(u, hn::Zero(d)), hn::Lt(u, c(static_cast<float>(s.source->width)))),
+            hn::And(hn::Ge(v, hn::Zero(d)), hn::Lt(v, c(static_cast<float>(s.source->height)))));
+        const auto bits = hn::LoadU(du, g.sources + l);
+        const auto chosen = hn::RebindMask(d, hn::TestBit(bits, hn::Set(du, bit)));
+        const auto active = hn::And(hn::And(inFrame, chosen), hn::Gt(w, hn::Zero(d)));
+        // Lanes without this source get a harmless place, so that none reads outside.
+        hn::StoreU(hn::IfThenElseZero(active, weight), d, &out.weight[l]);
+        hn::StoreU(hn::IfThenElse(active, u, one), d, &out.u[l]);
+        hn::StoreU(hn::IfThenElse(active, v, one), d, &out.v[l]);
+        hn::StoreU(hn::IfThenElse(active, hn::Mul(vy, inverseDet), one), d, &out.xu[l]);
+        hn::StoreU(hn::IfThenElseZero(active, hn::Neg(hn::Mul(uy, inverseDet))), d, &out.xv[l]);
+        hn::StoreU(hn::IfThenElseZero(active, hn::Neg(hn::Mul(vx, inverseDet))), d, &out.yu[l]);
+        hn::StoreU(hn::IfThenElse(active, hn::Mul(ux, inverseDet), one), d, &out.yv[l]);
+    }
+    const std::uint8_t* info = s.source->info.data();
+    const int stride = s.source->width;
+    const int lastX = stride - 1, lastY = s.source->height - 1;
+    alignas(64) std::int32_t pixel[kGroup];
+    for (int l = 0; l < kGroup; ++l)
+        pixel[l] = std::min(static_cast<int>(out.v[l]), lastY) * stride +
+                   std::min(static_cast<int>(out.u[l]), lastX);
+    alignas(64) std::int32_t edge[kGroup];
+    for (int l = 0; l < kGroup; ++l) edge[l] = info[pixel[l]] >> 4;
+    int any = 0, rough = 0;
+    for (int l = 0; l < kGroup; ++l) {
+        const float e = std::min(static_cast<float>(edge[l]) * (1.0f / kEdgeFade), 1.0f);
+        const int on = out.weight[l] > 0.0f ? 1 : 0;
+        any |= on;
+        rough |= on & (static_cast<float>(edge[l]) < kEdgeFade ? 1 : 0);
+        out.weight[l] *= kEdgeWeight + (1.0f - kEdgeWeight) * e;
+    }
+    out.active = any != 0;
+    out.plain = rough == 0;
+}
+
+/// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row.
+HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u, float v,
+                         const View& view, int baseU, int baseV, float out[kTaps * kTaps]) {
+    const Source& source = *s.source;
+    const auto& m = s.sourceFromPixel.m;
+    const float x = g.x[lane], y = g.y[lane], q = g.q[lane];
+    const float inverse = 1.0f / (m[12] * x + m[13] * y + m[14] * q + m[15]);
+    const float p = (m[8] * x + m[9] * y + m[10] * q + m[11]) * inverse;
+    const float wx = m[12] + m[14] * g.qx[lane], wy = m[13] + m[14] * g.qy[lane];
+    const float px = (m[8] + m[10] * g.qx[lane] - p * wx) * inverse;
+    const float py = (m[9] + m[10] * g.qy[lane] - p * wy) * inverse;
+    const float pu = px * view.xu[lane] + py * view.yu[lane];
+    const float pv = px * view.xv[lane] + py * view.yv[lane];
+    const float whole = source.space.axis.whole(p);
+    const float allowed =
+        kOnSurface * whole + kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * whole);
+    for (int j = 0; j < kTaps; ++j) {
+        for (int i = 0; i < kTaps; ++i) {
+            const int cx = baseU + i, cy = baseV + j;
+            float& value = out[j * kTaps + i];
+            value = 0.0f;
+            if (!source.q.contains(cx, cy)) continue;
+            const float there = source.q.at(cx, cy);
+            if (!(there > 0.0f)) continue;
+            const float du = static_cast<float>(cx) + 0.5f - u,
+                        dv = static_cast<float>(cy) + 0.5f - v;
+            const float predicted =
+                p + std::clamp(pu * du + pv * dv, -kFarthestTap * whole, kFarthestTap * whole);
+            if (std::abs(there - predicted) > allowed) continue;
+            value = source.hasAlpha ? source.alpha(cx, cy) : 1.0f;
+        }
+    }
+}
+
+template <class D, class V = hn::Vec<D>>
+struct Terms {
+    V dx, dy, weight;
+};
+
+/// The map from taps to frame offsets and their kernel, for lanes l.. of one source.
+template <class D>
+struct Kernel {
+    using V = hn::Vec<D>;
+    V x0, y0, xu, xv, yu, yv;  ///< offset of tap (0, 0) and its steps
+    V a, b, c;                 ///< metric: r² = a du² + 2 b du dv + c dv²
+    V u0, v0;
+    V weight;
+
+    HWY_INLINE Kernel(D d, const View& view, const Lanes& baseU, const Lanes& baseV, int l,
+                      float inverseRadius) {
+        const V half = hn::Set(d, 0.5f);
+        u0 = hn::Sub(hn::Add(hn::LoadU(d, &baseU[l]), half), hn::LoadU(d, &view.u[l]));
+        v0 = hn::Sub(hn::Add(hn::LoadU(d, &baseV[l]), half), hn::LoadU(d, &view.v[l]));
+        xu = hn::LoadU(d, &view.xu[l]);
+        xv = hn::LoadU(d, &view.xv[l]);
+        yu = hn::LoadU(d, &view.yu[l]);
+        yv = hn::LoadU(d, &view.yv[l]);
+        x0 = hn::MulAdd(xu, u0, hn::Mul(xv, v0));
+        y0 = hn::MulAdd(yu, u0, hn::Mul(yv, v0));
+        weight = hn::LoadU(d, &view.weight[l]);
+        // (1-h) I + h J Jt, inverted.
+        const V h = hn::Set(d, kOwn), rest = hn::Set(d, 1.0f - kOwn);
+        const V sxx = hn::MulAdd(h, hn::MulAdd(xu, xu, hn::Mul(xv, xv)), rest);
+        const V syy = hn::MulAdd(h, hn::MulAdd(yu, yu, hn::Mul(yv, yv)), rest);
+        const V sxy = hn::Mul(h, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
+        const V scale =
+            hn::Div(hn::Set(d, inverseRadius),
+                    hn::Max(hn::NegMulAdd(sxy, sxy, hn::Mul(sxx, syy)), hn::Set(d, 1e-6f)));
+        a = hn::Mul(syy, scale);
+        b = hn::Mul(hn::Set(d, -2.0f), hn::Mul(sxy, scale));
+        c = hn::Mul(sxx, scale);
+    }
+    HWY_INLINE Terms<D> at(D d, int i, int j) const {
+        const V fi = hn::Set(d, static_cast<float>(i)), fj = hn::Set(d, static_cast<float>(j));
+        Terms<D> t;
+        t.dx = hn::MulAdd(xv, fj, hn::MulAdd(xu, fi, x0));
+        t.dy = hn::MulAdd(yv, fj, hn::MulAdd(yu, fi, y0));
+        const V r = hn::MulAdd(a, hn::Mul(t.dx, t.dx),
+                               hn::MulAdd(b, hn::Mul(t.dx, t.dy), hn::Mul(c, hn::Mul(t.dy, t.dy))));
+        // (1 - r²/R²)^8: close to a Gaussian, and cheaper.
+        V k = hn::Max(hn::Sub(hn::Set(d, 1.0f), r), hn::Zero(d));
+        k = hn::Mul(k, k);
+        k = hn::Mul(k, k);
+        k = hn::Mul(k, k);
+        t.weight = hn::Mul(k, weight);
+        return t;
+    }
+};
+
+/// The first row of the inverse of the 6x6 normal matrix, terms 1, dx, dy, dx², dxdy, dy².
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE void solveFirstRow(D d, const V* m, V ridge, V* out) {
+    // Moments by power: 0:1 1:x 2:y 3:xx 4:xy 5:yy 6:xxx 7:xxy 8:xyy 9:yyy 10:x4 11:x3y 12:x2y2
+    // 13:xy3 14:y4
+    const V hold = hn::Mul(m[0], ridge);
+    constexpr int kIndex[5][5] = {{3, 4, 6, 7, 8},
+                                  {4, 5, 7, 8, 9},
+                                  {6, 7, 10, 11, 12},
+                                  {7, 8, 11, 12, 13},
+                                  {8, 9, 12, 13, 14}};
+    V lower[5][5], inverse[5], z[5];
+    for (int i = 0; i < 5; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            V sum = m[kIndex[i][j]];
+            if (i == j) sum = hn::Add(sum, hold);
+            for (int k = 0; k < j; ++k)
+                sum = hn::NegMulAdd(lower[i][k], hn::Mul(lower[j][k], z[k]), sum);
+            if (i == j) {
+                z[i] = hn::Max(sum, hn::Mul(hold, hn::Set(d, 0.01f)));
+                inverse[i] = hn::Div(hn::Set(d, 1.0f), z[i]);
+            } else {
+                lower[i][j] = hn::Mul(sum, inverse[j]);
+            }
+        }
+    }
+    V y[5];
+    for (int i = 0; i < 5; ++i) {
+        V sum = m[i + 1];
+        for (int k = 0; k < i; ++k) sum = hn::NegMulAdd(lower[i][k], y[k], sum);
+        y[i] = sum;
+    }
+    for (int i = 0; i < 5; ++i) y[i] = hn::Mul(y[i], inverse[i]);
+    for (int i = 4; i >= 0; --i)
+        for (int k = i + 1; k < 5; ++k) y[i] = hn::NegMulAdd(lower[k][i], y[k], y[i]);
+    V schur = m[0];
+    for (int i = 0; i < 5; ++i) schur = hn::NegMulAdd(m[i + 1], y[i], schur);
+    const V first = hn::Div(hn::Set(d, 1.0f), hn::Max(schur, hn::Mul(m[0], hn::Set(d, 1e-4f))));
+    out[0] = first;
+    for (int i = 0; i < 5; ++i) out[i + 1] = hn::Neg(hn::Mul(y[i], first));
+}
+
+/// Running sums of one lane's colour: RGBA, several times over, to be added up at the end.
+struct alignas(64) ColourSum {
+    float v[16];
+};
+
+/// The weights of the taps of all pieces of a group, as fetching wants them: the four of a row side
+/// by side.
+struct TapWeights {
+    /// v[row][l % 4] holds the row's taps of piece l from 4 (l / 4) on: what transposing blocks of
+    /// four pieces gives.
+    Lanes v[kTaps][4];
+
+    [[nodiscard]] const float* row(int j, int lane) const { return &v[j][lane & 3][lane & ~3]; }
+
+    /// Keeps four taps of a row for the pieces l and following, a vector of each.
+    template <class D, class V = hn::Vec<D>>
+    HWY_INLINE void store(D d, int j, int l, const V* taps) {
+#if HWY_TARGET == HWY_SCALAR
+        (void)d;
+        for (int i = 0; i < kTaps; ++i) v[j][l & 3][(l & ~3) + i] = hn::GetLane(taps[i]);
+#else
+        const V a = hn::InterleaveLower(d, taps[0], taps[2]);
+        const V b = hn::InterleaveUpper(d, taps[0], taps[2]);
+        const V e = hn::InterleaveLower(d, taps[1], taps[3]);
+        const V f = hn::InterleaveUpper(d, taps[1], taps[3]);
+        hn::StoreU(hn::InterleaveLower(d, a, e), d, &v[j][0][l]);
+        hn::StoreU(hn::InterleaveUpper(d, a, e), d, &v[j][1][l]);
+        hn::StoreU(hn::InterleaveLower(d, b, f), d, &v[j][2][l]);
+        hn::StoreU(hn::InterleaveUpper(d, b, f), d, &v[j][3][l]);
+#endif
+    }
+};
+
+/// Adds the weighted taps of one lane, one by one: at borders and of float textures.
+HWY_NOINLINE void fetchSlowly(const Source& source, int baseU, int baseV, const TapWeights& weights,
+                              int lane, ColourSum& sum) {
+    for (int j = 0; j < kTaps; ++j) {
+        for (int i = 0; i < kTaps; ++i) {
+            const int x = baseU + i, y = baseV + j;
+            if (!source.q.contains(x, y)) continue;
+            const float w = weights.row(j, lane)[i];
+            const glm::vec4 texel = source.view->texture.rgba8()
+                                        ? glm::vec4(source.view->texture.rgba8()->at(x, y))
+                                        : source.view->texture.rgbaFloat()->at(x, y);
+            for (int c = 0; c < 4; ++c) sum.v[c] += w * texel[c];
+        }
+    }
+}
+
+/// The same where all taps are inside an 8-bit texture: as many texels of a row as a vector takes.
+HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const TapWeights& weights,
+                          int lane, ColourSum& sum) {
+    const hn::CappedTag<float, 16> d;
+    using V = hn::Vec<decltype(d)>;
+    constexpr int kN = static_cast<int>(hn::MaxLanes(d));
+    if constexpr (kN < 4) {
+        for (int t = 0; t < kTaps * kTaps; ++t)
+            for (int c = 0; c < 4; ++c)
+                sum.v[c] += weights.row(t / kTaps, lane)[t % kTaps] *
+                            static_cast<float>(texels[t / kTaps * stride + t % kTaps][c]);
+    } else {
+        constexpr int kTexels = kN / 4;  // in one vector
+        const hn::Rebind<std::uint8_t, decltype(d)> d8;
+        const hn::RebindToSigned<decltype(d)> d32;
+        const auto spread = hn::ShiftRight<2>(hn::Iota(d32, 0));
+        V acc = hn::Load(d, sum.v);
+        for (int j = 0; j < kTaps; ++j) {
+            const V row = hn::LoadDup128(d, weights.row(j, lane));
+            for (int i = 0; i < kTaps; i += kTexels) {
+                const auto* from = &texels[j * stride + i].x;
+                const V texel = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, from)));
+                const auto indices = hn::IndicesFromVec(d, hn::Add(spread, hn::Set(d32, i)));
+                acc = hn::MulAdd(hn::TableLookupLanes(row, indices), texel, acc);
+            }
+        }
+        hn::Store(acc, d, sum.v);
+    }
+}
+
+void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
+                const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
+    const hn::ScalableTag<float> d;
+    using V = hn::Vec<decltype(d)>;
+    const int n = static_cast<int>(hn::Lanes(d));
+
+    std::uint32_t seen = 0;
+    for (int l = 0; l < g.count; ++l) seen |= g.sources[l];
+    static thread_local View views[32];
+    int list[32];
+    int count = 0;
+    for (std::uint32_t left = seen; left; left &= left - 1) {
+        const int s = std::countr_zero(left);
+        place(sources[static_cast<std::size_t>(s)], fromEye, g, 1u << s, views[s]);
+        if (views[s].active) list[count++] = s;
+    }
+    alignas(64) std::int32_t top[kGroup];
+    Lanes topWeight;
+    for (int l = 0; l < kGroup; ++l) {
+        top[l] = -1;
+        topWeight[l] = 0.0f;
+    }
+    for (int k = 0; k < count; ++k) {
+        const View& view = views[list[k]];
+        for (int l = 0; l < kGroup; ++l) {
+            const bool better = view.weight[l] > topWeight[l];
+            topWeight[l] = better ? view.weight[l] : topWeight[l];
+            top[l] = better ? list[k] : top[l];
+        }
+    }
+    for (int l = 0; l < g.count; ++l) best[l] = static_cast<std::int8_t>(top[l]);
+    if (count > settings.mostSources) {
+        for (int l = 0; l < g.count; ++l) {
+            float kept[32];
+            for (int k = 0; k < count; ++k) kept[k] = views[list[k]].weight[l];
+            std::nth_element(kept, kept + settings.mostSources - 1, kept + count, std::greater<>());
+            const float least = kept[settings.mostSources - 1];
+            for (int k = 0; k < count; ++k)
+                if (views[list[k]].weight[l] < least) views[list[k]].weight[l] = 0.0f;
+        }
+    }
+
+    static thread_local Lanes bases[32][2];
+    static thread_local Lanes kernels[32][kTaps * kTaps];
+    static thread_local Lanes masks[32][kTaps * kTaps];
+    Lanes moments[kMoments] = {};
+    for (int k = 0; k < count; ++k) {
+        const int s = list[k];
+        View& view = views[s];
+        for (int l = 0; l < kGroup; l += n) {
+            const V shift = hn::Set(d, -1.5f);
+            hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.u[l]), shift)), d, &bases[s][0][l]);
+            hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.v[l]), shift)), d, &bases[s][1][l]);
+        }
+        if (!view.plain) {
+            for (int l = 0; l < kGroup; ++l) {
+                float mask[kTaps * kTaps];
+                if (l < g.count && view.weight[l] > 0.0f) {
+                    maskTaps(sources[static_cast<std::size_t>(s)], g, l, view.u[l], view.v[l], view,
+                             static_cast<int>(bases[s][0][l]), static_cast<int>(bases[s][1][l]),
+                             mask);
+                } else {
+                    std::fill(mask, mask + kTaps * kTaps, 0.0f);
+                }
+                for (int t = 0; t < kTaps * kTaps; ++t) masks[s][t][l] = mask[t];
+            }
+        }
+        for (int l = 0; l < kGroup; l += n) {
+            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
+                                             1.0f / settings.kernel);
+            V m[kMoments];
+            for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
+            for (int j = 0; j < kTaps; ++j) {
+                for (int i = 0; i < kTaps; ++i) {
+                    auto t = kernel.at(d, i, j);
+                    if (!view.plain)
+                        t.weight = hn::Mul(t.weight, hn::LoadU(d, &masks[s][j * kTaps + i][l]));
+                    hn::StoreU(t.weight, d, &kernels[s][j * kTaps + i][l]);
+                    const V wx = hn::Mul(t.weight, t.dx), wy = hn::Mul(t.weight, t.dy);
+                    const V wxx = hn::Mul(wx, t.dx), wxy = hn::Mul(wx, t.dy),
+                            wyy = hn::Mul(wy, t.dy);
+                    const V xx = hn::Mul(t.dx, t.dx), xy = hn::Mul(t.dx, t.dy),
+                            yy = hn::Mul(t.dy, t.dy);
+                    m[0] = hn::Add(m[0], t.weight);
+                    m[1] = hn::Add(m[1], wx);
+                    m[2] = hn::Add(m[2], wy);
+                    m[3] = hn::Add(m[3], wxx);
+                    m[4] = hn::Add(m[4], wxy);
+                    m[5] = hn::Add(m[5], wyy);
+                    m[6] = hn::MulAdd(wxx, t.dx, m[6]);
+                    m[7] = hn::MulAdd(wxx, t.dy, m[7]);
+                    m[8] = hn::MulAdd(wyy, t.dx, m[8]);
+                    m[9] = hn::MulAdd(wyy, t.dy, m[9]);
+                    m[10] = hn::MulAdd(wxx, xx, m[10]);
+                    m[11] = hn::MulAdd(wxx, xy, m[11]);
+                    m[12] = hn::MulAdd(wxx, yy, m[12]);
+                    m[13] = hn::MulAdd(wyy, xy, m[13]);
+                    m[14] = hn::MulAdd(wyy, yy, m[14]);
+                }
+            }
+            for (int i = 0; i < kMoments; ++i) hn::StoreU(m[i], d, &moments[i][l]);
+        }
+    }
+
+    Lanes rows[6];
+    for (int l = 0; l < kGroup; l += n) {
+        V m[kMoments], row[6];
+        for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
+        m[0] = hn::Max(m[0], hn::Set(d, 1e-12f));
+        solveFirstRow(d, m, hn::Set(d, settings.ridge), row);
+        for (int i = 0; i < 6; ++i) hn::StoreU(row[i], d, &rows[i][l]);
+    }
+
+    ColourSum sums[kGroup] = {};
+    alignas(64) float total[kGroup] = {};
+    TapWeights weights;
+    for (int k = 0; k < count; ++k) {
+        const int s = list[k];
+        const View& view = views[s];
+        const Source& source = *sources[static_cast<std::size_t>(s)].source;
+        const Rgba8Image* bytes = source.view->texture.rgba8();
+        for (int l = 0; l < kGroup; l += n) {
+            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
+                                             1.0f / settings.kernel);
+            V row[6];
+            for (int i = 0; i < 6; ++i) row[i] = hn::LoadU(d, &rows[i][l]);
+            V sum = hn::LoadU(d, &total[l]);
+            for (int j = 0; j < kTaps; ++j) {
+                V taps[kTaps];
+                for (int i = 0; i < kTaps; ++i) {
+                    const V fi = hn::Set(d, static_cast<float>(i)),
+                            fj = hn::Set(d, static_cast<float>(j));
+                    const V dx = hn::MulAdd(kernel.xv, fj, hn::MulAdd(kernel.xu, fi, kernel.x0));
+                    const V dy = hn::MulAdd(kernel.yv, fj, hn::MulAdd(kernel.yu, fi, kernel.y0));
+                    const V linear = hn::MulAdd(row[1], dx, hn::MulAdd(row[2], dy, row[0]));
+                    const V quadratic = hn::MulAdd(dx, hn::MulAdd(row[3], dx, hn::Mul(row[4], dy)),
+                                                   hn::MulAdd(hn::Mul(row[5], dy), dy, linear));
+                    taps[i] = hn::Mul(hn::LoadU(d, &kernels[s][j * kTaps + i][l]), quadratic);
+                    sum = hn::Add(sum, taps[i]);
+                }
+                weights.store(d, j, l, taps);
+            }
+            hn::StoreU(sum, d, &total[l]);
+        }
+        for (int l = 0; l < g.count; ++l) {
+            if (!(view.weight[l] > 0.0f)) continue;
+            const int baseU = static_cast<int>(bases[s][0][l]);
+            const int baseV = static_cast<int>(bases[s][1][l]);
+            if (bytes && baseU >= 0 && baseV >= 0 && baseU + kTaps <= source.width &&
+                baseV + kTaps <= source.height) {
+                fetchRows(bytes->data() + static_cast<std::ptrdiff_t>(baseV) * source.width + baseU,
+                          source.width, weights, l, sums[l]);
+            } else {
+                fetchSlowly(source, baseU, baseV, weights, l, sums[l]);
+            }
+        }
+    }
+    for (int l = 0; l < g.count; ++l) {
+        const bool bytes = !sources.empty() && sources[0].source->view->texture.rgba8();
+        const float scale = bytes ? 1.0f / 255.0f : 1.0f;
+        if (total[l] > 0.5f) {
+            const float f = scale / total[l];
+            glm::vec3 value;
+            for (int c = 0; c < 3; ++c)
+                value[c] =
+                    (sums[l].v[c] + sums[l].v[4 + c] + sums[l].v[8 + c] + sums[l].v[12 + c]) * f;
+            value = glm::max(value, glm::vec3(0.0f));
+            if (bytes) value = glm::min(value, glm::vec3(1.0f));
+            colours[l] = value;
+        } else if (best[l] >= 0) {
+            // No tap on the surface: the nearest pixel that is one.
+            const View& view = views[best[l]];
+            const Source& source = *sources[static_cast<std::size_t>(best[l])].source;
+            colours[l] = glm::vec3(source.view->texture.at(
+                std::clamp(static_cast<int>(view.u[l]), 0, source.width - 1),
+                std::clamp(static_cast<int>(view.v[l]), 0, source.height - 1)));
+        } else {
+            colours[l] = glm::vec3(0.0f);
+        }
+    }
+}
+
+void ShadePieces(const Pieces& p, std::span<const ShadeSource> sources, const Ray& fromEye,
+                 const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
+    const std::size_t size = p.size();
+    for (std::size_t i = 0; i < size; i += kGroup) {
+        if (i + kGroup <= size) {
+            shadeGroup({&p.x[i], &p.y[i], &p.q[i], &p.qx[i], &p.qy[i], &p.sources[i], kGroup},
+                       sources, fromEye, settings, colours + i, best + i);
+            continue;
+        }
+        Lanes x, y, q, qx, qy;
+        std::uint32_t seenBy[kGroup];
+        for (int l = 0; l < kGroup; ++l) {
+            const std::size_t k = std::min(i + static_cast<std::size_t>(l), size - 1);
+            x[l] = p.x[k];
+            y[l] = p.y[k];
+            q[l] = p.q[k];
+            qx[l] = p.qx[k];
+            qy[l] = p.qy[k];
+            seenBy[l] = p.sources[k];
+        }
+        shadeGroup({x.v, y.v, q.v, qx.v, qy.v, seenBy, static_cast<int>(size - i)}, sources,
+                   fromEye, settings, colours + i, best + i);
+    }
+}
+
+}  // namespace stx::surface::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stx::surface {
+
+HWY_EXPORT(ShadePieces);
+
+Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
+    Ray ray{};
+    const glm::dmat4& m = frame.worldFromPixel;
+    const glm::dvec3 at = eye.camera.position;
+    const glm::dvec3 forward = eye.camera.forward();
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int column = 0; column < 4; ++column) {
+            const double value = eye.camera.orthographic
+                                     ? (column == 3 ? forward[axis] : 0.0)
+                                     : m[column][axis] - at[axis] * m[column][3];
+            ray[static_cast<std::size_t>(axis * 4 + column)] = static_cast<float>(value);
+        }
+    }
+    return ray;
+}
+
+void shadePieces(const Pieces& pieces, std::span<const ShadeSource> sources, const Ray& fromEye,
+                 const ShadeSettings& settings, std::vector<glm::vec3>& colours,
+                 std::vector<std::int8_t>& bestSource) {
+    colours.resize(pieces.size());
+    bestSource.resize(pieces.size());
+    if (pieces.size() == 0) return;
+    HWY_DYNAMIC_DISPATCH(ShadePieces)
+    (pieces, sources, fromEye, settings, colours.data(), bestSource.data());
+}
+
+}  // namespace stx::surface
+#endif

@@ -1,0 +1,455 @@
+#include "lib/render/surface/gpu/gpu_surface.hpp"
+
+#include <array>
+#include <deque>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/device/egl_context.hpp"
+#include "lib/render/device/growing_buffer.hpp"
+#include "lib/render/device/returned_buffer.hpp"
+#include "lib/render/surface/backend.hpp"
+#include "lib/render/surface/cpu/raster.hpp"
+#include "lib/render/surface/gpu/surface_shaders.hpp"
+#include "lib/render/surface/gpu/surface_textures.hpp"
+#include "lib/render/surface/votes.hpp"
+
+namespace stx::gpu {
+namespace {
+
+using surface::FrameSource;
+using surface::FrameWork;
+using surface::kTile;
+using surface::PaintedFrame;
+using surface::Source;
+
+constexpr std::int64_t kTilePixels = static_cast<std::int64_t>(kTile) * kTile;
+/// Samples of one batch of tiles take at most this much video memory.
+constexpr std::int64_t kSampleBytes = 256ll << 20;
+constexpr int kShadeGroup = 128;          ///< threads of a group of surface_shade.comp
+constexpr std::uint32_t kNoSlot = ~0u;    ///< NO_SLOT of the shaders
+constexpr std::int64_t kPieceBytes = 32;  ///< Piece of surface_tiles.glsl
+constexpr std::int64_t kMostGroups = 65535;
+
+using Rows = std::array<float, 16>;
+
+/// Source of shaders/surface/surface_common.glsl (std430).
+struct SourceEntry {
+    Rows sourceFromPixel;
+    surface::Ray fromEye;
+    glm::ivec4 size;
+    glm::vec4 axis;
+};
+/// Slot of shaders/surface/surface_raster.comp (std430): one source in one tile.
+struct SlotEntry {
+    Rows sampleFromSource;
+    glm::ivec4 source;
+};
+/// Tile of shaders/surface/surface_tiles.glsl (std430).
+struct TileEntry {
+    glm::ivec2 at;
+    std::uint32_t first, count;
+    float step;
+    float pad[3];
+};
+/// Frame of shaders/surface/surface_common.glsl (std140).
+struct FrameUniforms {
+    glm::vec4 axis;
+    surface::Ray eye;
+    glm::vec4 fit;
+    glm::ivec4 size;
+};
+
+/// A tile that shows something, and how much work it is.
+struct TilePlan {
+    int tile = 0;
+    std::vector<int> sources;
+    std::uint32_t slots = 0, meshes = 0, edges = 0;  ///< blocks with cells, with edges
+    std::uint32_t firstLocal = 0, firstSlot = 0, firstMesh = 0, firstEdge = 0;  ///< in its batch
+};
+
+bool hasCells(const surface::SourceBlock& block) {
+    return block.anyCell || block.leafBegin < block.leafEnd;
+}
+
+/// What a batch of tiles uploads.
+struct Batch {
+    std::vector<TileEntry> tiles;
+    std::vector<glm::uvec2> locals;
+    std::vector<SlotEntry> slots;
+    std::vector<glm::uvec4> meshes, edges;  ///< tasks
+};
+
+/// Where a batch arrives on its way back.
+struct Returned {
+    ReturnedBuffer memory;
+    std::span<const TilePlan> tiles;
+};
+
+/// Everything that lives in the context; destroyed while it is current.
+struct Resources {
+    GpuSurfaceScene scene;
+    GlProgram mesh, extensions, fuse, shade, resolve, resolveWithOrigin;
+    GlBuffer uniforms;
+    GrowingBuffer sources, slots, meshes, edges, tiles, locals;
+    GrowingBuffer samples, pieces, ranges, counts, pieceColours, colour, depth, origin;
+    std::array<Returned, 2> returned;
+};
+
+/// A frame under way: its first batch is being drawn.
+struct Begun {
+    const FrameWork* work = nullptr;
+    std::vector<TilePlan> plans;
+    std::size_t drawn = 0;  ///< tiles so far
+    Returned* back = nullptr;
+};
+
+class GpuSurfacePainter final : public surface::TilePainter {
+  public:
+    explicit GpuSurfacePainter(std::shared_ptr<EglContext> context)
+        : context_(std::move(context)) {}
+    ~GpuSurfacePainter() override {
+        if (!resources_) return;
+        // Where the context cannot be bound any more its objects are gone with it.
+        if (auto current = context_->makeCurrent())
+            resources_.reset();
+        else
+            (void)resources_.release();
+    }
+
+    Result<void> prepare(std::span<const Source> sources, const surface::Effort& effort,
+                         Job& job) override;
+    Result<void> begin(const FrameWork& work) override;
+    Result<void> finish(PaintedFrame out) override;
+    void drop() override;
+    std::string backend() const override { return "gpu"; }
+    std::string device() const override { return context_->device().name; }
+
+  private:
+    [[nodiscard]] Result<GlProgram> build(SurfaceProgram program) const;
+    [[nodiscard]] std::vector<TilePlan> planTiles(const FrameWork& work) const;
+    [[nodiscard]] std::size_t batchEnd(std::span<TilePlan> plans, std::size_t begin) const;
+    [[nodiscard]] Batch fillBatch(const FrameWork& work, std::span<const TilePlan> plans) const;
+    void uploadSources(const FrameWork& work);
+    Result<void> drawNext(Begun& frame, Returned& back);
+    Result<void> draw(const FrameWork& work, std::span<const TilePlan> plans, Returned& back);
+    Result<void> collect(const FrameWork& work, Returned& back, PaintedFrame out) const;
+
+    std::shared_ptr<EglContext> context_;
+    int perPixel_ = 1, mostSources_ = 4;
+    float freeAlpha_ = surface::kFreeAlpha;
+    std::int64_t mostSlots_ = 0, mostTiles_ = 0;  ///< of a batch
+    std::unique_ptr<Resources> resources_;
+    std::deque<Begun> begun_;
+};
+
+Result<GlProgram> GpuSurfacePainter::build(SurfaceProgram program) const {
+    const std::array<ShaderStage, 1> stages{surfaceStage(program)};
+    return buildProgram(surfaceHeader({perPixel_, mostSources_, freeAlpha_}, program), stages);
+}
+
+Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
+                                        const surface::Effort& effort, Job& job) {
+    STX_TRY(auto current, context_->makeCurrent());
+    resources_ = std::make_unique<Resources>();
+    Resources& r = *resources_;
+    perPixel_ = effort.samplesPerPixel;
+    mostSources_ = effort.shade.mostSources;
+    freeAlpha_ = effort.freeAlpha;
+    const std::int64_t storage = context_->abilities().maxStorageBytes;
+    const std::int64_t perTile = kTilePixels * perPixel_ * perPixel_;
+    mostSlots_ = std::min(storage, kSampleBytes) / (perTile * 4);
+    mostTiles_ = std::min({storage / (perTile * kPieceBytes), kMostGroups * kShadeGroup / perTile,
+                           kMostGroups * kShadeGroup / kTilePixels});
+    STX_TRY(r.scene, GpuSurfaceScene::upload(sources, *context_, job));
+    STX_TRY(r.mesh, build(SurfaceProgram::mesh));
+    STX_TRY(r.extensions, build(SurfaceProgram::extensions));
+    STX_TRY(r.fuse, build(SurfaceProgram::fuse));
+    STX_TRY(r.shade, build(SurfaceProgram::shade));
+    STX_TRY(r.resolve, build(SurfaceProgram::resolve));
+    STX_TRY(r.resolveWithOrigin, build(SurfaceProgram::resolveWithOrigin));
+    r.uniforms = GlBuffer::create();
+    glNamedBufferStorage(r.uniforms.get(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
+    return context_->check("preparing the renderer");
+}
+
+std::vector<TilePlan> GpuSurfacePainter::planTiles(const FrameWork& work) const {
+    std::vector<TilePlan> plans(static_cast<std::size_t>(work.tilesX) * work.tilesY);
+    parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
+        const auto t = static_cast<std::size_t>(i);
+        TilePlan& plan = plans[t];
+        plan.tile = static_cast<int>(i);
+        if (std::all_of(work.sources.begin(), work.sources.end(),
+                        [&](const FrameSource& f) { return f.tileBegin[t] == f.tileBegin[t + 1]; }))
+            return;
+        plan.sources = work.chooseSources(plan.tile);
+        for (const int k : plan.sources) {
+            const FrameSource& f = work.sources[static_cast<std::size_t>(k)];
+            plan.slots += f.tileBegin[t] < f.tileBegin[t + 1];
+            for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
+                const surface::SourceBlock& block = f.source->blocks[f.blocks[b]];
+                plan.meshes += hasCells(block);
+                plan.edges += block.anyEdge;
+            }
+        }
+    });
+    std::erase_if(plans, [](const TilePlan& plan) { return plan.slots == 0; });
+    return plans;
+}
+
+/// The end of the batch that begins at a tile; tells its tiles where their parts begin.
+std::size_t GpuSurfacePainter::batchEnd(std::span<TilePlan> plans, std::size_t begin) const {
+    std::uint32_t locals = 0, slots = 0, meshes = 0, edges = 0;
+    std::size_t end = begin;
+    for (; end < plans.size() && static_cast<std::int64_t>(end - begin) < mostTiles_; ++end) {
+        TilePlan& plan = plans[end];
+        if (end > begin && slots + plan.slots > mostSlots_) break;
+        plan.firstLocal = locals;
+        plan.firstSlot = slots;
+        plan.firstMesh = meshes;
+        plan.firstEdge = edges;
+        locals += static_cast<std::uint32_t>(plan.sources.size());
+        slots += plan.slots;
+        meshes += plan.meshes;
+        edges += plan.edges;
+    }
+    return end;
+}
+
+Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePlan> plans) const {
+    const TilePlan& last = plans.back();
+    Batch batch;
+    batch.tiles.resize(plans.size());
+    batch.locals.resize(last.firstLocal + last.sources.size());
+    batch.slots.resize(last.firstSlot + last.slots);
+    batch.meshes.resize(last.firstMesh + last.meshes);
+    batch.edges.resize(last.firstEdge + last.edges);
+    parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
+        const TilePlan& plan = plans[static_cast<std::size_t>(i)];
+        const auto t = static_cast<std::size_t>(plan.tile);
+        const glm::dmat4 sampleFromPixel = work.sampleFromPixel(plan.tile);
+        std::uint32_t local = plan.firstLocal, slot = plan.firstSlot;
+        std::uint32_t mesh = plan.firstMesh, edge = plan.firstEdge;
+        float step = 0;
+        for (const int k : plan.sources) {
+            const FrameSource& f = work.sources[static_cast<std::size_t>(k)];
+            step = std::max(step, f.source->step);
+            const bool any = f.tileBegin[t] < f.tileBegin[t + 1];
+            batch.locals[local++] = {static_cast<std::uint32_t>(k), any ? slot : kNoSlot};
+            if (!any) continue;
+            batch.slots[slot] = {surface::warpFrom(sampleFromPixel * f.pixelFromSource).m,
+                                 glm::ivec4(k, 0, 0, 0)};
+            const std::uint32_t firstLeaf =
+                resources_->scene.firstLeaf[static_cast<std::size_t>(k)];
+            for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
+                const surface::SourceBlock& block = f.source->blocks[f.blocks[b]];
+                const glm::uvec4 task(slot, f.blocks[b], firstLeaf + block.leafBegin, 0);
+                if (hasCells(block)) batch.meshes[mesh++] = task;
+                if (block.anyEdge) batch.edges[edge++] = task;
+            }
+            ++slot;
+        }
+        batch.tiles[static_cast<std::size_t>(i)] = {
+            glm::ivec2(plan.tile % work.tilesX, plan.tile / work.tilesX) * kTile,
+            plan.firstLocal,
+            static_cast<std::uint32_t>(plan.sources.size()),
+            step,
+            {}};
+    });
+    return batch;
+}
+
+void GpuSurfacePainter::uploadSources(const FrameWork& work) {
+    std::vector<SourceEntry> entries;
+    for (const FrameSource& f : work.sources) {
+        const Source& s = *f.source;
+        const surface::DepthAxis& axis = s.space.axis;
+        entries.push_back({f.sourceFromPixel.m, f.fromEye,
+                           glm::ivec4(s.width, s.height, s.hasAlpha ? 1 : 0, s.blocksX),
+                           glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, s.step,
+                                     surface::kClearlyBehind + s.noise)});
+    }
+    resources_->sources.upload(entries);
+}
+
+Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const TilePlan> plans,
+                                     Returned& back) {
+    Resources& r = *resources_;
+    const Batch batch = fillBatch(work, plans);
+    uploadSources(work);
+    r.slots.upload(batch.slots);
+    r.meshes.upload(batch.meshes);
+    r.edges.upload(batch.edges);
+    r.tiles.upload(batch.tiles);
+    r.locals.upload(batch.locals);
+    const auto tiles = static_cast<std::int64_t>(plans.size());
+    const std::int64_t pixels = tiles * kTilePixels, most = pixels * perPixel_ * perPixel_;
+    const std::int64_t sampleBytes =
+        static_cast<std::int64_t>(batch.slots.size()) * kTilePixels * perPixel_ * perPixel_ * 4;
+    r.samples.reserve(sampleBytes);
+    r.pieces.reserve(most * kPieceBytes);
+    r.pieceColours.reserve(most * 16);
+    r.ranges.reserve(pixels * 8);
+    r.colour.reserve(pixels * 16);
+    r.depth.reserve(pixels * 4);
+    if (work.wantOrigin) r.origin.reserve(pixels * 16);
+    r.counts.upload(std::vector<std::uint32_t>{0, 1, 1, 0});
+    back.memory.reserve(pixels * (work.wantOrigin ? 36 : 20));
+    STX_CHECK(context_->check("making the frame's buffers"));
+    if (!back.memory.memory)
+        return fail(ErrorCode::failed, "'{}' gives no memory to read the frame back through",
+                    context_->device().name);
+
+    const surface::DepthAxis& axis = work.space.axis;
+    const bool bytes = work.sources[0].source->view->texture.rgba8() != nullptr;
+    const surface::ShadeSettings& shade = work.effort.shade;
+    const FrameUniforms uniforms{
+        glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, work.qLimit(), 0.0f),
+        surface::rayFrom(work.space, work.space),
+        glm::vec4(shade.kernel, shade.ridge, bytes ? 1.0f : 0.0f, 0.0f),
+        glm::ivec4(work.space.camera.width, work.space.camera.height, batch.meshes.size(),
+                   batch.edges.size())};
+    glNamedBufferSubData(r.uniforms.get(), 0, sizeof(uniforms), &uniforms);
+    const std::uint32_t zero = 0;
+    glClearNamedBufferSubData(r.samples.buffer.get(), GL_R32UI, 0, sampleBytes, GL_RED_INTEGER,
+                              GL_UNSIGNED_INT, &zero);
+
+    glBindTextureUnit(0, r.scene.surfaces.get());
+    glBindTextureUnit(1, r.scene.colours.get());
+    glBindBufferBase(GL_UNIFORM_BUFFER, 0, r.uniforms.get());
+    const std::array<GLuint, 14> storage{
+        r.sources.buffer.get(), r.slots.buffer.get(),        r.meshes.buffer.get(),
+        r.scene.leaves.get(),   r.samples.buffer.get(),      r.tiles.buffer.get(),
+        r.locals.buffer.get(),  r.pieces.buffer.get(),       r.ranges.buffer.get(),
+        r.counts.buffer.get(),  r.pieceColours.buffer.get(), r.colour.buffer.get(),
+        r.depth.buffer.get(),   r.origin.buffer.get()};
+    for (GLuint i = 0; i < storage.size(); ++i)
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, storage[i]);
+
+    const auto rasterise = [&](const GlProgram& program, const GrowingBuffer& tasks,
+                               std::size_t count) {
+        if (count == 0) return;
+        glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, tasks.buffer.get());
+        glUseProgram(program.get());
+        // A dispatch has at most 65535 groups a side; the shader counts in rows of 32768.
+        glDispatchCompute(static_cast<GLuint>(std::min<std::size_t>(count, 32768)),
+                          static_cast<GLuint>((count + 32767) / 32768), 1);
+    };
+    rasterise(r.mesh, r.meshes, batch.meshes.size());
+    rasterise(r.extensions, r.edges, batch.edges.size());
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    glUseProgram(r.fuse.get());
+    glDispatchCompute(static_cast<GLuint>(pixels / 256), 1, 1);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
+    glUseProgram(r.shade.get());
+    glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, r.counts.buffer.get());
+    glDispatchComputeIndirect(0);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    glUseProgram(work.wantOrigin ? r.resolveWithOrigin.get() : r.resolve.get());
+    glDispatchCompute(static_cast<GLuint>(pixels / kShadeGroup), 1, 1);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    const auto fetch = [&](const GrowingBuffer& from, std::int64_t at, std::int64_t each) {
+        glCopyNamedBufferSubData(from.buffer.get(), back.memory.buffer.get(), 0, at * pixels,
+                                 each * pixels);
+    };
+    fetch(r.colour, 0, 16);
+    fetch(r.depth, 16, 4);
+    if (work.wantOrigin) fetch(r.origin, 20, 16);
+    back.memory.fence();
+    back.tiles = plans;
+    return context_->check("drawing");
+}
+
+Result<void> GpuSurfacePainter::collect(const FrameWork& work, Returned& back,
+                                        PaintedFrame out) const {
+    if (!back.memory.done) return {};
+    STX_CHECK(back.memory.wait(*context_));
+    const std::byte* memory = back.memory.memory;
+    const std::int64_t pixels = static_cast<std::int64_t>(back.tiles.size()) * kTilePixels;
+    const auto* colour = reinterpret_cast<const glm::vec4*>(memory);
+    const auto* depth = reinterpret_cast<const float*>(memory + 16 * pixels);
+    const auto* origin = reinterpret_cast<const glm::vec4*>(memory + 20 * pixels);
+    parallelFor(0, static_cast<std::int64_t>(back.tiles.size()), [&](std::int64_t i) {
+        const int tile = back.tiles[static_cast<std::size_t>(i)].tile;
+        const int x0 = tile % work.tilesX * kTile, y0 = tile / work.tilesX * kTile;
+        const int columns = std::min(kTile, out.q.width() - x0);
+        const int rows = std::min(kTile, out.q.height() - y0);
+        for (int y = 0; y < rows; ++y) {
+            const std::int64_t from = i * kTilePixels + static_cast<std::int64_t>(y) * kTile;
+            std::copy_n(colour + from, columns, out.colour.row(y0 + y).data() + x0);
+            std::copy_n(depth + from, columns, out.q.row(y0 + y).data() + x0);
+            if (!work.wantOrigin) continue;
+            for (int x = 0; x < columns; ++x)
+                out.origin.at(x0 + x, y0 + y) = glm::vec3(origin[from + x]);
+        }
+    });
+    return {};
+}
+
+/// Draws the next batch of a frame into `back`.
+Result<void> GpuSurfacePainter::drawNext(Begun& frame, Returned& back) {
+    const std::size_t end = batchEnd(frame.plans, frame.drawn);
+    const auto plans = std::span<const TilePlan>(frame.plans);
+    STX_CHECK(draw(*frame.work, plans.subspan(frame.drawn, end - frame.drawn), back));
+    frame.drawn = end;
+    return {};
+}
+
+Result<void> GpuSurfacePainter::begin(const FrameWork& work) {
+    Begun frame;
+    frame.work = &work;
+    frame.plans = planTiles(work);
+    if (!frame.plans.empty()) {
+        STX_TRY(auto current, context_->makeCurrent());
+        auto& returned = resources_->returned;
+        const bool taken = !begun_.empty() && begun_.front().back == &returned[0];
+        frame.back = &returned[taken ? 1 : 0];
+        STX_CHECK(drawNext(frame, *frame.back));
+    }
+    begun_.push_back(std::move(frame));
+    return {};
+}
+
+Result<void> GpuSurfacePainter::finish(PaintedFrame out) {
+    Begun frame = std::move(begun_.front());
+    begun_.pop_front();
+    if (frame.plans.empty()) return {};
+    STX_TRY(auto current, context_->makeCurrent());
+    // While no other frame is under way, one batch is drawn while the one before it arrives.
+    auto& returned = resources_->returned;
+    Returned* other = &returned[frame.back == &returned[0] ? 1 : 0];
+    if (!begun_.empty()) other = nullptr;
+    while (frame.drawn < frame.plans.size()) {
+        if (other) {
+            STX_CHECK(drawNext(frame, *other));
+            STX_CHECK(collect(*frame.work, *frame.back, out));
+            std::swap(frame.back, other);
+        } else {
+            STX_CHECK(collect(*frame.work, *frame.back, out));
+            STX_CHECK(drawNext(frame, *frame.back));
+        }
+    }
+    return collect(*frame.work, *frame.back, out);
+}
+
+void GpuSurfacePainter::drop() {
+    const Begun frame = std::move(begun_.front());
+    begun_.pop_front();
+    if (!frame.back) return;
+    // Its memory is written in the order of the commands: the next frame overwrites it.
+    if (auto current = context_->makeCurrent()) frame.back->memory.forget();
+    frame.back->memory.done = nullptr;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(const Bundle& bundle,
+                                                         const RenderSettings& settings, int device,
+                                                         Job& job) {
+    STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
+    STX_CHECK(context->requireModern("surface mode on the GPU", "--mode splat or --backend cpu"));
+    return surface::makePaintedSurfaceRenderer(
+        bundle, settings, job, std::make_unique<GpuSurfacePainter>(std::move(context)));
+}
+
+}  // namespace stx::gpu

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lib/render/device/shader_program.hpp"
+#include "lib/render/surface/constants.hpp"
+
+namespace stx::gpu {
+
+/// What is the same for all shaders of a renderer in surface mode.
+struct SurfaceVariant {
+    int samplesPerPixel = 3;  ///< along a side
+    int mostSources = 4;      ///< that a piece takes colours from
+    float freeAlpha = surface::kFreeAlpha;
+};
+
+enum class SurfaceProgram { mesh, extensions, fuse, shade, resolve, resolveWithOrigin };
+
+[[nodiscard]] std::string surfaceHeader(const SurfaceVariant& variant, SurfaceProgram program);
+[[nodiscard]] ShaderStage surfaceStage(SurfaceProgram program);
+
+/// Every shader of surface mode in every variant that a Quality asks for.
+[[nodiscard]] std::vector<ShaderText> allSurfaceShaders();
+
+}  // namespace stx::gpu

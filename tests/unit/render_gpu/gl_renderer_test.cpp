@@ -1,0 +1,109 @@
+#include "lib/render/splat/gl/gl_renderer.hpp"
+
+#include "lib/render/splat/gl/gl_points.hpp"
+#include "tests/unit/render_gpu/gpu_fixture.hpp"
+
+namespace stx {
+namespace {
+
+using test::psnr;
+using test::splatSettings;
+
+TEST(GlPoints, GrowAsTheCameraComesNearer) {
+    const Bundle bundle = test::smallRoom(1, 64);
+    const gl::PointArrays points = gl::makePointArrays(bundle, true);
+    EXPECT_EQ(static_cast<std::int64_t>(points.positions.size()), bundle.pointCount());
+    Camera camera = bundle.views[0].camera;
+    gl::PointGroups groups;
+    groupPoints(points, splatSettings(), camera, 255, groups);
+    // From its own place each sample is a pixel, and sqrt(2) closes the diagonal: two.
+    ASSERT_EQ(groups.groups.size(), 1u);
+    EXPECT_EQ(groups.groups[0].size, 2);
+    EXPECT_EQ(groups.groups[0].count, points.positions.size());
+    camera.fx *= 4;
+    camera.fy *= 4;
+    groupPoints(points, splatSettings(), camera, 255, groups);
+    EXPECT_EQ(groups.groups[0].size, 6);
+    groupPoints(points, splatSettings(), camera, 3, groups);
+    EXPECT_EQ(groups.groups[0].size, 3);
+    groupPoints(points, splatSettings(SplatRule::point), camera, 255, groups);
+    EXPECT_EQ(groups.groups[0].size, 1);
+}
+
+TEST(GlPoints, BehindTheCameraAreLeftOut) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 1);
+    const gl::PointArrays points = gl::makePointArrays(bundle, false);
+    Camera camera = bundle.views[0].camera;
+    camera.orientation = glm::normalize(camera.orientation * glm::dquat(0, 0, 1, 0));
+    gl::PointGroups groups;
+    groupPoints(points, splatSettings(), camera, 255, groups);
+    EXPECT_TRUE(groups.groups.empty());
+}
+
+TEST(GlRenderer, ShowsTheRoom) {
+    REQUIRE_GPU();
+    const Bundle bundle = test::smallRoom(2);
+    Job job;
+    const auto renderer = gl::makeGlRenderer(bundle, splatSettings(), -1, job);
+    ASSERT_TRUE(renderer) << renderer.error().text();
+    for (const bool orthographic : {false, true}) {
+        Camera camera = test::small(analyticCamera(AnalyticScene::room, 0.5, 2), 256);
+        camera.cx += 9;
+        camera.cy -= 5;
+        camera.fx *= 1.2;
+        camera.fy *= 1.2;
+        if (orthographic) {
+            camera.orthographic = true;
+            camera.fx = camera.fy = 70;
+        }
+        const auto frame = (*renderer)->render(camera);
+        ASSERT_TRUE(frame) << frame.error().text();
+        const auto truth = viewOfAnalyticScene(AnalyticScene::room, camera, 3);
+        // An orthographic view sees parts of the room that the references did not.
+        EXPECT_GT(psnr(frame->colour, test::pictureOf(truth)), orthographic ? 12.0 : 19.0);
+        int good = 0, points = 0;
+        for (std::size_t i = 0; i < frame->depth.count(); ++i) {
+            if (!hasPoint(frame->depth.pixels()[i])) continue;
+            ++points;
+            good += std::abs(frame->depth.pixels()[i] - truth.depth.pixels()[i]) <
+                            0.02f * truth.depth.pixels()[i]
+                        ? 1
+                        : 0;
+        }
+        EXPECT_GT(good, points * 9 / 10) << orthographic;
+        EXPECT_GT(points, static_cast<int>(frame->depth.count()) / 2);
+    }
+}
+
+TEST(GlRenderer, LightsWithFixedFunctions) {
+    REQUIRE_GPU();
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 3);
+    RenderSettings settings = splatSettings();
+    settings.lighting.lights = {{Light::Kind::directional, {0, -1, 0}, {1, 1, 1}, false}};
+    settings.lighting.ambient = glm::vec3(0.1f);
+    Job job;
+    const auto renderer = gl::makeGlRenderer(bundle, settings, -1, job);
+    ASSERT_TRUE(renderer) << renderer.error().text();
+    const Camera camera = bundle.views[0].camera;
+    const auto frame = (*renderer)->render(camera);
+    ASSERT_TRUE(frame) << frame.error().text();
+    // Without highlights the fixed functions are Phong's: diffuse and ambient of the true normal.
+    const Image<glm::vec3>& normals = bundle.views[0].normal;
+    double error = 0;
+    int looked = 0;
+    for (int y = 0; y < camera.height; ++y) {
+        for (int x = 0; x < camera.width; ++x) {
+            const glm::vec4 albedo = frame->albedo.at(x, y);
+            if (albedo.a < 1 || normals.at(x, y) == glm::vec3(0)) continue;
+            const float light = 0.1f + std::max(0.0f, normals.at(x, y).y);
+            const glm::vec3 expected = glm::min(glm::vec3(albedo) * light, glm::vec3(1));
+            error += glm::length(expected - glm::vec3(frame->colour.at(x, y)));
+            ++looked;
+        }
+    }
+    ASSERT_GT(looked, 5000);
+    EXPECT_LT(error / looked, 0.05);
+}
+
+}  // namespace
+}  // namespace stx
