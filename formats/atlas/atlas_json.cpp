@@ -38,6 +38,7 @@ Json jsonOf(const ReferenceView& v) {
     j["nearPlane"] = v.nearPlane;
     j["farPlane"] = v.farPlane;
     j["depthBits"] = v.depthBits;
+    j["pruned"] = v.pruned;
     return j;
 }
 
@@ -98,8 +99,9 @@ class Reader {
     Result<void> finite(const char* name, double& to) const {
         return number(name, to, -1e300, 1e300);
     }
-    Result<void> flag(const char* name, bool& to) const {
+    Result<void> flag(const char* name, bool& to, bool needed = true) const {
         const auto it = json_.find(name);
+        if (it == json_.end() && !needed) return {};
         if (it == json_.end() || !it->is_boolean()) return wrong(name, "must be true or false");
         to = it->get<bool>();
         return {};
@@ -157,7 +159,8 @@ class Reader {
 
 constexpr double kAnyInt = 2147483647.0;
 
-Result<void> readView(const Reader& r, const Limits& limits, ReferenceView& v) {
+Result<void> readView(const Reader& r, const Limits& limits, bool prunedByCount,
+                      ReferenceView& v) {
     Camera& c = v.camera;
     std::array<double, 3> position{};
     std::array<double, 4> q{};
@@ -177,6 +180,9 @@ Result<void> readView(const Reader& r, const Limits& limits, ReferenceView& v) {
     STX_CHECK(r.number("depthBits", v.depthBits, 8, 32));
     if (v.depthBits != 8 && v.depthBits != 16 && v.depthBits != 32)
         return r.wrong("depthBits", "must be 8, 16 or 32");
+    // Older versions did not write it: there fewer pixels than before meant that all were pruned.
+    v.pruned = prunedByCount;
+    STX_CHECK(r.flag("pruned", v.pruned, false));
     c.position = {position[0], position[1], position[2]};
     c.orientation = glm::dquat(q[0], q[1], q[2], q[3]);
     return {};
@@ -347,7 +353,8 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     }));
     STX_CHECK(checkTextures(top, header));
     STX_CHECK(top.list("views", static_cast<std::size_t>(limits.maxViews), [&](const Reader& r) {
-        return readView(r, limits, atlas.views.emplace_back());
+        return readView(r, limits, atlas.keptPixels < atlas.sourcePixels,
+                        atlas.views.emplace_back());
     }));
     const auto most = static_cast<std::size_t>(header.pageWidth) * header.pageHeight * header.pages;
     const auto readRectangle = [&](const Reader& r) -> Result<void> {

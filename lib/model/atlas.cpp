@@ -11,43 +11,68 @@ std::string nameOf(const AtlasRectangle& r, std::size_t index) {
                        r.atlasHeight(), r.atlasX, r.atlasY, r.page);
 }
 
-/// Two rectangles of one page that overlap, or none: sweeps along x and keeps what is open by y.
+/// What a rectangle takes on its page, the texels around it included.
+struct Box {
+    std::int64_t x0, y0, x1, y1;
+};
+
+/// A rectangle with `around` texels on each side, as far as its view goes.
+Box boxOf(const AtlasRectangle& r, const Camera& camera, int around) {
+    const int left = std::min(around, r.viewX), above = std::min(around, r.viewY);
+    const int right = std::min(around, camera.width - r.viewX - r.width);
+    const int below = std::min(around, camera.height - r.viewY - r.height);
+    const std::int64_t x = r.atlasX, y = r.atlasY;
+    if (r.turned)
+        return {x - below, y - left, x + r.atlasWidth() + above, y + r.atlasHeight() + right};
+    return {x - left, y - above, x + r.atlasWidth() + right, y + r.atlasHeight() + below};
+}
+
+/// Two of these boxes that overlap, or none: sweeps along x and keeps what is open by y.
 std::optional<std::pair<std::size_t, std::size_t>> findOverlap(
-    const std::vector<AtlasRectangle>& rectangles, int page) {
+    const std::vector<std::pair<std::size_t, Box>>& boxes) {
     struct Event {
         std::int64_t x;
         bool opens;
         std::size_t index;
     };
     std::vector<Event> events;
-    for (std::size_t i = 0; i < rectangles.size(); ++i) {
-        const auto& r = rectangles[i];
-        if (r.page != page) continue;
-        events.push_back({r.atlasX, true, i});
-        events.push_back({std::int64_t{r.atlasX} + r.atlasWidth(), false, i});
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+        events.push_back({boxes[i].second.x0, true, i});
+        events.push_back({boxes[i].second.x1, false, i});
     }
     std::sort(events.begin(), events.end(), [](const Event& a, const Event& b) {
         return std::tie(a.x, a.opens, a.index) < std::tie(b.x, b.opens, b.index);
     });
-    std::map<int, std::size_t> open;  // by top edge; what is open does not overlap
+    std::map<std::int64_t, std::size_t> open;  // by top edge; what is open does not overlap
     for (const auto& e : events) {
-        const auto& r = rectangles[e.index];
+        const Box& box = boxes[e.index].second;
         if (!e.opens) {
-            open.erase(r.atlasY);
+            open.erase(box.y0);
             continue;
         }
-        const auto below = open.lower_bound(r.atlasY);
-        if (below != open.end() && below->first < r.atlasY + r.atlasHeight())
-            return std::pair(below->second, e.index);
+        const auto clash = [&](std::size_t other) {
+            return std::pair(boxes[other].first, boxes[e.index].first);
+        };
+        const auto below = open.lower_bound(box.y0);
+        if (below != open.end() && below->first < box.y1) return clash(below->second);
         if (below != open.begin()) {
             const auto above = std::prev(below);
-            const auto& other = rectangles[above->second];
-            if (other.atlasY + other.atlasHeight() > r.atlasY)
-                return std::pair(above->second, e.index);
+            if (boxes[above->second].second.y1 > box.y0) return clash(above->second);
         }
-        open.emplace(r.atlasY, e.index);
+        open.emplace(box.y0, e.index);
     }
     return std::nullopt;
+}
+
+/// The boxes of the rectangles on a page, with their numbers.
+std::vector<std::pair<std::size_t, Box>> boxesOf(const Atlas& atlas, std::size_t page, int around) {
+    std::vector<std::pair<std::size_t, Box>> boxes;
+    for (std::size_t i = 0; i < atlas.rectangles.size(); ++i) {
+        const AtlasRectangle& r = atlas.rectangles[i];
+        if (r.page == static_cast<int>(page))
+            boxes.emplace_back(i, boxOf(r, atlas.views[r.view].camera, around));
+    }
+    return boxes;
 }
 
 }  // namespace
@@ -64,6 +89,22 @@ double Atlas::used() const {
     for (const auto& r : rectangles) covered += static_cast<double>(r.width) * r.height;
     const double area = static_cast<double>(width()) * height() * static_cast<double>(pages.size());
     return area > 0 ? covered / area : 0.0;
+}
+
+bool Atlas::paddingHolds(int texels) const {
+    for (std::size_t page = 0; page < pages.size(); ++page) {
+        const auto boxes = boxesOf(*this, page, texels);
+        for (const auto& [index, box] : boxes) {
+            const Box written = boxOf(rectangles[index], views[rectangles[index].view].camera,
+                                      std::min(texels, padding));
+            if (box.x0 != written.x0 || box.y0 != written.y0 || box.x1 != written.x1 ||
+                box.y1 != written.y1 || box.x0 < 0 || box.y0 < 0 || box.x1 > width() ||
+                box.y1 > height())
+                return false;
+        }
+        if (findOverlap(boxes)) return false;
+    }
+    return true;
 }
 
 Result<void> Atlas::check() const {
@@ -116,7 +157,7 @@ Result<void> Atlas::check() const {
                         width(), height());
     }
     for (std::size_t page = 0; page < pages.size(); ++page) {
-        if (const auto hit = findOverlap(rectangles, static_cast<int>(page)))
+        if (const auto hit = findOverlap(boxesOf(*this, page, 0)))
             return fail(ErrorCode::invalidInput, "{} and {} overlap",
                         nameOf(rectangles[hit->first], hit->first),
                         nameOf(rectangles[hit->second], hit->second));

@@ -65,6 +65,9 @@ struct Atlas {
     [[nodiscard]] int textureCount() const;
     /// Share of the page area that rectangles cover, without padding, 0..1.
     [[nodiscard]] double used() const;
+    /// Each rectangle has this many texels of padding on each side to itself, or as many as its view
+    /// has pixels there. The atlas must pass check().
+    [[nodiscard]] bool paddingHolds(int texels) const;
     /// Errors when a rectangle leaves its view or page, two overlap, or sizes disagree.
     [[nodiscard]] Result<void> check() const;
 };

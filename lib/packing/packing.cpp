@@ -67,6 +67,7 @@ ReferenceView withoutImages(const ReferenceView& view) {
     v.nearPlane = view.nearPlane;
     v.farPlane = view.farPlane;
     v.depthBits = view.depthBits;
+    v.pruned = view.pruned;
     return v;
 }
 
@@ -80,8 +81,8 @@ std::int64_t objectPixels(const ReferenceView& view) {
     return n;
 }
 
-/// Marks where the points of other views fall in a view, a little generously. What was pruned from
-/// the view is there: it went because others show it.
+/// Marks where the points of other views fall in a view, a little generously. What is missing from
+/// the view is there: others show it.
 void markShown(const std::vector<ReferenceView>& views, std::size_t of,
                Image<std::uint8_t>& shown) {
     constexpr int kMostReach = 6;  // pixels
@@ -241,7 +242,8 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     STX_CHECK(
         job.limits.checkAllocation(pixels, contents.bytesPerPixel() + 1, "the views of the atlas"));
 
-    const bool pruned = atlas.keptPixels < atlas.sourcePixels;
+    // Something of the object is in no rectangle: pruned, or missed by a sensor.
+    const bool partial = atlas.keptPixels < atlas.sourcePixels;
     std::vector<std::vector<const AtlasRectangle*>> ofView(atlas.views.size());
     for (const auto& r : atlas.rectangles) ofView[r.view].push_back(&r);
     Bundle bundle;
@@ -252,7 +254,6 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
-        view.pruned = pruned;
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);
@@ -263,7 +264,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         }
         Image<std::uint8_t>& told = toldOf[i];  // 1 = by padding, 2 = by a rectangle
         told = Image<std::uint8_t>(width, height, 0);
-        if (pruned) {
+        if (partial) {
             for (const AtlasRectangle* r : ofView[i]) copyPadding(*r, atlas, view, told);
         }
         std::int64_t covered = 0;
@@ -296,7 +297,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         dropIfZero(view.splatV);
     });
     STX_CHECK(job.checkCancelled());
-    if (pruned) {
+    if (partial) {
         parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
             fillPruned(bundle.views, toldOf[i], static_cast<std::size_t>(i),
                        bundle.views[i].texture);

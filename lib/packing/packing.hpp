@@ -40,10 +40,10 @@ struct PackSettings {
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle
-/// are coloured from the nearest covered ones and are background (alpha 0). When the atlas was
-/// pruned (keptPixels < sourcePixels), those where points of other views fall have full alpha
-/// instead (the object is there, another view tells its distance), and next to rectangles the
-/// padding tells. unpack(pack(b)) == b for points and pixels of partial coverage. Errors: an atlas
+/// are coloured from the nearest covered ones and are background (alpha 0). When the atlas lacks
+/// pixels of the object (keptPixels < sourcePixels: pruned, or missed by a sensor), those where
+/// points of other views fall have full alpha instead (the object is there, another view gives its
+/// distance), and next to rectangles the padding decides. unpack(pack(b)) == b for points and pixels of partial coverage. Errors: an atlas
 /// that fails check(), memory over the limit.
 [[nodiscard]] Result<Bundle> unpack(const Atlas& atlas, Job& job);
 

@@ -2,6 +2,7 @@
 
 #include "lib/render/fallback.hpp"
 #include "lib/render/finish/footprint.hpp"
+#include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 #include "lib/render/surface/surface_renderer.hpp"
 #ifdef STX_WITH_GPU
@@ -14,26 +15,26 @@
 namespace stx {
 namespace {
 
-Result<std::unique_ptr<Renderer>> makeCpu(const Bundle& bundle, const RenderSettings& settings,
+Result<std::unique_ptr<Renderer>> makeCpu(const PageSet& set, const RenderSettings& settings,
                                           Job& job) {
-    if (settings.mode == RenderMode::splat) return makeCpuSplatRenderer(bundle, settings, job);
-    return makeCpuSurfaceRenderer(bundle, settings, job);
+    if (settings.mode == RenderMode::splat) return makeCpuSplatRenderer(set, settings, job);
+    return makeCpuSurfaceRenderer(set, settings, job);
 }
 
 #ifdef STX_WITH_GPU
-Result<std::unique_ptr<Renderer>> makeGpu(const Bundle& bundle, const RenderSettings& settings,
+Result<std::unique_ptr<Renderer>> makeGpu(const PageSet& set, const RenderSettings& settings,
                                           int device, Job& job) {
     if (settings.mode == RenderMode::surface)
-        return gpu::makeGpuSurfaceRenderer(bundle, settings, device, job);
-    return gpu::makeGpuSplatRenderer(bundle, settings, device, job);
+        return gpu::makeGpuSurfaceRenderer(set, settings, device, job);
+    return gpu::makeGpuSplatRenderer(set, settings, device, job);
 }
 
-Result<std::unique_ptr<Renderer>> makeGl(const Bundle& bundle, const RenderSettings& settings,
+Result<std::unique_ptr<Renderer>> makeGl(const PageSet& set, const RenderSettings& settings,
                                          int device, Job& job) {
     if (settings.mode == RenderMode::surface)
         return fail(ErrorCode::unsupported,
                     "the gl backend draws splats only; use --mode splat or --backend cpu");
-    return gl::makeGlRenderer(bundle, settings, device, job);
+    return gl::makeGlRenderer(set, settings, device, job);
 }
 
 /// A hardware GPU among the devices, or the one asked for if it is.
@@ -50,10 +51,10 @@ bool hasHardware(int device) {
 constexpr const char* kNoGpu =
     "this build has no {} backend (STX_WITH_GPU was off); use --backend cpu";
 
-Result<std::unique_ptr<Renderer>> makeGpu(const Bundle&, const RenderSettings&, int, Job&) {
+Result<std::unique_ptr<Renderer>> makeGpu(const PageSet&, const RenderSettings&, int, Job&) {
     return fail(ErrorCode::unsupported, kNoGpu, "gpu");
 }
-Result<std::unique_ptr<Renderer>> makeGl(const Bundle&, const RenderSettings&, int, Job&) {
+Result<std::unique_ptr<Renderer>> makeGl(const PageSet&, const RenderSettings&, int, Job&) {
     return fail(ErrorCode::unsupported, kNoGpu, "gl");
 }
 bool hasHardware(int) {
@@ -71,28 +72,35 @@ bool averages(Backend backend, const RenderSettings& settings) {
     return settings.splat == SplatRule::data && backend != Backend::gl;
 }
 
-Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const Bundle& bundle,
+Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const PageSet& set,
                                             const RenderSettings& settings, int device, Job& job) {
     switch (backend) {
         case Backend::gpu:
-            return makeGpu(bundle, settings, device, job);
+            return makeGpu(set, settings, device, job);
         case Backend::gl:
-            return makeGl(bundle, settings, device, job);
+            return makeGl(set, settings, device, job);
         case Backend::cpu:
-            return makeCpu(bundle, settings, job);
+            return makeCpu(set, settings, job);
         case Backend::automatic:
             break;
     }
     if (hasHardware(device)) {
-        auto made = makeGpu(bundle, settings, device, job);
+        auto made = makeGpu(set, settings, device, job);
         if (made)
             return withFallback(
-                std::move(*made),
-                [&bundle, settings, &job] { return makeCpu(bundle, settings, job); }, job);
+                std::move(*made), [set, settings, &job] { return makeCpu(set, settings, job); },
+                job);
         job.note(fmt::format("the gpu backend cannot be used ({}); the cpu backend draws instead",
                              made.error().text()));
     }
-    return makeCpu(bundle, settings, job);
+    return makeCpu(set, settings, job);
+}
+
+Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
+                                           const RenderSettings& settings, int device, Job& job) {
+    STX_TRY(auto made, makePlain(backend, set, settings, device, job));
+    if (averages(backend, settings)) made = withFootprint(std::move(made), set, job.limits);
+    return made;
 }
 
 }  // namespace
@@ -101,9 +109,14 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
                                                const RenderSettings& settings, int device,
                                                Job& job) {
     STX_CHECK(bundle.check());
-    STX_TRY(auto made, makePlain(backend, bundle, settings, device, job));
-    if (averages(backend, settings)) made = withFootprint(std::move(made), bundle, job.limits);
-    return made;
+    return makeFrom(backend, bundle, settings, device, job);
+}
+
+Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atlas,
+                                               const RenderSettings& settings, int device,
+                                               Job& job) {
+    STX_TRY(const PageSet set, PageSet::of(atlas, job));
+    return makeFrom(backend, set, settings, device, job);
 }
 
 std::vector<Device> listDevices(Job& job) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lib/base/job.hpp"
+#include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/render/frame.hpp"
 #include "lib/render/lighting.hpp"
@@ -45,8 +46,8 @@ struct RenderSettings {
     [[nodiscard]] bool wantNormals() const { return normals || lighting.on(); }
 };
 
-/// Draws novel views of one bundle. Made once (uploads, per-view preparation), then asked for
-/// frames.
+/// Draws novel views of one bundle or atlas. Made once (uploads, per-view preparation), then asked
+/// for frames.
 class Renderer {
   public:
     virtual ~Renderer() = default;
@@ -66,8 +67,13 @@ class Renderer {
 /// Makes the renderer of a backend. Backend::automatic takes a hardware GPU when there is one, else
 /// cpu: a software GL driver is no reason to be slow; when the GPU fails midway, cpu draws on. The
 /// bundle must outlive the renderer, and so must the job.
-/// `device` chooses among listDevices() (-1 = the best). Errors: unsupported, with what was tried.
+/// `device` chooses among listDevices() (-1 = the best). Errors: a bundle that fails check();
+/// unsupported, with what was tried.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
+                                                             const RenderSettings& settings,
+                                                             int device, Job& job);
+/// The same of an atlas, which is drawn from its own textures.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atlas,
                                                              const RenderSettings& settings,
                                                              int device, Job& job);
 

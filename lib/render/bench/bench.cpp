@@ -2,6 +2,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/cpu_device.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 #include "lib/render/surface/surface_renderer.hpp"
 #ifdef STX_WITH_GPU

@@ -21,8 +21,8 @@ constexpr std::uint64_t kBytesEach = 64;
 
 class FootprintRenderer final : public Renderer {
   public:
-    FootprintRenderer(std::unique_ptr<Renderer> inner, const Bundle& bundle, const Limits& limits)
-        : inner_(std::move(inner)), footprint_(bundle), limits_(limits) {}
+    FootprintRenderer(std::unique_ptr<Renderer> inner, const PageSet& set, const Limits& limits)
+        : inner_(std::move(inner)), set_(set), footprint_(set), limits_(limits) {}
 
     Result<Frame> render(const Camera& camera) override {
         STX_CHECK(camera.check());
@@ -42,6 +42,11 @@ class FootprintRenderer final : public Renderer {
         return factor == 1 ? camera : camera.resized(camera.width * factor, camera.height * factor);
     }
     [[nodiscard]] int factorOf(const Camera& camera) const {
+        // In sets of mixed resolution a small view's own pose looks like a reduced picture of the
+        // large ones; renderers return it exactly.
+        if (std::any_of(set_.views().begin(), set_.views().end(),
+                        [&](const PageView& v) { return sameCamera(v.camera, camera); }))
+            return 1;
         const double ratio = footprint_.samplesPerPixel(camera);
         if (!(ratio > kEnough)) return 1;
         int factor = static_cast<int>(std::lround(std::min(ratio, double{kMostFactor})));
@@ -56,20 +61,21 @@ class FootprintRenderer final : public Renderer {
     }
 
     std::unique_ptr<Renderer> inner_;
+    PageSet set_;
     Footprint footprint_;
     Limits limits_;
 };
 
 }  // namespace
 
-Footprint::Footprint(const Bundle& bundle) {
-    for (const auto& view : bundle.views) {
-        const Camera& c = view.camera;
+Footprint::Footprint(const PageSet& set) {
+    for (std::size_t v = 0; v < set.views().size(); ++v) {
+        const Camera& c = set.views()[v].camera;
         for (int j = 0; j < kGrid; ++j) {
             for (int i = 0; i < kGrid; ++i) {
                 const int x = (2 * i + 1) * c.width / (2 * kGrid);
                 const int y = (2 * j + 1) * c.height / (2 * kGrid);
-                const float depth = view.depth.at(x, y);
+                const float depth = set.depth(v, x, y);
                 if (!hasPoint(depth)) continue;
                 const glm::dvec2 spacing = c.sampleSpacing(depth);
                 points_.push_back(
@@ -145,9 +151,9 @@ Frame minified(const Frame& large, int factor) {
     return out;
 }
 
-std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const Bundle& bundle,
+std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const PageSet& set,
                                         const Limits& limits) {
-    return std::make_unique<FootprintRenderer>(std::move(inner), bundle, limits);
+    return std::make_unique<FootprintRenderer>(std::move(inner), set, limits);
 }
 
 }  // namespace stx

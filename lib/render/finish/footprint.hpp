@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "lib/base/job.hpp"
-#include "lib/model/bundle.hpp"
 #include "lib/render/renderer.hpp"
+#include "lib/render/scene/page_set.hpp"
 
 namespace stx {
 
@@ -12,7 +12,7 @@ namespace stx {
 /// over points of the scene that it sees; 1 when it sees none.
 class Footprint {
   public:
-    explicit Footprint(const Bundle& bundle);
+    explicit Footprint(const PageSet& set);
     [[nodiscard]] double samplesPerPixel(const Camera& camera) const;
 
   private:
@@ -30,9 +30,9 @@ class Footprint {
 
 /// A renderer that draws pictures which are smaller than the reference views as large as those, and
 /// averages: the renderers of this library look at a handful of samples for each pixel and would
-/// alias. Cameras that see the samples at up to 1.5 to the pixel are left to `inner`. Larger
-/// pictures are held to `limits` and to 16 million pixels. The bundle must outlive it.
+/// alias. Cameras that see the samples at up to 1.5 to the pixel, and the very cameras of reference
+/// views, are left to `inner`. Larger pictures are held to `limits` and to 16 million pixels.
 [[nodiscard]] std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner,
-                                                      const Bundle& bundle, const Limits& limits);
+                                                      const PageSet& set, const Limits& limits);
 
 }  // namespace stx

@@ -15,21 +15,26 @@ constexpr std::uint32_t kAllSamples = (1u << (kSamples * kSamples)) - 1;
 /// Points that touch a silhouette have an alpha of one half there; below this a ray passes by.
 constexpr float kFree = 0.43f * 255.0f;
 
-std::uint8_t alphaAt(const Texture& texture, int x, int y) {
-    if (const auto* image = texture.rgba8()) return image->at(x, y).w;
-    return static_cast<std::uint8_t>(std::clamp(texture.at(x, y).w, 0.0f, 1.0f) * 255.0f + 0.5f);
+/// Coverage of a texel, 0..255.
+float alphaOf(const Texture& texture, std::size_t texel) {
+    if (const auto* image = texture.rgba8()) return image->data()[texel].a;
+    return std::round(std::clamp(texture.rgbaFloat()->data()[texel].a, 0.0f, 1.0f) * 255.0f);
 }
 
-/// Bilinear coverage at a pixel position; full outside the image, where nothing is known.
-float alphaBilinear(const Image<std::uint8_t>& alpha, double x, double y) {
-    const double px = x - 0.5, py = y - 0.5;
-    const double bx = std::floor(px), by = std::floor(py);
-    if (!(bx >= 0 && by >= 0 && bx < alpha.width() - 1 && by < alpha.height() - 1)) return 255.0f;
-    const int ix = static_cast<int>(bx), iy = static_cast<int>(by);
-    const auto fx = static_cast<float>(px - bx), fy = static_cast<float>(py - by);
-    const float top = alpha.at(ix, iy) * (1 - fx) + alpha.at(ix + 1, iy) * fx;
-    const float bottom = alpha.at(ix, iy + 1) * (1 - fx) + alpha.at(ix + 1, iy + 1) * fx;
-    return top * (1 - fy) + bottom * fy;
+/// Coverage of all pixels of a view, 0..255.
+Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
+    const Camera& camera = set.views()[number].camera;
+    Image<std::uint8_t> alpha(camera.width, camera.height);
+    for (int y = 0; y < camera.height; ++y) {
+        for (int x = 0; x < camera.width; ++x) {
+            const PageRectangle* r = set.find(number, x, y);
+            alpha.at(x, y) = static_cast<std::uint8_t>(
+                r ? alphaOf(*set.pages()[static_cast<std::size_t>(r->page)].texture, r->texel(x, y))
+                : set.objectOutside(number, x, y) ? 255
+                                                  : 0);
+        }
+    }
+    return alpha;
 }
 
 /// 1 where some pixel of the row lies within kReach of an empty one, in the row.
@@ -46,28 +51,44 @@ void markRow(const Image<float>& depth, int y, std::vector<std::uint8_t>& near) 
 
 }  // namespace
 
-Silhouettes::Silhouettes(const Bundle& bundle) {
-    std::vector<View> all(bundle.views.size());
+/// Bilinear coverage at a pixel position; full outside the image, where nothing is known.
+float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
+    const double px = x - 0.5, py = y - 0.5;
+    const double bx = std::floor(px), by = std::floor(py);
+    if (!(bx >= 0 && by >= 0 && bx < view.camera.width - 1 && by < view.camera.height - 1))
+        return 255.0f;
+    const int ix = static_cast<int>(bx), iy = static_cast<int>(by);
+    const auto fx = static_cast<float>(px - bx), fy = static_cast<float>(py - by);
+    const PageRectangle* r = set_.find(view.number, ix, iy, ix + 1, iy + 1);
+    const Texture* texture = r ? set_.pages()[static_cast<std::size_t>(r->page)].texture : nullptr;
+    const auto at = [&](int i, int j) {
+        if (r) return alphaOf(*texture, r->texel(i, j));
+        return set_.objectOutside(view.number, i, j) ? 255.0f : 0.0f;
+    };
+    const float top = at(ix, iy) * (1 - fx) + at(ix + 1, iy) * fx;
+    const float bottom = at(ix, iy + 1) * (1 - fx) + at(ix + 1, iy + 1) * fx;
+    return top * (1 - fy) + bottom * fy;
+}
+
+Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
+    std::vector<View> all(set_.views().size());
     parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
-        const auto& source = bundle.views[n];
-        const int w = source.camera.width, h = source.camera.height;
-        View view{source.camera, source.camera.cameraFromWorld(), Image<std::uint8_t>(w, h), {}};
-        bool partial = false;
-        for (int y = 0; y < h; ++y) {
-            for (int x = 0; x < w; ++x) {
-                view.alpha.at(x, y) = alphaAt(source.texture, x, y);
-                partial = partial || view.alpha.at(x, y) < 255;
-            }
-        }
-        if (!partial) return;
+        const auto number = static_cast<std::size_t>(n);
+        const Camera& camera = set_.views()[number].camera;
+        const int w = camera.width, h = camera.height;
+        const Image<std::uint8_t> alpha = alphaOf(set_, number);
+        if (std::all_of(alpha.data(), alpha.data() + alpha.count(),
+                        [](std::uint8_t a) { return a == 255; }))
+            return;
+        View view{number, camera, camera.cameraFromWorld(), {}};
         view.around = Image<Around>(w, h, Around::mixed);
         for (int y = kReach; y + kReach < h; ++y) {
             for (int x = kReach; x + kReach < w; ++x) {
                 std::uint8_t least = 255, most = 0;
                 for (int j = -kReach; j <= kReach; ++j) {
                     for (int i = -kReach; i <= kReach; ++i) {
-                        least = std::min(least, view.alpha.at(x + i, y + j));
-                        most = std::max(most, view.alpha.at(x + i, y + j));
+                        least = std::min(least, alpha.at(x + i, y + j));
+                        most = std::max(most, alpha.at(x + i, y + j));
                     }
                 }
                 view.around.at(x, y) = least == 255 ? Around::full
@@ -75,7 +96,7 @@ Silhouettes::Silhouettes(const Bundle& bundle) {
                                                     : Around::mixed;
             }
         }
-        all[n] = std::move(view);
+        all[number] = std::move(view);
     });
     for (auto& view : all) {
         if (!view.around.empty()) views_.push_back(std::move(view));
@@ -105,7 +126,7 @@ std::uint32_t Silhouettes::freeSamples(const Camera& camera, const glm::dmat4& w
             const double dx = (k % kSamples + 0.5) / kSamples - 0.5;
             const double dy = (k / kSamples + 0.5) / kSamples - 0.5;
             const auto p = centre + right * dx + down * dy;
-            if (alphaBilinear(view.alpha, p.x, p.y) < kFree) free |= 1u << k;
+            if (alphaBilinear(view, p.x, p.y) < kFree) free |= 1u << k;
         }
         if (free == kAllSamples) break;
     }

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "lib/model/bundle.hpp"
 #include "lib/render/frame.hpp"
+#include "lib/render/scene/page_set.hpp"
 
 namespace stx {
 
@@ -13,11 +13,10 @@ namespace stx {
 /// no reference sees through as coverage, so silhouettes are thin and smooth.
 class Silhouettes {
   public:
-    /// The bundle must outlive this. Views whose alpha is full everywhere (full scenes) have no say
-    /// and cost nothing.
-    explicit Silhouettes(const Bundle& bundle);
+    /// Views whose alpha is full everywhere (full scenes) have no vote and cost nothing.
+    explicit Silhouettes(PageSet set);
 
-    /// Nothing to do for this bundle.
+    /// Nothing to do for these views.
     [[nodiscard]] bool none() const { return views_.empty(); }
     /// Sets alpha, premultiplied colour and albedo of the pixels within two pixels of the
     /// background; what is left with no coverage gets empty. The same on any number of threads.
@@ -26,16 +25,18 @@ class Silhouettes {
   private:
     enum class Around : std::uint8_t { mixed, full, empty };
     struct View {
+        std::size_t number = 0;
         Camera camera;
         glm::dmat4 cameraFromWorld;
-        Image<std::uint8_t> alpha;  ///< coverage, 0..255
-        Image<Around> around;       ///< coverage of a pixel and what is next to it
+        Image<Around> around;  ///< coverage of a pixel and what is next to it
     };
+    [[nodiscard]] float alphaBilinear(const View& view, double x, double y) const;
     [[nodiscard]] std::uint32_t freeSamples(const Camera& camera, const glm::dmat4& worldFromCamera,
                                             int x, int y, double depth) const;
     [[nodiscard]] float coverage(const Camera& camera, const glm::dmat4& worldFromCamera, int x,
                                  int y, float depth) const;
 
+    PageSet set_;
     std::vector<View> views_;
 };
 

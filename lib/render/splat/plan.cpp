@@ -78,8 +78,8 @@ PixelMap pixelMap(const Camera& source, const Camera& novel) {
     return m;
 }
 
-bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, const Camera& novel,
-               bool cullBackFaces, BlockTask& task) {
+bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const Source& s,
+               const Camera& novel, bool cullBackFaces, BlockTask& task) {
     task.u0 = block.u0;
     task.v0 = block.v0;
     task.u1 = block.u1;
@@ -165,7 +165,7 @@ bool planBlock(const ViewInfo& view, const BlockInfo& block, const Source& s, co
     // it from about where we stand, since looks change with the angle.
     const double density = 1.0 / std::max(1.0, stretch2);
     task.density = std::max(static_cast<float>(density * density), kLeastDensity);
-    const auto& c = view.view->camera;
+    const auto& c = rectangle.camera();
     const glm::dvec3 point =
         c.position +
         c.orientation * c.unproject(uc + 0.5, vc + 0.5, 0.5 * (block.zMin + block.zMax));

@@ -9,6 +9,7 @@
 
 #include "lib/base/job.hpp"
 #include "lib/render/renderer.hpp"
+#include "lib/render/scene/page_set.hpp"
 #include "lib/render/surface/cpu/shade.hpp"
 #include "lib/render/surface/source.hpp"
 
@@ -78,7 +79,7 @@ class TilePainter {
 
 /// Surface mode with a painter of its own: see makeCpuSurfaceRenderer(). Errors: the painter's.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makePaintedSurfaceRenderer(
-    const Bundle& bundle, const RenderSettings& settings, Job& job,
+    const PageSet& set, const RenderSettings& settings, Job& job,
     std::unique_ptr<TilePainter> painter);
 
 }  // namespace stx::surface

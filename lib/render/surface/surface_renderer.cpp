@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/cpu_device.hpp"
 #include "lib/render/finish/fill.hpp"
 #include "lib/render/surface/backend.hpp"
 #include "lib/render/surface/cpu/fuse.hpp"
@@ -45,13 +46,14 @@ Effort effortOf(Quality quality) {
 
 class CpuSurfaceRenderer final : public Renderer {
   public:
-    CpuSurfaceRenderer(const Bundle& bundle, const RenderSettings& settings, Job& job,
+    CpuSurfaceRenderer(const PageSet& set, const RenderSettings& settings, Job& job,
                        std::unique_ptr<TilePainter> painter = nullptr)
-        : bundle_(bundle),
+        : bundle_(copyOf(set)),
           settings_(settings),
           effort_(effortOf(settings.quality)),
           job_(job),
           painter_(std::move(painter)) {
+        const Bundle& bundle = bundle_;
         sources_.resize(bundle.views.size());
         parallelFor(0, static_cast<std::int64_t>(sources_.size()), [&](std::int64_t i) {
             sources_[static_cast<std::size_t>(i)] =
@@ -87,7 +89,7 @@ class CpuSurfaceRenderer final : public Renderer {
         return painter_ ? painter_->backend() : "cpu";
     }
     [[nodiscard]] std::string device() const override {
-        return painter_ ? painter_->device() : fmt::format("CPU ({})", simdTarget());
+        return painter_ ? painter_->device() : cpuDeviceName();
     }
     /// Hands the sources to the painter.
     [[nodiscard]] Result<void> preparePainter() {
@@ -95,6 +97,11 @@ class CpuSurfaceRenderer final : public Renderer {
     }
 
   private:
+    static Bundle copyOf(const PageSet& set) {
+        Bundle b;
+        for (std::size_t i = 0; i < set.views().size(); ++i) b.views.push_back(set.copyOfView(i));
+        return b;
+    }
     void addBounds(const Source& s);
     void findNormals();
     /// Unit world normal of a source at pixel position (u, v); zero where it has none.
@@ -123,7 +130,7 @@ class CpuSurfaceRenderer final : public Renderer {
     [[nodiscard]] Frame copyOf(std::size_t index) const;
     void light(const Camera& camera, Frame& frame) const;
 
-    const Bundle& bundle_;
+    Bundle bundle_;
     RenderSettings settings_;
     Effort effort_;
     Job& job_;
@@ -540,20 +547,20 @@ float FrameWork::qLimit() const {
                               : static_cast<float>(space.axis.q(0.0));
 }
 
-Result<std::unique_ptr<Renderer>> makePaintedSurfaceRenderer(const Bundle& bundle,
+Result<std::unique_ptr<Renderer>> makePaintedSurfaceRenderer(const PageSet& set,
                                                              const RenderSettings& settings,
                                                              Job& job,
                                                              std::unique_ptr<TilePainter> painter) {
-    auto renderer = std::make_unique<CpuSurfaceRenderer>(bundle, settings, job, std::move(painter));
+    auto renderer = std::make_unique<CpuSurfaceRenderer>(set, settings, job, std::move(painter));
     STX_CHECK(renderer->preparePainter());
     return std::unique_ptr<Renderer>(std::move(renderer));
 }
 
 }  // namespace surface
 
-std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const Bundle& bundle,
-                                                 const RenderSettings& settings, Job& job) {
-    return std::make_unique<CpuSurfaceRenderer>(bundle, settings, job);
+std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const PageSet& set, const RenderSettings& settings,
+                                                 Job& job) {
+    return std::make_unique<CpuSurfaceRenderer>(set, settings, job);
 }
 
 }  // namespace stx

@@ -62,6 +62,53 @@ TEST(Grid, PaddingRepeatsTheEdge) {
     EXPECT_EQ(atlas->pages[0].depth.at(8, 8), 20.0f);
 }
 
+/// An OpenEXR file of another program without alpha: all is covered, not all has a depth.
+TEST(Grid, ViewsThatASensorMissedInPartsComeBackAsSuch) {
+    Bundle bundle = whiteViews(2, 24, 20);
+    for (int x = 0; x < 24; ++x) bundle.views[1].depth.at(x, 7) = kNoDepth;
+    bundle.views[0].pruned = true;
+    bundle.views[0].depth.at(3, 3) = kNoDepth;
+    for (const auto layout : {PackSettings::Layout::grid, PackSettings::Layout::tight}) {
+        PackSettings settings;
+        settings.layout = layout;
+        Job job;
+        const auto atlas = pack(bundle, settings, job);
+        ASSERT_TRUE(atlas);
+        const auto back = unpack(*atlas, job);
+        ASSERT_TRUE(back);
+        EXPECT_TRUE(back->views[0].pruned);
+        EXPECT_FALSE(back->views[1].pruned) << "nobody pruned it";
+        EXPECT_EQ(back->views[1].texture.at(5, 7).a, 1.0f);
+    }
+}
+
+/// What is read around a rectangle must be its view's: nothing beyond the view, padding elsewhere.
+TEST(Grid, WholeViewsNeedNoPadding) {
+    PackSettings settings;
+    settings.padding = 0;
+    Job job;
+    Bundle bundle = whiteViews(4, 24, 20);
+    const auto whole = pack(bundle, settings, job);
+    ASSERT_TRUE(whole);
+    EXPECT_TRUE(whole->paddingHolds(2));
+    // Two parts of a view and a third in the middle that fits in no other way.
+    for (auto& view : bundle.views)
+        for (int y = 0; y < 20; ++y)
+            for (int x = 0; x < 24; ++x)
+                if (x + y < 20) {
+                    view.depth.at(x, y) = kNoDepth;
+                    view.texture.rgba8()->at(x, y).a = 0;
+                }
+    settings.layout = PackSettings::Layout::tight;
+    const auto narrow = pack(bundle, settings, job);
+    ASSERT_TRUE(narrow);
+    EXPECT_FALSE(narrow->paddingHolds(2));
+    settings.padding = 2;
+    const auto wide = pack(bundle, settings, job);
+    ASSERT_TRUE(wide);
+    EXPECT_TRUE(wide->paddingHolds(2));
+}
+
 TEST(Grid, ATextureAtTheExactLimitFits) {
     PackSettings settings;
     settings.padding = 2;

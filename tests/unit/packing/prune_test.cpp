@@ -9,40 +9,13 @@
 #include "lib/packing/packing.hpp"
 #include "lib/render/surface/surface_renderer.hpp"
 #include "tests/shared_data.hpp"
+#include "tests/torus_bundle.hpp"
 #include "tests/unit/packing/holes.hpp"
 #include "tests/unit/packing/spheres_miv.hpp"
 #include "tests/unit/surface/analytic.hpp"
 
 namespace stx {
 namespace {
-
-/// A torus from 14 sides, its colour changing from place to place.
-Bundle torusViews() {
-    Mesh mesh;
-    mesh.materials.emplace_back();
-    constexpr int kAround = 96, kAcross = 48;
-    for (int i = 0; i < kAround; ++i) {
-        for (int j = 0; j < kAcross; ++j) {
-            const double a = i * 6.283185307179586 / kAround, b = j * 6.283185307179586 / kAcross;
-            const double r = 0.75 + 0.3 * std::cos(b);
-            mesh.positions.emplace_back(r * std::cos(a), 0.3 * std::sin(b), r * std::sin(a));
-            mesh.colours.emplace_back(0.5 + 0.4 * std::sin(3 * a), 0.5 + 0.4 * std::cos(b),
-                                      0.5 + 0.4 * std::sin(a + 2 * b), 1);
-            const auto at = [](int k, int l) { return (k % kAround) * kAcross + l % kAcross; };
-            mesh.triangles.emplace_back(at(i, j), at(i, j + 1), at(i + 1, j + 1));
-            mesh.triangles.emplace_back(at(i, j), at(i + 1, j + 1), at(i + 1, j));
-        }
-    }
-    mesh.triangleMaterial.assign(mesh.triangles.size(), 0);
-    ViewFraming framing;
-    framing.width = framing.height = 192;
-    Job job;
-    const auto cameras = layoutCameras({ViewLayout::Kind::sphere, 14, 0}, framing, mesh.positions);
-    EXPECT_TRUE(cameras);
-    auto bundle = captureBundle(mesh, *cameras, {}, job);
-    EXPECT_TRUE(bundle);
-    return std::move(*bundle);
-}
 
 Frame draw(const Bundle& bundle, const Camera& camera) {
     Job job;

@@ -59,6 +59,21 @@ TEST(Footprint, LeavesPicturesAsLargeAsTheViewsAlone) {
     EXPECT_EQ((*made)->render(camera)->colour, plain->colour);
 }
 
+/// The large views have several samples to a pixel of the small one, whose own they are not.
+TEST(Footprint, GivesBackASmallViewAmongLargeOnes) {
+    Bundle bundle = analyticBundle(AnalyticScene::object, 8, 1);
+    Camera small = bundle.views[2].camera;
+    small = small.resized(small.width / 4, small.height / 4);
+    bundle.views[2] = viewOfAnalyticScene(AnalyticScene::object, small, 1);
+    Job job;
+    const auto made = makeRenderer(Backend::cpu, bundle, {}, -1, job);
+    ASSERT_TRUE(made);
+    EXPECT_GT(Footprint(bundle).samplesPerPixel(small), 2.0);
+    const auto frame = (*made)->render(small);
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->depth, bundle.views[2].depth);
+}
+
 TEST(Footprint, AveragesWhatIsThere) {
     Frame large;
     large.colour = Image<glm::vec4>(4, 2, glm::vec4(0.0f));

@@ -7,16 +7,13 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/cpu_device.hpp"
 #include "lib/render/finish/pinholes.hpp"
 #include "lib/render/finish/silhouettes.hpp"
 #include "lib/render/splat/cpu/kernels.hpp"
 #include "lib/render/splat/paper_rule.hpp"
 #include "lib/render/splat/plan.hpp"
-#include "lib/render/splat/view.hpp"
-
-#if defined(__x86_64__)
-#include <cpuid.h>
-#endif
+#include "lib/render/splat/prepared.hpp"
 
 namespace stx {
 namespace {
@@ -35,16 +32,16 @@ struct Scratch {
 
 class CpuSplatRenderer final : public Renderer {
   public:
-    CpuSplatRenderer(const Bundle& bundle, const RenderSettings& settings, Job& job)
-        : bundle_(bundle),
+    CpuSplatRenderer(const PageSet& set, const RenderSettings& settings, Job& job)
+        : set_(set),
           settings_(settings),
           limits_(job.limits),
           wantNormals_(settings.wantNormals()),
-          views_(prepareViews(bundle, wantNormals_)),
-          silhouettes_(bundle) {
-        for (const auto& v : views_) {
-            for (const auto& b : v.blocks) opaque_ = opaque_ && b.opaque;
-            blockCount_ += v.blocks.size();
+          prepared_(preparePages(set_, wantNormals_)),
+          silhouettes_(set_) {
+        for (const auto& r : prepared_.rectangles) {
+            for (const auto& b : r.blocks) opaque_ = opaque_ && b.opaque;
+            blockCount_ += r.blocks.size();
         }
         tasks_.resize(blockCount_);
         seen_.resize(blockCount_);
@@ -69,11 +66,11 @@ class CpuSplatRenderer final : public Renderer {
     void resolvePoints(Picture& picture, const Band& band) const;
     void shade(Picture& picture, int x, int y, glm::vec3 normal) const;
 
-    const Bundle& bundle_;
+    PageSet set_;
     RenderSettings settings_;
     Limits limits_;
     bool wantNormals_;
-    std::vector<ViewInfo> views_;
+    PreparedPages prepared_;
     Silhouettes silhouettes_;
     bool opaque_ = true;
     std::size_t blockCount_ = 0;
@@ -86,38 +83,42 @@ class CpuSplatRenderer final : public Renderer {
     tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 
-Source sourceOf(const ViewInfo& info, const Camera& novel) {
-    const ReferenceView& v = *info.view;
+Source sourceOf(const PageRectangle& r, const Page& page, const PreparedPage& prepared,
+                const Camera& novel) {
+    const std::size_t first = static_cast<std::size_t>(r.pageY) * page.width() + r.pageX;
     Source s;
-    s.depth = v.depth.data();
-    if (const auto* image = v.texture.rgba8())
-        s.rgba8 = reinterpret_cast<const std::uint8_t*>(image->data());
-    if (const auto* image = v.texture.rgbaFloat())
-        s.rgbaFloat = reinterpret_cast<const float*>(image->data());
-    s.slopes = info.slopes.data();
-    s.normals =
-        info.normals.empty() ? nullptr : reinterpret_cast<const std::int8_t*>(info.normals.data());
-    s.sizes = info.sizes.empty() ? nullptr : info.sizes.data();
-    s.firstPoint = info.firstPoint;
-    s.width = v.camera.width;
-    s.orthographic = v.camera.orthographic;
-    s.fx = static_cast<float>(v.camera.fx);
-    s.fy = static_cast<float>(v.camera.fy);
-    s.map = pixelMap(v.camera, novel);
+    s.depth = page.depth->data() + first;
+    if (const auto* image = page.texture->rgba8())
+        s.rgba8 = reinterpret_cast<const std::uint8_t*>(image->data() + first);
+    if (const auto* image = page.texture->rgbaFloat())
+        s.rgbaFloat = reinterpret_cast<const float*>(image->data() + first);
+    s.slopes = prepared.slopes.data() + first;
+    if (!prepared.normals.empty())
+        s.normals = reinterpret_cast<const std::int8_t*>(prepared.normals.data() + first);
+    if (!prepared.sizes.empty()) s.sizes = prepared.sizes.data() + first;
+    s.firstPoint = prepared.firstPoint + static_cast<std::uint32_t>(first);
+    s.stride = page.width();
+    s.orthographic = r.window.orthographic;
+    s.fx = static_cast<float>(r.window.fx);
+    s.fy = static_cast<float>(r.window.fy);
+    s.map = pixelMap(r.window, novel);
     return s;
 }
 
 void CpuSplatRenderer::planFrame(const Camera& camera) {
     sources_.clear();
-    for (const auto& v : views_) sources_.push_back(sourceOf(v, camera));
+    for (const PageRectangle& r : set_.rectangles()) {
+        const auto page = static_cast<std::size_t>(r.page);
+        sources_.push_back(sourceOf(r, set_.pages()[page], prepared_.pages[page], camera));
+    }
     std::size_t first = 0;
-    for (std::size_t k = 0; k < views_.size(); ++k) {
-        const auto& info = views_[k];
+    for (std::size_t k = 0; k < prepared_.rectangles.size(); ++k) {
+        const auto& info = prepared_.rectangles[k];
         parallelForBlocks(0, static_cast<std::int64_t>(info.blocks.size()), 512,
                           [&](std::int64_t from, std::int64_t to) {
                               for (auto i = from; i < to; ++i) {
                                   BlockTask& task = tasks_[first + i];
-                                  task.source = static_cast<std::uint16_t>(k);
+                                  task.source = static_cast<std::uint32_t>(k);
                                   seen_[first + i] =
                                       planBlock(info, info.blocks[i], sources_[k], camera,
                                                 settings_.splat == SplatRule::data, task);
@@ -134,7 +135,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     STX_CHECK(limits_.checkAllocation(pixels, wantNormals_ ? 48 : 20, "the frame"));
     const auto start = std::chrono::steady_clock::now();
     Picture picture{camera, lightsInWorld(settings_.lighting, camera.worldFromCamera()), {}, {}, 0};
-    picture.frame.linear = bundle_.views[0].texture.isLinear();
+    picture.frame.linear = set_.linear();
     parallelFor(0, 2, [&](std::int64_t part) {
         if (part == 0) {
             planFrame(camera);
@@ -148,7 +149,8 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
         }
     });
     if (settings_.splat == SplatRule::paper)
-        picture.shape.coefficient = static_cast<float>(paperCoefficient(views_, settings_, camera));
+        picture.shape.coefficient =
+            static_cast<float>(paperCoefficient(prepared_.rectangles, settings_, camera));
 
     picture.bandRows = std::clamp(kBandBytes / (24 * camera.width), 16, 64);
     const int bands = (camera.height + picture.bandRows - 1) / picture.bandRows;
@@ -170,7 +172,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     }
     parallelFor(0, bands, [&](std::int64_t b) { drawBand(picture, static_cast<int>(b)); });
     if (settings_.splat == SplatRule::data) {
-        closePinholes(picture.frame, bundle_.pruned());
+        closePinholes(picture.frame, set_.pruned());
         silhouettes_.carve(picture.frame, camera);
     }
     picture.frame.milliseconds =
@@ -317,44 +319,27 @@ void CpuSplatRenderer::resolvePoints(Picture& picture, const Band& band) const {
             }
             const auto bits = static_cast<std::uint32_t>(key >> 32);
             const auto point = static_cast<std::uint32_t>(key);
-            while (point < views_[k].firstPoint) --k;
-            while (k + 1 < views_.size() && point >= views_[k + 1].firstPoint) ++k;
-            const ReferenceView& v = *views_[k].view;
-            const std::uint32_t pixel = point - views_[k].firstPoint;
-            glm::vec4 c = v.texture.rgba8()
-                              ? glm::vec4(v.texture.rgba8()->pixels()[pixel]) * (1.0f / 255.0f)
-                              : v.texture.rgbaFloat()->pixels()[pixel];
+            const auto& pages = prepared_.pages;
+            while (point < pages[k].firstPoint) --k;
+            while (k + 1 < pages.size() && point >= pages[k + 1].firstPoint) ++k;
+            const Texture& texture = *set_.pages()[k].texture;
+            const std::uint32_t texel = point - pages[k].firstPoint;
+            glm::vec4 c = texture.rgba8()
+                              ? glm::vec4(texture.rgba8()->pixels()[texel]) * (1.0f / 255.0f)
+                              : texture.rgbaFloat()->pixels()[texel];
             std::memcpy(&frame.depth.at(x, y), &bits, sizeof(float));
             frame.colour.at(x, y) = {c.r * c.a, c.g * c.a, c.b * c.a, c.a};
             if (wantNormals_)
-                shade(picture, x, y, glm::vec3(views_[k].normals[pixel]) * (1.0f / 127.0f));
+                shade(picture, x, y, glm::vec3(pages[k].normals[texel]) * (1.0f / 127.0f));
         }
     }
 }
 
 }  // namespace
 
-std::unique_ptr<Renderer> makeCpuSplatRenderer(const Bundle& bundle, const RenderSettings& settings,
+std::unique_ptr<Renderer> makeCpuSplatRenderer(const PageSet& set, const RenderSettings& settings,
                                                Job& job) {
-    return std::make_unique<CpuSplatRenderer>(bundle, settings, job);
-}
-
-std::string cpuDeviceName() {
-    std::string name = "CPU";
-#if defined(__x86_64__)
-    unsigned words[12] = {};
-    bool ok = true;
-    for (unsigned i = 0; i < 3; ++i)
-        ok = ok && __get_cpuid(0x80000002u + i, &words[4 * i], &words[4 * i + 1], &words[4 * i + 2],
-                               &words[4 * i + 3]);
-    if (ok) {
-        char text[49] = {};
-        std::memcpy(text, words, 48);
-        name = text;
-        while (!name.empty() && name.back() == ' ') name.pop_back();
-    }
-#endif
-    return fmt::format("{} ({})", name, simdTarget());
+    return std::make_unique<CpuSplatRenderer>(set, settings, job);
 }
 
 }  // namespace stx

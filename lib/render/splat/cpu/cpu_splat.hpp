@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "lib/base/job.hpp"
-#include "lib/model/bundle.hpp"
 #include "lib/render/renderer.hpp"
+#include "lib/render/scene/page_set.hpp"
 
 namespace stx {
 
@@ -18,14 +18,10 @@ namespace stx {
 /// SplatRule::paper: round, of diameter splatCoefficient / distance pixels; a coefficient of 0 is
 /// chosen so that the nearest view's samples just close. SplatRule::point: one pixel, nearest wins.
 ///
-/// Frames carry normals when there is light. The bundle must outlive the renderer and have passed
-/// Bundle::check(). Bytes are the same on any number of threads. Errors of render(): a camera that
-/// fails check(), or a frame over the job's memory limit.
-[[nodiscard]] std::unique_ptr<Renderer> makeCpuSplatRenderer(const Bundle& bundle,
+/// Frames carry normals when there is light. Bytes are the same on any number of threads. Errors of
+/// render(): a camera that fails check(), or a frame over the job's memory limit.
+[[nodiscard]] std::unique_ptr<Renderer> makeCpuSplatRenderer(const PageSet& set,
                                                              const RenderSettings& settings,
                                                              Job& job);
-
-/// The processor's name and the SIMD target in use, such as "AMD EPYC (AVX3_ZEN4)".
-[[nodiscard]] std::string cpuDeviceName();
 
 }  // namespace stx

@@ -68,7 +68,7 @@ void depthBlock(const Source& s, const BlockTask& t, const Band& band) {
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
-            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
             Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
             if (!t.opaque) {
@@ -137,7 +137,7 @@ void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
-            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
             Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
             if (!kOpaque) {
@@ -221,7 +221,7 @@ HWY_INLINE void forRound(const Source& s, const BlockTask& t, const Shape& shape
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int u = t.u0; u < t.u1; ++u) {
-            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + u;
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + u;
             const float alpha =
                 s.rgba8 ? s.rgba8[4 * pixel + 3] : s.rgbaFloat[4 * pixel + 3] * 255.0f;
             if (!(s.depth[pixel] < kInfinity) || !(alpha > alphaThreshold)) continue;
@@ -254,7 +254,7 @@ void pointsImpl(const Source& s, const BlockTask& t, const Band& band) {
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
-            const std::size_t pixel = static_cast<std::size_t>(v) * s.width + t.u0 + i;
+            const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
             Landed p = land(d, map, i, loadDepth(d, s.depth + pixel, count), band);
             if (!t.opaque) p.inside = hn::And(p.inside, alphaAbove(d, s, pixel, count, 0));
@@ -317,10 +317,6 @@ void colourImpl(const Source& s, const BlockTask& t, const Shape& shape, const B
     }
 }
 
-const char* targetImpl() {
-    return hwy::TargetName(HWY_TARGET);
-}
-
 }  // namespace stx::splat::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -330,7 +326,6 @@ namespace stx::splat {
 HWY_EXPORT(depthImpl);
 HWY_EXPORT(colourImpl);
 HWY_EXPORT(pointsImpl);
-HWY_EXPORT(targetImpl);
 
 void drawDepth(const Source& source, const BlockTask& task, const Shape& shape, const Band& band) {
     HWY_DYNAMIC_DISPATCH(depthImpl)(source, task, shape, band);
@@ -340,9 +335,6 @@ void drawColour(const Source& source, const BlockTask& task, const Shape& shape,
 }
 void drawPoints(const Source& source, const BlockTask& task, const Band& band) {
     HWY_DYNAMIC_DISPATCH(pointsImpl)(source, task, band);
-}
-const char* simdTarget() {
-    return HWY_DYNAMIC_DISPATCH(targetImpl)();
 }
 
 }  // namespace stx::splat

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "lib/render/splat/constants.hpp"
-#include "lib/render/splat/view.hpp"
+#include "lib/render/splat/prepared.hpp"
 
 /// The inner loops of splat mode, compiled for each SIMD target and chosen at run time (Highway).
 
@@ -16,7 +16,7 @@ struct PixelMap {
     glm::dvec3 a0, au, av, b0, bu, bv;
 };
 
-/// The images of a source, as the loops read them.
+/// The images of a rectangle, as the loops read them: from its first texel on.
 struct Source {
     const float* depth = nullptr;
     const std::uint8_t* rgba8 = nullptr;  ///< one of rgba8 and rgbaFloat
@@ -25,7 +25,7 @@ struct Source {
     const std::int8_t* normals = nullptr;  ///< four to a pixel; null when not needed
     const std::uint8_t* sizes = nullptr;   ///< null: all 1
     std::uint32_t firstPoint = 0;
-    int width = 0;
+    int stride = 0;  ///< texels in a row of the page
     bool orthographic = false;
     float fx = 1, fy = 1;
     PixelMap map;
@@ -34,9 +34,9 @@ struct Source {
 /// A block of source pixels in one frame.
 struct BlockTask {
     std::uint16_t u0 = 0, v0 = 0, u1 = 0, v1 = 0;
-    std::uint16_t source = 0;
-    bool small = true;    ///< every splat closes its gaps within 2x2 pixels
-    bool uniform = true;  ///< small, and all share a tilt and go on in colour
+    std::uint32_t source = 0;  ///< number of its rectangle
+    bool small = true;         ///< every splat closes its gaps within 2x2 pixels
+    bool uniform = true;       ///< small, and all share a tilt and go on in colour
     bool opaque = true;
     float slopeX = 0,
           slopeY = 0;         ///< relative change of novel depth per output pixel; 0 if not smooth
@@ -79,8 +79,5 @@ void drawDepth(const Source& source, const BlockTask& task, const Shape& shape, 
 void drawColour(const Source& source, const BlockTask& task, const Shape& shape, const Band& band);
 /// SplatRule::point in one pass.
 void drawPoints(const Source& source, const BlockTask& task, const Band& band);
-
-/// Name of the SIMD target in use, such as "AVX2".
-[[nodiscard]] const char* simdTarget();
 
 }  // namespace stx::splat

@@ -175,7 +175,7 @@ HWY_INLINE Paint paintOf(const Source& s, std::size_t pixel, bool opaque) {
 // source pixels that go by per output pixel.
 HWY_INLINE void addGradient(const Source& s, std::size_t pixel, float uAcross, float vAcross,
                             float uDown, float vDown, Paint& p) {
-    const std::size_t row = static_cast<std::size_t>(s.width);
+    const std::size_t row = static_cast<std::size_t>(s.stride);
     Four u, v;
     if (s.rgba8) {
         const std::uint8_t* c = s.rgba8 + 4 * pixel;

@@ -25,33 +25,40 @@ Image<glm::vec3> normalsOf(const ReferenceView& view) {
 
 }  // namespace
 
-PointArrays makePointArrays(const Bundle& bundle, bool withNormals) {
+PointArrays makePointArrays(const PageSet& set, bool withNormals) {
     PointArrays out;
-    const Bounds bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
+    const Bounds bounds = set.bounds();
     if (!bounds.empty()) out.centre = bounds.centre();
-    out.linear = bundle.views.front().texture.isLinear();
-    for (const auto& view : bundle.views) {
+    out.linear = set.linear();
+    for (std::size_t i = 0; i < set.views().size(); ++i) {
+        const PageView& view = set.views()[i];
         const Camera& camera = view.camera;
         Image<glm::vec3> made;
-        if (withNormals && !view.hasNormals()) made = normalsOf(view);
-        const Image<glm::vec3>& normals = view.hasNormals() ? view.normal : made;
-        for (int y = 0; y < camera.height; ++y) {
-            for (int x = 0; x < camera.width; ++x) {
-                const float dist = view.depth.at(x, y);
-                if (!hasPoint(dist)) continue;
-                const glm::vec4 colour = view.texture.at(x, y);
-                if (!(colour.a > 0.5f)) continue;
-                const glm::dvec3 p = view.worldPoint(x, y) - out.centre;
-                out.radius = std::max(out.radius, glm::length(p));
-                out.positions.emplace_back(p);
-                if (out.linear)
-                    out.coloursF.emplace_back(glm::vec3(colour), 1.0f);
-                else
-                    out.colours.emplace_back(
-                        glm::round(glm::vec4(glm::vec3(colour), 1.0f) * 255.0f));
-                if (withNormals) out.normals.push_back(normals.at(x, y));
-                const glm::dvec2 spacing = camera.sampleSpacing(dist);
-                out.spacings.push_back(static_cast<float>(std::max(spacing.x, spacing.y)));
+        if (withNormals && !view.hasNormals) made = normalsOf(set.copyOfView(i));
+        for (const PageRectangle& r : set.rectanglesOf(i)) {
+            const Page& page = set.pages()[static_cast<std::size_t>(r.page)];
+            for (int y = r.y0; y < r.y1; ++y) {
+                for (int x = r.x0; x < r.x1; ++x) {
+                    const std::size_t texel = r.texel(x, y);
+                    const float dist = page.depth->data()[texel];
+                    if (!hasPoint(dist)) continue;
+                    if (!(PageSet::alphaOf(*page.texture, texel) > 0.5f)) continue;
+                    const glm::dvec3 p =
+                        camera.position +
+                        camera.orientation * camera.unproject(x + 0.5, y + 0.5, dist) - out.centre;
+                    out.radius = std::max(out.radius, glm::length(p));
+                    out.positions.emplace_back(p);
+                    if (const auto* floats = page.texture->rgbaFloat())
+                        out.coloursF.emplace_back(glm::vec3(floats->data()[texel]), 1.0f);
+                    else
+                        out.colours.emplace_back(glm::u8vec3(page.texture->rgba8()->data()[texel]),
+                                                 255);
+                    if (withNormals)
+                        out.normals.push_back(view.hasNormals ? page.normal->data()[texel]
+                                                              : made.at(x, y));
+                    const glm::dvec2 spacing = camera.sampleSpacing(dist);
+                    out.spacings.push_back(static_cast<float>(std::max(spacing.x, spacing.y)));
+                }
             }
         }
     }

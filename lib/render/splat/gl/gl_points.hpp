@@ -4,12 +4,12 @@
 
 #include <glm/glm.hpp>
 
-#include "lib/model/bundle.hpp"
 #include "lib/render/renderer.hpp"
+#include "lib/render/scene/page_set.hpp"
 
 namespace stx::gl {
 
-/// A bundle's points as vertex arrays in system memory.
+/// The points of all views as vertex arrays in system memory.
 struct PointArrays {
     glm::dvec3 centre{0};              ///< positions are relative to it, so that floats suffice
     double radius = 0;                 ///< of a ball around it that holds all points
@@ -22,7 +22,7 @@ struct PointArrays {
 };
 
 /// All points at least half covered.
-[[nodiscard]] PointArrays makePointArrays(const Bundle& bundle, bool withNormals);
+[[nodiscard]] PointArrays makePointArrays(const PageSet& set, bool withNormals);
 
 /// Points of one size, as a run of PointGroups::indices.
 struct PointGroup {

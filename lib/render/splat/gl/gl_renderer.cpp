@@ -26,12 +26,12 @@ struct Targets {
 
 class GlRenderer final : public Renderer {
   public:
-    GlRenderer(std::shared_ptr<EglContext> context, const Bundle& bundle, RenderSettings settings,
+    GlRenderer(std::shared_ptr<EglContext> context, const PageSet& set, RenderSettings settings,
                Limits limits)
         : context_(std::move(context)),
           settings_(std::move(settings)),
           limits_(limits),
-          points_(makePointArrays(bundle, settings_.lighting.on())) {}
+          points_(makePointArrays(set, settings_.lighting.on())) {}
 
     ~GlRenderer() override {
         if (!targets_) return;
@@ -240,19 +240,18 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
 
 }  // namespace
 
-Result<std::unique_ptr<Renderer>> makeGlRenderer(const Bundle& bundle,
-                                                 const RenderSettings& settings, int device,
-                                                 Job& job) {
+Result<std::unique_ptr<Renderer>> makeGlRenderer(const PageSet& set, const RenderSettings& settings,
+                                                 int device, Job& job) {
     if (settings.lighting.lights.size() > kMaxLights)
         return fail(ErrorCode::unsupported,
                     "{} lights; the gl backend has {}, use --backend gpu or cpu",
                     settings.lighting.lights.size(), kMaxLights);
     std::uint64_t points = 0;
-    for (const auto& view : bundle.views) points += view.depth.count();
+    for (const Page& page : set.pages()) points += page.depth->count();
     STX_CHECK(job.limits.checkAllocation(points, 48, "the vertex arrays of the gl backend"));
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::compatibility));
     STX_CHECK(context->requireModern("the gl backend", "--backend gpu or cpu"));
-    return std::make_unique<GlRenderer>(std::move(context), bundle, settings, job.limits);
+    return std::make_unique<GlRenderer>(std::move(context), set, settings, job.limits);
 }
 
 }  // namespace stx::gl

@@ -9,19 +9,20 @@ struct Layout {
     int layers = 1;
 };
 
-/// A grid of equal cells, as square as the views allow, in as few layers as the device needs.
-Result<Layout> layOut(const Bundle& bundle, const EglContext& context) {
+/// A grid of equal cells, one a page, as square as the pages allow, in as few layers as the device
+/// needs. The pages of an atlas are large already: a layer each.
+Result<Layout> layOut(const PageSet& set, const EglContext& context) {
     Layout out;
-    for (const auto& view : bundle.views)
-        out.cell = glm::max(out.cell, glm::ivec2(view.camera.width, view.camera.height));
+    for (const Page& page : set.pages())
+        out.cell = glm::max(out.cell, glm::ivec2(page.width(), page.height()));
     const int limit = std::min(context.abilities().maxTextureSize, 65535);
     if (out.cell.x > limit || out.cell.y > limit)
         return fail(
             ErrorCode::unsupported,
-            "the views are up to {}x{} pixels, more than '{}' takes ({}x{}); use smaller views "
+            "the textures are up to {}x{} pixels, more than '{}' takes ({}x{}); use smaller views "
             "or --backend cpu",
             out.cell.x, out.cell.y, context.device().name, limit, limit);
-    const int count = static_cast<int>(bundle.views.size());
+    const int count = static_cast<int>(set.pages().size());
     // Width near height: columns * cell.x ~ rows * cell.y.
     const double side = std::sqrt(static_cast<double>(count) * out.cell.x * out.cell.y);
     out.grid.x = std::clamp(static_cast<int>(std::ceil(side / out.cell.x)), 1,
@@ -58,13 +59,13 @@ GlTexture makeTexture(GLenum format, GLenum pixels, GLenum type, const Layout& l
 
 }  // namespace
 
-Result<GpuScene> GpuScene::upload(const Bundle& bundle, const EglContext& context, bool withNormals,
+Result<GpuScene> GpuScene::upload(const PageSet& set, const EglContext& context, bool withNormals,
                                   Job& job) {
-    STX_TRY(const Layout layout, layOut(bundle, context));
+    STX_TRY(const Layout layout, layOut(set, context));
     GpuScene scene;
-    scene.linear = bundle.views.front().texture.isLinear();
-    scene.hasSizes = std::any_of(bundle.views.begin(), bundle.views.end(),
-                                 [](const auto& v) { return v.hasSplats(); });
+    scene.linear = set.linear();
+    scene.hasSizes = std::any_of(set.views().begin(), set.views().end(),
+                                 [](const PageView& v) { return v.hasSplats; });
     const int bytesEach =
         (scene.linear ? 8 : 4) + 4 + (withNormals ? 4 : 0) + (scene.hasSizes ? 8 : 4);
     const std::int64_t texels = static_cast<std::int64_t>(layout.cell.x) * layout.grid.x *
@@ -82,51 +83,54 @@ Result<GpuScene> GpuScene::upload(const Bundle& bundle, const EglContext& contex
                                  : makeTexture(GL_RG16I, GL_RG_INTEGER, GL_SHORT, layout);
     STX_CHECK(context.check("making the textures of the reference views"));
 
-    scene.views = splat::prepareViews(bundle, withNormals);
+    splat::PreparedPages prepared = splat::preparePages(set, withNormals);
     const int perLayer = layout.grid.x * layout.grid.y;
-    const int count = static_cast<int>(bundle.views.size());
+    const int count = static_cast<int>(set.pages().size());
+    std::vector<glm::ivec3> cells;
     for (int i = 0; i < count; ++i) {
         STX_CHECK(job.checkCancelled());
-        const ReferenceView& view = bundle.views[static_cast<std::size_t>(i)];
-        splat::ViewInfo& info = scene.views[static_cast<std::size_t>(i)];
-        const int width = view.camera.width, height = view.camera.height;
+        const Page& page = set.pages()[static_cast<std::size_t>(i)];
+        splat::PreparedPage& ready = prepared.pages[static_cast<std::size_t>(i)];
         const glm::ivec3 cell((i % perLayer % layout.grid.x) * layout.cell.x,
                               (i % perLayer / layout.grid.x) * layout.cell.y, i / perLayer);
-        scene.cells.push_back(cell);
+        cells.push_back(cell);
         const auto put = [&](const GlTexture& texture, GLenum format, GLenum type,
                              const void* pixels) {
             glBindTexture(GL_TEXTURE_2D_ARRAY, texture.get());
-            glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, cell.x, cell.y, cell.z, width, height, 1,
-                            format, type, pixels);
+            glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, cell.x, cell.y, cell.z, page.width(),
+                            page.height(), 1, format, type, pixels);
         };
         glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-        if (const auto* image = view.texture.rgba8()) {
+        if (const auto* image = page.texture->rgba8()) {
             put(scene.colour, GL_RGBA, GL_UNSIGNED_BYTE, image->data());
-        } else if (const auto* floats = view.texture.rgbaFloat()) {
+        } else if (const auto* floats = page.texture->rgbaFloat()) {
             put(scene.colour, GL_RGBA, GL_FLOAT, floats->data());
             for (const auto& p : floats->pixels())
                 scene.maxColour = std::max({scene.maxColour, p.r, p.g, p.b});
         }
-        put(scene.depth, GL_RED, GL_FLOAT, view.depth.data());
-        if (withNormals) put(scene.normal, GL_RGBA, GL_BYTE, info.normals.data());
+        put(scene.depth, GL_RED, GL_FLOAT, page.depth->data());
+        if (withNormals) put(scene.normal, GL_RGBA, GL_BYTE, ready.normals.data());
         if (!scene.hasSizes) {
-            put(scene.slope, GL_RG_INTEGER, GL_SHORT, info.slopes.data());
+            put(scene.slope, GL_RG_INTEGER, GL_SHORT, ready.slopes.data());
         } else {
-            std::vector<glm::i16vec4> coded(info.slopes.size());
+            std::vector<glm::i16vec4> coded(ready.slopes.size());
             for (std::size_t k = 0; k < coded.size(); ++k)
-                coded[k] = {info.slopes[k].u, info.slopes[k].v,
-                            info.sizes.empty() ? 64 : info.sizes[k], 0};
+                coded[k] = {ready.slopes[k].u, ready.slopes[k].v,
+                            ready.sizes.empty() ? 64 : ready.sizes[k], 0};
             put(scene.slope, GL_RGBA_INTEGER, GL_SHORT, coded.data());
         }
-        for (const auto& block : info.blocks)
-            scene.translucent = scene.translucent || !block.opaque;
-        scene.points += view.pointCount();
-        info.slopes = {};
-        info.normals = {};
-        info.sizes = {};
-        STX_CHECK(context.check("uploading the reference views"));
-        job.progress(i + 1, count, "uploading views");
+        ready = {};
+        STX_CHECK(context.check("uploading the textures"));
+        job.progress(i + 1, count, "uploading textures");
     }
+    scene.rectangles = std::move(prepared.rectangles);
+    for (const splat::PreparedRectangle& r : scene.rectangles) {
+        const PageRectangle& at = *r.rectangle;
+        scene.places.push_back(cells[static_cast<std::size_t>(at.page)] +
+                               glm::ivec3(at.pageX, at.pageY, 0));
+        for (const auto& block : r.blocks) scene.translucent = scene.translucent || !block.opaque;
+    }
+    scene.points = set.pointCount();
     return scene;
 }
 

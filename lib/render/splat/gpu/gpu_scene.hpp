@@ -5,15 +5,15 @@
 #include <glm/glm.hpp>
 
 #include "lib/base/job.hpp"
-#include "lib/model/bundle.hpp"
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/device/gl_object.hpp"
-#include "lib/render/splat/view.hpp"
+#include "lib/render/splat/prepared.hpp"
 
 namespace stx::gpu {
 
-/// A bundle in video memory: the reference views merged into at most four textures (Lee & Park,
-/// section 3.1), each a grid of cells in an array of layers.
+/// A PageSet in video memory: at most four textures (Lee & Park, section 3.1), each an array of
+/// layers. The pages of an atlas are layers as they are; those of a bundle, one a view, are merged
+/// into a grid of cells.
 struct GpuScene {
     GlTexture colour;  ///< RGBA8 as coded, or RGBA16F of linear bundles
     GlTexture depth;   ///< R32F distances, infinity = no point
@@ -24,15 +24,14 @@ struct GpuScene {
     bool translucent = false;  ///< some point is not fully covered
     bool hasSizes = false;     ///< `slope` holds sizes
     float maxColour = 1.0f;    ///< of linear bundles
-    /// Blocks and cameras; slopes, normals and sizes are in the textures and empty here.
-    std::vector<splat::ViewInfo> views;
-    std::vector<glm::ivec3> cells;  ///< per view: x, y, layer in the textures
+    std::vector<splat::PreparedRectangle> rectangles;
+    std::vector<glm::ivec3> places;  ///< per rectangle: x, y, layer of its first texel
     std::int64_t points = 0;
     std::int64_t textureBytes = 0;
 
-    /// Uploads a bundle; the context must be current. Errors: a view larger than the device's
-    /// textures, memory.
-    [[nodiscard]] static Result<GpuScene> upload(const Bundle& bundle, const EglContext& context,
+    /// Uploads the pages, which must outlive this; the context must be current. Errors: a page
+    /// larger than the device's textures, memory.
+    [[nodiscard]] static Result<GpuScene> upload(const PageSet& set, const EglContext& context,
                                                  bool withNormals, Job& job);
 };
 

@@ -33,8 +33,13 @@ struct Begun {
 
 class GpuSplatRenderer final : public Renderer {
   public:
-    GpuSplatRenderer(std::shared_ptr<EglContext> context, RenderSettings settings, Limits limits)
-        : context_(std::move(context)), settings_(std::move(settings)), limits_(limits) {}
+    GpuSplatRenderer(std::shared_ptr<EglContext> context, const PageSet& set,
+                     RenderSettings settings, Limits limits)
+        : context_(std::move(context)),
+          set_(set),
+          silhouettes_(set),
+          settings_(std::move(settings)),
+          limits_(limits) {}
 
     ~GpuSplatRenderer() override {
         if (!resources_) return;
@@ -45,7 +50,7 @@ class GpuSplatRenderer final : public Renderer {
             (void)resources_.release();
     }
 
-    Result<void> prepare(const Bundle& bundle, Job& job);
+    Result<void> prepare(Job& job);
     Result<Frame> render(const Camera& camera) override;
     void expect(const Camera& next) override { expected_ = next; }
     std::string backend() const override { return "gpu"; }
@@ -68,8 +73,8 @@ class GpuSplatRenderer final : public Renderer {
     Result<void> renderPieces(const Camera& camera, Frame& frame);
 
     std::shared_ptr<EglContext> context_;
-    std::unique_ptr<Silhouettes> silhouettes_;  ///< shared with the processor's splat mode
-    bool pruned_ = false;                       ///< some view is
+    PageSet set_;
+    Silhouettes silhouettes_;
     RenderSettings settings_;
     Limits limits_;
     std::unique_ptr<Resources> resources_;
@@ -77,7 +82,7 @@ class GpuSplatRenderer final : public Renderer {
     std::optional<Begun> begun_;  ///< a frame under way before it was asked for
 };
 
-Result<void> GpuSplatRenderer::prepare(const Bundle& bundle, Job& job) {
+Result<void> GpuSplatRenderer::prepare(Job& job) {
     auto pipeline = settings_.pipeline;
     if (pipeline == GpuPipeline::compute)
         STX_CHECK(context_->requireModern("the compute pipeline", "--pipeline raster"));
@@ -85,9 +90,7 @@ Result<void> GpuSplatRenderer::prepare(const Bundle& bundle, Job& job) {
         pipeline = choosePipeline(context_->device(), context_->abilities()).pipeline;
     STX_TRY(auto current, context_->makeCurrent());
     resources_ = std::make_unique<Resources>();
-    STX_TRY(resources_->scene, GpuScene::upload(bundle, *context_, settings_.wantNormals(), job));
-    silhouettes_ = std::make_unique<Silhouettes>(bundle);
-    pruned_ = bundle.pruned();
+    STX_TRY(resources_->scene, GpuScene::upload(set_, *context_, settings_.wantNormals(), job));
     const auto make = pipeline == GpuPipeline::compute ? makeComputeSplats : makeRasterSplats;
     STX_TRY(resources_->pipeline, make(*context_, resources_->scene, settings_));
     return {};
@@ -187,8 +190,8 @@ Result<Frame> GpuSplatRenderer::render(const Camera& camera) {
     }
     if (settings_.splat == SplatRule::data) {
         const auto start = Clock::now();
-        closePinholes(frame, pruned_);
-        silhouettes_->carve(frame, camera);
+        closePinholes(frame, set_.pruned());
+        silhouettes_.carve(frame, camera);
         frame.milliseconds += millisecondsSince(start);
     }
     return frame;
@@ -214,12 +217,13 @@ PipelineChoice choosePipeline(const Device& device, const ContextAbilities& abil
             "the blending units add four sums at once; 32-bit atomics take one each"};
 }
 
-Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const Bundle& bundle,
+Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const PageSet& set,
                                                        const RenderSettings& settings, int device,
                                                        Job& job) {
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
-    auto renderer = std::make_unique<GpuSplatRenderer>(std::move(context), settings, job.limits);
-    STX_CHECK(renderer->prepare(bundle, job));
+    auto renderer =
+        std::make_unique<GpuSplatRenderer>(std::move(context), set, settings, job.limits);
+    STX_CHECK(renderer->prepare(job));
     return std::unique_ptr<Renderer>(std::move(renderer));
 }
 

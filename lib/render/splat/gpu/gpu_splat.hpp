@@ -4,6 +4,7 @@
 
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/renderer.hpp"
+#include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/gpu/splat_pipeline.hpp"
 
 namespace stx::gpu {
@@ -19,7 +20,7 @@ struct PipelineChoice {
 /// Splat mode on a GPU (RenderMode::splat, every SplatRule). The bundle's images are uploaded and
 /// not looked at again. Errors: unsupported (no device, with what was tried; a pipeline that the
 /// device cannot run), a view larger than the device's textures, memory.
-[[nodiscard]] Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const Bundle& bundle,
+[[nodiscard]] Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const PageSet& set,
                                                                      const RenderSettings& settings,
                                                                      int device, Job& job);
 

@@ -120,10 +120,10 @@ Result<void> RasterSplats::prepare() {
     lights_ = std::make_unique<Table>();
     GLint texels = 65536;
     glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
-    if (static_cast<std::size_t>(texels) < scene_.views.size() * sizeof(ViewEntry) / 16)
+    if (static_cast<std::size_t>(texels) < scene_.rectangles.size() * sizeof(ViewEntry) / 16)
         return fail(ErrorCode::unsupported,
-                    "{} views are more than a table of '{}' holds ({}); use --backend cpu",
-                    scene_.views.size(), context_.device().name, texels / 6);
+                    "{} rectangles are more than a table of '{}' holds ({}); use --backend cpu",
+                    scene_.rectangles.size(), context_.device().name, texels / 6);
     // A draw's vertices are counted in 31 bits, and its tasks must fit into a texture buffer.
     tasksAtOnce_ =
         std::min((1 << 30) / (256 * 6), texels / static_cast<int>(sizeof(TaskEntry) / 16));

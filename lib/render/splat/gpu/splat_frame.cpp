@@ -13,9 +13,9 @@ namespace {
 constexpr double kLargestWeight = 1048576.0;
 
 /// Source pixels that fall on one novel pixel where the block is seen as its view saw it.
-double density(const splat::ViewInfo& info, const splat::BlockInfo& block,
+double density(const splat::PreparedRectangle& info, const splat::BlockInfo& block,
                const splat::BlockTask& task, const Camera& novel) {
-    const auto& c = info.view->camera;
+    const auto& c = info.camera();
     const double source = c.orthographic ? 1.0 : block.zMin;
     const double target = novel.orthographic ? 1.0 : std::max(1e-9, double(task.zMin));
     return (c.fx * c.fy / (source * source)) * (target * target) / (novel.fx * novel.fy);
@@ -30,14 +30,15 @@ FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, 
                          int margin) {
     FrameUniforms u;
     u.frameSize = {novel.width, novel.height, novel.width + 2, margin};
-    u.counts = {static_cast<int>(scene.views.size()), 0, 0, 0};
+    u.counts = {static_cast<int>(scene.rectangles.size()), 0, 0, 0};
     u.novelLens = {1.0 / novel.fx, 1.0 / novel.fy, novel.cx, novel.cy};
     const glm::mat3 axes = glm::mat3_cast(glm::quat(novel.orientation));
     u.novelAxisX = glm::vec4(axes[0], novel.orthographic ? 1.0f : 0.0f);
     u.novelAxisY = glm::vec4(axes[1], 0.0f);
     u.novelAxisZ = glm::vec4(axes[2], 0.0f);
-    const double coefficient =
-        settings.splat == SplatRule::paper ? paperCoefficient(scene.views, settings, novel) : 0.0;
+    const double coefficient = settings.splat == SplatRule::paper
+                                   ? paperCoefficient(scene.rectangles, settings, novel)
+                                   : 0.0;
     u.novelPosition = glm::vec4(novel.position, coefficient);
     u.ambient = glm::vec4(settings.lighting.ambient, 0.0f);
     u.specular = glm::vec4(settings.lighting.specular, settings.lighting.shininess);
@@ -58,9 +59,9 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
         bool seen = false;
     };
     std::vector<Planned> planned;
-    for (std::size_t k = 0; k < scene.views.size(); ++k) {
-        const splat::ViewInfo& info = scene.views[k];
-        const Camera& c = info.view->camera;
+    for (std::size_t k = 0; k < scene.rectangles.size(); ++k) {
+        const splat::PreparedRectangle& info = scene.rectangles[k];
+        const Camera& c = info.camera();
         splat::Source source;
         source.orthographic = c.orthographic;
         source.fx = static_cast<float>(c.fx);
@@ -83,7 +84,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                               }
                           });
         double densest = 0;
-        const glm::ivec3 cell = scene.cells[k];
+        const glm::ivec3 place = scene.places[k];
         for (const Planned& p : planned) {
             if (!p.seen) continue;
             const splat::BlockTask& t = p.task;
@@ -92,9 +93,9 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
                 static_cast<std::uint32_t>(t.u0) | static_cast<std::uint32_t>(t.v0) << 16,
                 static_cast<std::uint32_t>(t.u1 - t.u0) | static_cast<std::uint32_t>(t.v1 - t.v0)
                                                               << 16,
-                static_cast<std::uint32_t>(cell.x + t.u0) |
-                    static_cast<std::uint32_t>(cell.y + t.v0) << 16,
-                static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(cell.z) << 20,
+                static_cast<std::uint32_t>(place.x + t.u0) |
+                    static_cast<std::uint32_t>(place.y + t.v0) << 16,
+                static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(place.z) << 20,
                 t.slopeX,
                 t.slopeY,
                 t.core2,

@@ -4,7 +4,7 @@
 
 #include "embedded_shaders.hpp"
 #include "lib/render/splat/constants.hpp"
-#include "lib/render/splat/view.hpp"
+#include "lib/render/splat/prepared.hpp"
 
 namespace stx::gpu {
 namespace {

@@ -239,10 +239,6 @@ void RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uin
     }
 }
 
-const char* SimdTarget() {
-    return hwy::TargetName(HWY_TARGET);
-}
-
 }  // namespace stx::surface::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -250,7 +246,6 @@ HWY_AFTER_NAMESPACE();
 namespace stx::surface {
 
 HWY_EXPORT(RasteriseSource);
-HWY_EXPORT(SimdTarget);
 
 void rasteriseSource(const Source& source, const Warp& sampleFromSource,
                      std::span<const std::uint32_t> blocks, const SampleGrid& grid, float qLimit,
@@ -258,9 +253,6 @@ void rasteriseSource(const Source& source, const Warp& sampleFromSource,
     HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, qLimit, samples);
 }
 
-const char* simdTarget() {
-    return HWY_DYNAMIC_DISPATCH(SimdTarget)();
-}
 
 }  // namespace stx::surface
 #endif

@@ -32,7 +32,4 @@ void rasteriseSource(const Source& source, const Warp& sampleFromSource,
                      std::span<const std::uint32_t> blocks, const SampleGrid& grid, float qLimit,
                      float* samples);
 
-/// The SIMD target in use, as Highway names it.
-[[nodiscard]] const char* simdTarget();
-
 }  // namespace stx::surface

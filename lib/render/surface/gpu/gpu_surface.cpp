@@ -443,13 +443,13 @@ void GpuSurfacePainter::drop() {
 
 }  // namespace
 
-Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(const Bundle& bundle,
+Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(const PageSet& set,
                                                          const RenderSettings& settings, int device,
                                                          Job& job) {
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
     STX_CHECK(context->requireModern("surface mode on the GPU", "--mode splat or --backend cpu"));
     return surface::makePaintedSurfaceRenderer(
-        bundle, settings, job, std::make_unique<GpuSurfacePainter>(std::move(context)));
+        set, settings, job, std::make_unique<GpuSurfacePainter>(std::move(context)));
 }
 
 }  // namespace stx::gpu

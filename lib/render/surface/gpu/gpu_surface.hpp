@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "lib/render/renderer.hpp"
+#include "lib/render/scene/page_set.hpp"
 
 namespace stx::gpu {
 
@@ -12,6 +13,6 @@ namespace stx::gpu {
 /// unsupported (no device, with what was tried; views that the device's textures cannot take),
 /// memory.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(
-    const Bundle& bundle, const RenderSettings& settings, int device, Job& job);
+    const PageSet& set, const RenderSettings& settings, int device, Job& job);
 
 }  // namespace stx::gpu

@@ -5,7 +5,7 @@
 
 #include <glm/glm.hpp>
 
-#include "lib/model/bundle.hpp"
+#include "lib/render/scene/page_set.hpp"
 
 namespace stx::splat {
 
@@ -33,19 +33,30 @@ struct BlockInfo {
     bool opaque = true;  ///< all its points have full alpha
 };
 
-/// A reference view made ready for splatting; its images stay in the bundle.
-struct ViewInfo {
-    const ReferenceView* view = nullptr;
-    std::vector<Slope> slopes;  ///< one per pixel
-    std::vector<glm::i8vec4>
-        normals;                      ///< world normals * 127, one per pixel; empty when not needed
-    std::vector<std::uint8_t> sizes;  ///< splat sizes * 64 where the file says them, else empty
-    std::vector<BlockInfo> blocks;    ///< those that hold points
-    std::uint32_t firstPoint = 0;     ///< of pixel 0, counted over all views
+/// What is known of each texel of a page before any camera is. Arrays of one value per texel.
+struct PreparedPage {
+    std::vector<Slope> slopes;
+    std::vector<glm::i8vec4> normals;  ///< in the world, * 127; empty when not needed
+    std::vector<std::uint8_t> sizes;   ///< splat sizes * 64 where the file gives them, else empty
+    std::uint32_t firstPoint = 0;      ///< number of texel 0, counted over all pages
+};
+
+/// A rectangle of a PageSet and its blocks, in pixels of PageRectangle::window.
+struct PreparedRectangle {
+    const PageRectangle* rectangle = nullptr;
+    std::vector<BlockInfo> blocks;  ///< those that hold points
+
+    [[nodiscard]] const Camera& camera() const { return rectangle->window; }
+};
+
+/// A PageSet made ready for splatting; its images stay where they are.
+struct PreparedPages {
+    std::vector<PreparedPage> pages;
+    std::vector<PreparedRectangle> rectangles;
 };
 
 /// Tilts from splatU x splatV, else the normals, else the neighbours' depths (never over a depth
 /// discontinuity), sizes, block tables, and normals when asked for.
-[[nodiscard]] std::vector<ViewInfo> prepareViews(const Bundle& bundle, bool wantNormals);
+[[nodiscard]] PreparedPages preparePages(const PageSet& set, bool wantNormals);
 
 }  // namespace stx::splat

@@ -1,4 +1,4 @@
-#include "lib/render/splat/view.hpp"
+#include "lib/render/splat/prepared.hpp"
 
 #include <cmath>
 
@@ -53,11 +53,35 @@ float slopeFromNeighbours(float before, float at, float after, float scaleBefore
     return hasA ? a : hasB ? b : 0.0f;
 }
 
-glm::vec2 slopeFromDepth(const ReferenceView& v, int x, int y) {
-    const auto& c = v.camera;
-    const float z = v.depth.at(x, y);
+/// The texels of a rectangle and what surrounds it, by pixels of its window.
+struct Window {
+    const PageRectangle& rectangle;
+    const PageView& view;
+    const Page& page;
+    std::ptrdiff_t origin, stride;
+
+    Window(const PageSet& set, const PageRectangle& r)
+        : rectangle(r),
+          view(set.views()[static_cast<std::size_t>(r.view)]),
+          page(set.pages()[static_cast<std::size_t>(r.page)]),
+          origin(static_cast<std::ptrdiff_t>(r.pageY) * page.width() + r.pageX),
+          stride(page.width()) {}
+
+    [[nodiscard]] const Camera& camera() const { return rectangle.window; }
+    [[nodiscard]] std::size_t texel(int x, int y) const {
+        return static_cast<std::size_t>(origin + y * stride + x);
+    }
+    [[nodiscard]] float depth(int x, int y) const { return page.depth->data()[texel(x, y)]; }
+    [[nodiscard]] float alpha(int x, int y) const {
+        return PageSet::alphaOf(*page.texture, texel(x, y));
+    }
+};
+
+glm::vec2 slopeFromDepth(const Window& w, int x, int y) {
+    const auto& c = w.camera();
+    const float z = w.depth(x, y);
     const auto depth = [&](int i, int j) {
-        return v.depth.contains(i, j) ? v.depth.at(i, j) : kNoDepth;
+        return w.rectangle.shows(i, j) ? w.depth(i, j) : kNoDepth;
     };
     // On a plane 1/z is linear in the picture, so the exact tangent divides by the other depth.
     const auto scale = [&](double f, float other) {
@@ -73,25 +97,25 @@ struct Surroundings {
     bool rim = false;
 };
 
-// See Slope: how a point hangs together with its four neighbours.
-Surroundings surroundings(const ReferenceView& v, int x, int y) {
+// See Slope: whether a point and its four neighbours are one surface.
+Surroundings surroundings(const Window& w, int x, int y) {
     Surroundings out;
-    const auto& c = v.camera;
-    const float z = v.depth.at(x, y);
-    out.linked = v.texture.at(x, y).a >= 1.0f;
+    const auto& c = w.camera();
+    const float z = w.depth(x, y);
+    out.linked = w.alpha(x, y) >= 1.0f;
     bool behind[4] = {};
     constexpr glm::ivec2 kSteps[4] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
     for (int k = 0; k < 4; ++k) {
         const int i = x + kSteps[k].x, j = y + kSteps[k].y;
-        if (!v.depth.contains(i, j)) {
+        if (!w.rectangle.shows(i, j)) {
             out.linked = false;
             continue;
         }
-        const float other = v.depth.at(i, j);
+        const float other = w.depth(i, j);
         const double f = k < 2 ? c.fx : c.fy;
         const float slope = (other - z) * static_cast<float>(c.orthographic ? f : f / other);
         const bool same = std::abs(slope) <= kSteepest;
-        if (!same || v.texture.at(i, j).a < 1.0f) out.linked = false;
+        if (!same || w.alpha(i, j) < 1.0f) out.linked = false;
         behind[k] = !same && other > z;
     }
     // What is one pixel thin has no rim: it would break into dots.
@@ -104,37 +128,39 @@ bool usable(glm::vec3 v) {
     return glm::dot(v, v) > 0.0f;
 }
 
-void prepareRow(const ReferenceView& v, const glm::mat3& cameraFromWorld, int y, ViewInfo& out) {
-    const int width = v.camera.width;
+void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, PreparedPage& out) {
+    const Camera& camera = w.camera();
     const glm::mat3 worldFromCamera = glm::transpose(cameraFromWorld);
-    for (int x = 0; x < width; ++x) {
-        const std::size_t i = static_cast<std::size_t>(y) * width + x;
-        if (!hasPoint(v.depth.at(x, y))) continue;
-        const glm::vec3 ray = rayOf(v.camera, x, y);
+    for (int x = 0; x < camera.width; ++x) {
+        const std::size_t i = w.texel(x, y);
+        if (!hasPoint(w.depth(x, y))) continue;
+        const glm::vec3 ray = rayOf(camera, x, y);
+        const auto at = [i](const Image<glm::vec3>* image) { return image->data()[i]; };
         glm::vec2 slope;
         const bool hasSplat =
-            v.hasSplats() && usable(glm::cross(v.splatU.at(x, y), v.splatV.at(x, y)));
+            w.view.hasSplats && usable(glm::cross(at(w.page.splatU), at(w.page.splatV)));
+        const bool hasNormal = w.view.hasNormals && usable(at(w.page.normal));
         if (hasSplat) {
-            const glm::vec3 u = cameraFromWorld * v.splatU.at(x, y);
-            const glm::vec3 w = cameraFromWorld * v.splatV.at(x, y);
-            glm::vec3 n = glm::cross(u, w);
+            const glm::vec3 u = cameraFromWorld * at(w.page.splatU);
+            const glm::vec3 v = cameraFromWorld * at(w.page.splatV);
+            glm::vec3 n = glm::cross(u, v);
             if (glm::dot(n, ray) > 0) n = -n;
             slope = slopeFromNormal(n, ray);
             // Area of the ellipse's parallelogram against that of a lattice cell's on the same
             // plane, whose half diagonals just close the lattice: half a cell.
-            const auto spacing = v.camera.sampleSpacing(v.depth.at(x, y));
+            const auto spacing = camera.sampleSpacing(w.depth(x, y));
             const float cell = static_cast<float>(spacing.x * spacing.y) *
                                glm::length(glm::cross(glm::vec3(1, 0, 0) + slope.x * ray,
                                                       glm::vec3(0, -1, 0) + slope.y * ray));
             const float size =
-                std::sqrt(glm::length(glm::cross(u, w)) / std::max(0.5f * cell, 1e-30f));
+                std::sqrt(glm::length(glm::cross(u, v)) / std::max(0.5f * cell, 1e-30f));
             out.sizes[i] = static_cast<std::uint8_t>(std::clamp(size, 0.5f, 3.9f) * 64.0f);
-        } else if (v.hasNormals() && usable(v.normal.at(x, y))) {
-            slope = slopeFromNormal(cameraFromWorld * v.normal.at(x, y), ray);
+        } else if (hasNormal) {
+            slope = slopeFromNormal(cameraFromWorld * at(w.page.normal), ray);
         } else {
-            slope = slopeFromDepth(v, x, y);
+            slope = slopeFromDepth(w, x, y);
         }
-        const Surroundings around = surroundings(v, x, y);
+        const Surroundings around = surroundings(w, x, y);
         // Where a surface turns away its tilt runs off to infinity; a splat that followed it would
         // stick out.
         if (around.rim && !hasSplat)
@@ -145,17 +171,15 @@ void prepareRow(const ReferenceView& v, const glm::mat3& cameraFromWorld, int y,
         out.slopes[i] = {flagged(coded(slope.x), around.linked),
                          flagged(coded(slope.y), around.rim)};
         if (!out.normals.empty()) {
-            const glm::vec3 n = v.hasNormals() && usable(v.normal.at(x, y))
-                                    ? glm::normalize(v.normal.at(x, y))
-                                    : worldFromCamera * normalFromSlope(slope, ray);
+            const glm::vec3 n = hasNormal ? glm::normalize(at(w.page.normal))
+                                          : worldFromCamera * normalFromSlope(slope, ray);
             out.normals[i] = glm::i8vec4(glm::round(glm::vec4(n, 0) * 127.0f));
         }
     }
 }
 
-std::vector<BlockInfo> blocksOfRow(const ViewInfo& info, int v0) {
-    const auto& view = *info.view;
-    const int width = view.camera.width, v1 = std::min(v0 + kBlock, view.camera.height);
+std::vector<BlockInfo> blocksOfRow(const Window& w, const PreparedPage& page, int v0) {
+    const int width = w.camera().width, v1 = std::min(v0 + kBlock, w.camera().height);
     std::vector<BlockInfo> out;
     for (int u0 = 0; u0 < width; u0 += kBlock) {
         BlockInfo b;
@@ -166,29 +190,25 @@ std::vector<BlockInfo> blocksOfRow(const ViewInfo& info, int v0) {
         b.zMin = kNoDepth;
         b.slopeMin = {32767, 32767};
         b.slopeMax = {-32768, -32768};
-        b.size = info.sizes.empty() ? 1.0f : 0.0f;
+        b.size = page.sizes.empty() ? 1.0f : 0.0f;
         for (int y = v0; y < v1; ++y) {
             for (int x = u0; x < b.u1; ++x) {
-                const float z = view.depth.at(x, y);
+                const float z = w.depth(x, y);
                 if (!hasPoint(z)) continue;
-                const float alpha = view.texture.at(x, y).a;
+                const float alpha = w.alpha(x, y);
+                // Points of alpha 0 are not drawn, but have to be told apart from the others.
+                b.opaque = b.opaque && alpha >= 1.0f;
                 if (!(alpha > 0)) continue;
-                const std::size_t i = static_cast<std::size_t>(y) * width + x;
+                const std::size_t i = w.texel(x, y);
                 b.zMin = std::min(b.zMin, z);
                 b.zMax = std::max(b.zMax, z);
-                const Slope s = info.slopes[i];
+                const Slope s = page.slopes[i];
                 b.slopeMin = {std::min(b.slopeMin.u, s.u), std::min(b.slopeMin.v, s.v)};
                 b.slopeMax = {std::max(b.slopeMax.u, s.u), std::max(b.slopeMax.v, s.v)};
-                if (!info.sizes.empty()) b.size = std::max(b.size, info.sizes[i] / 64.0f);
-                b.opaque = b.opaque && alpha >= 1.0f;
+                if (!page.sizes.empty()) b.size = std::max(b.size, page.sizes[i] / 64.0f);
                 b.linked = b.linked && (s.u & Slope::kLinked);
             }
         }
-        // Points of alpha 0 still have to be told apart from the others.
-        for (int y = v0; y < v1 && b.opaque; ++y)
-            for (int x = u0; x < b.u1; ++x)
-                if (hasPoint(view.depth.at(x, y)) && !(view.texture.at(x, y).a > 0))
-                    b.opaque = false;
         if (b.zMin < kNoDepth) out.push_back(b);
     }
     return out;
@@ -196,29 +216,38 @@ std::vector<BlockInfo> blocksOfRow(const ViewInfo& info, int v0) {
 
 }  // namespace
 
-std::vector<ViewInfo> prepareViews(const Bundle& bundle, bool wantNormals) {
-    std::vector<ViewInfo> out(bundle.views.size());
+PreparedPages preparePages(const PageSet& set, bool wantNormals) {
+    PreparedPages out;
+    const bool splats = std::any_of(set.views().begin(), set.views().end(),
+                                    [](const PageView& v) { return v.hasSplats; });
     std::uint32_t firstPoint = 0;
-    for (std::size_t k = 0; k < out.size(); ++k) {
-        const auto& v = bundle.views[k];
-        ViewInfo& info = out[k];
-        info.view = &v;
-        info.firstPoint = firstPoint;
-        firstPoint += static_cast<std::uint32_t>(v.depth.count());
-        info.slopes.resize(v.depth.count());
-        if (wantNormals) info.normals.resize(v.depth.count());
-        if (v.hasSplats()) info.sizes.assign(v.depth.count(), 64);
-        const glm::mat3 cameraFromWorld(glm::mat3_cast(glm::conjugate(v.camera.orientation)));
-        parallelForBlocks(0, v.camera.height, 16, [&](std::int64_t from, std::int64_t to) {
+    for (const Page& page : set.pages()) {
+        PreparedPage& prepared = out.pages.emplace_back();
+        const std::size_t count = page.depth->count();
+        prepared.firstPoint = firstPoint;
+        firstPoint += static_cast<std::uint32_t>(count);
+        prepared.slopes.resize(count);
+        if (wantNormals) prepared.normals.resize(count);
+        if (splats && page.splatU && page.splatV) prepared.sizes.assign(count, 64);
+    }
+    for (const PageRectangle& rectangle : set.rectangles()) {
+        const Window w(set, rectangle);
+        PreparedPage& page = out.pages[static_cast<std::size_t>(rectangle.page)];
+        const glm::mat3 cameraFromWorld(
+            glm::mat3_cast(glm::conjugate(rectangle.window.orientation)));
+        parallelForBlocks(0, rectangle.height, 16, [&](std::int64_t from, std::int64_t to) {
             for (auto y = from; y < to; ++y)
-                prepareRow(v, cameraFromWorld, static_cast<int>(y), info);
+                prepareRow(w, cameraFromWorld, static_cast<int>(y), page);
         });
-        const int rows = (v.camera.height + kBlock - 1) / kBlock;
-        std::vector<std::vector<BlockInfo>> perRow(rows);
+        const int rows = (rectangle.height + kBlock - 1) / kBlock;
+        std::vector<std::vector<BlockInfo>> perRow(static_cast<std::size_t>(rows));
         parallelFor(0, rows, [&](std::int64_t r) {
-            perRow[r] = blocksOfRow(info, static_cast<int>(r) * kBlock);
+            perRow[static_cast<std::size_t>(r)] =
+                blocksOfRow(w, page, static_cast<int>(r) * kBlock);
         });
-        for (auto& r : perRow) info.blocks.insert(info.blocks.end(), r.begin(), r.end());
+        PreparedRectangle& prepared = out.rectangles.emplace_back();
+        prepared.rectangle = &rectangle;
+        for (auto& r : perRow) prepared.blocks.insert(prepared.blocks.end(), r.begin(), r.end());
     }
     return out;
 }

@@ -1,0 +1,308 @@
+#include "lib/render/scene/page_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lib/base/parallel.hpp"
+#include "lib/packing/packing.hpp"
+
+namespace stx {
+namespace {
+
+const Image<glm::vec3>* orNull(const Image<glm::vec3>& image) {
+    return image.empty() ? nullptr : &image;
+}
+
+/// The camera whose pixels are the texels of a rectangle on its page.
+Camera windowOf(const Camera& view, const AtlasRectangle& r) {
+    Camera c = view;
+    c.width = r.atlasWidth();
+    c.height = r.atlasHeight();
+    if (!r.turned) {
+        c.cx = view.cx - r.viewX;
+        c.cy = view.cy - r.viewY;
+        return c;
+    }
+    // A quarter clockwise: the window's x runs up the view, its y to the view's right.
+    c.fx = view.fy;
+    c.fy = view.fx;
+    c.cx = r.height - (view.cy - r.viewY);
+    c.cy = view.cx - r.viewX;
+    c.orientation = view.orientation * glm::angleAxis(glm::half_pi<double>(), glm::dvec3(0, 0, 1));
+    return c;
+}
+
+bool anyValue(const Image<glm::vec3>& image, const PageRectangle& r) {
+    for (int y = r.y0; y < r.y1; ++y)
+        for (int x = r.x0; x < r.x1; ++x)
+            if (image.data()[r.texel(x, y)] != glm::vec3(0)) return true;
+    return false;
+}
+
+PageView viewFrom(const ReferenceView& from) {
+    PageView v;
+    v.name = from.name;
+    v.camera = from.camera;
+    v.nearPlane = from.nearPlane;
+    v.farPlane = from.farPlane;
+    v.depthBits = from.depthBits;
+    v.pruned = from.pruned;
+    return v;
+}
+
+}  // namespace
+
+void PageSet::addRectangle(const AtlasRectangle& from, int padding, Data& data) {
+    const auto page = static_cast<std::size_t>(from.page);
+    const Camera& camera = data.views[static_cast<std::size_t>(from.view)].camera;
+    const std::ptrdiff_t stride = data.pages[page].width();
+    PageRectangle r;
+    r.view = from.view;
+    r.page = from.page;
+    r.x0 = from.viewX;
+    r.y0 = from.viewY;
+    r.x1 = from.viewX + from.width;
+    r.y1 = from.viewY + from.height;
+    const glm::ivec2 origin = from.atlasFromView(r.x0, r.y0);
+    r.stepX = from.turned ? stride : 1;
+    r.stepY = from.turned ? -1 : stride;
+    r.first = origin.y * stride + origin.x - r.x0 * r.stepX - r.y0 * r.stepY;
+    r.pageX = from.atlasX;
+    r.pageY = from.atlasY;
+    r.width = from.atlasWidth();
+    r.height = from.atlasHeight();
+    r.left = std::min(padding, from.turned ? camera.height - r.y1 : r.x0);
+    r.right = std::min(padding, from.turned ? r.y0 : camera.width - r.x1);
+    r.top = std::min(padding, from.turned ? r.x0 : r.y0);
+    r.bottom = std::min(padding, from.turned ? camera.width - r.x1 : camera.height - r.y1);
+    r.window = windowOf(camera, from);
+    data.rectangles.push_back(r);
+}
+
+void PageSet::addBundle(const Bundle& bundle, Data& data) {
+    data.bounds = bundle.bounds;
+    data.pruned = bundle.pruned();
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        const ReferenceView& from = bundle.views[i];
+        data.pages.push_back({&from.texture, &from.depth, orNull(from.normal), orNull(from.splatU),
+                              orNull(from.splatV)});
+        PageView v = viewFrom(from);
+        v.hasNormals = from.hasNormals();
+        v.hasSplats = from.hasSplats();
+        v.firstRectangle = static_cast<std::uint32_t>(i);
+        v.rectangleCount = 1;
+        v.whole = true;
+        data.views.push_back(std::move(v));
+        const auto number = static_cast<int>(i);
+        addRectangle({number, number, 0, 0, from.camera.width, from.camera.height, 0, 0, false}, 0,
+                     data);
+    }
+    data.index.resize(data.views.size());
+}
+
+PageSet::PageSet(const Bundle& bundle) {
+    auto data = std::make_shared<Data>();
+    addBundle(bundle, *data);
+    data_ = std::move(data);
+}
+
+Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
+    STX_CHECK(atlas.check());
+    auto data = std::make_shared<Data>();
+    if (!atlas.paddingHolds(kPadding)) {
+        STX_TRY(auto bundle, unpack(atlas, job));
+        data->unpacked = std::make_unique<const Bundle>(std::move(bundle));
+        addBundle(*data->unpacked, *data);
+        return PageSet(std::move(data));
+    }
+    data->bounds = atlas.bounds;
+    data->padding = kPadding;
+    for (const AtlasPage& page : atlas.pages)
+        data->pages.push_back({&page.texture, &page.depth, orNull(page.normal), orNull(page.splatU),
+                               orNull(page.splatV)});
+    for (const ReferenceView& view : atlas.views) {
+        data->views.push_back(viewFrom(view));
+        data->pruned = data->pruned || view.pruned;
+    }
+    std::vector<AtlasRectangle> sorted = atlas.rectangles;
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const auto& a, const auto& b) { return a.view < b.view; });
+    for (const AtlasRectangle& r : sorted) {
+        PageView& view = data->views[static_cast<std::size_t>(r.view)];
+        if (view.rectangleCount++ == 0)
+            view.firstRectangle = static_cast<std::uint32_t>(data->rectangles.size());
+        addRectangle(r, kPadding, *data);
+        // An atlas keeps room for normals and splats when any view has them.
+        const PageRectangle& added = data->rectangles.back();
+        const AtlasPage& page = atlas.pages[static_cast<std::size_t>(r.page)];
+        if (!page.normal.empty() && !view.hasNormals)
+            view.hasNormals = anyValue(page.normal, added);
+        if (!page.splatU.empty() && !view.hasSplats)
+            view.hasSplats = anyValue(page.splatU, added) || anyValue(page.splatV, added);
+    }
+    buildIndex(*data);
+    PageSet set(data);
+    if (atlas.keptPixels < atlas.sourcePixels) {
+        std::vector<std::vector<std::uint64_t>> bits(data->views.size());
+        parallelFor(0, static_cast<std::int64_t>(bits.size()), [&](std::int64_t i) {
+            const auto view = static_cast<std::size_t>(i);
+            set.markOutside(view, bits[view]);
+        });
+        for (std::size_t i = 0; i < bits.size(); ++i) data->index[i].outside = std::move(bits[i]);
+    }
+    STX_CHECK(job.checkCancelled());
+    return set;
+}
+
+void PageSet::buildIndex(Data& data) {
+    data.index.resize(data.views.size());
+    for (std::size_t i = 0; i < data.views.size(); ++i) {
+        const PageView& view = data.views[i];
+        ViewIndex& index = data.index[i];
+        index.blocksX = static_cast<std::uint32_t>((view.camera.width + kBlock - 1) / kBlock);
+        const int blocksY = (view.camera.height + kBlock - 1) / kBlock;
+        std::vector<std::vector<std::uint32_t>> near(static_cast<std::size_t>(blocksY) *
+                                                     index.blocksX);
+        for (std::uint32_t k = 0; k < view.rectangleCount; ++k) {
+            const std::uint32_t number = view.firstRectangle + k;
+            const PageRectangle& r = data.rectangles[number];
+            const int lastX = std::min(r.x1 + data.padding, view.camera.width) - 1;
+            const int lastY = std::min(r.y1 + data.padding, view.camera.height) - 1;
+            for (int by = std::max(r.y0 - data.padding, 0) / kBlock; by <= lastY / kBlock; ++by)
+                for (int bx = std::max(r.x0 - data.padding, 0) / kBlock; bx <= lastX / kBlock; ++bx)
+                    near[static_cast<std::size_t>(by) * index.blocksX + static_cast<unsigned>(bx)]
+                        .push_back(number);
+        }
+        for (const auto& list : near) {
+            index.begin.push_back(static_cast<std::uint32_t>(index.near.size()));
+            index.near.insert(index.near.end(), list.begin(), list.end());
+        }
+        index.begin.push_back(static_cast<std::uint32_t>(index.near.size()));
+    }
+}
+
+/// Marks where the points of other views fall in a view, a little generously: what was left out of
+/// the view is there, since others show it.
+void PageSet::markOutside(std::size_t of, std::vector<std::uint64_t>& bits) const {
+    constexpr int kMostReach = 6;  // pixels
+    const Camera& camera = views()[of].camera;
+    bits.assign((static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
+    const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
+    for (const PageRectangle& r : rectangles()) {
+        if (r.view == static_cast<int>(of)) continue;
+        const Camera& other = views()[static_cast<std::size_t>(r.view)].camera;
+        const Image<float>& depth = *pages()[static_cast<std::size_t>(r.page)].depth;
+        const glm::dmat4 fromOther = cameraFromWorld * other.worldFromCamera();
+        for (int y = r.y0; y < r.y1; ++y) {
+            for (int x = r.x0; x < r.x1; ++x) {
+                const float dist = depth.data()[r.texel(x, y)];
+                if (!hasPoint(dist)) continue;
+                const glm::dvec3 p(fromOther *
+                                   glm::dvec4(other.unproject(x + 0.5, y + 0.5, dist), 1.0));
+                if (!camera.orthographic && !(p.z < 0)) continue;
+                const glm::dvec3 at = camera.project(p);
+                if (!(at.x > -kMostReach && at.y > -kMostReach &&
+                      at.x < camera.width + kMostReach && at.y < camera.height + kMostReach))
+                    continue;
+                const double coarser = other.sampleSpacing(dist).x / camera.sampleSpacing(-p.z).x;
+                const int reach = 1 + static_cast<int>(std::min(coarser, kMostReach - 1.0));
+                const int cx = static_cast<int>(std::floor(at.x)),
+                          cy = static_cast<int>(std::floor(at.y));
+                for (int ny = std::max(0, cy - reach);
+                     ny <= std::min(camera.height - 1, cy + reach); ++ny) {
+                    for (int nx = std::max(0, cx - reach);
+                         nx <= std::min(camera.width - 1, cx + reach); ++nx) {
+                        const std::size_t i =
+                            static_cast<std::size_t>(ny) * camera.width + static_cast<unsigned>(nx);
+                        bits[i / 64] |= std::uint64_t{1} << (i % 64);
+                    }
+                }
+            }
+        }
+    }
+}
+
+std::int64_t PageSet::pointCount() const {
+    std::int64_t n = 0;
+    for (const PageRectangle& r : rectangles()) {
+        const Image<float>& depth = *pages()[static_cast<std::size_t>(r.page)].depth;
+        for (int y = r.pageY; y < r.pageY + r.height; ++y)
+            for (int x = r.pageX; x < r.pageX + r.width; ++x) n += hasPoint(depth.at(x, y)) ? 1 : 0;
+    }
+    return n;
+}
+
+Bounds PageSet::bounds() const {
+    if (data_->bounds) return *data_->bounds;
+    Bounds bounds;
+    for (const PageRectangle& r : rectangles()) {
+        const Image<float>& depth = *pages()[static_cast<std::size_t>(r.page)].depth;
+        const Camera& c = r.window;
+        for (int j = 0; j < r.height; ++j) {
+            for (int i = 0; i < r.width; ++i) {
+                const float dist = depth.at(r.pageX + i, r.pageY + j);
+                if (hasPoint(dist))
+                    bounds.add(c.position + c.orientation * c.unproject(i + 0.5, j + 0.5, dist));
+            }
+        }
+    }
+    return bounds;
+}
+
+ReferenceView PageSet::copyOfView(std::size_t number) const {
+    const PageView& from = views()[number];
+    const int width = from.camera.width, height = from.camera.height;
+    ReferenceView view;
+    view.name = from.name;
+    view.camera = from.camera;
+    view.nearPlane = from.nearPlane;
+    view.farPlane = from.farPlane;
+    view.depthBits = from.depthBits;
+    view.pruned = from.pruned;
+    if (linear())
+        view.texture = RgbaFloatImage(width, height, glm::vec4(0));
+    else
+        view.texture = Rgba8Image(width, height, glm::u8vec4(0));
+    view.depth = Image<float>(width, height, kNoDepth);
+    if (from.hasNormals) view.normal = Image<glm::vec3>(width, height, glm::vec3(0));
+    if (from.hasSplats) {
+        view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
+        view.splatV = view.splatU;
+    }
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            const PageRectangle* r = find(number, x, y);
+            if (!r) {
+                if (!objectOutside(number, x, y)) continue;
+                if (auto* bytes = view.texture.rgba8()) bytes->at(x, y).a = 255;
+                if (auto* floats = view.texture.rgbaFloat()) floats->at(x, y).a = 1.0f;
+                continue;
+            }
+            const Page& page = pages()[static_cast<std::size_t>(r->page)];
+            const std::size_t texel = r->texel(x, y);
+            if (auto* bytes = view.texture.rgba8())
+                bytes->at(x, y) = page.texture->rgba8()->data()[texel];
+            if (auto* floats = view.texture.rgbaFloat())
+                floats->at(x, y) = page.texture->rgbaFloat()->data()[texel];
+            view.depth.at(x, y) = page.depth->data()[texel];
+            if (from.hasNormals) view.normal.at(x, y) = page.normal->data()[texel];
+            if (from.hasSplats) {
+                view.splatU.at(x, y) = page.splatU->data()[texel];
+                view.splatV.at(x, y) = page.splatV->data()[texel];
+            }
+        }
+    }
+    return view;
+}
+
+bool sameCamera(const Camera& a, const Camera& b) {
+    const auto near = [](double x, double y) {
+        return std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(x));
+    };
+    return a.width == b.width && a.height == b.height && a.orthographic == b.orthographic &&
+           near(a.fx, b.fx) && near(a.fy, b.fy) && near(a.cx, b.cx) && near(a.cy, b.cy) &&
+           glm::length(a.position - b.position) <= 1e-9 * std::max(1.0, glm::length(a.position)) &&
+           std::abs(std::abs(glm::dot(a.orientation, b.orientation)) - 1.0) <= 1e-12;
+}
+
+}  // namespace stx

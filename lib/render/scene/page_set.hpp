@@ -1,0 +1,190 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/job.hpp"
+#include "lib/geometry/depth_code.hpp"
+#include "lib/model/atlas.hpp"
+#include "lib/model/bundle.hpp"
+
+namespace stx {
+
+/// The images of one texture page, all of one size. They belong to the bundle or atlas.
+struct Page {
+    const Texture* texture = nullptr;
+    const Image<float>* depth = nullptr;       ///< distances in scene units, kNoDepth = no point
+    const Image<glm::vec3>* normal = nullptr;  ///< null when absent
+    const Image<glm::vec3>* splatU = nullptr;  ///< null when absent
+    const Image<glm::vec3>* splatV = nullptr;
+
+    [[nodiscard]] int width() const { return depth->width(); }
+    [[nodiscard]] int height() const { return depth->height(); }
+};
+
+/// A rectangle of a reference view on a page. It can be read in two ways: as a part of its view,
+/// pixel (x, y) of the view being texel `first + x * stepX + y * stepY` of the page; and as a small
+/// view of its own, whose pixels are the page's and whose camera is `window`.
+struct PageRectangle {
+    int view = 0, page = 0;
+    int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< in the view, x1 and y1 one past the last
+    std::ptrdiff_t first = 0, stepX = 1, stepY = 0;
+
+    int pageX = 0, pageY = 0;   ///< first texel on the page
+    int width = 0, height = 0;  ///< on the page
+    /// Texels beyond each side of the rectangle on the page that repeat its view's pixels, without
+    /// what would lie outside of the view.
+    int left = 0, top = 0, right = 0, bottom = 0;
+    Camera window;  ///< of the rectangle's texels: pixel (0, 0) is texel (pageX, pageY)
+
+    [[nodiscard]] std::size_t texel(int x, int y) const {
+        return static_cast<std::size_t>(first + x * stepX + y * stepY);
+    }
+    /// Whether texel (i, j) of the window or of what surrounds it shows a pixel of the view.
+    [[nodiscard]] bool shows(int i, int j) const {
+        return i >= -left && j >= -top && i < width + right && j < height + bottom;
+    }
+};
+
+/// A reference view of a PageSet.
+struct PageView {
+    std::string name;
+    Camera camera;
+    double nearPlane = 0, farPlane = 0;  ///< scene units
+    int depthBits = 16;
+    bool pruned = false;  ///< see ReferenceView::pruned
+    bool hasNormals = false, hasSplats = false;
+    /// Its rectangles in PageSet::rectangles().
+    std::uint32_t firstRectangle = 0, rectangleCount = 0;
+    /// One upright rectangle holds all of the view, and nothing else is on the page.
+    bool whole = false;
+
+    [[nodiscard]] DepthCode depthCode() const {
+        return {nearPlane, farPlane, depthBits == 8 ? 255u : 65535u};
+    }
+};
+
+/// What renderers draw from: texture pages, rectangles on them, cameras (Lee & Park, section 3.1:
+/// the reference images merged into few textures). A bundle is one page and one rectangle for each
+/// view; an atlas goes in as it is. Cheap to copy; safe to read from several threads. The bundle or
+/// atlas must outlive it.
+class PageSet {
+  public:
+    /// Side of the blocks in which rectangles are looked up, pixels of a view.
+    static constexpr int kBlock = 16;
+    /// Pixels around a rectangle that filters and links read.
+    static constexpr int kPadding = 2;
+
+    PageSet(const Bundle& bundle);  // NOLINT: a bundle is a set of pages
+    /// The pages of an atlas. Where the rectangles do not have kPadding pixels of padding to
+    /// themselves (see Atlas::paddingHolds()) it is unpacked first, which costs the views' memory. Errors: an atlas that
+    /// fails check(), memory over the limit.
+    [[nodiscard]] static Result<PageSet> of(const Atlas& atlas, Job& job);
+
+    [[nodiscard]] std::span<const Page> pages() const { return data_->pages; }
+    [[nodiscard]] std::span<const PageView> views() const { return data_->views; }
+    /// In the order of their views.
+    [[nodiscard]] std::span<const PageRectangle> rectangles() const { return data_->rectangles; }
+    [[nodiscard]] std::span<const PageRectangle> rectanglesOf(std::size_t view) const {
+        const PageView& v = data_->views[view];
+        return rectangles().subspan(v.firstRectangle, v.rectangleCount);
+    }
+
+    [[nodiscard]] bool linear() const { return data_->pages[0].texture->isLinear(); }
+    [[nodiscard]] bool pruned() const { return data_->pruned; }
+    [[nodiscard]] std::int64_t pointCount() const;
+    /// World bounds of all points: those that the file gives, else computed from the pixels.
+    [[nodiscard]] Bounds bounds() const;
+
+    /// A rectangle from whose texels pixel (x, y) of a view can be read, padding included; null
+    /// where there is none. The pixel must be in the view.
+    [[nodiscard]] const PageRectangle* find(std::size_t view, int x, int y) const {
+        return find(view, x, y, x, y);
+    }
+    /// The same for all pixels from (x0, y0) to (x1, y1), inclusive, at most kBlock apart.
+    [[nodiscard]] const PageRectangle* find(std::size_t view, int x0, int y0, int x1, int y1) const;
+    /// Whether the object is at a pixel that no rectangle shows: another view gives its distance.
+    [[nodiscard]] bool objectOutside(std::size_t view, int x, int y) const {
+        const auto& bits = data_->index[view].outside;
+        if (bits.empty()) return false;
+        const std::size_t i = static_cast<std::size_t>(y) * data_->views[view].camera.width +
+                              static_cast<unsigned>(x);
+        return bits[i / 64] >> (i % 64) & 1;
+    }
+
+    // ---- Single pixels of a view; slow ways for what is not worth a loop over rectangles. ----
+
+    /// Coverage 0..1; of pixels that no rectangle shows: 1 where the object is, else 0.
+    [[nodiscard]] float alpha(std::size_t view, int x, int y) const {
+        const PageRectangle* r = find(view, x, y);
+        if (!r) return objectOutside(view, x, y) ? 1.0f : 0.0f;
+        return alphaOf(*pages()[static_cast<std::size_t>(r->page)].texture, r->texel(x, y));
+    }
+    /// Distance; kNoDepth where there is no point.
+    [[nodiscard]] float depth(std::size_t view, int x, int y) const {
+        const PageRectangle* r = find(view, x, y);
+        return r ? pages()[static_cast<std::size_t>(r->page)].depth->data()[r->texel(x, y)]
+                 : kNoDepth;
+    }
+    [[nodiscard]] static float alphaOf(const Texture& texture, std::size_t texel) {
+        if (const auto* bytes = texture.rgba8()) return bytes->data()[texel].a * (1.0f / 255.0f);
+        return texture.rgbaFloat()->data()[texel].a;
+    }
+    /// One view with images of its own, as unpack() gives it.
+    [[nodiscard]] ReferenceView copyOfView(std::size_t view) const;
+
+  private:
+    /// Where a view's rectangles are, by blocks of kBlock pixels.
+    struct ViewIndex {
+        std::uint32_t blocksX = 0;
+        std::vector<std::uint32_t> begin;    ///< of each block in `near`, and the end
+        std::vector<std::uint32_t> near;     ///< rectangles whose padding reaches the block
+        std::vector<std::uint64_t> outside;  ///< a bit for each pixel; empty = all clear
+    };
+    struct Data {
+        std::vector<Page> pages;
+        std::vector<PageView> views;
+        std::vector<PageRectangle> rectangles;
+        std::vector<ViewIndex> index;
+        std::optional<Bounds> bounds;
+        int padding = 0;  ///< texels around each rectangle that may be read
+        bool pruned = false;
+        std::unique_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles
+    };
+    explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+    static void addBundle(const Bundle& bundle, Data& data);
+    static void addRectangle(const AtlasRectangle& from, int padding, Data& data);
+    static void buildIndex(Data& data);
+    void markOutside(std::size_t view, std::vector<std::uint64_t>& bits) const;
+
+    std::shared_ptr<const Data> data_;
+};
+
+inline const PageRectangle* PageSet::find(std::size_t view, int x0, int y0, int x1, int y1) const {
+    const PageView& v = data_->views[view];
+    const PageRectangle* all = data_->rectangles.data();
+    if (v.whole) return all + v.firstRectangle;
+    const ViewIndex& index = data_->index[view];
+    const std::size_t block =
+        static_cast<std::size_t>(y0 / kBlock) * index.blocksX + static_cast<unsigned>(x0 / kBlock);
+    for (std::uint32_t i = index.begin[block]; i < index.begin[block + 1]; ++i) {
+        const PageRectangle& r = all[index.near[i]];
+        const int padding = data_->padding;
+        if (x0 >= r.x0 - padding && y0 >= r.y0 - padding && x1 < r.x1 + padding &&
+            y1 < r.y1 + padding)
+            return &r;
+    }
+    return nullptr;
+}
+
+/// Whether a camera is the very one of a reference view: same pose, lens and size.
+[[nodiscard]] bool sameCamera(const Camera& a, const Camera& b);
+
+}  // namespace stx
