@@ -1,36 +1,46 @@
-// What the passes of surface mode share. The twins of these functions are in
-// lib/render/surface/; names and constants are the same.
-// Defined from outside: S (samples along a side of a pixel), TILE.
-#define SIDE (TILE * S)
-#define EXTENSION 1u
-#define NEAR_EDGE 2u
-#define NO_SLOT 0xffffffffu
+// What the passes of surface mode share: the frame, the sources, and their pixels as the shared
+// code asks for them. Defined from outside: S (samples along a side of a pixel), kFreeAlpha of this
+// renderer as FREE_ALPHA.
+#include "shared/language.glsl"
+#include "shared/surface_constants.glsl"
+#include "shared/surface_structs.glsl"
+#include "shared/surface_cells.glsl"
+#define SIDE (kTile * S)
+#define SAMPLES (S * S)
 
-struct Source {
-    vec4 warpX, warpY, warpQ, warpW;  // rows of sourceFromPixel
-    vec4 rayX, rayY, rayZ;            // rows of the vector from its eye to a point of the frame
-    ivec4 size;                       // width, height, has alpha, blocks in a row
-    vec4 axis;                        // 1 = q is 1/dist, 1/unit, step, share of q that is clearly behind
-};
-layout(std430, binding = 0) readonly buffer SourceBuffer { Source sources[]; };
-layout(std140, binding = 0) uniform Frame {
-    vec4 axis;               // 1 = q is 1/dist, 1/unit, largest q
-    vec4 eyeX, eyeY, eyeZ;   // rows of the vector from the eye to a point of the frame
-    vec4 fit;                // squared radius, ridge, colours are at most 1
-    ivec4 frameSize;         // width, height, blocks with cells, blocks with edges
-};
-// q, dq/dx, dq/dy as bits, and what the pixel is: see CellCode in gpu_surface_scene.hpp.
+layout(std430, binding = 0) readonly buffer SourceBuffer { SourceEntry sources[]; };
+layout(std140, binding = 0) uniform FrameBlock { FrameEntry frame; };
+// q, dq/dx, dq/dy as bits, and what the pixel is: see shared/surface_cells.glsl.
 layout(binding = 0) uniform usampler2DArray surfaces;
 layout(binding = 1) uniform sampler2DArray colours;
 
-float whole(vec4 a, float q) { return a.x != 0.0 ? q : 1.0; }
-float perUnit(vec4 a, float q) { return a.x != 0.0 ? q * q : a.y; }
+// See DepthAxis. 1 = q is 1/dist, 1/unit.
+#define Axis vec4
+float relativeScale(Axis a, float q) { return a.x != 0.0 ? q : 1.0; }
+float qPerUnit(Axis a, float q) { return a.x != 0.0 ? q * q : a.y; }
+Axis frameAxis() { return frame.axis; }
+Axis axisOf(int s) { return sources[s].axis; }
 
+// A group of pixels that are kept together: a layer of the textures for each source.
+struct Place {
+    ivec3 texel;
+};
+Place placeOf(int s, ivec2 corner) { return Place(ivec3(corner, s)); }
+uvec4 surfaceAt(int s, Place p, int i, int j) { return texelFetch(surfaces, p.texel + ivec3(i, j, 0), 0); }
+vec4 colourOf(int s, Place p, int i, int j) { return texelFetch(colours, p.texel + ivec3(i, j, 0), 0); }
+float qAt(int s, Place p, int i, int j) { return uintBitsToFloat(surfaceAt(s, p, i, j).x); }
+vec2 gradientAt(int s, Place p, int i, int j) { return uintBitsToFloat(surfaceAt(s, p, i, j).yz); }
+float alphaOf(int s, Place p, int i, int j) { return colourOf(s, p, i, j).a; }
+float edgeDistanceOf(int s, Place p, int i, int j) {
+    return float(surfaceAt(s, p, i, j).w >> kDistanceShift & kDistanceMask);
+}
+ivec2 sizeOf(int s) { return sources[s].size.xy; }
+bool hasAlpha(int s) { return sources[s].size.z != 0; }
+float freeAlphaOf(int s) { return FREE_ALPHA; }
+float stepOf(int s) { return sources[s].axis.z; }
+float clearlyBehindOf(int s) { return sources[s].axis.w; }
 vec4 warp(int s, float x, float y, float q) {
     vec4 p = vec4(x, y, q, 1.0);
     return vec4(dot(sources[s].warpX, p), dot(sources[s].warpY, p), dot(sources[s].warpQ, p),
                 dot(sources[s].warpW, p));
-}
-bool inside(int s, ivec2 p) {
-    return p.x >= 0 && p.y >= 0 && p.x < sources[s].size.x && p.y < sources[s].size.y;
 }

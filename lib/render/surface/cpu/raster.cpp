@@ -157,41 +157,39 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
             const int x = x0 + i, y = y0 + j;
             const Vertex &v00 = grid[j][i], &v10 = grid[j][i + 1];
             const Vertex &v01 = grid[j + 1][i], &v11 = grid[j + 1][i + 1];
-            const bool top = s.linkRight(x, y), bottom = s.linkRight(x, y + 1);
-            const bool leftLink = s.linkDown(x, y), rightLink = s.linkDown(x + 1, y);
-            const int edge =
-                std::min(std::min(s.edgeDistance(x, y), s.edgeDistance(x + 1, y)),
-                         std::min(s.edgeDistance(x, y + 1), s.edgeDistance(x + 1, y + 1)));
-            const std::uint32_t bits = edge < 3 ? kNearEdgeBit : 0;
-            const int links = top + bottom + leftLink + rightLink;
-            if (links >= 3) {
-                const float q00 = s.q.at(x, y), q10 = s.q.at(x + 1, y);
-                const float q01 = s.q.at(x, y + 1), q11 = s.q.at(x + 1, y + 1);
-                if (links == 4 &&
-                    std::abs(q00 + q11 - q10 - q01) <= 2 * s.flat * s.space.axis.whole(q00)) {
+            const std::uint32_t bits = cellNearEdge(s, x, y) ? kNearEdgeBit : 0;
+            const auto triangle = [&](const Vertex& a, const Vertex& b, const Vertex& c) HWY_ATTR {
+                const Vertex corners[3] = {a, b, c};
+                fillPolygon<3, false>(t, corners, kCrack, bits);
+            };
+            switch (cellShape(s, x, y)) {
+                case kQuadCell: {
                     const Vertex quad[4] = {v00, v10, v11, v01};
                     fillPolygon<4, false>(t, quad, kCrack, bits);
-                } else if (std::abs(q00 - q11) < std::abs(q10 - q01)) {
-                    const Vertex a[3] = {v00, v10, v11}, b[3] = {v00, v11, v01};
-                    fillPolygon<3, false>(t, a, kCrack, bits);
-                    fillPolygon<3, false>(t, b, kCrack, bits);
-                } else {
-                    const Vertex a[3] = {v00, v10, v01}, b[3] = {v10, v11, v01};
-                    fillPolygon<3, false>(t, a, kCrack, bits);
-                    fillPolygon<3, false>(t, b, kCrack, bits);
+                    break;
                 }
-            } else if (top && leftLink) {
-                const Vertex a[3] = {v00, v10, v01};
-                fillPolygon<3, false>(t, a, kCrack, bits);
-            } else if (top && rightLink) {
-                const Vertex a[3] = {v10, v11, v00};
-                fillPolygon<3, false>(t, a, kCrack, bits);
-            } else if (bottom && rightLink) {
-                const Vertex a[3] = {v11, v01, v10};
-                fillPolygon<3, false>(t, a, kCrack, bits);
-            } else if (bottom && leftLink) {
-                const Vertex a[3] = {v01, v00, v11};
-                fillPolygon<3, false>(t, a, kCrack, bits);
+                case kFallingSplit:
+                    triangle(v00, v10, v11);
+                    triangle(v00, v11, v01);
+                    break;
+                case kRisingSplit:
+                    triangle(v00, v10, v01);
+                    triangle(v10, v11, v01);
+                    break;
+                case kUpperLeft:
+                    triangle(v00, v10, v01);
+                    break;
+                case kUpperRight:
+                    triangle(v10, v11, v00);
+                    break;
+                case kLowerRight:
+                    triangle(v11, v01, v10);
+                    break;
+                case kLowerLeft:
+                    triangle(v01, v00, v11);
+                    break;
+                default:
+                    break;
             }
         }
     }

@@ -1,6 +1,7 @@
 #include "lib/render/surface/gpu/gpu_surface.hpp"
 
 #include <array>
+#include <cstring>
 #include <deque>
 
 #include "lib/base/parallel.hpp"
@@ -16,47 +17,33 @@
 namespace stx::gpu {
 namespace {
 
+using surface::FrameEntry;
 using surface::FrameSource;
 using surface::FrameWork;
+using surface::kNoSlot;
+using surface::kShadeGroup;
 using surface::kTile;
 using surface::PaintedFrame;
+using surface::SlotEntry;
 using surface::Source;
+using surface::SourceEntry;
+using surface::TileEntry;
 
 constexpr std::int64_t kTilePixels = static_cast<std::int64_t>(kTile) * kTile;
 /// Samples of one batch of tiles take at most this much video memory.
 constexpr std::int64_t kSampleBytes = 256ll << 20;
-constexpr int kShadeGroup = 128;          ///< threads of a group of surface_shade.comp
-constexpr std::uint32_t kNoSlot = ~0u;    ///< NO_SLOT of the shaders
-constexpr std::int64_t kPieceBytes = 32;  ///< Piece of surface_tiles.glsl
+constexpr std::int64_t kPieceBytes = sizeof(surface::Piece);
 constexpr std::int64_t kMostGroups = 65535;
 
-using Rows = std::array<float, 16>;
-
-/// Source of shaders/surface/surface_common.glsl (std430).
-struct SourceEntry {
-    Rows sourceFromPixel;
-    surface::Ray fromEye;
-    glm::ivec4 size;
-    glm::vec4 axis;
+/// The four rows of a warp.
+struct Rows {
+    glm::vec4 x, y, q, w;
+    explicit Rows(const surface::Warp& warp) { std::memcpy(this, warp.m.data(), sizeof(*this)); }
 };
-/// Slot of shaders/surface/surface_raster.comp (std430): one source in one tile.
-struct SlotEntry {
-    Rows sampleFromSource;
-    glm::ivec4 source;
-};
-/// Tile of shaders/surface/surface_tiles.glsl (std430).
-struct TileEntry {
-    glm::ivec2 at;
-    std::uint32_t first, count;
-    float step;
-    float pad[3];
-};
-/// Frame of shaders/surface/surface_common.glsl (std140).
-struct FrameUniforms {
-    glm::vec4 axis;
-    surface::Ray eye;
-    glm::vec4 fit;
-    glm::ivec4 size;
+/// The three rows of a ray.
+struct RayRows {
+    glm::vec4 x, y, z;
+    explicit RayRows(const surface::Ray& ray) { std::memcpy(this, ray.data(), sizeof(*this)); }
 };
 
 /// A tile that shows something, and how much work it is.
@@ -168,7 +155,7 @@ Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
     STX_TRY(r.resolve, build(SurfaceProgram::resolve));
     STX_TRY(r.resolveWithOrigin, build(SurfaceProgram::resolveWithOrigin));
     r.uniforms = GlBuffer::create();
-    glNamedBufferStorage(r.uniforms.get(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
+    glNamedBufferStorage(r.uniforms.get(), sizeof(FrameEntry), nullptr, GL_DYNAMIC_STORAGE_BIT);
     return context_->check("preparing the renderer");
 }
 
@@ -236,8 +223,8 @@ Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePl
             const bool any = f.tileBegin[t] < f.tileBegin[t + 1];
             batch.locals[local++] = {static_cast<std::uint32_t>(k), any ? slot : kNoSlot};
             if (!any) continue;
-            batch.slots[slot] = {surface::warpFrom(sampleFromPixel * f.pixelFromSource).m,
-                                 glm::ivec4(k, 0, 0, 0)};
+            const Rows warp(surface::warpFrom(sampleFromPixel * f.pixelFromSource));
+            batch.slots[slot] = {warp.x, warp.y, warp.q, warp.w, glm::ivec4(k, 0, 0, 0)};
             const std::uint32_t firstLeaf =
                 resources_->scene.firstLeaf[static_cast<std::size_t>(k)];
             for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
@@ -249,11 +236,14 @@ Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePl
             ++slot;
         }
         batch.tiles[static_cast<std::size_t>(i)] = {
-            glm::ivec2(plan.tile % work.tilesX, plan.tile / work.tilesX) * kTile,
+            plan.tile % work.tilesX * kTile,
+            plan.tile / work.tilesX * kTile,
             plan.firstLocal,
             static_cast<std::uint32_t>(plan.sources.size()),
             step,
-            {}};
+            0,
+            0,
+            0};
     });
     return batch;
 }
@@ -263,7 +253,9 @@ void GpuSurfacePainter::uploadSources(const FrameWork& work) {
     for (const FrameSource& f : work.sources) {
         const Source& s = *f.source;
         const surface::DepthAxis& axis = s.space.axis;
-        entries.push_back({f.sourceFromPixel.m, f.fromEye,
+        const Rows warp(f.sourceFromPixel);
+        const RayRows ray(f.fromEye);
+        entries.push_back({warp.x, warp.y, warp.q, warp.w, ray.x, ray.y, ray.z,
                            glm::ivec4(s.width, s.height, s.hasAlpha ? 1 : 0, s.blocksX),
                            glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, s.step,
                                      surface::kClearlyBehind + s.noise)});
@@ -302,9 +294,12 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     const surface::DepthAxis& axis = work.space.axis;
     const bool bytes = work.sources[0].source->view->texture.rgba8() != nullptr;
     const surface::ShadeSettings& shade = work.effort.shade;
-    const FrameUniforms uniforms{
+    const RayRows eye(surface::rayFrom(work.space, work.space));
+    const FrameEntry uniforms{
         glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, work.qLimit(), 0.0f),
-        surface::rayFrom(work.space, work.space),
+        eye.x,
+        eye.y,
+        eye.z,
         glm::vec4(shade.kernel, shade.ridge, bytes ? 1.0f : 0.0f, 0.0f),
         glm::ivec4(work.space.camera.width, work.space.camera.height, batch.meshes.size(),
                    batch.edges.size())};

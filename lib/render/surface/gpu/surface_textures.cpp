@@ -3,30 +3,12 @@
 #include <bit>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/surface/cpu/raster.hpp"
 
 namespace stx::gpu {
 namespace {
 
 using surface::Source;
-
-CellCode::Shape shapeOf(const Source& s, int x, int y) {
-    const bool top = s.linkRight(x, y), bottom = s.linkRight(x, y + 1);
-    const bool left = s.linkDown(x, y), right = s.linkDown(x + 1, y);
-    const int links = top + bottom + left + right;
-    if (links >= 3) {
-        const float q00 = s.q.at(x, y), q10 = s.q.at(x + 1, y);
-        const float q01 = s.q.at(x, y + 1), q11 = s.q.at(x + 1, y + 1);
-        if (links == 4 && std::abs(q00 + q11 - q10 - q01) <= 2 * s.flat * s.space.axis.whole(q00))
-            return CellCode::quad;
-        return std::abs(q00 - q11) < std::abs(q10 - q01) ? CellCode::fallingSplit
-                                                         : CellCode::risingSplit;
-    }
-    if (top && left) return CellCode::upperLeft;
-    if (top && right) return CellCode::upperRight;
-    if (bottom && right) return CellCode::lowerRight;
-    if (bottom && left) return CellCode::lowerLeft;
-    return CellCode::nothing;
-}
 
 Result<void> checkSize(std::span<const Source> sources, const EglContext& context, int width,
                        int height) {
@@ -65,25 +47,21 @@ Image<std::uint32_t> cellCodes(const Source& s) {
             for (int y = y0; y < yEnd; ++y) {
                 for (int x = x0; x < xEnd; ++x) {
                     std::uint32_t& code = codes.at(x, y);
-                    code = static_cast<std::uint32_t>(s.edgeDistance(x, y))
-                           << CellCode::kDistanceShift;
+                    code = static_cast<std::uint32_t>(s.edgeDistance(x, y)) << surface::kDistanceShift;
                     if (s.info.at(x, y) & Source::kBesideBackground)
-                        code |= CellCode::kBesideBackground;
-                    if (block.edges[y - y0] >> (x - x0) & 1) code |= CellCode::kEdge;
+                        code |= surface::kBesideBackground;
+                    if (block.edges[y - y0] >> (x - x0) & 1) code |= surface::kEdgePixel;
                     if (!(block.cells[y - y0] >> (x - x0) & 1)) continue;
-                    code |= shapeOf(s, x, y);
-                    const int edge =
-                        std::min(std::min(s.edgeDistance(x, y), s.edgeDistance(x + 1, y)),
-                                 std::min(s.edgeDistance(x, y + 1), s.edgeDistance(x + 1, y + 1)));
-                    if (edge < 3) code |= CellCode::kNearEdge;
+                    code |= surface::cellShape(s, x, y);
+                    if (surface::cellNearEdge(s, x, y)) code |= surface::kCellNearEdge;
                 }
             }
             for (std::uint32_t k = block.leafBegin; k < block.leafEnd; ++k) {
                 const surface::Leaf& leaf = s.leaves[k];
                 for (int y = leaf.y; y < leaf.y + leaf.size; ++y)
                     for (int x = leaf.x; x < leaf.x + leaf.size; ++x)
-                        codes.at(x, y) |= CellCode::leaf | (k - block.leafBegin)
-                                                               << CellCode::kLeafShift;
+                        codes.at(x, y) |= surface::kLeafCell | (k - block.leafBegin)
+                                                                   << surface::kLeafShift;
             }
         }
     });
