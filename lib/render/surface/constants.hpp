@@ -6,6 +6,6 @@
 /// processor and the shaders.
 namespace stx::surface {
 using glsl::uint;
-#include "shaders/shared/surface_constants.glsl"
 #include "shaders/shared/surface_cells.glsl"
+#include "shaders/shared/surface_constants.glsl"
 }  // namespace stx::surface

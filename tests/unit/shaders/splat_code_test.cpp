@@ -169,12 +169,13 @@ Drawn drawVectors(const Inputs& in) {
 
 template <class T>
 gpu::GlTexture textureOf(GLuint unit, GLenum stored, GLenum format, GLenum type,
-                    const std::vector<T>& pixels) {
+                         const std::vector<T>& pixels) {
     auto texture = gpu::GlTexture::create(GL_TEXTURE_2D_ARRAY);
     glTextureStorage3D(texture.get(), 1, stored, kBlock, kBlock, 1);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
     glTextureSubImage3D(texture.get(), 0, 0, 0, 0, kBlock, kBlock, 1, format, type, pixels.data());
     glTextureParameteri(texture.get(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTextureParameteri(texture.get(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glBindTextureUnit(unit, texture.get());
     return texture;
 }
@@ -240,7 +241,9 @@ class SplatCode : public testing::TestWithParam<int> {
 };
 INSTANTIATE_TEST_SUITE_P(Random, SplatCode, testing::Range(0, 6));
 
-TEST_P(SplatCode, DrawsAsTheProcessorsVectorsDo) { expectSame(drawVectors(in), drawScalar(in)); }
+TEST_P(SplatCode, DrawsAsTheProcessorsVectorsDo) {
+    expectSame(drawVectors(in), drawScalar(in));
+}
 
 TEST_P(SplatCode, DrawsAsTheShaderDoes) {
     const auto device = test::Device::open();

@@ -81,8 +81,8 @@ struct ScalarShade : SourcePixels {
     [[nodiscard]] vec4 colourOf(int s, Place p, int i, int j) const {
         return at(s).view->texture.at(p.x + i, p.y + j);
     }
-#include "shaders/shared/surface_votes.glsl"
 #include "shaders/shared/surface_shade.glsl"
+#include "shaders/shared/surface_votes.glsl"
 };
 
 /// A wall that all see, with blocks that are missing, nearer, or noisy in some views.
@@ -91,8 +91,7 @@ ReferenceView randomView(std::mt19937& random) {
     const auto aside = [&] { return 0.8 * unit(random) - 0.4; };
     const glm::dvec3 eye(aside(), aside(), 3.0 + aside());
     ReferenceView view;
-    view.camera =
-        Camera::fromFieldOfView(eye, *lookAt(eye, {0, 0, 0}), {0.7, 0.7}, false, 80, 72);
+    view.camera = Camera::fromFieldOfView(eye, *lookAt(eye, {0, 0, 0}), {0.7, 0.7}, false, 80, 72);
     view.depthBits = 32;
     view.nearPlane = 1;
     view.farPlane = 9;
@@ -139,9 +138,9 @@ struct Inputs {
         for (int i = 0; i < kSources; ++i) views.push_back(randomView(random));
         for (const ReferenceView& view : views) sources.push_back(prepareSource(view));
         const glm::dvec3 at(0.1, 0.05, 2.9);
-        space = PixelSpace(Camera::fromFieldOfView(at, *lookAt(at, {0, 0, 0}), {0.6, 0.6}, false,
-                                                   kFrame, kFrame),
-                           9.0);
+        space = PixelSpace(
+            Camera::fromFieldOfView(at, *lookAt(at, {0, 0, 0}), {0.6, 0.6}, false, kFrame, kFrame),
+            9.0);
         const glm::ivec2 corner = first(tile);
         glm::dmat4 sampleFromPixel(1.0);
         sampleFromPixel[0][0] = sampleFromPixel[1][1] = kPerPixel;
@@ -156,15 +155,17 @@ struct Inputs {
             std::vector<std::uint32_t> blocks(s.blocks.size());
             for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b] = static_cast<uint>(b);
             samples.emplace_back(grid.count());
-            rasteriseSource(s, sampleWarps.back(), blocks, grid,
-                            std::numeric_limits<float>::max(), samples.back().data());
+            rasteriseSource(s, sampleWarps.back(), blocks, grid, std::numeric_limits<float>::max(),
+                            samples.back().data());
         }
         for (std::size_t i = 0; i < sources.size(); ++i)
             locals.push_back({&sources[i], warps[i], samples[i].data()});
         fuseTile(locals, grid, space.axis, corner.x, corner.y, kTile, kTile, pieces);
     }
 
-    [[nodiscard]] static glm::ivec2 first(int tile) { return glm::ivec2(tile % 2, tile / 2) * kTile; }
+    [[nodiscard]] static glm::ivec2 first(int tile) {
+        return glm::ivec2(tile % 2, tile / 2) * kTile;
+    }
     [[nodiscard]] uint sampleOf(std::size_t source, int x, int y) const {
         return std::bit_cast<uint>(
             samples[source][static_cast<std::size_t>(y) * grid.stride() + x]);
@@ -264,7 +265,7 @@ TEST_P(SurfaceCode, DrawsAsTheProcessorsVectorsDo) {
 }
 
 TEST_P(SurfaceCode, ShadesAsTheProcessorsVectorsDo) {
-    ASSERT_GT(in.pieces.size(), 500u);
+    ASSERT_GT(in.pieces.size(), 300u);
     EXPECT_LE(strays(scalarColours(in), vectorColours(in)),
               static_cast<int>(in.pieces.size() / 200));
 }
@@ -281,9 +282,9 @@ class SurfaceShaders : public SurfaceCode {
         glBindTextureUnit(1, scene.colours.get());
         device->uniforms(0, in.frameEntry());
         device->storage(0, in.sourceEntries());
-        device->storage(5, std::vector<TileEntry>{{Inputs::first(GetParam() % 4).x,
-                                                   Inputs::first(GetParam() % 4).y, 0, kSources, 0,
-                                                   0, 0, 0}});
+        device->storage(
+            5, std::vector<TileEntry>{{Inputs::first(GetParam() % 4).x,
+                                       Inputs::first(GetParam() % 4).y, 0, kSources, 0, 0, 0, 0}});
         std::vector<glm::uvec2> locals;
         for (uint i = 0; i < kSources; ++i) locals.emplace_back(i, i);
         device->storage(6, locals);
@@ -351,7 +352,7 @@ TEST_P(SurfaceShaders, FuseAsTheSharedCodeDoesOnTheProcessor) {
         for (std::size_t k = 0; same && k < expected[at].size(); ++k) {
             const Piece &a = pieces[ranges[at].x + k], &b = expected[at][k];
             same = std::abs(a.q - b.q) < 1e-4f * b.q && std::abs(a.x - b.x) < 0.01f &&
-                   std::abs(a.qx - b.qx) < 1e-3f * b.q && a.share == b.share &&
+                   std::abs(a.qx - b.qx) < 1e-3f * b.q && std::abs(a.share - b.share) < 1e-5f &&
                    a.seenBy == b.seenBy && a.at == at;
         }
         differing += !same;

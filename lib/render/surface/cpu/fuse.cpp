@@ -65,12 +65,11 @@ struct Fuser : Votes {
         std::array<std::array<std::uint32_t, kTile>, kMostTileSources> flags;
         for (std::size_t s = 0; s < locals.size(); ++s) {
             if (!locals[s].samples) continue;
-            const float* lines =
-                locals[s].samples + static_cast<std::ptrdiff_t>(row) * S * stride;
+            const float* lines = locals[s].samples + static_cast<std::ptrdiff_t>(row) * S * stride;
             constexpr std::array summarise = {summarisePixels<1>, summarisePixels<2>,
                                               summarisePixels<3>, summarisePixels<4>};
-            summarise[static_cast<std::size_t>(S - 1)](lines, stride, low[s].data(),
-                                                       high[s].data(), flags[s].data());
+            summarise[static_cast<std::size_t>(S - 1)](lines, stride, low[s].data(), high[s].data(),
+                                                       flags[s].data());
         }
         for (int column = 0; column < columns; ++column) {
             const auto k = static_cast<std::size_t>(column);

@@ -235,15 +235,14 @@ Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePl
             }
             ++slot;
         }
-        batch.tiles[static_cast<std::size_t>(i)] = {
-            plan.tile % work.tilesX * kTile,
-            plan.tile / work.tilesX * kTile,
-            plan.firstLocal,
-            static_cast<std::uint32_t>(plan.sources.size()),
-            step,
-            0,
-            0,
-            0};
+        batch.tiles[static_cast<std::size_t>(i)] = {plan.tile % work.tilesX * kTile,
+                                                    plan.tile / work.tilesX * kTile,
+                                                    plan.firstLocal,
+                                                    static_cast<std::uint32_t>(plan.sources.size()),
+                                                    step,
+                                                    0,
+                                                    0,
+                                                    0};
     });
     return batch;
 }

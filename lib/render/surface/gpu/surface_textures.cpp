@@ -47,7 +47,8 @@ Image<std::uint32_t> cellCodes(const Source& s) {
             for (int y = y0; y < yEnd; ++y) {
                 for (int x = x0; x < xEnd; ++x) {
                     std::uint32_t& code = codes.at(x, y);
-                    code = static_cast<std::uint32_t>(s.edgeDistance(x, y)) << surface::kDistanceShift;
+                    code = static_cast<std::uint32_t>(s.edgeDistance(x, y))
+                           << surface::kDistanceShift;
                     if (s.info.at(x, y) & Source::kBesideBackground)
                         code |= surface::kBesideBackground;
                     if (block.edges[y - y0] >> (x - x0) & 1) code |= surface::kEdgePixel;
