@@ -1,8 +1,26 @@
-# Turns shader files into one header: namespace stx::shaders { constexpr std::string_view kName }.
+# Turns shader files into one header: namespace stx::shaders { constexpr std::string_view id }.
+# A line #include "path", below this folder, becomes that file, the first time that a shader meets it.
 # Usage: cmake -DOUT=header.hpp "-DFILES=a.vert;b.frag" -P embed.cmake
+cmake_minimum_required(VERSION 3.25)
 set(text "#pragma once\n#include <string_view>\n\nnamespace stx::shaders {\n")
 foreach(file IN LISTS FILES)
     file(READ "${file}" body)
+    set(included "")
+    while(body MATCHES "#include \"([^\"]+)\"")
+        set(line "${CMAKE_MATCH_0}")
+        set(name "${CMAKE_MATCH_1}")
+        set(part "")
+        if(NOT name IN_LIST included)
+            file(READ "${CMAKE_CURRENT_LIST_DIR}/${name}" part)
+            list(APPEND included "${name}")
+        endif()
+        string(FIND "${body}" "${line}" from)
+        string(LENGTH "${line}" length)
+        math(EXPR after "${from} + ${length}")
+        string(SUBSTRING "${body}" 0 ${from} head)
+        string(SUBSTRING "${body}" ${after} -1 tail)
+        set(body "${head}${part}${tail}")
+    endwhile()
     get_filename_component(name "${file}" NAME)
     string(MAKE_C_IDENTIFIER "${name}" id)
     string(APPEND text "inline constexpr std::string_view ${id} = R\"__glsl(${body})__glsl\";\n")

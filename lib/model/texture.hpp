@@ -46,6 +46,12 @@ class Texture {
         return rgbaFloat()->at(x, y);
     }
 
+    /// The same of a pixel by its number, row by row.
+    [[nodiscard]] glm::vec4 at(std::size_t pixel) const {
+        if (const auto* i = rgba8()) return glm::vec4(i->data()[pixel]) * (1.0f / 255.0f);
+        return rgbaFloat()->data()[pixel];
+    }
+
     bool operator==(const Texture&) const = default;
 
   private:

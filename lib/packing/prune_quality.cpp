@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "lib/metrics/compare.hpp"
-#include "lib/render/surface/surface_renderer.hpp"
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 
 namespace stx {
 namespace {

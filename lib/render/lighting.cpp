@@ -1,27 +1,33 @@
 #include "lib/render/lighting.hpp"
 
-#include <cmath>
+#include "shaders/shared/language.hpp"
 
 namespace stx {
 
+namespace {
+using namespace glsl;
+
+struct Phong {
+    const Lighting& lighting;
+    [[nodiscard]] vec3 ambientLight() const { return lighting.ambient; }
+    [[nodiscard]] vec3 specularLight() const { return lighting.specular; }
+    [[nodiscard]] float shininess() const { return lighting.shininess; }
+    [[nodiscard]] int lightCount() const { return static_cast<int>(lighting.lights.size()); }
+    [[nodiscard]] const Light& light(int i) const {
+        return lighting.lights[static_cast<std::size_t>(i)];
+    }
+    [[nodiscard]] vec3 lightColour(int i) const { return light(i).colour; }
+    [[nodiscard]] vec4 lightVector(int i) const {
+        return {light(i).vector, light(i).kind == Light::Kind::point ? 1.0f : 0.0f};
+    }
+#include "shaders/shared/phong.glsl"
+};
+
+}  // namespace
+
 glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
                      glm::vec3 normal, glm::vec3 toEye) {
-    glm::vec3 diffuse = lighting.ambient;
-    glm::vec3 specular(0.0f);
-    for (const auto& light : lighting.lights) {
-        const glm::vec3 toLight =
-            light.kind == Light::Kind::directional ? -light.vector : light.vector - position;
-        const float length = glm::length(toLight);
-        if (!(length > 0.0f)) continue;
-        const glm::vec3 l = toLight / length;
-        const float cosine = glm::dot(normal, l);
-        if (cosine <= 0.0f) continue;
-        diffuse += light.colour * cosine;
-        const glm::vec3 mirrored = normal * (2.0f * cosine) - l;
-        const float gloss = glm::dot(mirrored, toEye);
-        if (gloss > 0.0f) specular += light.colour * std::pow(gloss, lighting.shininess);
-    }
-    return albedo * diffuse + specular * lighting.specular;
+    return Phong{lighting}.shadePhong(albedo, position, normal, toEye);
 }
 
 Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera) {

@@ -10,7 +10,7 @@ namespace stx {
 struct Light {
     enum class Kind { directional, point };
     Kind kind = Kind::directional;
-    /// Directional: the way the light travels. Point: where it stands, scene units.
+    /// Directional: the way the light travels. Point: its position, scene units.
     glm::vec3 vector{0, 0, -1};
     glm::vec3 colour{1, 1, 1};
     bool inCameraSpace = false;  ///< moves with the camera (a headlight)
@@ -27,8 +27,7 @@ struct Lighting {
 };
 
 /// Phong: albedo * (ambient + sum of diffuse) + sum of specular. All vectors in one space;
-/// `toEye` and `normal` unit, `position` the lit point. lib/render/lighting.cpp; the shader
-/// phong.glsl is its twin.
+/// `toEye` and `normal` unit, `position` the lit point. The shaders share its code.
 [[nodiscard]] glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
                                    glm::vec3 normal, glm::vec3 toEye);
 

@@ -4,7 +4,7 @@
 #include "lib/render/finish/footprint.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
-#include "lib/render/surface/surface_renderer.hpp"
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 #ifdef STX_WITH_GPU
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/splat/gl/gl_renderer.hpp"

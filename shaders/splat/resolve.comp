@@ -1,4 +1,5 @@
-// The picture out of what splat.comp left. Needs resolve.glsl.
+// The picture out of what splat.comp left.
+#include "splat/resolve.glsl"
 layout(local_size_x = 16, local_size_y = 8) in;
 
 layout(std430, binding = 6) writeonly buffer ColourOut { vec4 colourOut[]; };
@@ -10,8 +11,8 @@ layout(std430, binding = 9) writeonly buffer AlbedoOut { vec4 albedoOut[]; };
 
 void main() {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, frameSize.xy))) return;
-    int index = at.y * frameSize.x + at.x;
+    if (any(greaterThanEqual(at, frame.frameSize.xy))) return;
+    int index = at.y * frame.frameSize.x + at.x;
     vec4 colour, albedo;
     vec3 normal;
     float dist;

@@ -1,4 +1,5 @@
-// The picture out of what splat.frag left, drawn by screen.vert. Needs resolve.glsl.
+// The picture out of what splat.frag left, drawn by screen.vert.
+#include "splat/resolve.glsl"
 layout(location = 0) out vec4 colourOut;
 layout(location = 1) out float depthOut;
 #if NORMALS

@@ -1,6 +1,9 @@
-// Sums -> picture: normalises, settles silhouettes, lights; the twin of resolveBlended() in
-// lib/render/splat/cpu/cpu_splat.cpp. RASTER: the sums are textures, else buffers as splat.comp leaves
-// them. LIT: Phong (phong.glsl). Needs splat_frame.glsl.
+// Sums -> picture: normalises, settles silhouettes, lights; resolveBlended() in
+// lib/render/splat/cpu/cpu_splat.cpp does the same. RASTER: the sums are textures, else buffers as
+// splat.comp leaves them. LIT: Phong.
+#include "splat/splat_frame.glsl"
+#include "splat/phong_lights.glsl"
+#include "shared/phong.glsl"
 #define CHANNELS (4 + TRANSLUCENT + 3 * NORMALS)
 #if ACCUMULATE == 2
 #define STRIDE ((CHANNELS + 1) / 2 * 2)
@@ -25,9 +28,9 @@ const float kNone = 3.0e38;
 
 float frontAt(ivec2 at) {
 #if RASTER
-    return texelFetch(frontTexture, at + frameSize.w, 0).r;
+    return texelFetch(frontTexture, at + frame.frameSize.w, 0).r;
 #else
-    return uintBitsToFloat(front[(at.y + 1) * frameSize.z + at.x + 1]);
+    return uintBitsToFloat(front[(at.y + 1) * frame.frameSize.z + at.x + 1]);
 #endif
 }
 
@@ -43,10 +46,10 @@ float sumOf(int j, int k) {
 #endif
 
 vec3 worldPosition(vec2 pixel, float dist) {
-    vec2 ray = (pixel - novelLens.zw) * novelLens.xy * vec2(1.0, -1.0);
-    float spread = novelAxisX.w != 0.0 ? 1.0 : dist;
-    return novelPosition.xyz + novelAxisX.xyz * (ray.x * spread) + novelAxisY.xyz * (ray.y * spread) -
-           novelAxisZ.xyz * dist;
+    vec2 ray = (pixel - frame.novelLens.zw) * frame.novelLens.xy * vec2(1.0, -1.0);
+    float spread = orthographic() ? 1.0 : dist;
+    return frame.novelPosition.xyz + frame.novelAxisX.xyz * (ray.x * spread) + frame.novelAxisY.xyz * (ray.y * spread) -
+           frame.novelAxisZ.xyz * dist;
 }
 
 // What a pixel of the frame shows; `albedo` is its colour without light.
@@ -55,21 +58,21 @@ void resolvePixel(ivec2 at, out vec4 colour, out float dist, out vec3 normal, ou
     colour = vec4(0.0);
     normal = vec3(0.0);
 #if RASTER
-    vec4 sum = texelFetch(colourSums, at + frameSize.w, 0);
+    vec4 sum = texelFetch(colourSums, at + frame.frameSize.w, 0);
     if (sum.a > 0.0) {
         colour = vec4(sum.rgb / sum.a, 1.0);
 #if TRANSLUCENT
-        colour.a = texelFetch(alphaSums, at + frameSize.w, 0).r / sum.a;
+        colour.a = texelFetch(alphaSums, at + frame.frameSize.w, 0).r / sum.a;
 #endif
 #if NORMALS
-        normal = texelFetch(normalSums, at + frameSize.w, 0).xyz / sum.a;
+        normal = texelFetch(normalSums, at + frame.frameSize.w, 0).xyz / sum.a;
 #endif
     }
 #else
-    int j = ((at.y + 1) * frameSize.z + at.x + 1) * STRIDE;
+    int j = ((at.y + 1) * frame.frameSize.z + at.x + 1) * STRIDE;
     float weight = sumOf(j, 3);
     if (weight > 0.0) {
-        float scale = 1.0 / (weight * scales.y);
+        float scale = 1.0 / (weight * frame.scales.y);
         colour = vec4(vec3(sumOf(j, 0), sumOf(j, 1), sumOf(j, 2)) * scale, 1.0);
 #if TRANSLUCENT
         colour.a = min(sumOf(j, 4) * scale, 1.0);
@@ -92,8 +95,8 @@ void resolvePixel(ivec2 at, out vec4 colour, out float dist, out vec3 normal, ou
         if (colour.a > 0.0) {
             if (at.x > 0) dist = min(dist, frontAt(at - ivec2(1, 0)));
             if (at.y > 0) dist = min(dist, frontAt(at - ivec2(0, 1)));
-            if (at.x + 1 < frameSize.x) dist = min(dist, frontAt(at + ivec2(1, 0)));
-            if (at.y + 1 < frameSize.y) dist = min(dist, frontAt(at + ivec2(0, 1)));
+            if (at.x + 1 < frame.frameSize.x) dist = min(dist, frontAt(at + ivec2(1, 0)));
+            if (at.y + 1 < frame.frameSize.y) dist = min(dist, frontAt(at + ivec2(0, 1)));
         }
 #else
         colour = vec4(0.0);
@@ -108,8 +111,8 @@ void resolvePixel(ivec2 at, out vec4 colour, out float dist, out vec3 normal, ou
 #if LIT
     if (colour.a > 0.0 && normal != vec3(0.0)) {
         vec3 world = worldPosition(vec2(at) + 0.5, dist < kNone ? dist : 1.0);
-        vec3 ahead = worldPosition(vec2(at) + 0.5, 1.0) - novelPosition.xyz;
-        vec3 toEye = novelAxisX.w != 0.0 ? novelAxisZ.xyz : -normalize(ahead);
+        vec3 ahead = worldPosition(vec2(at) + 0.5, 1.0) - frame.novelPosition.xyz;
+        vec3 toEye = orthographic() ? frame.novelAxisZ.xyz : -normalize(ahead);
         colour.rgb = shadePhong(colour.rgb / colour.a, world, normal, toEye) * colour.a;
     }
 #endif

@@ -1,8 +1,9 @@
 // Splatting with atomics. PASS 1: the front distance per pixel. PASS 2: what lies within the
-// tolerance of the front is added with its weight. Needs splat_points.glsl.
+// tolerance of the front is added with its weight.
 // ACCUMULATE: 0 = 32-bit integers, 1 = floats, 2 = pairs of 32-bit integers in 64 bits.
 // NORMALS: normals are kept. Channels of a pixel: R, G, B (times alpha), weight, alpha, normal.
 // Continued colours may be negative: sums are two's complement.
+#include "splat/splat_points.glsl"
 layout(local_size_x = 256) in;
 
 layout(std430, binding = 3) buffer FrontBuffer { uint front[]; };
@@ -38,21 +39,21 @@ struct Paint {
     float quality, tolerance;
 };
 
-Paint paintOf(Point p, Splat splat) {
+Paint paintOf(Point p, ivec3 texel, Splat splat) {
     Paint paint;
-    vec4 colour = pointColour(p);
+    vec4 colour = pointColour(texel);
 #if TRANSLUCENT
     colour.rgb *= colour.a;
 #endif
-    paint.colour = colour.rgb * scales.y;
-    paint.alpha = colour.a * scales.y;
+    paint.colour = colour.rgb * frame.scales.y;
+    paint.alpha = colour.a * frame.scales.y;
 #if NORMALS
-    paint.normal = (pointNormal(p) * 0.5 + 0.5) * scales.y;
+    paint.normal = (pointNormal(texel) * 0.5 + 0.5) * frame.scales.y;
 #endif
-    colourGradient(p, splat.steps, paint.across, paint.down);
-    paint.across *= scales.y;
-    paint.down *= scales.y;
-    paint.quality = splat.quality * scales.x;
+    colourGradient(texel, splat.steps, paint.across, paint.down);
+    paint.across *= frame.scales.y;
+    paint.down *= frame.scales.y;
+    paint.quality = splat.quality * frame.scales.x;
     paint.tolerance = p.task.tolerance;
     return paint;
 }
@@ -124,16 +125,17 @@ void add(int at, float kernel, vec2 d, float depth, Paint paint) {
 
 void main() {
     uint task = gl_WorkGroupID.y * 32768u + gl_WorkGroupID.x;
-    if (task >= uint(counts.y)) return;
+    if (task >= uint(frame.counts.y)) return;
 #if CULL && PASS == 2
-    if (visible[task + uint(counts.z)] == 0u) return;
+    if (visible[task + uint(frame.counts.z)] == 0u) return;
 #endif
     Point p;
-    if (!fetchPoint(task + uint(counts.z), gl_LocalInvocationIndex, p)) return;
-    int stride = frameSize.z;  // buffers have a border of one pixel, so small splats need no clipping
+    ivec3 texel;
+    if (!fetchPoint(task + uint(frame.counts.z), gl_LocalInvocationIndex, p, texel)) return;
+    int stride = frame.frameSize.z;  // buffers have a border of one pixel, so small splats need no clipping
 #if RULE == 0
     ivec2 at = ivec2(floor(clamp(p.pixel, vec2(-2.0), vec2(1.0e6)) + 0.5));
-    if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, frameSize.xy))) return;
+    if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, frame.frameSize.xy))) return;
     int index = (at.y + 1) * stride + at.x + 1;
 #if PASS == 1
     atomicMin(front[index], floatBitsToUint(p.dist));
@@ -141,18 +143,18 @@ void main() {
     Splat splat;
     splat.quality = 1.0;
     splat.steps = vec4(0.0);
-    Paint paint = paintOf(p, splat);
+    Paint paint = paintOf(p, texel, splat);
     paint.tolerance = 0.0;
     add(index, 1.0, vec2(0.0), p.dist, paint);
 #endif
 #elif TWO_BY_TWO
     vec2 corner = floor(p.pixel);
-    if (!(all(greaterThanEqual(corner, vec2(-1.0))) && all(lessThan(corner, vec2(frameSize.xy))))) return;
+    if (!(all(greaterThanEqual(corner, vec2(-1.0))) && all(lessThan(corner, vec2(frame.frameSize.xy))))) return;
     vec2 f = p.pixel - corner, g = 1.0 - f;
     vec2 f2 = f * f, g2 = g * g;
     int index = (int(corner.y) + 1) * stride + int(corner.x) + 1;
     Splat splat;
-    if (!splatOf(p, splat)) return;
+    if (!splatOf(p, texel, splat)) return;
     float zx = splat.slope.x, zy = splat.slope.y, core2 = splat.core2;
     float z = p.dist - f.x * zx - f.y * zy;
 #if PASS == 1
@@ -161,7 +163,7 @@ void main() {
     if (f2.x + g2.y <= core2) atomicMin(front[index + stride], floatBitsToUint(z + zy));
     if (g2.x + g2.y <= core2) atomicMin(front[index + stride + 1], floatBitsToUint(z + zx + zy));
 #else
-    Paint paint = paintOf(p, splat);
+    Paint paint = paintOf(p, texel, splat);
     vec2 near = lowPass(f2), far = lowPass(g2);
     vec4 kernel = vec4(near.x, far.x, near.x, far.x) * vec4(near.yy, far.yy);
     vec4 radius2 = vec4(f2.x, g2.x, f2.x, g2.x) + vec4(f2.yy, g2.yy);
@@ -175,25 +177,24 @@ void main() {
 #endif
 #else
     Splat splat;
-    if (!splatOf(p, splat)) return;
+    if (!splatOf(p, texel, splat)) return;
     vec2 low = floor(p.pixel), high = low + 1.0;
     if (!splat.small) {
         low = ceil(p.pixel - splat.reach);
         high = floor(p.pixel + splat.reach);
     }
     low = max(low, vec2(0.0));
-    high = min(high, vec2(frameSize.xy - 1));
+    high = min(high, vec2(frame.frameSize.xy - 1));
     if (!all(lessThanEqual(low, high))) return;
     ivec2 from = ivec2(low), to = ivec2(high);
 #if PASS == 2
-    Paint paint = paintOf(p, splat);
+    Paint paint = paintOf(p, texel, splat);
 #endif
     for (int y = from.y; y <= to.y; ++y) {
         for (int x = from.x; x <= to.x; ++x) {
             vec2 d = vec2(x, y) - p.pixel;
             float q = squaredRadius(splat, d);
-            // A plane that runs through the viewpoint must not hide all.
-            float depth = max(p.dist + dot(splat.slope, d), 0.5 * p.dist);
+            float depth = depthAt(p.dist, splat.slope, d);
             int index = (y + 1) * stride + x + 1;
 #if PASS == 1
             if (q <= splat.core2) atomicMin(front[index], floatBitsToUint(depth));

@@ -1,5 +1,6 @@
-// The visibility pass (PASS 1: the least distance, by MIN blending) and the blended pass (PASS 2) of
-// the raster pipeline. Needs splat_points.glsl.
+// The visibility pass (PASS 1: the least distance, by MIN blending) and the blended pass (PASS
+// 2) of the raster pipeline.
+#include "splat/splat_points.glsl"
 #if PASS == 2
 flat in vec4 colour;
 flat in vec3 across, down;
@@ -21,7 +22,7 @@ flat in vec3 inverse;
 flat in vec4 shape;
 
 void main() {
-    vec2 d = gl_FragCoord.xy - 0.5 - float(frameSize.w) - centre.xy;
+    vec2 d = gl_FragCoord.xy - 0.5 - float(frame.frameSize.w) - centre.xy;
     float depth = centre.z;
     float kernel = 1.0;
 #if RULE != 0
@@ -29,11 +30,7 @@ void main() {
     splat.small = TWO_BY_TWO || shape.x != 0.0;
     splat.q = inverse;
     float q = squaredRadius(splat, d);
-    depth += dot(shape.zw, d);
-#if BOXES
-    // A plane that runs through the viewpoint must not hide all.
-    depth = max(depth, 0.5 * centre.z);
-#endif
+    depth = depthAt(centre.z, shape.zw, d);
 #if PASS == 1
     if (q > shape.y) discard;
 #else

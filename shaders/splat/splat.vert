@@ -1,6 +1,6 @@
-// Lee & Park's vertex shader: no vertex attributes; each vertex fetches its point from the textures.
-// Small splats are GL points, others are two triangles. Needs
-// splat_points.glsl.
+// Lee & Park's vertex shader: no vertex attributes; each vertex fetches its point from the
+// textures. Small splats are GL points, others are two triangles.
+#include "splat/splat_points.glsl"
 #if PASS == 2
 flat out vec4 colour;
 flat out vec3 across, down;
@@ -22,9 +22,10 @@ void main() {
     uint id = uint(gl_VertexID);
 #endif
     Point p;
-    if (!fetchPoint((id >> 8u) + uint(counts.z), id & 255u, p)) return;
+    ivec3 texel;
+    if (!fetchPoint((id >> 8u) + uint(frame.counts.z), id & 255u, p, texel)) return;
     Splat splat;
-    if (!splatOf(p, splat)) return;
+    if (!splatOf(p, texel, splat)) return;
 #if BOXES
     // Corners 0 1 2 and 3 4 5: (-,-) (+,-) (+,+) and (-,-) (+,+) (-,+).
     vec2 side = vec2(corner == 1u || corner == 2u || corner == 4u ? 1.0 : -1.0,
@@ -42,15 +43,15 @@ void main() {
 #endif
     shape = vec4(splat.small ? 1.0 : 0.0, splat.core2, splat.slope);
 #if PASS == 2
-    colour = pointColour(p);
+    colour = pointColour(texel);
     weighing = vec2(splat.quality, p.task.tolerance);
 #if RULE != 0
-    colourGradient(p, splat.steps, across, down);
+    colourGradient(texel, splat.steps, across, down);
 #endif
 #if NORMALS
-    normal = pointNormal(p);
+    normal = pointNormal(texel);
 #endif
 #endif
-    vec2 target = vec2(frameSize.xy + 2 * frameSize.w);
-    gl_Position = vec4((at + float(frameSize.w)) / target * 2.0 - 1.0, 0.5, 1.0);
+    vec2 target = vec2(frame.frameSize.xy + 2 * frame.frameSize.w);
+    gl_Position = vec4((at + float(frame.frameSize.w)) / target * 2.0 - 1.0, 0.5, 1.0);
 }

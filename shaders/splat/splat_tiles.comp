@@ -1,5 +1,6 @@
-// The farthest front distance of each tile of the frame, after the visibility pass: what lies behind
-// it is hidden. A group does one tile; pixels where nothing is hide nothing. Needs splat_frame.glsl.
+// The farthest front distance of each tile of the frame, after the visibility pass: what lies
+// behind it is hidden. A group does one tile; pixels where nothing is hide nothing.
+#include "splat/splat_frame.glsl"
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 3) readonly buffer FrontBuffer { uint front[]; };
@@ -14,8 +15,8 @@ void main() {
     for (uint k = gl_LocalInvocationIndex; k < uint(TILE * TILE); k += 64u) {
         ivec2 at = ivec2(gl_WorkGroupID.xy) * TILE + ivec2(k % uint(TILE), k / uint(TILE));
         // Positive floats sort as their bits do.
-        if (all(lessThan(at, frameSize.xy)))
-            mine = max(mine, front[(at.y + 1) * frameSize.z + at.x + 1]);
+        if (all(lessThan(at, frame.frameSize.xy)))
+            mine = max(mine, front[(at.y + 1) * frame.frameSize.z + at.x + 1]);
     }
     atomicMax(most, mine);
     barrier();

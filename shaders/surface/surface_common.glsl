@@ -1,36 +1,116 @@
-// What the passes of surface mode share. The twins of these functions are in
-// lib/render/surface/; names and constants are the same.
-// Defined from outside: S (samples along a side of a pixel), TILE.
-#define SIDE (TILE * S)
-#define EXTENSION 1u
-#define NEAR_EDGE 2u
-#define NO_SLOT 0xffffffffu
+// What the passes of surface mode share: the frame, the sources, and their pixels as the shared
+// code asks for them. Defined from outside: S (samples along a side of a pixel), kFreeAlpha of this
+// renderer as FREE_ALPHA.
+#include "shared/language.glsl"
+#include "shared/surface_constants.glsl"
+#include "shared/surface_structs.glsl"
+#include "shared/surface_cells.glsl"
+#define SIDE (kTile * S)
+#define SAMPLES (S * S)
 
-struct Source {
-    vec4 warpX, warpY, warpQ, warpW;  // rows of sourceFromPixel
-    vec4 rayX, rayY, rayZ;            // rows of the vector from its eye to a point of the frame
-    ivec4 size;                       // width, height, has alpha, blocks in a row
-    vec4 axis;                        // 1 = q is 1/dist, 1/unit, step, share of q that is clearly behind
-};
-layout(std430, binding = 0) readonly buffer SourceBuffer { Source sources[]; };
-layout(std140, binding = 0) uniform Frame {
-    vec4 axis;               // 1 = q is 1/dist, 1/unit, largest q
-    vec4 eyeX, eyeY, eyeZ;   // rows of the vector from the eye to a point of the frame
-    vec4 fit;                // squared radius, ridge, colours are at most 1
-    ivec4 frameSize;         // width, height, blocks with cells, blocks with edges
-};
-// q, dq/dx, dq/dy as bits, and what the pixel is: see CellCode in gpu_surface_scene.hpp.
+layout(std430, binding = 0) readonly buffer SourceBuffer { SourceEntry sources[]; };
+layout(std140, binding = 0) uniform FrameBlock { FrameEntry frame; };
+// q, dq/dx, dq/dy as bits, and what the pixel is: see shared/surface_cells.glsl.
 layout(binding = 0) uniform usampler2DArray surfaces;
 layout(binding = 1) uniform sampler2DArray colours;
 
-float whole(vec4 a, float q) { return a.x != 0.0 ? q : 1.0; }
-float perUnit(vec4 a, float q) { return a.x != 0.0 ? q * q : a.y; }
+// See DepthAxis. 1 = q is 1/dist, 1/unit.
+#define Axis vec4
+float relativeScale(Axis a, float q) { return a.x != 0.0 ? q : 1.0; }
+float qPerUnit(Axis a, float q) { return a.x != 0.0 ? q * q : a.y; }
+Axis frameAxis() { return frame.axis; }
+Axis axisOf(int s) { return sources[s].axis; }
 
+// Where the rectangles of sources are, for those that are not whole: see PlaceTable in
+// lib/render/surface/gpu/surface_textures.hpp.
+layout(std430, binding = 14) readonly buffer PlaceBuffer { uint table[]; };
+
+// Neighbouring pixels of a source: where they are kept, pixel (i, j) at texel + i stepX + j stepY, and
+// which pixels of the source can be read there, the last two one past the last.
+struct Place {
+    ivec3 texel;  // layer -1: no rectangle shows them
+    ivec2 stepX, stepY;
+    uint outside;  // of no rectangle: bit i + 2 j says that the object is at (i, j)
+    ivec4 bounds;
+};
+
+// A rectangle of source s that shows all pixels from `low` to `high`, seen from `corner`.
+Place findPlace(int s, ivec2 corner, ivec2 low, ivec2 high) {
+    int first = sources[s].place.y + (low.y / kSourceBlock) * sources[s].size.w + low.x / kSourceBlock;
+    for (uint k = table[first]; k < table[first + 1]; ++k) {
+        int r = int(table[k]);
+        ivec4 bounds = ivec4(table[r], table[r + 1], table[r + 2], table[r + 3]);
+        if (any(lessThan(low, bounds.xy)) || any(greaterThanEqual(high, bounds.zw))) continue;
+        ivec2 origin = ivec2(table[r + 4], table[r + 5]);
+        int layer = int(table[r + 6]);
+        if (table[r + 7] != 0u)  // turned
+            return Place(ivec3(origin.x - corner.y, origin.y + corner.x, layer), ivec2(0, 1),
+                         ivec2(-1, 0), 0u, bounds);
+        return Place(ivec3(origin + corner, layer), ivec2(1, 0), ivec2(0, 1), 0u, bounds);
+    }
+    return Place(ivec3(0, 0, -1), ivec2(0), ivec2(0), 0u, ivec4(0));
+}
+Place wholePlace(int s, ivec2 corner) {
+    return Place(ivec3(corner, sources[s].place.x), ivec2(1, 0), ivec2(0, 1), 0u,
+                 ivec4(0, 0, sources[s].size.xy));
+}
+bool objectOutside(int s, ivec2 p) {
+    if (sources[s].place.z < 0) return false;
+    uint bit = uint(p.y) * uint(sources[s].size.x) + uint(p.x);
+    return (table[sources[s].place.z + int(bit / 32u)] >> (bit % 32u) & 1u) != 0u;
+}
+
+// Of the 2x2 pixels from `corner` on and, where they have points, of their neighbours.
+Place placeOf(int s, ivec2 corner) {
+    if (sources[s].place.x >= 0) return wholePlace(s, corner);
+    ivec2 last = sources[s].size.xy - 1;
+    ivec2 low = max(corner, ivec2(0)), high = min(corner + 1, last);
+    Place p = findPlace(s, corner, max(low - 1, ivec2(0)), min(high + 1, last));
+    if (p.texel.z < 0) p = findPlace(s, corner, low, high);
+    if (p.texel.z >= 0) return p;
+    for (int y = low.y; y <= high.y; ++y)
+        for (int x = low.x; x <= high.x; ++x)
+            if (objectOutside(s, ivec2(x, y))) p.outside |= 1u << (x - corner.x + 2 * (y - corner.y));
+    return p;
+}
+#define Taps Place
+// Of the 4x4 pixels from `corner` on, taps around a point among the middle four.
+Place tapPlaceOf(int s, ivec2 corner) {
+    if (sources[s].place.x >= 0) return wholePlace(s, corner);
+    ivec2 last = sources[s].size.xy - 1;
+    Place p = findPlace(s, corner, max(corner, ivec2(0)), min(corner + 3, last));
+    for (int k = 1; k <= 2 && p.texel.z < 0; ++k) {
+        ivec2 middle = clamp(corner + k, ivec2(0), last);
+        p = findPlace(s, corner, middle, middle);
+    }
+    return p;
+}
+bool canRead(Place p, ivec2 pixel) {
+    return all(greaterThanEqual(pixel, p.bounds.xy)) && all(lessThan(pixel, p.bounds.zw));
+}
+ivec3 texelOf(Place p, int i, int j) { return p.texel + ivec3(i * p.stepX + j * p.stepY, 0); }
+uvec4 surfaceAt(int s, Place p, int i, int j) {
+    if (p.texel.z >= 0) return texelFetch(surfaces, texelOf(p, i, j), 0);
+    bool pruned = sources[s].place.w != 0 && (p.outside >> (i + 2 * j) & 1u) != 0u;
+    return uvec4(pruned ? floatBitsToUint(-1.0) : 0u, 0u, 0u, 0u);
+}
+vec4 colourOf(int s, Place p, int i, int j) {
+    if (p.texel.z >= 0) return texelFetch(colours, texelOf(p, i, j), 0);
+    return vec4(0.0, 0.0, 0.0, float(p.outside >> (i + 2 * j) & 1u));
+}
+float qAt(int s, Place p, int i, int j) { return uintBitsToFloat(surfaceAt(s, p, i, j).x); }
+vec2 gradientAt(int s, Place p, int i, int j) { return uintBitsToFloat(surfaceAt(s, p, i, j).yz); }
+float alphaOf(int s, Place p, int i, int j) { return colourOf(s, p, i, j).a; }
+float edgeDistanceOf(int s, Place p, int i, int j) {
+    return float(surfaceAt(s, p, i, j).w >> kDistanceShift & kDistanceMask);
+}
+ivec2 sizeOf(int s) { return sources[s].size.xy; }
+bool hasAlpha(int s) { return sources[s].size.z != 0; }
+float freeAlphaOf(int s) { return FREE_ALPHA; }
+float stepOf(int s) { return sources[s].axis.z; }
+float clearlyBehindOf(int s) { return sources[s].axis.w; }
 vec4 warp(int s, float x, float y, float q) {
     vec4 p = vec4(x, y, q, 1.0);
     return vec4(dot(sources[s].warpX, p), dot(sources[s].warpY, p), dot(sources[s].warpQ, p),
                 dot(sources[s].warpW, p));
-}
-bool inside(int s, ivec2 p) {
-    return p.x >= 0 && p.y >= 0 && p.x < sources[s].size.x && p.y < sources[s].size.y;
 }

@@ -1,6 +1,8 @@
 // Surface mode, last pass: the pieces of each pixel, in their order, so that the sum is always the
 // same. ORIGIN = 1 also tells from where in which source the main piece of each pixel comes.
-layout(local_size_x = 128) in;
+#include "surface/surface_common.glsl"
+#include "surface/surface_tiles.glsl"
+layout(local_size_x = int(kShadeGroup)) in;
 layout(std430, binding = 10) readonly buffer PieceColourBuffer { vec4 pieceColours[]; };
 layout(std430, binding = 11) writeonly buffer ColourOutBuffer { vec4 colourOut[]; };
 layout(std430, binding = 12) writeonly buffer DepthOutBuffer { float depthOut[]; };
@@ -9,7 +11,7 @@ layout(std430, binding = 13) writeonly buffer OriginOutBuffer { vec4 originOut[]
 #endif
 
 void main() {
-    uint index = gl_WorkGroupID.x * 128u + gl_LocalInvocationID.x;
+    uint index = gl_WorkGroupID.x * kShadeGroup + gl_LocalInvocationID.x;
     uvec2 range = ranges[index];
     vec4 sum = vec4(0.0);
     float most = 0.0, q = 0.0;

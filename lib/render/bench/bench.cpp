@@ -4,7 +4,7 @@
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/cpu_device.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
-#include "lib/render/surface/surface_renderer.hpp"
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 #ifdef STX_WITH_GPU
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/splat/gl/gl_renderer.hpp"

@@ -51,13 +51,6 @@ Result<GlProgram> buildProgram(const std::string& header, std::span<const Shader
     return program;
 }
 
-std::string shaderConstants(std::span<const ShaderConstant> constants) {
-    std::string out;
-    for (const auto& c : constants)
-        out += fmt::format("const float {} = {:.9e};\n", c.name, c.value);
-    return out;
-}
-
 ShaderText shaderText(std::string name, const std::string& header, const ShaderStage& stage) {
     ShaderText out{std::move(name),
                    stage.type == GL_VERTEX_SHADER     ? "vert"

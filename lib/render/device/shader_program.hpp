@@ -22,14 +22,6 @@ struct ShaderStage {
 [[nodiscard]] Result<GlProgram> buildProgram(const std::string& header,
                                              std::span<const ShaderStage> stages);
 
-/// A number that shaders know by the name that C++ has for it.
-struct ShaderConstant {
-    const char* name;
-    float value;
-};
-/// "const float name = value;" for each, exactly.
-[[nodiscard]] std::string shaderConstants(std::span<const ShaderConstant> constants);
-
 /// The whole text of one shader as a driver would get it, for tools that check it offline.
 struct ShaderText {
     std::string name;    ///< what it is, such as "splat.comp pass 1 rule 0"

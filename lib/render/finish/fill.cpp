@@ -65,7 +65,7 @@ float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float 
         const float q = qNear + (qFar - qNear) * static_cast<float>(step) / (kSteps - 1);
         bool free = false;
         for (const LocalSource& s : sources) {
-            if (opinionOf(*s.source, s.sourceFromPixel, x, y, q) != Opinion::none) {
+            if (seesPast(s, x, y, q)) {
                 free = true;
                 break;
             }
@@ -108,17 +108,17 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
                     }
                 }
                 if (!enclosed(met)) continue;
-                const float whole = frame.space.axis.whole(nearest);
+                const float scale = frame.space.axis.relativeScale(nearest);
                 const float q = hiddenDepth(sources, static_cast<float>(x) + 0.5f,
-                                            static_cast<float>(y) + 0.5f, nearest + 0.02f * whole,
-                                            std::max(farthest - 0.05f * whole, 0.5f * farthest));
+                                            static_cast<float>(y) + 0.5f, nearest + 0.02f * scale,
+                                            std::max(farthest - 0.05f * scale, 0.5f * farthest));
                 if (!(q > 0.0f)) continue;
                 glm::vec3 sum(0.0f);
                 float weights = 0;
                 for (int k = 0; k < count; ++k) {
                     const Hit& hit = hits[static_cast<std::size_t>(k)];
                     float weight = 1.0f / (hit.distance * hit.distance);
-                    if (hit.q > q + 0.01f * frame.space.axis.whole(q)) weight *= 0.1f;
+                    if (hit.q > q + 0.01f * frame.space.axis.relativeScale(q)) weight *= 0.1f;
                     sum += weight * hit.colour;
                     weights += weight;
                 }
@@ -184,7 +184,7 @@ void fillBackground(OpenFrame frame) {
                         if (averaged == 0) {
                             hit = here;
                         } else {
-                            if (std::abs(here.q - hit.q) > 0.03f * frame.space.axis.whole(hit.q))
+                            if (std::abs(here.q - hit.q) > 0.03f * frame.space.axis.relativeScale(hit.q))
                                 break;
                             hit.colour += here.colour;
                         }
@@ -200,7 +200,7 @@ void fillBackground(OpenFrame frame) {
                     farthest = std::min(farthest, hits[static_cast<std::size_t>(k)].q);
                     nearest = std::max(nearest, hits[static_cast<std::size_t>(k)].q);
                 }
-                const float range = nearest - farthest + 0.05f * frame.space.axis.whole(nearest);
+                const float range = nearest - farthest + 0.05f * frame.space.axis.relativeScale(nearest);
                 glm::vec3 sum(0.0f);
                 float weights = 0, depth = 0;
                 for (int k = 0; k < count; ++k) {

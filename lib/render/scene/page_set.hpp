@@ -110,6 +110,14 @@ class PageSet {
     }
     /// The same for all pixels from (x0, y0) to (x1, y1), inclusive, at most kBlock apart.
     [[nodiscard]] const PageRectangle* find(std::size_t view, int x0, int y0, int x1, int y1) const;
+    /// Numbers of the rectangles in or beside the block of a view that holds a pixel.
+    [[nodiscard]] std::span<const std::uint32_t> near(std::size_t view, int x, int y) const {
+        const ViewIndex& index = data_->index[view];
+        const std::size_t block = static_cast<std::size_t>(y / kBlock) * index.blocksX +
+                                  static_cast<unsigned>(x / kBlock);
+        return std::span(index.near).subspan(index.begin[block],
+                                             index.begin[block + 1] - index.begin[block]);
+    }
     /// Whether the object is at a pixel that no rectangle shows: another view gives its distance.
     [[nodiscard]] bool objectOutside(std::size_t view, int x, int y) const {
         const auto& bits = data_->index[view].outside;
@@ -117,6 +125,11 @@ class PageSet {
         const std::size_t i = static_cast<std::size_t>(y) * data_->views[view].camera.width +
                               static_cast<unsigned>(x);
         return bits[i / 64] >> (i % 64) & 1;
+    }
+
+    /// Those marks of a whole view, a bit for each pixel, row by row; empty when none is set.
+    [[nodiscard]] std::span<const std::uint64_t> outside(std::size_t view) const {
+        return data_->index[view].outside;
     }
 
     // ---- Single pixels of a view; slow ways for what is not worth a loop over rectangles. ----
@@ -171,12 +184,9 @@ inline const PageRectangle* PageSet::find(std::size_t view, int x0, int y0, int 
     const PageView& v = data_->views[view];
     const PageRectangle* all = data_->rectangles.data();
     if (v.whole) return all + v.firstRectangle;
-    const ViewIndex& index = data_->index[view];
-    const std::size_t block =
-        static_cast<std::size_t>(y0 / kBlock) * index.blocksX + static_cast<unsigned>(x0 / kBlock);
-    for (std::uint32_t i = index.begin[block]; i < index.begin[block + 1]; ++i) {
-        const PageRectangle& r = all[index.near[i]];
-        const int padding = data_->padding;
+    const int padding = data_->padding;
+    for (const std::uint32_t number : near(view, x0, y0)) {
+        const PageRectangle& r = all[number];
         if (x0 >= r.x0 - padding && y0 >= r.y0 - padding && x1 < r.x1 + padding &&
             y1 < r.y1 + padding)
             return &r;

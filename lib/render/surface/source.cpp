@@ -19,66 +19,146 @@ constexpr float kPlanarPixels = 0.08f;
 bool linked(const DepthAxis& axis, float codeStep, float a, float b, float c, float d) {
     if (!(b > 0.0f && c > 0.0f)) return false;
     const float step = c - b, size = std::abs(step);
-    const float whole = axis.whole(std::max(b, c));
-    if (size < kLinkAlways * whole + 1.5f * codeStep * axis.perUnit(std::max(b, c))) return true;
-    if (size >= kLinkNever * whole) return false;
+    const float scale = axis.relativeScale(std::max(b, c));
+    if (size < kLinkAlways * scale + 1.5f * codeStep * axis.qPerUnit(std::max(b, c))) return true;
+    if (size >= kLinkNever * scale) return false;
     const float agree = 0.5f * size;
     return (a > 0.0f && std::abs(step - (b - a)) < agree) ||
            (d > 0.0f && std::abs(step - (d - c)) < agree);
 }
 
-double farthestPoint(const ReferenceView& view) {
+/// A view while it is prepared: its pixels side by side, wherever they are kept.
+struct Draft {
+    Image<float> q;               ///< see PreparedPage
+    Image<std::uint8_t> info;     ///< see PreparedPage
+    Image<std::uint8_t> covered;  ///< 1 = full alpha
+
+    [[nodiscard]] bool linkRight(int x, int y) const { return info.at(x, y) & Info::kLinkRight; }
+    [[nodiscard]] bool linkDown(int x, int y) const { return info.at(x, y) & Info::kLinkDown; }
+    [[nodiscard]] int edgeDistance(int x, int y) const { return info.at(x, y) >> 4; }
+    [[nodiscard]] bool pruned(int x, int y) const { return q.at(x, y) < 0.0f; }
+};
+
+double farthestPoint(const PageSet& set, std::size_t view) {
     double farthest = 0.0;
-    for (const float dist : view.depth.pixels())
-        if (hasPoint(dist)) farthest = std::max(farthest, static_cast<double>(dist));
+    for (const PageRectangle& r : set.rectanglesOf(view)) {
+        const Image<float>& depth = *set.pages()[static_cast<std::size_t>(r.page)].depth;
+        for (int y = r.pageY; y < r.pageY + r.height; ++y)
+            for (const float dist : depth.row(y).subspan(static_cast<std::size_t>(r.pageX),
+                                                         static_cast<std::size_t>(r.width)))
+                if (hasPoint(dist)) farthest = std::max(farthest, static_cast<double>(dist));
+    }
     return farthest;
 }
 
-void findLinks(Source& s) {
+/// Calls visit(x, y, texel) for the pixels of a rectangle and `around` more on each side, as far as
+/// the view goes, rows on several threads.
+template <class Visit>
+void forEachPixel(const Source& s, const PageRectangle& r, int around, const Visit& visit) {
+    const int x0 = std::max(r.x0 - around, 0), x1 = std::min(r.x1 + around, s.width);
+    const int y0 = std::max(r.y0 - around, 0), y1 = std::min(r.y1 + around, s.height);
+    parallelForBlocks(y0, y1, 32, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y)
+            for (int x = x0; x < x1; ++x) visit(x, y, r.texel(x, y));
+    });
+}
+
+Draft draftOf(const Source& s) {
+    const bool pruned = s.view->pruned;
+    Draft d{Image<float>(s.width, s.height, 0.0f), Image<std::uint8_t>(s.width, s.height),
+            Image<std::uint8_t>(s.width, s.height, 0)};
+    const auto mark = [&](int x, int y, bool covered) {
+        d.covered.at(x, y) = covered ? 1 : 0;
+        d.q.at(x, y) = covered && pruned ? -1.0f : 0.0f;
+    };
+    const auto rectangles = s.set->rectanglesOf(s.number);
+    if (!s.whole) {
+        parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
+            for (int y = static_cast<int>(from); y < to; ++y)
+                for (int x = 0; x < s.width; ++x) mark(x, y, s.set->objectOutside(s.number, x, y));
+        });
+        for (const PageRectangle& r : rectangles) {
+            const Texture& texture = *s.pages[r.page].texture;
+            forEachPixel(s, r, PageSet::kPadding, [&](int x, int y, std::size_t texel) {
+                mark(x, y, PageSet::alphaOf(texture, texel) >= 1.0f);
+            });
+        }
+    }
+    for (const PageRectangle& r : rectangles) {
+        const Texture& texture = *s.pages[r.page].texture;
+        const Image<float>& depth = *s.set->pages()[static_cast<std::size_t>(r.page)].depth;
+        forEachPixel(s, r, 0, [&](int x, int y, std::size_t texel) {
+            mark(x, y, PageSet::alphaOf(texture, texel) >= 1.0f);
+            const float dist = depth.data()[texel];
+            if (hasPoint(dist) && dist > 0.0f)
+                d.q.at(x, y) = static_cast<float>(s.space.axis.q(dist));
+        });
+    }
+    return d;
+}
+
+/// Puts the draft where the pixels of the view are kept.
+void keep(Source& s, Draft&& d, std::vector<PreparedPage>& pages) {
+    if (s.whole) {
+        PreparedPage& page = pages[static_cast<std::size_t>(s.whole - s.pages)];
+        page.q = std::move(d.q);
+        page.info = std::move(d.info);
+        return;
+    }
+    for (const PageRectangle& r : s.set->rectanglesOf(s.number)) {
+        PreparedPage& page = pages[static_cast<std::size_t>(r.page)];
+        forEachPixel(s, r, PageSet::kPadding, [&](int x, int y, std::size_t texel) {
+            page.q.data()[texel] = d.q.at(x, y);
+            page.info.data()[texel] = d.info.at(x, y);
+        });
+    }
+}
+
+void findLinks(const Source& s, Draft& d) {
     const DepthAxis axis = s.space.axis;
     parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < s.width; ++x) {
                 std::uint8_t bits = 0;
                 const auto at = [&](int nx, int ny) {
-                    return s.q.contains(nx, ny) ? s.q.at(nx, ny) : 0.0f;
+                    return d.q.contains(nx, ny) ? d.q.at(nx, ny) : 0.0f;
                 };
-                const float q = s.q.at(x, y);
+                const float q = d.q.at(x, y);
                 if (linked(axis, s.step, at(x - 1, y), q, at(x + 1, y), at(x + 2, y)))
-                    bits |= Source::kLinkRight;
+                    bits |= Info::kLinkRight;
                 if (linked(axis, s.step, at(x, y - 1), q, at(x, y + 1), at(x, y + 2)))
-                    bits |= Source::kLinkDown;
+                    bits |= Info::kLinkDown;
                 const auto empty = [&](int nx, int ny) {
-                    return s.q.contains(nx, ny) && s.q.at(nx, ny) == 0.0f;
+                    return d.q.contains(nx, ny) && d.q.at(nx, ny) == 0.0f;
                 };
-                if (s.q.at(x, y) > 0.0f &&
+                if (d.q.at(x, y) > 0.0f &&
                     (empty(x - 1, y) || empty(x + 1, y) || empty(x, y - 1) || empty(x, y + 1)))
-                    bits |= Source::kBesideBackground;
-                s.info.at(x, y) = bits;
+                    bits |= Info::kBesideBackground;
+                d.info.at(x, y) = bits;
             }
         }
     });
 }
 
 /// Fills the block's edge masks and the distances to edges.
-void findEdges(Source& s) {
+void findEdges(Source& s, Draft& d) {
     Image<std::uint8_t> distance(s.width, s.height, kFarFromEdge);
     parallelForBlocks(0, s.blocksY, 1, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from) * kBlock; y < std::min<int>(to * kBlock, s.height);
              ++y) {
             for (int x = 0; x < s.width; ++x) {
-                const bool point = s.q.at(x, y) > 0.0f;
-                const bool all = point && s.linkRight(x, y) && s.linkDown(x, y) && x > 0 && y > 0 &&
-                                 s.linkRight(x - 1, y) && s.linkDown(x, y - 1);
-                if (all && (!s.hasAlpha || s.alpha(x, y) >= 1.0f)) continue;
+                const bool point = d.q.at(x, y) > 0.0f;
+                const bool all = point && d.linkRight(x, y) && d.linkDown(x, y) && x > 0 && y > 0 &&
+                                 d.linkRight(x - 1, y) && d.linkDown(x, y - 1);
+                if (all && (!s.hasAlpha || d.covered.at(x, y))) continue;
                 // Where pruning took the neighbour away the surface goes on: that is the border of
-                // what is told, but no edge.
+                // what has depth, but no edge.
                 const bool goesOn = point && x > 0 && y > 0 && x + 1 < s.width &&
-                                    y + 1 < s.height && (s.linkRight(x, y) || s.pruned(x + 1, y)) &&
-                                    (s.linkDown(x, y) || s.pruned(x, y + 1)) &&
-                                    (s.linkRight(x - 1, y) || s.pruned(x - 1, y)) &&
-                                    (s.linkDown(x, y - 1) || s.pruned(x, y - 1));
-                if (!s.pruned(x, y) && !(goesOn && (!s.hasAlpha || s.alpha(x, y) >= 1.0f)))
+                                    y + 1 < s.height && (d.linkRight(x, y) || d.pruned(x + 1, y)) &&
+                                    (d.linkDown(x, y) || d.pruned(x, y + 1)) &&
+                                    (d.linkRight(x - 1, y) || d.pruned(x - 1, y)) &&
+                                    (d.linkDown(x, y - 1) || d.pruned(x, y - 1));
+                if (!d.pruned(x, y) && !(goesOn && (!s.hasAlpha || d.covered.at(x, y))))
                     distance.at(x, y) = 0;
                 if (!point || all) continue;
                 auto& block =
@@ -113,25 +193,26 @@ void findEdges(Source& s) {
         });
     }
     for (std::size_t i = 0; i < distance.count(); ++i)
-        s.info.data()[i] |= static_cast<std::uint8_t>(distance.data()[i] << 4);
+        d.info.data()[i] |= static_cast<std::uint8_t>(distance.data()[i] << 4);
 }
 
 /// The least-squares plane of (size+1)² pixels, when no pixel leaves it by more than `tolerance`.
-bool fitPlane(const Source& s, int x0, int y0, int size, float tolerance, Leaf& leaf) {
+bool fitPlane(const Source& s, const Draft& d, int x0, int y0, int size, float tolerance,
+              Leaf& leaf) {
     const int n = size + 1;
     for (int y = y0; y <= y0 + size; ++y)
         for (int x = x0; x <= x0 + size; ++x)
-            if (s.edgeDistance(x, y) < 3) return false;
-    const float anchor = s.q.at(x0, y0);
+            if (d.edgeDistance(x, y) < 3) return false;
+    const float anchor = d.q.at(x0, y0);
     float sum = 0, sumX = 0, sumY = 0;
     const float half = static_cast<float>(size) * 0.5f;
     for (int y = 0; y < n; ++y) {
-        const float* row = &s.q.at(x0, y0 + y);
+        const float* row = &d.q.at(x0, y0 + y);
         for (int x = 0; x < n; ++x) {
-            const float d = row[x] - anchor;
-            sum += d;
-            sumX += d * (static_cast<float>(x) - half);
-            sumY += d * (static_cast<float>(y) - half);
+            const float above = row[x] - anchor;
+            sum += above;
+            sumX += above * (static_cast<float>(x) - half);
+            sumY += above * (static_cast<float>(y) - half);
         }
     }
     const float spread =
@@ -142,9 +223,9 @@ bool fitPlane(const Source& s, int x0, int y0, int size, float tolerance, Leaf& 
     leaf.qx = sumX / spread;
     leaf.qy = sumY / spread;
     leaf.q0 = anchor + sum / static_cast<float>(n * n) - half * (leaf.qx + leaf.qy);
-    const float limit = tolerance * s.space.axis.whole(anchor);
+    const float limit = tolerance * s.space.axis.relativeScale(anchor);
     for (int y = 0; y < n; ++y) {
-        const float* row = &s.q.at(x0, y0 + y);
+        const float* row = &d.q.at(x0, y0 + y);
         for (int x = 0; x < n; ++x) {
             const float on =
                 leaf.q0 + leaf.qx * static_cast<float>(x) + leaf.qy * static_cast<float>(y);
@@ -154,42 +235,42 @@ bool fitPlane(const Source& s, int x0, int y0, int size, float tolerance, Leaf& 
     return true;
 }
 
-void divide(const Source& s, int x, int y, int size, float tolerance, SourceBlock& block,
-            std::vector<Leaf>& leaves) {
+void divide(const Source& s, const Draft& d, int x, int y, int size, float tolerance,
+            SourceBlock& block, std::vector<Leaf>& leaves) {
     if (x >= s.width - 1 || y >= s.height - 1) return;
     if (size > 1 && x + size < s.width && y + size < s.height) {
         Leaf leaf;
-        if (fitPlane(s, x, y, size, tolerance, leaf)) {
+        if (fitPlane(s, d, x, y, size, tolerance, leaf)) {
             leaves.push_back(leaf);
             return;
         }
     }
     if (size > 1) {
         const int h = size / 2;
-        divide(s, x, y, h, tolerance, block, leaves);
-        divide(s, x + h, y, h, tolerance, block, leaves);
-        divide(s, x, y + h, h, tolerance, block, leaves);
-        divide(s, x + h, y + h, h, tolerance, block, leaves);
+        divide(s, d, x, y, h, tolerance, block, leaves);
+        divide(s, d, x + h, y, h, tolerance, block, leaves);
+        divide(s, d, x, y + h, h, tolerance, block, leaves);
+        divide(s, d, x + h, y + h, h, tolerance, block, leaves);
         return;
     }
     const int links =
-        s.linkRight(x, y) + s.linkDown(x, y) + s.linkRight(x, y + 1) + s.linkDown(x + 1, y);
+        d.linkRight(x, y) + d.linkDown(x, y) + d.linkRight(x, y + 1) + d.linkDown(x + 1, y);
     if (links < 2) return;
     block.cells[y % kBlock] |= static_cast<std::uint16_t>(1u << (x % kBlock));
     block.anyCell = true;
 }
 
 /// How far the code of the depth makes planes uneven: the median second difference, relative.
-float unevenness(const Source& s) {
+float unevenness(const Source& s, const Draft& d) {
     std::vector<float> values;
     const int step = std::max(1, s.height / 64);
     for (int y = step / 2; y < s.height; y += step) {
         for (int x = 1; x + 1 < s.width; x += 3) {
-            if (s.edgeDistance(x, y) < 3) continue;
-            const float q = s.q.at(x, y);
-            if (!(q > 0 && s.q.at(x - 1, y) > 0 && s.q.at(x + 1, y) > 0)) continue;
-            values.push_back(std::abs(s.q.at(x - 1, y) - 2 * q + s.q.at(x + 1, y)) /
-                             s.space.axis.whole(q));
+            if (d.edgeDistance(x, y) < 3) continue;
+            const float q = d.q.at(x, y);
+            if (!(q > 0 && d.q.at(x - 1, y) > 0 && d.q.at(x + 1, y) > 0)) continue;
+            values.push_back(std::abs(d.q.at(x - 1, y) - 2 * q + d.q.at(x + 1, y)) /
+                             s.space.axis.relativeScale(q));
         }
     }
     if (values.empty()) return 0.0f;
@@ -198,8 +279,8 @@ float unevenness(const Source& s) {
     return *middle;
 }
 
-void findLeaves(Source& s) {
-    s.noise = std::min(unevenness(s), 0.01f);
+void findLeaves(Source& s, const Draft& d) {
+    s.noise = std::min(unevenness(s, d), 0.01f);
     const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
     const double perPixel = 1.0 / (focal * (s.space.axis.inverse ? 1.0 : s.space.axis.unit));
     s.flat = static_cast<float>(
@@ -213,7 +294,7 @@ void findLeaves(Source& s) {
             float low = std::numeric_limits<float>::max(), high = 0;
             for (int y = y0; y <= std::min(y0 + kBlock, s.height - 1); ++y) {
                 for (int x = x0; x <= std::min(x0 + kBlock, s.width - 1); ++x) {
-                    const float q = s.q.at(x, y);
+                    const float q = d.q.at(x, y);
                     if (!(q > 0)) continue;
                     low = std::min(low, q);
                     high = std::max(high, q);
@@ -223,7 +304,7 @@ void findLeaves(Source& s) {
             block.qMin = low;
             block.qMax = high;
             block.leafBegin = static_cast<std::uint32_t>(leaves.size());
-            divide(s, x0, y0, kBlock, s.flat, block, leaves);
+            divide(s, d, x0, y0, kBlock, s.flat, block, leaves);
             block.leafEnd = static_cast<std::uint32_t>(leaves.size());
         }
     });
@@ -239,16 +320,34 @@ void findLeaves(Source& s) {
     }
 }
 
-/// See Source::told.
-double toldShare(const Source& s) {
+/// See Source::validShare.
+double validShareOf(const Draft& d) {
     std::int64_t points = 0, object = 0;
-    for (int y = 0; y < s.height; ++y) {
-        for (int x = 0; x < s.width; ++x) {
-            points += s.q.at(x, y) > 0.0f;
-            object += s.q.at(x, y) > 0.0f || s.alpha(x, y) >= 1.0f;
-        }
+    for (std::size_t i = 0; i < d.q.count(); ++i) {
+        points += d.q.data()[i] > 0.0f;
+        object += d.q.data()[i] > 0.0f || d.covered.data()[i];
     }
     return object > 0 ? static_cast<double>(points) / static_cast<double>(object) : 1.0;
+}
+
+void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
+    const Camera& camera = s.view->camera;
+    s.width = camera.width;
+    s.height = camera.height;
+    s.space = PixelSpace(camera, farthestPoint(*s.set, s.number));
+    if (s.view->depthBits < 32) s.step = static_cast<float>(s.view->depthCode().step());
+    s.blocksX = (s.width + kBlock - 1) / kBlock;
+    s.blocksY = (s.height + kBlock - 1) / kBlock;
+    s.blocks.resize(static_cast<std::size_t>(s.blocksX) * s.blocksY);
+    Draft d = draftOf(s);
+    const auto& covered = d.covered;
+    s.hasAlpha = std::find(covered.data(), covered.data() + covered.count(), 0) !=
+                 covered.data() + covered.count();
+    s.validShare = validShareOf(d);
+    findLinks(s, d);
+    findEdges(s, d);
+    findLeaves(s, d);
+    keep(s, std::move(d), pages);
 }
 
 }  // namespace
@@ -297,64 +396,101 @@ Warp warpFrom(const glm::dmat4& m) {
     return w;
 }
 
-glm::vec2 Source::gradient(int x, int y) const {
-    const float here = q.at(x, y);
-    const auto choose = [](bool a, float da, bool b, float db) {
-        if (a && b) {
-            if (std::abs(da) < 0.5f * std::abs(db)) return da;
-            if (std::abs(db) < 0.5f * std::abs(da)) return db;
-            return 0.5f * (da + db);
-        }
-        return a ? da : b ? db : 0.0f;
-    };
-    const bool left = x > 0 && linkRight(x - 1, y), right = linkRight(x, y);
-    const bool up = y > 0 && linkDown(x, y - 1), down = linkDown(x, y);
-    return {
-        choose(left, left ? here - q.at(x - 1, y) : 0.0f, right,
-               right ? q.at(x + 1, y) - here : 0.0f),
-        choose(up, up ? here - q.at(x, y - 1) : 0.0f, down, down ? q.at(x, y + 1) - here : 0.0f)};
+Place Source::placeInRectangles(int x, int y) const {
+    const int x0 = std::max(x, 0), y0 = std::max(y, 0);
+    const int x1 = std::min(x + 1, width - 1), y1 = std::min(y + 1, height - 1);
+    // A pixel further around, so that gradients can be read where there are points; beyond that
+    // padding has none.
+    const PageRectangle* r = set->find(number, std::max(x0 - 1, 0), std::max(y0 - 1, 0),
+                                       std::min(x1 + 1, width - 1), std::min(y1 + 1, height - 1));
+    if (!r) r = set->find(number, x0, y0, x1, y1);
+    if (r) return {pages + r->page, r->first + x * r->stepX + y * r->stepY, r->stepX, r->stepY, 0};
+    Place none;
+    for (int j = y0; j <= y1; ++j)
+        for (int i = x0; i <= x1; ++i)
+            if (set->objectOutside(number, i, j)) none.outside |= 1u << (i - x + 2 * (j - y));
+    return none;
 }
 
-Source prepareSource(const ReferenceView& view) {
-    Source s;
-    s.view = &view;
-    s.width = view.depth.width();
-    s.height = view.depth.height();
-    s.space = PixelSpace(view.camera, farthestPoint(view));
-    if (view.depthBits < 32) s.step = static_cast<float>(view.depthCode().step());
-    s.q = Image<float>(s.width, s.height);
-    s.info = Image<std::uint8_t>(s.width, s.height);
-    s.blocksX = (s.width + kBlock - 1) / kBlock;
-    s.blocksY = (s.height + kBlock - 1) / kBlock;
-    s.blocks.resize(static_cast<std::size_t>(s.blocksX) * s.blocksY);
-    std::vector<char> rowHasAlpha(static_cast<std::size_t>(s.height), 0);
-    parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < s.width; ++x) {
-                const float dist = view.depth.at(x, y);
-                if (hasPoint(dist) && dist > 0.0f)
-                    s.q.at(x, y) = static_cast<float>(s.space.axis.q(dist));
-                else if (view.pruned && s.alpha(x, y) >= 1.0f)
-                    s.q.at(x, y) = -1.0f;
-                if (s.alpha(x, y) < 1.0f) rowHasAlpha[static_cast<std::size_t>(y)] = 1;
+TapPlace Source::tapsInRectangles(int x, int y) const {
+    const int x0 = std::max(x, 0), y0 = std::max(y, 0);
+    const int x1 = std::min(x + 3, width - 1), y1 = std::min(y + 3, height - 1);
+    const PageRectangle* r = set->find(number, x0, y0, x1, y1);
+    // Beside a rectangle only those of its padding; what lies beyond has no point.
+    if (!r)
+        r = set->find(number, std::clamp(x + 1, 0, width - 1), std::clamp(y + 1, 0, height - 1));
+    if (!r)
+        r = set->find(number, std::clamp(x + 2, 0, width - 1), std::clamp(y + 2, 0, height - 1));
+    if (!r) return {};
+    constexpr int kAround = PageSet::kPadding;
+    return {{pages + r->page, r->first + x * r->stepX + y * r->stepY, r->stepX, r->stepY, 0},
+            std::max(r->x0 - kAround, 0),
+            std::max(r->y0 - kAround, 0),
+            std::min(r->x1 + kAround, width),
+            std::min(r->y1 + kAround, height)};
+}
+
+SurfaceScene::SurfaceScene(const PageSet& pageSet) : set(pageSet) {
+    bool whole = true;
+    pages.resize(set.pages().size());
+    for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = set.pages()[i].texture;
+    sources.resize(set.views().size());
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        Source& s = sources[i];
+        s.view = &set.views()[i];
+        s.number = i;
+        s.set = &set;
+        s.pages = pages.data();
+        if (s.view->whole)
+            s.whole = pages.data() + set.rectanglesOf(i)[0].page;
+        else
+            whole = false;
+    }
+    if (whole) {
+        parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
+            prepareSource(sources[static_cast<std::size_t>(i)], pages);
+        });
+        return;
+    }
+    for (std::size_t i = 0; i < pages.size(); ++i) {
+        const Page& page = set.pages()[i];
+        pages[i].q = Image<float>(page.width(), page.height(), 0.0f);
+        pages[i].info = Image<std::uint8_t>(page.width(), page.height(), 0);
+    }
+    // One after the other: a draft takes the memory of a whole view.
+    for (Source& s : sources) prepareSource(s, pages);
+}
+
+BlockTexels blockTexels(const Source& s, int x0, int y0, BlockBuffer& buffer) {
+    if (s.whole) {
+        const std::size_t first = static_cast<std::size_t>(y0) * s.width + x0;
+        return {s.whole->q.data() + first, s.whole->info.data() + first, s.width};
+    }
+    constexpr int kSide = BlockBuffer::kSide;
+    buffer.q.fill(0.0f);
+    buffer.info.fill(0);
+    for (const std::uint32_t number : s.set->near(s.number, x0, y0)) {
+        const PageRectangle& r = s.set->rectangles()[number];
+        const PreparedPage& page = s.pages[r.page];
+        for (int y = std::max(r.y0, y0 - 1); y < std::min(r.y1, y0 + kBlock + 1); ++y) {
+            for (int x = std::max(r.x0, x0 - 1); x < std::min(r.x1, x0 + kBlock + 1); ++x) {
+                const std::size_t at = static_cast<std::size_t>((y - y0 + 1) * kSide + x - x0 + 1);
+                const std::size_t texel = r.texel(x, y);
+                buffer.q[at] = page.q.data()[texel];
+                buffer.info[at] = page.info.data()[texel];
             }
         }
-    });
-    s.hasAlpha = std::find(rowHasAlpha.begin(), rowHasAlpha.end(), 1) != rowHasAlpha.end();
-    s.told = toldShare(s);
-    findLinks(s);
-    findEdges(s);
-    findLeaves(s);
-    return s;
+    }
+    return {buffer.q.data() + kSide + 1, buffer.info.data() + kSide + 1, kSide};
 }
 
 double borderCoverage(const Source& s) {
     std::int64_t points = 0, all = 0;
     const auto count = [&](int x, int y) {
         ++all;
-        // Full alpha without a depth is a pixel whose distance is not told: it was pruned, or a
+        // Full alpha without a depth is a pixel whose distance is unknown: it was pruned, or a
         // sensor missed it. The scene goes on there all the same.
-        points += s.q.at(x, y) > 0.0f || s.alpha(x, y) >= 1.0f;
+        points += s.q(x, y) > 0.0f || s.alpha(x, y) >= 1.0f;
     };
     for (int x = 0; x < s.width; ++x) {
         count(x, 0);

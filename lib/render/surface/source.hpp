@@ -2,13 +2,15 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include <glm/glm.hpp>
 
 #include "lib/base/image.hpp"
 #include "lib/geometry/camera.hpp"
-#include "lib/model/reference_view.hpp"
+#include "lib/render/scene/page_set.hpp"
 #include "lib/render/surface/constants.hpp"
 
 namespace stx::surface {
@@ -25,9 +27,9 @@ struct DepthAxis {
     }
     [[nodiscard]] double dist(double q) const { return inverse ? 1.0 / q : origin - unit * q; }
     /// What a relative depth difference of 1 is in q: q itself, or 1 when orthographic.
-    [[nodiscard]] float whole(float q) const { return inverse ? q : 1.0f; }
+    [[nodiscard]] float relativeScale(float q) const { return inverse ? q : 1.0f; }
     /// How much q changes over one scene unit of distance.
-    [[nodiscard]] float perUnit(float q) const {
+    [[nodiscard]] float qPerUnit(float q) const {
         return inverse ? q * q : static_cast<float>(1.0 / unit);
     }
 };
@@ -57,7 +59,8 @@ struct PixelSpace {
 [[nodiscard]] Warp warpFrom(const glm::dmat4& m);
 
 /// Side of the blocks that sources are prepared in, pixels.
-inline constexpr int kBlock = 16;
+inline constexpr int kBlock = kSourceBlock;
+static_assert(kBlock == PageSet::kBlock);
 /// Edge distances are counted up to this.
 inline constexpr int kFarFromEdge = 4;
 
@@ -76,42 +79,174 @@ struct SourceBlock {
     bool anyCell = false, anyEdge = false;
 };
 
-/// One reference view prepared for warping: links between neighbours, edges, planar pieces.
-/// Refers to the view, which must outlive it.
+/// Bits of PreparedPage::info; the distance to the nearest edge is above them, from bit 4 on.
+struct Info {
+    static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4;
+};
+
+/// What surface mode knows of each texel of a page.
+struct PreparedPage {
+    /// 0 = nothing here; below 0 = pruned: the object is here, other sources give its distance.
+    Image<float> q;
+    Image<std::uint8_t> info;
+    const Texture* texture = nullptr;
+};
+
+/// Where neighbouring pixels of a source are kept: those of one rectangle, or of none.
+struct Place {
+    const PreparedPage* page = nullptr;              ///< null: no rectangle shows them
+    std::ptrdiff_t first = 0, stepX = 1, stepY = 0;  ///< texel of (i, j): first + i stepX + j stepY
+    unsigned outside = 0;  ///< of no rectangle: bit i + 2 j says that the object is at (i, j)
+
+    [[nodiscard]] std::size_t texel(int i, int j) const {
+        return static_cast<std::size_t>(first + i * stepX + j * stepY);
+    }
+};
+
+/// Where the 4x4 pixels around a point are kept, and which of them: those of the source from
+/// (x0, y0) to (x1, y1), one past the last.
+struct TapPlace : Place {
+    int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+/// One reference view prepared for warping: links between neighbours, edges, planar pieces. Its
+/// pixels are in the prepared pages.
 struct Source {
-    const ReferenceView* view = nullptr;
+    const PageView* view = nullptr;
+    std::size_t number = 0;  ///< of the view
     PixelSpace space;
     int width = 0, height = 0;
     bool hasAlpha = false;  ///< some pixel is not fully covered
     float freeAlpha = kFreeAlpha;
-    float step = 0;     ///< scene units between neighbouring depth codes
-    double told = 1.0;  ///< share of the pixels of the object (points, or full alpha) with depth
-    float noise = 0;    ///< how far, as a share of q, pixels stray from their neighbours
-    float flat = 0;     ///< share of q by which pixels may leave the plane of a piece
-    /// 0 = nothing here; below 0 = pruned: the object is here, other sources tell its distance.
-    Image<float> q;
-
-    static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4;
-    Image<std::uint8_t> info;  ///< the links, and the distance to the nearest edge << 4
+    float step = 0;           ///< scene units between neighbouring depth codes
+    double validShare = 1.0;  ///< of the pixels of the object (points, or full alpha): with depth
+    float noise = 0;          ///< how far, as a share of q, pixels stray from their neighbours
+    float flat = 0;           ///< share of q by which pixels may leave the plane of a piece
+    /// The page that holds nothing but this view, upright; null when it is in rectangles.
+    const PreparedPage* whole = nullptr;
 
     int blocksX = 0, blocksY = 0;
     std::vector<SourceBlock> blocks;
     std::vector<Leaf> leaves;
 
-    [[nodiscard]] int edgeDistance(int x, int y) const { return info.at(x, y) >> 4; }
-    [[nodiscard]] bool linkRight(int x, int y) const { return info.at(x, y) & kLinkRight; }
-    [[nodiscard]] bool linkDown(int x, int y) const { return info.at(x, y) & kLinkDown; }
-    [[nodiscard]] bool pruned(int x, int y) const { return q.at(x, y) < 0.0f; }
-    /// Alpha 0..1 of a pixel.
-    [[nodiscard]] float alpha(int x, int y) const {
-        if (const auto* i = view->texture.rgba8()) return i->at(x, y).a * (1.0f / 255.0f);
-        return view->texture.rgbaFloat()->at(x, y).a;
+    const PageSet* set = nullptr;
+    const PreparedPage* pages = nullptr;  ///< by number
+
+    /// Where the pixels (x, y) to (x + 1, y + 1) and, when they have points, their neighbours are.
+    /// Pixels outside of the source must not be read.
+    [[nodiscard]] Place placeOf(int x, int y) const {
+        if (whole) return {whole, static_cast<std::ptrdiff_t>(y) * width + x, 1, width, 0};
+        return placeInRectangles(x, y);
     }
-    /// dq/dx and dq/dy on the surface of a pixel, from its linked neighbours.
-    [[nodiscard]] glm::vec2 gradient(int x, int y) const;
+    /// Where the pixels (x, y) to (x + 3, y + 3) are: taps around a point among the middle four.
+    /// Pixels that cannot be read have no point.
+    [[nodiscard]] TapPlace tapPlaceOf(int x, int y) const {
+        if (whole) return {placeOf(x, y), 0, 0, width, height};
+        return tapsInRectangles(x, y);
+    }
+    [[nodiscard]] float qAt(const Place& p, int i, int j) const {
+        if (p.page) return p.page->q.data()[p.texel(i, j)];
+        return view->pruned && (p.outside >> (i + 2 * j) & 1) ? -1.0f : 0.0f;
+    }
+    [[nodiscard]] int infoAt(const Place& p, int i, int j) const {
+        return p.page ? p.page->info.data()[p.texel(i, j)] : 0;
+    }
+    /// Alpha 0..1.
+    [[nodiscard]] float alphaAt(const Place& p, int i, int j) const {
+        if (p.page) return PageSet::alphaOf(*p.page->texture, p.texel(i, j));
+        return p.outside >> (i + 2 * j) & 1 ? 1.0f : 0.0f;
+    }
+    /// dq/dx and dq/dy on the surface of pixel (x, y) = (i, j) of the place, which must have a
+    /// point, from its linked neighbours.
+    [[nodiscard]] glm::vec2 gradientAt(const Place& p, int i, int j, int x, int y) const;
+
+    // ---- Single pixels. ----
+    [[nodiscard]] bool contains(int x, int y) const {
+        return x >= 0 && y >= 0 && x < width && y < height;
+    }
+    [[nodiscard]] float q(int x, int y) const { return qAt(placeOf(x, y), 0, 0); }
+    [[nodiscard]] float alpha(int x, int y) const { return alphaAt(placeOf(x, y), 0, 0); }
+    /// Straight RGBA; black where no rectangle shows the pixel.
+    [[nodiscard]] glm::vec4 colour(int x, int y) const {
+        const Place p = placeOf(x, y);
+        return p.page ? p.page->texture->at(p.texel(0, 0)) : glm::vec4(0.0f);
+    }
+    [[nodiscard]] int edgeDistance(int x, int y) const { return infoAt(placeOf(x, y), 0, 0) >> 4; }
+    [[nodiscard]] bool linkRight(int x, int y) const {
+        return infoAt(placeOf(x, y), 0, 0) & Info::kLinkRight;
+    }
+    [[nodiscard]] bool linkDown(int x, int y) const {
+        return infoAt(placeOf(x, y), 0, 0) & Info::kLinkDown;
+    }
+    [[nodiscard]] glm::vec2 gradient(int x, int y) const {
+        return gradientAt(placeOf(x, y), 0, 0, x, y);
+    }
+
+  private:
+    [[nodiscard]] Place placeInRectangles(int x, int y) const;
+    [[nodiscard]] TapPlace tapsInRectangles(int x, int y) const;
 };
 
-[[nodiscard]] Source prepareSource(const ReferenceView& view);
+/// The slope out of the differences to both sides, where there are any: the smaller when it is
+/// under half of the other, which then crosses a crease, else their mean.
+[[nodiscard]] inline float chooseSlope(bool hasA, float a, bool hasB, float b) {
+    if (hasA && hasB) {
+        if (std::abs(a) < 0.5f * std::abs(b)) return a;
+        if (std::abs(b) < 0.5f * std::abs(a)) return b;
+        return 0.5f * (a + b);
+    }
+    return hasA ? a : hasB ? b : 0.0f;
+}
+
+/// The gradient from q and info of a pixel and its neighbours: `q` and `info` point at the pixel.
+[[nodiscard]] inline glm::vec2 gradientFrom(const float* q, const std::uint8_t* info,
+                                            std::ptrdiff_t stepX, std::ptrdiff_t stepY,
+                                            bool hasLeft, bool hasAbove) {
+    const float here = *q;
+    const bool left = hasLeft && (info[-stepX] & Info::kLinkRight),
+               right = *info & Info::kLinkRight;
+    const bool above = hasAbove && (info[-stepY] & Info::kLinkDown),
+               below = *info & Info::kLinkDown;
+    return {
+        chooseSlope(left, left ? here - q[-stepX] : 0.0f, right, right ? q[stepX] - here : 0.0f),
+        chooseSlope(above, above ? here - q[-stepY] : 0.0f, below, below ? q[stepY] - here : 0.0f)};
+}
+
+inline glm::vec2 Source::gradientAt(const Place& p, int i, int j, int x, int y) const {
+    const std::size_t texel = p.texel(i, j);
+    return gradientFrom(p.page->q.data() + texel, p.page->info.data() + texel, p.stepX, p.stepY,
+                        x > 0, y > 0);
+}
+
+/// All views of a PageSet prepared. Not to be moved: its parts point at each other.
+struct SurfaceScene {
+    PageSet set;
+    std::vector<PreparedPage> pages;
+    std::vector<Source> sources;
+
+    explicit SurfaceScene(const PageSet& pageSet);
+    SurfaceScene(const SurfaceScene&) = delete;
+    SurfaceScene& operator=(const SurfaceScene&) = delete;
+};
+
+/// q and info of a block of a source and one pixel around it, row by row.
+struct BlockTexels {
+    const float* q = nullptr;  ///< at the block's first pixel
+    const std::uint8_t* info = nullptr;
+    std::ptrdiff_t stride = 0;
+
+    /// Of the block's pixel (i, j), -1..kBlock.
+    [[nodiscard]] std::ptrdiff_t at(int i, int j) const { return j * stride + i; }
+};
+/// Room for the texels of a block that lies in several rectangles.
+struct BlockBuffer {
+    static constexpr int kSide = kBlock + 2;
+    std::array<float, kSide * kSide> q;
+    std::array<std::uint8_t, kSide * kSide> info;
+};
+/// The texels of the block whose first pixel is (x0, y0). Pixels outside of the source must not be
+/// read.
+[[nodiscard]] BlockTexels blockTexels(const Source& source, int x0, int y0, BlockBuffer& buffer);
 
 /// Share of the image border where the view has points or full alpha: near 1 in scenes that fill
 /// the frame.

@@ -10,7 +10,7 @@
 
 #include "formats/files/files.hpp"
 #include "formats/images/images.hpp"
-#include "lib/render/surface/surface_renderer.hpp"
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx {

@@ -7,7 +7,7 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/packing/packing.hpp"
-#include "lib/render/surface/surface_renderer.hpp"
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/torus_bundle.hpp"
 #include "tests/unit/packing/holes.hpp"

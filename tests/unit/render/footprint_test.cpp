@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/render/splat/cpu/cpu_splat.hpp"
-#include "lib/render/surface/surface_renderer.hpp"
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 
 namespace stx {

@@ -1,4 +1,4 @@
-#include "lib/render/surface/surface_renderer.hpp"
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 
 #include <cmath>
 #include <functional>

@@ -28,7 +28,7 @@ std::uint32_t tileOf(int x, int y) {
 
 FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, const Camera& novel,
                          int margin) {
-    FrameUniforms u;
+    FrameUniforms u{};
     u.frameSize = {novel.width, novel.height, novel.width + 2, margin};
     u.counts = {static_cast<int>(scene.rectangles.size()), 0, 0, 0};
     u.novelLens = {1.0 / novel.fx, 1.0 / novel.fy, novel.cx, novel.cy};

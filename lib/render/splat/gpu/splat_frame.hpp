@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include <glm/glm.hpp>
@@ -7,41 +8,29 @@
 #include "lib/geometry/camera.hpp"
 #include "lib/render/renderer.hpp"
 #include "lib/render/splat/gpu/gpu_scene.hpp"
+#include "shaders/shared/language.hpp"
 
 namespace stx::gpu {
 
-/// FrameBlock of shaders/splat/splat_frame.glsl (std140).
-struct FrameUniforms {
-    glm::ivec4 frameSize{0};
-    glm::ivec4 counts{0};
-    glm::vec4 novelLens{0};
-    glm::vec4 novelAxisX{0}, novelAxisY{0}, novelAxisZ{0}, novelPosition{0};
-    glm::vec4 scales{0};
-    glm::vec4 ambient{0}, specular{0};
-};
+/// The structs of splat mode's buffers, one definition for C++ and the shaders.
+namespace buffers {
+using namespace glsl;
+#include "shaders/shared/splat_structs.glsl"
+}  // namespace buffers
+using buffers::FrameUniforms;
+using buffers::LightEntry;
+using buffers::TaskEntry;
+using buffers::ViewEntry;
 
-/// View of shaders/splat/splat_frame.glsl (std430).
-struct ViewEntry {
-    glm::vec4 a0, au, av, b0, bu, bv;
-};
-
-/// Task of shaders/splat/splat_points.glsl (std430): a block to be drawn in this frame.
-struct TaskEntry {
-    std::uint32_t uv, count, atlasXY, viewLayer;
-    float slopeX, slopeY, core2, tolerance, quality;
-    float uAcross, vAcross, uDown, vDown;
-    std::uint32_t tilesFrom, tilesTo;  ///< tiles of kCullTile pixels that it may touch
-    float nearest;                     ///< splat::BlockTask::nearest
-};
-
-/// PhongLight of shaders/shared/phong.glsl (std430).
-struct LightEntry {
-    glm::vec4 vector, colour;
-};
+// As std140 and std430 lay them out, and as texture buffers of four numbers take them.
+static_assert(sizeof(FrameUniforms) == 10 * 16 && offsetof(FrameUniforms, specular) == 9 * 16);
+static_assert(sizeof(ViewEntry) == 6 * 16 && sizeof(LightEntry) == 2 * 16);
+static_assert(offsetof(TaskEntry, slopeX) == 16 && offsetof(TaskEntry, quality) == 32 &&
+              offsetof(TaskEntry, vDown) == 48 && sizeof(TaskEntry) == 64);
 
 /// All that a frame needs beside the scene: computed on the CPU, uploaded once a frame.
 struct SplatFrame {
-    FrameUniforms uniforms;
+    FrameUniforms uniforms{};
     std::vector<ViewEntry> views;
     /// Blocks of small splats that share a tilt; then blocks of small ones; then all others.
     std::vector<TaskEntry> tasks;

@@ -1,35 +1,9 @@
 #include "lib/render/splat/gpu/splat_shaders.hpp"
 
-#include <array>
-
 #include "embedded_shaders.hpp"
-#include "lib/render/splat/constants.hpp"
 #include "lib/render/splat/prepared.hpp"
 
 namespace stx::gpu {
-namespace {
-
-std::string splatConstants() {
-    using namespace splat;
-    const std::array constants{ShaderConstant{"kNearest", kNearest},
-                               ShaderConstant{"kSlopeScale", kSlopeScale},
-                               ShaderConstant{"kSigmaSource", kSigmaSource},
-                               ShaderConstant{"kSigmaPixel", kSigmaPixel},
-                               ShaderConstant{"kReach2", kReach2},
-                               ShaderConstant{"kCore2", kCore2},
-                               ShaderConstant{"kLargest", kLargest},
-                               ShaderConstant{"kSteepestPlane", kSteepestPlane},
-                               ShaderConstant{"kRimCore2", kRimCore2},
-                               ShaderConstant{"kEdgeQuality", kEdgeQuality},
-                               ShaderConstant{"kSmallCover2", kSmallCover2},
-                               ShaderConstant{"kLeastDensity", kLeastDensity},
-                               ShaderConstant{"kGradient", kGradient},
-                               ShaderConstant{"kFadeTo", kFadeTo}};
-    return shaderConstants(constants);
-}
-
-}  // namespace
-
 std::string splatHeader(const SplatVariant& v, int pass, Rule rule) {
     // The raster pipeline is for devices without compute shaders: OpenGL 3.3 has all it needs.
     std::string text = v.raster ? "#version 330 core\n" : "#version 450 core\n";
@@ -53,35 +27,31 @@ std::string splatHeader(const SplatVariant& v, int pass, Rule rule) {
     define("LINEAR", v.linear);
     define("CULL", v.cull);
     define("TILE", kCullTile);
-    return text + splatConstants();
+    return text + fmt::format("const float kSlopeScale = {:.9e};\n", splat::kSlopeScale);
 }
 
 std::vector<ShaderStage> splatStages(bool raster, SplatProgram program) {
     using namespace shaders;
-    const auto compute = [](std::string_view name, std::vector<std::string_view> pieces) {
-        return std::vector<ShaderStage>{{GL_COMPUTE_SHADER, name, std::move(pieces)}};
+    const auto compute = [](std::string_view name, std::string_view text) {
+        return std::vector<ShaderStage>{{GL_COMPUTE_SHADER, name, {text}}};
     };
     if (raster && program == SplatProgram::splats)
-        return {
-            {GL_VERTEX_SHADER, "splat.vert", {splat_frame_glsl, splat_points_glsl, splat_vert}},
-            {GL_FRAGMENT_SHADER, "splat.frag", {splat_frame_glsl, splat_points_glsl, splat_frag}}};
+        return {{GL_VERTEX_SHADER, "splat.vert", {splat_vert}},
+                {GL_FRAGMENT_SHADER, "splat.frag", {splat_frag}}};
     if (raster)
         return {{GL_VERTEX_SHADER, "screen.vert", {screen_vert}},
-                {GL_FRAGMENT_SHADER,
-                 "resolve.frag",
-                 {splat_frame_glsl, phong_glsl, resolve_glsl, resolve_frag}}};
+                {GL_FRAGMENT_SHADER, "resolve.frag", {resolve_frag}}};
     switch (program) {
         case SplatProgram::splats:
-            return compute("splat.comp", {splat_frame_glsl, splat_points_glsl, splat_comp});
+            return compute("splat.comp", splat_comp);
         case SplatProgram::resolve:
-            return compute("resolve.comp",
-                           {splat_frame_glsl, phong_glsl, resolve_glsl, resolve_comp});
+            return compute("resolve.comp", resolve_comp);
         case SplatProgram::tiles:
-            return compute("splat_tiles.comp", {splat_frame_glsl, splat_tiles_comp});
+            return compute("splat_tiles.comp", splat_tiles_comp);
         case SplatProgram::cull:
             break;
     }
-    return compute("splat_cull.comp", {splat_frame_glsl, splat_points_glsl, splat_cull_comp});
+    return compute("splat_cull.comp", splat_cull_comp);
 }
 
 std::vector<ShaderText> allSplatShaders() {

@@ -5,15 +5,9 @@
 #include <vector>
 
 #include "lib/render/surface/cpu/raster.hpp"
+#include "lib/render/surface/votes.hpp"
 
 namespace stx::surface {
-
-/// A source as one tile uses it.
-struct LocalSource {
-    const Source* source = nullptr;
-    Warp sourceFromPixel;            ///< from frame pixel positions
-    const float* samples = nullptr;  ///< its own surface in this tile; null = it has none here
-};
 
 /// Parts of surfaces to shade, one per pixel and depth, as arrays of equal length.
 struct Pieces {
@@ -24,8 +18,7 @@ struct Pieces {
     std::vector<std::uint16_t> pixel;    ///< column + kTile * row in the tile
 
     void clear();
-    void add(float px, float py, float depth, float slopeX, float slopeY, float part,
-             std::uint32_t seenBy, int at);
+    void add(const Piece& piece);
     [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 

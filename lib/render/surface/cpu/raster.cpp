@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "lib/render/surface/constants.hpp"
+#include "lib/render/surface/cells.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lib/render/surface/cpu/raster.cpp"
@@ -134,8 +134,9 @@ HWY_INLINE void drawLeaf(const Target& t, const Warp& warp, const Leaf& leaf, fl
     fillPolygon<4, false>(t, v, grow, 0);
 }
 
+/// Draws the cells of a block, whose first pixel is (x0, y0).
 HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
-                            const SourceBlock& block, int x0, int y0) {
+                            const SourceBlock& block, const BlockTexels& texels, int x0, int y0) {
     constexpr int kSide = kBlock + 1;
     Vertex grid[kSide][kSide];
     const int xEnd = std::min(x0 + kBlock, s.width - 1), yEnd = std::min(y0 + kBlock, s.height - 1);
@@ -146,7 +147,7 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
     }
     for (int y = y0; y <= yEnd; ++y) {
         if (!needed[y - y0]) continue;
-        const float* q = &s.q.at(x0, y);
+        const float* q = texels.q + texels.at(0, y - y0);
         for (int x = 0; x <= xEnd - x0; ++x)
             grid[y - y0][x] = project(warp, static_cast<float>(x0 + x) + 0.5f,
                                       static_cast<float>(y) + 0.5f, q[x]);
@@ -154,65 +155,67 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
     for (int j = 0; j < kBlock; ++j) {
         for (std::uint32_t left = block.cells[j]; left; left &= left - 1) {
             const int i = __builtin_ctz(left);
-            const int x = x0 + i, y = y0 + j;
             const Vertex &v00 = grid[j][i], &v10 = grid[j][i + 1];
             const Vertex &v01 = grid[j + 1][i], &v11 = grid[j + 1][i + 1];
-            const bool top = s.linkRight(x, y), bottom = s.linkRight(x, y + 1);
-            const bool leftLink = s.linkDown(x, y), rightLink = s.linkDown(x + 1, y);
-            const int edge =
-                std::min(std::min(s.edgeDistance(x, y), s.edgeDistance(x + 1, y)),
-                         std::min(s.edgeDistance(x, y + 1), s.edgeDistance(x + 1, y + 1)));
-            const std::uint32_t bits = edge < 3 ? kNearEdgeBit : 0;
-            const int links = top + bottom + leftLink + rightLink;
-            if (links >= 3) {
-                const float q00 = s.q.at(x, y), q10 = s.q.at(x + 1, y);
-                const float q01 = s.q.at(x, y + 1), q11 = s.q.at(x + 1, y + 1);
-                if (links == 4 &&
-                    std::abs(q00 + q11 - q10 - q01) <= 2 * s.flat * s.space.axis.whole(q00)) {
+            const std::uint32_t bits = cellNearEdge(texels, i, j) ? kNearEdgeBit : 0;
+            const auto triangle = [&](const Vertex& a, const Vertex& b, const Vertex& c) HWY_ATTR {
+                const Vertex corners[3] = {a, b, c};
+                fillPolygon<3, false>(t, corners, kCrack, bits);
+            };
+            switch (cellShape(s, texels, i, j)) {
+                case kQuadCell: {
                     const Vertex quad[4] = {v00, v10, v11, v01};
                     fillPolygon<4, false>(t, quad, kCrack, bits);
-                } else if (std::abs(q00 - q11) < std::abs(q10 - q01)) {
-                    const Vertex a[3] = {v00, v10, v11}, b[3] = {v00, v11, v01};
-                    fillPolygon<3, false>(t, a, kCrack, bits);
-                    fillPolygon<3, false>(t, b, kCrack, bits);
-                } else {
-                    const Vertex a[3] = {v00, v10, v01}, b[3] = {v10, v11, v01};
-                    fillPolygon<3, false>(t, a, kCrack, bits);
-                    fillPolygon<3, false>(t, b, kCrack, bits);
+                    break;
                 }
-            } else if (top && leftLink) {
-                const Vertex a[3] = {v00, v10, v01};
-                fillPolygon<3, false>(t, a, kCrack, bits);
-            } else if (top && rightLink) {
-                const Vertex a[3] = {v10, v11, v00};
-                fillPolygon<3, false>(t, a, kCrack, bits);
-            } else if (bottom && rightLink) {
-                const Vertex a[3] = {v11, v01, v10};
-                fillPolygon<3, false>(t, a, kCrack, bits);
-            } else if (bottom && leftLink) {
-                const Vertex a[3] = {v01, v00, v11};
-                fillPolygon<3, false>(t, a, kCrack, bits);
+                case kFallingSplit:
+                    triangle(v00, v10, v11);
+                    triangle(v00, v11, v01);
+                    break;
+                case kRisingSplit:
+                    triangle(v00, v10, v01);
+                    triangle(v10, v11, v01);
+                    break;
+                case kUpperLeft:
+                    triangle(v00, v10, v01);
+                    break;
+                case kUpperRight:
+                    triangle(v10, v11, v00);
+                    break;
+                case kLowerRight:
+                    triangle(v11, v01, v10);
+                    break;
+                case kLowerLeft:
+                    triangle(v01, v00, v11);
+                    break;
+                default:
+                    break;
             }
         }
     }
 }
 
+/// Draws the squares around the edge pixels of a block, whose first pixel is (x0, y0).
 HWY_NOINLINE void drawExtensions(const Target& t, const Source& s, const Warp& warp,
-                                 const SourceBlock& block, int x0, int y0) {
+                                 const SourceBlock& block, const BlockTexels& texels, int x0,
+                                 int y0) {
     for (int j = 0; j < kBlock; ++j) {
         for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
-            const int x = x0 + __builtin_ctz(left), y = y0 + j;
+            const int i = __builtin_ctz(left);
+            const int x = x0 + i, y = y0 + j;
+            const float* at = texels.q + texels.at(i, j);
+            const std::uint8_t* info = texels.info + texels.at(i, j);
             const float half =
-                (s.info.at(x, y) & Source::kBesideBackground) ? kHalfBesideBackground : kHalfInside;
-            const float q = s.q.at(x, y);
-            const glm::vec2 g = s.gradient(x, y) * half;
-            const float reach = kExtensionReach * s.space.axis.whole(q);
-            const auto at = [&](float sx, float sy) {
+                (*info & Info::kBesideBackground) ? kHalfBesideBackground : kHalfInside;
+            const float q = *at;
+            const glm::vec2 g = gradientFrom(at, info, 1, texels.stride, x > 0, y > 0) * half;
+            const float reach = kExtensionReach * s.space.axis.relativeScale(q);
+            const auto corner = [&](float sx, float sy) {
                 const float dq = std::clamp(g.x * sx + g.y * sy, -reach, reach);
                 return project(warp, static_cast<float>(x) + 0.5f + sx * half,
                                static_cast<float>(y) + 0.5f + sy * half, q + dq);
             };
-            const Vertex v[4] = {at(-1, -1), at(1, -1), at(1, 1), at(-1, 1)};
+            const Vertex v[4] = {corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)};
             fillPolygon<4, true>(t, v, kCrack, kExtensionBit | kNearEdgeBit);
         }
     }
@@ -222,20 +225,23 @@ void RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uin
                      const SampleGrid& grid, float qLimit, float* samples) {
     std::memset(samples, 0, grid.count() * sizeof(float));
     const Target t{samples, grid.side(), grid.stride(), qLimit};
+    BlockBuffer buffer;
     const float leafGrow = kLeafGrow * static_cast<float>(grid.perPixel);
     for (const std::uint32_t index : blocks) {
         const SourceBlock& block = s.blocks[index];
         for (std::uint32_t i = block.leafBegin; i < block.leafEnd; ++i)
             drawLeaf(t, warp, s.leaves[i], leafGrow);
-        if (block.anyCell)
-            drawCells(t, s, warp, block, static_cast<int>(index % s.blocksX) * kBlock,
-                      static_cast<int>(index / s.blocksX) * kBlock);
+        if (!block.anyCell) continue;
+        const int x0 = static_cast<int>(index % s.blocksX) * kBlock;
+        const int y0 = static_cast<int>(index / s.blocksX) * kBlock;
+        drawCells(t, s, warp, block, blockTexels(s, x0, y0, buffer), x0, y0);
     }
     for (const std::uint32_t index : blocks) {
         const SourceBlock& block = s.blocks[index];
-        if (block.anyEdge)
-            drawExtensions(t, s, warp, block, static_cast<int>(index % s.blocksX) * kBlock,
-                           static_cast<int>(index / s.blocksX) * kBlock);
+        if (!block.anyEdge) continue;
+        const int x0 = static_cast<int>(index % s.blocksX) * kBlock;
+        const int y0 = static_cast<int>(index / s.blocksX) * kBlock;
+        drawExtensions(t, s, warp, block, blockTexels(s, x0, y0, buffer), x0, y0);
     }
 }
 
@@ -252,7 +258,6 @@ void rasteriseSource(const Source& source, const Warp& sampleFromSource,
                      float* samples) {
     HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, qLimit, samples);
 }
-
 
 }  // namespace stx::surface
 #endif

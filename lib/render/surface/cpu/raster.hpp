@@ -3,18 +3,13 @@
 #include <cstdint>
 #include <span>
 
+#include "lib/render/surface/constants.hpp"
 #include "lib/render/surface/source.hpp"
 
 namespace stx::surface {
 
-/// Side of the tiles that a frame is drawn in, pixels.
-inline constexpr int kTile = 32;
 /// Floats of room after each row of samples, so that whole vectors may be loaded and stored.
 inline constexpr int kSamplePadding = 16;
-
-/// Remarks kept in the lowest bits of a sample's q, where they do not matter to its value.
-inline constexpr std::uint32_t kExtensionBit = 1;  ///< beyond the source's own mesh
-inline constexpr std::uint32_t kNearEdgeBit = 2;   ///< from within two pixels of an edge
 
 /// The samples of one tile: `side` x `side`, sample (i, j) at tile pixel ((i + ½) / S, (j + ½) /
 /// S).
@@ -26,8 +21,9 @@ struct SampleGrid {
 };
 
 /// Draws blocks of one source as a surface into a tile: the nearest q at each sample, 0 where the
-/// source has nothing, with the remarks above. Surfaces seen from behind are left out.
-/// `sampleFromSource` maps source pixel positions to sample indices; q beyond `qLimit` is cut off.
+/// source has nothing, with kSampleFlags in its lowest bits. Surfaces seen from behind are left
+/// out. `sampleFromSource` maps source pixel positions to sample indices; q beyond `qLimit` is cut
+/// off.
 void rasteriseSource(const Source& source, const Warp& sampleFromSource,
                      std::span<const std::uint32_t> blocks, const SampleGrid& grid, float qLimit,
                      float* samples);

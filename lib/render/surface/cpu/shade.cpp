@@ -32,7 +32,13 @@ struct View {
     Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
     Lanes weight;
     bool active = false;
-    bool plain = true;  ///< all taps of all lanes lie on one surface, fully covered
+    bool plain = true;      ///< all taps of all lanes lie on one surface, fully covered
+    TapPlace taps[kGroup];  ///< of sources that are not whole
+
+    /// Where the taps of a lane are, from pixel (baseU, baseV) on.
+    [[nodiscard]] TapPlace tapsOf(const Source& source, int lane, int baseU, int baseV) const {
+        return source.whole ? source.tapPlaceOf(baseU, baseV) : taps[lane];
+    }
 };
 
 struct Group {
@@ -44,6 +50,34 @@ struct Group {
     const std::uint32_t* sources;
     int count;
 };
+
+/// The distance to the nearest edge at the position of each lane. Lanes without texels lose their
+/// weight.
+HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) {
+    const int lastX = source.width - 1, lastY = source.height - 1;
+    alignas(64) std::int32_t column[kGroup], row[kGroup];
+    for (int l = 0; l < kGroup; ++l) {
+        column[l] = std::min(static_cast<int>(view.u[l]), lastX);
+        row[l] = std::min(static_cast<int>(view.v[l]), lastY);
+    }
+    if (source.whole) {
+        const std::uint8_t* info = source.whole->info.data();
+        for (int l = 0; l < kGroup; ++l) edge[l] = info[row[l] * source.width + column[l]] >> 4;
+        return;
+    }
+    for (int l = 0; l < kGroup; ++l) {
+        edge[l] = 0;
+        if (!(view.weight[l] > 0.0f)) continue;
+        const int baseU = static_cast<int>(std::floor(view.u[l] - 1.5f));
+        const int baseV = static_cast<int>(std::floor(view.v[l] - 1.5f));
+        const TapPlace& taps = view.taps[l] = source.tapPlaceOf(baseU, baseV);
+        if (!taps.page)
+            view.weight[l] = 0.0f;
+        else if (column[l] >= taps.x0 && row[l] >= taps.y0 && column[l] < taps.x1 &&
+                 row[l] < taps.y1)
+            edge[l] = taps.page->info.data()[taps.texel(column[l] - baseU, row[l] - baseV)] >> 4;
+    }
+}
 
 /// Positions, Jacobians and weights of one source for a group.
 HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, std::uint32_t bit,
@@ -100,15 +134,8 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         hn::StoreU(hn::IfThenElseZero(active, hn::Neg(hn::Mul(vx, inverseDet))), d, &out.yu[l]);
         hn::StoreU(hn::IfThenElse(active, hn::Mul(ux, inverseDet), one), d, &out.yv[l]);
     }
-    const std::uint8_t* info = s.source->info.data();
-    const int stride = s.source->width;
-    const int lastX = stride - 1, lastY = s.source->height - 1;
-    alignas(64) std::int32_t pixel[kGroup];
-    for (int l = 0; l < kGroup; ++l)
-        pixel[l] = std::min(static_cast<int>(out.v[l]), lastY) * stride +
-                   std::min(static_cast<int>(out.u[l]), lastX);
     alignas(64) std::int32_t edge[kGroup];
-    for (int l = 0; l < kGroup; ++l) edge[l] = info[pixel[l]] >> 4;
+    findEdges(*s.source, out, edge);
     int any = 0, rough = 0;
     for (int l = 0; l < kGroup; ++l) {
         const float e = std::min(static_cast<float>(edge[l]) * (1.0f / kEdgeFade), 1.0f);
@@ -134,23 +161,24 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const float py = (m[9] + m[10] * g.qy[lane] - p * wy) * inverse;
     const float pu = px * view.xu[lane] + py * view.yu[lane];
     const float pv = px * view.xv[lane] + py * view.yv[lane];
-    const float whole = source.space.axis.whole(p);
+    const float scale = source.space.axis.relativeScale(p);
     const float allowed =
-        kOnSurface * whole + kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * whole);
+        kOnSurface * scale + kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * scale);
+    const TapPlace taps = view.tapsOf(source, lane, baseU, baseV);
     for (int j = 0; j < kTaps; ++j) {
         for (int i = 0; i < kTaps; ++i) {
             const int cx = baseU + i, cy = baseV + j;
             float& value = out[j * kTaps + i];
             value = 0.0f;
-            if (!source.q.contains(cx, cy)) continue;
-            const float there = source.q.at(cx, cy);
+            if (cx < taps.x0 || cy < taps.y0 || cx >= taps.x1 || cy >= taps.y1) continue;
+            const float there = source.qAt(taps, i, j);
             if (!(there > 0.0f)) continue;
             const float du = static_cast<float>(cx) + 0.5f - u,
                         dv = static_cast<float>(cy) + 0.5f - v;
             const float predicted =
-                p + std::clamp(pu * du + pv * dv, -kFarthestTap * whole, kFarthestTap * whole);
+                p + std::clamp(pu * du + pv * dv, -kFarthestTap * scale, kFarthestTap * scale);
             if (std::abs(there - predicted) > allowed) continue;
-            value = source.hasAlpha ? source.alpha(cx, cy) : 1.0f;
+            value = source.hasAlpha ? source.alphaAt(taps, i, j) : 1.0f;
         }
     }
 }
@@ -285,23 +313,21 @@ struct TapWeights {
     }
 };
 
-/// Adds the weighted taps of one lane, one by one: at borders and of float textures.
-HWY_NOINLINE void fetchSlowly(const Source& source, int baseU, int baseV, const TapWeights& weights,
-                              int lane, ColourSum& sum) {
+/// Adds the weighted taps of one lane of a float texture.
+HWY_NOINLINE void fetchFloats(const RgbaFloatImage& image, const TapPlace& taps, int baseU,
+                              int baseV, const TapWeights& weights, int lane, ColourSum& sum) {
     for (int j = 0; j < kTaps; ++j) {
         for (int i = 0; i < kTaps; ++i) {
             const int x = baseU + i, y = baseV + j;
-            if (!source.q.contains(x, y)) continue;
+            if (x < taps.x0 || y < taps.y0 || x >= taps.x1 || y >= taps.y1) continue;
             const float w = weights.row(j, lane)[i];
-            const glm::vec4 texel = source.view->texture.rgba8()
-                                        ? glm::vec4(source.view->texture.rgba8()->at(x, y))
-                                        : source.view->texture.rgbaFloat()->at(x, y);
+            const glm::vec4 texel = image.data()[taps.texel(i, j)];
             for (int c = 0; c < 4; ++c) sum.v[c] += w * texel[c];
         }
     }
 }
 
-/// The same where all taps are inside an 8-bit texture: as many texels of a row as a vector takes.
+/// The same of 8-bit texels, four rows of four: as many of a row at once as a vector takes.
 HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const TapWeights& weights,
                           int lane, ColourSum& sum) {
     const hn::CappedTag<float, 16> d;
@@ -328,6 +354,18 @@ HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const TapWeight
             }
         }
         hn::Store(acc, d, sum.v);
+    }
+}
+
+/// The texels of taps that are not side by side or not all there, which count nothing.
+HWY_NOINLINE void gatherTaps(const Rgba8Image& image, const TapPlace& taps, int baseU, int baseV,
+                             glm::u8vec4* out) {
+    for (int j = 0; j < kTaps; ++j) {
+        for (int i = 0; i < kTaps; ++i) {
+            const int x = baseU + i, y = baseV + j;
+            const bool inside = x >= taps.x0 && y >= taps.y0 && x < taps.x1 && y < taps.y1;
+            out[j * kTaps + i] = inside ? image.data()[taps.texel(i, j)] : glm::u8vec4(0);
+        }
     }
 }
 
@@ -451,7 +489,6 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         const int s = list[k];
         const View& view = views[s];
         const Source& source = *sources[static_cast<std::size_t>(s)].source;
-        const Rgba8Image* bytes = source.view->texture.rgba8();
         for (int l = 0; l < kGroup; l += n) {
             const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
                                              1.0f / settings.kernel);
@@ -479,17 +516,24 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             if (!(view.weight[l] > 0.0f)) continue;
             const int baseU = static_cast<int>(bases[s][0][l]);
             const int baseV = static_cast<int>(bases[s][1][l]);
-            if (bytes && baseU >= 0 && baseV >= 0 && baseU + kTaps <= source.width &&
-                baseV + kTaps <= source.height) {
-                fetchRows(bytes->data() + static_cast<std::ptrdiff_t>(baseV) * source.width + baseU,
-                          source.width, weights, l, sums[l]);
+            const TapPlace taps = view.tapsOf(source, l, baseU, baseV);
+            const Rgba8Image* bytes = taps.page->texture->rgba8();
+            if (!bytes) {
+                fetchFloats(*taps.page->texture->rgbaFloat(), taps, baseU, baseV, weights, l,
+                            sums[l]);
+            } else if (taps.stepX == 1 && baseU >= taps.x0 && baseV >= taps.y0 &&
+                       baseU + kTaps <= taps.x1 && baseV + kTaps <= taps.y1) {
+                fetchRows(bytes->data() + taps.first, static_cast<int>(taps.stepY), weights, l,
+                          sums[l]);
             } else {
-                fetchSlowly(source, baseU, baseV, weights, l, sums[l]);
+                glm::u8vec4 gathered[kTaps * kTaps];
+                gatherTaps(*bytes, taps, baseU, baseV, gathered);
+                fetchRows(gathered, kTaps, weights, l, sums[l]);
             }
         }
     }
     for (int l = 0; l < g.count; ++l) {
-        const bool bytes = !sources.empty() && sources[0].source->view->texture.rgba8();
+        const bool bytes = !sources.empty() && !sources[0].source->set->linear();
         const float scale = bytes ? 1.0f / 255.0f : 1.0f;
         if (total[l] > 0.5f) {
             const float f = scale / total[l];
@@ -504,9 +548,9 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             // No tap on the surface: the nearest pixel that is one.
             const View& view = views[best[l]];
             const Source& source = *sources[static_cast<std::size_t>(best[l])].source;
-            colours[l] = glm::vec3(source.view->texture.at(
-                std::clamp(static_cast<int>(view.u[l]), 0, source.width - 1),
-                std::clamp(static_cast<int>(view.v[l]), 0, source.height - 1)));
+            colours[l] = glm::vec3(
+                source.colour(std::clamp(static_cast<int>(view.u[l]), 0, source.width - 1),
+                              std::clamp(static_cast<int>(view.v[l]), 0, source.height - 1)));
         } else {
             colours[l] = glm::vec3(0.0f);
         }
@@ -545,22 +589,6 @@ HWY_AFTER_NAMESPACE();
 namespace stx::surface {
 
 HWY_EXPORT(ShadePieces);
-
-Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
-    Ray ray{};
-    const glm::dmat4& m = frame.worldFromPixel;
-    const glm::dvec3 at = eye.camera.position;
-    const glm::dvec3 forward = eye.camera.forward();
-    for (int axis = 0; axis < 3; ++axis) {
-        for (int column = 0; column < 4; ++column) {
-            const double value = eye.camera.orthographic
-                                     ? (column == 3 ? forward[axis] : 0.0)
-                                     : m[column][axis] - at[axis] * m[column][3];
-            ray[static_cast<std::size_t>(axis * 4 + column)] = static_cast<float>(value);
-        }
-    }
-    return ray;
-}
 
 void shadePieces(const Pieces& pieces, std::span<const ShadeSource> sources, const Ray& fromEye,
                  const ShadeSettings& settings, std::vector<glm::vec3>& colours,

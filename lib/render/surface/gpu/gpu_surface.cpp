@@ -1,6 +1,7 @@
 #include "lib/render/surface/gpu/gpu_surface.hpp"
 
 #include <array>
+#include <cstring>
 #include <deque>
 
 #include "lib/base/parallel.hpp"
@@ -8,55 +9,41 @@
 #include "lib/render/device/growing_buffer.hpp"
 #include "lib/render/device/returned_buffer.hpp"
 #include "lib/render/surface/backend.hpp"
-#include "lib/render/surface/cpu/raster.hpp"
 #include "lib/render/surface/gpu/surface_shaders.hpp"
 #include "lib/render/surface/gpu/surface_textures.hpp"
-#include "lib/render/surface/votes.hpp"
+#include "lib/render/surface/structs.hpp"
 
 namespace stx::gpu {
 namespace {
 
+using surface::DrawnFrame;
+using surface::FrameEntry;
 using surface::FrameSource;
-using surface::FrameWork;
+using surface::kNoSlot;
+using surface::kShadeGroup;
 using surface::kTile;
-using surface::PaintedFrame;
+using surface::SlotEntry;
 using surface::Source;
+using surface::SourceEntry;
+using surface::SurfaceFrame;
+using surface::SurfaceScene;
+using surface::TileEntry;
 
 constexpr std::int64_t kTilePixels = static_cast<std::int64_t>(kTile) * kTile;
 /// Samples of one batch of tiles take at most this much video memory.
 constexpr std::int64_t kSampleBytes = 256ll << 20;
-constexpr int kShadeGroup = 128;          ///< threads of a group of surface_shade.comp
-constexpr std::uint32_t kNoSlot = ~0u;    ///< NO_SLOT of the shaders
-constexpr std::int64_t kPieceBytes = 32;  ///< Piece of surface_tiles.glsl
+constexpr std::int64_t kPieceBytes = sizeof(surface::Piece);
 constexpr std::int64_t kMostGroups = 65535;
 
-using Rows = std::array<float, 16>;
-
-/// Source of shaders/surface/surface_common.glsl (std430).
-struct SourceEntry {
-    Rows sourceFromPixel;
-    surface::Ray fromEye;
-    glm::ivec4 size;
-    glm::vec4 axis;
+/// The four rows of a warp.
+struct Rows {
+    glm::vec4 x, y, q, w;
+    explicit Rows(const surface::Warp& warp) { std::memcpy(this, warp.m.data(), sizeof(*this)); }
 };
-/// Slot of shaders/surface/surface_raster.comp (std430): one source in one tile.
-struct SlotEntry {
-    Rows sampleFromSource;
-    glm::ivec4 source;
-};
-/// Tile of shaders/surface/surface_tiles.glsl (std430).
-struct TileEntry {
-    glm::ivec2 at;
-    std::uint32_t first, count;
-    float step;
-    float pad[3];
-};
-/// Frame of shaders/surface/surface_common.glsl (std140).
-struct FrameUniforms {
-    glm::vec4 axis;
-    surface::Ray eye;
-    glm::vec4 fit;
-    glm::ivec4 size;
+/// The three rows of a ray.
+struct RayRows {
+    glm::vec4 x, y, z;
+    explicit RayRows(const surface::Ray& ray) { std::memcpy(this, ray.data(), sizeof(*this)); }
 };
 
 /// A tile that shows something, and how much work it is.
@@ -97,17 +84,17 @@ struct Resources {
 
 /// A frame under way: its first batch is being drawn.
 struct Begun {
-    const FrameWork* work = nullptr;
+    const SurfaceFrame* work = nullptr;
     std::vector<TilePlan> plans;
     std::size_t drawn = 0;  ///< tiles so far
     Returned* back = nullptr;
 };
 
-class GpuSurfacePainter final : public surface::TilePainter {
+class GpuSurfaceBackend final : public surface::SurfaceBackend {
   public:
-    explicit GpuSurfacePainter(std::shared_ptr<EglContext> context)
+    explicit GpuSurfaceBackend(std::shared_ptr<EglContext> context)
         : context_(std::move(context)) {}
-    ~GpuSurfacePainter() override {
+    ~GpuSurfaceBackend() override {
         if (!resources_) return;
         // Where the context cannot be bound any more its objects are gone with it.
         if (auto current = context_->makeCurrent())
@@ -116,23 +103,24 @@ class GpuSurfacePainter final : public surface::TilePainter {
             (void)resources_.release();
     }
 
-    Result<void> prepare(std::span<const Source> sources, const surface::Effort& effort,
+    Result<void> prepare(const SurfaceScene& scene, const surface::Effort& effort,
                          Job& job) override;
-    Result<void> begin(const FrameWork& work) override;
-    Result<void> finish(PaintedFrame out) override;
+    Result<void> begin(const SurfaceFrame& work) override;
+    Result<void> finish(DrawnFrame out) override;
     void drop() override;
-    std::string backend() const override { return "gpu"; }
+    bool drawsAhead() const override { return true; }
+    std::string name() const override { return "gpu"; }
     std::string device() const override { return context_->device().name; }
 
   private:
     [[nodiscard]] Result<GlProgram> build(SurfaceProgram program) const;
-    [[nodiscard]] std::vector<TilePlan> planTiles(const FrameWork& work) const;
+    [[nodiscard]] std::vector<TilePlan> planTiles(const SurfaceFrame& work) const;
     [[nodiscard]] std::size_t batchEnd(std::span<TilePlan> plans, std::size_t begin) const;
-    [[nodiscard]] Batch fillBatch(const FrameWork& work, std::span<const TilePlan> plans) const;
-    void uploadSources(const FrameWork& work);
+    [[nodiscard]] Batch fillBatch(const SurfaceFrame& work, std::span<const TilePlan> plans) const;
+    void uploadSources(const SurfaceFrame& work);
     Result<void> drawNext(Begun& frame, Returned& back);
-    Result<void> draw(const FrameWork& work, std::span<const TilePlan> plans, Returned& back);
-    Result<void> collect(const FrameWork& work, Returned& back, PaintedFrame out) const;
+    Result<void> draw(const SurfaceFrame& work, std::span<const TilePlan> plans, Returned& back);
+    Result<void> collect(const SurfaceFrame& work, Returned& back, DrawnFrame out) const;
 
     std::shared_ptr<EglContext> context_;
     int perPixel_ = 1, mostSources_ = 4;
@@ -142,13 +130,13 @@ class GpuSurfacePainter final : public surface::TilePainter {
     std::deque<Begun> begun_;
 };
 
-Result<GlProgram> GpuSurfacePainter::build(SurfaceProgram program) const {
+Result<GlProgram> GpuSurfaceBackend::build(SurfaceProgram program) const {
     const std::array<ShaderStage, 1> stages{surfaceStage(program)};
     return buildProgram(surfaceHeader({perPixel_, mostSources_, freeAlpha_}, program), stages);
 }
 
-Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
-                                        const surface::Effort& effort, Job& job) {
+Result<void> GpuSurfaceBackend::prepare(const SurfaceScene& scene, const surface::Effort& effort,
+                                        Job& job) {
     STX_TRY(auto current, context_->makeCurrent());
     resources_ = std::make_unique<Resources>();
     Resources& r = *resources_;
@@ -160,7 +148,7 @@ Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
     mostSlots_ = std::min(storage, kSampleBytes) / (perTile * 4);
     mostTiles_ = std::min({storage / (perTile * kPieceBytes), kMostGroups * kShadeGroup / perTile,
                            kMostGroups * kShadeGroup / kTilePixels});
-    STX_TRY(r.scene, GpuSurfaceScene::upload(sources, *context_, job));
+    STX_TRY(r.scene, GpuSurfaceScene::upload(scene, *context_, job));
     STX_TRY(r.mesh, build(SurfaceProgram::mesh));
     STX_TRY(r.extensions, build(SurfaceProgram::extensions));
     STX_TRY(r.fuse, build(SurfaceProgram::fuse));
@@ -168,11 +156,11 @@ Result<void> GpuSurfacePainter::prepare(std::span<const Source> sources,
     STX_TRY(r.resolve, build(SurfaceProgram::resolve));
     STX_TRY(r.resolveWithOrigin, build(SurfaceProgram::resolveWithOrigin));
     r.uniforms = GlBuffer::create();
-    glNamedBufferStorage(r.uniforms.get(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
+    glNamedBufferStorage(r.uniforms.get(), sizeof(FrameEntry), nullptr, GL_DYNAMIC_STORAGE_BIT);
     return context_->check("preparing the renderer");
 }
 
-std::vector<TilePlan> GpuSurfacePainter::planTiles(const FrameWork& work) const {
+std::vector<TilePlan> GpuSurfaceBackend::planTiles(const SurfaceFrame& work) const {
     std::vector<TilePlan> plans(static_cast<std::size_t>(work.tilesX) * work.tilesY);
     parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
         const auto t = static_cast<std::size_t>(i);
@@ -181,7 +169,7 @@ std::vector<TilePlan> GpuSurfacePainter::planTiles(const FrameWork& work) const 
         if (std::all_of(work.sources.begin(), work.sources.end(),
                         [&](const FrameSource& f) { return f.tileBegin[t] == f.tileBegin[t + 1]; }))
             return;
-        plan.sources = work.chooseSources(plan.tile);
+        plan.sources = work.sourcesOf(plan.tile);
         for (const int k : plan.sources) {
             const FrameSource& f = work.sources[static_cast<std::size_t>(k)];
             plan.slots += f.tileBegin[t] < f.tileBegin[t + 1];
@@ -197,7 +185,7 @@ std::vector<TilePlan> GpuSurfacePainter::planTiles(const FrameWork& work) const 
 }
 
 /// The end of the batch that begins at a tile; tells its tiles where their parts begin.
-std::size_t GpuSurfacePainter::batchEnd(std::span<TilePlan> plans, std::size_t begin) const {
+std::size_t GpuSurfaceBackend::batchEnd(std::span<TilePlan> plans, std::size_t begin) const {
     std::uint32_t locals = 0, slots = 0, meshes = 0, edges = 0;
     std::size_t end = begin;
     for (; end < plans.size() && static_cast<std::int64_t>(end - begin) < mostTiles_; ++end) {
@@ -215,7 +203,8 @@ std::size_t GpuSurfacePainter::batchEnd(std::span<TilePlan> plans, std::size_t b
     return end;
 }
 
-Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePlan> plans) const {
+Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
+                                   std::span<const TilePlan> plans) const {
     const TilePlan& last = plans.back();
     Batch batch;
     batch.tiles.resize(plans.size());
@@ -236,8 +225,8 @@ Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePl
             const bool any = f.tileBegin[t] < f.tileBegin[t + 1];
             batch.locals[local++] = {static_cast<std::uint32_t>(k), any ? slot : kNoSlot};
             if (!any) continue;
-            batch.slots[slot] = {surface::warpFrom(sampleFromPixel * f.pixelFromSource).m,
-                                 glm::ivec4(k, 0, 0, 0)};
+            const Rows warp(surface::warpFrom(sampleFromPixel * f.pixelFromSource));
+            batch.slots[slot] = {warp.x, warp.y, warp.q, warp.w, glm::ivec4(k, 0, 0, 0)};
             const std::uint32_t firstLeaf =
                 resources_->scene.firstLeaf[static_cast<std::size_t>(k)];
             for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
@@ -248,30 +237,35 @@ Batch GpuSurfacePainter::fillBatch(const FrameWork& work, std::span<const TilePl
             }
             ++slot;
         }
-        batch.tiles[static_cast<std::size_t>(i)] = {
-            glm::ivec2(plan.tile % work.tilesX, plan.tile / work.tilesX) * kTile,
-            plan.firstLocal,
-            static_cast<std::uint32_t>(plan.sources.size()),
-            step,
-            {}};
+        batch.tiles[static_cast<std::size_t>(i)] = {plan.tile % work.tilesX * kTile,
+                                                    plan.tile / work.tilesX * kTile,
+                                                    plan.firstLocal,
+                                                    static_cast<std::uint32_t>(plan.sources.size()),
+                                                    step,
+                                                    0,
+                                                    0,
+                                                    0};
     });
     return batch;
 }
 
-void GpuSurfacePainter::uploadSources(const FrameWork& work) {
+void GpuSurfaceBackend::uploadSources(const SurfaceFrame& work) {
     std::vector<SourceEntry> entries;
     for (const FrameSource& f : work.sources) {
         const Source& s = *f.source;
         const surface::DepthAxis& axis = s.space.axis;
-        entries.push_back({f.sourceFromPixel.m, f.fromEye,
+        const Rows warp(f.sourceFromPixel);
+        const RayRows ray(f.fromEye);
+        entries.push_back({warp.x, warp.y, warp.q, warp.w, ray.x, ray.y, ray.z,
                            glm::ivec4(s.width, s.height, s.hasAlpha ? 1 : 0, s.blocksX),
                            glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, s.step,
-                                     surface::kClearlyBehind + s.noise)});
+                                     surface::kClearlyBehind + s.noise),
+                           resources_->scene.places[s.number]});
     }
     resources_->sources.upload(entries);
 }
 
-Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const TilePlan> plans,
+Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const TilePlan> plans,
                                      Returned& back) {
     Resources& r = *resources_;
     const Batch batch = fillBatch(work, plans);
@@ -300,11 +294,14 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
                     context_->device().name);
 
     const surface::DepthAxis& axis = work.space.axis;
-    const bool bytes = work.sources[0].source->view->texture.rgba8() != nullptr;
+    const bool bytes = !work.sources[0].source->set->linear();
     const surface::ShadeSettings& shade = work.effort.shade;
-    const FrameUniforms uniforms{
+    const RayRows eye(surface::rayFrom(work.space, work.space));
+    const FrameEntry uniforms{
         glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, work.qLimit(), 0.0f),
-        surface::rayFrom(work.space, work.space),
+        eye.x,
+        eye.y,
+        eye.z,
         glm::vec4(shade.kernel, shade.ridge, bytes ? 1.0f : 0.0f, 0.0f),
         glm::ivec4(work.space.camera.width, work.space.camera.height, batch.meshes.size(),
                    batch.edges.size())};
@@ -316,12 +313,12 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     glBindTextureUnit(0, r.scene.surfaces.get());
     glBindTextureUnit(1, r.scene.colours.get());
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, r.uniforms.get());
-    const std::array<GLuint, 14> storage{
+    const std::array<GLuint, 15> storage{
         r.sources.buffer.get(), r.slots.buffer.get(),        r.meshes.buffer.get(),
         r.scene.leaves.get(),   r.samples.buffer.get(),      r.tiles.buffer.get(),
         r.locals.buffer.get(),  r.pieces.buffer.get(),       r.ranges.buffer.get(),
         r.counts.buffer.get(),  r.pieceColours.buffer.get(), r.colour.buffer.get(),
-        r.depth.buffer.get(),   r.origin.buffer.get()};
+        r.depth.buffer.get(),   r.origin.buffer.get(),       r.scene.table.get()};
     for (GLuint i = 0; i < storage.size(); ++i)
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, storage[i]);
 
@@ -360,8 +357,8 @@ Result<void> GpuSurfacePainter::draw(const FrameWork& work, std::span<const Tile
     return context_->check("drawing");
 }
 
-Result<void> GpuSurfacePainter::collect(const FrameWork& work, Returned& back,
-                                        PaintedFrame out) const {
+Result<void> GpuSurfaceBackend::collect(const SurfaceFrame& work, Returned& back,
+                                        DrawnFrame out) const {
     if (!back.memory.done) return {};
     STX_CHECK(back.memory.wait(*context_));
     const std::byte* memory = back.memory.memory;
@@ -387,7 +384,7 @@ Result<void> GpuSurfacePainter::collect(const FrameWork& work, Returned& back,
 }
 
 /// Draws the next batch of a frame into `back`.
-Result<void> GpuSurfacePainter::drawNext(Begun& frame, Returned& back) {
+Result<void> GpuSurfaceBackend::drawNext(Begun& frame, Returned& back) {
     const std::size_t end = batchEnd(frame.plans, frame.drawn);
     const auto plans = std::span<const TilePlan>(frame.plans);
     STX_CHECK(draw(*frame.work, plans.subspan(frame.drawn, end - frame.drawn), back));
@@ -395,7 +392,7 @@ Result<void> GpuSurfacePainter::drawNext(Begun& frame, Returned& back) {
     return {};
 }
 
-Result<void> GpuSurfacePainter::begin(const FrameWork& work) {
+Result<void> GpuSurfaceBackend::begin(const SurfaceFrame& work) {
     Begun frame;
     frame.work = &work;
     frame.plans = planTiles(work);
@@ -410,7 +407,7 @@ Result<void> GpuSurfacePainter::begin(const FrameWork& work) {
     return {};
 }
 
-Result<void> GpuSurfacePainter::finish(PaintedFrame out) {
+Result<void> GpuSurfaceBackend::finish(DrawnFrame out) {
     Begun frame = std::move(begun_.front());
     begun_.pop_front();
     if (frame.plans.empty()) return {};
@@ -432,7 +429,7 @@ Result<void> GpuSurfacePainter::finish(PaintedFrame out) {
     return collect(*frame.work, *frame.back, out);
 }
 
-void GpuSurfacePainter::drop() {
+void GpuSurfaceBackend::drop() {
     const Begun frame = std::move(begun_.front());
     begun_.pop_front();
     if (!frame.back) return;
@@ -448,8 +445,8 @@ Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(const PageSet& set,
                                                          Job& job) {
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
     STX_CHECK(context->requireModern("surface mode on the GPU", "--mode splat or --backend cpu"));
-    return surface::makePaintedSurfaceRenderer(
-        set, settings, job, std::make_unique<GpuSurfacePainter>(std::move(context)));
+    return surface::makeSurfaceRenderer(set, settings, job,
+                                        std::make_unique<GpuSurfaceBackend>(std::move(context)));
 }
 
 }  // namespace stx::gpu

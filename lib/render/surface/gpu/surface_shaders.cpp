@@ -1,63 +1,33 @@
 #include "lib/render/surface/gpu/surface_shaders.hpp"
 
-#include <array>
-
 #include "embedded_shaders.hpp"
-#include "lib/render/surface/constants.hpp"
-#include "lib/render/surface/cpu/fuse.hpp"
 
 namespace stx::gpu {
 
 std::string surfaceHeader(const SurfaceVariant& v, SurfaceProgram program) {
-    using namespace surface;
-    const std::array constants{ShaderConstant{"kCrack", kCrack},
-                               ShaderConstant{"kLeafGrow", kLeafGrow},
-                               ShaderConstant{"kHalfBesideBackground", kHalfBesideBackground},
-                               ShaderConstant{"kHalfInside", kHalfInside},
-                               ShaderConstant{"kExtensionReach", kExtensionReach},
-                               ShaderConstant{"kSame", kSame},
-                               ShaderConstant{"kJump", kJump},
-                               ShaderConstant{"kOneSurface", kOneSurface},
-                               ShaderConstant{"kLinkedSamples", kLinkedSamples},
-                               ShaderConstant{"kExtensionWeight", kExtensionWeight},
-                               ShaderConstant{"kFreeAlpha", v.freeAlpha},
-                               ShaderConstant{"kSlopeDoubt", kSlopeDoubt},
-                               ShaderConstant{"kAngleFalloff", kAngleFalloff},
-                               ShaderConstant{"kEdgeFade", kEdgeFade},
-                               ShaderConstant{"kEdgeWeight", kEdgeWeight},
-                               ShaderConstant{"kOwn", kOwn},
-                               ShaderConstant{"kOnSurface", kOnSurface},
-                               ShaderConstant{"kOnSlope", kOnSlope},
-                               ShaderConstant{"kSteepestTap", kSteepestTap},
-                               ShaderConstant{"kFarthestTap", kFarthestTap}};
     return fmt::format(
-               "#version 450 core\n#define S {}\n#define TILE {}\n#define MOST {}\n"
-               "#define EXTEND {}\n#define ORIGIN {}\n",
-               v.samplesPerPixel, kTile, v.mostSources,
-               program == SurfaceProgram::extensions ? 1 : 0,
-               program == SurfaceProgram::resolveWithOrigin ? 1 : 0) +
-           shaderConstants(constants);
+        "#version 450 core\n#define S {}\n#define FREE_ALPHA {:.9e}\n#define MOST {}\n"
+        "#define EXTEND {}\n#define ORIGIN {}\n",
+        v.samplesPerPixel, v.freeAlpha, v.mostSources,
+        program == SurfaceProgram::extensions ? 1 : 0,
+        program == SurfaceProgram::resolveWithOrigin ? 1 : 0);
 }
 
 ShaderStage surfaceStage(SurfaceProgram program) {
     using namespace shaders;
-    const auto stage = [](std::string_view name, std::string_view body) {
-        return ShaderStage{
-            GL_COMPUTE_SHADER, name, {surface_common_glsl, surface_tiles_glsl, body}};
-    };
     switch (program) {
         case SurfaceProgram::mesh:
         case SurfaceProgram::extensions:
-            return stage("surface_raster.comp", surface_raster_comp);
+            return {GL_COMPUTE_SHADER, "surface_raster.comp", {surface_raster_comp}};
         case SurfaceProgram::fuse:
-            return stage("surface_fuse.comp", surface_fuse_comp);
+            return {GL_COMPUTE_SHADER, "surface_fuse.comp", {surface_fuse_comp}};
         case SurfaceProgram::shade:
-            return stage("surface_shade.comp", surface_shade_comp);
+            return {GL_COMPUTE_SHADER, "surface_shade.comp", {surface_shade_comp}};
         case SurfaceProgram::resolve:
         case SurfaceProgram::resolveWithOrigin:
             break;
     }
-    return stage("surface_resolve.comp", surface_resolve_comp);
+    return {GL_COMPUTE_SHADER, "surface_resolve.comp", {surface_resolve_comp}};
 }
 
 std::vector<ShaderText> allSurfaceShaders() {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include <glm/glm.hpp>
@@ -13,41 +12,35 @@
 
 namespace stx::gpu {
 
-/// What a pixel is to the shaders, in 32 bits: how the cell to its lower right is drawn, and what
-/// the pixel itself is.
-struct CellCode {
-    /// Bits 0..3.
-    enum Shape : std::uint32_t {
-        nothing = 0,
-        leaf = 1,          ///< part of a planar piece
-        quad = 2,          ///< flat enough for one piece
-        fallingSplit = 3,  ///< two triangles along the diagonal from the upper left
-        risingSplit = 4,
-        upperLeft = 5,  ///< one triangle around this corner
-        upperRight = 6,
-        lowerRight = 7,
-        lowerLeft = 8,
-    };
-    static constexpr std::uint32_t kNearEdge = 1u << 4;  ///< the cell is
-    static constexpr std::uint32_t kEdge = 1u << 5;      ///< the pixel lays out an extension
-    static constexpr std::uint32_t kBesideBackground = 1u << 6;
-    static constexpr int kDistanceShift = 8;  ///< distance to the nearest edge
-    static constexpr int kLeafShift = 16;     ///< the leaf's number in its block
-};
-
-/// The codes of all pixels of a source.
+/// What each pixel of a source is to the shaders: see shaders/shared/surface_cells.glsl.
 [[nodiscard]] Image<std::uint32_t> cellCodes(const surface::Source& source);
 
-/// Prepared sources in video memory: one layer of each texture a source.
+/// Where the rectangles of sources are on the pages, as shaders/surface/surface_common.glsl looks
+/// them up.
+struct PlaceTable {
+    /// Of each source from `SourceEntry::place` on: for each of its blocks, and after the last, the
+    /// index of its list of rectangles. A list holds indices of rectangles: first and last pixel in
+    /// the source, padding included, the latter one past (x0, y0, x1, y1), texel of pixel (0, 0)
+    /// (x, y), layer, 1 = turned. Then a bit for each pixel that is outside of all rectangles where
+    /// the object is.
+    std::vector<std::uint32_t> words;
+    std::vector<glm::ivec4> places;  ///< SourceEntry::place of each source
+
+    explicit PlaceTable(const surface::SurfaceScene& scene);
+};
+
+/// A prepared scene in video memory: one layer of each texture a page.
 struct GpuSurfaceScene {
-    GlTexture surfaces;                    ///< RGBA32UI: bits of q, dq/dx, dq/dy; CellCode
+    GlTexture surfaces;                    ///< RGBA32UI: bits of q, dq/dx, dq/dy; cell code
     GlTexture colours;                     ///< RGBA8 as coded, or RGBA32F of linear bundles
     GlBuffer leaves;                       ///< std430: bits of q0, qx, qy; x | y << 16
     std::vector<std::uint32_t> firstLeaf;  ///< of each source in `leaves`
+    GlBuffer table;                        ///< std430: PlaceTable::words
+    std::vector<glm::ivec4> places;        ///< see PlaceTable
 
-    /// Uploads; the context must be current. Errors: views larger or more than the device's
+    /// Uploads; the context must be current. Errors: pages larger or more than the device's
     /// textures take, memory.
-    [[nodiscard]] static Result<GpuSurfaceScene> upload(std::span<const surface::Source> sources,
+    [[nodiscard]] static Result<GpuSurfaceScene> upload(const surface::SurfaceScene& from,
                                                         const EglContext& context, Job& job);
 };
 

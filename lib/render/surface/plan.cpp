@@ -1,0 +1,231 @@
+#include "lib/render/surface/plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx::surface {
+namespace {
+
+/// Shares of q by which a block may reach out of its range: extensions, and a little for rounding.
+constexpr float kBlockMargin = 1.05f * kExtensionReach;
+
+void addBounds(const Source& s, Bounds& bounds) {
+    for (int by = 0; by < s.blocksY; ++by) {
+        for (int bx = 0; bx < s.blocksX; ++bx) {
+            const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
+            if (!(block.qMax > 0)) continue;
+            for (int corner = 0; corner < 8; ++corner) {
+                const double x = std::min((bx + (corner & 1)) * kBlock, s.width);
+                const double y = std::min((by + (corner >> 1 & 1)) * kBlock, s.height);
+                const double q = (corner & 4) ? block.qMax : block.qMin;
+                const glm::dvec4 p = s.space.worldFromPixel * glm::dvec4(x, y, q, 1.0);
+                bounds.add(glm::dvec3(p) / p.w);
+            }
+        }
+    }
+}
+
+FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, int tilesY) {
+    FrameSource f;
+    f.source = &s;
+    f.pixelFromSource = space.pixelFromWorld * s.space.worldFromPixel;
+    f.sourceFromPixel = warpFrom(s.space.pixelFromWorld * space.worldFromPixel);
+    f.fromEye = rayFrom(s.space, space);
+    const Warp warp = warpFrom(f.pixelFromSource);
+    struct Range {
+        std::uint32_t block;
+        int x0, y0, x1, y1;
+    };
+    std::vector<Range> ranges;
+    f.tileBegin.assign(static_cast<std::size_t>(tilesX) * tilesY + 1, 0);
+    for (std::uint32_t index = 0; index < s.blocks.size(); ++index) {
+        const SourceBlock& block = s.blocks[index];
+        if (!(block.qMax > 0)) continue;
+        const auto bx = static_cast<float>(index % s.blocksX * kBlock);
+        const auto by = static_cast<float>(index / s.blocksX * kBlock);
+        const float margin = kBlockMargin * s.space.axis.relativeScale(block.qMax);
+        float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
+        bool front = false, behind = false;
+        for (int corner = 0; corner < 8; ++corner) {
+            const float x = (corner & 1) ? bx + kBlock + 1.5f : bx - 0.5f;
+            const float y = (corner & 2) ? by + kBlock + 1.5f : by - 0.5f;
+            const float q = (corner & 4) ? block.qMax + margin
+                                         : std::max(block.qMin - margin, 0.5f * block.qMin);
+            const glm::vec4 h = warp.homogeneous(x, y, q);
+            if (!(h.w > 0)) {
+                behind = true;
+                continue;
+            }
+            front = true;
+            x0 = std::min(x0, h.x / h.w);
+            x1 = std::max(x1, h.x / h.w);
+            y0 = std::min(y0, h.y / h.w);
+            y1 = std::max(y1, h.y / h.w);
+        }
+        if (!front) continue;
+        const auto limitX = static_cast<float>(space.camera.width),
+                   limitY = static_cast<float>(space.camera.height);
+        if (behind) {
+            x0 = y0 = 0;
+            x1 = limitX;
+            y1 = limitY;
+        }
+        x0 = std::max(x0 - 0.5f, 0.0f);
+        y0 = std::max(y0 - 0.5f, 0.0f);
+        x1 = std::min(x1 + 0.5f, limitX - 0.5f);
+        y1 = std::min(y1 + 0.5f, limitY - 0.5f);
+        if (!(x0 <= x1 && y0 <= y1)) continue;
+        const Range r{index, static_cast<int>(x0) / kTile, static_cast<int>(y0) / kTile,
+                      static_cast<int>(x1) / kTile, static_cast<int>(y1) / kTile};
+        ranges.push_back(r);
+        for (int ty = r.y0; ty <= r.y1; ++ty)
+            for (int tx = r.x0; tx <= r.x1; ++tx)
+                ++f.tileBegin[static_cast<std::size_t>(ty * tilesX + tx) + 1];
+    }
+    for (std::size_t t = 1; t < f.tileBegin.size(); ++t) f.tileBegin[t] += f.tileBegin[t - 1];
+    f.blocks.resize(f.tileBegin.back());
+    std::vector<std::uint32_t> next(f.tileBegin.begin(), f.tileBegin.end() - 1);
+    for (const Range& r : ranges)
+        for (int ty = r.y0; ty <= r.y1; ++ty)
+            for (int tx = r.x0; tx <= r.x1; ++tx)
+                f.blocks[next[static_cast<std::size_t>(ty * tilesX + tx)]++] = r.block;
+    return f;
+}
+
+}  // namespace
+
+Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
+    Ray ray{};
+    const glm::dmat4& m = frame.worldFromPixel;
+    const glm::dvec3 at = eye.camera.position;
+    const glm::dvec3 forward = eye.camera.forward();
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int column = 0; column < 4; ++column) {
+            const double value = eye.camera.orthographic
+                                     ? (column == 3 ? forward[axis] : 0.0)
+                                     : m[column][axis] - at[axis] * m[column][3];
+            ray[static_cast<std::size_t>(axis * 4 + column)] = static_cast<float>(value);
+        }
+    }
+    return ray;
+}
+
+Effort effortOf(Quality quality, const SurfaceScene& scene) {
+    Effort e;
+    switch (quality) {
+        case Quality::draft:
+            e.samplesPerPixel = 1;
+            e.mostGeometry = 4;
+            e.shade.mostSources = 2;
+            break;
+        case Quality::normal:
+            break;
+        case Quality::best:
+            e.samplesPerPixel = 4;
+            e.mostGeometry = kMostTileSources;
+            break;
+    }
+    double valid = 0;
+    for (const Source& s : scene.sources)
+        valid += s.validShare / static_cast<double>(scene.sources.size());
+    // Pruned views share the surface among them: each may be the only one left to show a piece of
+    // it. Of views with gaps as many are needed as together show what the usual number would.
+    if (scene.set.pruned()) {
+        e.mostGeometry = kMostTileSources;
+        e.freeAlpha = kFreeAlphaPruned;
+        e.preferShown = true;
+    } else if (valid < 1) {
+        e.mostGeometry =
+            static_cast<int>(std::min<double>(kMostTileSources, std::ceil(e.mostGeometry / valid)));
+    }
+    return e;
+}
+
+std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
+    std::vector<int> chosen;
+    const auto count = static_cast<int>(sources.size());
+    if (count <= effort.mostGeometry) {
+        for (int i = 0; i < count; ++i) chosen.push_back(i);
+        return chosen;
+    }
+    // A point of the scene in the middle of the tile: where the blocks that fall in it are.
+    double q = 0;
+    int blocks = 0;
+    for (const FrameSource& f : sources) {
+        for (const std::uint32_t index : f.blocksOf(tile)) {
+            const SourceBlock& block = f.source->blocks[index];
+            const glm::dvec4 h =
+                f.pixelFromSource * glm::dvec4((index % f.source->blocksX + 0.5) * kBlock,
+                                               (index / f.source->blocksX + 0.5) * kBlock,
+                                               0.5 * (block.qMin + block.qMax), 1.0);
+            if (!(h.w > 0)) continue;
+            q += h.z / h.w;
+            ++blocks;
+        }
+    }
+    if (!blocks) return chosen;
+    const glm::dvec4 h =
+        space.worldFromPixel *
+        glm::dvec4(tileX(tile) + kTile * 0.5, tileY(tile) + kTile * 0.5, q / blocks, 1.0);
+    const glm::dvec3 point = glm::dvec3(h) / h.w;
+    const auto towards = [&](const Camera& c) {
+        return c.orthographic ? c.forward() : glm::normalize(point - c.position);
+    };
+    const glm::dvec3 look = towards(space.camera);
+    std::vector<std::pair<double, int>> ranked;
+    for (int i = 0; i < count; ++i) {
+        const FrameSource& f = sources[static_cast<std::size_t>(i)];
+        const double idle = effort.preferShown && f.blocksOf(tile).empty() ? 2.0 : 0.0;
+        ranked.emplace_back(idle - glm::dot(look, towards(f.source->space.camera)), i);
+    }
+    std::nth_element(ranked.begin(), ranked.begin() + effort.mostGeometry - 1, ranked.end());
+    for (int i = 0; i < effort.mostGeometry; ++i)
+        chosen.push_back(ranked[static_cast<std::size_t>(i)].second);
+    std::sort(chosen.begin(), chosen.end());
+    return chosen;
+}
+
+glm::dmat4 SurfaceFrame::sampleFromPixel(int tile) const {
+    const int S = effort.samplesPerPixel;
+    glm::dmat4 m(1.0);
+    m[0][0] = m[1][1] = S;
+    m[3][0] = -tileX(tile) * S - 0.5;
+    m[3][1] = -tileY(tile) * S - 0.5;
+    return m;
+}
+
+float SurfaceFrame::qLimit() const {
+    return space.axis.inverse ? std::numeric_limits<float>::max()
+                              : static_cast<float>(space.axis.q(0.0));
+}
+
+Bounds boundsOf(const SurfaceScene& scene) {
+    Bounds bounds;
+    for (const Source& s : scene.sources) addBounds(s, bounds);
+    return bounds;
+}
+
+SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Effort& effort,
+                       const Camera& camera) {
+    double farthest = 1.0;
+    if (!bounds.empty())
+        farthest = std::max(
+            1e-6 * bounds.radius(),
+            glm::dot(bounds.centre() - camera.position, camera.forward()) + bounds.radius());
+    SurfaceFrame f;
+    f.space = PixelSpace(camera, farthest);
+    f.tilesX = (camera.width + kTile - 1) / kTile;
+    f.tilesY = (camera.height + kTile - 1) / kTile;
+    f.effort = effort;
+    f.sources.resize(scene.sources.size());
+    parallelFor(0, static_cast<std::int64_t>(f.sources.size()), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        f.sources[k] = placeSource(scene.sources[k], f.space, f.tilesX, f.tilesY);
+    });
+    return f;
+}
+
+}  // namespace stx::surface

@@ -1,0 +1,26 @@
+// The numbers that splat mode is tuned with: C++ has them by lib/render/splat/constants.hpp. Where no
+// source is named the value was chosen by measurement on the image sets and meshes of README.md.
+
+// Nearer than this the projection means nothing.
+CONSTANT float kNearest = 1e-12f;
+// A splat closes its gaps within 2x2 pixels while no point of the surface is farther from a sample
+// than this, squared.
+CONSTANT float kSmallCover2 = 0.9f;
+// Sparse samples weigh less than dense ones, down to this share.
+CONSTANT float kLeastDensity = 1e-3f;
+// Inside its splat a point's colour goes on as its neighbours' does, by this share of the
+// gradient. Where samples are so dense that their mean matters more this fades out: all at twice
+// kFadeTo output pixels per source pixel, nothing at kFadeTo.
+CONSTANT float kGradient = 0.75f, kFadeTo = 0.3f;
+// Half width of the Gaussian in sample spacings, and of the low-pass filter in pixels.
+CONSTANT float kSigmaSource = 0.5f, kSigmaPixel = 0.3f;
+// Where a large splat ends, and where it stops to hide, in squared standard deviations. The
+// lattice closes at half a diagonal: 0.5 / kSigmaSource^2 = 2.
+CONSTANT float kReach2 = 5.0f, kCore2 = 2.1f;
+// None is larger, in pixels from its centre: a point almost at the viewpoint would fill the frame.
+CONSTANT float kLargest = 256.0f;
+// Steeper planes (relative depth per pixel) are nearly edge-on and would run away.
+CONSTANT float kSteepestPlane = 0.05f;
+// Where a surface ends: the share of the squared radius that hides; beside any edge: of the
+// weight.
+CONSTANT float kRimCore2 = 0.5f, kEdgeQuality = 0.05f;

@@ -1,0 +1,65 @@
+// The numbers that surface mode is tuned with: C++ has them by lib/render/surface/constants.hpp.
+// Depths are in q (see DepthAxis), shares of q or of 1. Where no source is named the value was
+// chosen by measurement on the image sets and meshes of README.md.
+
+// Side of the tiles that a frame is drawn in, pixels.
+CONSTANT int kTile = 32;
+// Side of the blocks that sources are prepared in, pixels.
+CONSTANT int kSourceBlock = 16;
+// Instead of a slot: the source has no samples in the tile.
+CONSTANT uint kNoSlot = 0xffffffffu;
+// Threads of a group that shade pieces.
+CONSTANT uint kShadeGroup = 128u;
+
+// Drawing the sources.
+// Room that neighbouring pieces overlap by, in samples, so that rounding opens no crack.
+CONSTANT float kCrack = 0.004f;
+// Leaves are on fitted planes, a little beside their neighbours' corners: pixels. Less than the
+// parallax that a leaf may be off by (kPlanarPixels, 0.08).
+CONSTANT float kLeafGrow = 0.06f;
+// Half the side of an extension, pixels: at inner edges the half pixel that the source's own mesh
+// leaves, beside background a little more, since alpha cuts it there.
+CONSTANT float kHalfBesideBackground = 0.6f, kHalfInside = 0.5f;
+// The corners of an extension leave its pixel's q by no more.
+CONSTANT float kExtensionReach = 0.02f;
+
+// Fusing them.
+// Surfaces closer than this share of their depth are one.
+CONSTANT float kSame = 0.002f;
+// Samples of one pixel are one piece until q jumps by more.
+CONSTANT float kJump = 0.0015f;
+// Samples of one source in a pixel are one surface within this.
+CONSTANT float kOneSurface = 0.01f;
+// Neighbouring samples of one source are linked within this.
+CONSTANT float kLinkedSamples = 0.03f;
+// What an extension counts beside a mesh: its depth is used only where no mesh is.
+CONSTANT float kExtensionWeight = 0.01f;
+// Bilinear alpha below which a point is outside the object. Points tangent to a silhouette have one
+// half, and a threshold of one half or more removes them; this is clearly less. Among pruned
+// sources often only one is left to show a piece of surface, and no other agrees with it where it
+// touches another's silhouette: less still (the largest value at which spot, Fox, CesiumMilkTruck
+// and 2CylinderEngine open at no pixel).
+CONSTANT float kFreeAlpha = 0.45f, kFreeAlphaPruned = 0.36f;
+// A point this share of its depth in front of a surface is in front of it.
+CONSTANT float kClearlyBehind = 0.0002f;
+// And this share of the change of q over a pixel more, where the surface is steep.
+CONSTANT float kSlopeDoubt = 0.0625f;
+// Votes that reject a sample: one where it is near an edge of its source, else two.
+CONSTANT int kVotesNearEdge = 1, kVotesElsewhere = 2;
+// Flags in the lowest bits of a sample's q, where they do not matter to its value: beyond the
+// source's own mesh; from within two pixels of an edge.
+CONSTANT uint kExtensionBit = 1u, kNearEdgeBit = 2u, kSampleFlags = 3u;
+// Sources that one tile is built from, at most: the bits of a piece's `seenBy`.
+CONSTANT int kMostTileSources = 32;
+
+// Shading the pieces.
+// Views weigh exp(-kAngleFalloff * angle).
+CONSTANT float kAngleFalloff = 3.0f;
+// Pixels this far from an edge count in full, those on it kEdgeWeight.
+CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.01f;
+// A sample covers its own pixel, so a coarse source spreads by this share of its Jacobian.
+CONSTANT float kOwn = 0.15f;
+// A tap is on the surface of the piece within this share of q, and this share of the slope, which
+// counts up to kSteepestTap; predictions go no further than kFarthestTap.
+CONSTANT float kOnSurface = 0.003f, kOnSlope = 0.5f;
+CONSTANT float kSteepestTap = 0.02f, kFarthestTap = 0.04f;

@@ -1,0 +1,245 @@
+// What a pixel shows: the surfaces of the sources fused, and checked against what others see.
+// Needs surface_votes.glsl. From outside: TileEntry tile; Axis frameAxis(); S and SIDE, samples
+// along a side of a pixel and of a tile; SAMPLES, at least S * S;
+//   uint sampleOf(k, i, j)  bits of the q of source k of the tile at sample (i, j), flags in the
+//                           lowest two; 0 = nothing there
+//   int sourceOf(k)         what the votes know source k by
+
+// The samples of a pixel that show a surface, nearest first: q, who sees it, number in the pixel.
+float shownQ[SAMPLES];
+uint shownTo[SAMPLES];
+int shownAt[SAMPLES];
+int shownCount;
+
+// Surfaces that are no further apart than this in q are one.
+float sameWithin(float q) {
+    return kSame * relativeScale(frameAxis(), q) + tile.step * qPerUnit(frameAxis(), q);
+}
+
+// The slope out of the differences to both sides, where there are any.
+float chooseSlope(bool hasA, float a, bool hasB, float b) {
+    if (hasA && hasB) {
+        if (abs(a) < 0.5f * abs(b)) return a;
+        if (abs(b) < 0.5f * abs(a)) return b;
+        return 0.5f * (a + b);
+    }
+    return hasA ? a : hasB ? b : 0.0f;
+}
+
+// dq/dx, dq/dy per pixel of a source's surface at a sample.
+vec2 slopeAt(int k, int i, int j) {
+    float here = uintBitsToFloat(sampleOf(k, i, j));
+    float limit = kLinkedSamples * relativeScale(frameAxis(), here);
+    float left = i > 0 ? uintBitsToFloat(sampleOf(k, i - 1, j)) : 0.0f;
+    float right = i < SIDE - 1 ? uintBitsToFloat(sampleOf(k, i + 1, j)) : 0.0f;
+    float up = j > 0 ? uintBitsToFloat(sampleOf(k, i, j - 1)) : 0.0f;
+    float down = j < SIDE - 1 ? uintBitsToFloat(sampleOf(k, i, j + 1)) : 0.0f;
+    return vec2(chooseSlope(left > 0.0f && abs(here - left) < limit, here - left,
+                            right > 0.0f && abs(right - here) < limit, right - here),
+                chooseSlope(up > 0.0f && abs(here - up) < limit, here - up,
+                            down > 0.0f && abs(down - here) < limit, down - here)) *
+           float(S);
+}
+
+// The same of a pixel whose samples, S > 1 a side, are all of one surface; (i, j) is its first.
+vec2 slopeInside(int k, int i, int j) {
+    float left = uintBitsToFloat(sampleOf(k, i, j + S / 2));
+    float right = uintBitsToFloat(sampleOf(k, i + S - 1, j + S / 2));
+    float up = uintBitsToFloat(sampleOf(k, i + S / 2, j));
+    float down = uintBitsToFloat(sampleOf(k, i + S / 2, j + S - 1));
+    return vec2(right - left, down - up) * (float(S) / float(max(S - 1, 1)));
+}
+
+// Whether others see past the point (x, y, q), which source `own` shows; (i, j) is its sample. The
+// flags are an argument of their own: the bits of a computed q mean nothing.
+bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
+    int enough = (flags & kNearEdgeBit) != 0u ? kVotesNearEdge : kVotesElsewhere;
+    int votes = 0;
+    for (int k = 0; k < int(tile.count); ++k) {
+        int s = sourceOf(k);
+        if (k == own) {
+            if (!hasAlpha(s) || (flags & kNearEdgeBit) == 0u) continue;
+            vec4 h = warp(s, x, y, q);
+            ivec2 size = sizeOf(s);
+            vec2 at = vec2(clamp(h.x / h.w, 0.0f, float(size.x)), clamp(h.y / h.w, 0.0f, float(size.y)));
+            if (alphaAt(s, at) < freeAlphaOf(s)) return true;
+            continue;
+        }
+        uint other = sampleOf(k, i, j);
+        if (other != 0u && (other & kExtensionBit) == 0u &&
+            abs(uintBitsToFloat(other) - q) < sameWithin(q))
+            continue;
+        int vote = voteOf(s, x, y, q);
+        if (vote == kFreeByAlpha) return true;
+        if (vote == kFreeByDepth && ++votes >= enough) return true;
+    }
+    return false;
+}
+
+// The first surface at a sample that is not rejected: its q and who sees it.
+bool fuseSample(int i, int j, OUT(float) q, OUT(uint) seenBy) {
+    // Nearest first; equal ones in the order of the sources.
+    uint values[kMostTileSources];
+    int owners[kMostTileSources];
+    int count = 0;
+    for (int k = 0; k < int(tile.count); ++k) {
+        uint value = sampleOf(k, i, j);
+        if (value == 0u) continue;
+        int at = count++;
+        for (; at > 0 && values[at - 1] < value; --at) {
+            values[at] = values[at - 1];
+            owners[at] = owners[at - 1];
+        }
+        values[at] = value;
+        owners[at] = k;
+    }
+    q = 0.0f;
+    seenBy = 0u;
+    float scale = 1.0f / float(S);
+    float x = float(tile.x) + (float(i) + 0.5f) * scale;
+    float y = float(tile.y) + (float(j) + 0.5f) * scale;
+    for (int c = 0; c < count; ++c) {
+        float front = uintBitsToFloat(values[c]), behind = front - sameWithin(front);
+        uint flags = values[c] & kSampleFlags;
+        // Two that agree far from their edges need no votes.
+        bool sure = false;
+        if (flags == 0u)
+            for (int o = c + 1; o < count && uintBitsToFloat(values[o]) > behind; ++o)
+                sure = sure || (values[o] & kSampleFlags) == 0u;
+        if (!sure && rejected(front, flags, owners[c], x, y, i, j)) continue;
+        float sum = 0.0f, weights = 0.0f;
+        uint meshes = 0u, extensions = 0u;
+        for (int o = c; o < count && uintBitsToFloat(values[o]) > behind; ++o) {
+            bool extension = (values[o] & kExtensionBit) != 0u;
+            float weight = extension ? kExtensionWeight : 1.0f;
+            sum += weight * (uintBitsToFloat(values[o]) - front);
+            weights += weight;
+            if (extension)
+                extensions |= 1u << owners[o];
+            else
+                meshes |= 1u << owners[o];
+        }
+        q = front + sum / weights;
+        seenBy = meshes != 0u ? meshes : extensions;
+        return true;
+    }
+    return false;
+}
+
+// Fuses all samples of a pixel of the tile, one by one, into shownQ and its companions.
+void fuseSamples(int column, int row) {
+    shownCount = 0;
+    for (int k = 0; k < S * S; ++k) {
+        float q;
+        uint seenBy;
+        if (!fuseSample(column * S + k % S, row * S + k / S, q, seenBy)) continue;
+        int at = shownCount++;
+        for (; at > 0 && shownQ[at - 1] < q; --at) {
+            shownQ[at] = shownQ[at - 1];
+            shownTo[at] = shownTo[at - 1];
+            shownAt[at] = shownAt[at - 1];
+        }
+        shownQ[at] = q;
+        shownTo[at] = seenBy;
+        shownAt[at] = k;
+    }
+}
+
+// The end of the piece that begins at one of those samples: where q jumps.
+int pieceEnd(int begin) {
+    int end = begin + 1;
+    for (; end < shownCount; ++end) {
+        float before = shownQ[end - 1];
+        if (before - shownQ[end] > kJump * relativeScale(frameAxis(), before) +
+                                       tile.step * qPerUnit(frameAxis(), before))
+            break;
+    }
+    return end;
+}
+
+// The piece of the samples begin..end of a pixel.
+Piece pieceOf(int column, int row, int begin, int end) {
+    float scale = 1.0f / float(S);
+    float x = 0.0f, y = 0.0f, q = 0.0f;
+    uint seenBy = 0u;
+    for (int k = begin; k < end; ++k) {
+        x += (float(shownAt[k] % S) + 0.5f) * scale;
+        y += (float(shownAt[k] / S) + 0.5f) * scale;
+        q += shownQ[k];
+        seenBy |= shownTo[k];
+    }
+    float n = 1.0f / float(end - begin);
+    int middle = (begin + end) / 2;
+    vec2 g = slopeAt(findLSB(shownTo[middle]), column * S + shownAt[middle] % S,
+                     row * S + shownAt[middle] / S);
+    Piece piece;
+    piece.x = float(tile.x + column) + x * n;
+    piece.y = float(tile.y + row) + y * n;
+    piece.q = q * n;
+    piece.qx = g.x;
+    piece.qy = g.y;
+    piece.share = float(end - begin) * scale * scale;
+    piece.seenBy = seenBy;
+    piece.at = uint(row * kTile + column);
+    return piece;
+}
+
+// A pixel as a whole: simple while the samples of each source are one surface far from edges, and
+// all sources agree. Then there is no need to look at each sample.
+struct WholePixel {
+    bool any, simple;
+    float lowMean, highMean, sum;
+    uint present;  // bit k: source k of the tile
+    int first;     // of them
+};
+
+WholePixel startPixel() {
+    WholePixel p;
+    p.any = false;
+    p.simple = true;
+    p.lowMean = 3.0e38f;
+    p.highMean = 0.0f;
+    p.sum = 0.0f;
+    p.present = 0u;
+    p.first = -1;
+    return p;
+}
+
+// Adds a source: the least and the greatest of its samples, and the flags of all.
+void addSource(INOUT(WholePixel) p, int k, float low, float high, uint flags) {
+    if (!(high > 0.0f)) return;
+    p.any = true;
+    if (!(low > 0.0f) || (flags & kSampleFlags) != 0u ||
+        high - low > kOneSurface * relativeScale(frameAxis(), high)) {
+        p.simple = false;
+        return;
+    }
+    float mean = 0.5f * (high + low);
+    p.lowMean = min(p.lowMean, mean);
+    p.highMean = max(p.highMean, mean);
+    p.sum += mean;
+    p.present |= 1u << k;
+    if (p.first < 0) p.first = k;
+}
+
+bool isSimple(WholePixel p) {
+    return p.simple && !(p.highMean - p.lowMean > sameWithin(p.highMean));
+}
+
+// The piece of a simple pixel; false when it is rejected.
+bool simplePiece(WholePixel p, int column, int row, OUT(Piece) piece) {
+    int count = bitCount(p.present);
+    piece.x = float(tile.x + column) + 0.5f;
+    piece.y = float(tile.y + row) + 0.5f;
+    piece.q = p.sum / float(count);
+    piece.share = 1.0f;
+    piece.seenBy = p.present;
+    piece.at = uint(row * kTile + column);
+    if (count == 1 && tile.count > 1u &&
+        rejected(piece.q, 0u, p.first, piece.x, piece.y, column * S + S / 2, row * S + S / 2))
+        return false;
+    vec2 g = S > 1 ? slopeInside(p.first, column * S, row * S) : slopeAt(p.first, column, row);
+    piece.qx = g.x;
+    piece.qy = g.y;
+    return true;
+}

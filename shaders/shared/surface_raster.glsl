@@ -1,0 +1,101 @@
+// A source drawn as a surface into a tile: the nearest q at each sample. The processor does the same
+// with vectors in lib/render/surface/cpu/raster.cpp; a test holds both against this. From outside:
+//   vec4 toSamples(x, y, q)      a position in the source as sample position and q, homogeneous
+//   int SIDE, float qLimit()     samples along a side of the tile, the largest q
+//   bool mayDraw(x, y)           whether a sample is free: extensions are drawn only there
+//   void raise(x, y, value)      makes a sample at least as near as `value`, bits of q and flags
+
+// Sample position, q and, in w, 1 = in front of the camera.
+vec4 cornerAt(float x, float y, float q) {
+    vec4 h = toSamples(x, y, q);
+    float inverse = 1.0f / h.w;
+    return vec4(h.x * inverse, h.y * inverse, h.z * inverse, h.w > 0.0f ? 1.0f : 0.0f);
+}
+
+// Samples of the convex polygon with these edges (ex x + ey y + e0 >= 0), this plane of q and this
+// range, inside a box.
+void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 low, vec2 high, uint flags) {
+    vec2 from = max(low, vec2(0.0f)), to = min(high, vec2(float(SIDE - 1)));
+    if (!(from.x <= to.x && from.y <= to.y) || !(qMin > 0.0f) || !(qMax <= qLimit())) return;
+    ivec2 first = ivec2(ceil(from)), last = ivec2(floor(to));
+    for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x; x <= last.x; ++x) {
+            vec4 e = ex * float(x) + (ey * float(y) + e0);
+            if (min(min(e.x, e.y), min(e.z, e.w)) < 0.0f || !mayDraw(x, y)) continue;
+            float q = clamp(plane.x * float(x) + (plane.y * float(y) + plane.z), qMin, qMax);
+            raise(x, y, (floatBitsToUint(q) & ~kSampleFlags) | flags);
+        }
+    }
+}
+
+// Polygons that turn the right way; `grow` moves their edges out, in samples.
+void fillQuad(vec4 a, vec4 b, vec4 c, vec4 d, float grow, uint flags) {
+    if (a.w + b.w + c.w + d.w < 4.0f) return;
+    // The diagonals span the plane; its z component is twice the signed area.
+    vec4 ac = c - a, bd = d - b;
+    float area = ac.x * bd.y - ac.y * bd.x;
+    if (!(area > 0.0f)) return;
+    float px = (ac.z * bd.y - ac.y * bd.z) / area, py = (ac.x * bd.z - ac.z * bd.x) / area;
+    vec4 middle = 0.25f * (a + b + c + d);
+    vec4 xs = vec4(a.x, b.x, c.x, d.x), ys = vec4(a.y, b.y, c.y, d.y);
+    vec4 ex = ys - vec4(b.y, c.y, d.y, a.y), ey = vec4(b.x, c.x, d.x, a.x) - xs;
+    vec4 e0 = grow * (abs(ex) + abs(ey)) - (ex * xs + ey * ys);
+    vec4 low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));
+    scan(ex, ey, e0, vec3(px, py, middle.z - px * middle.x - py * middle.y), low.z, high.z,
+         vec2(low) - grow, vec2(high) + grow, flags);
+}
+
+void fillTriangle(vec4 a, vec4 b, vec4 c, uint flags) {
+    if (a.w + b.w + c.w < 3.0f) return;
+    vec4 ab = b - a, ac = c - a;
+    float area = ab.x * ac.y - ab.y * ac.x;
+    if (!(area > 0.0f)) return;
+    float px = (ab.z * ac.y - ab.y * ac.z) / area, py = (ab.x * ac.z - ab.z * ac.x) / area;
+    vec4 middle = (a + b + c) / 3.0f;
+    vec4 xs = vec4(a.x, b.x, c.x, 0.0f), ys = vec4(a.y, b.y, c.y, 0.0f);
+    vec4 ex = vec4(a.y - b.y, b.y - c.y, c.y - a.y, 0.0f), ey = vec4(b.x - a.x, c.x - b.x, a.x - c.x, 0.0f);
+    vec4 e0 = kCrack * (abs(ex) + abs(ey)) - (ex * xs + ey * ys);
+    vec4 low = min(min(a, b), c), high = max(max(a, b), c);
+    scan(ex, ey, e0, vec3(px, py, middle.z - px * middle.x - py * middle.y), low.z, high.z,
+         vec2(low) - kCrack, vec2(high) + kCrack, flags);
+}
+
+// A cell that is no leaf, by its shape; the corners clockwise from the upper left.
+void drawCell(uint shape, vec4 a, vec4 b, vec4 c, vec4 d, uint flags) {
+    if (shape == kQuadCell) {
+        fillQuad(a, b, c, d, kCrack, flags);
+    } else if (shape == kFallingSplit) {
+        fillTriangle(a, b, c, flags);
+        fillTriangle(a, c, d, flags);
+    } else if (shape == kRisingSplit) {
+        fillTriangle(a, b, d, flags);
+        fillTriangle(b, c, d, flags);
+    } else if (shape == kUpperLeft) {
+        fillTriangle(a, b, d, flags);
+    } else if (shape == kUpperRight) {
+        fillTriangle(b, c, a, flags);
+    } else if (shape == kLowerRight) {
+        fillTriangle(c, d, b, flags);
+    } else if (shape == kLowerLeft) {
+        fillTriangle(d, a, c, flags);
+    }
+}
+
+// Part of a plane: q at its upper left corner, the middle of a pixel, and its slopes per pixel.
+void drawLeaf(float x, float y, float size, float q0, float qx, float qy) {
+    fillQuad(cornerAt(x, y, q0), cornerAt(x + size, y, q0 + size * qx),
+             cornerAt(x + size, y + size, q0 + size * (qx + qy)), cornerAt(x, y + size, q0 + size * qy),
+             kLeafGrow * float(S), 0u);
+}
+
+// The square around an edge pixel, whose middle is at (x, y), with the slope (gx, gy) of its q.
+// `scale` is what a relative difference of 1 is in q there.
+void drawExtension(float x, float y, float q, float gx, float gy, float scale, bool besideBackground) {
+    float side = besideBackground ? kHalfBesideBackground : kHalfInside;
+    float reach = kExtensionReach * scale;
+    float plus = clamp(gx * side + gy * side, -reach, reach);
+    float minus = clamp(gx * side - gy * side, -reach, reach);
+    fillQuad(cornerAt(x - side, y - side, q - plus), cornerAt(x + side, y - side, q + minus),
+             cornerAt(x + side, y + side, q + plus), cornerAt(x - side, y + side, q - minus), kCrack,
+             kExtensionBit | kNearEdgeBit);
+}

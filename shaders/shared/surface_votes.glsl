@@ -1,0 +1,73 @@
+// Free-space votes: does a source see past a point of space?
+// From outside: Axis, float relativeScale(Axis, q) (what a relative depth difference of 1 is in q),
+// float qPerUnit(Axis, q) (how much q changes over one scene unit); of source s:
+//   vec4 warp(s, x, y, q)      the point in the source, homogeneous
+//   ivec2 sizeOf(s), bool hasAlpha(s), float freeAlphaOf(s), Axis axisOf(s)
+//   float clearlyBehindOf(s)   share of q by which a surface must be behind a point, with its noise
+//   float stepOf(s)            of its depth code, scene units
+//   Place placeOf(s, corner)   where the 2x2 pixels from `corner` on are kept, and in that place
+//   float qAt(s, place, i, j), vec2 gradientAt(s, place, i, j), float alphaOf(s, place, i, j)
+// Pixels of a place that are not inside the source are never asked for.
+
+CONSTANT int kNoVote = 0;  // the point is hidden from it, on its surface, or out of its frame
+CONSTANT int kFreeByDepth = 1;  // it sees a surface clearly behind the point
+CONSTANT int kFreeByAlpha = 2;  // it sees background there
+
+bool inside(ivec2 at, ivec2 size) {
+    return at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
+}
+
+// Bilinear alpha at `t` (0..1) between the middles of the 2x2 pixels from `corner` on.
+float alphaAmong(int s, Place place, ivec2 corner, vec2 t) {
+    ivec2 size = sizeOf(s);
+    int i0 = corner.x < 0 ? 1 : 0, i1 = corner.x + 1 < size.x ? 1 : 0;
+    int j0 = corner.y < 0 ? 1 : 0, j1 = corner.y + 1 < size.y ? 1 : 0;
+    return (alphaOf(s, place, i0, j0) * (1.0f - t.x) + alphaOf(s, place, i1, j0) * t.x) * (1.0f - t.y) +
+           (alphaOf(s, place, i0, j1) * (1.0f - t.x) + alphaOf(s, place, i1, j1) * t.x) * t.y;
+}
+
+// Bilinear alpha of a source at a position inside it, pixels; 1 when it has none.
+float alphaAt(int s, vec2 at) {
+    if (!hasAlpha(s)) return 1.0f;
+    vec2 f = floor(at - 0.5f);
+    ivec2 corner = ivec2(f);
+    return alphaAmong(s, placeOf(s, corner), corner, at - 0.5f - f);
+}
+
+// The vote of a source on the point at (x, y, q) of the frame.
+int voteOf(int s, float x, float y, float q) {
+    vec4 h = warp(s, x, y, q);
+    if (!(h.w > 0.0f)) return kNoVote;
+    float inverse = 1.0f / h.w;
+    vec2 at = vec2(h.x * inverse, h.y * inverse);
+    float p = h.z * inverse;
+    ivec2 size = sizeOf(s);
+    if (!(at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y) && p > 0.0f))
+        return kNoVote;
+    vec2 f = floor(at - 0.5f);
+    ivec2 corner = ivec2(f);
+    Place place = placeOf(s, corner);
+    if (hasAlpha(s) && alphaAmong(s, place, corner, at - 0.5f - f) < freeAlphaOf(s))
+        return kFreeByAlpha;
+    bool any = false;
+    for (int j = 0; j < 2; ++j) {
+        for (int i = 0; i < 2; ++i) {
+            ivec2 c = corner + ivec2(i, j);
+            if (!inside(c, size)) continue;
+            float there = qAt(s, place, i, j);
+            // What was pruned from here may be the very surface that is asked about.
+            if (there < 0.0f) return kNoVote;
+            if (!(there > 0.0f)) continue;
+            any = true;
+            // The cheap half of the test first: most surfaces are not behind the point at all.
+            float margin = clearlyBehindOf(s) * relativeScale(axisOf(s), p) +
+                           stepOf(s) * qPerUnit(axisOf(s), p);
+            float reach = 4.0f * kLinkedSamples * relativeScale(axisOf(s), there);
+            if (p < there + margin - reach) return kNoVote;
+            vec2 g = gradientAt(s, place, i, j);
+            float predicted = there + g.x * (at.x - 0.5f - float(c.x)) + g.y * (at.y - 0.5f - float(c.y));
+            if (p < predicted + margin + kSlopeDoubt * (abs(g.x) + abs(g.y))) return kNoVote;
+        }
+    }
+    return any ? kFreeByDepth : kNoVote;
+}
