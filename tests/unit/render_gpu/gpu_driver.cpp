@@ -35,27 +35,23 @@ const std::string kAsked = [] {
 }();
 
 DriverState look() {
+    const bool mesa = !kAsked.empty() && kAsked != "hardware", zink = kAsked == "zink";
+    if (mesa && !canLoad("libEGL_mesa.so.0"))
+        return {"Mesa's EGL is not here; install libegl-mesa0 and libgl1-mesa-dri", ""};
+    if (zink && !canLoad("libvulkan_lvp.so"))
+        return {"zink needs Mesa's Vulkan driver lavapipe; install mesa-vulkan-drivers", ""};
     Job job;
     const auto devices = listDevices(job);
-    if (kAsked.empty()) {
-        if (!devices.empty()) return {};
-        return {"no OpenGL through EGL here; GPU tests are left out", ""};
-    }
-    if (kAsked == "hardware") {
-        if (!devices.empty() && !devices[0].software) return {};
+    if (kAsked == "hardware" && (devices.empty() || devices[0].software))
         return {"no hardware GPU here", ""};
-    }
-    if (!canLoad("libEGL_mesa.so.0"))
-        return {"Mesa's EGL is not here; install libegl-mesa0 and libgl1-mesa-dri", ""};
-    if (kAsked == "zink" && !canLoad("libvulkan_lvp.so"))
-        return {"zink needs Mesa's Vulkan driver lavapipe; install mesa-vulkan-drivers", ""};
     if (devices.empty()) {
-        if (kAsked == "zink") return {"", "zink gives no device, though lavapipe is installed"};
-        return {"no OpenGL through Mesa's EGL; install libgl1-mesa-dri", ""};
+        if (zink) return {"", "zink gives no device, though lavapipe is installed"};
+        return {"no OpenGL through EGL here; install libegl-mesa0 and libgl1-mesa-dri", ""};
     }
-    if (devices[0].name.rfind(kAsked, 0) != 0)
+    if (mesa && devices[0].name.rfind(kAsked, 0) != 0)
         return {"", kAsked + " was asked for and '" + devices[0].name + "' answers"};
-    if (!devices[0].software) return {"", "'" + devices[0].name + "' is not taken for software"};
+    if (mesa && !devices[0].software)
+        return {"", "'" + devices[0].name + "' is not taken for software"};
     return {};
 }
 
