@@ -20,13 +20,14 @@ layout(std430, binding = 4) buffer SumBuffer { int sums[]; };
 #elif ACCUMULATE == 1
 layout(std430, binding = 4) buffer SumBuffer { float sums[]; };
 #else
-layout(std430, binding = 4) buffer SumBuffer { uint64_t sums[]; };
+layout(std430, binding = 4) buffer SumBuffer { int64_t sums[]; };
 #endif
 
 #if ACCUMULATE == 2
-// low + high * 2^32 as one number; resolve.comp takes it apart.
-uint64_t pair(int low, int high) {
-    return packUint2x32(uvec2(uint(low), uint(low < 0 ? high - 1 : high)));
+// low + high * 2^32 as one number; resolve.comp takes it apart. Signed, since Mesa has the 64-bit
+// atomicAdd() of GL_NV_shader_atomic_int64 for signed numbers only.
+int64_t pair(int low, int high) {
+    return packInt2x32(ivec2(low, low < 0 ? high - 1 : high));
 }
 #endif
 

@@ -216,9 +216,13 @@ tl::expected<std::unique_ptr<EglContext::Impl>, std::string> open(const Candidat
     GLint64 bytes = 0;
     if (impl->abilities.modern) glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
     impl->abilities.maxStorageBytes = bytes;
-    impl->abilities.atomicInt64 = epoxy_has_gl_extension("GL_NV_shader_atomic_int64") &&
-                                  epoxy_has_gl_extension("GL_ARB_gpu_shader_int64");
-    impl->abilities.atomicFloat = epoxy_has_gl_extension("GL_NV_shader_atomic_float");
+    impl->abilities.atomicInt64 =
+        faults().atomicInt64.value_or(epoxy_has_gl_extension("GL_NV_shader_atomic_int64") &&
+                                      epoxy_has_gl_extension("GL_ARB_gpu_shader_int64"));
+    impl->abilities.atomicFloat =
+        faults().atomicFloat.value_or(epoxy_has_gl_extension("GL_NV_shader_atomic_float"));
+    // Mesa's softpipe counts gl_VertexID from 0 again after each 4096 vertices.
+    if (impl->device.name == "softpipe") impl->abilities.verticesAtOnce = 4096;
     if (impl->abilities.modern) {
         GLint strategy = 0;
         glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct ContextAbilities {
     int maxTextureSize = 0;    ///< pixels a side
     int maxTextureLayers = 0;
     std::int64_t maxStorageBytes = 0;  ///< of one shader storage block
+    int verticesAtOnce = 1 << 30;      ///< of a draw, which counts them in 31 bits
 };
 
 /// An OpenGL context without a window. One thread at a time may hold it, any thread.
@@ -76,6 +78,8 @@ class EglContext {
 struct Faults {
     int maxTextureSize = 0;  ///< the device says so; 0 = what it has
     bool onlyOld = false;    ///< nothing newer than OpenGL 3.3
+    /// The device names these extensions, or does not; unset = as it is.
+    std::optional<bool> atomicInt64, atomicFloat;
     /// EglContext::check() finds this error the n-th time it is asked from now on, -1 = never:
     /// GL_OUT_OF_MEMORY, or GL_CONTEXT_LOST for a device that was reset.
     int errorAfter = -1;

@@ -33,7 +33,7 @@ TEST(Bench, MeasuresThePathsAskedFor) {
     EXPECT_EQ(report->rows[5].path, "points");
 }
 
-TEST(Bench, LeavesSurfacesOnSoftwareDriversToThoseWhoAsk) {
+TEST(GpuBench, LeavesSurfacesOnSoftwareDriversToThoseWhoAsk) {
     REQUIRE_GPU();
     Job devices;
     if (!listDevices(devices)[0].software) GTEST_SKIP() << "a hardware GPU is here";

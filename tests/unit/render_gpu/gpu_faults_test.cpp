@@ -1,17 +1,12 @@
 // What goes wrong with devices: little memory, a reset, old drivers, small textures.
 
-#include "lib/render/device/egl_context.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 
 namespace stx {
 namespace {
 
 using test::psnr;
-
-struct WithFaults {
-    explicit WithFaults(const gpu::Faults& faults) { gpu::setFaultsForTests(faults); }
-    ~WithFaults() { gpu::setFaultsForTests({}); }
-};
+using test::WithFaults;
 
 RenderSettings settingsOf(RenderMode mode, GpuPipeline pipeline) {
     RenderSettings s;

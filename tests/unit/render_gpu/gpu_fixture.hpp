@@ -7,15 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/device/egl_context.hpp"
 #include "lib/render/renderer.hpp"
-
-/// Skips with a clear line where no OpenGL context without a display can be had.
-#define REQUIRE_GPU()                                                             \
-    do {                                                                          \
-        ::stx::Job gpuJob;                                                        \
-        if (::stx::listDevices(gpuJob).empty())                                   \
-            GTEST_SKIP() << "no OpenGL through EGL here; GPU tests are left out"; \
-    } while (false)
+#include "tests/unit/render_gpu/gpu_driver.hpp"
 
 namespace stx::test {
 
@@ -87,6 +81,12 @@ inline void expectAgreement(const Result<Frame>& frame, const Frame& expected,
     for (const float d : frame->depth.pixels()) drawn += hasPoint(d) ? 1 : 0;
     EXPECT_GT(drawn, 100) << what;
 }
+
+/// Puts faults into every context made while it lives.
+struct WithFaults {
+    explicit WithFaults(const gpu::Faults& faults) { gpu::setFaultsForTests(faults); }
+    ~WithFaults() { gpu::setFaultsForTests({}); }
+};
 
 /// A camera smaller than the scene's own, so that tests stay quick.
 inline Camera small(Camera camera, int width) {

@@ -164,6 +164,17 @@ TEST_P(GpuRenderers, KeepLinearColoursAboveOne) {
     EXPECT_GT(psnr(frame->colour, expected.colour) + 20 * std::log10(7.0), 45.0);
 }
 
+TEST_P(GpuRenderers, AverageSmallPicturesAsTheCpuDoes) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
+    const Camera camera = analyticCamera(AnalyticScene::object, 0.5, 4);
+    const Camera small = camera.resized(camera.width / 4, camera.height / 4);
+    agree(bundle, settings(), small, "small");
+    const auto truth = viewOfAnalyticScene(AnalyticScene::object, small, 16);
+    const auto frame = draw(bundle, settings(), small);
+    ASSERT_TRUE(frame);
+    EXPECT_GT(psnr(frame->colour, test::pictureOf(truth)), 33.0);
+}
+
 TEST_P(GpuRenderers, SayNothingWhereNothingIs) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 2);
     Camera camera = analyticCamera(AnalyticScene::object, 0, 2);

@@ -154,7 +154,7 @@ TEST(GpuSplatCulling, LeavesOutHiddenBlocksAndNothingElse) {
     }
 }
 
-TEST(GpuPipelines, AreChosenByWhatTheDeviceHas) {
+TEST(Pipelines, AreChosenByWhatTheDeviceHas) {
     Device device;
     gpu::ContextAbilities able;
     // OpenGL 3.3.
@@ -174,7 +174,9 @@ TEST(Devices, AreNamed) {
     Job job;
     for (const auto& device : listDevices(job)) {
         EXPECT_FALSE(device.name.empty());
-        EXPECT_NE(device.version.find("4."), std::string::npos);
+        EXPECT_NE(device.version.find(test::askedDriver() == "softpipe" ? "3.3" : "4."),
+                  std::string::npos)
+            << device.version;
         EXPECT_GE(device.maxTextureSize, 4096);
     }
 }

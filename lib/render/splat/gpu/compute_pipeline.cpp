@@ -251,7 +251,7 @@ Result<SplatPlanes> ComputeSplats::map(int slot) {
 }
 
 SplatCounts ComputeSplats::counts() {
-    SplatCounts out{lastTasks_, 0};
+    SplatCounts out{lastTasks_, 0, variant_.sums};
     if (!variant_.cull || lastTasks_ == 0) return out;
     std::vector<std::uint32_t> visible(static_cast<std::size_t>(lastTasks_));
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);

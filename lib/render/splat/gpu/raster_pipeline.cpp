@@ -124,9 +124,9 @@ Result<void> RasterSplats::prepare() {
         return fail(ErrorCode::unsupported,
                     "{} rectangles are more than a table of '{}' holds ({}); use --backend cpu",
                     scene_.rectangles.size(), context_.device().name, texels / 6);
-    // A draw's vertices are counted in 31 bits, and its tasks must fit into a texture buffer.
-    tasksAtOnce_ =
-        std::min((1 << 30) / (256 * 6), texels / static_cast<int>(sizeof(TaskEntry) / 16));
+    // The tasks of a draw must fit into a texture buffer, too.
+    tasksAtOnce_ = std::min(context_.abilities().verticesAtOnce / (256 * 6),
+                            texels / static_cast<int>(sizeof(TaskEntry) / 16));
     std::vector<Rule> rules{Rule::uniform, Rule::small, Rule::ellipse};
     if (rule_ == SplatRule::point) rules = {Rule::point};
     if (rule_ == SplatRule::paper) rules = {Rule::paper};

@@ -43,6 +43,7 @@ struct SplatPlanes {
 struct SplatCounts {
     int tasks = 0;
     int hidden = 0;
+    Sums sums = Sums::integers;  ///< how the compute pipeline added up
 };
 
 /// One way of getting splats into a picture. All calls with the context current. Two pictures may
