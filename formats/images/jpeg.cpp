@@ -154,7 +154,8 @@ class JpegReader final : public ImageReader {
     Result<void> checked(bool done) {
         if (scansTooMany_)
             return fail(ErrorCode::invalidInput, "the JPEG has more than {} scans", kMaxScans);
-        if (errors_.ranOut && (!done || errors_.bitsLack))
+        // Arithmetic decoding takes what lacks for zeros and says nothing.
+        if (errors_.ranOut && (!done || errors_.bitsLack || jpeg_.arith_code))
             return fail(ErrorCode::invalidInput,
                         "the JPEG ends at byte {} before its last pixels; it is cut off",
                         file_.size());

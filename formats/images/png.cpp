@@ -116,6 +116,8 @@ class PngReader final : public ImageReader {
         if (const int error =
                 spng_decode_image(context_.get(), pixels, size, format, SPNG_DECODE_TRNS))
             return failWith(error);
+        // To the end, for the checksum of the last chunk.
+        if (const int error = spng_decode_chunks(context_.get())) return failWith(error);
         return {};
     }
 
