@@ -105,7 +105,11 @@ class PngReader final : public ImageReader {
         return decode(format, values, info_.channels * info_.bits / 8);
     }
 
-    [[nodiscard]] bool givesRgba8() const override { return info_.bits == 8; }
+    [[nodiscard]] bool givesRgba8() const override {
+        // Spreading grey to RGBA, libspng 0.7.3 compares a transparent grey's unused high bits too.
+        return info_.bits == 8 &&
+               !(header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE && transparency_);
+    }
     Result<void> readRgba8(glm::u8vec4* pixels) override {
         return decode(SPNG_FMT_RGBA8, pixels, 4);
     }

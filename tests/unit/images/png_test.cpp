@@ -118,6 +118,21 @@ TEST(PngReader, EveryKindIsDecodedExactly) {
     }
 }
 
+/// Found by fuzzing: bits of the transparent colour beyond the image's depth do not count
+/// (ISO/IEC 15948, 11.3.2.1).
+TEST(PngReader, HighBitsOfTheTransparentColourDoNotCount) {
+    for (const auto& [type, bits] : {std::pair{0, 1}, {0, 4}, {0, 8}, {2, 8}}) {
+        auto p = picture(type, bits, false, true);
+        const auto plain = decode(png::build(p));
+        for (std::size_t i = 0; i < p.transparency.size(); i += 2) p.transparency[i] = '\x3b';
+        const auto file = png::build(p);
+        const auto image = decode(file);
+        ASSERT_TRUE(plain && image);
+        EXPECT_EQ(image->values, plain->values) << type << " " << bits;
+        EXPECT_EQ(*decodeRgba8(span(file), "a.png", Limits()), rgba8From(*plain));
+    }
+}
+
 TEST(PngReader, MetadataIsNotRead) {
     auto p = picture(2, 8, false, false);
     const auto plain = decode(png::build(p));
