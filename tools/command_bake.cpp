@@ -18,7 +18,7 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
-    preloadCodecs();
+    preloadCodecs(o.input);
     STX_TRY(auto bundle, openBundle(o.input, {}, program.job));
     BakeSettings settings = o.settings;
     settings.method =

@@ -78,7 +78,6 @@ std::string decibels(std::optional<double> v) {
 }
 
 Result<int> compareImages(const CompareOptions& o, Program& program) {
-    preloadCodecs();
     std::optional<Image<std::uint8_t>> mask;
     if (!o.mask.empty()) {
         STX_TRY(const auto loaded, load(o.mask, program));

@@ -99,7 +99,6 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
 
 /// One bundle for each frame `A-B` of one set; {frame} in the output's name is the frame.
 Result<int> convertFrames(const ConvertOptions& o, Program& program) {
-    preloadCodecs();
     const auto dash = o.frames.find('-');
     double first = 0, last = 0;
     STX_CHECK(setTextOptions("--frames",
@@ -119,6 +118,7 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
                     "name",
                     o.output);
     // Before an hour's work, not after it.
+    preloadCodecs(o.inputs[0]);
     OpenOptions open = o.open;
     open.set.texturePattern = open.texture;
     open.set.frame = static_cast<int>(first);
@@ -148,8 +148,7 @@ Result<int> convert(const ConvertOptions& o, Program& program) {
     STX_CHECK(checkMeshViewOptions(*o.mesh, program));
     STX_CHECK(containerOf(items[0].output));
     const BatchWork work = [&](const BatchItem& item, Program& p) {
-        // Loading the image libraries takes 190 ms: let it happen while the model is read.
-        preloadCodecs();
+        preloadCodecs(item.input);
         return convertOne(item.input, item.output, o, p);
     };
     // One name on the command line is one conversion; a list is a batch, however short.

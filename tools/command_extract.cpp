@@ -54,7 +54,7 @@ Points pointsOf(const Bundle& bundle) {
 Result<int> extract(const ExtractOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
-    preloadCodecs();
+    preloadCodecs(o.input);
     STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
     const auto ending = std::filesystem::path(o.output).extension();
     std::string what;

@@ -41,7 +41,7 @@ Result<std::int64_t> parsePixels(const std::string& text) {
 Result<int> packBundle(const PackOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
-    preloadCodecs();
+    preloadCodecs(o.input);
     PruneSettings pruning = o.pruning;
     if (!o.budget.empty()) {
         STX_TRY(pruning.budget, parsePixels(o.budget));

@@ -162,7 +162,7 @@ Result<int> render(const RenderOptions& o, Program& program) {
     writing.noClobber = program.common.noClobber;
     STX_CHECK(FrameWriter::check(writing));
 
-    preloadCodecs();
+    preloadCodecs(o.input);
     STX_TRY(auto opened, openRenderable(o.input, o.open, program.job));
     CameraContext context;
     std::int64_t points = 0;

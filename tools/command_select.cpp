@@ -37,7 +37,7 @@ Result<int> select(const SelectOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
-    preloadCodecs();
+    preloadCodecs(o.input);
     STX_TRY(auto opened, openRenderable(o.input, {}, program.job));
     if (const auto* mesh = std::get_if<Mesh>(&opened)) return selectAroundMesh(*mesh, o, program);
     const auto& bundle = std::get<Bundle>(opened);

@@ -305,13 +305,13 @@ void takePicture(const std::vector<From>& from, int width, int x0, int y0, Image
 /// One image of a folder into its page; alpha that stands in the depth texture into `coverage`.
 Result<void> readImage(const fs::path& file, const AtlasHeader& header, const AtlasTexture& t,
                        AtlasPage& page, Image<std::uint8_t>& coverage, const Limits& limits) {
-    STX_TRY(const auto bytes, readFile(file, limits));
     const auto where = fmt::format("'{}'", file.string());
     if (t.coding == "float") {
-        STX_TRY(const auto reader, ExrReader::open(bytes, file.string(), limits));
+        STX_TRY(const auto reader, ExrReader::open(file, limits));
         STX_CHECK(checkPartSize(reader, 0, header));
         return readFloats(reader, 0, {t.attribute}, header.linear, page);
     }
+    STX_TRY(const auto bytes, readFile(file, limits));
     STX_TRY(auto image, decodeImage(bytes, file.string(), limits));
     const int channels = t.attribute == "depth" ? 1 : t.coding == "sRGB8" ? 4 : 3;
     const int bits = t.attribute == "colour" || t.coding == "code8" ? 8 : 16;
@@ -445,8 +445,7 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
 }
 
 Result<Atlas> readExr(const fs::path& path, Job& job) {
-    STX_TRY(const auto bytes, readFile(path, job.limits));
-    STX_TRY(const auto reader, ExrReader::open(bytes, path.string(), job.limits));
+    STX_TRY(const auto reader, ExrReader::open(path, job.limits));
     STX_TRY(const auto header, exrHeader(reader, job.limits));
     STX_CHECK(checkMemory(header, reader.where(), job.limits));
     Atlas atlas = header.atlas;

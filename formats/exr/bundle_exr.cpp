@@ -310,8 +310,8 @@ Result<Bundle> readExrBundle(ByteSpan bytes, std::string_view name, Job& job) {
 }
 
 Result<Bundle> readExrBundle(const std::filesystem::path& path, Job& job) {
-    STX_TRY(const auto bytes, readFile(path, job.limits));
-    return readExrBundle(bytes, path.string(), job);
+    STX_TRY(const auto reader, ExrReader::open(path, job.limits));
+    return readExrBundle(reader, job);
 }
 
 }  // namespace stx

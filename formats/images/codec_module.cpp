@@ -2,9 +2,12 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -70,6 +73,31 @@ class Preloader {
     std::thread thread_;
 };
 
+bool hasEnding(const fs::path& file, std::initializer_list<std::string_view> endings) {
+    std::string ending = file.extension().string();
+    for (char& c : ending) {
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    }
+    return std::find(endings.begin(), endings.end(), ending) != endings.end();
+}
+
+bool needsCodecs(const fs::path& file) {
+    return hasEnding(file, {".tif", ".tiff", ".tga", ".bmp", ".webp", ".gif", ".hdr", ".psd",
+                            ".pnm", ".ppm",  ".pgm", ".pbm", ".dds",  ".dpx", ".jp2", ".j2k",
+                            ".j2c", ".jpc",  ".sgi", ".rgb", ".rgba", ".bw"});
+}
+
+bool holdsImageThatNeedsCodecs(const fs::path& folder) {
+    constexpr int kMostFiles = 1000;  // a look must not take longer than the loading
+    std::error_code ec;
+    int files = 0;
+    for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
+        if (needsCodecs(it->path())) return true;
+        if (++files == kMostFiles) break;
+    }
+    return false;
+}
+
 }  // namespace
 
 Result<const codecs::Table*> loadCodecs() {
@@ -77,8 +105,14 @@ Result<const codecs::Table*> loadCodecs() {
     return loaded;
 }
 
-void preloadCodecs() {
-    static const Preloader preloader;
+void preloadCodecs(const fs::path& input) {
+    // These are read without OpenImageIO, whatever lies beside them.
+    if (hasEnding(input, {".png", ".jpg", ".jpeg", ".exr", ".mp4", ".xmt", ".bt"})) return;
+    std::error_code ec;
+    const fs::path folder = fs::is_directory(input, ec) ? input : folderOf(input);
+    if (needsCodecs(input) || holdsImageThatNeedsCodecs(folder)) {
+        static const Preloader preloader;
+    }
 }
 
 }  // namespace stx

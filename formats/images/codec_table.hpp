@@ -8,7 +8,7 @@
 /// build.
 namespace stx::codecs {
 
-inline constexpr std::uint32_t kTableVersion = 1;
+inline constexpr std::uint32_t kTableVersion = 2;
 /// The one symbol of the module: `const Table* stxCodecs();`
 inline constexpr const char* kTableSymbol = "stxCodecs";
 
@@ -18,7 +18,7 @@ struct Failure {
     char message[1024] = {};
 };
 
-/// What a file holds, told before its pixels are decoded.
+/// What a file holds, given before its pixels are decoded.
 struct Header {
     int width = 0, height = 0, channels = 0;
     int bits = 0;                  ///< how the values come: 8 and 16 unsigned, 32 float
@@ -32,7 +32,7 @@ struct Header {
 struct DecodeRequest {
     const void* bytes = nullptr;
     std::size_t size = 0;
-    /// A name with the ending of the format, for formats that cannot be told by their first bytes.
+    /// A name with the ending of the format, for formats that first bytes do not show.
     const char* name = nullptr;
     void* context = nullptr;
     /// Checks the header, gives room for width * height * channels values, or null (with
@@ -40,22 +40,10 @@ struct DecodeRequest {
     void* (*allocate)(void* context, const Header& header, Failure& failure) = nullptr;
 };
 
-struct EncodeRequest {
-    const char* format = nullptr;  ///< "png" or "jpeg"
-    int width = 0, height = 0, channels = 0, bits = 8;
-    const void* values = nullptr;  ///< interleaved, host order
-    bool srgb = false;
-    int level = 6;     ///< png: zlib's
-    int quality = 92;  ///< jpeg
-    void* context = nullptr;
-    void (*emit)(void* context, const void* bytes, std::size_t size) = nullptr;
-};
-
 struct Table {
     std::uint32_t version = kTableVersion;
-    /// Both give true, or false with a failure. Safe to call from several threads.
+    /// True, or false with a failure.
     bool (*decode)(const DecodeRequest& request, Failure& failure) = nullptr;
-    bool (*encode)(const EncodeRequest& request, Failure& failure) = nullptr;
 };
 
 }  // namespace stx::codecs

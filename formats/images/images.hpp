@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -40,11 +41,16 @@ struct DecodedImage {
     }
 };
 
-/// Decodes any format OpenImageIO reads, from memory. Header sizes are checked against the limits
-/// and against what the file can hold before pixels are allocated. `name` is for messages and for
-/// formats that are told by their ending.
+/// Decodes an image in memory: PNG, JPEG and OpenEXR here, every other format that OpenImageIO
+/// reads in a process of its own. Header sizes are checked against the limits and against what the
+/// file can hold before pixels are allocated. `name` is for messages and for formats that are told
+/// by their ending. Safe to call from several threads, none of which waits for another.
 [[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,
                                                const Limits& limits);
+
+/// The same as rgba8From(decodeImage()); 8-bit PNG and JPEG are decoded into the result at once.
+[[nodiscard]] Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
+                                                     const Limits& limits);
 
 /// 8-bit sRGB RGBA with straight alpha of any decoded image (grey is spread, missing alpha is 255,
 /// 16 bits are rounded, linear floats are coded as sRGB, premultiplied floats divided). The size is
@@ -63,9 +69,10 @@ struct DecodedImage {
 [[nodiscard]] Result<Bytes> encodeJpeg(int width, int height, int channels,
                                        const std::uint8_t* values, int quality);
 
-/// Starts loading the codecs' libraries (190 ms) on another thread, while the caller does something
-/// else. More calls do nothing; errors show at the first image. For programs that decode, or end by
-/// _exit(): some of the libraries crash when a process runs their destructors while they load.
-void preloadCodecs();
+/// Starts loading OpenImageIO (190 ms) on another thread, while the caller does something else,
+/// when `input` is an image that it will be needed for, or a folder that holds one. More calls do
+/// nothing; errors show at the first image. For programs that decode, or end by _exit(): some of
+/// the libraries crash when a process runs their destructors while they load.
+void preloadCodecs(const std::filesystem::path& input);
 
 }  // namespace stx

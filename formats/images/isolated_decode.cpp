@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -100,13 +101,14 @@ void* allocateAndTell(void* context, const Header& header, Failure& failure) {
 }
 
 [[noreturn]] void runChild(const codecs::Table& table, const DecodeRequest& request, int fd,
-                           std::uint64_t maxMemoryBytes, std::uint64_t dataNow) {
+                           std::uint64_t maxMemoryBytes) {
     for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPIPE, SIGXCPU, SIGTERM})
         ::signal(signal, SIG_DFL);
     const rlimit noCore = {0, 0};
     const rlimit time = {kPatienceMs / 1000, kPatienceMs / 1000 + 1};
     ::setrlimit(RLIMIT_CORE, &noCore);
     ::setrlimit(RLIMIT_CPU, &time);
+    const std::uint64_t dataNow = dataBytes();
     const std::uint64_t allowed = dataNow + maxMemoryBytes + (maxMemoryBytes >> 1) + (256u << 20);
     const rlimit memory = {allowed, allowed};
     if (dataNow) ::setrlimit(RLIMIT_DATA, &memory);
@@ -155,18 +157,22 @@ bool failWith(Failure& failure, ErrorCode code, const std::string& message) {
 
 bool decodeIsolated(const codecs::Table& table, const DecodeRequest& request,
                     std::uint64_t maxMemoryBytes, Failure& failure) {
+    // A child gets copies of all descriptors, also of other children's pipes, whose ends it would
+    // hold open: so there is only its own while it is made. The decoding itself runs side by side.
+    static std::mutex making;
+    std::unique_lock lock(making);
     int ends[2] = {-1, -1};
     if (::pipe2(ends, O_CLOEXEC) != 0)
         return failWith(failure, ErrorCode::failed, "no pipe to a decoder can be made");
     const Descriptor in(ends[0]);
     Descriptor out(ends[1]);
-    const std::uint64_t dataNow = dataBytes();
     const pid_t pid = ::fork();
     if (pid < 0)
         return failWith(failure, ErrorCode::failed, "no process for a decoder can be made");
-    if (pid == 0) runChild(table, request, out.get(), maxMemoryBytes, dataNow);
+    if (pid == 0) runChild(table, request, out.get(), maxMemoryBytes);
     const ChildGuard guard(pid);
     out.close();
+    lock.unlock();
 
     const auto died = [&] {
         return failWith(failure, ErrorCode::invalidInput,

@@ -35,8 +35,7 @@ void placeInDisplay(DecodedImage& image) {
     image.height = image.displayHeight;
 }
 
-Result<DecodedImage> decode(const PictureSource& source, Job& job) {
-    STX_TRY(const auto bytes, readFile(source.path, job.limits));
+Result<DecodedImage> decode(const PictureSource& source, ByteSpan bytes, Job& job) {
     auto image = decodeImage(bytes, source.name, job.limits);
     if (image) {
         const auto pixels = static_cast<std::uint64_t>(std::max(0, image->displayWidth)) *
@@ -121,7 +120,15 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         out.texture = std::move(image);
         return out;
     }
-    STX_TRY(auto image, decode(source, job));
+    STX_TRY(const auto bytes, readFile(source.path, job.limits));
+    if (const auto info = probeImage(bytes); info && info->bits == 8) {
+        // What two components of a JPEG are, it does not say.
+        out.alpha = info->format == "png" && info->channels % 2 == 0;
+        STX_TRY(auto pixels, decodeRgba8(bytes, source.name, job.limits));
+        out.texture = std::move(pixels);
+        return out;
+    }
+    STX_TRY(auto image, decode(source, bytes, job));
     const auto hasName = [&](std::string_view n) {
         return std::find(image.channelNames.begin(), image.channelNames.end(), n) !=
                image.channelNames.end();
@@ -185,7 +192,8 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
         STX_TRY(out.values, parse(bytes, source.name, job.limits));
         return out;
     }
-    STX_TRY(const auto image, decode(source, job));
+    STX_TRY(const auto bytes, readFile(source.path, job.limits));
+    STX_TRY(const auto image, decode(source, bytes, job));
     out.bits = image.bits();
     STX_TRY(const int channel, depthChannel(image, source.name));
     out.values = Image<float>(image.width, image.height);
@@ -203,7 +211,7 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
 Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job) {
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
     if (const auto info = probeImage(bytes)) return glm::ivec2(info->width, info->height);
-    STX_TRY(const auto image, decode(source, job));
+    STX_TRY(const auto image, decode(source, bytes, job));
     return glm::ivec2(image.width, image.height);
 }
 

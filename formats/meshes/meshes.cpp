@@ -92,10 +92,10 @@ std::filesystem::path textureBeside(const std::filesystem::path& model) {
 /// Gives every material without a base colour texture this one.
 Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
-    auto decoded = decodeImage(bytes, path.filename().string(), job.limits);
-    if (!decoded) return tl::unexpected(decoded.error().at(fmt::format("'{}'", path.string())));
+    auto pixels = decodeRgba8(bytes, path.filename().string(), job.limits);
+    if (!pixels) return tl::unexpected(pixels.error().at(fmt::format("'{}'", path.string())));
     const int index = static_cast<int>(mesh.textures.size());
-    mesh.textures.push_back({rgba8From(*decoded)});
+    mesh.textures.push_back({std::move(*pixels)});
     for (auto& material : mesh.materials) {
         if (material.baseColourTexture < 0) material.baseColourTexture = index;
     }

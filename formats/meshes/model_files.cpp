@@ -53,16 +53,16 @@ Result<int> ModelFiles::textureFromFile(std::string_view name, SamplerState samp
 Result<int> ModelFiles::textureFromBytes(ByteSpan bytes, std::string_view name,
                                          SamplerState sampler, std::vector<MeshTexture>& textures) {
     if (const auto index = known(name, sampler, textures)) return *index;
-    const auto decoded = decodeImage(bytes, name, job_.limits);
-    if (!decoded) {
-        if (decoded.error().code == ErrorCode::failed) return tl::unexpected(decoded.error());
+    auto pixels = decodeRgba8(bytes, name, job_.limits);
+    if (!pixels) {
+        if (pixels.error().code == ErrorCode::failed) return tl::unexpected(pixels.error());
         job_.note(
             fmt::format("texture '{}' cannot be decoded ({}); the plain colour is used instead",
-                        name, decoded.error().message));
+                        name, pixels.error().message));
         first_.emplace(std::string(name), -1);
         return -1;
     }
-    MeshTexture texture{rgba8From(*decoded), sampler.wrapU, sampler.wrapV, sampler.nearest};
+    MeshTexture texture{std::move(*pixels), sampler.wrapU, sampler.wrapV, sampler.nearest};
     pixelBytes_ += texture.pixels.count() * sizeof(glm::u8vec4);
     if (pixelBytes_ > job_.limits.maxMemoryBytes)
         return fail(

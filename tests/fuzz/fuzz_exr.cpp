@@ -4,7 +4,7 @@
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
-#include "formats/exr/exr_image.hpp"
+#include "formats/images/exr_image.hpp"
 
 using namespace stx;
 

@@ -69,11 +69,9 @@ const char* formatByContent(std::string_view head) {
         const char* format;
     };
     static constexpr Magic kMagics[] = {
-        {"\x89PNG\r\n"sv, "png"}, {"\xff\xd8\xff"sv, "jpeg"},
-
-        {"II*\0"sv, "tiff"},      {"MM\0*"sv, "tiff"},        {"BM"sv, "bmp"},   {"GIF8"sv, "gif"},
-        {"#?"sv, "hdr"},          {"8BPS"sv, "psd"},          {"DDS "sv, "dds"}, {"SDPX"sv, "dpx"},
-        {"XPDS"sv, "dpx"},
+        {"II*\0"sv, "tiff"}, {"MM\0*"sv, "tiff"}, {"BM"sv, "bmp"},
+        {"GIF8"sv, "gif"},   {"#?"sv, "hdr"},     {"8BPS"sv, "psd"},
+        {"DDS "sv, "dds"},   {"SDPX"sv, "dpx"},   {"XPDS"sv, "dpx"},
     };
     for (const auto& magic : kMagics) {
         if (head.starts_with(magic.start)) return magic.format;
@@ -210,35 +208,6 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     input->close();
 }
 
-void encodeOrThrow(const EncodeRequest& request) {
-    setUpOnce();
-    auto output = OIIO::ImageOutput::create(request.format);
-    if (!output) failWith(OIIO::geterror(), "the image format cannot be written");
-    OIIO::ImageSpec spec(request.width, request.height, request.channels,
-                         request.bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8);
-    const bool png = std::string_view(request.format) == "png";
-    if (request.srgb) spec.attribute("oiio:ColorSpace", "sRGB");
-    if (request.channels == 2 || request.channels == 4) {
-        spec.alpha_channel = request.channels - 1;
-        spec.attribute("oiio:UnassociatedAlpha", 1);
-    }
-    if (png) {
-        spec.attribute("png:compressionLevel", request.level);
-    } else {
-        spec.attribute("Compression", fmt::format("jpeg:{}", request.quality));
-        spec.attribute("jpeg:subsampling", request.quality >= 90 ? "4:4:4" : "4:2:0");
-    }
-    std::vector<unsigned char> bytes;
-    OIIO::Filesystem::IOVecOutput writer(bytes);
-    void* proxy = &writer;
-    spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
-    if (!output->open(png ? "image.png" : "image.jpg", spec))
-        failWith(output->geterror(), "the image cannot be encoded");
-    if (!output->write_image(spec.format, request.values) || !output->close())
-        failWith(output->geterror(), "the image cannot be encoded");
-    request.emit(request.context, bytes.data(), bytes.size());
-}
-
 }  // namespace
 
 }  // namespace stx::codecs
@@ -249,9 +218,6 @@ extern "C" __attribute__((visibility("default"))) const stx::codecs::Table* stxC
         kTableVersion,
         [](const DecodeRequest& request, Failure& failure) {
             return adapt(failure, [&] { decodeOrThrow(request, failure); });
-        },
-        [](const EncodeRequest& request, Failure& failure) {
-            return adapt(failure, [&] { encodeOrThrow(request); });
         },
     };
     return &table;

@@ -55,6 +55,19 @@ INSTANTIATE_TEST_SUITE_P(All, BundleOfEachKind,
                          testing::Combine(testing::Values(8, 16, 32), testing::Bool(),
                                           testing::Bool()));
 
+TEST(BundleExr, FileIsReadInPiecesAndNotWhole) {
+    const TemporaryFolder folder;
+    const Bundle bundle = smallBundle(2, 16, false, false);
+    Job job;
+    ASSERT_TRUE(writeExrBundle(bundle, folder / "a.exr", job));
+    // Bytes behind the pixels, which no part of the file uses, beyond what may be held at once.
+    fs::resize_file(folder / "a.exr", 300u << 20);
+    job.limits.maxMemoryBytes = 64u << 20;
+    const auto back = readExrBundle(folder / "a.exr", job);
+    ASSERT_TRUE(back) << back.error().text();
+    EXPECT_EQ(differenceOf(bundle, *back), "");
+}
+
 TEST(ExrColour, EachCodeUnderEachAlphaSurvivesHalfFloats) {
     Bundle bundle;
     ReferenceView v;

@@ -212,7 +212,6 @@ TEST(Decode, MalformedFilesEndInResultsOrErrors) {
 }
 
 TEST(Decode, IsSafeFromManyThreads) {
-    preloadCodecs();
     std::vector<int> good(64, 0);
     parallelFor(0, 64, [&](std::int64_t i) {
         std::vector<std::uint8_t> values(32 * 32 * 4, static_cast<std::uint8_t>(i));

@@ -1,4 +1,4 @@
-#include "formats/exr/exr_image.hpp"
+#include "formats/images/exr_image.hpp"
 
 #include <algorithm>
 #include <cstring>

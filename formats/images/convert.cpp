@@ -1,0 +1,106 @@
+#include <algorithm>
+#include <string_view>
+
+#include "formats/images/images.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx {
+
+namespace {
+
+/// Index of the channel with that name, in the main layer if there are several; -1 = none.
+int channelNamed(const DecodedImage& image, std::string_view name) {
+    for (int i = 0; i < image.channels; ++i) {
+        if (image.channelNames[i] == name) return i;
+    }
+    return -1;
+}
+
+struct ColourChannels {
+    int r = 0, g = 0, b = 0, a = -1;  ///< indices; a = -1: there is no alpha
+};
+
+/// Where an image's colour stands: by name, else by position.
+ColourChannels colourChannels(const DecodedImage& image) {
+    int r = channelNamed(image, "R"), g = channelNamed(image, "G"), b = channelNamed(image, "B");
+    int a = channelNamed(image, "A");
+    if (r < 0 || g < 0 || b < 0) {
+        const bool grey = image.channels < 3;
+        r = 0;
+        g = grey ? 0 : 1;
+        b = grey ? 0 : 2;
+        if (a < 0 && (image.channels == 2 || image.channels == 4)) a = image.channels - 1;
+        if (a == 0) a = -1;
+    }
+    return {r, g, b, a};
+}
+
+}  // namespace
+
+Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
+    Image<glm::u8vec4> out(image.width, image.height);
+    const ColourChannels at = colourChannels(image);
+    const int r = at.r, g = at.g, b = at.b, a = at.a;
+    const auto pixel = [&](const auto* values, const auto& coded) {
+        parallelFor(0, image.height, [&](std::int64_t y) {
+            const auto* p = values + static_cast<std::size_t>(y) * image.width * image.channels;
+            for (auto& q : out.row(static_cast<int>(y))) {
+                q = coded(p[r], p[g], p[b], a < 0 ? nullptr : p + a);
+                p += image.channels;
+            }
+        });
+    };
+    if (const auto* v8 = std::get_if<0>(&image.values)) {
+        pixel(v8->data(), [](auto red, auto green, auto blue, const auto* alpha) {
+            return glm::u8vec4(red, green, blue, alpha ? *alpha : 255);
+        });
+    } else if (const auto* v16 = std::get_if<1>(&image.values)) {
+        const auto to8 = [](std::uint32_t v) {
+            return static_cast<std::uint8_t>((v * 255u + 32767u) / 65535u);
+        };
+        pixel(v16->data(), [&](auto red, auto green, auto blue, const auto* alpha) {
+            return glm::u8vec4(to8(red), to8(green), to8(blue), alpha ? to8(*alpha) : 255);
+        });
+    } else {
+        const auto to8 = [](float v) {
+            return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255.0f + 0.5f);
+        };
+        const bool premultiplied = image.premultiplied && a >= 0;
+        const auto colour = [&](float v, float alpha) {
+            if (premultiplied && alpha > 0.0f) v /= alpha;
+            return to8(image.linear ? srgbFromLinear(v) : v);
+        };
+        pixel(std::get<2>(image.values).data(),
+              [&](float red, float green, float blue, const float* alpha) {
+                  const float cover = alpha ? *alpha : 1.0f;
+                  return glm::u8vec4(colour(red, cover), colour(green, cover), colour(blue, cover),
+                                     to8(cover));
+              });
+    }
+    return out;
+}
+
+Image<glm::vec4> rgbaFloatFrom(const DecodedImage& image) {
+    Image<glm::vec4> out(image.width, image.height);
+    const ColourChannels at = colourChannels(image);
+    const int r = at.r, g = at.g, b = at.b, a = at.a;
+    std::visit(
+        [&](const auto& values) {
+            using Value = typename std::decay_t<decltype(values)>::value_type;
+            constexpr float kScale = std::is_same_v<Value, std::uint8_t>    ? 1.0f / 255.0f
+                                     : std::is_same_v<Value, std::uint16_t> ? 1.0f / 65535.0f
+                                                                            : 1.0f;
+            const auto* p = values.data();
+            for (auto& q : out.pixels()) {
+                const float alpha = a < 0 ? 1.0f : static_cast<float>(p[a]) * kScale;
+                q = glm::vec4(p[r] * kScale, p[g] * kScale, p[b] * kScale, alpha);
+                if (image.premultiplied && alpha > 0.0f) q = glm::vec4(glm::vec3(q) / alpha, alpha);
+                p += image.channels;
+            }
+        },
+        image.values);
+    return out;
+}
+
+}  // namespace stx

@@ -1,0 +1,228 @@
+#include <spng.h>
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <string_view>
+#include <vector>
+
+#include "formats/images/reader.hpp"
+
+namespace stx {
+
+namespace {
+
+struct FreeContext {
+    void operator()(spng_ctx* context) const { spng_ctx_free(context); }
+};
+using Context = std::unique_ptr<spng_ctx, FreeContext>;
+
+std::uint32_t bigEndian32(ByteSpan bytes, std::size_t at) {
+    const auto byte = [&](std::size_t i) { return std::to_integer<std::uint32_t>(bytes[at + i]); };
+    return byte(0) << 24 | byte(1) << 16 | byte(2) << 8 | byte(3);
+}
+
+/// The chunks that pixels depend on, signature first. The library parses and keeps all others
+/// (text, profiles, dates), which only gives hostile files something to attack.
+Result<std::vector<ByteSpan>> pixelChunks(ByteSpan bytes) {
+    std::vector<ByteSpan> chunks = {bytes.first(8)};
+    std::size_t at = 8, paletteEntries = 0;
+    unsigned colourType = 0;
+    for (;;) {
+        if (bytes.size() - at < 12)
+            return fail(ErrorCode::invalidInput,
+                        "the PNG ends at byte {} without an IEND chunk; it is cut off",
+                        bytes.size());
+        const std::size_t length = bigEndian32(bytes, at);
+        const std::string_view kind(reinterpret_cast<const char*>(bytes.data()) + at + 4, 4);
+        if (length > bytes.size() - at - 12)
+            return fail(ErrorCode::invalidInput,
+                        "the PNG chunk at byte {} claims {} bytes, but only {} follow; it is cut "
+                        "off or damaged",
+                        at, length, bytes.size() - at - 12);
+        bool keep = kind == "IHDR" || kind == "IDAT" || kind == "IEND";
+        if (kind == "IHDR" && length == 13)
+            colourType = std::to_integer<unsigned>(bytes[at + 8 + 9]);
+        // In other colour types a palette is a hint for poor screens.
+        if (kind == "PLTE" && colourType == SPNG_COLOR_TYPE_INDEXED) {
+            keep = true;
+            paletteEntries = length / 3;
+        }
+        // One of a wrong length is no reason to refuse the picture (libpng thinks so, too).
+        if (kind == "tRNS")
+            keep =
+                (colourType == SPNG_COLOR_TYPE_GRAYSCALE && length == 2) ||
+                (colourType == SPNG_COLOR_TYPE_TRUECOLOR && length == 6) ||
+                (colourType == SPNG_COLOR_TYPE_INDEXED && length > 0 && length <= paletteEntries);
+        const bool critical = !std::to_integer<bool>(bytes[at + 4] & std::byte{0x20});
+        if (critical && !keep && kind != "PLTE")
+            return fail(ErrorCode::invalidInput, "the PNG has an unknown critical chunk at byte {}",
+                        at);
+        if (keep) chunks.push_back(bytes.subspan(at, length + 12));
+        if (kind == "IEND") return chunks;
+        at += length + 12;
+    }
+}
+
+class PngReader final : public ImageReader {
+  public:
+    PngReader(ByteSpan file, std::vector<ByteSpan> chunks)
+        : file_(file), chunks_(std::move(chunks)), context_(spng_ctx_new(0)) {}
+
+    Result<void> open() {
+        if (!context_) return failWith(SPNG_EMEM);
+        if (const int error = spng_set_png_stream(context_.get(), readMore, this))
+            return failWith(error);
+        if (const int error = spng_get_ihdr(context_.get(), &header_)) return failWith(error);
+        spng_trns transparency;
+        const int error = spng_get_trns(context_.get(), &transparency);
+        if (error && error != SPNG_ECHUNKAVAIL) return failWith(error);
+        transparency_ = error == 0;
+        info_.format = "png";
+        info_.width = static_cast<int>(header_.width);
+        info_.height = static_cast<int>(header_.height);
+        info_.bits = header_.bit_depth == 16 ? 16 : 8;
+        const bool grey = header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE ||
+                          header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE_ALPHA;
+        const bool alpha = header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE_ALPHA ||
+                           header_.color_type == SPNG_COLOR_TYPE_TRUECOLOR_ALPHA;
+        info_.channels = (grey ? 1 : 3) + (alpha || transparency_ ? 1 : 0);
+        return {};
+    }
+
+    Result<void> read(void* values) override {
+        const bool wide = info_.bits == 16;
+        // Host order and no conversion, unless bits, palettes or a transparent colour are spread.
+        int format = SPNG_FMT_PNG;
+        if (header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE && transparency_)
+            format = wide ? SPNG_FMT_GA16 : SPNG_FMT_GA8;
+        else if (header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE && !wide)
+            format = SPNG_FMT_G8;
+        else if (transparency_)
+            format = wide ? SPNG_FMT_RGBA16 : SPNG_FMT_RGBA8;
+        else if (header_.color_type == SPNG_COLOR_TYPE_INDEXED)
+            format = SPNG_FMT_RGB8;
+        return decode(format, values, info_.channels * info_.bits / 8);
+    }
+
+    [[nodiscard]] bool givesRgba8() const override {
+        // Spreading grey to RGBA, libspng 0.7.3 compares a transparent grey's unused high bits too.
+        return info_.bits == 8 &&
+               !(header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE && transparency_);
+    }
+    Result<void> readRgba8(glm::u8vec4* pixels) override {
+        return decode(SPNG_FMT_RGBA8, pixels, 4);
+    }
+
+  private:
+    Result<void> decode(int format, void* pixels, int bytesEach) {
+        const auto size = std::size_t{header_.width} * header_.height * bytesEach;
+        if (const int error =
+                spng_decode_image(context_.get(), pixels, size, format, SPNG_DECODE_TRNS))
+            return failWith(error);
+        // To the end, for the checksum of the last chunk.
+        if (const int error = spng_decode_chunks(context_.get())) return failWith(error);
+        return {};
+    }
+
+    static int readMore(spng_ctx*, void* user, void* to, std::size_t size) {
+        auto& self = *static_cast<PngReader*>(user);
+        auto* out = static_cast<std::byte*>(to);
+        while (size > 0) {
+            if (self.chunk_ == self.chunks_.size()) return SPNG_IO_EOF;
+            const ByteSpan rest = self.chunks_[self.chunk_].subspan(self.offset_);
+            const std::size_t n = std::min(size, rest.size());
+            std::memcpy(out, rest.data(), n);
+            out += n;
+            size -= n;
+            self.offset_ += n;
+            if (n < rest.size()) continue;
+            self.offset_ = 0;
+            ++self.chunk_;
+        }
+        return 0;
+    }
+
+    [[nodiscard]] tl::unexpected<Error> failWith(int error) const {
+        if (error == SPNG_EMEM)
+            return fail(ErrorCode::failed, "there is not enough memory for the image");
+        // Where the library is, to the chunk: the one that it began last.
+        const auto next = std::min(chunk_ + (offset_ > 0 ? 1 : 0), chunks_.size());
+        const auto at = next == 0 ? 0 : chunks_[next - 1].data() - file_.data();
+        return fail(ErrorCode::invalidInput, "the PNG is damaged in the chunk at byte {}: {}", at,
+                    spng_strerror(error));
+    }
+
+    ByteSpan file_;
+    std::vector<ByteSpan> chunks_;
+    std::size_t chunk_ = 0, offset_ = 0;  ///< what the library reads next
+    spng_ihdr header_{};
+    bool transparency_ = false;
+    Context context_;
+};
+
+int appendBytes(spng_ctx*, void* user, void* from, std::size_t size) {
+    try {
+        auto& out = *static_cast<Bytes*>(user);
+        const auto* bytes = static_cast<const std::byte*>(from);
+        out.insert(out.end(), bytes, bytes + size);
+        return 0;
+    } catch (const std::bad_alloc&) {
+        return SPNG_IO_ERROR;  // an exception must not pass through C
+    }
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ImageReader>> openPng(ByteSpan bytes) {
+    STX_TRY(auto chunks, pixelChunks(bytes));
+    auto reader = std::make_unique<PngReader>(bytes, std::move(chunks));
+    STX_CHECK(reader->open());
+    return reader;
+}
+
+Result<Bytes> encodePng(int width, int height, int channels, int bits, const void* values,
+                        bool srgb, int level) {
+    STX_CHECK(checkEncodable(width, height, "PNG"));
+    if (channels < 1 || channels > 4 || (bits != 8 && bits != 16))
+        return fail(ErrorCode::failed,
+                    "cannot encode a PNG of {} channels of {} bits; 1 to 4 of 8 or 16 is possible",
+                    channels, bits);
+    const Context context(spng_ctx_new(SPNG_CTX_ENCODER));
+    Bytes out;
+    int error = context ? 0 : SPNG_EMEM;
+    const auto step = [&](auto function, auto... arguments) {
+        if (!error) error = function(context.get(), arguments...);
+    };
+    constexpr std::uint8_t kColourTypes[] = {
+        SPNG_COLOR_TYPE_GRAYSCALE, SPNG_COLOR_TYPE_GRAYSCALE_ALPHA, SPNG_COLOR_TYPE_TRUECOLOR,
+        SPNG_COLOR_TYPE_TRUECOLOR_ALPHA};
+    constexpr int kDefaultStrategy = 0;  // zlib's Z_DEFAULT_STRATEGY
+    spng_ihdr header{};
+    header.width = static_cast<std::uint32_t>(width);
+    header.height = static_cast<std::uint32_t>(height);
+    header.bit_depth = static_cast<std::uint8_t>(bits);
+    header.color_type = kColourTypes[channels - 1];
+    step(spng_set_png_stream, appendBytes, &out);
+    step(spng_set_ihdr, &header);
+    if (srgb) {
+        // With the gamma and primaries that ISO/IEC 15948, 11.3.3.5 recommends beside it.
+        constexpr std::uint8_t kAbsoluteColorimetric = 3;
+        spng_chrm_int primaries = {31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000};
+        step(spng_set_srgb, kAbsoluteColorimetric);
+        step(spng_set_gama_int, std::uint32_t{45455});
+        step(spng_set_chrm_int, &primaries);
+    }
+    step(spng_set_option, SPNG_IMG_COMPRESSION_LEVEL, std::clamp(level, 0, 9));
+    // The library's own choice, Z_FILTERED, is larger by up to a third for flat pictures.
+    step(spng_set_option, SPNG_IMG_COMPRESSION_STRATEGY, kDefaultStrategy);
+    step(spng_encode_image, values,
+         static_cast<std::size_t>(width) * height * channels * (bits / 8),
+         static_cast<int>(SPNG_FMT_PNG), static_cast<int>(SPNG_ENCODE_FINALIZE));
+    if (error)
+        return fail(ErrorCode::failed, "cannot encode a PNG of {}x{} pixels: {}", width, height,
+                    spng_strerror(error));
+    return out;
+}
+
+}  // namespace stx

@@ -1,0 +1,130 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "formats/images/images.hpp"
+
+namespace stx {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A small file of tests/fuzz/corpus; baseline, progressive, arithmetic and restarts hold the same
+/// coefficients.
+Bytes sample(const std::string& name) {
+    const auto bytes =
+        readFile(fs::path(STX_SOURCE_DIR) / "tests/fuzz/corpus/pictures" / name, Limits());
+    EXPECT_TRUE(bytes) << bytes.error().text();
+    return bytes.value_or(Bytes());
+}
+
+std::vector<std::uint8_t> pixelsOf(ByteSpan bytes) {
+    const auto image = decodeImage(bytes, "a.jpg", Limits());
+    EXPECT_TRUE(image) << image.error().text();
+    if (!image) return {};
+    const auto rgba = decodeRgba8(bytes, "a.jpg", Limits());
+    EXPECT_TRUE(rgba && *rgba == rgba8From(*image));
+    return std::get<0>(image->values);
+}
+
+std::size_t find(const Bytes& bytes, int marker, std::size_t from = 2) {
+    for (std::size_t at = from; at + 1 < bytes.size(); ++at) {
+        if (bytes[at] == std::byte{0xff} && bytes[at + 1] == static_cast<std::byte>(marker))
+            return at;
+    }
+    return bytes.size();
+}
+
+TEST(JpegReader, AllCodingsOfAPictureGiveTheSamePixels) {
+    const auto baseline = pixelsOf(sample("baseline.jpg"));
+    EXPECT_EQ(baseline.size(), 20u * 12 * 3);
+    EXPECT_EQ(pixelsOf(sample("progressive.jpg")), baseline);
+    EXPECT_EQ(pixelsOf(sample("arithmetic.jpg")), baseline);
+    EXPECT_EQ(pixelsOf(sample("restarts.jpg")), baseline);
+}
+
+TEST(JpegReader, InksBecomeRgb) {
+    // Inverted inks: 200, 100, 50 of 255, and a black of 128 over them.
+    for (const char* name : {"cmyk.jpg", "ycck.jpg"}) {
+        const auto pixels = pixelsOf(sample(name));
+        ASSERT_EQ(pixels.size(), 8u * 8 * 3) << name;
+        EXPECT_NEAR(pixels[0], 200 * 128 / 255.0, 1.5) << name;
+        EXPECT_NEAR(pixels[1], 100 * 128 / 255.0, 1.5) << name;
+        EXPECT_NEAR(pixels[2], 50 * 128 / 255.0, 1.5) << name;
+    }
+}
+
+TEST(JpegReader, TwoComponentsStayTwo) {
+    const auto image = decodeImage(sample("two_components.jpg"), "a.jpg", Limits());
+    ASSERT_TRUE(image) << image.error().text();
+    EXPECT_EQ(image->channels, 2);
+    EXPECT_EQ(image->channelNames, (std::vector<std::string>{"R", "G"}));
+}
+
+TEST(JpegReader, CutOffFilesAreErrors) {
+    for (const char* name : {"baseline.jpg", "arithmetic.jpg", "restarts.jpg"}) {
+        const auto whole = sample(name);
+        const auto pixels = pixelsOf(whole);
+        // Only the end marker lacks: nothing is lost, but arithmetic codes do not show it.
+        if (name != std::string_view("arithmetic.jpg")) {
+            EXPECT_EQ(pixelsOf(ByteSpan(whole).first(whole.size() - 2)), pixels) << name;
+        }
+        const std::size_t scan = find(whole, 0xda);
+        for (std::size_t size = 1; size < scan + 20; ++size)
+            EXPECT_FALSE(decodeImage(ByteSpan(whole).first(size), "a", Limits())) << name << size;
+    }
+    const auto baseline = sample("baseline.jpg");
+    const auto half = decodeImage(ByteSpan(baseline).first(baseline.size() - 100), "a", Limits());
+    ASSERT_FALSE(half);
+    EXPECT_EQ(half.error().message,
+              fmt::format("the JPEG ends at byte {} before its last pixels; it is cut off",
+                          baseline.size() - 100));
+}
+
+TEST(JpegReader, TwelveBitsAreRefused) {
+    auto bytes = sample("baseline.jpg");
+    bytes[find(bytes, 0xc0) + 4] = std::byte{12};
+    const auto image = decodeImage(bytes, "a.jpg", Limits());
+    ASSERT_FALSE(image);
+    EXPECT_EQ(image.error().text(),
+              "'a.jpg': the JPEG's header is damaged: Unsupported JPEG data precision 12");
+}
+
+TEST(JpegReader, ThousandsOfScansAreRefused) {
+    auto bytes = sample("grey_progressive.jpg");
+    const std::size_t first = find(bytes, 0xda), second = find(bytes, 0xda, first + 2);
+    ASSERT_LT(second, bytes.size());
+    const std::size_t end = std::min(second, find(bytes, 0xc4, first));
+    const Bytes scan(bytes.begin() + first, bytes.begin() + end);
+    for (int i = 0; i < 2000; ++i) bytes.insert(bytes.begin() + first, scan.begin(), scan.end());
+    const auto image = decodeImage(bytes, "a.jpg", Limits());
+    ASSERT_FALSE(image);
+    EXPECT_EQ(image.error().message, "the JPEG has more than 100 scans");
+}
+
+TEST(JpegReader, CoefficientsCountAgainstTheLimit) {
+    Limits limits;
+    limits.maxMemoryBytes = 20 * 12 * 3;
+    EXPECT_TRUE(decodeImage(sample("baseline.jpg"), "a.jpg", limits));
+    const auto image = decodeImage(sample("progressive.jpg"), "a.jpg", limits);
+    ASSERT_FALSE(image);
+    EXPECT_NE(image.error().message.find("--max-memory"), std::string::npos)
+        << image.error().text();
+}
+
+TEST(JpegReader, WrongBytesNeverStopTheProcess) {
+    for (const char* name : {"baseline.jpg", "progressive.jpg", "cmyk.jpg", "arithmetic.jpg"}) {
+        const auto whole = sample(name);
+        for (std::size_t i = 2; i < whole.size(); ++i) {
+            for (const int value : {0x00, 0xff, 0xd8, 0x7f}) {
+                auto changed = whole;
+                changed[i] = static_cast<std::byte>(value);
+                const auto image = decodeImage(changed, "a.jpg", Limits());
+                EXPECT_TRUE(image || !image.error().message.empty());
+            }
+        }
+    }
+}
+
+}  // namespace
+}  // namespace stx
