@@ -1,6 +1,7 @@
 # Installs stx.hpp and every header of ours that it includes, and no other: lib/base/image.hpp becomes
 # <stx/base/image.hpp>. Includes are rewritten to those names, so that one include directory is enough
 # and no folder named lib comes into the search path of a user's program.
+cmake_policy(VERSION 3.25)
 set(queue formats/stx/stx.hpp)
 set(installed)
 while(queue)

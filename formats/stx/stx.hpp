@@ -99,10 +99,10 @@ struct ConvertSettings {
     /// The views themselves, when there are any: then neither `views` nor the framing below, from
     /// width to elevationRad, counts.
     std::vector<Camera> cameras;
-    int width = 512, height = 512;       ///< pixels of each view
-    std::optional<bool> orthographic;    ///< without a value: only the faces of a cube are
-    double fovRad = 0.6108652381980153;  ///< 35 degrees; the angle that the whole object fills
-    double elevationRad = 0.2617993877991494;  ///< 15 degrees; of a ring above the horizon
+    int width = 512, height = 512;             ///< pixels of each view
+    std::optional<bool> orthographic;          ///< without a value: only the faces of a cube are
+    double fovRad = glm::radians(35.0);        ///< the angle that the whole object fills
+    double elevationRad = glm::radians(15.0);  ///< of a ring above the horizon
     int supersampling = 4;                     ///< colour samples per pixel and axis, 1..8
     bool meshNormals = false;                  ///< keeps the mesh's own normals (SimpleTextureV2)
     std::string title;                         ///< of the bundle
@@ -129,7 +129,7 @@ struct ConvertSettings {
 /// The lens and the frame of novel cameras.
 struct CameraSettings {
     int width = 512, height = 512;       ///< pixels
-    double fovRad = 0.6981317007977318;  ///< 40 degrees; vertical, above 0 and below pi
+    double fovRad = glm::radians(40.0);  ///< vertical, above 0 and below pi
     double orthoHeight = 0;  ///< above 0: orthographic, with a window of this height in scene units
     glm::dvec3 up{0, 1, 0};  ///< what is up in the picture; need not be orthogonal
 };
