@@ -14,9 +14,9 @@
 ///     stx::save(*frame, "novel.png", {}, job);
 ///
 /// Each call gives a Result: the value, or one Error with a code, a sentence and where it happened.
-/// std::bad_alloc is the only exception that leaves a call. Calls are safe from several threads as
-/// long as each has its own objects; one Job may serve all of them. Work runs on all processors,
-/// or on as many threads as a ThreadLimit allows.
+/// A call that runs out of memory throws std::bad_alloc, as the standard library does. Calls are
+/// safe from several threads as long as each has its own objects; one Job may serve all of them.
+/// Work runs on all processors, or on as many threads as a ThreadLimit allows.
 ///
 /// Units: lengths are in scene units, angles in radians, sizes and positions in images in pixels.
 /// Cameras look along -Z with +X right and +Y up; pixel (0, 0) is the top-left one and its centre
