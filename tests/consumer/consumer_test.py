@@ -67,8 +67,8 @@ def hidden(folders):
     script = "for f in $HIDE; do if [ -d $f ]; then mount -t tmpfs none $f; " \
              "elif [ -e $f ]; then mount --bind /dev/null $f; fi; done; exec \"$@\""
     prefix = ["env", "HIDE=" + " ".join(folders), "unshare", "-rm", "sh", "-euc", script, "sh"]
-    tried = subprocess.run(prefix + ["ls", folders[0]], capture_output=True, text=True, check=False)
-    return prefix if tried.returncode == 0 and not tried.stdout else []
+    gone = subprocess.run(prefix + ["test", "!", "-e", os.path.join(folders[0], "bin/stx")], capture_output=True)
+    return prefix if gone.returncode == 0 else []
 
 
 def main():

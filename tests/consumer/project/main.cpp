@@ -48,8 +48,8 @@ int main(int argc, char** argv) {
     lens.height = 120;
     const auto camera = valueOf(stx::cameraAt({1.5, 1.2, 2.5}, {0, 0.5, 0}, lens));
     const auto frame = valueOf(stx::render(opened, camera, {}, job));
-    valueOf(stx::save(frame, "library.png", {}, job));
-    const auto picture = stx::pictureOf(frame);
+    valueOf(stx::save(frame, "library.png", {.background = glm::vec3(0)}, job));
+    const auto picture = stx::pictureOf(frame, glm::vec3(0));
 
     // TIFF needs the module of codecs.
     for (const char* path : {argv[2], argv[3]}) {

@@ -9,7 +9,8 @@ libdir=$(dirname "$(find "$prefix" -name libstx.so)")
 "$prefix/bin/stx" convert ../amphora.obj -o bundle.exr --views sphere:6 --size 128x128 --quiet
 "$prefix/bin/stx" bake bundle.exr -o baked.exr --quiet
 "$prefix/bin/stx" pack baked.exr -o atlas --quiet
-"$prefix/bin/stx" render atlas -o novel.png --eye=1.5,1.2,2.5 --target 0,0.5,0 --size 160x120 --quiet
+"$prefix/bin/stx" render atlas -o novel.png --eye=1.5,1.2,2.5 --target 0,0.5,0 --size 160x120 \
+    --background 0,0,0 --quiet
 oiiotool novel.png -o novel.tif
 "$prefix/bin/stx" compare novel.png novel.tif
 
