@@ -6,22 +6,25 @@
 namespace stx {
 namespace {
 
+/// The renderer of a model that outlives it.
+Result<std::unique_ptr<Renderer>> borrow(const Model& model, const RenderSettings& settings,
+                                         Backend backend, int device, Job& job) {
+    if (const auto* bundle = std::get_if<Bundle>(&model))
+        return makeRenderer(backend, *bundle, settings, device, job);
+    if (const auto* atlas = std::get_if<Atlas>(&model))
+        return makeRenderer(backend, *atlas, settings, device, job);
+    const auto& mesh = std::get<Mesh>(model);
+    STX_CHECK(mesh.check());
+    return makeMeshRenderer(mesh, settings, job);
+}
+
 /// A renderer together with what it draws from.
 class KeptRenderer final : public Renderer {
   public:
     explicit KeptRenderer(Model model) : model_(std::move(model)) {}
 
-    Result<void> make(Backend backend, const RenderSettings& settings, int device, Job& job) {
-        if (const auto* atlas = std::get_if<Atlas>(&model_)) {
-            STX_TRY(auto bundle, unpack(*atlas, job));
-            model_ = std::move(bundle);
-        }
-        if (const auto* mesh = std::get_if<Mesh>(&model_)) {
-            STX_CHECK(mesh->check());
-            renderer_ = makeMeshRenderer(*mesh, settings, job);
-            return {};
-        }
-        STX_TRY(renderer_, makeRenderer(backend, std::get<Bundle>(model_), settings, device, job));
+    Result<void> make(const RenderSettings& settings, Backend backend, int device, Job& job) {
+        STX_TRY(renderer_, borrow(model_, settings, backend, device, job));
         return {};
     }
 
@@ -40,7 +43,7 @@ class KeptRenderer final : public Renderer {
 Result<std::unique_ptr<Renderer>> rendererOf(Model model, const RenderSettings& settings, Job& job,
                                              Backend backend, int device) {
     auto renderer = std::make_unique<KeptRenderer>(std::move(model));
-    STX_CHECK(renderer->make(backend, settings, device, job));
+    STX_CHECK(renderer->make(settings, backend, device, job));
     return renderer;
 }
 
@@ -49,16 +52,7 @@ Result<Frame> render(const Model& model, const Camera& camera, const RenderSetti
     STX_CHECK(camera.check());
     STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
                                          64, "the picture"));
-    if (const auto* bundle = std::get_if<Bundle>(&model)) {
-        STX_TRY(const auto renderer, makeRenderer(Backend::automatic, *bundle, settings, -1, job));
-        return renderer->render(camera);
-    }
-    if (const auto* mesh = std::get_if<Mesh>(&model)) {
-        STX_CHECK(mesh->check());
-        return makeMeshRenderer(*mesh, settings, job)->render(camera);
-    }
-    STX_TRY(const auto bundle, unpack(std::get<Atlas>(model), job));
-    STX_TRY(const auto renderer, makeRenderer(Backend::automatic, bundle, settings, -1, job));
+    STX_TRY(const auto renderer, borrow(model, settings, Backend::automatic, -1, job));
     return renderer->render(camera);
 }
 

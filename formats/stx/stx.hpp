@@ -148,7 +148,7 @@ struct CameraSettings {
 
 /// The renderer of any model, which it keeps: for more than one picture. A mesh is rasterised
 /// itself, on the processor: the truth to compare with. The job must outlive the renderer; backend,
-/// device and errors are those of makeRenderer(), which borrows a bundle instead.
+/// device and errors are those of makeRenderer(), which borrows a bundle or an atlas instead.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> rendererOf(Model model,
                                                            const RenderSettings& settings, Job& job,
                                                            Backend backend = Backend::automatic,
