@@ -5,8 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "formats/files/files.hpp"
-#include "formats/imagesets/image_sets.hpp"
+#include "formats/stx/options.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
@@ -30,11 +29,6 @@ enum class FileKind {
 /// "a mesh", "an MPEG-4 file" …
 [[nodiscard]] const char* nameOf(FileKind kind);
 
-struct OpenOptions {
-    std::string texture;  ///< texture of a mesh that names none; empty = none
-    ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
-};
-
 /// Opens a bundle, an atlas (unpacked) or an image set as a Bundle. Meshes: error that says to use
 /// `stx convert`.
 [[nodiscard]] Result<Bundle> openBundle(const std::filesystem::path& path,
@@ -44,12 +38,6 @@ struct OpenOptions {
 [[nodiscard]] Result<std::variant<Mesh, Bundle>> openRenderable(const std::filesystem::path& path,
                                                                 const OpenOptions& options,
                                                                 Job& job);
-
-struct SaveOptions {
-    bool noClobber = false;
-    int jpegQuality = 0;        ///< 0 = PNG; 1..100 = colour as JPEG (MPEG-4 containers)
-    bool pointTexture = false;  ///< MPEG-4: PointTexture nodes instead of SimpleTexture
-};
 
 /// The container that a target's ending asks for: .exr, .mp4, .xmt or .bt. Errors (usage) for
 /// others.

@@ -3,33 +3,12 @@
 #include <numbers>
 
 #include "formats/imagesets/camera_file.hpp"
-#include "lib/geometry/view_layout.hpp"
+#include "formats/stx/stx.hpp"
 
 namespace stx::tools {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kDefaultFovDeg = 40.0;
-
-/// A camera with a vertical field of view, square pixels, centred.
-Camera withVerticalFov(glm::dvec3 eye, glm::dquat orientation, double fovRad, glm::ivec2 size) {
-    Camera c;
-    c.position = eye;
-    c.orientation = orientation;
-    c.width = size.x;
-    c.height = size.y;
-    c.fx = c.fy = size.y * 0.5 / std::tan(fovRad * 0.5);
-    c.cx = size.x * 0.5;
-    c.cy = size.y * 0.5;
-    return c;
-}
-
-/// Distance at which a sphere fills the narrower side of the frame.
-double framingDistance(double radius, double verticalFovRad, glm::ivec2 size) {
-    const double tangent = std::tan(verticalFovRad * 0.5);
-    const double half = std::atan(std::min(1.0, static_cast<double>(size.x) / size.y) * tangent);
-    return radius / std::sin(half) * 1.02;
-}
 
 }  // namespace
 
@@ -121,50 +100,34 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
         return out;
     }
 
-    const glm::ivec2 frame = size.value_or(glm::ivec2(512));
-    const double fov = o.fovDeg.value_or(kDefaultFovDeg) * kDegree;
-    const double radius = std::max(context.bounds.radius(), 1e-9);
-    const double distance = framingDistance(radius, fov, frame);
-    const auto finish = [&](glm::dvec3 eye, glm::dquat orientation, double orthoDefault) {
-        Camera c = withVerticalFov(eye, orientation, fov, frame);
-        if (o.orthoHeight) {
-            c.orthographic = true;
-            c.fx = c.fy = frame.y / o.orthoHeight.value_or(orthoDefault);
-        }
-        return c;
-    };
-    glm::dvec3 up(0, 1, 0),
-        target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
+    CameraSettings lens;
+    if (size) {
+        lens.width = size->x;
+        lens.height = size->y;
+    }
+    if (o.fovDeg) lens.fovRad = *o.fovDeg * kDegree;
+    lens.orthoHeight = o.orthoHeight.value_or(0);
+    glm::dvec3 target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
     if (!o.up.empty()) {
-        STX_TRY(up, parseVec3(o.up, "--up"));
-        if (!(glm::length(up) > 0))
+        STX_TRY(lens.up, parseVec3(o.up, "--up"));
+        if (!(glm::length(lens.up) > 0))
             return fail(ErrorCode::usage, "--up is 0,0,0; it must point somewhere");
     }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));
     }
-    std::vector<Camera> out;
-    if (pose) {
-        glm::dvec3 eye;
-        if (o.eye.empty()) {
-            eye = target + glm::dvec3(0, 0, distance);
-        } else {
-            STX_TRY(eye, parseVec3(o.eye, "--eye"));
-        }
-        STX_TRY(const auto orientation, lookAt(eye, target, up));
-        out.push_back(finish(eye, orientation, 2.0 * radius));
-        return out;
+    const double radius = context.bounds.radius();
+    if (!pose)
+        return orbitCameras(target, radius, std::max(o.orbit, 1), o.elevationDeg * kDegree, lens);
+    glm::dvec3 eye;
+    if (o.eye.empty()) {
+        STX_TRY(const auto front, orbitCameras(target, radius, 1, 0.0, lens));
+        eye = front[0].position;
+    } else {
+        STX_TRY(eye, parseVec3(o.eye, "--eye"));
     }
-    ViewLayout ring;
-    ring.kind = ViewLayout::Kind::ring;
-    ring.count = std::max(o.orbit, 1);
-    ring.elevationRad = o.elevationDeg * kDegree;
-    for (const auto& direction : layoutDirections(ring)) {
-        const glm::dvec3 eye = target + direction * distance;
-        STX_TRY(const auto orientation, lookAt(eye, target, up));
-        out.push_back(finish(eye, orientation, 2.0 * radius));
-    }
-    return out;
+    STX_TRY(const auto camera, cameraAt(eye, target, lens));
+    return std::vector<Camera>{camera};
 }
 
 Result<int> checkCameraOptions(const CameraOptions& options, Program& program) {

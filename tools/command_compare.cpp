@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "formats/images/images.hpp"
+#include "formats/stx/stx.hpp"
 #include "lib/metrics/compare.hpp"
 #include "tools/program.hpp"
 
@@ -15,23 +16,6 @@ struct CompareOptions {
     int firstFrame = 0;
     int frames = 0;
 };
-
-struct LoadedImage {
-    Image<glm::u8vec4> coded;  ///< always
-    Image<glm::vec4> linear;   ///< of float formats
-    bool isLinear = false;
-};
-
-Result<LoadedImage> load(const std::string& path, Program& program) {
-    STX_TRY(const auto bytes, readFile(path, program.job.limits));
-    auto decoded = decodeImage(bytes, path, program.job.limits);
-    if (!decoded) return tl::unexpected(decoded.error().at(fmt::format("'{}'", path)));
-    LoadedImage out;
-    out.isLinear = decoded->linear;
-    if (decoded->linear) out.linear = rgbaFloatFrom(*decoded);
-    out.coded = rgba8From(*decoded);
-    return out;
-}
 
 nlohmann::ordered_json number(std::optional<double> v) {
     if (!v) return nullptr;
@@ -49,20 +33,16 @@ nlohmann::ordered_json toJson(const Comparison& c) {
 
 Result<Comparison> comparePair(const std::string& a, const std::string& b, const CompareOptions& o,
                                const Image<std::uint8_t>* mask, Program& program) {
-    STX_TRY(const auto first, load(a, program));
-    STX_TRY(const auto second, load(b, program));
-    const bool linear = first.isLinear && second.isLinear;
-    if (first.isLinear != second.isLinear)
-        program.job.note(
-            "one picture is linear float, the other 8-bit: both are compared as 8-bit sRGB");
+    STX_TRY(const auto first, openPicture(a, program.job));
+    STX_TRY(const auto second, openPicture(b, program.job));
     CompareSettings settings;
     settings.mask = mask;
     STX_TRY(const auto background, parseVec3(o.background, "--background"));
     settings.background = glm::vec3(background);
-    auto result = linear ? compare(first.linear, second.linear, settings)
-                         : compare(first.coded, second.coded, settings);
+    auto result = compare(first, second, settings, program.job);
     if (!result) return tl::unexpected(result.error().at(fmt::format("'{}' and '{}'", a, b)));
     if (!o.errorPicture.empty()) {
+        const bool linear = first.isLinear() && second.isLinear();
         STX_TRY(const auto picture,
                 linear ? errorPicture(first.linear, second.linear, settings, o.gain)
                        : errorPicture(first.coded, second.coded, settings, o.gain));
@@ -80,8 +60,8 @@ std::string decibels(std::optional<double> v) {
 Result<int> compareImages(const CompareOptions& o, Program& program) {
     std::optional<Image<std::uint8_t>> mask;
     if (!o.mask.empty()) {
-        STX_TRY(const auto loaded, load(o.mask, program));
-        if (loaded.isLinear)
+        STX_TRY(const auto loaded, openPicture(o.mask, program.job));
+        if (loaded.isLinear())
             return fail(ErrorCode::usage, "--mask '{}' must be an 8-bit image", o.mask);
         mask.emplace(loaded.coded.width(), loaded.coded.height());
         for (std::size_t i = 0; i < mask->count(); ++i)

@@ -63,26 +63,6 @@ Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& prog
     return framing;
 }
 
-/// What is drawn, as points that the cameras frame.
-std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
-    std::vector<glm::vec3> points;
-    points.reserve(mesh.triangles.size() * 3 + mesh.points.size());
-    for (const auto& t : mesh.triangles) {
-        for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[t[k]]);
-    }
-    // Loose points are drawn as discs, which must fit into the frame, too.
-    const float radius = pointRadius(mesh);
-    for (const auto p : mesh.points) {
-        for (int axis = 0; axis < 3; ++axis) {
-            glm::vec3 offset(0.0f);
-            offset[axis] = radius;
-            points.push_back(mesh.positions[p] + offset);
-            points.push_back(mesh.positions[p] - offset);
-        }
-    }
-    return points;
-}
-
 Image<glm::u8vec4> onBlack(const Frame& frame) {
     Image<glm::u8vec4> out(frame.colour.width(), frame.colour.height());
     for (std::size_t i = 0; i < out.count(); ++i) {

@@ -1,6 +1,7 @@
 #include "formats/images/codec_module.hpp"
 
 #include <dlfcn.h>
+#include <link.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -19,19 +20,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// The folder of the library or program that this code is linked into; empty when unknown.
+fs::path ownFolder() {
+    std::error_code ec;
+    static const char inThisObject = 0;
+    Dl_info info = {};
+    link_map* object = nullptr;
+    const bool found =
+        ::dladdr1(&inThisObject, &info, reinterpret_cast<void**>(&object), RTLD_DL_LINKMAP) != 0;
+    // The program itself has no name there.
+    const bool isLibrary = found && object && object->l_name && *object->l_name;
+    return fs::canonical(isLibrary ? object->l_name : "/proc/self/exe", ec).parent_path();
+}
+
 std::vector<std::string> placesOfModule() {
-    std::vector<std::string> places;
     // Somebody who names a module wants that one and no other.
     if (const char* named = std::getenv("STX_CODECS"); named && *named) return {named};
-    std::error_code ec;
-    const fs::path program = fs::read_symlink("/proc/self/exe", ec);
-    if (!ec) {
-        const fs::path prefix = program.parent_path().parent_path();
-        places.push_back(prefix / "lib/stx/stx_codecs.so");
-        places.push_back(prefix / STX_CODECS_LIBDIR / "stx/stx_codecs.so");
+    constexpr const char* kModule = "stx/stx_codecs.so";
+    const fs::path folder = ownFolder();
+    std::vector<std::string> places;
+    if (!folder.empty()) {
+        places.push_back(folder / kModule);  // of lib/libstx.so
+        // Of bin/stx, installed or in the build tree.
+        places.push_back((folder / STX_LIB_FROM_BIN / kModule).lexically_normal());
     }
-    places.push_back(STX_CODECS_INSTALL_PATH);
-    places.push_back(STX_CODECS_BUILD_PATH);
     return places;
 }
 

@@ -99,4 +99,23 @@ Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& camera
     return bundle;
 }
 
+std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
+    std::vector<glm::vec3> points;
+    points.reserve(mesh.triangles.size() * 3 + mesh.points.size());
+    for (const auto& t : mesh.triangles) {
+        for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[t[k]]);
+    }
+    // Loose points are drawn as discs, which must fit into the frame, too.
+    const float radius = pointRadius(mesh);
+    for (const auto p : mesh.points) {
+        for (int axis = 0; axis < 3; ++axis) {
+            glm::vec3 offset(0.0f);
+            offset[axis] = radius;
+            points.push_back(mesh.positions[p] + offset);
+            points.push_back(mesh.positions[p] - offset);
+        }
+    }
+    return points;
+}
+
 }  // namespace stx

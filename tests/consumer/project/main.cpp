@@ -1,23 +1,77 @@
-// A program of somebody else: renders a captured triangle and checks that something is there.
+// A program of somebody else: `use_stx MODEL.obj PICTURE.png PICTURE.tif FORBIDDEN...` does with
+// the library what use.sh did with the program, and compares. Nothing may be loaded from FORBIDDEN.
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string>
 
-#include <formats/images/images.hpp>
-#include <lib/capture/capture.hpp>
-#include <lib/geometry/view_layout.hpp>
+#include <stx/stx.hpp>
 
-int main() {
-    stx::Mesh mesh;
-    mesh.materials.emplace_back();
-    mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};
-    mesh.triangles = {{0, 1, 2}};
-    mesh.triangleMaterial = {0};
+namespace {
+
+void require(bool holds, const std::string& what) {
+    if (holds) return;
+    std::fprintf(stderr, "use_stx: %s\n", what.c_str());
+    std::exit(1);
+}
+
+template <class T>
+T valueOf(stx::Result<T> result) {
+    require(result.has_value(), result ? "" : result.error().text());
+    if constexpr (!std::is_void_v<T>) return std::move(*result);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    require(argc >= 4, "usage: use_stx MODEL PNG TIFF FORBIDDEN...");
+    require(std::string(stx::version()).size() >= 5, "no version");
     stx::Job job;
-    const auto cameras = stx::layoutCameras(*stx::parseViewLayout("ring:2"), {}, mesh.positions);
-    const auto bundle = stx::captureBundle(mesh, *cameras, {}, job);
-    if (!bundle || bundle->pointCount() < 1000) return 1;
-    const auto* texture = bundle->views[0].texture.rgba8();
-    const auto png =
-        stx::encodePng(texture->width(), texture->height(), 4, 8, texture->data(), true);
-    if (!png) std::fprintf(stderr, "%s\n", png.error().text().c_str());
-    return png ? 0 : 1;
+
+    stx::ConvertSettings settings;
+    settings.views = "sphere:6";
+    settings.width = settings.height = 128;
+    settings.title = "amphora";
+    auto bundle = valueOf(stx::convert(valueOf(stx::open(argv[1], {}, job)), settings, job));
+    valueOf(stx::bake(bundle, {}, job));
+    valueOf(stx::save(bundle, "library.exr", {}, job));
+    require(valueOf(stx::validate("library.exr", job)).empty(), "library.exr breaks a rule");
+
+    const auto atlas = valueOf(stx::pack(bundle, {}, job));
+    require(atlas.textureCount() <= 4, "more than four textures");
+    valueOf(stx::save(atlas, "library_atlas", {}, job));
+    const auto opened = valueOf(stx::open("library_atlas", {}, job));
+    require(std::holds_alternative<stx::Atlas>(opened), "library_atlas is not an atlas");
+
+    stx::CameraSettings lens;
+    lens.width = 160;
+    lens.height = 120;
+    const auto camera = valueOf(stx::cameraAt({1.5, 1.2, 2.5}, {0, 0.5, 0}, lens));
+    const auto frame = valueOf(stx::render(opened, camera, {}, job));
+    valueOf(stx::save(frame, "library.png", {.background = glm::vec3(0)}, job));
+    const auto picture = stx::pictureOf(frame, glm::vec3(0));
+
+    // TIFF needs the module of codecs.
+    for (const char* path : {argv[2], argv[3]}) {
+        const auto comparison =
+            valueOf(stx::compare(picture, valueOf(stx::openPicture(path, job)), {}, job));
+        require(comparison.identical(), std::string("the picture differs from ") + path);
+        require(comparison.pixels == 160 * 120, "not all pixels were compared");
+    }
+
+    // Several pictures, drawn by one renderer that keeps the model.
+    const auto sphere = stx::boundsOf(opened);
+    const auto orbit = valueOf(stx::orbitCameras(sphere.centre(), sphere.radius(), 2, 0.3, lens));
+    const auto renderer = valueOf(stx::rendererOf(opened, {}, job, stx::Backend::cpu));
+    for (const auto& c : orbit)
+        require(valueOf(renderer->render(c)).colour.width() == 160, "a picture of another size");
+
+    require(stx::open("missing.obj", {}, job).error().code == stx::ErrorCode::io,
+            "a missing file is not an io error");
+
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);) {
+        for (int i = 4; i < argc; ++i)
+            require(line.find(argv[i]) == std::string::npos, "loaded from elsewhere: " + line);
+    }
 }

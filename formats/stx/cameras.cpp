@@ -1,0 +1,71 @@
+#include <cmath>
+#include <numbers>
+
+#include "formats/stx/stx.hpp"
+#include "lib/geometry/view_layout.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kMostCameras = 1000000;
+
+Result<void> check(const CameraSettings& s) {
+    if (s.width < 1 || s.height < 1)
+        return fail(ErrorCode::usage, "a picture of {}x{} is asked for; sizes are above 0", s.width,
+                    s.height);
+    if (!(s.fovRad > 0 && s.fovRad < std::numbers::pi))
+        return fail(ErrorCode::usage, "fovRad is {:g}; it must be above 0 and below pi", s.fovRad);
+    if (!(s.orthoHeight >= 0 && std::isfinite(s.orthoHeight)))
+        return fail(ErrorCode::usage, "orthoHeight is {:g}; it must be 0 or more", s.orthoHeight);
+    if (!(glm::length(s.up) > 0))
+        return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
+    return {};
+}
+
+/// Distance at which a sphere fills the narrower side of the frame.
+double framingDistance(double radius, const CameraSettings& s) {
+    // Room around the object, so that no edge touches the frame.
+    constexpr double kMargin = 1.02;
+    const double aspect = static_cast<double>(s.width) / s.height;
+    const double half = std::atan(std::min(1.0, aspect) * std::tan(s.fovRad * 0.5));
+    return radius / std::sin(half) * kMargin;
+}
+
+}  // namespace
+
+Result<Camera> cameraAt(glm::dvec3 eye, glm::dvec3 target, const CameraSettings& s) {
+    STX_CHECK(check(s));
+    STX_TRY(const auto orientation, lookAt(eye, target, s.up));
+    Camera c;
+    c.position = eye;
+    c.orientation = orientation;
+    c.width = s.width;
+    c.height = s.height;
+    c.orthographic = s.orthoHeight > 0;
+    c.fx = c.fy =
+        c.orthographic ? s.height / s.orthoHeight : s.height * 0.5 / std::tan(s.fovRad * 0.5);
+    c.cx = s.width * 0.5;
+    c.cy = s.height * 0.5;
+    return c;
+}
+
+Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius, int count,
+                                         double elevationRad, const CameraSettings& s) {
+    STX_CHECK(check(s));
+    if (count < 1 || count > kMostCameras)
+        return fail(ErrorCode::usage, "an orbit of {} cameras is asked for; 1 to {} are possible",
+                    count, kMostCameras);
+    const double distance = framingDistance(std::max(radius, 1e-9), s);
+    ViewLayout ring;
+    ring.kind = ViewLayout::Kind::ring;
+    ring.count = count;
+    ring.elevationRad = elevationRad;
+    std::vector<Camera> cameras;
+    for (const auto& direction : layoutDirections(ring)) {
+        STX_TRY(const auto camera, cameraAt(centre + direction * distance, centre, s));
+        cameras.push_back(camera);
+    }
+    return cameras;
+}
+
+}  // namespace stx

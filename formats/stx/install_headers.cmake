@@ -1,0 +1,21 @@
+# Installs stx.hpp and every header of ours that it includes, and no other: lib/base/image.hpp becomes
+# <stx/base/image.hpp>. Includes are rewritten to those names, so that one include directory is enough
+# and no folder named lib comes into the search path of a user's program.
+cmake_policy(VERSION 3.25)
+set(queue formats/stx/stx.hpp)
+set(installed)
+while(queue)
+    list(POP_FRONT queue header)
+    if(header IN_LIST installed)
+        continue()
+    endif()
+    list(APPEND installed ${header})
+    file(READ ${SOURCE}/${header} text)
+    string(REGEX MATCHALL "#include \"[^\"]+\"" includes "${text}")
+    list(TRANSFORM includes REPLACE "#include \"(.+)\"" "\\1")
+    list(APPEND queue ${includes})
+    string(REGEX REPLACE "#include \"(formats/stx|formats|lib)/" "#include \"stx/" text "${text}")
+    string(REGEX REPLACE "^(formats/stx|formats|lib)/" "stx/" target ${header})
+    message(STATUS "Installing: ${INCLUDEDIR}/${target}")
+    file(WRITE ${INCLUDEDIR}/${target} "${text}")
+endwhile()

@@ -1,0 +1,92 @@
+#include "formats/images/frames.hpp"
+#include "formats/images/images.hpp"
+#include "formats/stx/stx.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
+
+namespace stx {
+namespace {
+
+/// The renderer of a model that outlives it.
+Result<std::unique_ptr<Renderer>> borrow(const Model& model, const RenderSettings& settings,
+                                         Backend backend, int device, Job& job) {
+    if (const auto* bundle = std::get_if<Bundle>(&model))
+        return makeRenderer(backend, *bundle, settings, device, job);
+    if (const auto* atlas = std::get_if<Atlas>(&model))
+        return makeRenderer(backend, *atlas, settings, device, job);
+    const auto& mesh = std::get<Mesh>(model);
+    STX_CHECK(mesh.check());
+    return makeMeshRenderer(mesh, settings, job);
+}
+
+/// A renderer together with what it draws from.
+class KeptRenderer final : public Renderer {
+  public:
+    explicit KeptRenderer(Model model) : model_(std::move(model)) {}
+
+    Result<void> make(const RenderSettings& settings, Backend backend, int device, Job& job) {
+        STX_TRY(renderer_, borrow(model_, settings, backend, device, job));
+        return {};
+    }
+
+    Result<Frame> render(const Camera& camera) override { return renderer_->render(camera); }
+    void expect(const Camera& next) override { renderer_->expect(next); }
+    std::string backend() const override { return renderer_->backend(); }
+    std::string device() const override { return renderer_->device(); }
+
+  private:
+    Model model_;
+    std::unique_ptr<Renderer> renderer_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Renderer>> rendererOf(Model model, const RenderSettings& settings, Job& job,
+                                             Backend backend, int device) {
+    auto renderer = std::make_unique<KeptRenderer>(std::move(model));
+    STX_CHECK(renderer->make(settings, backend, device, job));
+    return renderer;
+}
+
+Result<Frame> render(const Model& model, const Camera& camera, const RenderSettings& settings,
+                     Job& job) {
+    STX_CHECK(camera.check());
+    STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
+                                         64, "the picture"));
+    STX_TRY(const auto renderer, borrow(model, settings, Backend::automatic, -1, job));
+    return renderer->render(camera);
+}
+
+Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
+    STX_TRY(const auto bytes, readFile(path, job.limits));
+    auto decoded = decodeImage(bytes, path.string(), job.limits);
+    if (!decoded) return tl::unexpected(decoded.error().at(fmt::format("'{}'", path.string())));
+    Picture picture;
+    if (decoded->linear) picture.linear = rgbaFloatFrom(*decoded);
+    picture.coded = rgba8From(*decoded);
+    return picture;
+}
+
+Picture pictureOf(const Frame& frame, const std::optional<glm::vec3>& background) {
+    return {rgba8From(frame, background), {}};
+}
+
+Result<void> save(const Frame& frame, const std::filesystem::path& target,
+                  const PictureOptions& options, Job& job) {
+    STX_CHECK(job.checkCancelled());
+    FrameOptions file;
+    file.background = options.background;
+    file.jpegQuality = options.jpegQuality;
+    file.noClobber = options.noClobber;
+    file.camera = options.camera;
+    return writeFrame(frame, target, file);
+}
+
+Result<Comparison> compare(const Picture& a, const Picture& b, const CompareSettings& settings,
+                           Job& job) {
+    if (a.isLinear() != b.isLinear())
+        job.note("one picture is linear float, the other 8-bit: both are compared as 8-bit sRGB");
+    if (a.isLinear() && b.isLinear()) return compare(a.linear, b.linear, settings);
+    return compare(a.coded, b.coded, settings);
+}
+
+}  // namespace stx

@@ -1,0 +1,198 @@
+#pragma once
+
+/// The library stx: reference views with depth (ISO/IEC 14496-16, depth image-based representation)
+/// from models and photographs, packed, baked, drawn and measured. This is the only header to
+/// include; it does what the program `stx` does, a call for each command:
+///
+///     stx::Job job;
+///     auto model = stx::open("amphora.obj", {}, job);              // Result<Model>
+///     auto bundle = stx::convert(std::move(*model), {}, job);      // 16 views of 512x512
+///     stx::bake(*bundle, {}, job);                                 // normals and splats
+///     auto atlas = stx::pack(*bundle, {}, job);                    // at most four textures
+///     auto camera = stx::cameraAt({1.5, 1.2, 2.5}, {0, 0.5, 0}, {});
+///     auto frame = stx::render(*bundle, *camera, {}, job);
+///     stx::save(*frame, "novel.png", {}, job);
+///
+/// Each call gives a Result: the value, or one Error with a code, a sentence and where it happened.
+/// A call that runs out of memory throws std::bad_alloc, as the standard library does. Calls are
+/// safe from several threads as long as each has its own objects; one Job may serve all of them.
+/// Work runs on all processors, or on as many threads as a ThreadLimit allows.
+///
+/// Units: lengths are in scene units, angles in radians, sizes and positions in images in pixels.
+/// Cameras look along -Z with +X right and +Y up; pixel (0, 0) is the top-left one and its centre
+/// is (0.5, 0.5); depth is planar (Camera).
+
+#if __cplusplus < 202002L
+#error "stx needs C++20: compile with -std=c++20"
+#endif
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "formats/stx/options.hpp"
+#include "lib/base/job.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/metrics/compare.hpp"
+#include "lib/model/atlas.hpp"
+#include "lib/model/bundle.hpp"
+#include "lib/model/mesh.hpp"
+#include "lib/packing/packing.hpp"
+#include "lib/packing/prune.hpp"
+#include "lib/render/renderer.hpp"
+#include "lib/surface/normals.hpp"
+
+namespace stx {
+
+/// The version of the library that runs, as "0.1.0".
+[[nodiscard]] const char* version();
+
+// ---- Files ----
+
+/// What a file or a folder holds.
+using Model = std::variant<Mesh, Bundle, Atlas>;
+
+/// Opens a mesh (glTF, GLB, OBJ, PLY, STL, DRC), a bundle (.mp4, .xmt, .bt, .exr), an image set, or
+/// an atlas (its folder, its atlas.json, or .exr). The content decides, then the name's ending.
+/// What is opened has passed check(). What is lossy or left out is in job.takeNotes(). Errors: io,
+/// invalidInput (with the byte offset, line or key), usage (an option that the set does not have),
+/// unsupported (the module of image codecs is not there).
+[[nodiscard]] Result<Model> open(const std::filesystem::path& path, const OpenOptions& options,
+                                 Job& job);
+
+/// Writes a bundle, whole or not at all, in the container of the target's ending: .exr (nothing is
+/// lost), .mp4, .xmt or .bt (depth in 8 or 16 bits, colour as PNG or JPEG). Errors: usage (another
+/// ending), invalidInput (a bundle that fails check()), io.
+[[nodiscard]] Result<void> save(const Bundle& bundle, const std::filesystem::path& target,
+                                const SaveOptions& options, Job& job);
+
+/// Writes an atlas, whole or not at all: one OpenEXR file when the name ends in .exr, else a folder
+/// of atlas.json and at most four images. Errors: invalidInput (Atlas::check()), unsupported (JPEG
+/// where OpenEXR is needed), io.
+[[nodiscard]] Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
+                                const SaveOptions& options, Job& job);
+
+/// A rule that a file breaks.
+struct BrokenRule {
+    int number = 0;        ///< 1xxx file, 2xxx container, 3xxx camera, 4xxx depth, 5xxx atlas, 6xxx
+                           ///< normal and splat; never used again for something else
+    bool isError = false;  ///< readers cannot show the file; false: a warning
+    std::string clause;    ///< of the standard, or of this project's conventions
+    std::string summary;   ///< what must hold
+    std::string where;     ///< the view, stream or box; may be empty
+    std::string found, expected;
+};
+
+/// Every rule that a bundle's or an atlas's file breaks, in its order; empty when it breaks none.
+/// Looks at every pixel. Errors: io; invalidInput for meshes and image sets.
+[[nodiscard]] Result<std::vector<BrokenRule>> validate(const std::filesystem::path& path, Job& job);
+
+// ---- Bundles ----
+
+/// How a model becomes reference views. What is said of views applies to meshes.
+struct ConvertSettings {
+    /// `cube` (6), `ring:N`, `sphere:N`, `octahedral:N` (N x N) or `auto:N` (the N best), N from 1.
+    std::string views = "sphere:16";
+    /// The views themselves, when there are any: then neither `views` nor the framing below, from
+    /// width to elevationRad, counts.
+    std::vector<Camera> cameras;
+    int width = 512, height = 512;             ///< pixels of each view
+    std::optional<bool> orthographic;          ///< without a value: only the faces of a cube are
+    double fovRad = glm::radians(35.0);        ///< the angle that the whole object fills
+    double elevationRad = glm::radians(15.0);  ///< of a ring above the horizon
+    int supersampling = 4;                     ///< colour samples per pixel and axis, 1..8
+    bool meshNormals = false;                  ///< keeps the mesh's own normals (SimpleTextureV2)
+    std::string title;                         ///< of the bundle
+    /// 8, 16 or 32 (float distances, only .exr holds them). Without a value meshes get 16 and
+    /// bundles keep theirs.
+    std::optional<int> depthBits;
+};
+
+/// Captures a mesh from all sides; takes the views out of an atlas; gives a bundle the depth bits
+/// that are asked for. Errors: usage (settings), invalidInput (a mesh that fails check(), no view
+/// sees the object), failed (cancelled), and memory over the limit.
+[[nodiscard]] Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job);
+
+// bake(Bundle&, BakeSettings, Job&)           normals and splat axes from depth
+// prune(Bundle&, PruneSettings, Job&)         takes away pixels that other views show as well
+// pack(Bundle, PackSettings, Job&) -> Atlas   at most four textures; unpack(Atlas, Job&) -> Bundle
+// are declared in the headers above.
+
+/// The box around a model's surface or points; empty when there is none.
+[[nodiscard]] Bounds boundsOf(const Model& model);
+
+// ---- Pictures ----
+
+/// The lens and the frame of novel cameras.
+struct CameraSettings {
+    int width = 512, height = 512;       ///< pixels
+    double fovRad = glm::radians(40.0);  ///< vertical, above 0 and below pi
+    double orthoHeight = 0;  ///< above 0: orthographic, with a window of this height in scene units
+    glm::dvec3 up{0, 1, 0};  ///< what is up in the picture; need not be orthogonal
+};
+
+/// A camera at `eye` that looks at `target`, both in the world. Errors (usage): they coincide, or
+/// settings out of range.
+[[nodiscard]] Result<Camera> cameraAt(glm::dvec3 eye, glm::dvec3 target,
+                                      const CameraSettings& settings);
+
+/// `count` cameras (from 1) on a circle around +Y, from which a sphere just fills the narrower side
+/// of the frame: the first on +Z, counter-clockwise from above, `elevationRad` above the horizon.
+/// Errors (usage): settings out of range.
+[[nodiscard]] Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius, int count,
+                                                       double elevationRad,
+                                                       const CameraSettings& settings);
+
+/// The renderer of any model, which it keeps: for more than one picture. A mesh is rasterised
+/// itself, on the processor: the truth to compare with. The job must outlive the renderer; backend,
+/// device and errors are those of makeRenderer(), which borrows a bundle or an atlas instead.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> rendererOf(Model model,
+                                                           const RenderSettings& settings, Job& job,
+                                                           Backend backend = Backend::automatic,
+                                                           int device = -1);
+
+/// One picture of camera.width x camera.height by the best backend of this machine. Errors: a
+/// camera that fails check(), memory over the limit, and those of rendererOf().
+[[nodiscard]] Result<Frame> render(const Model& model, const Camera& camera,
+                                   const RenderSettings& settings, Job& job);
+
+/// A picture as files hold it, straight alpha.
+struct Picture {
+    Rgba8Image coded;       ///< 8-bit sRGB, always
+    RgbaFloatImage linear;  ///< linear light, of files of floats (OpenEXR, HDR); else empty
+
+    [[nodiscard]] bool isLinear() const { return !linear.empty(); }
+};
+
+/// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...). Errors: io,
+/// invalidInput, unsupported (the module of image codecs is not there).
+[[nodiscard]] Result<Picture> openPicture(const std::filesystem::path& path, Job& job);
+
+/// What save() would put into a PNG.
+[[nodiscard]] Picture pictureOf(const Frame& frame,
+                                const std::optional<glm::vec3>& background = {});
+
+struct PictureOptions {
+    /// Put behind the picture, sRGB-coded 0..1. Without it PNG and EXR keep their alpha, and JPEG
+    /// has black behind.
+    std::optional<glm::vec3> background;
+    int jpegQuality = 92;          ///< 1..100
+    bool noClobber = false;        ///< error (io) when the target exists
+    std::optional<Camera> camera;  ///< OpenEXR: goes into its standard attributes
+};
+
+/// Writes a picture, whole or not at all, as .png or .jpg (8-bit sRGB) or .exr (linear, with depth,
+/// and normals where the frame has them). Errors: usage (another ending), io.
+[[nodiscard]] Result<void> save(const Frame& frame, const std::filesystem::path& target,
+                                const PictureOptions& options, Job& job);
+
+/// PSNR, SSIM and the worst pixel of two pictures of one size: as floats when both are linear, else
+/// as 8-bit sRGB, with a note when only one is linear. Pictures in memory: compare() of two images.
+/// Errors: invalidInput when sizes disagree or the mask leaves nothing.
+[[nodiscard]] Result<Comparison> compare(const Picture& a, const Picture& b,
+                                         const CompareSettings& settings, Job& job);
+
+}  // namespace stx

@@ -1,0 +1,183 @@
+#include "formats/stx/stx.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/small_bundle.hpp"
+#include "tests/temporary_folder.hpp"
+
+namespace stx {
+namespace {
+
+Mesh quad() {
+    Mesh mesh;
+    mesh.materials.emplace_back();
+    mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0.2f}, {-1, 1, 0}};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    mesh.triangleMaterial = {0, 0};
+    return mesh;
+}
+
+ConvertSettings smallViews(const std::string& views) {
+    ConvertSettings settings;
+    settings.views = views;
+    settings.width = 32;
+    settings.height = 24;
+    return settings;
+}
+
+TEST(Stx, ConvertsMeshByLayoutByBestViewsAndByCameras) {
+    Job job;
+    for (const auto& [views, count] : {std::pair{"ring:3", 3}, {"auto:2", 2}}) {
+        const auto bundle = convert(quad(), smallViews(views), job);
+        ASSERT_TRUE(bundle) << bundle.error().text();
+        EXPECT_EQ(static_cast<int>(bundle->views.size()), count);
+        EXPECT_EQ(bundle->views[0].camera.width, 32);
+        EXPECT_EQ(bundle->views[0].depthBits, 16);
+    }
+    ConvertSettings settings;
+    settings.title = "a quad";
+    settings.cameras = {*cameraAt({0, 0, 4}, {0, 0, 0}, {})};
+    const auto bundle = convert(quad(), settings, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    EXPECT_EQ(bundle->views.size(), 1u);
+    EXPECT_EQ(bundle->views[0].camera, settings.cameras[0]);
+    EXPECT_EQ(bundle->title, "a quad");
+}
+
+TEST(Stx, FramesCubesOrthographicallyUnlessToldOtherwise) {
+    Job job;
+    auto settings = smallViews("cube");
+    EXPECT_TRUE(convert(quad(), settings, job)->views[0].camera.orthographic);
+    settings.orthographic = false;
+    EXPECT_FALSE(convert(quad(), settings, job)->views[0].camera.orthographic);
+}
+
+TEST(Stx, RefusesSettingsOutOfRange) {
+    Job job;
+    const auto codeOf = [&](auto change) {
+        auto settings = smallViews("sphere:2");
+        change(settings);
+        const auto bundle = convert(quad(), settings, job);
+        return bundle ? ErrorCode::difference : bundle.error().code;
+    };
+    EXPECT_EQ(codeOf([](auto& s) { s.views = "auto:0"; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.views = "auto:2x"; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.views = "rings"; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.width = 0; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.height = 1 << 20; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.fovRad = 0; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.supersampling = 9; }), ErrorCode::usage);
+    EXPECT_EQ(codeOf([](auto& s) { s.depthBits = 12; }), ErrorCode::usage);
+}
+
+TEST(Stx, ConvertsAtlasToItsViews) {
+    Job job;
+    const auto bundle = smallBundle(3, 16, true, false);
+    auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas) << atlas.error().text();
+    const auto back = convert(*atlas, {}, job);
+    ASSERT_TRUE(back) << back.error().text();
+    ASSERT_EQ(back->views.size(), bundle.views.size());
+    for (std::size_t i = 0; i < bundle.views.size(); ++i)
+        EXPECT_EQ(back->views[i].depth, bundle.views[i].depth) << i;
+
+    atlas->bounds.reset();
+    const Bounds fromAtlas = boundsOf(Model(*atlas)), fromBundle = bundle.computeBounds();
+    EXPECT_NEAR(glm::distance(fromAtlas.min, fromBundle.min), 0, 1e-9);
+    EXPECT_NEAR(glm::distance(fromAtlas.max, fromBundle.max), 0, 1e-9);
+}
+
+TEST(Stx, NotesWhatDepthInEightBitsCosts) {
+    Job job;
+    ConvertSettings settings;
+    settings.depthBits = 8;
+    const auto bundle = convert(smallBundle(2, 16, false, false), settings, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    EXPECT_EQ(bundle->views[1].depthBits, 8);
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("8 bits"), std::string::npos) << notes[0];
+}
+
+TEST(Stx, CamerasLookAtTheirTargetAndHoldTheSphere) {
+    CameraSettings lens;
+    lens.width = 200;
+    lens.height = 100;
+    const auto camera = cameraAt({3, 4, 5}, {1, 1, 1}, lens);
+    ASSERT_TRUE(camera);
+    const auto middle =
+        camera->project(glm::dvec3(camera->cameraFromWorld() * glm::dvec4(1, 1, 1, 1)));
+    EXPECT_NEAR(middle.x, 100, 1e-9);
+    EXPECT_NEAR(middle.y, 50, 1e-9);
+    EXPECT_NEAR(camera->fieldOfView().y, lens.fovRad, 1e-12);
+
+    const auto orbit = orbitCameras({1, 0, 0}, 2.0, 4, 0.0, lens);
+    ASSERT_TRUE(orbit);
+    ASSERT_EQ(orbit->size(), 4u);
+    EXPECT_NEAR((*orbit)[0].position.x, 1.0, 1e-12);
+    EXPECT_GT((*orbit)[0].position.z, 2.0);
+    const double distance = (*orbit)[0].position.z;
+    const double reach = std::asin(2.0 / distance);  // of the sphere, from the viewpoint
+    EXPECT_LT(reach, lens.fovRad / 2);
+    EXPECT_GT(reach, lens.fovRad / 2 * 0.95);
+
+    lens.orthoHeight = 4;
+    EXPECT_DOUBLE_EQ(cameraAt({0, 0, 5}, {0, 0, 0}, lens)->fy, 25.0);
+    lens.fovRad = std::numbers::pi;
+    EXPECT_EQ(cameraAt({0, 0, 5}, {0, 0, 0}, lens).error().code, ErrorCode::usage);
+    EXPECT_EQ(cameraAt({1, 1, 1}, {1, 1, 1}, {}).error().code, ErrorCode::usage);
+    EXPECT_EQ(orbitCameras({}, 1, 0, 0, {}).error().code, ErrorCode::usage);
+}
+
+TEST(Stx, RendererKeepsItsModel) {
+    Job job;
+    const auto camera = *cameraAt({0, 0, 4}, {0, 0, 0}, {.width = 48, .height = 32});
+    const auto bundle = *convert(quad(), smallViews("ring:3"), job);
+    for (const Model& model : {Model(quad()), Model(bundle), Model(*pack(bundle, {}, job))}) {
+        const auto once = render(model, camera, {}, job);
+        ASSERT_TRUE(once) << once.error().text();
+        const auto renderer = rendererOf(model, {}, job);
+        ASSERT_TRUE(renderer) << renderer.error().text();
+        EXPECT_EQ((*renderer)->render(camera)->colour, once->colour);
+        const auto pixels = once->colour.pixels();
+        EXPECT_TRUE(std::any_of(pixels.begin(), pixels.end(), [](auto p) { return p.a > 0.5f; }));
+    }
+}
+
+TEST(Stx, OpensAndValidatesWhatItSaved) {
+    Job job;
+    const TemporaryFolder folder;
+    const auto bundle = smallBundle(2, 16, false, false);
+    ASSERT_TRUE(save(bundle, folder / "a.exr", {}, job));
+    EXPECT_TRUE(validate(folder / "a.exr", job)->empty());
+    const auto opened = open(folder / "a.exr", {}, job);
+    ASSERT_TRUE(opened) << opened.error().text();
+    EXPECT_EQ(differenceOf(std::get<Bundle>(*opened), bundle), "");
+
+    SaveOptions keep;
+    keep.noClobber = true;
+    EXPECT_EQ(save(bundle, folder / "a.exr", keep, job).error().code, ErrorCode::io);
+    EXPECT_EQ(save(bundle, folder / "a.png", {}, job).error().code, ErrorCode::usage);
+    EXPECT_EQ(open(folder / "b.exr", {}, job).error().code, ErrorCode::io);
+
+    ASSERT_TRUE(save(*pack(bundle, {}, job), folder / "atlas", {}, job));
+    EXPECT_TRUE(std::holds_alternative<Atlas>(*open(folder / "atlas", {}, job)));
+    EXPECT_TRUE(validate(folder / "atlas", job)->empty());
+}
+
+TEST(Stx, ComparesPicturesOfFloatsAndOfBytes) {
+    Job job;
+    Picture bytes{Rgba8Image(16, 16, glm::u8vec4(255)), {}};
+    Picture floats{Rgba8Image(16, 16, glm::u8vec4(255)), RgbaFloatImage(16, 16, glm::vec4(1))};
+    EXPECT_TRUE(compare(floats, floats, {}, job)->identical());
+    EXPECT_TRUE(job.takeNotes().empty());
+    EXPECT_TRUE(compare(bytes, floats, {}, job)->identical());
+    EXPECT_EQ(job.takeNotes().size(), 1u);
+    bytes.coded.at(3, 4) = {0, 0, 0, 255};
+    EXPECT_EQ(compare(bytes, floats, {}, job)->worst.x, 3);
+}
+
+}  // namespace
+}  // namespace stx
