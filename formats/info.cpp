@@ -43,7 +43,7 @@ Json viewJson(const ReferenceView& view) {
     return j;
 }
 
-/// Fills in what only the pixels tell.
+/// Fills in what only the pixels show.
 void addFromPixels(Json& out, const Bundle& bundle) {
     std::int64_t points = 0;
     for (std::size_t i = 0; i < bundle.views.size() && i < out["views"].size(); ++i) {

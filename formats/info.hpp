@@ -10,7 +10,7 @@
 namespace stx {
 
 struct InfoOptions {
-    /// Decode the pixels where the file does not tell the bounds or the points.
+    /// Decode the pixels where the headers do not have the bounds or the points.
     bool bounds = false;
 };
 

@@ -36,13 +36,10 @@ bool startsWith(ByteSpan bytes, std::string_view text, std::size_t at = 0) {
     return std::equal(text.begin(), text.end(), reinterpret_cast<const char*>(bytes.data()) + at);
 }
 
-/// A part of it is a view that we wrote.
-bool isExrBundle(const fs::path& path) {
+/// Whether a part of it is a view that we wrote.
+bool isExrBundleFile(const fs::path& path) {
     const auto reader = ExrReader::open(path, Limits());
-    return reader &&
-           std::any_of(reader->parts().begin(), reader->parts().end(), [](const ExrPart& part) {
-               return part.attribute<glm::dvec3>("stx:position");
-           });
+    return reader && isExrBundle(*reader);
 }
 
 Error notThere(const fs::path& path) {
@@ -91,7 +88,8 @@ Result<FileKind> recognise(const fs::path& path) {
     if (mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path)) return FileKind::mpeg4;
     if (startsWith(head, "\x89PNG") || startsWith(head, "\xff\xd8\xff")) return FileKind::image;
     if (isMesh(path, head)) return FileKind::mesh;
-    if (ending == ".json" || ending == ".txt") return FileKind::imageSet;
+    // .freiburg: the lists of camera poses of TUM's and ICL-NUIM's recordings.
+    if (ending == ".json" || ending == ".txt" || ending == ".freiburg") return FileKind::imageSet;
     if (ending == ".exr") return FileKind::exr;
     return FileKind::unknown;
 }
@@ -121,7 +119,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
             // Colour and Z in parts of their own, or cameras in a file beside it.
             if (!bundle && bundle.error().code == ErrorCode::invalidInput) {
                 auto set = readImageSet(path, options.set, job);
-                if (set || !isExrBundle(path)) bundle = std::move(set);
+                if (set || !isExrBundleFile(path)) bundle = std::move(set);
             }
             break;
         case FileKind::mpeg4:
@@ -144,48 +142,8 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
                         path.string());
     }
     if (!bundle) return propagate(bundle);
-    if (auto ok = bundle->check(); !ok)
-        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    // Every reader checks what it returns: see Bundle::check().
     return Opened(std::move(*bundle));
-}
-
-Result<FileKind> containerOf(const fs::path& target) {
-    const auto ending = lowerExtension(target);
-    if (ending == ".exr") return FileKind::exr;
-    if (mpeg4ContainerOf(target)) return FileKind::mpeg4;
-    return fail(ErrorCode::usage,
-                "'{}' ends in '{}'; a bundle is written as .exr, .mp4, .xmt or .bt",
-                target.string(), ending);
-}
-
-Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const SaveOptions& options,
-                        Job& job) {
-    STX_CHECK(bundle.check());
-    STX_TRY(const auto container, containerOf(target));
-    if (container == FileKind::exr) return writeExrBundle(bundle, target, job, {options.noClobber});
-    mpeg4::SceneWriteOptions scene;
-    if (options.jpegQuality > 0) {
-        scene.texture = mpeg4::SceneWriteOptions::Texture::jpeg;
-        scene.jpegQuality = options.jpegQuality;
-    }
-    scene.pointTexture = options.pointTexture;
-    Mpeg4WriteOptions write;
-    write.output.noClobber = options.noClobber;
-    return writeMpeg4Bundle(bundle, target, job, scene, write);
-}
-
-Result<bool> convertDocument(const fs::path& input, const fs::path& target,
-                             const SaveOptions& options, bool changesDepth, Job& job) {
-    STX_TRY(const auto from, recognise(input));
-    STX_TRY(const auto to, containerOf(target));
-    if (from != FileKind::mpeg4 || to != FileKind::mpeg4 || changesDepth ||
-        options.jpegQuality != 0 || options.pointTexture)
-        return false;
-    STX_TRY(const auto document, readMpeg4(input, job));
-    Mpeg4WriteOptions write;
-    write.output.noClobber = options.noClobber;
-    STX_CHECK(writeMpeg4(document, target, job, write));
-    return true;
 }
 
 }  // namespace stx

@@ -13,13 +13,13 @@
 
 namespace stx {
 
-/// What a file or folder is, told by its content first and its ending second.
+/// What a file or folder is, by its content first and its ending second.
 enum class FileKind {
     mesh,      ///< glTF, GLB, OBJ, PLY, STL, DRC
     mpeg4,     ///< .mp4, .xmt, .bt
     exr,       ///< a bundle as multi-part OpenEXR
     atlas,     ///< a folder with atlas.json (or that file), or an atlas .exr
-    imageSet,  ///< a calibrated set of images with depth
+    imageSet,  ///< a calibrated set of images with depth: a folder or its camera file
     image,     ///< a plain picture
     unknown,
 };
@@ -34,24 +34,9 @@ enum class FileKind {
 [[nodiscard]] Result<Bundle> openBundle(const std::filesystem::path& path,
                                         const OpenOptions& options, Job& job);
 
-/// Opens whatever can be rendered.
+/// Opens whatever can be rendered. A bundle passes Bundle::check(), a mesh Mesh::check().
 [[nodiscard]] Result<std::variant<Mesh, Bundle>> openRenderable(const std::filesystem::path& path,
                                                                 const OpenOptions& options,
                                                                 Job& job);
-
-/// The container that a target's ending asks for: .exr, .mp4, .xmt or .bt. Errors (usage) for
-/// others.
-[[nodiscard]] Result<FileKind> containerOf(const std::filesystem::path& target);
-
-/// Writes a bundle whole or not at all, in the container of the target's ending.
-[[nodiscard]] Result<void> saveBundle(const Bundle& bundle, const std::filesystem::path& target,
-                                      const SaveOptions& options, Job& job);
-
-/// Converts one MPEG-4 file into another container without decoding an image: every stream's bytes
-/// pass untouched. False (and nothing written) when this is not such a conversion: another kind of
-/// input or target, or options that change pixels.
-[[nodiscard]] Result<bool> convertDocument(const std::filesystem::path& input,
-                                           const std::filesystem::path& target,
-                                           const SaveOptions& options, bool changesDepth, Job& job);
 
 }  // namespace stx

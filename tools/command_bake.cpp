@@ -2,6 +2,7 @@
 
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
+#include "formats/save.hpp"
 #include "lib/surface/normals.hpp"
 #include "tools/program.hpp"
 

@@ -5,6 +5,7 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/open.hpp"
+#include "formats/save.hpp"
 #include "lib/capture/capture.hpp"
 #include "tools/batch.hpp"
 #include "tools/mesh_views.hpp"
@@ -71,30 +72,31 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(target, program));
     STX_CHECK(containerOf(target));
-    std::size_t views = 0;
-    std::string sizes;
-    std::int64_t points = 0;
-    STX_TRY(const bool passed, convertDocument(input, target, saveOptions(o, program),
-                                               o.mesh->depthBitsGiven, program.job));
-    if (!passed) {
-        STX_TRY(const auto bundle, makeBundle(input, o, program));
+    // Only the report has the points, for which the images must be decoded.
+    const bool countPoints = !program.common.report.empty();
+    STX_TRY(auto bundle, convertDocument(input, target, saveOptions(o, program),
+                                         o.mesh->depthBitsGiven, countPoints, program.job));
+    if (!bundle) {
+        STX_TRY(bundle, makeBundle(input, o, program));
         STX_CHECK(program.job.checkCancelled());
-        STX_CHECK(saveBundle(bundle, target, saveOptions(o, program), program.job));
-        views = bundle.views.size();
-        points = bundle.pointCount();
-        sizes = fmt::format(", {} views {}x{}", views, bundle.views[0].camera.width,
-                            bundle.views[0].camera.height);
+        STX_CHECK(saveBundle(*bundle, target, saveOptions(o, program), program.job));
     }
+    const std::size_t views = bundle->views.size();
+    std::string sizes;
+    if (views > 0)
+        sizes = fmt::format(", {} views {}x{}", views, bundle->views[0].camera.width,
+                            bundle->views[0].camera.height);
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}){}, {:.2g} s", input.filename().string(),
                             humanBytes(bytesOf(input)), target.filename().string(),
                             humanBytes(bytesOf(target)), sizes, seconds));
-    return nlohmann::ordered_json{{"input", input.string()},  {"output", target.string()},
-                                  {"status", "ok"},           {"exitCode", 0},
-                                  {"views", views},           {"points", points},
-                                  {"bytes", bytesOf(target)}, {"seconds", seconds}};
+    return nlohmann::ordered_json{
+        {"input", input.string()},  {"output", target.string()},
+        {"status", "ok"},           {"exitCode", 0},
+        {"views", views},           {"points", countPoints ? bundle->pointCount() : 0},
+        {"bytes", bytesOf(target)}, {"seconds", seconds}};
 }
 
 /// One bundle for each frame `A-B` of one set; {frame} in the output's name is the frame.

@@ -53,10 +53,13 @@ Points pointsOf(const Bundle& bundle) {
 
 Result<int> extract(const ExtractOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
+    const auto ending = std::filesystem::path(o.output).extension();
+    if (!ending.empty() && ending != ".ply" && ending != ".drc")
+        return fail(ErrorCode::usage, "-o '{}' ends in '{}'; a folder, .ply or .drc is expected",
+                    o.output, ending.string());
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
     STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
-    const auto ending = std::filesystem::path(o.output).extension();
     std::string what;
     if (ending == ".ply" || ending == ".drc") {
         STX_CHECK(program.job.limits.checkAllocation(
@@ -70,7 +73,7 @@ Result<int> extract(const ExtractOptions& o, Program& program) {
         options.file.noClobber = program.common.noClobber;
         STX_CHECK(writePoints(o.output, cloud, program.job, options));
         what = fmt::format("{} points", points.positions.size());
-    } else if (ending.empty()) {
+    } else {
         ExportOptions options;
         options.kind =
             o.cameras == "miv" ? ExportOptions::Kind::miv : ExportOptions::Kind::transforms;
@@ -78,9 +81,6 @@ Result<int> extract(const ExtractOptions& o, Program& program) {
         options.floatDepth = o.depth == "exr";
         STX_CHECK(exportImages(bundle, o.output, options, program.job));
         what = fmt::format("{} views", bundle.views.size());
-    } else {
-        return fail(ErrorCode::usage, "-o '{}' ends in '{}'; a folder, .ply or .drc is expected",
-                    o.output, ending.string());
     }
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -2,6 +2,7 @@
 
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
+#include "formats/save.hpp"
 #include "lib/selection/selection.hpp"
 #include "tools/mesh_views.hpp"
 #include "tools/program.hpp"

@@ -1,6 +1,3 @@
-#include "formats/atlas/atlas_files.hpp"
-#include "formats/images/images.hpp"
-#include "formats/open.hpp"
 #include "formats/validate/validate.hpp"
 #include "lib/base/printable.hpp"
 #include "tools/program.hpp"
@@ -25,32 +22,11 @@ Result<int> printRules(Program& program) {
     return 0;
 }
 
-Result<std::vector<Finding>> findingsOf(const ValidateCommandOptions& o, Program& program) {
-    STX_TRY(const auto kind, recognise(o.input));
-    if (kind == FileKind::atlas) {
-        STX_TRY(const auto atlas, readAtlas(o.input, program.job));
-        return validate(atlas);
-    }
-    if (kind == FileKind::exr) {
-        STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
-        return validate(bundle);
-    }
-    if (kind == FileKind::mpeg4 || kind == FileKind::unknown) {
-        ValidateOptions options;
-        options.pixels = !o.noPixels;
-        options.folder = std::filesystem::path(o.input).parent_path();
-        return validateMpeg4File(o.input, options, program.job);
-    }
-    return fail(ErrorCode::invalidInput,
-                "'{}' is {}; bundles (.mp4, .xmt, .bt, .exr) and atlases can be validated", o.input,
-                nameOf(kind));
-}
-
-Result<int> validateFile(const ValidateCommandOptions& o, Program& program) {
+Result<int> run(const ValidateCommandOptions& o, Program& program) {
     if (o.rules) return printRules(program);
     if (o.input.empty())
         return fail(ErrorCode::usage, "FILE is required. See 'stx validate --help'");
-    STX_TRY(const auto findings, findingsOf(o, program));
+    STX_TRY(const auto findings, validateFile(o.input, {!o.noPixels}, program.job));
     bool valid = true;
     auto list = nlohmann::ordered_json::array();
     for (const auto& f : findings) {
@@ -86,7 +62,7 @@ Command addValidate(CLI::App& app, Program& program) {
     c->add_flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
     c->add_flag("--rules", o->rules, "Print the catalogue of rules and stop");
     addCommonOptions(*c, program, kFormat | kOutside);
-    return {c, [o](Program& p) { return validateFile(*o, p); }};
+    return {c, [o](Program& p) { return run(*o, p); }};
 }
 
 }  // namespace stx::tools

@@ -274,11 +274,6 @@ Result<void> readFloats(const ExrReader& reader, int part,
                           part, p.channel);
     }
     STX_CHECK(reader.readPart(part, pixels));
-    for (const float d : page.depth.pixels()) {
-        if (!(d >= 0))
-            return failAt(reader.where(), ErrorCode::invalidInput,
-                          "depth holds {}; distances are 0 or more", d);
-    }
     if (!colour.empty())
         page.texture =
             linear ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
@@ -302,7 +297,7 @@ void takePicture(const std::vector<From>& from, int width, int x0, int y0, Image
     }
 }
 
-/// One image of a folder into its page; alpha that stands in the depth texture into `coverage`.
+/// One image of a folder into its page; alpha that is in the depth texture into `coverage`.
 Result<void> readImage(const fs::path& file, const AtlasHeader& header, const AtlasTexture& t,
                        AtlasPage& page, Image<std::uint8_t>& coverage, const Limits& limits) {
     const auto where = fmt::format("'{}'", file.string());
@@ -385,11 +380,12 @@ fs::path setFolderOf(const fs::path& path) {
     return path.filename() == kIndexFile ? path.parent_path() : path;
 }
 
-Result<AtlasHeader> exrHeader(const ExrReader& reader, const Limits& limits) {
+Result<AtlasHeader> exrHeader(const ExrReader& reader, const Limits& limits,
+                              AtlasChecks checks = AtlasChecks::all) {
     const auto* json = reader.parts()[0].attribute<std::string>("stx:atlas");
     if (!json || !isExrAtlas(reader))
         return failAt(reader.where(), ErrorCode::invalidInput, "it holds no stx atlas");
-    STX_TRY(auto header, atlasFromJson(*json, reader.where() + ": stx:atlas", limits));
+    STX_TRY(auto header, atlasFromJson(*json, reader.where() + ": stx:atlas", limits, checks));
     if (static_cast<int>(reader.parts().size()) != header.pages)
         return failAt(reader.where(), ErrorCode::invalidInput,
                       "it has {} parts, but the atlas {} pages", reader.parts().size(),
@@ -399,23 +395,31 @@ Result<AtlasHeader> exrHeader(const ExrReader& reader, const Limits& limits) {
             return failAt(reader.where(), ErrorCode::invalidInput,
                           "the coding of its {} texture is '{}', not float", t.attribute, t.coding);
     }
+    if (checks == AtlasChecks::format) return header;
     for (int i = 0; i < header.pages; ++i) STX_CHECK(checkPartSize(reader, i, header));
     STX_CHECK(checkRectangles(header, reader.where()));
     return header;
 }
 
-Result<AtlasHeader> folderHeader(const fs::path& path, const Limits& limits) {
+Result<AtlasHeader> folderHeader(const fs::path& path, const Limits& limits,
+                                 AtlasChecks checks = AtlasChecks::all) {
     const fs::path index = setFolderOf(path) / kIndexFile;
     STX_TRY(const auto bytes, readFile(index, limits));
     const auto where = fmt::format("'{}'", index.string());
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    STX_TRY(auto header, atlasFromJson(text, where, limits));
-    STX_CHECK(checkRectangles(header, where));
+    STX_TRY(auto header, atlasFromJson(text, where, limits, checks));
+    if (checks == AtlasChecks::all) STX_CHECK(checkRectangles(header, where));
     return header;
 }
 
-Result<Atlas> checked(Atlas atlas, const std::string& where) {
+Result<Atlas> checked(Atlas atlas, const AtlasHeader& header, const std::string& where) {
     if (auto ok = atlas.check(); !ok) return tl::unexpected(ok.error().at(where));
+    for (const AtlasTexture& t : header.textures) {
+        // Integer codes stand for distances only; floats may be anything.
+        if (t.attribute != "depth" || t.coding != "float") continue;
+        for (const float d : atlas.pages[t.page].depth.pixels())
+            if (!(d >= 0)) return tl::unexpected(Error(depthError(d).value()).at(where));
+    }
     return atlas;
 }
 
@@ -441,7 +445,7 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
     for (std::size_t i = 0; i < coverage.size(); ++i) {
         if (!coverage[i].empty()) setAlpha(*atlas.pages[i].texture.rgba8(), coverage[i]);
     }
-    return checked(std::move(atlas), where);
+    return checked(std::move(atlas), header, where);
 }
 
 Result<Atlas> readExr(const fs::path& path, Job& job) {
@@ -457,7 +461,7 @@ Result<Atlas> readExr(const fs::path& path, Job& job) {
         }
         STX_CHECK(readFloats(reader, i, attributes, header.linear, atlas.pages[i]));
     }
-    return checked(std::move(atlas), reader.where());
+    return checked(std::move(atlas), header, reader.where());
 }
 
 /// A file is an OpenEXR atlas unless it is the folder's index.
@@ -494,16 +498,17 @@ Result<Atlas> readAtlas(const fs::path& path, Job& job) {
     return isFolderPath(path) ? readFolder(path, job) : readExr(path, job);
 }
 
-Result<AtlasHeader> readAtlasHeader(const fs::path& path, const Limits& limits) {
+Result<AtlasHeader> readAtlasHeader(const fs::path& path, const Limits& limits,
+                                    AtlasChecks checks) {
     if (!isFolderPath(path)) {
         STX_TRY(const auto reader, ExrReader::open(path, limits));
-        STX_TRY(auto header, exrHeader(reader, limits));
-        // Which of a part's bytes are whose is not told; they stand with its colour.
+        STX_TRY(auto header, exrHeader(reader, limits, checks));
+        // The file does not say which bytes of a part are whose; all are counted as its colour's.
         for (auto& t : header.textures)
             t.bytes = t.attribute == "colour" ? reader.parts()[t.page].bytes : 0;
         return header;
     }
-    STX_TRY(auto header, folderHeader(path, limits));
+    STX_TRY(auto header, folderHeader(path, limits, checks));
     for (auto& t : header.textures) {
         std::error_code ec;
         if (const auto file = resolveInside(setFolderOf(path), t.file, limits)) {
@@ -512,6 +517,37 @@ Result<AtlasHeader> readAtlasHeader(const fs::path& path, const Limits& limits) 
         }
     }
     return header;
+}
+
+Result<glm::ivec2> atlasTextureSize(const fs::path& path, const AtlasTexture& texture,
+                                    const Limits& limits) {
+    const auto sizeOf = [](const ExrPart& part) { return glm::ivec2(part.width, part.height); };
+    if (!isFolderPath(path)) {
+        STX_TRY(const auto reader, ExrReader::open(path, limits));
+        return sizeOf(reader.parts().at(static_cast<std::size_t>(texture.page)));
+    }
+    STX_TRY(const auto file, resolveInside(setFolderOf(path), texture.file, limits));
+    if (texture.coding == "float") {
+        STX_TRY(const auto reader, ExrReader::open(file, limits));
+        return sizeOf(reader.parts()[0]);
+    }
+    STX_TRY(const auto bytes, readFile(file, limits));
+    const auto info = probeImage(bytes);
+    if (!info) return tl::unexpected(info.error().at(fmt::format("'{}'", file.string())));
+    return glm::ivec2(info->width, info->height);
+}
+
+Result<void> readAtlasTexture(const fs::path& path, const AtlasHeader& header,
+                              const AtlasTexture& texture, AtlasPage& page, const Limits& limits) {
+    STX_CHECK(checkMemory(header, fmt::format("'{}'", path.string()), limits));
+    if (!isFolderPath(path)) {
+        STX_TRY(const auto reader, ExrReader::open(path, limits));
+        STX_CHECK(checkPartSize(reader, texture.page, header));
+        return readFloats(reader, texture.page, {texture.attribute}, header.linear, page);
+    }
+    STX_TRY(const auto file, resolveInside(setFolderOf(path), texture.file, limits));
+    Image<std::uint8_t> coverage;
+    return readImage(file, header, texture, page, coverage, limits);
 }
 
 bool isAtlasFolder(const fs::path& path) {

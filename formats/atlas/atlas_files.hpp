@@ -48,6 +48,12 @@ struct AtlasHeader {
     [[nodiscard]] double used() const;
 };
 
+/// What reading an atlas' header refuses.
+enum class AtlasChecks {
+    all,     ///< whatever breaks a rule
+    format,  ///< only what makes the rest unreadable; the validator reports the broken rules
+};
+
 /// How an atlas is written.
 struct AtlasSaveOptions {
     /// 1..100: colour of a folder is JPEG of this quality, colour.jpg, and its alpha goes without
@@ -62,8 +68,8 @@ struct AtlasSaveOptions {
 /// 8- and 16-bit depth comes back to the code and normals to 1/32767; an atlas with a view of 32
 /// depth bits gets .exr images, and everything comes back to the bit. Linear colour is colour.exr.
 /// Depth that belongs to no rectangle or its padding is dropped with a note. Colours under alpha 0
-/// are bled anew when they come from OpenEXR or go to JPEG. Errors: Atlas::check(); files;
-/// unsupported: JPEG where OpenEXR is needed.
+/// are filled again from their neighbours when they come from OpenEXR or go to JPEG. Errors:
+/// Atlas::check(); files; unsupported: JPEG where OpenEXR is needed.
 [[nodiscard]] Result<void> writeAtlas(const Atlas& atlas, const std::filesystem::path& path,
                                       Job& job, const AtlasSaveOptions& options = {});
 
@@ -72,7 +78,20 @@ struct AtlasSaveOptions {
 [[nodiscard]] Result<Atlas> readAtlas(const std::filesystem::path& path, Job& job);
 /// The same without pixels, in milliseconds.
 [[nodiscard]] Result<AtlasHeader> readAtlasHeader(const std::filesystem::path& path,
+                                                  const Limits& limits,
+                                                  AtlasChecks checks = AtlasChecks::all);
+
+/// The size of one texture's image as it is in the file, whatever the header says; pixels are not
+/// decoded. Errors: files, content that is not an image of that coding.
+[[nodiscard]] Result<glm::ivec2> atlasTextureSize(const std::filesystem::path& path,
+                                                  const AtlasTexture& texture,
                                                   const Limits& limits);
+/// Reads one texture, without a check of the depths and without the alpha that "sRGB8-opaque" has
+/// elsewhere. Every rectangle of the header must lie inside its view and its page. Errors: files;
+/// (invalidInput) another size, channels or bits than the header says.
+[[nodiscard]] Result<void> readAtlasTexture(const std::filesystem::path& path,
+                                            const AtlasHeader& header, const AtlasTexture& texture,
+                                            AtlasPage& page, const Limits& limits);
 
 /// The path is a folder that holds an atlas.json, or that file itself.
 [[nodiscard]] bool isAtlasFolder(const std::filesystem::path& path);

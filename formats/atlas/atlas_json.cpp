@@ -79,8 +79,11 @@ std::string linesOf(const char* name, const List& list) {
 /// Typed access that says where in the document something is wrong.
 class Reader {
   public:
-    Reader(const Json& json, std::string path, const std::string& where)
-        : json_(json), path_(std::move(path)), where_(where) {}
+    Reader(const Json& json, std::string path, const std::string& where, AtlasChecks checks)
+        : json_(json), path_(std::move(path)), where_(where), checks_(checks) {}
+
+    /// Whether values that break a rule of the validator are errors.
+    [[nodiscard]] bool checksRules() const { return checks_ == AtlasChecks::all; }
 
     template <class T>
     Result<void> number(const char* name, T& to, double least, double most) const {
@@ -134,7 +137,7 @@ class Reader {
             return wrong(name,
                          fmt::format("has {} entries; at most {} are read", it->size(), most));
         for (std::size_t i = 0; i < it->size(); ++i) {
-            const Reader entry((*it)[i], fmt::format("{}{}[{}]", path_, name, i), where_);
+            const Reader entry((*it)[i], fmt::format("{}{}[{}]", path_, name, i), where_, checks_);
             if (!(*it)[i].is_object()) return entry.wrong("", "must be an object");
             STX_CHECK(take(entry.inside()));
         }
@@ -144,9 +147,9 @@ class Reader {
     [[nodiscard]] std::optional<Reader> object(const char* name) const {
         const auto it = json_.find(name);
         if (it == json_.end() || !it->is_object()) return std::nullopt;
-        return Reader(*it, fmt::format("{}{}.", path_, name), where_);
+        return Reader(*it, fmt::format("{}{}.", path_, name), where_, checks_);
     }
-    [[nodiscard]] Reader inside() const { return {json_, path_ + ".", where_}; }
+    [[nodiscard]] Reader inside() const { return {json_, path_ + ".", where_, checks_}; }
     [[nodiscard]] tl::unexpected<Error> wrong(const char* name, std::string_view what) const {
         return failAt(where_, ErrorCode::invalidInput, "{}{} {}", path_, name, what);
     }
@@ -155,6 +158,7 @@ class Reader {
     const Json& json_;
     std::string path_;
     const std::string& where_;
+    AtlasChecks checks_;
 };
 
 constexpr double kAnyInt = 2147483647.0;
@@ -174,11 +178,13 @@ Result<void> readView(const Reader& r, const Limits& limits, bool prunedByCount,
     STX_CHECK(r.finite("fy", c.fy));
     STX_CHECK(r.finite("cx", c.cx));
     STX_CHECK(r.finite("cy", c.cy));
-    STX_CHECK(r.number("nearPlane", v.nearPlane, 0, 1e300));
-    STX_CHECK(r.number("farPlane", v.farPlane, 0, 1e300));
-    if (!(v.nearPlane < v.farPlane)) return r.wrong("farPlane", "must be beyond nearPlane");
+    const double nearest = r.checksRules() ? 0 : -1e300;
+    STX_CHECK(r.number("nearPlane", v.nearPlane, nearest, 1e300));
+    STX_CHECK(r.number("farPlane", v.farPlane, nearest, 1e300));
+    if (r.checksRules() && !(v.nearPlane < v.farPlane))
+        return r.wrong("farPlane", "must be beyond nearPlane");
     STX_CHECK(r.number("depthBits", v.depthBits, 8, 32));
-    if (v.depthBits != 8 && v.depthBits != 16 && v.depthBits != 32)
+    if (r.checksRules() && v.depthBits != 8 && v.depthBits != 16 && v.depthBits != 32)
         return r.wrong("depthBits", "must be 8, 16 or 32");
     // Older versions did not write it: there fewer pixels than before meant that all were pruned.
     v.pruned = prunedByCount;
@@ -223,14 +229,13 @@ Result<void> readTexture(const Reader& r, const Limits& limits, const AtlasHeade
         width += t.secondX;
         height += t.secondY;
     }
-    if (t.width != width || t.height != height)
+    if (r.checksRules() && (t.width != width || t.height != height))
         return r.wrong("width", fmt::format("and height are {}x{}, but the page needs {}x{}",
                                             t.width, t.height, width, height));
     return {};
 }
 
 Result<void> checkTextures(const Reader& r, const AtlasHeader& header) {
-    if (header.textures.size() > 4) return r.wrong("textures", "are more than 4");
     for (int page = 0; page < header.pages; ++page) {
         std::map<std::string, int> count;
         for (const auto& t : header.textures) count[t.attribute] += t.page == page ? 1 : 0;
@@ -313,7 +318,7 @@ std::string atlasJson(const AtlasHeader& header) {
 }
 
 Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& where,
-                                  const Limits& limits) {
+                                  const Limits& limits, AtlasChecks checks) {
     // A parsed document takes some 30 times its text.
     if (auto ok = limits.checkAllocation(text.size(), 32, "the atlas' JSON"); !ok)
         return tl::unexpected(ok.error().at(where));
@@ -321,7 +326,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     STX_TRY(const Json json, parse(text, where));
     if (!json.is_object())
         return failAt(where, ErrorCode::invalidInput, "it is no JSON object, so no atlas");
-    const Reader top(json, "", where);
+    const Reader top(json, "", where, checks);
     AtlasHeader header;
     Atlas& atlas = header.atlas;
     int version = 0;
@@ -334,7 +339,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     if (atlas.layout != "grid" && atlas.layout != "tight")
         return top.wrong("layout", "must be grid or tight");
     STX_CHECK(top.number("padding", atlas.padding, 0, limits.maxImageSide));
-    STX_CHECK(top.number("pages", header.pages, 1, 2));
+    STX_CHECK(top.number("pages", header.pages, 1, top.checksRules() ? 2 : 64));
     STX_CHECK(top.number("width", header.pageWidth, 1, limits.maxImageSide));
     STX_CHECK(top.number("height", header.pageHeight, 1, limits.maxImageSide));
     STX_CHECK(top.flag("linear", header.linear));
@@ -348,7 +353,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
         STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));
         STX_CHECK(pixels->number("kept", atlas.keptPixels, 0, 1e15));
     }
-    STX_CHECK(top.list("textures", 4, [&](const Reader& r) {
+    STX_CHECK(top.list("textures", top.checksRules() ? 4 : 256, [&](const Reader& r) {
         return readTexture(r, limits, header, header.textures.emplace_back());
     }));
     STX_CHECK(checkTextures(top, header));
@@ -368,7 +373,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
                                                                  {"height", &rect.height},
                                                                  {"atlasX", &rect.atlasX},
                                                                  {"atlasY", &rect.atlasY}}) {
-            STX_CHECK(r.number(name, *to, 0, kAnyInt / 4));
+            STX_CHECK(r.number(name, *to, r.checksRules() ? 0 : -kAnyInt / 4, kAnyInt / 4));
         }
         return r.flag("turned", rect.turned);
     };

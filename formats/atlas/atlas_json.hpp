@@ -14,8 +14,10 @@ inline constexpr const char* kAtlasSchema = "urn:stx:schema:atlas:1";
 [[nodiscard]] std::string atlasJson(const AtlasHeader& header);
 /// The inverse. Every number is checked for its kind and range, sizes against the limits;
 /// rectangles and cameras are checked by Atlas::check() once there are pixels. `where` is for
-/// messages. Errors: invalidInput with the path inside the document ("views[3].fx").
+/// messages. Errors: invalidInput with the path inside the document ("views[3].fx"). With
+/// AtlasChecks::format, planes, rectangles and sizes of textures may be anything that is a number.
 [[nodiscard]] Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& where,
-                                                const Limits& limits);
+                                                const Limits& limits,
+                                                AtlasChecks checks = AtlasChecks::all);
 
 }  // namespace stx

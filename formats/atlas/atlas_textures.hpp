@@ -25,8 +25,8 @@ struct DepthCodes {
 [[nodiscard]] Image<std::uint16_t> withAlpha(const Image<std::uint16_t>& codes,
                                              const Rgba8Image& colour, const AtlasTexture& texture,
                                              int factor);
-/// Interleaved RGB without alpha, bled anew over all pixels of alpha 0, so that a lossy codec finds
-/// no edge beside the object. `texture` holds 8-bit sRGB.
+/// Interleaved RGB without alpha, filled from the neighbours at all pixels of alpha 0, so that a
+/// lossy codec finds no edge beside the object. `texture` holds 8-bit sRGB.
 [[nodiscard]] std::vector<std::uint8_t> opaqueBytes(Texture texture);
 /// Puts alpha into a colour image of the same size.
 void setAlpha(Rgba8Image& colour, const Image<std::uint8_t>& alpha);

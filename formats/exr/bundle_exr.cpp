@@ -7,12 +7,14 @@
 #include "formats/exr/exr_colour.hpp"
 #include "lib/base/parallel.hpp"
 
-/// Our attributes, all exact. On each part: stx:position (v3d), stx:orientation (text: axis x y z
-/// and angle in radians), stx:quaternion (text: w x y z), stx:fieldOfView (v2d), stx:orthographic
-/// (int), stx:fx fy cx cy (double, pixels), stx:nearPlane, stx:farPlane (double), stx:depthBits
-/// (int), stx:points (double), and on pruned views stx:pruned (int, 1). On part 0: stx:version
-/// (int), stx:kind ("bundle"), stx:colour
-/// ("sRGB8" or "linear"), stx:title (text), stx:boundsMin, stx:boundsMax (v3d).
+// Our attributes, all exact.
+//   each part: stx:position (v3d) · stx:orientation (text: axis x y z, angle in radians) ·
+//              stx:quaternion (text: w x y z) · stx:fieldOfView (v2d) · stx:orthographic (int) ·
+//              stx:fx, stx:fy, stx:cx, stx:cy (double, pixels) · stx:nearPlane, stx:farPlane
+//              (double) · stx:depthBits (int) · stx:points (double) · stx:pruned (int, 1; of
+//              pruned views only)
+//   part 0:    stx:version (int) · stx:kind ("bundle") · stx:colour ("sRGB8" or "linear") ·
+//              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d)
 namespace stx {
 
 namespace {
@@ -55,7 +57,7 @@ double commonAspect(const Bundle& bundle) {
     return std::abs(first - 1.0) < 1e-6 || first < 1e-5 || first > 1e5 ? 1.0 : first;
 }
 
-std::vector<ExrPart> partsFrom(const Bundle& bundle) {
+Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
     glm::ivec2 display(0);
     for (const auto& v : bundle.views)
         display = glm::max(display, glm::ivec2(v.camera.width, v.camera.height));
@@ -73,7 +75,9 @@ std::vector<ExrPart> partsFrom(const Bundle& bundle) {
         part.displayHeight = display.y;
         part.pixelAspectRatio = aspect;
         setExrCamera(part, view);
-        part.attributes["stx:points"] = static_cast<double>(view.pointCount());
+        const auto points = view.checkedPointCount();
+        if (!points) return tl::unexpected(points.error().at(fmt::format("view {}", i)));
+        part.attributes["stx:points"] = static_cast<double>(*points);
         const Type colour = view.texture.isLinear() ? Type::float32 : Type::half;
         for (const char* name : {"R", "G", "B", "A"}) part.channels.push_back({name, colour});
         part.channels.push_back({"Z", Type::float32});
@@ -93,21 +97,6 @@ std::vector<ExrPart> partsFrom(const Bundle& bundle) {
         first["stx:boundsMax"] = bounds.max;
     }
     return parts;
-}
-
-Result<void> checkOurs(const ExrReader& reader) {
-    const ExrPart& first = reader.parts()[0];
-    const auto* version = first.attribute<std::int64_t>("stx:version");
-    if (version && *version > kVersion)
-        return failAt(reader.where(), ErrorCode::unsupported,
-                      "it was written by a newer stx (version {} of the attributes; this one knows "
-                      "{})",
-                      *version, kVersion);
-    const auto* kind = first.attribute<std::string>("stx:kind");
-    if (kind && *kind != "bundle")
-        return failAt(reader.where(), ErrorCode::invalidInput, "it holds an stx '{}', not a bundle",
-                      *kind);
-    return {};
 }
 
 bool hasVectors(const ExrPart& part, const std::string& name) {
@@ -136,8 +125,48 @@ void adoptForeignDepth(ReferenceView& view) {
     view.farPlane = nearest < farthest ? farthest : std::nextafter(farthest, kNoDepth);
 }
 
-Result<void> readView(const ExrReader& reader, int index, bool linear, ReferenceView& view) {
-    const ExrPart& part = reader.parts()[index];
+bool isLinearExr(const ExrReader& reader) {
+    const auto* colour = reader.parts()[0].attribute<std::string>("stx:colour");
+    return !colour || *colour != "sRGB8";
+}
+
+}  // namespace
+
+std::vector<int> exrViewParts(const ExrReader& reader) {
+    std::vector<int> views;
+    const auto& parts = reader.parts();
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        const bool other = parts[i].attribute<glm::dmat4>("worldToCamera") && parts[i].channel("Z");
+        if (isOurView(parts[i]) || other) views.push_back(static_cast<int>(i));
+    }
+    return views;
+}
+
+bool isOurView(const ExrPart& part) {
+    return part.attribute<glm::dvec3>("stx:position");
+}
+
+bool isExrBundle(const ExrReader& reader) {
+    return std::any_of(reader.parts().begin(), reader.parts().end(), isOurView);
+}
+
+Result<void> checkExrKind(const ExrReader& reader) {
+    const ExrPart& first = reader.parts()[0];
+    const auto* version = first.attribute<std::int64_t>("stx:version");
+    if (version && *version > kVersion)
+        return failAt(reader.where(), ErrorCode::unsupported,
+                      "it was written by a newer stx (version {} of the attributes; this one knows "
+                      "{})",
+                      *version, kVersion);
+    const auto* kind = first.attribute<std::string>("stx:kind");
+    if (kind && *kind != "bundle")
+        return failAt(reader.where(), ErrorCode::invalidInput, "it holds an stx '{}', not a bundle",
+                      *kind);
+    return {};
+}
+
+Result<void> readExrView(const ExrReader& reader, int index, const ExrPart& part,
+                         ReferenceView& view) {
     std::vector<ExrPixels> pixels;
     Image<glm::vec4> colour(part.width, part.height);
     const bool hasColour = part.channel("R") && part.channel("G") && part.channel("B");
@@ -162,39 +191,21 @@ Result<void> readView(const ExrReader& reader, int index, bool linear, Reference
     if (!hasColour) {
         for (auto& p : colour.pixels()) p.g = p.b = p.r;
     }
-    if (!part.attribute<glm::dvec3>("stx:position")) adoptForeignDepth(view);
-    view.texture = linear ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
+    if (!isOurView(part)) adoptForeignDepth(view);
+    view.texture =
+        isLinearExr(reader) ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
     return {};
 }
 
-bool isLinearBundle(const ExrReader& reader) {
-    const auto* colour = reader.parts()[0].attribute<std::string>("stx:colour");
-    return !colour || *colour != "sRGB8";
-}
-
-/// Parts that are views: all of ours, those with Z and a camera of others.
-std::vector<int> partsThatAreViews(const ExrReader& reader) {
-    std::vector<int> views;
-    const auto& parts = reader.parts();
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-        const bool ours = parts[i].attribute<glm::dvec3>("stx:position");
-        const bool other = parts[i].attribute<glm::dmat4>("worldToCamera") && parts[i].channel("Z");
-        if (ours || other) views.push_back(static_cast<int>(i));
-    }
-    return views;
-}
-
-}  // namespace
-
 const char* ExrBundleHeader::nodeKind() const {
     const bool v2 = std::any_of(views.begin(), views.end(),
-                                [](const View& v) { return v.normals || v.splats; });
+                                [](const ExrViewHeader& v) { return v.normals || v.splats; });
     return v2 ? "SimpleTextureV2" : "SimpleTexture";
 }
 
 Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
-    STX_CHECK(bundle.check());
-    const auto parts = partsFrom(bundle);
+    STX_CHECK(bundle.checkHeaders());
+    STX_TRY(const auto parts, partsFrom(bundle));
     STX_TRY(auto writer, ExrWriter::create(file, parts));
     const auto count = static_cast<std::int64_t>(parts.size());
     for (std::int64_t i = 0; i < count; ++i) {
@@ -232,19 +243,19 @@ Result<void> writeExrBundle(const Bundle& bundle, const std::filesystem::path& p
 }
 
 Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
-    STX_CHECK(checkOurs(reader));
+    STX_CHECK(checkExrKind(reader));
     ExrBundleHeader header;
     const ExrPart& first = reader.parts()[0];
     if (const auto* title = first.attribute<std::string>("stx:title")) header.title = *title;
     const auto* min = first.attribute<glm::dvec3>("stx:boundsMin");
     const auto* max = first.attribute<glm::dvec3>("stx:boundsMax");
     if (min && max) header.bounds = Bounds{*min, *max};
-    header.linear = isLinearBundle(reader);
-    for (const int i : partsThatAreViews(reader)) {
+    header.linear = isLinearExr(reader);
+    for (const int i : exrViewParts(reader)) {
         const ExrPart& part = reader.parts()[i];
         auto view = exrCamera(part);
         if (!view) return tl::unexpected(view.error().at(reader.where()));
-        ExrBundleHeader::View entry;
+        ExrViewHeader entry;
         entry.view = std::move(*view);
         if (auto ok = entry.view.camera.check(); !ok)
             return tl::unexpected(
@@ -271,7 +282,7 @@ Result<ExrBundleHeader> readExrBundleHeader(const std::filesystem::path& path,
 
 Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     STX_TRY(auto header, readExrBundleHeader(reader));
-    const auto parts = partsThatAreViews(reader);
+    const auto parts = exrViewParts(reader);
     std::uint64_t total = 0;
     for (const int i : parts) {
         STX_CHECK(reader.checkPlausible(i));
@@ -294,7 +305,7 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     parallelFor(0, count, [&](std::int64_t i) {
         done[i] = job.checkCancelled();
         if (!done[i]) return;
-        done[i] = readView(reader, parts[i], header.linear, bundle.views[i]);
+        done[i] = readExrView(reader, parts[i], reader.parts()[parts[i]], bundle.views[i]);
         job.progress(++finished, count, "reading views");
     });
     for (auto& result : done) {

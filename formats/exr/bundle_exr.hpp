@@ -14,31 +14,36 @@
 
 namespace stx {
 
-/// What the headers of an OpenEXR bundle tell, without a pixel decoded.
+/// What the header of one view says.
+struct ExrViewHeader {
+    ReferenceView view;  ///< its images are empty
+    bool normals = false, splats = false;
+    std::int64_t points = -1;  ///< -1 = the file does not say
+    std::uint64_t bytes = 0;   ///< of the pixels in the file, compressed
+};
+
+/// What the headers of an OpenEXR bundle say, without a pixel decoded.
 struct ExrBundleHeader {
-    struct View {
-        ReferenceView view;  ///< its images are empty
-        bool normals = false, splats = false;
-        std::int64_t points = -1;  ///< -1 = the file does not tell
-        std::uint64_t bytes = 0;   ///< of the pixels in the file, compressed
-    };
     std::string title;
     std::optional<Bounds> bounds;
-    bool linear = false;  ///< colour was linear floats, not 8-bit sRGB
-    std::vector<View> views;
+    bool linear = false;  ///< colour is linear floats, not 8-bit sRGB
+    std::vector<ExrViewHeader> views;
 
     [[nodiscard]] const char* nodeKind() const;
 };
 
+// clang-format off
 /// Writes a bundle as one multi-part OpenEXR file, a part for each view (named as the view):
-/// - R G B A: linear Rec. 709, premultiplied; half for 8-bit sRGB textures, which come back to the
-///   bit (bled colours under alpha 0 are bled anew), float32 for linear ones;
-/// - Z: planar distance, float32 exactly, +inf where there is no point (what OpenEXR's documents
-/// ask
-///   for; OpenImageIO's tools count it as Inf; Blender writes 1e10 instead, Nuke 1/z with 0);
-/// - N.X N.Y N.Z and splatU.X .. splatV.Z: world vectors, float32 exactly, where the view has them.
-/// Cameras stand in the standard attributes worldToCamera, worldToNDC, screenWindowCenter and
-/// screenWindowWidth (float, for others) and exactly in `stx:` ones (see bundle_exr.cpp).
+///  - R G B A: linear Rec. 709, premultiplied; half for 8-bit sRGB textures, which come back to the
+///    bit (colours under alpha 0 are filled again from their neighbours), float32 for linear ones.
+///  - Z: planar distance, float32 exactly, +inf where there is no point. That is what OpenEXR's
+///    documentation asks for; Blender writes 1e10 instead, Nuke 1/z with 0.
+///  - N.X N.Y N.Z and splatU.X .. splatV.Z: world vectors, float32 exactly, where the view has them.
+///
+/// Cameras are in the standard attributes worldToCamera, worldToNDC, screenWindowCenter and
+/// screenWindowWidth (float, for other programs) and exactly in `stx:` ones (see bundle_exr.cpp).
+/// Errors: what Bundle::check() says; files.
+// clang-format on
 [[nodiscard]] Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job);
 /// The same with creating and committing the file.
 [[nodiscard]] Result<void> writeExrBundle(const Bundle& bundle, const std::filesystem::path& path,
@@ -46,7 +51,7 @@ struct ExrBundleHeader {
 
 /// Reads what writeExrBundle() wrote. Parts of other programs are views, too, when they have Z and
 /// worldToCamera; their planes are fitted to their depth, and distances of 1e9 and more, NaN and
-/// those below 0 are no points.
+/// those below 0 are not points. The result passes Bundle::check().
 [[nodiscard]] Result<Bundle> readExrBundle(ByteSpan bytes, std::string_view name, Job& job);
 [[nodiscard]] Result<Bundle> readExrBundle(const std::filesystem::path& path, Job& job);
 [[nodiscard]] Result<Bundle> readExrBundle(const ExrReader& reader, Job& job);
@@ -55,6 +60,20 @@ struct ExrBundleHeader {
 [[nodiscard]] Result<ExrBundleHeader> readExrBundleHeader(const std::filesystem::path& path,
                                                           const Limits& limits);
 [[nodiscard]] Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader);
+
+/// The steps of readExrBundle(), for those who look at views that break rules (validation).
+/// Error (unsupported) for a file of a newer version, (invalidInput) for another kind of content.
+[[nodiscard]] Result<void> checkExrKind(const ExrReader& reader);
+/// Whether we wrote this part as a view: it has stx:position.
+[[nodiscard]] bool isOurView(const ExrPart& part);
+/// Whether any part is such a view.
+[[nodiscard]] bool isExrBundle(const ExrReader& reader);
+/// Parts that are views: all of ours, and those of other programs with Z and a camera.
+[[nodiscard]] std::vector<int> exrViewParts(const ExrReader& reader);
+/// Reads the images of part `index` into a view without any check of what is in them. Only channels
+/// that `part` lists are read: the part's own header, or a copy with fewer channels.
+[[nodiscard]] Result<void> readExrView(const ExrReader& reader, int index, const ExrPart& part,
+                                       ReferenceView& view);
 
 /// The attributes of a camera, its planes and depthBits in an OpenEXR part whose display window is
 /// as large as part.displayWidth and displayHeight say; and back. Shared with atlases and frames.

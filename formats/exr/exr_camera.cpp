@@ -83,7 +83,8 @@ void setExrCamera(ExrPart& part, const Camera& c, double nearPlane, double farPl
     const glm::dvec2 display(part.displayWidth, part.displayHeight);
     const glm::dmat4 exrCameraFromWorld = kFlipZ * c.cameraFromWorld();
     part.screenWindowWidth = display.x / c.fx;
-    // Where the parts' aspects differ, the one that the file can tell counts for others, too.
+    // Where the parts' aspects differ, the one that the file can hold counts for other programs,
+    // too.
     part.screenWindowCenter = {(display.x / 2 - c.cx) / c.fx,
                                (c.cy - display.y / 2) / (c.fx * part.pixelAspectRatio)};
     part.attributes["worldToCamera"] = exrCameraFromWorld;

@@ -130,9 +130,11 @@ ExrPart partFrom(const Imf::Header& header) {
     if (compression >= 0 && compression < 10) part.compression = kCompressions[compression];
     for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
         const auto type = it.channel().type;
-        part.channels.push_back({it.name(), type == Imf::HALF    ? ExrChannel::Type::half
-                                            : type == Imf::FLOAT ? ExrChannel::Type::float32
-                                                                 : ExrChannel::Type::uint32});
+        part.channels.push_back({it.name(),
+                                 type == Imf::HALF    ? ExrChannel::Type::half
+                                 : type == Imf::FLOAT ? ExrChannel::Type::float32
+                                                      : ExrChannel::Type::uint32,
+                                 it.channel().xSampling, it.channel().ySampling});
     }
     for (auto it = header.begin(); it != header.end(); ++it)
         takeAttribute(it.attribute(), it.name(), part);

@@ -25,6 +25,7 @@ struct ExrChannel {
     enum class Type { half, float32, uint32 };
     std::string name;  ///< "R", "N.X", ...
     Type type = Type::float32;
+    int xSampling = 1, ySampling = 1;  ///< a value for every n-th pixel; read only
 
     bool operator==(const ExrChannel&) const = default;
 };
@@ -79,7 +80,8 @@ struct ExrConstPixels {
 class ExrReader {
   public:
     /// `bytes` must outlive the reader. `name` is for messages. Errors (invalidInput) of anything
-    /// that is no OpenEXR file, has more parts than limits.maxViews or windows beyond the limits.
+    /// that is not an OpenEXR file, has more parts than limits.maxViews or windows beyond the
+    /// limits.
     [[nodiscard]] static Result<ExrReader> open(ByteSpan bytes, std::string_view name,
                                                 const Limits& limits);
     /// Reads no more of the file than is needed.
@@ -139,8 +141,8 @@ class ExrWriter {
     const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
     std::uint64_t fileSize);
 
-/// Bytes of the pixels of each part, by the tables of offsets; empty when they cannot be told. Part
-/// of ExrReader, by itself because it needs no library.
+/// Bytes of the pixels of each part, by the tables of offsets; empty when they cannot be found.
+/// Part of ExrReader, by itself because it needs no library.
 [[nodiscard]] std::vector<std::uint64_t> exrBytesPerPart(
     const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
     std::uint64_t fileSize);

@@ -15,8 +15,8 @@ struct NamedCamera {
 };
 
 /// The cameras of a file, in its order, without any image: transforms.json (NeRF, nerfstudio,
-/// Blender), MIV/RVS JSON, or our own cameras.json; told apart by their keys. Each camera has its
-/// own intrinsics and size. Errors: io, invalidInput with file and key.
+/// Blender), MIV/RVS JSON, or our own cameras.json; distinguished by their keys. Each camera has
+/// its own intrinsics and size. Errors: io, invalidInput with file and key.
 [[nodiscard]] Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path,
                                                               Job& job);
 

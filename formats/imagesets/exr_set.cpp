@@ -1,5 +1,5 @@
 // OpenEXR pictures with a channel Z, as renderers write them: one part or several, one view or
-// more. Cameras stand in the standard attributes or in a JSON file beside the picture.
+// more. Cameras are in the standard attributes or in a JSON file beside the picture.
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace stx::imagesets {
 namespace {
 
-/// Where the channels of one view are: a part, and what stands before their names.
+/// Where the channels of one view are: a part, and the prefix of their names.
 struct Layer {
     int part = -1;
     std::string prefix;
@@ -30,7 +30,7 @@ std::string prefixOf(const std::string& channel) {
     return dot == std::string::npos ? "" : channel.substr(0, dot + 1);
 }
 
-/// Views by the attribute `view`, else by what stands before the last dot of a part's or a
+/// Views by the attribute `view`, else by what is before the last dot of a part's or a
 /// channel's name.
 std::map<std::string, ExrView> viewsOf(const ExrReader& reader) {
     std::map<std::string, ExrView> views;

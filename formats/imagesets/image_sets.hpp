@@ -42,7 +42,7 @@ struct ImageSetOptions {
     std::string from;  ///< one of imageSetKinds(); empty = recognise
     int frame = 0;     ///< of sets that have time, from 0
     int every = 1;     ///< takes each N-th view, for recordings of thousands
-    /// Depth range that the set itself does not tell (MSR), scene units; 0, 0 = not given.
+    /// Depth range that the set itself does not have (MSR), scene units; 0, 0 = not given.
     double depthMin = 0, depthMax = 0;
     /// Names of the images relative to the set's folder with {name} {w} {h} {format} {frame}
     /// {frame:04} in them (MIV); empty = the usual names.
@@ -52,8 +52,8 @@ struct ImageSetOptions {
     double focal = 0, baseline = 0, disparityOffset = 0;
     /// Stored value of one pixel of disparity (Middlebury 2001: 8, 2003: 4 at quarter size).
     double disparityScale = 1;
-    /// fx, fy, cx, cy of TUM and 7-Scenes recordings whose folder does not tell, in pixels as these
-    /// sets count them (the first pixel's centre is 0, 0); fx = 0: not given.
+    /// fx, fy, cx, cy of TUM and 7-Scenes recordings whose folder does not have them, in pixels as
+    /// these sets count them (the first pixel's centre is 0, 0); fx = 0: not given.
     double intrinsics[4] = {0, 0, 0, 0};
     MixedPixels mixedPixels = MixedPixels::automatic;
     /// Moves the cameras so that views that overlap agree; see lib/registration.
@@ -72,14 +72,14 @@ struct ImageSetKind {
 [[nodiscard]] const std::vector<ImageSetKind>& imageSetKinds();
 
 /// The kind of the set that a file or folder is. Looks at names and the first bytes only. Errors:
-/// io when there is nothing, invalidInput when it is no image set, with what was looked for.
+/// io when there is nothing, invalidInput when it is not an image set, with what was looked for.
 [[nodiscard]] Result<std::string> recogniseImageSet(const std::filesystem::path& path);
 
 /// Reads one frame of a set. Cameras are exact; lens distortion and skew are undone and rotations
-/// repaired, with a note of their size in pixels. Depth that is unknown is no part of the object;
-/// nearPlane and farPlane of each view are fitted. Several views at a time, in the memory of one
-/// per thread beside the bundle. Errors: io, usage (an option that this kind needs or does not
-/// have), invalidInput with file and line or key.
+/// repaired, with a note of their size in pixels. Pixels of unknown depth do not belong to the
+/// object; nearPlane and farPlane of each view are fitted. Several views at a time, in the memory
+/// of one per thread beside the bundle. Errors: io, usage (an option that this kind needs or does
+/// not have), invalidInput with file and line or key.
 [[nodiscard]] Result<Bundle> readImageSet(const std::filesystem::path& path,
                                           const ImageSetOptions& options, Job& job);
 

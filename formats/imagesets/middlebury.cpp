@@ -1,5 +1,5 @@
 // Middlebury's stereo sets: calib.txt with PFM disparities (2014 and later), and the older ones
-// with 8-bit disparities, whose focal length and baseline must be told. Cameras look along -Z of
+// with 8-bit disparities, whose focal length and baseline must be given. Cameras look along -Z of
 // our world and differ along +X.
 
 #include <algorithm>

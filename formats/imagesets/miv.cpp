@@ -14,12 +14,12 @@ namespace stx::imagesets {
 namespace {
 
 constexpr double kRadian = glm::pi<double>() / 180.0;
-/// A far distance of this or more stands for infinity.
+/// A far distance of this or more means infinity.
 constexpr double kInfinity = 1000;
 
 struct MivDepth {
     double nearest = 0, farthest = 0;
-    bool invalidZero = false;  ///< code 0 is no depth
+    bool invalidZero = false;  ///< code 0 means "no depth"
 };
 
 Result<MivDepth> depthOf(const Json& camera, const std::string& where) {
@@ -55,7 +55,7 @@ auto distancesOf(MivDepth depth) {
             }
             double s = v / largest;
             if (endless && s == 0) {
-                // The nearest distance that this code stands for.
+                // The nearest distance that has this code.
                 s = 0.5 / largest;
                 atInfinity = true;
             }
@@ -146,7 +146,7 @@ struct Search {
     const Json& camera;  ///< of the JSON
     const SetView& view;
     int frame;
-    const char* bitsKey;  ///< of the stored values, when a file's name does not tell
+    const char* bitsKey;  ///< of the stored values, when a file's name does not say
     const char* spaceKey;
 };
 
@@ -163,7 +163,7 @@ const std::vector<std::string>& formatNames() {
     return names;
 }
 
-/// The layout that a name's last part tells (`..._yuv420p10le.yuv`), else the JSON's.
+/// The layout by a name's last part (`..._yuv420p10le.yuv`), else the JSON's.
 Result<YuvFormat> formatOf(const std::string& name, const Search& search) {
     const std::string stem = path(name).stem().string();
     std::optional<YuvFormat> format;

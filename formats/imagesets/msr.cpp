@@ -28,7 +28,7 @@ std::vector<std::string> usualNames(const char* what, const std::string& name, i
     return names;
 }
 
-/// The pinhole in our axes, and what stands in the way of its being one.
+/// The pinhole in our axes, and what keeps it from being one.
 struct Placed {
     Camera camera;
     Lens lens;

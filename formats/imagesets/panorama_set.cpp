@@ -1,4 +1,4 @@
-// A folder with one equirectangular picture and its depth (ray length), and no camera: it stands at
+// A folder with one equirectangular picture and its depth (ray length), and no camera: it is at
 // the origin and looks along -Z in the middle of the picture.
 
 #include <algorithm>

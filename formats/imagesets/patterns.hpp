@@ -5,7 +5,7 @@
 
 namespace stx::imagesets {
 
-/// What stands in for the words of a pattern of file names.
+/// What replaces the words of a pattern of file names.
 struct Placeholders {
     std::string name;           ///< {name}
     int width = 0, height = 0;  ///< {w} {h}

@@ -66,7 +66,7 @@ Result<int> depthChannel(const DecodedImage& image, std::string_view name) {
         [&](const auto& values) {
             const std::size_t step = static_cast<std::size_t>(image.channels);
             for (std::size_t i = 0; i + 2 < values.size(); i += step)
-                // NaN (nothing) is no difference.
+                // NaN (nothing) is not a difference.
                 if ((values[i] != values[i + 1] || values[i] != values[i + 2]) &&
                     (values[i] == values[i] || values[i + 1] == values[i + 1] ||
                      values[i + 2] == values[i + 2]))

@@ -7,7 +7,7 @@
 
 namespace stx::imagesets {
 
-/// The colour of a source; `alpha` tells whether its alpha is the file's own.
+/// The colour of a source; `alpha` says whether its alpha is the file's own.
 struct StoredColour {
     Texture texture;
     bool alpha = false;

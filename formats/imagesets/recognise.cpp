@@ -119,6 +119,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     int pictures = 0, exr = 0, disparities = 0, depths = 0;
     for (const std::string& name : files) {
         if (name.ends_with(".pose.txt")) return std::string("7scenes");
+        if (name.ends_with(".gt.freiburg")) return std::string("tum");
         const std::string ending = fs::path(name).extension().string();
         exr += ending == ".exr";
         const bool picture = ending == ".png" || ending == ".jpg" || ending == ".exr" ||

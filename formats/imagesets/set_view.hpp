@@ -19,7 +19,7 @@ namespace stx::imagesets {
 struct PictureSource {
     std::filesystem::path path;
     std::string name;              ///< for messages, not quoted
-    std::optional<YuvFormat> yuv;  ///< raw planes; else the file tells (images, PFM)
+    std::optional<YuvFormat> yuv;  ///< raw planes; else by the file (images, PFM)
     int frame = 0;                 ///< of raw planes
     bool colmap = false;           ///< COLMAP's depth maps: `w&h&c&` and floats
 };
@@ -45,7 +45,7 @@ struct SetView {
     Camera camera;
     double angleX = 0, angleY = 0;  ///< radians; angleY 0 = square pixels
     Lens lens;
-    std::optional<Panorama> panorama;  ///< then `camera` tells position and orientation only
+    std::optional<Panorama> panorama;  ///< then `camera` has position and orientation only
 
     PictureSource texture, depth;
     /// Reads both, for kinds whose images are not files of their own.
@@ -55,7 +55,7 @@ struct SetView {
 
     bool sensor = false;    ///< mixed pixels at depth edges are to be expected
     bool measured = false;  ///< stereo's disparities, whose edges lie beside the picture's
-    /// Planes and code that an export of ours told; used when they hold all points.
+    /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
     int depthBits = 0;      ///< with planes: 8, 16, 32
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty

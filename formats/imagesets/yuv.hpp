@@ -24,7 +24,7 @@ struct YuvFormat {
 /// Width and height are left to the caller.
 [[nodiscard]] std::optional<YuvFormat> yuvFormatNamed(std::string_view name);
 
-/// Frames in a file. Errors when its size is no whole number of them, or it has none.
+/// Frames in a file. Errors when its size is not a whole number of them, or it has none.
 [[nodiscard]] Result<int> yuvFrameCount(const std::filesystem::path& path, const YuvFormat& format);
 
 /// One frame as 8-bit RGB; chroma is interpolated, its samples in the middle of their pixels.

@@ -29,7 +29,7 @@ class DracoGeometry {
     /// Is asked for memory before Draco takes it: (count, bytes each).
     using Charge = std::function<Result<void>(std::uint64_t, std::uint64_t)>;
 
-    /// Errors (invalidInput) when the stream is no Draco stream or is damaged; those of `charge`.
+    /// Errors (invalidInput) when the stream is not of Draco or is damaged; those of `charge`.
     [[nodiscard]] static Result<DracoGeometry> decode(ByteSpan bytes, const Charge& charge);
 
     [[nodiscard]] bool isMesh() const { return isMesh_; }

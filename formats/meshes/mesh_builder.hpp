@@ -36,7 +36,7 @@ class MeshBuilder {
                                       std::string_view what);
 
     /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite,
-    /// an index out of range. Triangles without area are left out and counted; normals that are no
+    /// an index out of range. Triangles without area are left out and counted; normals that are not
     /// directions are replaced by those of the triangles; uvs and colours that are not finite
     /// become 0.
     [[nodiscard]] Result<void> add(MeshPart part);

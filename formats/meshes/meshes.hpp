@@ -42,7 +42,7 @@ struct MeshOptions {
 [[nodiscard]] Result<Mesh> readMesh(const std::filesystem::path& path, Job& job,
                                     const MeshOptions& options = {});
 
-/// The same for a file in memory. `path` tells the format where the bytes do not, and the folder in
+/// The same for a file in memory. `path` gives the format where the bytes do not, and the folder in
 /// which buffers, material files and textures are looked for.
 [[nodiscard]] Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
                                     const MeshOptions& options = {});

@@ -24,7 +24,7 @@ class ModelFiles {
     ModelFiles(std::filesystem::path folder, Job& job) : folder_(std::move(folder)), job_(job) {}
 
     /// The bytes of a file that the model names. Backslashes are tried as separators when the name
-    /// as it stands does not exist. Errors as resolveInside() and readFile().
+    /// as it is does not exist. Errors as resolveInside() and readFile().
     [[nodiscard]] Result<Bytes> read(std::string_view name) const;
 
     /// Index into `textures` of the image file `name`, or -1, with a note, when it is missing or

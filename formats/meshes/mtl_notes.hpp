@@ -7,7 +7,7 @@
 
 namespace stx {
 
-/// What Assimp's OBJ importer does not tell about a material of an MTL file.
+/// What Assimp's OBJ importer does not report about a material of an MTL file.
 struct MtlMaterial {
     bool hasDiffuse = false;                  ///< a Kd line
     bool hasDissolve = false;                 ///< a d line

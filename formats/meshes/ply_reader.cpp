@@ -27,7 +27,7 @@ class PlyValues {
 
     [[nodiscard]] std::size_t offset() const { return at_; }
 
-    /// False at the end of the file or where text is no number.
+    /// False at the end of the file or where text is not a number.
     bool next(PlyType type, double& value) {
         return coding_ == PlyCoding::ascii ? nextText(value) : nextBinary(type, value);
     }

@@ -52,7 +52,8 @@ void triangulate(std::span<const glm::vec3> corners, std::vector<glm::uvec3>& tr
     bool convex = true;
     for (std::size_t i = 0; i < n; ++i)
         convex = convex && cross(flat[i], flat[(i + 1) % n], flat[(i + 2) % n]) >= 0;
-    // Ears cost n^2 to n^3 steps: a polygon of this many corners is no drawing but an attack.
+    // Ears cost n^2 to n^3 steps: a polygon of this many corners is an attack rather than a
+    // drawing.
     constexpr std::size_t kMostCorners = 2048;
     if (convex || n > kMostCorners) return fan(rest, triangles);
 

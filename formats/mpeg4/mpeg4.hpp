@@ -19,9 +19,9 @@ enum class Mpeg4Container { mp4, bt, xmt };
 /// By the first bytes of a file: an ftyp box, XML with <XMT-A, or BT's words.
 [[nodiscard]] std::optional<Mpeg4Container> mpeg4ContainerOf(ByteSpan head);
 
-/// Reads a presentation. The content tells the container; where it does not, the ending does. The
-/// images of an .mp4 stay in the file; the files that texts name are looked for beside the text
-/// (resolveInside) and opened. Errors as the readers', with the file's name.
+/// Reads a presentation. The content decides which container it is; where it does not, the ending
+/// does. The images of an .mp4 stay in the file; the files that texts name are looked for beside
+/// the text (resolveInside) and opened. Errors as the readers', with the file's name.
 [[nodiscard]] Result<Mpeg4Document> readMpeg4(const std::filesystem::path& path, Job& job);
 
 struct Mpeg4WriteOptions {
@@ -30,7 +30,7 @@ struct Mpeg4WriteOptions {
 };
 
 /// Writes a presentation into the container of the path's ending, whole or not at all. Beside
-/// `name.bt` and `name.xmt` stands the folder `name_images` with the streams' bytes, untouched.
+/// `name.bt` and `name.xmt` is the folder `name_images` with the streams' bytes, untouched.
 /// Errors: (usage) another ending, or a text for stdout that has images; (io); what the writers
 /// say.
 [[nodiscard]] Result<void> writeMpeg4(const Mpeg4Document& document,

@@ -4,6 +4,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/open.hpp"
+#include "formats/save.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/capture/rasterizer.hpp"

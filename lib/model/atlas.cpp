@@ -27,8 +27,9 @@ Box boxOf(const AtlasRectangle& r, const Camera& camera, int around) {
     return {x - left, y - above, x + r.atlasWidth() + right, y + r.atlasHeight() + below};
 }
 
-/// Two of these boxes that overlap, or none: sweeps along x and keeps what is open by y.
-std::optional<std::pair<std::size_t, std::size_t>> findOverlap(
+/// The boxes, with their numbers, that overlap: sweeps along x and keeps what is open by y. A box
+/// that overlaps one is not kept, so there are fewer pairs than boxes.
+std::vector<std::pair<std::size_t, std::size_t>> overlapsOf(
     const std::vector<std::pair<std::size_t, Box>>& boxes) {
     struct Event {
         std::int64_t x;
@@ -43,25 +44,25 @@ std::optional<std::pair<std::size_t, std::size_t>> findOverlap(
     std::sort(events.begin(), events.end(), [](const Event& a, const Event& b) {
         return std::tie(a.x, a.opens, a.index) < std::tie(b.x, b.opens, b.index);
     });
+    std::vector<std::pair<std::size_t, std::size_t>> overlaps;
     std::map<std::int64_t, std::size_t> open;  // by top edge; what is open does not overlap
     for (const auto& e : events) {
         const Box& box = boxes[e.index].second;
         if (!e.opens) {
-            open.erase(box.y0);
+            if (const auto it = open.find(box.y0); it != open.end() && it->second == e.index)
+                open.erase(it);
             continue;
         }
-        const auto clash = [&](std::size_t other) {
-            return std::pair(boxes[other].first, boxes[e.index].first);
-        };
         const auto below = open.lower_bound(box.y0);
-        if (below != open.end() && below->first < box.y1) return clash(below->second);
-        if (below != open.begin()) {
-            const auto above = std::prev(below);
-            if (boxes[above->second].second.y1 > box.y0) return clash(above->second);
-        }
-        open.emplace(box.y0, e.index);
+        const auto above = below == open.begin() ? open.end() : std::prev(below);
+        if (below != open.end() && below->first < box.y1)
+            overlaps.emplace_back(boxes[below->second].first, boxes[e.index].first);
+        else if (above != open.end() && boxes[above->second].second.y1 > box.y0)
+            overlaps.emplace_back(boxes[above->second].first, boxes[e.index].first);
+        else
+            open.emplace(box.y0, e.index);
     }
-    return std::nullopt;
+    return overlaps;
 }
 
 /// The boxes of the rectangles on a page, with their numbers.
@@ -76,6 +77,19 @@ std::vector<std::pair<std::size_t, Box>> boxesOf(const Atlas& atlas, std::size_t
 }
 
 }  // namespace
+
+std::vector<std::pair<std::size_t, std::size_t>> findOverlaps(
+    const std::vector<AtlasRectangle>& rectangles, int page) {
+    std::vector<std::pair<std::size_t, Box>> boxes;
+    for (std::size_t i = 0; i < rectangles.size(); ++i) {
+        const AtlasRectangle& r = rectangles[i];
+        if (r.page != page) continue;
+        boxes.push_back({i,
+                         {r.atlasX, r.atlasY, std::int64_t{r.atlasX} + r.atlasWidth(),
+                          std::int64_t{r.atlasY} + r.atlasHeight()}});
+    }
+    return overlapsOf(boxes);
+}
 
 int Atlas::textureCount() const {
     int count = 0;
@@ -102,7 +116,7 @@ bool Atlas::paddingHolds(int texels) const {
                 box.y1 > height())
                 return false;
         }
-        if (findOverlap(boxes)) return false;
+        if (!overlapsOf(boxes).empty()) return false;
     }
     return true;
 }
@@ -157,10 +171,11 @@ Result<void> Atlas::check() const {
                         width(), height());
     }
     for (std::size_t page = 0; page < pages.size(); ++page) {
-        if (const auto hit = findOverlap(boxesOf(*this, page, 0)))
-            return fail(ErrorCode::invalidInput, "{} and {} overlap",
-                        nameOf(rectangles[hit->first], hit->first),
-                        nameOf(rectangles[hit->second], hit->second));
+        const auto overlaps = findOverlaps(rectangles, static_cast<int>(page));
+        if (overlaps.empty()) continue;
+        const auto [a, b] = overlaps.front();
+        return fail(ErrorCode::invalidInput, "{} and {} overlap", nameOf(rectangles[a], a),
+                    nameOf(rectangles[b], b));
     }
     return {};
 }

@@ -34,6 +34,12 @@ struct AtlasRectangle {
     bool operator==(const AtlasRectangle&) const = default;
 };
 
+/// Pairs of rectangles of one page that overlap, by their indices. A rectangle that overlaps
+/// several is the second of one pair only, so there are fewer pairs than rectangles. No size may be
+/// 0 or less.
+[[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> findOverlaps(
+    const std::vector<AtlasRectangle>& rectangles, int page);
+
 /// One page of an atlas: its textures all have the same size.
 struct AtlasPage {
     Texture texture;

@@ -12,7 +12,16 @@ std::int64_t ReferenceView::pointCount() const {
     return n;
 }
 
-Result<void> ReferenceView::check() const {
+Result<std::int64_t> ReferenceView::checkedPointCount() const {
+    std::int64_t n = 0;
+    for (const float d : depth.pixels()) {
+        if (!(d >= 0)) return depthError(d);
+        n += hasPoint(d) ? 1 : 0;
+    }
+    return n;
+}
+
+Result<void> ReferenceView::checkHeader() const {
     STX_CHECK(camera.check());
     const auto sizeOf = [](const auto& image) {
         return fmt::format("{}x{}", image.width(), image.height());
@@ -37,10 +46,12 @@ Result<void> ReferenceView::check() const {
     if (depthBits != 8 && depthBits != 16 && depthBits != 32)
         return fail(ErrorCode::invalidInput, "depth has {} bits; 8, 16 or 32 (float) is possible",
                     depthBits);
-    for (const float d : depth.pixels()) {
-        if (!(d >= 0))
-            return fail(ErrorCode::invalidInput, "depth holds {}; distances are 0 or more", d);
-    }
+    return {};
+}
+
+Result<void> ReferenceView::check() const {
+    STX_CHECK(checkHeader());
+    STX_CHECK(checkedPointCount());
     return {};
 }
 
@@ -80,10 +91,14 @@ Bounds Bundle::computeBounds() const {
     return all;
 }
 
-Result<void> Bundle::check() const {
+namespace {
+
+using ViewCheck = Result<void> (ReferenceView::*)() const;
+
+Result<void> checkViews(const std::vector<ReferenceView>& views, ViewCheck check) {
     if (views.empty()) return fail(ErrorCode::invalidInput, "the bundle has no reference view");
     for (std::size_t i = 0; i < views.size(); ++i) {
-        if (auto ok = views[i].check(); !ok)
+        if (auto ok = (views[i].*check)(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("view {}", i)));
         if (views[i].texture.isLinear() != views[0].texture.isLinear())
             return fail(ErrorCode::invalidInput,
@@ -92,6 +107,16 @@ Result<void> Bundle::check() const {
                         views[0].texture.isLinear() ? "linear" : "sRGB");
     }
     return {};
+}
+
+}  // namespace
+
+Result<void> Bundle::check() const {
+    return checkViews(views, &ReferenceView::check);
+}
+
+Result<void> Bundle::checkHeaders() const {
+    return checkViews(views, &ReferenceView::checkHeader);
 }
 
 }  // namespace stx

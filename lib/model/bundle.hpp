@@ -23,7 +23,15 @@ struct Bundle {
     /// The bounds of all points, computed from the pixels.
     [[nodiscard]] Bounds computeBounds() const;
     /// Each view's check(), with its index; at least one view; one colour space in all views.
+    ///
+    /// Who calls it: it looks at every pixel, so a pixel is checked once, by whoever brings it in.
+    /// A reader returns only bundles that pass; openBundle() and saveBundle() rely on that. A
+    /// writer calls checkHeaders() and refuses a wrong depth in the loop that codes or counts the
+    /// depths anyway, so bundles that a caller makes are checked, too. Algorithms of lib call
+    /// check().
     [[nodiscard]] Result<void> check() const;
+    /// The same with each view's checkHeader(): no pixel is looked at.
+    [[nodiscard]] Result<void> checkHeaders() const;
 };
 
 }  // namespace stx

@@ -14,6 +14,11 @@
 
 namespace stx {
 
+/// The error of a depth that is NaN or below 0.
+[[nodiscard]] inline tl::unexpected<Error> depthError(float depth) {
+    return fail(ErrorCode::invalidInput, "depth holds {}; distances are 0 or more", depth);
+}
+
 /// One reference image of an object: a DepthImage with its SimpleTexture or SimpleTextureV2
 /// (ISO/IEC 14496-16, 4.5.4). All images of a view have the camera's width and height.
 struct ReferenceView {
@@ -44,12 +49,17 @@ struct ReferenceView {
     }
     /// Pixels that are points of the object.
     [[nodiscard]] std::int64_t pointCount() const;
+    /// The same, and the error of check() when a depth is NaN or below 0.
+    [[nodiscard]] Result<std::int64_t> checkedPointCount() const;
     /// World position of the point of pixel (x, y), whose depth must be one.
     [[nodiscard]] glm::dvec3 worldPoint(int x, int y) const {
         return camera.position +
                camera.orientation * camera.unproject(x + 0.5, y + 0.5, depth.at(x, y));
     }
-    /// Errors when sizes disagree, the camera or the planes make no sense, or values are NaN.
+    /// Errors when sizes disagree, or the camera, the planes or the depth bits make no sense. Looks
+    /// at no pixel.
+    [[nodiscard]] Result<void> checkHeader() const;
+    /// checkHeader(), and errors when a depth is NaN or below 0. Looks at every pixel.
     [[nodiscard]] Result<void> check() const;
 };
 

@@ -18,8 +18,8 @@ namespace {
 
 void frame(ByteSpan bytes) {
     constexpr std::array<std::uint32_t, 3> kMpod = {10, 11, 70000};
-    std::vector<Mp4Departure> departures;
-    const DescriptorContext context{kMpod, &departures};
+    std::vector<Mp4Deviation> deviations;
+    const DescriptorContext context{kMpod, &deviations};
     const auto commands = decodeOdFrame(bytes, context);
     if (!commands) return;
     const auto referenceOf = [](std::uint32_t esId) -> std::uint32_t {

@@ -3,7 +3,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "formats/meshes/gltf/document.hpp"
+#include "formats/meshes/gltf/gltf_file.hpp"
 
 namespace stx::gltf {
 namespace {
@@ -95,7 +95,7 @@ Result<void> checkRange(ByteSpan bytes, std::uint64_t offset, std::uint64_t coun
 
 }  // namespace
 
-struct Document::Layout {
+struct GltfFile::Layout {
     std::string where;
     std::uint64_t componentType = 0;
     int components = 0;
@@ -106,7 +106,7 @@ struct Document::Layout {
     const Json* sparse = nullptr;
 };
 
-Result<Document::Layout> Document::layout(std::uint64_t index, const std::string& user,
+Result<GltfFile::Layout> GltfFile::layout(std::uint64_t index, const std::string& user,
                                           std::initializer_list<std::string_view> types) {
     STX_TRY(const Json* object, element(root_, "accessors", index, user));
     Layout l;
@@ -137,7 +137,7 @@ Result<Document::Layout> Document::layout(std::uint64_t index, const std::string
 }
 
 template <class Component>
-Result<std::vector<Component>> Document::elements(const Layout& l) {
+Result<std::vector<Component>> GltfFile::elements(const Layout& l) {
     const auto size = static_cast<std::uint64_t>(componentSize(l.componentType));
     const auto components = static_cast<std::uint64_t>(l.components);
     const std::uint64_t elementSize = size * components;
@@ -206,7 +206,7 @@ Result<std::vector<Component>> Document::elements(const Layout& l) {
     return values;
 }
 
-Result<AccessorValues> Document::accessor(std::uint64_t index, const std::string& user,
+Result<AccessorValues> GltfFile::accessor(std::uint64_t index, const std::string& user,
                                           std::initializer_list<std::string_view> types,
                                           bool normalise) {
     STX_TRY(auto l, layout(index, user, types));
@@ -218,7 +218,7 @@ Result<AccessorValues> Document::accessor(std::uint64_t index, const std::string
     return result;
 }
 
-Result<std::vector<std::uint32_t>> Document::indices(std::uint64_t index, const std::string& user) {
+Result<std::vector<std::uint32_t>> GltfFile::indices(std::uint64_t index, const std::string& user) {
     STX_TRY(const auto l, layout(index, user, {"SCALAR"}));
     if (l.componentType != kUnsignedByte && l.componentType != kUnsignedShort &&
         l.componentType != kUnsignedInt)

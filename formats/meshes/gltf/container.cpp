@@ -2,7 +2,7 @@
 #include <array>
 #include <cstring>
 
-#include "formats/meshes/gltf/document.hpp"
+#include "formats/meshes/gltf/gltf_file.hpp"
 
 namespace stx::gltf {
 namespace {
@@ -76,10 +76,10 @@ std::optional<Bytes> decodeBase64(std::string_view text) {
     return bytes;
 }
 
-Result<Document> Document::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& builder) {
-    Document document;
-    document.files_ = &files;
-    document.builder_ = &builder;
+Result<GltfFile> GltfFile::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& builder) {
+    GltfFile model;
+    model.files_ = &files;
+    model.builder_ = &builder;
     ByteSpan json = bytes;
     if (bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0) {
         if (bytes.size() < 12)
@@ -95,8 +95,8 @@ Result<Document> Document::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& 
                         "the GLB header says {} bytes, but the file has only {}; it is cut short",
                         length, bytes.size());
         if (length < bytes.size())
-            document.job().note(fmt::format("{} bytes behind the end of the GLB file are not read",
-                                            bytes.size() - length));
+            model.job().note(fmt::format("{} bytes behind the end of the GLB file are not read",
+                                         bytes.size() - length));
         bytes = bytes.first(length);
         std::size_t at = 12;
         json = {};
@@ -117,8 +117,8 @@ Result<Document> Document::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& 
                 json = content;
                 hasJson = true;
             } else if (type == 0x004E4942 && chunk == 1) {
-                document.binaryChunk_ = content;
-                document.hasBinaryChunk_ = true;
+                model.binaryChunk_ = content;
+                model.hasBinaryChunk_ = true;
             } else if (chunk == 0) {
                 return fail(ErrorCode::invalidInput, "the first GLB chunk is no JSON");
             }
@@ -126,13 +126,13 @@ Result<Document> Document::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& 
         }
         if (!hasJson) return fail(ErrorCode::invalidInput, "the GLB file has no JSON chunk");
     }
-    STX_CHECK(document.parse(json));
-    STX_CHECK(document.checkAsset());
-    document.buffers_.resize(listSize(document.root_, "buffers"));
-    return document;
+    STX_CHECK(model.parse(json));
+    STX_CHECK(model.checkAsset());
+    model.buffers_.resize(listSize(model.root_, "buffers"));
+    return model;
 }
 
-Result<void> Document::parse(ByteSpan bytes) {
+Result<void> GltfFile::parse(ByteSpan bytes) {
     // Each value follows one of these; it takes some 40 bytes, its text once more.
     std::uint64_t values = 1;
     for (const auto b : bytes) {
@@ -161,7 +161,7 @@ Result<void> Document::parse(ByteSpan bytes) {
     return {};
 }
 
-Result<void> Document::checkAsset() {
+Result<void> GltfFile::checkAsset() {
     STX_TRY(const Json* asset, getObject(root_, "asset", ""));
     if (!asset)
         return fail(ErrorCode::invalidInput,
@@ -192,7 +192,7 @@ Result<void> Document::checkAsset() {
     return {};
 }
 
-Result<Bytes> Document::uri(const std::string& uri, const std::string& user) {
+Result<Bytes> GltfFile::uri(const std::string& uri, const std::string& user) {
     if (uri.starts_with("data:")) {
         const auto comma = uri.find(',');
         const std::string_view header = std::string_view(uri).substr(0, comma);
@@ -224,7 +224,7 @@ Result<Bytes> Document::uri(const std::string& uri, const std::string& user) {
     return bytes;
 }
 
-Result<ByteSpan> Document::buffer(std::uint64_t index, const std::string& user) {
+Result<ByteSpan> GltfFile::buffer(std::uint64_t index, const std::string& user) {
     STX_TRY(const Json* object, element(root_, "buffers", index, user));
     if (buffers_[index]) return *buffers_[index];
     const auto where = fmt::format("buffers[{}]", index);
@@ -249,7 +249,7 @@ Result<ByteSpan> Document::buffer(std::uint64_t index, const std::string& user) 
     return *buffers_[index];
 }
 
-Result<BufferView> Document::bufferView(std::uint64_t index, const std::string& user) {
+Result<BufferView> GltfFile::bufferView(std::uint64_t index, const std::string& user) {
     STX_TRY(const Json* object, element(root_, "bufferViews", index, user));
     const auto where = fmt::format("bufferViews[{}]", index);
     STX_TRY(const auto bufferIndex, getUint(*object, "buffer", where));

@@ -14,7 +14,7 @@ namespace stx::gltf {
 using Json = nlohmann::json;
 
 // Members of glTF objects, with types checked. `where` is the object's place (`materials[2]`); an
-// error names the member, what was found and what is expected. Absent members are no error.
+// error names the member, what was found and what is expected. Absent members are not errors.
 
 [[nodiscard]] Result<std::optional<double>> getNumber(const Json& object, const char* key,
                                                       const std::string& where);

@@ -59,12 +59,12 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
         if (override) uv.set = static_cast<int>(std::min<std::uint64_t>(*override, 1000));
     }
 
-    STX_TRY(const Json* object, element(document_.root(), "textures", *index, where));
+    STX_TRY(const Json* object, element(model_.root(), "textures", *index, where));
     const auto textureWhere = fmt::format("textures[{}]", *index);
     SamplerState state;
     STX_TRY(const auto sampler, getUint(*object, "sampler", textureWhere));
     if (sampler) {
-        STX_TRY(const Json* s, element(document_.root(), "samplers", *sampler, textureWhere));
+        STX_TRY(const Json* s, element(model_.root(), "samplers", *sampler, textureWhere));
         const auto samplerWhere = fmt::format("samplers[{}]", *sampler);
         const auto wrap = [&](const char* key) -> Result<MeshTexture::Wrap> {
             STX_TRY(const auto value, getUint(*s, key, samplerWhere));
@@ -94,11 +94,11 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
         if (webpSource) source = webpSource;
     }
     if (!source) {
-        document_.job().note(fmt::format(
+        model_.job().note(fmt::format(
             "{} names no image that can be read; the plain colour is used", textureWhere));
         return -1;
     }
-    STX_TRY(const Json* image, element(document_.root(), "images", *source, textureWhere));
+    STX_TRY(const Json* image, element(model_.root(), "images", *source, textureWhere));
     const auto imageWhere = fmt::format("images[{}]", *source);
     STX_TRY(const auto uri, getString(*image, "uri", imageWhere));
     STX_TRY(const auto view, getUint(*image, "bufferView", imageWhere));
@@ -111,16 +111,15 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
                 "{}: '{}' is a network or absolute address; only files beside the model are read",
                 imageWhere, uri->substr(0, 120));
         auto name = percentDecoded(*uri);
-        if (name != *uri && resolveInside(document_.files().folder(), *uri, document_.job().limits))
+        if (name != *uri && resolveInside(model_.files().folder(), *uri, model_.job().limits))
             name = *uri;
-        STX_TRY(result, document_.files().textureFromFile(name, state, textures));
+        STX_TRY(result, model_.files().textureFromFile(name, state, textures));
     } else if (uri) {
-        STX_TRY(const auto bytes, document_.uri(*uri, imageWhere));
-        STX_TRY(result, document_.files().textureFromBytes(bytes, imageWhere, state, textures));
+        STX_TRY(const auto bytes, model_.uri(*uri, imageWhere));
+        STX_TRY(result, model_.files().textureFromBytes(bytes, imageWhere, state, textures));
     } else if (view) {
-        STX_TRY(const auto bytes, document_.bufferView(*view, imageWhere));
-        STX_TRY(result,
-                document_.files().textureFromBytes(bytes.bytes, imageWhere, state, textures));
+        STX_TRY(const auto bytes, model_.bufferView(*view, imageWhere));
+        STX_TRY(result, model_.files().textureFromBytes(bytes.bytes, imageWhere, state, textures));
     } else {
         return fail(ErrorCode::invalidInput, "{} has neither a uri nor a bufferView", imageWhere);
     }
@@ -129,7 +128,7 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
 }
 
 Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user) {
-    STX_TRY(const Json* object, element(document_.root(), "materials", index, user));
+    STX_TRY(const Json* object, element(model_.root(), "materials", index, user));
     const auto where = fmt::format("materials[{}]", index);
     MaterialUse use;
     Material m;

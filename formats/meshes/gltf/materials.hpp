@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "formats/meshes/gltf/document.hpp"
+#include "formats/meshes/gltf/gltf_file.hpp"
 
 namespace stx::gltf {
 
@@ -28,7 +28,7 @@ struct MaterialUse {
 /// Makes the mesh's materials from the file's, each when it is first used.
 class Materials {
   public:
-    Materials(Document& document, MeshBuilder& builder) : document_(document), builder_(builder) {}
+    Materials(GltfFile& model, MeshBuilder& builder) : model_(model), builder_(builder) {}
 
     /// `index` of `materials`, or nothing for glTF's default material.
     [[nodiscard]] Result<MaterialUse> use(std::optional<std::uint64_t> index,
@@ -44,7 +44,7 @@ class Materials {
     [[nodiscard]] Result<MaterialUse> read(std::uint64_t index, const std::string& user);
     [[nodiscard]] Result<int> texture(const Json& info, const std::string& where, UvSource& uv);
 
-    Document& document_;
+    GltfFile& model_;
     MeshBuilder& builder_;
     std::map<std::int64_t, MaterialUse> known_;
     std::map<std::tuple<std::uint32_t, bool, bool>, std::uint32_t> plain_;

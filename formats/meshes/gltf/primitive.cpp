@@ -11,9 +11,9 @@ namespace {
 /// Attributes of one primitive, from accessors or from its Draco stream.
 class Attributes {
   public:
-    Attributes(Document& document, MeshBuilder& builder, const Json& primitive,
+    Attributes(GltfFile& model, MeshBuilder& builder, const Json& primitive,
                const std::string& where)
-        : document_(document), builder_(builder), primitive_(primitive), where_(where) {}
+        : model_(model), builder_(builder), primitive_(primitive), where_(where) {}
 
     Result<void> open() {
         STX_TRY(attributes_, getObject(primitive_, "attributes", where_));
@@ -26,7 +26,7 @@ class Attributes {
         if (!view) return fail(ErrorCode::invalidInput, "{} names no bufferView", at);
         STX_TRY(dracoIds_, getObject(*extension, "attributes", at));
         if (!dracoIds_) return fail(ErrorCode::invalidInput, "{} has no attributes", at);
-        STX_TRY(const auto bytes, document_.bufferView(*view, at));
+        STX_TRY(const auto bytes, model_.bufferView(*view, at));
         auto geometry = DracoGeometry::decode(
             bytes.bytes,
             [&](std::uint64_t n, std::uint64_t each) { return builder_.charge(n, each, at); });
@@ -60,7 +60,7 @@ class Attributes {
         }
         // Colours must be normalised; exporters forget to say so.
         STX_TRY(auto values,
-                document_.accessor(*index, where_ + " " + name, types, name.starts_with("COLOR")));
+                model_.accessor(*index, where_ + " " + name, types, name.starts_with("COLOR")));
         return values;
     }
 
@@ -70,7 +70,7 @@ class Attributes {
         for (const auto& a : draco_->attributes()) {
             if (a.uniqueId != id) continue;
             // The accessor still says whether integers are normalised.
-            STX_TRY(const Json* object, element(document_.root(), "accessors", accessor, where_));
+            STX_TRY(const Json* object, element(model_.root(), "accessors", accessor, where_));
             STX_TRY(const auto normalised,
                     getBool(*object, "normalized", fmt::format("accessors[{}]", accessor)));
             STX_CHECK(builder_.charge(draco_->pointCount(),
@@ -87,7 +87,7 @@ class Attributes {
                     where_, id, name);
     }
 
-    Document& document_;
+    GltfFile& model_;
     MeshBuilder& builder_;
     const Json& primitive_;
     const std::string& where_;
@@ -138,7 +138,7 @@ std::vector<glm::uvec3> assemble(std::uint64_t mode, std::size_t count, const au
     return triangles;
 }
 
-Result<void> applyMorph(Document& document, const Json& primitive, const std::string& where,
+Result<void> applyMorph(GltfFile& model, const Json& primitive, const std::string& where,
                         const std::vector<double>& weights, MeshPart& part) {
     STX_TRY(const Json* targets, getArray(primitive, "targets", where));
     if (!targets) return {};
@@ -152,7 +152,7 @@ Result<void> applyMorph(Document& document, const Json& primitive, const std::st
         const auto add = [&](const char* name, auto& values) -> Result<void> {
             STX_TRY(const auto index, getUint((*targets)[t], name, at));
             if (!index || values.empty()) return {};
-            STX_TRY(const auto deltas, document.accessor(*index, at + " " + name, {"VEC3"}));
+            STX_TRY(const auto deltas, model.accessor(*index, at + " " + name, {"VEC3"}));
             if (deltas.count != values.size())
                 return fail(ErrorCode::invalidInput, "{}: {} has {} elements, the mesh has {}", at,
                             name, deltas.count, values.size());
@@ -171,7 +171,7 @@ Result<void> applyMorph(Document& document, const Json& primitive, const std::st
 
 }  // namespace
 
-Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materials& materials,
+Result<Primitive> readPrimitive(GltfFile& model, MeshBuilder& builder, Materials& materials,
                                 const Json& primitive, const std::string& where,
                                 const std::vector<double>& morphWeights,
                                 std::map<std::string, int>& dropped) {
@@ -187,7 +187,7 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
         result.drawn = false;
         return result;
     }
-    Attributes attributes(document, builder, primitive, where);
+    Attributes attributes(model, builder, primitive, where);
     STX_CHECK(attributes.open());
 
     STX_TRY(const auto position, attributes.get("POSITION", {"VEC3"}));
@@ -252,7 +252,7 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
     const bool normalWorks = !material.normal.used ||
                              !(part.normalUvs.empty() && part.uvs.empty()) || position->count == 0;
     if (!baseWorks || !normalWorks) {
-        document.job().note(
+        model.job().note(
             fmt::format("{} has a textured material but no texture coordinates for it; the "
                         "plain colour is used",
                         where));
@@ -268,7 +268,7 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
         STX_CHECK(checkCount(weights, count, 4, where, "WEIGHTS"));
         result.influences.push_back({std::move(*joints), std::move(*weights)});
     }
-    STX_CHECK(applyMorph(document, primitive, where, morphWeights, part));
+    STX_CHECK(applyMorph(model, primitive, where, morphWeights, part));
 
     if (mode == 0) {
         part.points = true;
@@ -285,7 +285,7 @@ Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder, Materi
             assemble(mode, count, [](std::size_t i) { return static_cast<std::uint32_t>(i); });
         return result;
     }
-    STX_TRY(const auto indices, document.indices(*indexAccessor, where + " indices"));
+    STX_TRY(const auto indices, model.indices(*indexAccessor, where + " indices"));
     for (std::size_t i = 0; i < indices.size(); ++i) {
         if (indices[i] >= count)
             return fail(

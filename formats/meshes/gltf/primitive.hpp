@@ -19,7 +19,7 @@ struct Primitive {
 };
 
 /// Reads `meshes[m].primitives[p]`. `dropped` counts what is left out, by name.
-[[nodiscard]] Result<Primitive> readPrimitive(Document& document, MeshBuilder& builder,
+[[nodiscard]] Result<Primitive> readPrimitive(GltfFile& model, MeshBuilder& builder,
                                               Materials& materials, const Json& primitive,
                                               const std::string& where,
                                               const std::vector<double>& morphWeights,

@@ -44,8 +44,8 @@ void transform(MeshPart& part, const glm::dmat4& worldFromMesh) {
 
 class SceneReader {
   public:
-    SceneReader(Document& document, MeshBuilder& builder)
-        : document_(document), builder_(builder), materials_(document, builder) {}
+    SceneReader(GltfFile& model, MeshBuilder& builder)
+        : model_(model), builder_(builder), materials_(model, builder) {}
 
     Result<Mesh> read() {
         STX_CHECK(readNodes());
@@ -63,7 +63,7 @@ class SceneReader {
         glm::dmat4 worldFromNode{1.0};
     };
 
-    [[nodiscard]] const Json& root() const { return document_.root(); }
+    [[nodiscard]] const Json& root() const { return model_.root(); }
 
     Result<glm::dmat4> localMatrix(const Json& node, const std::string& where) {
         glm::dmat4 matrix(1.0);
@@ -155,7 +155,7 @@ class SceneReader {
             STX_TRY(const Json* scene, element(root(), "scenes", index, "scene"));
             STX_TRY(roots, getIndices(*scene, "nodes", fmt::format("scenes[{}]", index)));
             if (scenes > 1)
-                document_.job().note(
+                model_.job().note(
                     fmt::format("scene {} of {} is read; the others are dropped", index, scenes));
             for (const auto n : roots) {
                 if (n >= nodes_.size())
@@ -192,7 +192,7 @@ class SceneReader {
     Result<void> readScene() {
         const auto meshCount = listSize(root(), "meshes");
         if (nodes_.empty() && meshCount > 0) {
-            document_.job().note("the file has no nodes; its meshes are taken as they are");
+            model_.job().note("the file has no nodes; its meshes are taken as they are");
             for (std::size_t m = 0; m < meshCount; ++m)
                 STX_CHECK(addMesh(m, "glTF", {}, {glm::dmat4(1.0)}, nullptr, false));
             return {};
@@ -253,7 +253,7 @@ class SceneReader {
                               std::string_view type) -> Result<std::optional<AccessorValues>> {
             STX_TRY(const auto index, getUint(*attributes, name, where));
             if (!index) return std::nullopt;
-            STX_TRY(auto values, document_.accessor(*index, where + " " + name, {type}));
+            STX_TRY(auto values, model_.accessor(*index, where + " " + name, {type}));
             if (count != 0 && values.count != count)
                 return fail(ErrorCode::invalidInput,
                             "{}: instance attributes of {} and {} elements", where, count,
@@ -286,7 +286,7 @@ class SceneReader {
         std::optional<AccessorValues> inverse;
         STX_TRY(const auto accessor, getUint(*skin, "inverseBindMatrices", where));
         if (accessor) {
-            STX_TRY(inverse, document_.accessor(*accessor, where, {"MAT4"}));
+            STX_TRY(inverse, model_.accessor(*accessor, where, {"MAT4"}));
             if (inverse->count < joints.size())
                 return fail(ErrorCode::invalidInput,
                             "{} has {} joints but only {} inverse bind matrices", where,
@@ -374,8 +374,8 @@ class SceneReader {
                 const auto at = fmt::format("{}.primitives[{}]", where, p);
                 if (!(*list)[p].is_object())
                     return fail(ErrorCode::invalidInput, "{} is no object", at);
-                STX_TRY(auto primitive, readPrimitive(document_, builder_, materials_, (*list)[p],
-                                                      at, weights, dropped_));
+                STX_TRY(auto primitive, readPrimitive(model_, builder_, materials_, (*list)[p], at,
+                                                      weights, dropped_));
                 if (primitive.drawn) fresh.push_back(std::move(primitive));
             }
             if (keep) primitives = &meshes_.emplace(index, std::move(fresh)).first->second;
@@ -404,10 +404,10 @@ class SceneReader {
         std::string line;
         for (const auto& [name, count] : dropped_)
             line += fmt::format("{}{} ({})", line.empty() ? "dropped: " : ", ", name, count);
-        if (!line.empty()) document_.job().note(line);
+        if (!line.empty()) model_.job().note(line);
     }
 
-    Document& document_;
+    GltfFile& model_;
     MeshBuilder& builder_;
     Materials materials_;
     std::vector<Node> nodes_;
@@ -420,8 +420,8 @@ class SceneReader {
 
 Result<Mesh> readGltf(ByteSpan bytes, ModelFiles& files) {
     MeshBuilder builder(files.job());
-    STX_TRY(auto document, gltf::Document::open(bytes, files, builder));
-    return gltf::SceneReader(document, builder).read();
+    STX_TRY(auto model, gltf::GltfFile::open(bytes, files, builder));
+    return gltf::SceneReader(model, builder).read();
 }
 
 }  // namespace stx

@@ -6,7 +6,7 @@
 
 #include "formats/mpeg4/scene/document.hpp"
 
-/// BIFS: the binary form of scenes (ISO/IEC 14496-11 clause 8; bifs.md section 4).
+/// BIFS: the binary form of scenes (ISO/IEC 14496-11, clause 8).
 namespace stx::mpeg4 {
 
 /// The decoder config of a BIFS stream from its DecoderSpecificInfo. The version is that of the
@@ -54,7 +54,7 @@ class BifsEncoder {
     BifsEncoder(BifsEncoder&&) noexcept;
 
     /// Errors (invalidInput) when a value has no code: an od id above 1023, an image above 4095
-    /// pixels, a node where it may not stand, a field without the id that a command needs.
+    /// pixels, a node where it may not be, a field without the id that a command needs.
     [[nodiscard]] Result<Bytes> encode(const std::vector<Command>& commands);
 
   private:

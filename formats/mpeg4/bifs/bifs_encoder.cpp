@@ -14,7 +14,7 @@ struct BifsEncoder::Impl {
     BifsConfig config;
     BifsStyle style;
     NodeIds ids;
-    std::unordered_map<std::uint32_t, const Node*> written;  ///< what each id stands for by now
+    std::unordered_map<std::uint32_t, const Node*> written;  ///< the node that has each id by now
     bool useNames = false;
     QuantisationScope quantisation;
     BitWriter out;
@@ -143,7 +143,7 @@ struct BifsEncoder::Impl {
 
     // ---- fields
 
-    // writeField stands behind what it calls: clang 14 does not define templates that a generic
+    // writeField comes after what it calls: clang 14 does not define templates that a generic
     // lambda needs before they were seen.
     template <class T>
     Result<void> writeItem(const FieldInfo& field, const T& value, int depth) {

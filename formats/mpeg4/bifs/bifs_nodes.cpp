@@ -190,7 +190,7 @@ Result<void> BifsNodeReader::readEach(const NodeInfo& node, const FieldInfo& fie
 template <class T>
 Result<void> BifsNodeReader::readItems(const NodeInfo& node, const FieldInfo& field,
                                        std::vector<T>& items) {
-    // A coding that cannot be is no error where there is no item.
+    // An impossible coding is not an error where there is no item.
     const auto coding = located(quantisation.codingOf(field));
     return readEach(
         node, field, coding ? fewestBits(itemType(field.type), *coding) : 1,
@@ -223,7 +223,7 @@ Result<void> BifsNodeReader::readNodes(const NodeInfo& node, const FieldInfo& fi
     });
 }
 
-// Stands behind what it calls: clang 14 does not define templates that a generic lambda needs
+// Comes after what it calls: clang 14 does not define templates that a generic lambda needs
 // before they were seen.
 Result<FieldValue> BifsNodeReader::readList(const NodeInfo& node, const FieldInfo& field,
                                             int depth) {

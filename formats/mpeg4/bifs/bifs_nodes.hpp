@@ -10,11 +10,11 @@
 namespace stx::mpeg4 {
 
 /// Nodes, fields and values of BIFS (ISO/IEC 14496-11 clause 8): what the commands of access units
-/// are made of. Remembers what node ids stand for from command to command.
+/// are made of. Remembers which node has which id from command to command.
 struct BifsNodeReader {
     BifsNodeReader(BifsConfig c, const Limits& l) : config(c), limits(l) {}
 
-    /// What an id stands for. Height 0: the node is still being read, so a USE of it is a cycle.
+    /// The node that has an id. Height 0: the node is still being read, so a USE of it is a cycle.
     struct Defined {
         NodePtr node;
         int height = 0;

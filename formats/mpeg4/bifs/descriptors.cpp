@@ -64,10 +64,10 @@ Result<void> finished(const ByteReader& in, std::uint8_t tag) {
     return {};
 }
 
-void depart(const DescriptorContext& context, Mp4Departure::Kind kind, std::string text,
-            std::string where) {
-    if (context.departures != nullptr && context.departures->size() < kMaxDepartures)
-        context.departures->push_back({kind, std::move(text), std::move(where)});
+void addDeviation(const DescriptorContext& context, Mp4Deviation::Kind kind, std::string text,
+                  std::string where) {
+    if (context.deviations != nullptr && context.deviations->size() < kMaxDeviations)
+        context.deviations->push_back({kind, std::move(text), std::move(where)});
 }
 
 Result<void> readDecoderConfig(ByteReader in, ElementaryStream& stream) {
@@ -108,8 +108,8 @@ Result<std::optional<ElementaryStream>> readStream(const Descriptor& part,
     ByteReader in = part.body;
     const std::string place = placeOf(part.tag, in.offset());
     if (part.tag == kEsDescriptor) {
-        depart(context, Mp4Departure::Kind::fullEsdInOd,
-               "a whole ES_Descriptor stands where the file form has ES_ID_Ref", place);
+        addDeviation(context, Mp4Deviation::Kind::fullEsdInOd,
+                     "a whole ES_Descriptor stands where the file form has ES_ID_Ref", place);
         STX_TRY(ElementaryStream stream, readEsDescriptor(in));
         return stream;
     }
@@ -123,10 +123,11 @@ Result<std::optional<ElementaryStream>> readStream(const Descriptor& part,
     const std::uint16_t index = in.u16();
     STX_CHECK(finished(in, part.tag));
     if (index == 0 || index > context.mpod.size()) {
-        depart(context, Mp4Departure::Kind::mpodMissing,
-               fmt::format("ES_ID_Ref {} leads nowhere: the OD track's tref/mpod has {} entries",
-                           index, context.mpod.size()),
-               place);
+        addDeviation(
+            context, Mp4Deviation::Kind::mpodMissing,
+            fmt::format("ES_ID_Ref {} leads nowhere: the OD track's tref/mpod has {} entries",
+                        index, context.mpod.size()),
+            place);
         return std::nullopt;
     }
     ElementaryStream stream;
@@ -138,9 +139,9 @@ Result<ObjectDescriptor> readObjectDescriptor(const Descriptor& part,
                                               const DescriptorContext& context) {
     ByteReader in = part.body;
     if (part.tag == kObjectDescriptor)
-        depart(context, Mp4Departure::Kind::streamOdTag,
-               "an object descriptor has tag 0x01; the file form is 0x11",
-               placeOf(part.tag, in.offset()));
+        addDeviation(context, Mp4Deviation::Kind::streamOdTag,
+                     "an object descriptor has tag 0x01; the file form is 0x11",
+                     placeOf(part.tag, in.offset()));
     ObjectDescriptor descriptor;
     const std::uint16_t head = in.u16();
     descriptor.id = head >> 6;
@@ -202,9 +203,9 @@ Result<OdCommand> readCommand(const Descriptor& command, const DescriptorContext
                 } else if (value >= 1 && value <= context.mpod.size()) {
                     removal.esIds.push_back(context.mpod[value - 1u]);
                 } else {
-                    depart(context, Mp4Departure::Kind::mpodMissing,
-                           fmt::format("ES_DescriptorRemoveRef {} leads nowhere", value),
-                           placeOf(command.tag, in.offset()));
+                    addDeviation(context, Mp4Deviation::Kind::mpodMissing,
+                                 fmt::format("ES_DescriptorRemoveRef {} leads nowhere", value),
+                                 placeOf(command.tag, in.offset()));
                 }
             }
             return removal;
@@ -364,8 +365,8 @@ Result<DecodedIod> decodeIod(ByteSpan bytes, const DescriptorContext& context) {
                       "an initial object descriptor is expected (tag 0x10 or 0x02)");
     in = descriptor.body;
     if (descriptor.tag == kInitialObjectDescriptor)
-        depart(context, Mp4Departure::Kind::streamOdTag,
-               "the IOD has tag 0x02; the file form is 0x10", placeOf(descriptor.tag, 0));
+        addDeviation(context, Mp4Deviation::Kind::streamOdTag,
+                     "the IOD has tag 0x02; the file form is 0x10", placeOf(descriptor.tag, 0));
     DecodedIod decoded;
     InitialObjectDescriptor& iod = decoded.iod;
     const std::uint16_t head = in.u16();

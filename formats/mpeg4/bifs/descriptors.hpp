@@ -14,12 +14,12 @@ namespace stx::mpeg4 {
 struct DescriptorContext {
     std::span<const std::uint32_t>
         mpod;  ///< tref/mpod of the OD track: ES_ID_Ref is 1-based into it
-    /// Departures are added here; may be null.
-    std::vector<Mp4Departure>* departures = nullptr;
+    /// Deviations are added here; may be null.
+    std::vector<Mp4Deviation>* deviations = nullptr;
 };
 
 /// The commands of one OD access unit. Streams that came by reference have nothing but their esId
-/// (= track_ID); an unknown reference is left out and noted as a departure.
+/// (= track_ID); an unknown reference is left out and recorded as a deviation.
 [[nodiscard]] Result<std::vector<OdCommand>> decodeOdFrame(ByteSpan accessUnit,
                                                            const DescriptorContext& context);
 

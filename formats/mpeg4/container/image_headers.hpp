@@ -14,12 +14,12 @@ struct ImageHeader {
     int height = 0;
     int components = 0;  ///< channels: 1 grey, 2 grey alpha, 3 RGB, 4 RGBA; palettes count as 3
     int bitDepth = 8;
-    int headerLength = 0;  ///< JPEG: where the first marker after the JFIF segment stands
+    int headerLength = 0;  ///< JPEG: where the first marker after the JFIF segment is
     int xDensity = 1;      ///< JPEG
     int yDensity = 1;
 };
 
-/// Empty when the bytes are no JPEG or PNG, or end before their size.
+/// Empty when the bytes are not JPEG or PNG, or end before their size.
 [[nodiscard]] std::optional<ImageHeader> readImageHeader(ByteSpan head);
 
 /// The DecoderSpecificInfo of a JPEG stream: headerLength 16, Xdensity 16, Ydensity 16,

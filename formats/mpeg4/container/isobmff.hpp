@@ -19,10 +19,12 @@ struct Mp4WriteOptions {
     BifsStyle style;  ///< mask and vector forms
 };
 
-/// Writes a document: ftyp, moov, mdat, with the conventions of bifs.md 5. Bytes depend on nothing
-/// but the document (and SOURCE_DATE_EPOCH, which sets the creation time; 0 without it). Media
-/// bytes are copied untouched. Gives nodes that need one an id, and streams without ES_ID a track.
-/// Does not commit `out`. Errors (invalidInput) when the document has something without a code.
+/// Writes a document: ftyp, moov, mdat, as strict readers want it: an iods box whose IOD names the
+/// scene's track, object descriptors with ES_ID_Ref into tref/mpod, images in mp4v entries with an
+/// esds whose ES_ID is 0. Bytes depend on nothing but the document (and SOURCE_DATE_EPOCH, which
+/// sets the creation time; 0 without it). Media bytes are copied untouched. Gives nodes that need
+/// one an id, and streams without ES_ID a track. Does not commit `out`. Errors (invalidInput) when
+/// the document has something without a code.
 [[nodiscard]] Result<void> writeMp4(const Document& document, OutputFile& out, Job& job,
                                     const Mp4WriteOptions& options = {});
 /// The same into memory.

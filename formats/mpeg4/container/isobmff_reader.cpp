@@ -11,7 +11,7 @@
 namespace stx::mpeg4 {
 namespace {
 
-using Departure = Mp4Departure::Kind;
+using Deviation = Mp4Deviation::Kind;
 
 /// Top-level boxes of a file; more are a way to keep us reading, not a file.
 constexpr int kMaxTopLevelBoxes = 1'000'000;
@@ -41,9 +41,9 @@ class Reader {
 
   private:
     Mp4Facts& facts() { return *document_.mp4; }
-    void depart(Departure kind, std::string text, std::string where) {
-        if (facts().departures.size() < kMaxDepartures)
-            facts().departures.push_back({kind, std::move(text), std::move(where)});
+    void addDeviation(Deviation kind, std::string text, std::string where) {
+        if (facts().deviations.size() < kMaxDeviations)
+            facts().deviations.push_back({kind, std::move(text), std::move(where)});
     }
 
     // ---- boxes
@@ -151,16 +151,17 @@ class Reader {
             facts().hasIods = true;
             ByteReader in = iods->body;
             in.skip(4);
-            const DescriptorContext context{{}, &facts().departures};
+            const DescriptorContext context{{}, &facts().deviations};
             auto decoded = decodeIod(in.restView(), context);
             if (!decoded) return tl::unexpected(decoded.error().at(iods->place()));
             document_.iod = std::move(decoded->iod);
             initialTracks_ = std::move(decoded->trackIds);
         } else {
-            depart(Departure::noIods,
-                   "the file has no initial object descriptor ('iods'); many readers find no scene "
-                   "then",
-                   "moov");
+            addDeviation(
+                Deviation::noIods,
+                "the file has no initial object descriptor ('iods'); many readers find no scene "
+                "then",
+                "moov");
         }
         return {};
     }
@@ -183,8 +184,9 @@ class Reader {
         for (const std::uint32_t id : initialTracks_) {
             Mp4Track* track = findTrack(id);
             if (track == nullptr) {
-                depart(Departure::streamNotFound,
-                       fmt::format("the IOD names track {}, which is not there", id), "moov/iods");
+                addDeviation(Deviation::streamNotFound,
+                             fmt::format("the IOD names track {}, which is not there", id),
+                             "moov/iods");
                 continue;
             }
             track->facts.inIods = true;
@@ -197,8 +199,8 @@ class Reader {
             if (scene_ == nullptr && isScene(track)) {
                 scene_ = &track;
                 if (facts().hasIods)
-                    depart(Departure::sceneNotInIods, "the IOD does not name the scene track",
-                           track.path);
+                    addDeviation(Deviation::sceneNotInIods, "the IOD does not name the scene track",
+                                 track.path);
             } else if (&track != scene_ && isScene(track)) {
                 job_.note(fmt::format("scene track {} is passed over; the scene is in track {}",
                                       track.facts.trackId, scene_->facts.trackId));
@@ -214,14 +216,15 @@ class Reader {
         if (od_ != nullptr)
             document_.odStream = od_->stream;
         else
-            depart(Departure::noOdTrack,
-                   "the file has no object descriptor track; the scene cannot have images in it",
-                   "moov");
+            addDeviation(
+                Deviation::noOdTrack,
+                "the file has no object descriptor track; the scene cannot have images in it",
+                "moov");
         for (const Mp4Track* track : {scene_, od_})
             if (track != nullptr && track->facts.esIdInEsds != 0)
-                depart(Departure::esIdNotZero,
-                       fmt::format("ES_ID in 'esds' is {}, not 0", track->facts.esIdInEsds),
-                       track->path);
+                addDeviation(Deviation::esIdNotZero,
+                             fmt::format("ES_ID in 'esds' is {}, not 0", track->facts.esIdInEsds),
+                             track->path);
         return {};
     }
 
@@ -250,9 +253,9 @@ class Reader {
         if (!stream.url.empty()) return {};
         Mp4Track* track = findTrack(stream.esId);
         if (track == nullptr) {
-            depart(Departure::streamNotFound,
-                   fmt::format("a descriptor names track {}, which is not there", stream.esId),
-                   place);
+            addDeviation(
+                Deviation::streamNotFound,
+                fmt::format("a descriptor names track {}, which is not there", stream.esId), place);
             return {};
         }
         const bool first = !std::exchange(track->facts.referenced, true);
@@ -276,24 +279,27 @@ class Reader {
     void noteEntry(const Mp4Track& track) {
         const bool visual = track.stream.streamType == StreamType::visual;
         if (visual && track.facts.sampleEntry == "mp4s")
-            depart(Departure::imageInSystemsEntry,
-                   "an image stands in a sample entry 'mp4s'; 'mp4v' is expected", track.path);
+            addDeviation(Deviation::imageInSystemsEntry,
+                         "an image stands in a sample entry 'mp4s'; 'mp4v' is expected",
+                         track.path);
         if (visual && !track.hasEsds)
-            depart(Departure::imageInNativeEntry,
-                   fmt::format(
-                       "an image stands in a sample entry '{}' without 'esds'; 'mp4v' is expected",
-                       printable(track.facts.sampleEntry)),
-                   track.path);
+            addDeviation(
+                Deviation::imageInNativeEntry,
+                fmt::format(
+                    "an image stands in a sample entry '{}' without 'esds'; 'mp4v' is expected",
+                    printable(track.facts.sampleEntry)),
+                track.path);
         if (track.facts.esIdInEsds != 0)
-            depart(Departure::esIdNotZero,
-                   fmt::format("ES_ID in 'esds' is {}, not 0", track.facts.esIdInEsds), track.path);
+            addDeviation(Deviation::esIdNotZero,
+                         fmt::format("ES_ID in 'esds' is {}, not 0", track.facts.esIdInEsds),
+                         track.path);
     }
 
     Result<void> readObjectDescriptors() {
         if (od_ == nullptr) return {};
         STX_TRY(const std::vector<Sample>* samples, samplesOf(*od_));
         document_.odStream.samples = *samples;
-        const DescriptorContext context{od_->mpod, &facts().departures};
+        const DescriptorContext context{od_->mpod, &facts().deviations};
         for (std::size_t i = 0; i < samples->size(); ++i) {
             const Sample& sample = (*samples)[i];
             const std::string place =
@@ -342,8 +348,9 @@ class Reader {
             auto commands = decoder.decode(bytes);
             if (!commands) return tl::unexpected(commands.error().at(place));
             if (decoder.bitsLeft() >= 8)
-                depart(Departure::trailingBytes,
-                       fmt::format("{} bits follow the last command", decoder.bitsLeft()), place);
+                addDeviation(Deviation::trailingBytes,
+                             fmt::format("{} bits follow the last command", decoder.bitsLeft()),
+                             place);
             document_.frames.push_back({sample.time, std::move(*commands)});
         }
         return {};

@@ -7,7 +7,7 @@
 #include "formats/mpeg4/container/byte_io.hpp"
 #include "formats/mpeg4/scene/document.hpp"
 
-/// Inside of the MP4 reader: boxes, and tracks as their tables tell them.
+/// Inside of the MP4 reader: boxes, and tracks by their tables.
 namespace stx::mpeg4 {
 
 /// A box inside a parent that is in memory.

@@ -8,20 +8,21 @@
 #include "formats/mpeg4/scene/document.hpp"
 #include "lib/model/bundle.hpp"
 
-/// Scenes and bundles (ISO/IEC 14496-16, 4.5.4; mpeg4-dibr.md).
+// clang-format off
+/// Scenes and bundles (ISO/IEC 14496-16, 4.5.4).
 ///
-/// Decisions that the standard leaves open, and that these functions take:
-/// - Pixel (i, j), row 0 on top, samples u = (i+1/2)/W*2-1, v = 1-(j+1/2)/H*2 of the window.
-/// - Rows of a PixelTexture and of a PointTexture run from the bottom to the top.
-/// - Beside a depth image, the alpha of the texture is coverage; without alpha, coverage is full
-/// where
-///   the depth has a point. Without a depth image, alpha is the depth code.
-/// - Normals: n = 2c/cmax - 1, in the frame of the DepthImage's parent; 0 0 0 is no normal.
-/// - splatU and splatV hold the half axes of the splat, each component scaled from [0, cmax] to
-///   [splatMinMax.x, splatMinMax.y], in the same frame. Where splatMinMax.x is 0 or more (as in the
-///   default) components could not be negative; then s = 2c/cmax - 1 gives the direction, and the
-///   length is splatMinMax.x + (splatMinMax.y - splatMinMax.x) * min(1, |s|). What is written has
-///   splatMinMax = (-L, L), L the largest component of the view.
+/// What the standard leaves open, and these functions decide:
+///  - Pixel (i, j), row 0 on top, samples u = (i+1/2)/W*2-1, v = 1-(j+1/2)/H*2 of the window.
+///  - Rows of a PixelTexture and of a PointTexture run from the bottom to the top.
+///  - Beside a depth image, the alpha of the texture is coverage; without alpha, coverage is full
+///    where the depth has a point. Without a depth image, alpha is the depth code.
+///  - Normals: n = 2c/cmax - 1, in the frame of the DepthImage's parent; 0 0 0 means "no normal".
+///  - splatU and splatV hold the half axes of the splat, each component scaled from [0, cmax] to
+///    [splatMinMax.x, splatMinMax.y], in the same frame. Where splatMinMax.x is 0 or more (as in
+///    the default) components could not be negative; then s = 2c/cmax - 1 gives the direction, and
+///    the length is splatMinMax.x + (splatMinMax.y - splatMinMax.x) * min(1, |s|). What is written
+///    has splatMinMax = (-L, L), L the largest component of the view.
+// clang-format on
 namespace stx::mpeg4 {
 
 /// Decodes an image file; the default is decodeImage().
@@ -37,13 +38,13 @@ struct SceneReadOptions {
     bool pixels = true;
 };
 
-/// The object of a presentation as it stands at its first moment: a view for each DepthImage (and
+/// The object of a presentation as it is at its first moment: a view for each DepthImage (and
 /// DepthImageV2) that is shown. Transforms are folded into the cameras; of a Switch only the chosen
 /// child counts; a node used twice gives two views. A PointTexture gives as many views with the
 /// same camera as a pixel has depths; an OctreeImage gives a view for each of its images, with the
 /// depths of the voxels that it sees first. Views are named by DEF name. Title and bounds come from
 /// WorldInfo. Errors (invalidInput) name the view and what is wrong; Transforms that scale
-/// unevenly, shear or mirror are refused. Notes tell what is left out.
+/// unevenly, shear or mirror are refused. Notes say what is left out.
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
 
@@ -59,13 +60,13 @@ struct SceneWriteOptions {
     int depthBits = 0;     ///< 8 or 16; 0: as each view says (32 becomes 16)
     int normalBits = 16;   ///< 8 or 16, of normal, splatU and splatV
     Nodes nodes = Nodes::automatic;
-    bool pointTexture =
-        false;  ///< PointTexture instead of SimpleTexture; the colours stand in the scene
+    /// PointTexture instead of SimpleTexture; the colours are in the scene itself.
+    bool pointTexture = false;
 };
 
 /// A presentation of a bundle: Group { WorldInfo, DepthImage... }, the WorldInfo with title and
 /// bounds (computed where the bundle has none). Field values are rounded to float, planes outwards.
-/// A principal point off the centre is mended by padding with pixels without a point (see
+/// A principal point off the centre is centred by padding with pixels without a point (see
 /// placement.hpp) and noted; reading the scene back here undoes it. What is lossy is noted: float
 /// depth and 8 bits with the largest error, JPEG, linear colour, what V1 cannot hold. Errors:
 /// (unsupported) more images than MPEG-4 has object descriptors for, or images that padding makes

@@ -342,7 +342,7 @@ class BundleReader {
         }
         view.depth = Image<float>(c.width, c.height, kNoDepth);
         if (!(nearest < kNoDepth)) return {};
-        // The viewpoint may stand inside the cube or behind it: rays are parallel, so step back.
+        // The viewpoint may be inside the cube or behind it: rays are parallel, so step back.
         const double back = nearest < 0.5 ? 1.0 - nearest : 0.0;
         view.camera.position -= forward * back;
         view.nearPlane = std::floor((nearest + back) * 1024) / 1024;

@@ -122,7 +122,7 @@ class SceneWriter {
         if (options_.normalBits != 8 && options_.normalBits != 16)
             return fail(ErrorCode::usage, "normals of {} bits are not possible; 8 or 16",
                         options_.normalBits);
-        STX_CHECK(bundle_.check());
+        STX_CHECK(bundle_.checkHeaders());
         if (options_.pointTexture) return {};
         std::size_t count = 0;
         for (const ReferenceView& view : bundle_.views) {
@@ -159,10 +159,12 @@ class SceneWriter {
                         view.farPlane);
         const DepthCode code{out.nearPlane, out.farPlane, bitsOf(view) == 8 ? 255u : 65535u};
         if (options_.pointTexture) {
-            for (const float d : view.depth.pixels())
+            for (const float d : view.depth.pixels()) {
+                if (!(d >= 0)) return depthError(d);
                 if (hasPoint(d))
                     out.worstDepth =
                         std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
+            }
             out.coverageLost =
                 !alphaFollowsDepth(rgba8FromTexture(view.texture, out.clamped), view.depth);
             return out;

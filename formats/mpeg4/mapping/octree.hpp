@@ -12,7 +12,7 @@
 namespace stx::mpeg4 {
 
 /// The voxels of an OctreeImage (ISO/IEC 14496-16, 4.5.4): a cube of side 1 around the origin, cut
-/// in half along each axis at each level. One byte stands for each inner node, breadth first; its
+/// in half along each axis at each level. There is one byte for each inner node, breadth first; its
 /// bit i says that child i exists. Which octant bit i means is shown by a figure only; here it is
 /// x = i & 1, y = (i >> 1) & 1, z = (i >> 2) & 1, upwards along the axes.
 class Octree {

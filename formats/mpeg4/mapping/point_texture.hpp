@@ -13,7 +13,7 @@ namespace stx::mpeg4 {
 
 /// The layers of a PointTexture: layer k holds the k-th depth of every pixel that has so many.
 /// `view` gives camera (its size is set here), planes and name; layers after the first are named
-/// name_1, ... Depths of 0 are no points. Colours are sRGB. A node without any depth gives one
+/// name_1, ... Depths of 0 are not points. Colours are sRGB. A node without any depth gives one
 /// empty layer. Errors: sizes, bits, counts or lists that do not fit each other.
 [[nodiscard]] Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
                                                                        const ReferenceView& view,

@@ -120,7 +120,7 @@ Result<ImageInfo> StreamImages::probe(const Node& texture) const {
         const auto& image = texture.get<PixelImage>("image");
         return ImageInfo{"pixels", image.width, image.height, image.components, 8};
     }
-    // Headers stand at the front, but for a JPEG with much metadata.
+    // Headers are at the front, but for a JPEG with much metadata.
     if (const ElementaryStream* from = stream(texture); from && !from->samples.empty()) {
         ByteRange head = from->samples[0].data;
         head.size = std::min<std::uint64_t>(head.size, 1 << 16);

@@ -11,15 +11,15 @@ namespace stx::mpeg4 {
 /// The images that texture nodes name: streams by object descriptor, files by name, PixelTextures.
 class StreamImages {
   public:
-    /// Object descriptors as they stand at the scene's start; ones that come later serve where
+    /// Object descriptors as they are at the scene's start; ones that come later serve where
     /// there is none then. The document must outlive this.
     [[nodiscard]] static Result<StreamImages> make(const Document& document,
                                                    const std::filesystem::path& folder,
                                                    const Limits& limits);
 
     /// The bytes of an ImageTexture's or MovieTexture's first usable URL (of a movie, its first
-    /// picture). Errors: no URL, an unknown descriptor, a stream without samples, a URL that is no
-    /// file in the folder.
+    /// picture). Errors: no URL, an unknown descriptor, a stream without samples, a URL that is not
+    /// a file in the folder.
     [[nodiscard]] Result<Bytes> load(const Node& texture, const Limits& limits) const;
     /// The decoded picture, PixelTexture included. Errors: those of load() and of the decoder, an
     /// empty PixelTexture, a node of another type, a stream that is neither JPEG nor PNG.

@@ -144,11 +144,13 @@ Result<Bytes> depthPng(const Image<float>& depth, const DepthCode& code, const P
     const int width = depth.width() + padding.left + padding.right;
     const int height = depth.height() + padding.top + padding.bottom;
     worst = 0;
+    std::optional<float> wrong;
     const auto fill = [&](auto& codes) {
         codes.assign(static_cast<std::size_t>(width) * height, 0);
         for (int y = 0; y < depth.height(); ++y) {
             for (int x = 0; x < depth.width(); ++x) {
                 const float dist = depth.at(x, y);
+                if (!(dist >= 0)) wrong = dist;
                 if (!hasPoint(dist)) continue;
                 const std::uint32_t d = code.encode(dist);
                 worst = std::max(worst, std::abs(code.decode(d) - dist));
@@ -160,10 +162,12 @@ Result<Bytes> depthPng(const Image<float>& depth, const DepthCode& code, const P
     if (code.dmax == 255) {
         std::vector<std::uint8_t> codes;
         fill(codes);
+        if (wrong) return depthError(*wrong);
         return encodePng(width, height, 1, 8, codes.data(), false);
     }
     std::vector<std::uint16_t> codes;
     fill(codes);
+    if (wrong) return depthError(*wrong);
     return encodePng(width, height, 1, 16, codes.data(), false);
 }
 

@@ -20,7 +20,7 @@ namespace stx::mpeg4 {
 /// Whether red, green and blue are equal in every pixel.
 [[nodiscard]] bool isGrey(const DecodedImage& image);
 
-/// Unit normals of an RGB image; zero where `depth` has no point and where the code is no
+/// Unit normals of an RGB image; zero where `depth` has no point and where the code is not a
 /// direction.
 [[nodiscard]] Result<Image<glm::vec3>> normalsFromImage(const DecodedImage& image,
                                                         const Image<float>& depth);
@@ -42,7 +42,7 @@ namespace stx::mpeg4 {
 /// The largest absolute component.
 [[nodiscard]] float largestComponent(const Image<glm::vec3>& image);
 
-/// 8-bit sRGB of a texture; linear colour is coded, `clamped` tells whether some was brighter
+/// 8-bit sRGB of a texture; linear colour is coded, `clamped` says whether some was brighter
 /// than 1.
 [[nodiscard]] Rgba8Image rgba8FromTexture(const Texture& texture, bool& clamped);
 /// Whether alpha is 255 where the depth has a point and 0 elsewhere, so that it need not be

@@ -8,13 +8,16 @@
 #include "formats/mpeg4/scene/placement.hpp"
 #include "lib/geometry/bounds.hpp"
 
-/// What our scenes say in WorldInfo.info beyond the nodes' fields, so that a bundle comes back
-/// whole:
+// clang-format off
+/// What our scenes say in WorldInfo.info beyond the nodes' fields, so that nothing of a bundle is
+/// lost:
+///
 ///     "bounds minX minY minZ maxX maxY maxZ"
 ///     "name DEFNAME the view's own name"
-///     "padding DEFNAME left top right bottom cx cy"   (pixels; the principal point without
-///     padding)
-/// Other strings are left alone.
+///     "padding DEFNAME left top right bottom cx cy"
+///
+/// Padding is in pixels, cx and cy are the principal point without it. Other strings are left alone.
+// clang-format on
 namespace stx::mpeg4 {
 
 struct ViewNotes {

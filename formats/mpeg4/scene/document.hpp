@@ -10,15 +10,18 @@
 #include "formats/mpeg4/container/byte_source.hpp"
 #include "formats/mpeg4/scene/scene.hpp"
 
+// clang-format off
 /// A whole MPEG-4 presentation in memory: what an .mp4, .bt or .xmt file says. The readers of all
 /// three make a Document, the writers of all three take one:
 ///
-///     isobmff.hpp   Result<Document> readMp4(ByteSource, Job&);   writeMp4(document, OutputFile&,
-///     Job&) bifs.hpp      decodeBifs / encodeBifs      one access unit <-> commands
-///     descriptors.hpp   decodeObjectDescriptors / encode...        OD access units, IOD
+///     container/isobmff.hpp   readMp4, writeMp4                         the boxes of an .mp4
+///     bifs/bifs.hpp           decodeBifs, encodeBifs                    access unit <-> commands
+///     bifs/descriptors.hpp    decodeObjectDescriptors, encode...        OD access units, IOD
+///     text/bt.hpp, xmt.hpp    readBt, writeBt, readXmt, writeXmt        texts
 ///
-/// An image is reached thus: ImageTexture.url -> Url::objectDescriptorId -> findObjectDescriptor ->
-/// streams[0] -> samples[0].data.load(limits): a whole JPEG or PNG file.
+/// The way to an image: ImageTexture.url -> Url::objectDescriptorId -> findObjectDescriptor ->
+/// streams[0] -> samples[0].data.load(limits), which is a whole JPEG or PNG file.
+// clang-format on
 namespace stx::mpeg4 {
 
 /// objectTypeIndication (ISO/IEC 14496-1 table 5) of the streams we know.
@@ -44,12 +47,12 @@ enum class StreamType : std::uint8_t {
     interaction = 0x0A,
 };
 
-/// The decoder config of a BIFS stream (bifs.md 4.1).
+/// BIFSConfig, the decoder config of a BIFS stream (ISO/IEC 14496-11, 8.5).
 struct BifsConfig {
     int version = 1;               ///< 1, or 2 (OTI 2)
     bool use3DMeshCoding = false;  ///< v2
-    bool usePredictiveMFField =
-        false;           ///< v2: a flag before each MF field; coding itself is refused
+    /// v2: a flag before each MF field; predictive coding itself is refused.
+    bool usePredictiveMFField = false;
     int nodeIdBits = 0;  ///< 0..31; writers raise these to what the scene needs
     int routeIdBits = 0;
     int protoIdBits = 0;  ///< v2
@@ -88,9 +91,8 @@ struct ElementaryStream {
 
     std::uint32_t timescale = 1000;  ///< ticks a second, at least 1
     std::vector<Sample> samples;
-    int width =
-        0;  ///< of a visual track as its sample entry says; 0: the writer looks into the image
-    int height = 0;
+    /// Of a visual track as its sample entry says; 0: the writer looks into the image.
+    int width = 0, height = 0;
     /// The name of the file that the stream came from or goes to: MuxInfo.fileName, StreamSource
     /// url, or the track's handler name. Never opened by readMp4 or writeMp4.
     std::string fileName;
@@ -140,7 +142,7 @@ struct InitialObjectDescriptor {
     std::uint8_t graphicsProfileLevel = 0xFE;
 };
 
-/// A track as it stands in an .mp4, for `info` and `validate`.
+/// A track as an .mp4 has it, for `info` and `validate`.
 struct TrackFacts {
     std::uint32_t trackId = 0;
     std::string handler;      ///< four characters: sdsm, odsm, vide, ...
@@ -155,8 +157,8 @@ struct TrackFacts {
     std::uint32_t esIdInEsds = 0;
 };
 
-/// What a file departs in from what strict readers take; nothing here kept us from reading it.
-struct Mp4Departure {
+/// How a file differs from what strict readers take; nothing here kept us from reading it.
+struct Mp4Deviation {
     enum class Kind {
         noIods,  ///< no IOD: many readers find no scene then
         sceneNotInIods,
@@ -176,8 +178,8 @@ struct Mp4Departure {
     std::string where;  ///< box path and byte offset
 };
 
-/// Departures beyond these are not told.
-inline constexpr std::size_t kMaxDepartures = 1000;
+/// Deviations beyond these are not recorded.
+inline constexpr std::size_t kMaxDeviations = 1000;
 
 struct Mp4Facts {
     std::string majorBrand;  ///< four characters; empty when there is no ftyp
@@ -188,7 +190,7 @@ struct Mp4Facts {
     std::uint32_t movieTimescale = 600;
     std::uint64_t movieDuration = 0;
     std::vector<TrackFacts> tracks;
-    std::vector<Mp4Departure> departures;
+    std::vector<Mp4Deviation> deviations;
 };
 
 /// A presentation.
@@ -196,7 +198,7 @@ struct Document {
     InitialObjectDescriptor iod;
 
     /// The scene: its stream's descriptor, config and commands. readMp4 leaves the access units as
-    /// they stand in the file in `samples`; writers take `frames` and look at nothing else.
+    /// they are in the file in `samples`; writers take `frames` and look at nothing else.
     ElementaryStream sceneStream;
     BifsConfig bifsConfig;
     std::vector<CommandFrame> frames;
@@ -208,7 +210,7 @@ struct Document {
     /// How the file looked, when it was an .mp4.
     std::optional<Mp4Facts> mp4;
 
-    /// All object descriptors as they stand after the frames with time <= `until` (ticks of the OD
+    /// All object descriptors as they are after the frames with time <= `until` (ticks of the OD
     /// stream): updates replace, removals remove. In order of their ids. Pointers into this
     /// document.
     [[nodiscard]] std::vector<const ObjectDescriptor*> objectDescriptors(

@@ -81,7 +81,7 @@ inline NodeRow node(std::string_view name, std::vector<NodeCode> codes,
     return {name, std::move(codes), std::move(fields)};
 }
 
-/// The rows, made anew at each call.
+/// The rows, made at each call.
 [[nodiscard]] std::vector<NodeRow> makeNodeRows();
 
 }  // namespace stx::mpeg4

@@ -9,9 +9,9 @@
 #include <vector>
 
 /// The one table of MPEG-4 nodes from which the BIFS reader and writer, the BT and XMT-A forms and
-/// the validator work. The rows stand in node_rows.cpp; adding a node is adding a row there. All
+/// the validator work. The rows are in node_rows.cpp; adding a node is adding a row there. All
 /// identifiers of fields and the widths of codes are derived from the rows.
-/// Source: ISO/IEC 14496-11 annex H and 14496-16, as recorded in bifs.md.
+/// Source: ISO/IEC 14496-11, annex H (node coding tables), and ISO/IEC 14496-16, 4.5.4.
 namespace stx::mpeg4 {
 
 /// The type of a field's value. The order is that of the alternatives of FieldValue (scene.hpp).
@@ -152,7 +152,7 @@ struct NodeInfo {
     [[nodiscard]] int find(std::string_view fieldName) const;
     /// The same without regard to case (BT).
     [[nodiscard]] int findIgnoringCase(std::string_view fieldName) const;
-    /// How this node is coded where a `type` is expected; null when it may not stand there.
+    /// How this node is coded where a `type` is expected; null when it may not be there.
     [[nodiscard]] const NodeCode* codeIn(Ndt type) const;
 };
 

@@ -98,7 +98,7 @@ Result<Padding> centringPadding(const Camera& camera, int maxSide) {
             "the principal point {:.6g} {:.6g} is so far from the centre of the {}x{} image "
             "that padding would exceed {} pixels; crop the view first",
             camera.cx, camera.cy, camera.width, camera.height, maxSide);
-    // A rest that rounding in float makes no difference to is no rest.
+    // A rest below what float rounding changes does not count.
     const auto whole = [](double off) { return static_cast<int>(std::lround(off)); };
     const int x = whole(offX), y = whole(offY);
     (x > 0 ? p.right : p.left) = std::abs(x);

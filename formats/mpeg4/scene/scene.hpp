@@ -15,22 +15,23 @@
 #include "formats/mpeg4/scene/node_table.hpp"
 #include "lib/base/job.hpp"
 
+// clang-format off
 /// The MPEG-4 scene graph: nodes with typed field values, routes and commands. How to use it:
 ///
-///     NodePtr view = makeNode("DepthImage");                     // null only for unknown names
-///     view->set("position", glm::vec3(0, 0, 10));                // types are checked
+///     NodePtr view = makeNode("DepthImage");                      // null for unknown names only
+///     view->set("position", glm::vec3(0, 0, 10));                 // the type is checked
 ///     view->set("diTexture", makeNode("SimpleTexture"));
-///     const glm::vec2 fov = view->get<glm::vec2>("fieldOfView"); // the default when not set
+///     const glm::vec2 fov = view->get<glm::vec2>("fieldOfView");  // the default when not set
 ///     group->edit<NodeList>("children").push_back(view);
-///     view->defName = "VIEW0";                                   // DEF; sharing the NodePtr is
-///     USE
+///     view->defName = "VIEW0";                                    // DEF; sharing a NodePtr is USE
 ///
-/// `Document` (document.hpp) holds commands over such nodes with their times, and the streams.
+/// `Document` (document.hpp) holds commands on such nodes with their times, and the streams.
+// clang-format on
 namespace stx::mpeg4 {
 
 struct Node;
 /// A node, shared by all its USEs; null is NULL. Graphs have no cycles: readers refuse a node that
-/// USEs one it stands in, and who builds scenes must not make one.
+/// USEs one it is in, and who builds scenes must not make one.
 using NodePtr = std::shared_ptr<Node>;
 using NodeList = std::vector<NodePtr>;
 
@@ -148,7 +149,7 @@ struct Node {
 [[nodiscard]] NodePtr makeNode(std::string_view typeName);
 [[nodiscard]] NodePtr makeNode(const NodeInfo& type);
 
-/// Whether `node` may stand in a field that takes `expected` (null may stand in any).
+/// Whether `node` may be in a field that takes `expected` (null may be in any).
 [[nodiscard]] bool mayStandIn(const Node* node, Ndt expected);
 
 /// ROUTE: from an eventOut (or exposedField) to an eventIn (or exposedField). Fields are indices

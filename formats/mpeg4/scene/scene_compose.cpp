@@ -119,7 +119,7 @@ class Composer {
         return {};
     }
 
-    /// Puts `replacement` wherever `target` stands; null takes it out of lists.
+    /// Puts `replacement` wherever `target` is; null takes it out of lists.
     Result<void> exchange(const NodePtr& target, const NodePtr& replacement) {
         STX_TRY(const auto inside, below(replacement));
         std::vector<std::pair<NodePtr, int>> places;

@@ -94,9 +94,9 @@ bool sameBits(const std::vector<T>& a, const std::vector<T>& b) {
 }
 
 /// Compares two sets of graphs pair by pair, remembering which node answers to which.
-class Comparison {
+class GraphComparison {
   public:
-    explicit Comparison(SameOptions options) : options_(options) {}
+    explicit GraphComparison(SameOptions options) : options_(options) {}
 
     bool nodes(const NodePtr& a, const NodePtr& b) {
         if (!pair(a, b)) return false;
@@ -158,7 +158,7 @@ class Comparison {
 };
 
 template <class C>
-bool sameCommand(const C& a, const C& b, Comparison& compare, SameOptions options) {
+bool sameCommand(const C& a, const C& b, GraphComparison& compare, SameOptions options) {
     if constexpr (requires { a.target; })
         if (!compare.nodes(a.target, b.target)) return false;
     if constexpr (requires { a.field; })
@@ -209,12 +209,12 @@ bool sameValue(const FieldValue& a, const FieldValue& b) {
 }
 
 bool sameNode(const NodePtr& a, const NodePtr& b, SameOptions options) {
-    return Comparison(options).nodes(a, b);
+    return GraphComparison(options).nodes(a, b);
 }
 
 bool sameFrames(const std::vector<CommandFrame>& a, const std::vector<CommandFrame>& b,
                 SameOptions options) {
-    Comparison compare(options);
+    GraphComparison compare(options);
     if (a.size() != b.size()) return false;
     for (std::size_t i = 0; i < a.size(); ++i) {
         if (a[i].time != b[i].time || a[i].commands.size() != b[i].commands.size()) return false;

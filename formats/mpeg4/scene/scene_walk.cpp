@@ -9,7 +9,7 @@ class Walker {
 
     Result<void> visit(const NodePtr& node, const glm::dmat4& world, int parent, int depth) {
         if (!node) return {};
-        // A few nodes that USE each other in turn stand for any number of places.
+        // A few nodes that USE each other in turn can be shown in any number of places.
         if (++visits_ > kMaxVisits)
             return fail(ErrorCode::invalidInput,
                         "the scene shows more than {} nodes, counting each USE; that is not read",

@@ -21,7 +21,7 @@ struct ShownScene {
     std::vector<ShownNode> nodes;
     std::string title;              ///< of the first WorldInfo with one
     std::vector<std::string> info;  ///< of all WorldInfo
-    bool hasShapes = false;         ///< there is a Shape, which is no view
+    bool hasShapes = false;         ///< there is a Shape, which is not a view
 };
 [[nodiscard]] Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits);
 

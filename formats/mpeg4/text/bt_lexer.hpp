@@ -11,7 +11,7 @@ namespace stx::mpeg4 {
 struct BtToken {
     enum class Kind { word, string, openBrace, closeBrace, openBracket, closeBracket, end };
     Kind kind = Kind::end;
-    std::string_view text;  ///< as it stands in the file; of strings, without the quotes
+    std::string_view text;  ///< as in the file; of strings, without the quotes
     std::string value;      ///< strings only: with the escapes resolved
     int line = 1;           ///< from 1
     int column = 1;         ///< from 1, in bytes
@@ -20,11 +20,13 @@ struct BtToken {
     [[nodiscard]] std::string describe() const;
 };
 
-/// Cuts a BT text into pieces, one at a time and without a copy. Blanks and commas separate, `#`
-/// begins a comment that runs to the end of the line; `{ } [ ]` stand for themselves; text in `"`
-/// or
-/// `'` is a string, in which a backslash guards a quote or a backslash. All else is words: numbers,
-/// names, `TR.translation`, `od:10`.
+// clang-format off
+/// Cuts a BT text into tokens, one at a time and without a copy:
+///  - blanks and commas separate; `#` begins a comment that runs to the end of the line;
+///  - each of `{ } [ ]` is a token;
+///  - text in `"` or `'` is a string, in which a backslash escapes a quote or a backslash;
+///  - all else is words: numbers, names, `TR.translation`, `od:10`.
+// clang-format on
 class BtLexer {
   public:
     /// `text` must outlive the lexer. `name` is the file's name for errors.

@@ -325,7 +325,7 @@ Result<void> BtReader::readNodeList(const NodePtr& owner, int index, int depth, 
     while (!brackets || lexer_.peek().kind != Kind::closeBracket) {
         const std::string where = lexer_.where();
         const auto item = static_cast<int>(std::get<NodeList>(owner->value(index)).size());
-        // Something stands in the list while a later name is waited for.
+        // Something must be in the list while a later name is waited for.
         std::get<NodeList>(owner->edit(index)).push_back(nullptr);
         const bool isNull = isWord("NULL");
         int itemHeight = 0;

@@ -14,7 +14,7 @@
 
 namespace stx::mpeg4 {
 
-/// Reads a BT document by descent, a token ahead. Structure, nodes and descriptors stand in
+/// Reads a BT document by descent, a token ahead. Structure, nodes and descriptors are in
 /// bt_reader.cpp, the commands of `AT time { ... }` in bt_commands.cpp.
 class BtReader {
   public:

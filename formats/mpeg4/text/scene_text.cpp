@@ -65,7 +65,7 @@ Result<void> finishDocument(Document& document, NodeNames& names) {
                 replace->useNames = names.anyNames();
     ElementaryStream& scene = document.sceneStream;
     scene.streamType = StreamType::sceneDescription;
-    // The config that is written is told by its version, whatever number the text asks for.
+    // The config that is written follows its version, whatever number the text asks for.
     scene.objectTypeIndication =
         document.bifsConfig.version == 2 ? oti::kSystemsV2 : oti::kSystemsV1;
     ElementaryStream& od = document.odStream;
@@ -127,7 +127,7 @@ Result<TextNames> TextNames::make(const Document& document, const Limits& limits
                     if (!isPlainName(text)) text = fmt::format("_{}", text);
                 }
                 const std::string base = text;
-                // Two nodes of one name stand for different nodes only when commands replaced one.
+                // Two nodes of one name are different nodes only when commands replaced one.
                 while (taken.contains(text)) text = fmt::format("{}_{}", base, ++taken[base]);
                 taken[text] = 1;
                 result.names_[node.get()] = text;

@@ -21,7 +21,7 @@ enum class FieldUse { in, out };
 [[nodiscard]] Result<int> fieldOfCommand(const Node& node, std::string_view fieldName, FieldUse use,
                                          const std::string& where);
 
-/// Errors with where, the owner's field and what may stand there when `child` may not.
+/// Errors with where, the owner's field and what may be there when `child` may not.
 [[nodiscard]] Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view owner,
                                           std::string_view fieldName, const std::string& where);
 

@@ -396,7 +396,7 @@ std::vector<std::string> sampleFileNames(const ElementaryStream& stream) {
     const std::string& name = stream.fileName;
     const auto percent = name.find('%');
     if (stream.samples.size() <= 1 && percent == std::string::npos) return {name};
-    // Only %0Nd and %d, once: anything else is no pattern of ours.
+    // Only %0Nd and %d, once: anything else is not a pattern of ours.
     if (percent == std::string::npos || name.find('%', percent + 1) != std::string::npos) return {};
     std::size_t at = percent + 1;
     int width = 0;

@@ -12,7 +12,7 @@
 /// readers make a TextDescriptor of what they see, which is then understood in one place.
 namespace stx::mpeg4 {
 
-/// A descriptor as it stands in a text: its type, its scalar fields and the descriptors in it.
+/// A descriptor as a text has it: its type, its scalar fields and the descriptors in it.
 /// XMT-A elements that only group (`Descr`, `Profiles`, `custom`, `size`, ...) are flattened away.
 struct TextDescriptor {
     struct Field {
@@ -52,7 +52,7 @@ void collectTextIds(const TextDescriptor& descriptor, TextIds& odIds, TextIds& e
                                                      const TextIds& odIds, const TextIds& esIds,
                                                      Document& document, Job& job);
 
-/// `%00%14`, and back; nothing when it is no such text.
+/// `%00%14`, and back; nothing when it is not such a text.
 [[nodiscard]] std::string percentText(ByteSpan bytes);
 [[nodiscard]] std::optional<Bytes> bytesFromPercentText(std::string_view text);
 

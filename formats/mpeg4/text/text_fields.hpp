@@ -11,8 +11,8 @@
 /// What BT and XMT-A share: the spelling of field values, and the names of nodes.
 namespace stx::mpeg4 {
 
-/// Reads the value of a field that is no node. In BT, `[` ... `]` holds the items of an MF field
-/// and a single item may stand without; in the attribute of XMT-A (`wholeText`) items run to the
+/// Reads the value of a field that is not a node. In BT, `[` ... `]` holds the items of an MF field
+/// and a single item may be without; in the attribute of XMT-A (`wholeText`) items run to the
 /// end of the text and brackets are optional. Errors name the place, what was found and what is
 /// expected.
 [[nodiscard]] Result<FieldValue> readFieldValue(BtLexer& lexer, FieldType type, bool wholeText);
@@ -28,7 +28,7 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 [[nodiscard]] std::string textNameOf(const Node& node);
 /// The same for routes, with R.
 [[nodiscard]] std::string textNameOf(const Route& route);
-/// The id that `N12` stands for: 13; 0 for all other names.
+/// The id of the name `N12`: 13; 0 for all other names.
 [[nodiscard]] std::uint32_t idFromTextName(std::string_view name, char letter);
 /// Whether a name can be written as a word of BT and as an attribute of XMT-A.
 [[nodiscard]] bool isPlainName(std::string_view name);
@@ -39,7 +39,7 @@ class NodeNames {
     explicit NodeNames(const Limits& limits) : limits_(limits) {}
 
     /// DEF: from here on `node` is open until closed() is called with the height of its tree.
-    /// Errors when the name stands for another node, unless `again`: commands may bring a node that
+    /// Errors when the name is that of another node, unless `again`: commands may bring a node that
     /// takes over a name. Names like N12 become ids.
     [[nodiscard]] Result<void> define(const std::string& name, const NodePtr& node,
                                       const std::string& where, bool again);
@@ -56,7 +56,7 @@ class NodeNames {
     /// The node of a name that a route or a command mentions. Errors when there is none.
     [[nodiscard]] Result<NodePtr> target(const std::string& name, const std::string& where) const;
 
-    /// Fills in what useLater() remembered. Errors when a name never came, its node may not stand
+    /// Fills in what useLater() remembered. Errors when a name never came, its node may not be
     /// there, or nodes then hold themselves or nest too deeply.
     [[nodiscard]] Result<void> resolve();
 

@@ -49,7 +49,7 @@ std::optional<T> realFromText(std::string_view text) {
     auto [at, error] = std::from_chars(text.data(), end, value);
     if (error == std::errc()) return at == end ? std::optional<T>(value) : std::nullopt;
     if (error != std::errc::result_out_of_range || at != end) return {};
-    // Too large or too small; a wider type tells which. Below even that range: by the exponent.
+    // Too large or too small; a wider type shows which. Below even that range: by the exponent.
     long double wide = 0;
     const auto [wideAt, wideError] = std::from_chars(text.data(), end, wide);
     if (wideError == std::errc()) {

@@ -28,7 +28,7 @@ namespace stx::mpeg4 {
 /// TRUE, true, 1 and FALSE, false, 0 in any case of letters.
 [[nodiscard]] std::optional<bool> boolFromText(std::string_view text);
 
-/// The object descriptor a URL stands for: `10`, `od:10`, `od://10`, `od://od10` (letters in any
+/// The object descriptor that a URL names: `10`, `od:10`, `od://10`, `od://od10` (letters in any
 /// case). Nothing for all other URLs: `10 ` with a blank is one, and so are ids above 1023.
 [[nodiscard]] std::optional<int> odFromUrl(std::string_view url);
 

@@ -5,15 +5,15 @@
 
 #include "formats/mpeg4/scene/document.hpp"
 
-/// XMT-A, the XML form of BIFS (ISO/IEC 14496-11 annex; bifs.md section 6.2).
+/// XMT-A, the XML form of BIFS (ISO/IEC 14496-11, the clauses on XMT-A).
 namespace stx::mpeg4 {
 
 /// Reads a presentation: Header with InitialObjectDescriptor (may be missing), Body with Replace,
-/// Insert, Delete, ObjectDescriptorUpdate and `par begin="seconds"`. DEF names like N12 stand for
-/// node ids. Streams get their file names, not their bytes: see loadMedia() in mpeg4.hpp. DTDs are
+/// Insert, Delete, ObjectDescriptorUpdate and `par begin="seconds"`. The DEF name N12 is node
+/// id 13. Streams get their file names, not their bytes: see loadMedia() in mpeg4.hpp. DTDs are
 /// passed over: no entity but the five of XML is known, none is expanded. `name` is for errors,
-/// which are at `'name':line:column`. Errors (invalidInput): no well-formed XML, what the schema or
-/// the node table does not have, with what was found and what expected.
+/// which are at `'name':line:column`. Errors (invalidInput): XML that is not well-formed, what the
+/// schema or the node table does not have, with what was found and what expected.
 [[nodiscard]] Result<Document> readXmt(std::string_view text, const std::string& name, Job& job);
 
 /// The text of a presentation: well-formed XML in UTF-8; readXmt() gives it back, floats to the

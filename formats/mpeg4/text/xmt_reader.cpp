@@ -129,7 +129,7 @@ class XmtReader {
         STX_CHECK(fillDescriptor(descriptor, node, 1));
         return descriptor;
     }
-    /// URLs may name an object descriptor by its string id before the descriptor stands in the
+    /// URLs may name an object descriptor by its string id before the descriptor is in the
     /// file.
     Result<void> collectIds(xml_node root) {
         struct IdCollector : pugi::xml_tree_walker {

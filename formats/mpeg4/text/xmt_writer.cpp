@@ -150,7 +150,7 @@ class XmtWriter {
 
     // ---- Nodes
     static std::string valueText(const FieldValue& value) {
-        // Single strings and URLs stand as they are, lists of them in quotes.
+        // Single strings and URLs are written as they are, lists of them in quotes.
         if (const auto* text = std::get_if<std::string>(&value)) return *text;
         if (const auto* url = std::get_if<Url>(&value); url && url->objectDescriptorId != 0)
             return fmt::format("od:{}", url->objectDescriptorId);

@@ -8,8 +8,8 @@ namespace stx {
 namespace {
 
 TEST(Camera, ProjectsToTheStandardsPixelCentres) {
-    // mpeg4-dibr: u = (i+1/2)/W*2-1, v = 1-(j+1/2)/H*2; point = R(u z tan(fx/2), v z tan(fy/2),
-    // -z)+p.
+    // ISO/IEC 14496-16, 4.5.4: u = (i+1/2)/W*2-1, v = 1-(j+1/2)/H*2; point = R(u z tan(fx/2), v z
+    // tan(fy/2), -z)+p.
     const auto c = Camera::fromFieldOfView({1, 2, 3}, quatFromAxisAngle({0, 1, 0, 0.3}), {0.8, 0.6},
                                            false, 64, 48);
     const int i = 5, j = 7;

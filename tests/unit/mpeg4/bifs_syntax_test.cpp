@@ -33,7 +33,7 @@ std::string errorOf(std::string_view text, const BifsConfig& config = configOf(3
 constexpr std::string_view kGroup = "11 000000 0 0  0 001 ";  // scene, then a new Group
 
 TEST(BifsSyntax, TheWorkedExampleDecodes) {
-    // bifs.md 4.6
+    // ISO/IEC 14496-11, 8.6: BIFS-Command
     const Bytes unit = unhex("c005a0000364cda81726d40a80800000000000000020000000 40");
     BifsDecoder decoder(configOf(1), Limits());
     const auto commands = decoder.decode(unit);
@@ -231,7 +231,7 @@ TEST(BifsSyntax, WhatHasNoCodeIsNotWritten) {
     texture->set("texture", pixels);
     EXPECT_NE(error(sceneWith(view)).find("4096x1"), std::string::npos);
 
-    // DIBR fields have no IN id: bifs.md 2.
+    // The fields of DepthImage and its textures are not eventIns, so they have no IN id.
     const NodePtr root = makeNode("Group");
     const NodePtr plain = makeNode("DepthImage");
     root->set("children", NodeList{plain});

@@ -1,4 +1,4 @@
-// Object descriptors against the bytes of bifs.md 5.
+// Object descriptors against bytes written by hand by ISO/IEC 14496-1, 7.2.6.
 
 #include <gtest/gtest.h>
 
@@ -106,11 +106,11 @@ TEST(Descriptors, DamageIsToldWithItsByte) {
     EXPECT_FALSE(decodeIod(unhex("11 02 00 4f"), {}));
     EXPECT_FALSE(decodeIod(unhex("10 02 00 4f"), {}));
     EXPECT_FALSE(decodeEsDescriptor(unhex("03 02 00 00")));
-    // A reference that leads nowhere is a departure, not an error.
-    std::vector<Mp4Departure> departures;
-    EXPECT_TRUE(decodeOdFrame(unhex("01 08 11 06 02 9f 0f 02 00 09"), {kMpod, &departures}));
-    ASSERT_EQ(departures.size(), 1u);
-    EXPECT_EQ(departures[0].kind, Mp4Departure::Kind::mpodMissing);
+    // A reference that leads nowhere is a deviation, not an error.
+    std::vector<Mp4Deviation> deviations;
+    EXPECT_TRUE(decodeOdFrame(unhex("01 08 11 06 02 9f 0f 02 00 09"), {kMpod, &deviations}));
+    ASSERT_EQ(deviations.size(), 1u);
+    EXPECT_EQ(deviations[0].kind, Mp4Deviation::Kind::mpodMissing);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ TEST(IsobmffFile, WritesWhatItIsGivenAndNothingOfTheDay) {
     Job job;
     const auto document = readMp4(ByteSource::fromView(bytes), job);
     ASSERT_TRUE(document) << document.error().text();
-    EXPECT_TRUE(document->mp4->departures.empty());
+    EXPECT_TRUE(document->mp4->deviations.empty());
     EXPECT_TRUE(document->mp4->moovFirst);
     EXPECT_EQ(document->mp4->majorBrand, "mp42");
     EXPECT_TRUE(job.takeNotes().empty());

@@ -1,5 +1,5 @@
 // The 28 MP4 variants of an independent writer: what we say to each, beside what another
-// implementation says (bifs.md 5.2).
+// implementation says.
 
 #include <gtest/gtest.h>
 
@@ -8,13 +8,13 @@
 namespace stx::mpeg4 {
 namespace {
 
-using Kind = Mp4Departure::Kind;
+using Kind = Mp4Deviation::Kind;
 
 struct Variant {
     const char* file;
     const char* theirs;  ///< the other implementation's verdict, for people
     int images;          ///< object descriptors whose image bytes we reach
-    std::vector<Kind> departures;
+    std::vector<Kind> deviations;
 };
 
 const std::vector<Variant>& variants() {
@@ -59,7 +59,7 @@ int imagesOf(const Document& document) {
     return images;
 }
 
-TEST(IsobmffVariants, EachIsReadAndItsDeparturesAreTold) {
+TEST(IsobmffVariants, EachIsReadAndItsDeviationsAreReported) {
     REQUIRE_SHARED(folder, "reference/handmade");
     EXPECT_EQ(mp4FilesIn(folder).size(), variants().size());
     Job baseJob;
@@ -73,14 +73,14 @@ TEST(IsobmffVariants, EachIsReadAndItsDeparturesAreTold) {
         ASSERT_TRUE(document) << document.error().text();
         EXPECT_EQ(imagesOf(*document), variant.images);
         std::vector<Kind> kinds;
-        for (const Mp4Departure& departure : document->mp4->departures) {
-            if (std::find(kinds.begin(), kinds.end(), departure.kind) == kinds.end())
-                kinds.push_back(departure.kind);
-            EXPECT_FALSE(departure.text.empty());
-            EXPECT_FALSE(departure.where.empty()) << departure.text;
+        for (const Mp4Deviation& deviation : document->mp4->deviations) {
+            if (std::find(kinds.begin(), kinds.end(), deviation.kind) == kinds.end())
+                kinds.push_back(deviation.kind);
+            EXPECT_FALSE(deviation.text.empty());
+            EXPECT_FALSE(deviation.where.empty()) << deviation.text;
         }
         std::sort(kinds.begin(), kinds.end());
-        std::vector<Kind> expected = variant.departures;
+        std::vector<Kind> expected = variant.deviations;
         std::sort(expected.begin(), expected.end());
         EXPECT_EQ(kinds, expected);
         // All but the last two hold one and the same scene.
@@ -103,7 +103,7 @@ TEST(IsobmffVariants, EachIsWrittenAndReadsBackTheSame) {
             ASSERT_TRUE(bytes) << bytes.error().text();
             const auto again = readMp4(ByteSource::fromBytes(*bytes), job);
             ASSERT_TRUE(again) << again.error().text();
-            EXPECT_TRUE(again->mp4->departures.empty() || again->odFrames.empty());
+            EXPECT_TRUE(again->mp4->deviations.empty() || again->odFrames.empty());
             EXPECT_TRUE(sameFrames(document->frames, again->frames));
             const auto before = document->objectDescriptors();
             const auto after = again->objectDescriptors();

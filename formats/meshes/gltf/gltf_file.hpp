@@ -31,10 +31,10 @@ struct AccessorValues {
 };
 
 /// A glTF 2.0 or GLB file: its JSON, its buffers (loaded when first used), its accessors.
-class Document {
+class GltfFile {
   public:
     /// Errors: no glTF, another version, a required extension that is not known.
-    [[nodiscard]] static Result<Document> open(ByteSpan bytes, ModelFiles& files,
+    [[nodiscard]] static Result<GltfFile> open(ByteSpan bytes, ModelFiles& files,
                                                MeshBuilder& builder);
 
     [[nodiscard]] const Json& root() const { return root_; }
@@ -55,7 +55,7 @@ class Document {
 
   private:
     struct Layout;
-    Document() = default;
+    GltfFile() = default;
     [[nodiscard]] Result<void> parse(ByteSpan bytes);
     [[nodiscard]] Result<void> checkAsset();
     [[nodiscard]] Result<ByteSpan> buffer(std::uint64_t index, const std::string& user);

@@ -1,4 +1,4 @@
-#include "formats/validate/validate.hpp"
+#include "formats/validate/validate_mpeg4.hpp"
 
 #include <cassert>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
-#include "formats/validate/validate_findings.hpp"
+#include "formats/validate/findings.hpp"
 
 namespace stx {
 
@@ -21,8 +21,9 @@ namespace {
 
 class DocumentValidator {
   public:
-    DocumentValidator(const Document& document, const ValidateOptions& options, Job& job)
-        : document_(document), options_(options), job_(job) {}
+    DocumentValidator(const Document& document, const ValidateOptions& options,
+                      const PresentationImages& source, Job& job)
+        : document_(document), options_(options), source_(source), job_(job) {}
 
     std::vector<Finding> run() {
         checkContainer();
@@ -37,8 +38,8 @@ class DocumentValidator {
     }
 
     // ---- Container
-    static int ruleOf(Mp4Departure::Kind kind) {
-        using Kind = Mp4Departure::Kind;
+    static int ruleOf(Mp4Deviation::Kind kind) {
+        using Kind = Mp4Deviation::Kind;
         switch (kind) {
             case Kind::noIods:
                 return 2001;
@@ -69,9 +70,9 @@ class DocumentValidator {
     }
     void checkContainer() {
         if (!document_.mp4) return;
-        for (const Mp4Departure& departure : document_.mp4->departures) {
-            const int rule = ruleOf(departure.kind);
-            add(rule, departure.where, departure.text, findRule(rule)->summary);
+        for (const Mp4Deviation& deviation : document_.mp4->deviations) {
+            const int rule = ruleOf(deviation.kind);
+            add(rule, deviation.where, deviation.text, findRule(rule)->summary);
         }
     }
 
@@ -188,7 +189,7 @@ class DocumentValidator {
             add(2031, "scene", shown.error().text(), "a scene that can be walked");
             return;
         }
-        auto images = StreamImages::make(document_, options_.folder, job_.limits);
+        auto images = StreamImages::make(document_, source_.folder, job_.limits);
         if (!images) return;
         images_ = &*images;
         int index = 0;
@@ -329,14 +330,15 @@ class DocumentValidator {
                                     std::string_view what) {
         auto info = images_->probe(*node);
         if (info) return *info;
-        // An image that is not there is told by the rules on descriptors.
+        // An image that is not there breaks a rule on descriptors, which is reported there.
         const ElementaryStream* stream = images_->stream(*node);
-        const bool told = stream && (stream->samples.empty() || stream->samples[0].data.size == 0);
+        const bool reported =
+            stream && (stream->samples.empty() || stream->samples[0].data.size == 0);
         bool missing = false;
         if (const int url = node->info->find("url"); url >= 0 && !stream)
             if (const auto* urls = std::get_if<std::vector<Url>>(&node->value(url)))
                 missing = !urls->empty() && urls->front().objectDescriptorId != 0;
-        if (!told && !missing)
+        if (!reported && !missing)
             add(4005, where, fmt::format("{}: {}", what, info.error().message), "an image");
         return {};
     }
@@ -415,8 +417,8 @@ class DocumentValidator {
     void checkPixels(const Node& node, const Node& texture, const std::string& where) {
         const auto decode = [&](const NodePtr& image,
                                 std::string_view what) -> std::optional<DecodedImage> {
-            if (!images_->probe(*image)) return {};  // told already
-            auto decoded = images_->decode(*image, options_.decode, job_.limits);
+            if (!images_->probe(*image)) return {};  // reported already
+            auto decoded = images_->decode(*image, source_.decode, job_.limits);
             if (decoded) return std::move(*decoded);
             add(4005, where, fmt::format("{}: {}", what, decoded.error().text()),
                 "an image that can be decoded");
@@ -497,6 +499,7 @@ class DocumentValidator {
 
     const Document& document_;
     const ValidateOptions& options_;
+    const PresentationImages& source_;
     Job& job_;
     Findings findings_;
     const StreamImages* images_ = nullptr;
@@ -507,21 +510,22 @@ class DocumentValidator {
 }  // namespace
 
 std::vector<Finding> validate(const Mpeg4Document& document, const ValidateOptions& options,
-                              Job& job) {
-    return DocumentValidator(document, options, job).run();
+                              const PresentationImages& images, Job& job) {
+    return DocumentValidator(document, options, images, job).run();
 }
 
 Result<std::vector<Finding>> validateMpeg4File(const std::filesystem::path& path,
                                                const ValidateOptions& options, Job& job) {
-    ValidateOptions here = options;
-    if (here.folder.empty()) here.folder = path.has_parent_path() ? path.parent_path() : ".";
+    PresentationImages images;
+    images.folder = path.has_parent_path() ? path.parent_path() : ".";
     const auto document = readMpeg4(path, job);
     Findings findings;
     if (!document) {
-        if (document.error().code == ErrorCode::io && !std::filesystem::exists(path))
-            return tl::unexpected(document.error());
-        findings.add(1001, "", document.error().text(), "a presentation that can be read");
-        return findings.list;
+        // A file that a text names may be missing; only the text itself must be there.
+        Error error = document.error();
+        if (error.code == ErrorCode::io && (path == "-" || ByteSource::open(path)))
+            error.code = ErrorCode::invalidInput;
+        return unreadable(error);
     }
     if (path != "-") {
         const auto source = ByteSource::open(path);
@@ -536,7 +540,7 @@ Result<std::vector<Finding>> validateMpeg4File(const std::filesystem::path& path
                                                               : ".xmt");
         }
     }
-    auto rest = validate(*document, here, job);
+    auto rest = validate(*document, options, images, job);
     findings.list.insert(findings.list.end(), rest.begin(), rest.end());
     return findings.list;
 }

@@ -1,6 +1,8 @@
+#include "formats/validate/rules.hpp"
+
 #include <algorithm>
 
-#include "formats/validate/validate.hpp"
+#include <fmt/format.h>
 
 namespace stx {
 namespace {
@@ -20,8 +22,8 @@ constexpr Rule kRules[] = {
 
     {2001, error, kMp4, "moov has an iods box with the initial object descriptor"},
     {2002, error, kMp4, "the scene's track is listed in iods"},
-    {2003, error, kMp4, "images stand in a visual sample entry (mp4v)"},
-    {2004, warning, kMp4, "images stand in mp4v with esds, not in an entry of their own codec"},
+    {2003, error, kMp4, "images are in a visual sample entry (mp4v)"},
+    {2004, warning, kMp4, "images are in mp4v with esds, not in an entry of their own codec"},
     {2005, warning, kMp4, "object descriptors of a file refer to tracks (ES_ID_Ref)"},
     {2006, error, kMp4, "each ES_ID_Ref is an index into tref/mpod"},
     {2007, error, kMp4, "each stream that a descriptor names is there"},
@@ -38,9 +40,9 @@ constexpr Rule kRules[] = {
     {2025, error, kOd, "the bytes of an image are what objectTypeIndication says"},
     {2026, warning, kOd, "images are JPEG (0x6C) or PNG (0x6D)"},
     {2027, warning, "ISO/IEC 14496-11, 8.5",
-     "objectTypeIndication of the scene tells the version of its config"},
+     "objectTypeIndication of the scene gives the version of its config"},
     {2028, error, kOd, "no two streams have the same ES_ID"},
-    {2030, error, kBifs, "the first command brings a scene"},
+    {2030, error, kBifs, "the first command replaces the scene"},
     {2031, error, kBifs, "each command fits the scene that it changes"},
 
     {3001, error, kDibr, "nearPlane is less than farPlane"},
@@ -48,7 +50,7 @@ constexpr Rule kRules[] = {
     {3003, error, kDibr,
      "fieldOfView is an angle between 0 and pi, or a window with sides above 0"},
     {3004, warning, "ISO/IEC 14496-11, 7.1 (SFRotation)", "the axis of a rotation has length 1"},
-    {3005, error, kDibr, "all numbers of a camera are finite"},
+    {3005, error, kDibr, "all numbers of a camera are finite, its orientation is a rotation"},
     {3006, error, kDibr, "Transforms above a DepthImage rotate, move and scale all axes alike"},
     {3007, warning, kDibr, "nearPlane of a perspective camera is above 0"},
     {3008, warning, kDibr,
@@ -68,7 +70,7 @@ constexpr Rule kRules[] = {
     {4012, error, kDibr, "the lists of a PointTexture fit its size and each other"},
     {4013, error, kDibr, "the octree of an OctreeImage is whole, its images are orthographic"},
     {4014, error, kDibr, "the scene shows a DepthImage"},
-    {4020, warning, kDibr, "all DepthImages of an object stand under one Transform"},
+    {4020, warning, kDibr, "all DepthImages of an object are under one Transform"},
     {4021, warning, kDibr, "no DepthImage is shown twice in one place"},
     {4030, error, kDibr, "distances lie between nearPlane and farPlane"},
 
@@ -82,7 +84,7 @@ constexpr Rule kRules[] = {
     {6003, error, kV2, "splatU and splatV come together"},
     {6004, warning, kV2, "splatMinMax is given where there are splats"},
     {6005, error, kV2, "splatMinMax is finite and its first value the smaller"},
-    {6006, warning, kV2, "SimpleTextureV2 with splats stands in a DepthImageV2"},
+    {6006, warning, kV2, "SimpleTextureV2 with splats is in a DepthImageV2"},
     {6007, warning, kV2, "normals have length 1"},
     {6008, warning, kV2, "normals point to the viewer"},
 };

@@ -1,4 +1,4 @@
-#include "formats/validate/validate.hpp"
+#include "formats/validate/validate_mpeg4.hpp"
 
 #include <fstream>
 #include <map>
@@ -8,22 +8,10 @@
 #include "formats/mpeg4/text/bt.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
+#include "tests/unit/validate/numbers.hpp"
 
 namespace stx::mpeg4 {
 namespace {
-
-using Numbers = std::set<int>;
-
-std::string textOf(const std::vector<Finding>& findings) {
-    std::string text;
-    for (const Finding& f : findings) text += f.text() + "\n";
-    return text;
-}
-Numbers numbersOf(const std::vector<Finding>& findings) {
-    Numbers numbers;
-    for (const Finding& f : findings) numbers.insert(f.rule->number);
-    return numbers;
-}
 
 /// A sound V2 scene of two views, and one of V1.
 Document sound(bool v2 = true) {
@@ -93,21 +81,21 @@ std::string camera(const std::string& fields, int depth = 200) {
 /// A document that breaks a rule, by the rule's number.
 std::map<int, std::function<Document()>> brokenDocuments() {
     std::map<int, std::function<Document()>> broken;
-    const auto departure = [](Mp4Departure::Kind kind) {
+    const auto deviation = [](Mp4Deviation::Kind kind) {
         return [kind] {
             Document d = sound();
             d.mp4.emplace();
-            d.mp4->departures.push_back({kind, "what was found", "moov"});
+            d.mp4->deviations.push_back({kind, "what was found", "moov"});
             return d;
         };
     };
-    using Kind = Mp4Departure::Kind;
+    using Kind = Mp4Deviation::Kind;
     int rule = 2001;
     for (const Kind kind :
          {Kind::noIods, Kind::sceneNotInIods, Kind::imageInSystemsEntry, Kind::imageInNativeEntry,
           Kind::fullEsdInOd, Kind::mpodMissing, Kind::streamNotFound, Kind::streamOdTag,
           Kind::noOdTrack, Kind::esIdNotZero, Kind::trailingBytes, Kind::other})
-        broken[rule++] = departure(kind);
+        broken[rule++] = deviation(kind);
     const auto changed = [&broken](int number, std::function<void(Document&)> change,
                                    bool v2 = true) {
         broken[number] = [change, v2] {
@@ -203,7 +191,7 @@ std::map<int, std::function<Document()>> brokenDocuments() {
 TEST(Validate, isSilentWhenNoRuleIsBroken) {
     for (const bool v2 : {false, true}) {
         Job job;
-        const auto findings = validate(sound(v2), ValidateOptions(), job);
+        const auto findings = validate(sound(v2), {}, {}, job);
         EXPECT_TRUE(findings.empty()) << textOf(findings);
     }
     // Through a file, too.
@@ -211,7 +199,7 @@ TEST(Validate, isSilentWhenNoRuleIsBroken) {
     Job job;
     for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
         ASSERT_TRUE(writeMpeg4(sound(), folder / name, job));
-        const auto findings = validateMpeg4File(folder / name, {}, job);
+        const auto findings = validateFile(folder / name, {}, job);
         ASSERT_TRUE(findings);
         EXPECT_TRUE(findings->empty()) << name << "\n" << textOf(*findings);
     }
@@ -222,7 +210,7 @@ TEST(Validate, everyRuleHasASampleThatBreaksIt) {
     for (const auto& [number, make] : broken) {
         Job job;
         ASSERT_NE(findRule(number), nullptr) << number;
-        const auto findings = validate(make(), ValidateOptions(), job);
+        const auto findings = validate(make(), {}, {}, job);
         EXPECT_TRUE(numbersOf(findings).contains(number)) << number << " is not found in\n"
                                                           << textOf(findings);
         for (const Finding& f : findings) {
@@ -230,7 +218,7 @@ TEST(Validate, everyRuleHasASampleThatBreaksIt) {
             EXPECT_FALSE(f.expected.empty()) << number;
         }
     }
-    // Rules that other tests below break.
+    // Rules that other tests break: below, and in atlas_rules_test.cpp and exr_rules_test.cpp.
     const Numbers elsewhere = {1001, 1002, 4030, 5001, 5002, 5003, 5004};
     for (const Rule& rule : ruleCatalogue())
         EXPECT_TRUE(broken.contains(rule.number) || elsewhere.contains(rule.number))
@@ -250,7 +238,7 @@ TEST(Validate, aBrokenRuleBringsNoOthersThatHaveNothingToDoWithIt) {
                              3004, 3005, 3006, 3007, 3008, 4003, 4004, 4006, 4007, 4008, 4009,
                              4010, 4012, 4013, 4014, 4020, 4021, 6003, 6004, 6005, 6006, 6008}) {
         Job job;
-        Numbers found = numbersOf(validate(broken.at(number)(), ValidateOptions(), job));
+        Numbers found = numbersOf(validate(broken.at(number)(), {}, {}, job));
         found.erase(number);
         if (const auto allowed = company.find(number); allowed != company.end())
             for (const int other : allowed->second) found.erase(other);
@@ -262,74 +250,34 @@ TEST(Validate, aBrokenRuleBringsNoOthersThatHaveNothingToDoWithIt) {
 TEST(Validate, structureIsCheckedWithoutDecoding) {
     ValidateOptions options;
     options.pixels = false;
-    options.decode = [](ByteSpan, std::string_view, const Limits&) -> Result<DecodedImage> {
+    PresentationImages images;
+    images.decode = [](ByteSpan, std::string_view, const Limits&) -> Result<DecodedImage> {
         ADD_FAILURE() << "an image was decoded";
         return fail(ErrorCode::failed, "no");
     };
     Job job;
-    EXPECT_TRUE(validate(sound(), options, job).empty());
-    EXPECT_TRUE(numbersOf(validate(brokenDocuments().at(4001)(), options, job)).contains(4001));
+    EXPECT_TRUE(validate(sound(), options, images, job).empty());
+    EXPECT_TRUE(
+        numbersOf(validate(brokenDocuments().at(4001)(), options, images, job)).contains(4001));
 }
 
 TEST(Validate, filesThatCannotBeReadBreakRule1001) {
     const TemporaryFolder folder("unreadable");
     Job job;
     std::ofstream(folder / "a.bt") << "Group { children [ Depth { } ] }";
-    const auto findings = validateMpeg4File(folder / "a.bt", {}, job);
+    const auto findings = validateFile(folder / "a.bt", {}, job);
     ASSERT_TRUE(findings);
     EXPECT_EQ(numbersOf(*findings), Numbers{1001}) << textOf(*findings);
     EXPECT_NE(findings->at(0).text().find("'Depth'"), std::string::npos);
-    const auto missing = validateMpeg4File(folder / "b.bt", {}, job);
+    const auto missing = validateFile(folder / "b.bt", {}, job);
     ASSERT_FALSE(missing);
     EXPECT_EQ(missing.error().code, ErrorCode::io);
 
     ASSERT_TRUE(writeMpeg4(sound(), folder / "a.mp4", job));
     std::filesystem::rename(folder / "a.mp4", folder / "c.bt");
-    const auto renamed = validateMpeg4File(folder / "c.bt", {}, job);
+    const auto renamed = validateFile(folder / "c.bt", {}, job);
     ASSERT_TRUE(renamed);
     EXPECT_EQ(numbersOf(*renamed), Numbers{1002}) << textOf(*renamed);
-}
-
-TEST(Validate, bundlesKeepTheRulesOnViews) {
-    Bundle bundle;
-    bundle.views = {makeView(8, 6, 16, 1)};
-    EXPECT_TRUE(validate(bundle).empty()) << textOf(validate(bundle));
-    bundle.views[0].depth.at(1, 0) = 99.0f;
-    EXPECT_EQ(numbersOf(validate(bundle)), Numbers{4030});
-    bundle.views[0].nearPlane = 100;
-    EXPECT_TRUE(numbersOf(validate(bundle)).contains(3001));
-    bundle.views[0] = makeView(8, 6, 16, 1);
-    addVectors(bundle.views[0]);
-    for (auto& n : bundle.views[0].normal.pixels())
-        if (n != glm::vec3(0)) n = glm::vec3(bundle.views[0].camera.forward());
-    EXPECT_EQ(numbersOf(validate(bundle)), Numbers{6008});
-    bundle.views[0].splatV = {};
-    EXPECT_TRUE(numbersOf(validate(bundle)).contains(6003));
-    bundle.views[0] = makeView(8, 6, 16, 1);
-    for (float& d : bundle.views[0].depth.pixels()) d = kNoDepth;
-    EXPECT_EQ(numbersOf(validate(bundle)), (Numbers{4006, 4007}));
-}
-
-TEST(Validate, atlasesKeepTheirRules) {
-    Atlas atlas;
-    atlas.views = {makeView(8, 6, 16, 1)};
-    atlas.pages.resize(1);
-    atlas.pages[0].texture = Texture(Rgba8Image(20, 10));
-    atlas.pages[0].depth = Image<float>(20, 10, kNoDepth);
-    atlas.rectangles = {{0, 0, 0, 0, 8, 6, 0, 0, false}, {0, 0, 0, 0, 4, 6, 8, 0, true}};
-    EXPECT_TRUE(validate(atlas).empty()) << textOf(validate(atlas));
-    const Atlas good = atlas;
-    atlas.rectangles[1].atlasX = 7;
-    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5002});
-    atlas = good;
-    atlas.rectangles[1].atlasX = 15;
-    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5001});
-    atlas = good;
-    atlas.pages[0].texture = Texture(Rgba8Image(10, 10));
-    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5004});
-    atlas = good;
-    atlas.pages.resize(3, atlas.pages[0]);
-    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5003}) << textOf(validate(atlas));
 }
 
 TEST(Validate, numbersAscendAndBelongToTheirRange) {
@@ -347,7 +295,7 @@ TEST(Validate, referenceFilesBreakWhatTheyAreKnownToBreak) {
     REQUIRE_SHARED(folder, "reference");
     Job job;
     const auto rules = [&](const char* name) {
-        const auto findings = validateMpeg4File(folder / name, {}, job);
+        const auto findings = validateFile(folder / name, {}, job);
         return findings ? numbersOf(*findings) : Numbers{-1};
     };
     EXPECT_TRUE(rules("handmade/d_no_iods.mp4").contains(2001));

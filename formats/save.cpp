@@ -1,0 +1,62 @@
+#include "formats/save.hpp"
+
+#include <algorithm>
+
+#include "formats/exr/bundle_exr.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
+
+namespace stx {
+
+namespace fs = std::filesystem;
+
+Result<FileKind> containerOf(const fs::path& target) {
+    std::string ending = target.extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(),
+                   [](unsigned char c) { return c < 128 ? std::tolower(c) : c; });
+    if (ending == ".exr") return FileKind::exr;
+    if (mpeg4ContainerOf(target)) return FileKind::mpeg4;
+    return fail(ErrorCode::usage,
+                "'{}' ends in '{}'; a bundle is written as .exr, .mp4, .xmt or .bt",
+                target.string(), ending);
+}
+
+Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const SaveOptions& options,
+                        Job& job) {
+    // Both writers check the bundle: see Bundle::check().
+    STX_TRY(const auto container, containerOf(target));
+    if (container == FileKind::exr) return writeExrBundle(bundle, target, job, {options.noClobber});
+    mpeg4::SceneWriteOptions scene;
+    if (options.jpegQuality > 0) {
+        scene.texture = mpeg4::SceneWriteOptions::Texture::jpeg;
+        scene.jpegQuality = options.jpegQuality;
+    }
+    scene.pointTexture = options.pointTexture;
+    Mpeg4WriteOptions write;
+    write.output.noClobber = options.noClobber;
+    return writeMpeg4Bundle(bundle, target, job, scene, write);
+}
+
+Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::path& target,
+                                              const SaveOptions& options, bool changesDepth,
+                                              bool pixels, Job& job) {
+    STX_TRY(const auto from, recognise(input));
+    STX_TRY(const auto to, containerOf(target));
+    if (from != FileKind::mpeg4 || to != FileKind::mpeg4 || changesDepth ||
+        options.jpegQuality != 0 || options.pointTexture)
+        return std::nullopt;
+    STX_TRY(const auto document, readMpeg4(input, job));
+    Mpeg4WriteOptions write;
+    write.output.noClobber = options.noClobber;
+    STX_CHECK(writeMpeg4(document, target, job, write));
+    // A presentation need not be a bundle to be converted, so what is wrong with its views is
+    // neither an error nor a note here.
+    Job quiet;
+    quiet.limits = job.limits;
+    mpeg4::SceneReadOptions read;
+    read.folder = input.parent_path();
+    read.pixels = pixels;
+    auto bundle = mpeg4::bundleFromScene(document, read, quiet);
+    return bundle ? std::move(*bundle) : Bundle();
+}
+
+}  // namespace stx

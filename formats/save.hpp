@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "formats/open.hpp"
+#include "formats/stx/options.hpp"
+
+namespace stx {
+
+/// The container that a target's ending asks for: .exr, .mp4, .xmt or .bt. Errors (usage) for
+/// others.
+[[nodiscard]] Result<FileKind> containerOf(const std::filesystem::path& target);
+
+/// Writes a bundle whole or not at all, in the container of the target's ending. Errors: what
+/// Bundle::check() says; files; (unsupported) what the container cannot hold.
+[[nodiscard]] Result<void> saveBundle(const Bundle& bundle, const std::filesystem::path& target,
+                                      const SaveOptions& options, Job& job);
+
+/// Converts one MPEG-4 file into another container without decoding an image: every stream's bytes
+/// pass untouched. Returns what the presentation shows, as a bundle without images (empty when it
+/// shows no view), or with them when `pixels` is set, for a report. Nothing, and nothing written,
+/// when this is not such a conversion: another kind of input or target, or options that change
+/// pixels.
+[[nodiscard]] Result<std::optional<Bundle>> convertDocument(const std::filesystem::path& input,
+                                                            const std::filesystem::path& target,
+                                                            const SaveOptions& options,
+                                                            bool changesDepth, bool pixels,
+                                                            Job& job);
+
+}  // namespace stx

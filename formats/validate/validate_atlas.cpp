@@ -1,0 +1,175 @@
+#include <cmath>
+
+#include "formats/atlas/atlas_files.hpp"
+#include "formats/validate/findings.hpp"
+
+namespace stx {
+namespace {
+
+/// 5001 and 5002. `views` has the sizes; only rectangles that lie inside are left in `rectangles`.
+void checkRectangles(const std::vector<ReferenceView>& views, int pages, glm::ivec2 pageSize,
+                     std::vector<AtlasRectangle>& rectangles, Findings& findings) {
+    std::vector<AtlasRectangle> good;
+    std::vector<std::size_t> indexOf;
+    for (std::size_t i = 0; i < rectangles.size(); ++i) {
+        const AtlasRectangle& r = rectangles[i];
+        const auto within = [](int at, int size, int whole) {
+            return at >= 0 && size > 0 && size <= whole && at <= whole - size;
+        };
+        bool inside = r.view >= 0 && static_cast<std::size_t>(r.view) < views.size() &&
+                      r.page >= 0 && r.page < pages &&
+                      within(r.atlasX, r.atlasWidth(), pageSize.x) &&
+                      within(r.atlasY, r.atlasHeight(), pageSize.y);
+        if (inside) {
+            const Camera& c = views[static_cast<std::size_t>(r.view)].camera;
+            inside = within(r.viewX, r.width, c.width) && within(r.viewY, r.height, c.height);
+        }
+        if (inside) {
+            good.push_back(r);
+            indexOf.push_back(i);
+            continue;
+        }
+        findings.add(5001, fmt::format("rectangle {}", i),
+                     fmt::format("{}x{} at {} {} of view {}, at {} {} of page {}", r.width,
+                                 r.height, r.viewX, r.viewY, r.view, r.atlasX, r.atlasY, r.page),
+                     "a rectangle inside both");
+    }
+    for (int page = 0; page < pages; ++page)
+        for (const auto& [a, b] : findOverlaps(good, page))
+            findings.add(5002, fmt::format("rectangles {} and {}", indexOf[a], indexOf[b]),
+                         fmt::format("an overlap on page {}", page), "none");
+    rectangles = std::move(good);
+}
+
+void checkViewHeaders(const std::vector<ReferenceView>& views, Findings& findings) {
+    for (std::size_t i = 0; i < views.size(); ++i)
+        checkViewHeader(views[i], viewText(i, views[i].name), findings);
+}
+
+/// 4030, over the rectangles of each view.
+class OutsideCounts {
+  public:
+    explicit OutsideCounts(const std::vector<ReferenceView>& views)
+        : views_(views), outside_(views.size()) {}
+
+    /// `page` has the depth; rectangles lie inside it.
+    void add(const Image<float>& depth, const std::vector<AtlasRectangle>& rectangles, int page) {
+        for (const AtlasRectangle& r : rectangles) {
+            if (r.page != page) continue;
+            const ReferenceView& view = views_[static_cast<std::size_t>(r.view)];
+            const double slack = (view.farPlane - view.nearPlane) * 1e-4;
+            for (int y = 0; y < r.atlasHeight(); ++y)
+                for (const float d : depth.row(r.atlasY + y)
+                                         .subspan(static_cast<std::size_t>(r.atlasX),
+                                                  static_cast<std::size_t>(r.atlasWidth()))) {
+                    if (std::isinf(d) && d > 0) continue;
+                    ++points_;
+                    if (!(d >= 0 && d >= view.nearPlane - slack && d <= view.farPlane + slack))
+                        ++outside_[static_cast<std::size_t>(r.view)];
+                }
+        }
+    }
+    void report(Findings& findings) const {
+        for (std::size_t i = 0; i < outside_.size(); ++i) {
+            if (outside_[i] == 0) continue;
+            findings.add(4030, viewText(i, views_[i].name),
+                         fmt::format("{} distances outside {} to {}", outside_[i],
+                                     views_[i].nearPlane, views_[i].farPlane),
+                         "distances between the planes");
+        }
+        if (points_ == 0) findings.add(4007, "", "no point in any view", "points");
+    }
+
+  private:
+    const std::vector<ReferenceView>& views_;
+    std::vector<std::int64_t> outside_;
+    std::int64_t points_ = 0;
+};
+
+std::string textureText(const AtlasTexture& t) {
+    return t.file.empty() ? fmt::format("{} of page {}", t.attribute, t.page)
+                          : fmt::format("'{}'", t.file);
+}
+
+/// Sizes of the images and what is in them. `header` has good rectangles only.
+void checkTextures(const std::filesystem::path& path, const AtlasHeader& header,
+                   const ValidateOptions& options, Job& job, Findings& findings) {
+    OutsideCounts counts(header.atlas.views);
+    bool allDepth = options.pixels;
+    for (const AtlasTexture& t : header.textures) {
+        if (job.cancelled) return;
+        const std::string where = textureText(t);
+        const bool isDepth = t.attribute == "depth";
+        // Two pictures of the page are beside or below each other.
+        const glm::ivec2 expected(header.pageWidth + t.secondX, header.pageHeight + t.secondY);
+        const auto stored = atlasTextureSize(path, t, job.limits);
+        bool fits = stored && *stored == expected;
+        if (!stored) {
+            findings.add(4005, where, stored.error().text(), "an image");
+        } else if (!fits) {
+            findings.add(5004, where, sizeText(stored->x, stored->y),
+                         sizeText(expected.x, expected.y));
+        }
+        if (glm::ivec2(t.width, t.height) != expected) {
+            findings.add(5004, where, fmt::format("{} in the index", sizeText(t.width, t.height)),
+                         sizeText(expected.x, expected.y));
+            fits = false;
+        }
+        AtlasPage page;
+        if (fits && options.pixels) {
+            const auto read = readAtlasTexture(path, header, t, page, job.limits);
+            if (!read) findings.add(4005, where, read.error().text(), "an image that can be read");
+            fits = read.has_value();
+        }
+        if (!isDepth) continue;
+        if (fits && options.pixels)
+            counts.add(page.depth, header.atlas.rectangles, t.page);
+        else
+            allDepth = false;
+    }
+    if (allDepth) counts.report(findings);
+}
+
+}  // namespace
+
+std::vector<Finding> validate(const Atlas& atlas) {
+    Findings findings;
+    checkViewHeaders(atlas.views, findings);
+    const int textures = atlas.textureCount();
+    if (textures > 4) findings.add(5003, "", fmt::format("{} textures", textures), "at most 4");
+    const glm::ivec2 size(atlas.width(), atlas.height());
+    for (std::size_t p = 0; p < atlas.pages.size(); ++p) {
+        const AtlasPage& page = atlas.pages[p];
+        const auto fits = [&](const auto& image) {
+            return image.width() == 0 || glm::ivec2(image.width(), image.height()) == size;
+        };
+        if (page.depth.size() != size || !fits(page.texture) || !fits(page.normal) ||
+            !fits(page.splatU) || !fits(page.splatV))
+            findings.add(5004, fmt::format("page {}", p), "textures of several sizes",
+                         sizeText(size.x, size.y));
+    }
+    auto rectangles = atlas.rectangles;
+    checkRectangles(atlas.views, static_cast<int>(atlas.pages.size()), size, rectangles, findings);
+    OutsideCounts counts(atlas.views);
+    for (std::size_t p = 0; p < atlas.pages.size(); ++p)
+        if (atlas.pages[p].depth.size() == size)
+            counts.add(atlas.pages[p].depth, rectangles, static_cast<int>(p));
+    counts.report(findings);
+    return findings.list;
+}
+
+Result<std::vector<Finding>> validateAtlasFile(const std::filesystem::path& path,
+                                               const ValidateOptions& options, Job& job) {
+    auto header = readAtlasHeader(path, job.limits, AtlasChecks::format);
+    if (!header) return unreadable(header.error());
+    Findings findings;
+    checkViewHeaders(header->atlas.views, findings);
+    if (header->textures.size() > 4)
+        findings.add(5003, "", fmt::format("{} textures", header->textures.size()), "at most 4");
+    checkRectangles(header->atlas.views, header->pages, {header->pageWidth, header->pageHeight},
+                    header->atlas.rectangles, findings);
+    checkTextures(path, *header, options, job, findings);
+    return findings.list;
+}
+
+}  // namespace stx

@@ -1,0 +1,122 @@
+#include <cassert>
+#include <cmath>
+
+#include "formats/validate/findings.hpp"
+
+namespace stx {
+
+void Findings::add(int rule, std::string where, std::string found, std::string expected) {
+    const Rule* known = findRule(rule);
+    assert(known);
+    list.push_back({known, std::move(where), std::move(found), std::move(expected)});
+}
+
+Result<std::vector<Finding>> unreadable(const Error& error) {
+    if (error.code == ErrorCode::io) return tl::unexpected(error);
+    Findings findings;
+    findings.add(1001, "", error.text(), "a file that can be read");
+    return findings.list;
+}
+
+std::string sizeText(int width, int height) {
+    return fmt::format("{}x{}", width, height);
+}
+
+std::string viewText(std::size_t index, const std::string& name) {
+    return fmt::format("view {} '{}'", index, name);
+}
+
+void checkVectors(const ReferenceView& view, const std::string& where, Findings& findings) {
+    if (!view.hasNormals()) return;
+    std::int64_t count = 0, away = 0;
+    for (int y = 0; y < view.depth.height(); ++y) {
+        for (int x = 0; x < view.depth.width(); ++x) {
+            const glm::vec3 n = view.normal.at(x, y);
+            if (!hasPoint(view.depth.at(x, y)) || n == glm::vec3(0)) continue;
+            ++count;
+            const glm::dvec3 towards = -view.camera.viewDirection(x + 0.5, y + 0.5);
+            // Edge-on normals are rounded to either side.
+            if (glm::dot(glm::dvec3(n), towards) < -0.05) ++away;
+        }
+    }
+    if (away * 10 > count)
+        findings.add(6008, where, fmt::format("{} of {} normals point away from it", away, count),
+                     "normals that point to the viewer");
+}
+
+void checkViewHeader(const ReferenceView& view, const std::string& where, Findings& findings) {
+    const Camera& c = view.camera;
+    bool finite = std::isfinite(view.nearPlane) && std::isfinite(view.farPlane);
+    for (const double v :
+         {c.position.x, c.position.y, c.position.z, c.orientation.w, c.orientation.x,
+          c.orientation.y, c.orientation.z, c.fx, c.fy, c.cx, c.cy})
+        finite = finite && std::isfinite(v);
+    if (!finite) {
+        findings.add(3005, where, "a value that is not finite in its camera", "finite numbers");
+    } else if (!(c.fx > 0 && c.fy > 0)) {
+        findings.add(3003, where, fmt::format("focal lengths {:g} and {:g}", c.fx, c.fy),
+                     "both above 0");
+    } else if (const auto ok = c.check(); !ok) {
+        findings.add(3005, where, ok.error().message, "a camera");
+    }
+    if (!(view.nearPlane < view.farPlane))
+        findings.add(3001, where,
+                     fmt::format("nearPlane {} and farPlane {}", view.nearPlane, view.farPlane),
+                     "nearPlane < farPlane");
+    if (view.nearPlane < 0)
+        findings.add(3002, where, fmt::format("nearPlane {}", view.nearPlane), "0 or more");
+    if (view.depthBits != 8 && view.depthBits != 16 && view.depthBits != 32)
+        findings.add(4011, where, fmt::format("depth of {} bits", view.depthBits),
+                     "8, 16 or 32 (floats)");
+}
+
+std::int64_t checkViewImages(const ReferenceView& view, const std::string& where,
+                             Findings& findings) {
+    const glm::ivec2 size(view.camera.width, view.camera.height);
+    if (view.depth.size() != size || view.texture.width() != size.x ||
+        view.texture.height() != size.y) {
+        findings.add(4001, where,
+                     fmt::format("depth {}, texture {} and camera {}",
+                                 sizeText(view.depth.width(), view.depth.height()),
+                                 sizeText(view.texture.width(), view.texture.height()),
+                                 sizeText(size.x, size.y)),
+                     "one size");
+        return 0;
+    }
+    for (const auto* image : {&view.normal, &view.splatU, &view.splatV})
+        if (!image->empty() && image->size() != size)
+            findings.add(6001, where, sizeText(image->width(), image->height()),
+                         sizeText(size.x, size.y));
+    if (view.splatU.empty() != view.splatV.empty())
+        findings.add(6003, where, "one of splatU and splatV", "both or neither");
+    // Planes are rounded when they are written; a code's half step covers that.
+    const double slack = (view.farPlane - view.nearPlane) * 1e-4;
+    std::int64_t points = 0, outside = 0;
+    for (const float d : view.depth.pixels()) {
+        if (std::isinf(d) && d > 0) continue;
+        ++points;
+        if (!(d >= 0 && d >= view.nearPlane - slack && d <= view.farPlane + slack)) ++outside;
+    }
+    if (points == 0) findings.add(4006, where, "no point", "one point at least");
+    if (outside > 0)
+        findings.add(4030, where,
+                     fmt::format("{} of {} distances outside {} to {}", outside, points,
+                                 view.nearPlane, view.farPlane),
+                     "distances between the planes");
+    if (view.normal.size() == size && view.camera.check()) checkVectors(view, where, findings);
+    return points;
+}
+
+std::vector<Finding> validate(const Bundle& bundle) {
+    Findings findings;
+    std::int64_t points = 0;
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        const std::string where = viewText(i, bundle.views[i].name);
+        checkViewHeader(bundle.views[i], where, findings);
+        points += checkViewImages(bundle.views[i], where, findings);
+    }
+    if (points == 0) findings.add(4007, "", "no point in any view", "points");
+    return findings.list;
+}
+
+}  // namespace stx

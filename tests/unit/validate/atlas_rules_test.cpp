@@ -1,0 +1,205 @@
+// The rules on atlases: in memory, in folders, and in OpenEXR files whose index is changed.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "formats/atlas/atlas_files.hpp"
+#include "formats/images/images.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/atlas/small_atlas.hpp"
+#include "tests/unit/validate/numbers.hpp"
+
+namespace stx {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Two views on one page, with the same planes so that one fits the other's points.
+Atlas goodAtlas() {
+    Atlas atlas = smallAtlas(2, 32, false, false);
+    for (ReferenceView& view : atlas.views) {
+        view.nearPlane = 0.0625;
+        view.farPlane = 5.5;
+    }
+    return atlas;
+}
+
+TEST(ValidateAtlas, atlasesInMemoryKeepTheRules) {
+    const Atlas good = goodAtlas();
+    EXPECT_TRUE(validate(good).empty()) << textOf(validate(good));
+    Atlas atlas = good;
+    atlas.rectangles[1].atlasX = atlas.rectangles[0].atlasX;
+    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5002});
+    atlas = good;
+    atlas.rectangles[1].atlasX = atlas.width();
+    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5001});
+    atlas = good;
+    atlas.pages[0].texture = Texture(Rgba8Image(10, 10));
+    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5004});
+    atlas = good;
+    atlas.pages.resize(3, atlas.pages[0]);
+    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5003}) << textOf(validate(atlas));
+    atlas = good;
+    atlas.views[0].farPlane = -1;
+    atlas.views[1].nearPlane = -1;
+    EXPECT_EQ(numbersOf(validate(atlas)), (Numbers{3001, 3002, 4030})) << textOf(validate(atlas));
+    atlas = good;
+    for (float& d : atlas.pages[0].depth.pixels()) d = kNoDepth;
+    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{4007});
+}
+
+std::string textOfFile(const fs::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+}
+
+/// The text with the first `from` replaced.
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    const auto at = text.find(from);
+    if (at == std::string::npos) ADD_FAILURE() << from << " is not in\n" << text;
+    return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+/// What the index of an atlas of two views and one page says after a change.
+struct Sample {
+    Numbers numbers;
+    std::string from, to;
+};
+const std::vector<Sample>& samples() {
+    static const std::vector<Sample> all = {
+        {{3002}, "\"nearPlane\":", "\"nearPlane\":-"},
+        {{3003}, "\"fx\":", "\"fx\":-"},
+        {{3005}, "\"quaternion\":[", "\"quaternion\":[5"},
+        {{5001}, "\"atlasX\":", "\"atlasX\":99999"},
+        {{5001}, "\"viewX\":", "\"viewX\":-7"},
+        {{5001}, "\"view\":1", "\"view\":2"},
+        {{5001}, "\"page\":0,\"viewX\"", "\"page\":1,\"viewX\""},
+    };
+    return all;
+}
+
+TEST(ValidateAtlas, everyRuleIsReportedOfAFolder) {
+    const TemporaryFolder folder;
+    const auto path = folder / "atlas";
+    Job job;
+    const Atlas good = goodAtlas();
+    ASSERT_TRUE(writeAtlas(good, path, job));
+    const std::string index = textOfFile(path / "atlas.json");
+    const auto numbersWith = [&](const std::string& text, const ValidateOptions& options = {}) {
+        std::ofstream(path / "atlas.json", std::ios::binary) << text;
+        const auto findings = validateFile(path, options, job);
+        EXPECT_TRUE(findings) << findings.error().text();
+        return numbersOf(findings);
+    };
+    EXPECT_EQ(numbersWith(index), Numbers{});
+    for (const Sample& s : samples()) {
+        EXPECT_EQ(numbersWith(replaced(index, s.from, s.to)), s.numbers) << s.to;
+        EXPECT_EQ(numbersWith(replaced(index, s.from, s.to), {false}), s.numbers) << s.to;
+    }
+    // The second rectangle over the first one.
+    const auto x = [&](int i) { return fmt::format("\"atlasX\":{},", good.rectangles[i].atlasX); };
+    EXPECT_EQ(numbersWith(replaced(index, x(1), x(0))), Numbers{5002});
+    // farPlane before nearPlane, and so before the points.
+    EXPECT_EQ(numbersWith(replaced(index, "\"farPlane\":5.5", "\"farPlane\":0.03125")),
+              (Numbers{3001, 4030}));
+    EXPECT_EQ(numbersWith(replaced(index, "\"depthBits\":32", "\"depthBits\":12")), Numbers{4011});
+    // Several at once.
+    EXPECT_EQ(numbersWith(replaced(replaced(index, "\"fx\":", "\"fx\":-"), x(1), x(0))),
+              (Numbers{3003, 5002}));
+    EXPECT_EQ(numbersWith("{ \"version\": 1 }"), Numbers{1001});
+}
+
+TEST(ValidateAtlas, fiveTexturesOnTwoPagesAreTooMany) {
+    const TemporaryFolder folder;
+    const auto path = folder / "atlas";
+    Job job;
+    ASSERT_TRUE(writeAtlas(smallAtlas(2, 16, true, false), path, job));
+    std::string index = textOfFile(path / "atlas.json");
+    // Colour and depth of page 1 are those of page 0 again.
+    const auto lineOf = [&](const std::string& attribute) {
+        const auto at = index.find("{\"attribute\":\"" + attribute);
+        return index.substr(at, index.find('}', at) + 1 - at);
+    };
+    const auto onPage1 = [](const std::string& line) {
+        return replaced(line, "\"page\":0", "\"page\":1");
+    };
+    const std::string colour = lineOf("colour"), depth = lineOf("depth");
+    index = replaced(index, colour, colour + "," + onPage1(colour) + "," + onPage1(depth));
+    index = replaced(index, "\"pages\": 1", "\"pages\": 2");
+    std::ofstream(path / "atlas.json", std::ios::binary) << index;
+    const auto findings = validateFile(path, {}, job);
+    EXPECT_EQ(numbersOf(findings), Numbers{5003}) << textOf(findings);
+    EXPECT_NE(textOf(findings).find("6 textures"), std::string::npos);
+}
+
+TEST(ValidateAtlas, imagesOfAFolderHaveTheSizeOfThePage) {
+    const TemporaryFolder folder;
+    const auto path = folder / "atlas";
+    Job job;
+    ASSERT_TRUE(writeAtlas(smallAtlas(2, 16, false, false), path, job));
+    const std::vector<std::uint8_t> small(4 * 3 * 4, 9);
+    ASSERT_TRUE(writeFile(path / "colour.png", *encodePng(4, 3, 4, 8, small.data(), true)));
+    EXPECT_EQ(numbersOf(validateFile(path, {}, job)), Numbers{5004});
+    EXPECT_EQ(numbersOf(validateFile(path, {false}, job)), Numbers{5004});
+    EXPECT_EQ(numbersOf(validateFile(path / "atlas.json", {}, job)), Numbers{5004});
+    fs::remove(path / "depth.png");
+    EXPECT_EQ(numbersOf(validateFile(path, {}, job)), (Numbers{4005, 5004}));
+    std::ofstream(path / "depth.png") << "no image";
+    EXPECT_EQ(numbersOf(validateFile(path, {}, job)), (Numbers{4005, 5004}));
+}
+
+/// An atlas of one part with that index and depth.
+void writeExrAtlas(const fs::path& path, const std::string& index, const Image<float>& depth) {
+    ExrPart part;
+    part.width = part.displayWidth = depth.width();
+    part.height = part.displayHeight = depth.height();
+    part.attributes["stx:kind"] = std::string("atlas");
+    part.attributes["stx:atlas"] = index;
+    const std::vector<float> ones(depth.count(), 1.0f);
+    std::vector<ExrConstPixels> pixels;
+    for (const std::string name : {"R", "G", "B", "A", "Z"}) {
+        part.channels.push_back({name});
+        pixels.push_back({name, name == "Z" ? depth.data() : ones.data()});
+    }
+    auto file = OutputFile::create(path);
+    ASSERT_TRUE(file);
+    auto writer = ExrWriter::create(*file, {part});
+    ASSERT_TRUE(writer) << writer.error().text();
+    ASSERT_TRUE(writer->writePart(0, pixels));
+    ASSERT_TRUE(writer->finish());
+    ASSERT_TRUE(file->commit());
+}
+
+TEST(ValidateAtlas, everyRuleIsReportedOfAnExrFile) {
+    const TemporaryFolder folder;
+    const auto path = folder / "atlas.exr";
+    Job job;
+    const Atlas good = goodAtlas();
+    ASSERT_TRUE(writeAtlas(good, path, job));
+    EXPECT_EQ(numbersOf(validateFile(path, {}, job)), Numbers{});
+    std::string index;
+    {
+        const auto reader = ExrReader::open(path, job.limits);
+        ASSERT_TRUE(reader);
+        index = *reader->parts()[0].attribute<std::string>("stx:atlas");
+    }
+    const Image<float>& depth = good.pages[0].depth;
+    for (const Sample& s : samples()) {
+        writeExrAtlas(path, replaced(index, s.from, s.to), depth);
+        const auto findings = validateFile(path, {}, job);
+        EXPECT_EQ(numbersOf(findings), s.numbers) << s.to << "\n" << textOf(findings);
+    }
+    Image<float> nan = depth;
+    const AtlasRectangle& r = good.rectangles[0];
+    nan.at(r.atlasX, r.atlasY) = std::numeric_limits<float>::quiet_NaN();
+    writeExrAtlas(path, index, nan);
+    EXPECT_EQ(numbersOf(validateFile(path, {}, job)), Numbers{4030});
+    EXPECT_FALSE(readAtlas(path, job));  // opening still refuses it
+    writeExrAtlas(path, index, Image<float>(7, 5, 1.0f));
+    EXPECT_EQ(numbersOf(validateFile(path, {}, job)), Numbers{5004});
+}
+
+}  // namespace
+}  // namespace stx
