@@ -3,9 +3,7 @@
 
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
-#include "formats/open.hpp"
-#include "lib/capture/capture.hpp"
-#include "lib/render/mesh/mesh_renderer.hpp"
+#include "formats/stx/stx.hpp"
 #include "lib/render/renderer.hpp"
 #include "tools/camera_options.hpp"
 #include "tools/frame_writer.hpp"
@@ -163,19 +161,17 @@ Result<int> render(const RenderOptions& o, Program& program) {
     STX_CHECK(FrameWriter::check(writing));
 
     preloadCodecs(o.input);
-    STX_TRY(auto opened, openRenderable(o.input, o.open, program.job));
+    STX_TRY(auto model, stx::open(o.input, o.open, program.job));
     CameraContext context;
     std::int64_t points = 0;
-    std::unique_ptr<Renderer> renderer;
-    if (const auto* mesh = std::get_if<Mesh>(&opened)) {
-        STX_CHECK(mesh->check());
-        context.bounds = mesh->bounds();
-    } else {
-        const auto& bundle = std::get<Bundle>(opened);
-        context.bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
-        for (const auto& v : bundle.views) context.views.push_back(v.camera);
-        points = bundle.pointCount();
-    }
+    const auto addViews = [&](const auto& seen) {
+        for (const auto& v : seen.views) context.views.push_back(v.camera);
+        points = seen.pointCount();
+    };
+    if (const auto* mesh = std::get_if<Mesh>(&model)) STX_CHECK(mesh->check());
+    if (const auto* bundle = std::get_if<Bundle>(&model)) addViews(*bundle);
+    if (const auto* atlas = std::get_if<Atlas>(&model)) addViews(*atlas);
+    context.bounds = boundsOf(model);
     STX_TRY(const auto cameras, makeCameras(o.camera, context, program));
     STX_CHECK(checkFrames(o, static_cast<int>(cameras.size()), program));
     for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -184,12 +180,8 @@ Result<int> render(const RenderOptions& o, Program& program) {
         STX_CHECK(program.job.limits.checkAllocation(
             static_cast<std::uint64_t>(cameras[i].width) * cameras[i].height, 64, "the picture"));
     }
-    if (const auto* mesh = std::get_if<Mesh>(&opened)) {
-        renderer = makeMeshRenderer(*mesh, settings, program.job);
-    } else {
-        STX_TRY(renderer, makeRenderer(backendOf(o.backend), std::get<Bundle>(opened), settings,
-                                       o.device, program.job));
-    }
+    STX_TRY(const auto renderer,
+            rendererOf(std::move(model), settings, program.job, backendOf(o.backend), o.device));
     program.sayNotes();
 
     FrameWriter writer(writing, program.job);

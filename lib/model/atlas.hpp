@@ -67,12 +67,14 @@ struct Atlas {
 
     [[nodiscard]] int width() const { return pages.empty() ? 0 : pages[0].depth.width(); }
     [[nodiscard]] int height() const { return pages.empty() ? 0 : pages[0].depth.height(); }
+    /// Pixels of rectangles that are points of the object.
+    [[nodiscard]] std::int64_t pointCount() const;
     /// Textures in all pages together, at most 4.
     [[nodiscard]] int textureCount() const;
     /// Share of the page area that rectangles cover, without padding, 0..1.
     [[nodiscard]] double used() const;
-    /// Each rectangle has this many texels of padding on each side to itself, or as many as its view
-    /// has pixels there. The atlas must pass check().
+    /// Each rectangle has this many texels of padding on each side to itself, or as many as its
+    /// view has pixels there. The atlas must pass check().
     [[nodiscard]] bool paddingHolds(int texels) const;
     /// Errors when a rectangle leaves its view or page, two overlap, or sizes disagree.
     [[nodiscard]] Result<void> check() const;
