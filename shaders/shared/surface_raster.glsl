@@ -45,22 +45,10 @@ void fillQuad(vec4 a, vec4 b, vec4 c, vec4 d, float grow, uint flags) {
          vec2(low) - grow, vec2(high) + grow, flags);
 }
 
-void fillTriangle(vec4 a, vec4 b, vec4 c, uint flags) {
-    if (a.w + b.w + c.w < 3.0f) return;
-    vec4 ab = b - a, ac = c - a;
-    float area = ab.x * ac.y - ab.y * ac.x;
-    if (!(area > 0.0f)) return;
-    float px = (ab.z * ac.y - ab.y * ac.z) / area, py = (ab.x * ac.z - ab.z * ac.x) / area;
-    vec4 middle = (a + b + c) / 3.0f;
-    vec4 xs = vec4(a.x, b.x, c.x, 0.0f), ys = vec4(a.y, b.y, c.y, 0.0f);
-    vec4 ex = vec4(a.y - b.y, b.y - c.y, c.y - a.y, 0.0f), ey = vec4(b.x - a.x, c.x - b.x, a.x - c.x, 0.0f);
-    vec4 e0 = kCrack * (abs(ex) + abs(ey)) - (ex * xs + ey * ys);
-    vec4 low = min(min(a, b), c), high = max(max(a, b), c);
-    scan(ex, ey, e0, vec3(px, py, middle.z - px * middle.x - py * middle.y), low.z, high.z,
-         vec2(low) - kCrack, vec2(high) + kCrack, flags);
-}
+// A quad whose last corner is its first again: that edge holds everywhere, the plane is the same.
+void fillTriangle(vec4 a, vec4 b, vec4 c, uint flags) { fillQuad(a, b, c, a, kCrack, flags); }
 
-// A cell that is no leaf, by its shape; the corners clockwise from the upper left.
+// A cell that is not of a leaf, by its shape; the corners clockwise from the upper left.
 void drawCell(uint shape, vec4 a, vec4 b, vec4 c, vec4 d, uint flags) {
     if (shape == kQuadCell) {
         fillQuad(a, b, c, d, kCrack, flags);

@@ -146,7 +146,7 @@ Drawn drawVectors(const Inputs& in) {
     source.rgba8 = reinterpret_cast<const std::uint8_t*>(in.colour.data());
     source.slopes = in.slopes.data();
     source.sizes = in.sizes.data();
-    source.width = kBlock;
+    source.stride = kBlock;
     source.fx = static_cast<float>(in.view.fx);
     source.fy = static_cast<float>(in.view.fy);
     source.map = in.map;
