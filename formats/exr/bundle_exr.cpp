@@ -103,14 +103,6 @@ bool hasVectors(const ExrPart& part, const std::string& name) {
     return part.channel(name + ".X") && part.channel(name + ".Y") && part.channel(name + ".Z");
 }
 
-std::uint64_t bytesOfView(const ExrPart& part, bool linear) {
-    std::uint64_t each = (linear ? 16 : 4) + 4;
-    for (const char* name : {"N", "splatU", "splatV"}) {
-        if (hasVectors(part, name)) each += 12;
-    }
-    return each * static_cast<std::uint64_t>(part.width) * part.height;
-}
-
 /// Distances of other programs' files, and planes that hold them.
 void adoptForeignDepth(ReferenceView& view) {
     float nearest = kNoDepth, farthest = 0.0f;
@@ -163,6 +155,14 @@ Result<void> checkExrKind(const ExrReader& reader) {
         return failAt(reader.where(), ErrorCode::invalidInput, "it holds an stx '{}', not a bundle",
                       *kind);
     return {};
+}
+
+std::uint64_t exrViewBytes(const ExrReader& reader, const ExrPart& part) {
+    std::uint64_t each = (isLinearExr(reader) ? 16 : 4) + 4;
+    for (const char* name : {"N", "splatU", "splatV"}) {
+        if (hasVectors(part, name)) each += 12;
+    }
+    return each * static_cast<std::uint64_t>(part.width) * part.height;
 }
 
 Result<void> readExrView(const ExrReader& reader, int index, const ExrPart& part,
@@ -286,7 +286,7 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     std::uint64_t total = 0;
     for (const int i : parts) {
         STX_CHECK(reader.checkPlausible(i));
-        total += bytesOfView(reader.parts()[i], header.linear);
+        total += exrViewBytes(reader, reader.parts()[i]);
     }
     if (auto ok = job.limits.checkAllocation(total, 1, "the views"); !ok)
         return tl::unexpected(ok.error().at(reader.where()));

@@ -70,6 +70,8 @@ struct ExrBundleHeader {
 [[nodiscard]] bool isExrBundle(const ExrReader& reader);
 /// Parts that are views: all of ours, and those of other programs with Z and a camera.
 [[nodiscard]] std::vector<int> exrViewParts(const ExrReader& reader);
+/// Memory that the images of a view take.
+[[nodiscard]] std::uint64_t exrViewBytes(const ExrReader& reader, const ExrPart& part);
 /// Reads the images of part `index` into a view without any check of what is in them. Only channels
 /// that `part` lists are read: the part's own header, or a copy with fewer channels.
 [[nodiscard]] Result<void> readExrView(const ExrReader& reader, int index, const ExrPart& part,

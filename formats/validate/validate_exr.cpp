@@ -76,9 +76,7 @@ Result<std::vector<Finding>> validateExrFile(const std::filesystem::path& path,
         if (!checkChannels(part, where, findings)) allRead = false;
         if (!options.pixels || !part.channel("Z")) continue;
         auto read = reader->checkPlausible(at);
-        const auto count = static_cast<std::uint64_t>(part.width) * part.height;
-        // Colour as floats, depth, and at most three vectors.
-        if (read) read = job.limits.checkAllocation(count, 2 * 16 + 4 + 3 * 12, "the view");
+        if (read) read = job.limits.checkAllocation(exrViewBytes(*reader, part), 1, "the images");
         if (read) read = readExrView(*reader, at, part, *view);
         if (!read) {
             findings.add(4005, where, read.error().message, "pixels that can be decoded");
