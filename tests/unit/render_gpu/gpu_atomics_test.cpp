@@ -14,8 +14,11 @@ struct Kind {
     Sums sums;
     bool linear;
 };
+void PrintTo(const Kind& kind, std::ostream* out) {
+    *out << kind.name;
+}
 
-/// The picture and what it was added up with. Without `kind` the driver is left to its own.
+/// A picture and what it was added up with.
 struct Drawn {
     Frame frame;
     Sums sums = Sums::integers;

@@ -16,6 +16,9 @@ struct Way {
     RenderMode mode;
     GpuPipeline pipeline;
 };
+void PrintTo(const Way& way, std::ostream* out) {
+    *out << way.name;
+}
 
 class GpuRenderers : public testing::TestWithParam<Way> {
   protected:
