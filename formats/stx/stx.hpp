@@ -34,6 +34,7 @@
 #include <vector>
 
 #include "formats/stx/options.hpp"
+#include "formats/validate/validate.hpp"
 #include "lib/base/job.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/metrics/compare.hpp"
@@ -75,20 +76,8 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 [[nodiscard]] Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
-/// A rule that a file breaks.
-struct BrokenRule {
-    int number = 0;        ///< 1xxx file, 2xxx container, 3xxx camera, 4xxx depth, 5xxx atlas, 6xxx
-                           ///< normal and splat; never used again for something else
-    bool isError = false;  ///< readers cannot show the file; false: a warning
-    std::string clause;    ///< of the standard, or of this project's conventions
-    std::string summary;   ///< what must hold
-    std::string where;     ///< the view, stream or box; may be empty
-    std::string found, expected;
-};
-
-/// Every rule that a bundle's or an atlas's file breaks, in its order; empty when it breaks none.
-/// Looks at every pixel. Errors: io; invalidInput for meshes and image sets.
-[[nodiscard]] Result<std::vector<BrokenRule>> validate(const std::filesystem::path& path, Job& job);
+// validateFile(path, ValidateOptions, Job&)   every rule that a bundle or an atlas breaks
+// is declared in the headers above.
 
 // ---- Bundles ----
 
