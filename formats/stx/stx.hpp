@@ -34,6 +34,7 @@
 #include <vector>
 
 #include "formats/stx/options.hpp"
+#include "formats/validate/validate.hpp"
 #include "lib/base/job.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/metrics/compare.hpp"
@@ -75,20 +76,8 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 [[nodiscard]] Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
-/// A rule that a file breaks.
-struct BrokenRule {
-    int number = 0;        ///< 1xxx file, 2xxx container, 3xxx camera, 4xxx depth, 5xxx atlas, 6xxx
-                           ///< normal and splat; never used again for something else
-    bool isError = false;  ///< readers cannot show the file; false: a warning
-    std::string clause;    ///< of the standard, or of this project's conventions
-    std::string summary;   ///< what must hold
-    std::string where;     ///< the view, stream or box; may be empty
-    std::string found, expected;
-};
-
-/// Every rule that a bundle's or an atlas's file breaks, in its order; empty when it breaks none.
-/// Looks at every pixel. Errors: io; invalidInput for meshes and image sets.
-[[nodiscard]] Result<std::vector<BrokenRule>> validate(const std::filesystem::path& path, Job& job);
+// validateFile(path, ValidateOptions, Job&)   every rule that a bundle or an atlas breaks
+// is declared in the headers above.
 
 // ---- Bundles ----
 
@@ -98,17 +87,17 @@ struct ConvertSettings {
     std::string views = "sphere:16";
     /// The views themselves, when there are any: then neither `views` nor the framing below, from
     /// width to elevationRad, counts.
-    std::vector<Camera> cameras;
+    std::vector<Camera> cameras{};
     int width = 512, height = 512;             ///< pixels of each view
-    std::optional<bool> orthographic;          ///< without a value: only the faces of a cube are
+    std::optional<bool> orthographic{};        ///< without a value: only the faces of a cube are
     double fovRad = glm::radians(35.0);        ///< the angle that the whole object fills
     double elevationRad = glm::radians(15.0);  ///< of a ring above the horizon
     int supersampling = 4;                     ///< colour samples per pixel and axis, 1..8
     bool meshNormals = false;                  ///< keeps the mesh's own normals (SimpleTextureV2)
-    std::string title;                         ///< of the bundle
+    std::string title{};                       ///< of the bundle
     /// 8, 16 or 32 (float distances, only .exr holds them). Without a value meshes get 16 and
     /// bundles keep theirs.
-    std::optional<int> depthBits;
+    std::optional<int> depthBits{};
 };
 
 /// Captures a mesh from all sides; takes the views out of an atlas; gives a bundle the depth bits
@@ -178,10 +167,10 @@ struct Picture {
 struct PictureOptions {
     /// Put behind the picture, sRGB-coded 0..1. Without it PNG and EXR keep their alpha, and JPEG
     /// has black behind.
-    std::optional<glm::vec3> background;
-    int jpegQuality = 92;          ///< 1..100
-    bool noClobber = false;        ///< error (io) when the target exists
-    std::optional<Camera> camera;  ///< OpenEXR: goes into its standard attributes
+    std::optional<glm::vec3> background{};
+    int jpegQuality = 92;            ///< 1..100
+    bool noClobber = false;          ///< error (io) when the target exists
+    std::optional<Camera> camera{};  ///< OpenEXR: goes into its standard attributes
 };
 
 /// Writes a picture, whole or not at all, as .png or .jpg (8-bit sRGB) or .exr (linear, with depth,

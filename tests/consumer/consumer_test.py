@@ -18,7 +18,7 @@ import tempfile
 
 # Development files that a user of the library needs not have.
 UNNEEDED = ["OpenEXR", "Imath", "assimp", "draco", "tbb", "oneapi", "hwy", "epoxy", "nlohmann", "pugixml.hpp",
-            "CLI", "OpenImageIO", "EGL", "GL"]
+            "CLI", "OpenImageIO", "EGL", "GL", "spng.h", "jpeglib.h"]
 EXPECTED = ["bin/stx", "include/stx/stx.hpp", "share/man/man1/stx.1", "share/bash-completion/completions/stx",
             "share/zsh/vendor-completions/_stx", "share/fish/vendor_completions.d/stx.fish",
             "share/stx/schemas/info.schema.json", "share/stx/schemas/atlas.schema.json",

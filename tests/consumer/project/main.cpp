@@ -35,7 +35,8 @@ int main(int argc, char** argv) {
     auto bundle = valueOf(stx::convert(valueOf(stx::open(argv[1], {}, job)), settings, job));
     valueOf(stx::bake(bundle, {}, job));
     valueOf(stx::save(bundle, "library.exr", {}, job));
-    require(valueOf(stx::validate("library.exr", job)).empty(), "library.exr breaks a rule");
+    require(valueOf(stx::validateFile("library.exr", {}, job)).empty(),
+            "library.exr breaks a rule");
 
     const auto atlas = valueOf(stx::pack(bundle, {}, job));
     require(atlas.textureCount() <= 4, "more than four textures");

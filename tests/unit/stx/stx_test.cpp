@@ -151,7 +151,7 @@ TEST(Stx, OpensAndValidatesWhatItSaved) {
     const TemporaryFolder folder;
     const auto bundle = smallBundle(2, 16, false, false);
     ASSERT_TRUE(save(bundle, folder / "a.exr", {}, job));
-    EXPECT_TRUE(validate(folder / "a.exr", job)->empty());
+    EXPECT_TRUE(validateFile(folder / "a.exr", {}, job)->empty());
     const auto opened = open(folder / "a.exr", {}, job);
     ASSERT_TRUE(opened) << opened.error().text();
     EXPECT_EQ(differenceOf(std::get<Bundle>(*opened), bundle), "");
@@ -164,7 +164,7 @@ TEST(Stx, OpensAndValidatesWhatItSaved) {
 
     ASSERT_TRUE(save(*pack(bundle, {}, job), folder / "atlas", {}, job));
     EXPECT_TRUE(std::holds_alternative<Atlas>(*open(folder / "atlas", {}, job)));
-    EXPECT_TRUE(validate(folder / "atlas", job)->empty());
+    EXPECT_TRUE(validateFile(folder / "atlas", {}, job)->empty());
 }
 
 TEST(Stx, ComparesPicturesOfFloatsAndOfBytes) {
