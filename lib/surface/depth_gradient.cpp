@@ -29,7 +29,7 @@ double codedStep(const ReferenceView& view) {
     return points > 0 && onStep * 20 >= points * 19 ? code.step() : 0;
 }
 
-/// One pixel of a fitting window and the pixels through which it hangs together with the centre.
+/// One pixel of a fitting window and the pixels through which it is linked with the centre.
 struct Tap {
     int dx, dy;
     float weight;
@@ -65,7 +65,7 @@ struct Plane {
     double w = 0, gx = 0, gy = 0;
 };
 
-/// Weighted plane through the pixels of the window that hang together with its centre by links.
+/// Weighted plane through the pixels of the window that are linked with its centre.
 /// False when they do not span a plane.
 bool fitPlane(const Image<float>& w, const Image<std::uint8_t>& links,
               const std::vector<Tap>& window, int x, int y, Plane& plane) {

@@ -60,7 +60,7 @@ void fillTriangle(vec4 a, vec4 b, vec4 c, uint flags) {
          vec2(low) - kCrack, vec2(high) + kCrack, flags);
 }
 
-// A cell that is no leaf, by its shape; the corners clockwise from the upper left.
+// A cell that is not a leaf, by its shape; the corners clockwise from the upper left.
 void drawCell(uint shape, vec4 a, vec4 b, vec4 c, vec4 d, uint flags) {
     if (shape == kQuadCell) {
         fillQuad(a, b, c, d, kCrack, flags);
