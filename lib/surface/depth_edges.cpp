@@ -11,6 +11,7 @@
 namespace stx {
 namespace {
 
+// Chosen by trial on the project's image sets.
 /// A jump of this share of the nearer distance is an edge.
 constexpr float kEdge = 0.01f;
 /// Edges are moved by a pixel a round.
