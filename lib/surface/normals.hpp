@@ -27,8 +27,8 @@ struct BakeSettings {
 /// The splat is the ellipse { P + u U + v V : u^2 + v^2 <= 1 } in the tangent plane: U and V follow
 /// the image's x and y axes on the surface (conjugate half axes), each half a sample step times
 /// sqrt(2), so that the ellipse passes through the corners of its pixel's footprint and just closes
-/// the lattice. Where the surface is nearly edge-on they are held to kMaxSplatTilt times their length
-/// on a surface that faces the camera.
+/// the lattice. Where the surface is nearly edge-on they are held to kMaxSplatTilt times their
+/// length on a surface that faces the camera.
 ///
 /// Errors: a bundle that fails check(), settings out of range, cancelled, memory over the limit.
 [[nodiscard]] Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job);
