@@ -163,8 +163,7 @@ class Reader {
 
 constexpr double kAnyInt = 2147483647.0;
 
-Result<void> readView(const Reader& r, const Limits& limits, bool prunedByCount,
-                      ReferenceView& v) {
+Result<void> readView(const Reader& r, const Limits& limits, bool prunedByCount, ReferenceView& v) {
     Camera& c = v.camera;
     std::array<double, 3> position{};
     std::array<double, 4> q{};

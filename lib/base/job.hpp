@@ -27,7 +27,7 @@ struct Limits {
                                                std::string_view what) const;
 };
 
-/// What a caller gives to every longer operation: limits, a place for remarks, progress,
+/// What a caller gives to every longer operation: limits, a place for notes, progress,
 /// cancelling. Safe to use from several threads.
 class Job {
   public:

@@ -77,7 +77,7 @@ float pointRadius(const Mesh& mesh) {
     // Irregular scans: most gaps are closed by the distance that nine in ten points stay under.
     const auto at = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
     std::nth_element(distances.begin(), at, distances.end());
-    // A handful of points is no surface: they stay dots.
+    // A handful of points does not make a surface: they stay dots.
     return static_cast<float>(std::min(*at * std::numbers::sqrt2 * 0.75, size * 0.02));
 }
 

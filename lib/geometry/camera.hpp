@@ -7,7 +7,7 @@
 
 namespace stx {
 
-/// A camera: where it stands and how it maps the scene to pixels.
+/// A camera: where it is and how it maps the scene to pixels.
 ///
 /// Axes (ISO/IEC 14496-11 Viewpoint, VRML, OpenGL): +X right, +Y up, the camera looks along -Z.
 /// Pixels: (0,0) is the top-left corner of the top-left pixel, its centre is (0.5, 0.5), y runs
@@ -83,7 +83,7 @@ struct Camera {
 /// (a hair above for half turns as floats have them).
 /// No rotation is 0 0 1 0, the default of the standard.
 [[nodiscard]] glm::dvec4 axisAngleFromQuat(glm::dquat q);
-/// The inverse; the axis need not be unit. A zero axis is no rotation.
+/// The inverse; the axis need not be unit. A zero axis means no rotation.
 [[nodiscard]] glm::dquat quatFromAxisAngle(glm::dvec4 axisAngle);
 
 }  // namespace stx

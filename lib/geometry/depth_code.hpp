@@ -14,7 +14,7 @@ inline constexpr float kNoDepth = std::numeric_limits<float>::infinity();
 }
 
 /// The depth code of DepthImage (ISO/IEC 14496-16, 4.5.4): d = dmax is nearPlane, d = 1 is
-/// farPlane, d = 0 is no point of the object.
+/// farPlane, d = 0 is not a point of the object.
 struct DepthCode {
     double nearPlane = 10.0;   ///< scene units
     double farPlane = 100.0;   ///< scene units, > nearPlane

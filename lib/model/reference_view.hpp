@@ -29,7 +29,7 @@ struct ReferenceView {
     double farPlane = 100.0;
     /// How the depth is coded in MPEG-4 files: 8 or 16 bits; 32 = float distances, only in .exr.
     int depthBits = 16;
-    /// Pixels of full alpha without a depth were pruned: the object is there, other views tell its
+    /// Pixels of full alpha without a depth were pruned: the object is there, other views give its
     /// distance. In other views they are what a sensor missed.
     bool pruned = false;
 

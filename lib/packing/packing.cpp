@@ -71,7 +71,7 @@ ReferenceView withoutImages(const ReferenceView& view) {
     return v;
 }
 
-/// Pixels that belong to the object: points, and those of full alpha whose distance is not told.
+/// Pixels that belong to the object: points, and those of full alpha without a distance.
 std::int64_t objectPixels(const ReferenceView& view) {
     std::int64_t n = 0;
     for (int y = 0; y < view.depth.height(); ++y) {
@@ -119,7 +119,7 @@ void markShown(const std::vector<ReferenceView>& views, std::size_t of,
     }
 }
 
-/// Pixels of a pruned view that neither rectangles nor padding tell: full alpha where other views
+/// Pixels of a pruned view that neither a rectangle nor padding gives: full alpha where other views
 /// show something, else background.
 void fillPruned(const std::vector<ReferenceView>& views, const Image<std::uint8_t>& told,
                 std::size_t of, Texture& texture) {

@@ -43,8 +43,8 @@ struct PackSettings {
 /// are coloured from the nearest covered ones and are background (alpha 0). When the atlas lacks
 /// pixels of the object (keptPixels < sourcePixels: pruned, or missed by a sensor), those where
 /// points of other views fall have full alpha instead (the object is there, another view gives its
-/// distance), and next to rectangles the padding decides. unpack(pack(b)) == b for points and pixels of partial coverage. Errors: an atlas
-/// that fails check(), memory over the limit.
+/// distance), and next to rectangles the padding decides. unpack(pack(b)) == b for points and
+/// pixels of partial coverage. Errors: an atlas that fails check(), memory over the limit.
 [[nodiscard]] Result<Bundle> unpack(const Atlas& atlas, Job& job);
 
 }  // namespace stx

@@ -74,7 +74,8 @@ void giveAway(std::vector<PruneView>& views, const std::vector<int>& rank,
     }
 }
 
-/// One ring of points around what is kept; returns how many that would be, and adds them when told.
+/// One ring of points around what is kept; returns how many that would be, and adds them when asked
+/// to.
 std::int64_t growBand(std::vector<PruneView>& views, bool apply) {
     std::vector<std::int64_t> added(views.size(), 0);
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
@@ -221,7 +222,7 @@ void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
             if (view.hasSplats()) view.splatU.at(x, y) = view.splatV.at(x, y) = glm::vec3(0);
         }
     }
-    // A silhouette whose points are gone tells nothing any more: points of other views that lie on
+    // A silhouette whose points are gone says nothing any more: points of other views that lie on
     // it must not be taken for empty space, and no second view vouches for them now.
     const auto near = [&](int x, int y, int reach, const auto& is) {
         for (int ny = std::max(0, y - reach); ny <= std::min(height - 1, y + reach); ++ny) {
@@ -291,7 +292,7 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
     STX_CHECK(job.checkCancelled());
     if (countKept(views) > budget) {
         // Coarser and less alike replacements, rather than an object with holes. From the start:
-        // what the first round locked would stand in the way.
+        // what the first round locked would be in the way.
         for (auto& v : views) {
             for (std::size_t k = 0; k < v.kept.count(); ++k)
                 v.kept.pixels()[k] = std::isnan(v.surface.w.pixels()[k]) ? 0 : 1;

@@ -42,9 +42,10 @@ struct PruneReport {
 /// finer or equal rate and agree in colour; or when a view of lower rank shows it finer. What
 /// replaces a pixel is kept for good, so no hole can open.
 ///
-/// A pixel taken away has no depth but full alpha: "the object is here, its distance is not told".
-/// Renderers take no empty space from it. So are the background pixels beside pruned silhouettes.
-/// It keeps its colour next to kept pixels, for filters; farther off the colours are smooth.
+/// A pixel taken away has no depth but full alpha: "the object is here, another view gives its
+/// distance". Renderers take no empty space from it. So are the background pixels beside pruned
+/// silhouettes. It keeps its colour next to kept pixels, for filters; farther off the colours are
+/// smooth.
 ///
 /// Errors: settings out of range; a bundle that fails check(); a budget below what can be kept
 /// without a hole, with that number; cancelled. A pruned bundle gives the same bytes on any number

@@ -24,7 +24,7 @@ struct DepthSample {
 };
 [[nodiscard]] std::optional<DepthSample> sampleDepth(const Image<float>& depth, double x, double y);
 
-/// Where a view's camera stands, ready to be applied to many points.
+/// A view's camera, ready to be applied to many points.
 struct Pose {
     glm::dmat3 worldFromCamera;
     glm::dvec3 position;

@@ -143,7 +143,7 @@ double PoseSystem::solveAndMove(const std::vector<Pair>& pairs,
         return out;
     });
 
-    // A common motion of views that hang together changes no difference: take it out.
+    // A common motion of connected views changes no difference: take it out.
     Vector mean(twist.size(), Twist{});
     std::vector<int> members(twist.size(), 0);
     for (std::size_t i = 0; i < twist.size(); ++i) {

@@ -30,7 +30,7 @@ class PoseSystem {
     /// how it changes when the point moves in the world.
     [[nodiscard]] Twist jacobian(glm::dvec3 point, glm::dvec3 gradient) const;
 
-    /// Solves for the twists of all views and moves their cameras. Views that hang together keep
+    /// Solves for the twists of all views and moves their cameras. Connected views keep
     /// their mean pose. Gives the largest component of a twist.
     double solveAndMove(const std::vector<Pair>& pairs, const std::vector<PairEquations>& equations,
                         Bundle& bundle);
@@ -38,7 +38,7 @@ class PoseSystem {
   private:
     glm::dvec3 centre_{0.0};
     double size_ = 1;
-    std::vector<int> group_;    ///< of each view: the least index of those it hangs together with
+    std::vector<int> group_;    ///< of each view: the least index of those it is connected to
     std::vector<Twist> moved_;  ///< so far
 };
 

@@ -65,10 +65,9 @@ class Renderer {
 };
 
 /// Makes the renderer of a backend. Backend::automatic takes a hardware GPU when there is one, else
-/// cpu: a software GL driver is no reason to be slow; when the GPU fails midway, cpu draws on. The
-/// bundle must outlive the renderer, and so must the job.
-/// `device` chooses among listDevices() (-1 = the best). Errors: a bundle that fails check();
-/// unsupported, with what was tried.
+/// cpu: a software GL driver is slower than the processor; when the GPU fails midway, cpu draws on.
+/// The bundle must outlive the renderer, and so must the job. `device` chooses among listDevices()
+/// (-1 = the best). Errors: a bundle that fails check(); unsupported, with what was tried.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bundle,
                                                              const RenderSettings& settings,
                                                              int device, Job& job);

@@ -10,9 +10,9 @@ namespace stx {
 /// Moves the depth edges of measured depth images, which lie a pixel or two beside those of the
 /// picture, to where the colours have them: a pixel of the surface behind whose colour is (mostly)
 /// that of the surface in front gets the depth of the latter. Without that it would stay behind as
-/// a ghost of the outline in every novel view. What a surface's colour is, is told by its pixels
-/// within four pixels that are no edge themselves; where there are none, or both surfaces look the
-/// same, nothing is moved. Up to two pixels; no unknown pixel becomes known.
+/// a ghost of the outline in every novel view. A surface's colour is that of its pixels within four
+/// pixels that are not at an edge themselves; where there are none, or both surfaces look the same,
+/// nothing is moved. Up to two pixels; no unknown pixel becomes known.
 ///
 /// `distances`: scene units, kNoDepth = unknown; `texture` has the same size. Gives the number of
 /// pixels changed. The same on any number of threads.

@@ -14,6 +14,25 @@ namespace {
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr std::int64_t kRowsPerTask = 16;
 
+// Where no source is named the value was chosen by trial on the project's image sets.
+/// The resolution of a float, as a share of its value: 2^-23, rounded up.
+constexpr double kFloatStep = 1.2e-7;
+/// A distance this close to a code's value, in steps, was stored as that code.
+constexpr double kOnStep = 0.02;
+/// Steps of the code by which w of neighbours may differ beside the discontinuity: one, and
+/// rounding.
+constexpr double kStepRoom = 1.01;
+/// Of orthographic views: pixel spacings of depth that neighbours on one surface may always differ
+/// by.
+constexpr double kOrthographicSlope = 4.0;
+/// Windows are weighed by a Gaussian of this width: per pixel of their radius, and in pixels.
+constexpr double kSigmaOfRadius = 0.6, kSigmaLeast = 0.3;
+/// Taps nearly on a line (determinant over squared weight) give no plane.
+constexpr double kOnLine = 1e-3;
+/// Steps of the code, in pixel spacings, from which on depth is smoothed before it is fitted; is
+/// smoothed more; is fitted in a larger window.
+constexpr double kCoarse = 0.05, kCoarser = 0.3, kCoarsest = 3.0;
+
 /// The step of the depth code when nearly all distances lie on it; 0 when the image was never
 /// coded.
 double codedStep(const ReferenceView& view) {
@@ -24,12 +43,12 @@ double codedStep(const ReferenceView& view) {
         if (!hasPoint(z)) continue;
         ++points;
         const double off = std::abs(z - code.decode(code.encode(z)));
-        onStep += off <= 0.02 * code.step() + 1.2e-7 * z ? 1 : 0;
+        onStep += off <= kOnStep * code.step() + kFloatStep * z ? 1 : 0;
     }
     return points > 0 && onStep * 20 >= points * 19 ? code.step() : 0;
 }
 
-/// One pixel of a fitting window and the pixels through which it hangs together with the centre.
+/// One pixel of a fitting window and the pixels through which it is linked with the centre.
 struct Tap {
     int dx, dy;
     float weight;
@@ -43,7 +62,7 @@ std::vector<Tap> makeWindow(int radius) {
     const auto slot = [&](int dx, int dy) -> int& {
         return index[(dy + radius) * (2 * radius + 1) + dx + radius];
     };
-    const double sigma = 0.6 * radius + 0.3;
+    const double sigma = kSigmaOfRadius * radius + kSigmaLeast;
     for (int ring = 0; ring <= 2 * radius; ++ring) {
         for (int dy = -radius; dy <= radius; ++dy) {
             for (int dx = -radius; dx <= radius; ++dx) {
@@ -65,7 +84,7 @@ struct Plane {
     double w = 0, gx = 0, gy = 0;
 };
 
-/// Weighted plane through the pixels of the window that hang together with its centre by links.
+/// Weighted plane through the pixels of the window that are linked with its centre.
 /// False when they do not span a plane.
 bool fitPlane(const Image<float>& w, const Image<std::uint8_t>& links,
               const std::vector<Tap>& window, int x, int y, Plane& plane) {
@@ -97,7 +116,7 @@ bool fitPlane(const Image<float>& w, const Image<std::uint8_t>& links,
     const double cxx = sxx - sx * sx / s, cxy = sxy - sx * sy / s, cyy = syy - sy * sy / s;
     const double cxv = sxv - sx * sv / s, cyv = syv - sy * sv / s;
     const double det = cxx * cyy - cxy * cxy;
-    if (!(det > 1e-3 * s * s)) return false;
+    if (!(det > kOnLine * s * s)) return false;
     plane.gx = (cxv * cyy - cyv * cxy) / det;
     plane.gy = (cyv * cxx - cxv * cxy) / det;
     plane.w = centre + (sv - plane.gx * sx - plane.gy * sy) / s;
@@ -170,10 +189,13 @@ void link(const ReferenceView& view, double discontinuity, DepthSurface& surface
         const double a = w.at(x, y), b = w.at(qx, qy);
         if (std::isnan(a) || std::isnan(b)) return false;
         const double stepW = ortho ? surface.step : surface.step * a * b;
-        double limit = discontinuity * (ortho ? std::min(a, b) : std::max(a, b)) + 1.01 * stepW;
+        double limit =
+            discontinuity * (ortho ? std::min(a, b) : std::max(a, b)) + kStepRoom * stepW;
         // Parallel rays have no distance that could give a scale, so an orthographic viewpoint near
         // the object must not cut surfaces of ordinary tilt apart.
-        if (ortho) limit = std::max(limit, 4.0 * view.camera.sampleSpacing(1.0)[dx ? 0 : 1]);
+        if (ortho)
+            limit =
+                std::max(limit, kOrthographicSlope * view.camera.sampleSpacing(1.0)[dx ? 0 : 1]);
         const double d = b - a;
         if (std::abs(d) <= limit) return true;
         if (std::abs(d) > 4 * limit) return false;
@@ -244,17 +266,17 @@ DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& setting
         return surface;
     }
     const double meanZ = sumZ / static_cast<double>(points);
-    surface.step = std::max(codedStep(view), 1.2e-7 * meanZ);
+    surface.step = std::max(codedStep(view), kFloatStep * meanZ);
     link(view, settings.discontinuity, surface);
 
     const glm::dvec2 spacing = camera.sampleSpacing(meanZ);
     const double stairs = surface.step / std::max(spacing.x, spacing.y);
     const bool robust = settings.method == BakeSettings::Method::robust;
-    const bool coarse = robust && stairs > 0.05;
+    const bool coarse = robust && stairs > kCoarse;
     if (coarse)
         smoothWithinSteps(view, std::clamp(static_cast<int>(std::lround(2 + stairs)), 2, 8),
-                          stairs > 0.3 ? 4 : 2, surface);
-    const auto window = makeWindow(stairs > 3 ? 3 : 2);
+                          stairs > kCoarser ? 4 : 2, surface);
+    const auto window = makeWindow(stairs > kCoarsest ? 3 : 2);
     parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {

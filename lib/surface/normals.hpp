@@ -27,12 +27,13 @@ struct BakeSettings {
 /// The splat is the ellipse { P + u U + v V : u^2 + v^2 <= 1 } in the tangent plane: U and V follow
 /// the image's x and y axes on the surface (conjugate half axes), each half a sample step times
 /// sqrt(2), so that the ellipse passes through the corners of its pixel's footprint and just closes
-/// the lattice (paper.md, "Splat size and shape"). Where the surface is nearly edge-on they are
-/// held to kMaxSplatTilt times their length on a surface that faces the camera.
+/// the lattice. Where the surface is nearly edge-on they are held to kMaxSplatTilt times their
+/// length on a surface that faces the camera.
 ///
 /// Errors: a bundle that fails check(), settings out of range, cancelled, memory over the limit.
 [[nodiscard]] Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job);
 
+/// See bake(): an axis six times as long is that of a surface tilted by about 80 degrees.
 inline constexpr double kMaxSplatTilt = 6.0;
 
 /// Normal <-> RGB: n = 2 * c / max - 1 per component, made unit again; (0,0,0) is "no normal".

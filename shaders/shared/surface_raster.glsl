@@ -48,7 +48,7 @@ void fillQuad(vec4 a, vec4 b, vec4 c, vec4 d, float grow, uint flags) {
 // A quad whose last corner is its first again: that edge holds everywhere, the plane is the same.
 void fillTriangle(vec4 a, vec4 b, vec4 c, uint flags) { fillQuad(a, b, c, a, kCrack, flags); }
 
-// A cell that is not of a leaf, by its shape; the corners clockwise from the upper left.
+// A cell that is not a leaf, by its shape; the corners clockwise from the upper left.
 void drawCell(uint shape, vec4 a, vec4 b, vec4 c, vec4 d, uint flags) {
     if (shape == kQuadCell) {
         fillQuad(a, b, c, d, kCrack, flags);

@@ -1,5 +1,5 @@
 // Surface mode, last pass: the pieces of each pixel, in their order, so that the sum is always the
-// same. ORIGIN = 1 also tells from where in which source the main piece of each pixel comes.
+// same. ORIGIN = 1 also gives from where in which source the main piece of each pixel comes.
 #include "surface/surface_common.glsl"
 #include "surface/surface_tiles.glsl"
 layout(local_size_x = int(kShadeGroup)) in;

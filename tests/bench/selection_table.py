@@ -4,7 +4,7 @@
     tests/bench/selection_table.py build/release/bin/stx spot.obj Fox.gltf --counts 8 12
 
 Prints, for each model and count, the mean PSNR of RGB in dB over 40 random novel views of 512x512
-against the mesh itself. Deterministic; it is README's table of selection.
+against the mesh itself. Deterministic; README.md here has its table.
 """
 
 import argparse

@@ -1,5 +1,6 @@
-// README's figures of spheres-miv: milliseconds of the median frame of each mode on the processor,
-// frames drawn one after another and not written. Usage: bench_spheres [bundle.exr cameras.json]
+// The figures of spheres-miv in README.md here: milliseconds of the median frame of each mode on
+// the processor, frames drawn one after another and not written. Usage: bench_spheres [bundle.exr
+// cameras.json]
 
 #include <algorithm>
 #include <chrono>

@@ -332,7 +332,7 @@ Result<void> EglContext::check(std::string_view doing) const {
 bool mayHaveHardware() {
     if (!canLoad("libEGL.so.1")) return false;
     const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-    // Where devices cannot be listed only opening them tells.
+    // Where devices cannot be listed they have to be opened.
     if (!hasWord(client, "EGL_EXT_platform_device") ||
         !(hasWord(client, "EGL_EXT_device_enumeration") || hasWord(client, "EGL_EXT_device_base")))
         return true;

@@ -15,7 +15,7 @@ struct ContextAbilities {
     bool modern = false;  ///< OpenGL 4.5: compute shaders, storage buffers, direct state access
     bool atomicInt64 = false;  ///< GL_NV_shader_atomic_int64
     bool atomicFloat = false;  ///< GL_NV_shader_atomic_float
-    bool resetStatus = false;  ///< glGetGraphicsResetStatus tells of a lost device
+    bool resetStatus = false;  ///< glGetGraphicsResetStatus reports a lost device
     int maxTextureSize = 0;    ///< pixels a side
     int maxTextureLayers = 0;
     std::int64_t maxStorageBytes = 0;  ///< of one shader storage block

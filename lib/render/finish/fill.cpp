@@ -10,8 +10,38 @@
 namespace stx::surface {
 namespace {
 
-/// Less of a pixel than this is not worth filling.
+// Where no source is named the value was chosen by trial on the project's image sets and meshes.
+// Shares are of q, see DepthAxis::relativeScale().
+
+/// A pixel covered by this share or more is not worth filling.
 constexpr float kClosed = 0.999f;
+/// A pixel open by more than this share takes the depth of what fills it.
+constexpr float kMostlyOpen = 0.5f;
+
+// Small holes (fillUnseen).
+/// How far surface is looked for in each direction, pixels.
+constexpr int kReach = 12;
+/// Directions that must meet surface, of eight: see enclosed().
+constexpr int kLeastDirections = 6;
+/// The ray is looked at from this share of q in front of the nearest hit to this share of q behind
+/// the farthest, but no farther than twice its distance (half its q).
+constexpr float kInFront = 0.02f, kBehind = 0.05f, kFarthestShare = 0.5f;
+/// Depths that are tried on the way, and how many in a row must be hidden.
+constexpr int kDepths = 48, kHiddenDepths = 2;
+/// Colours of surfaces in front of the fill, by more than this share of q, weigh less by this.
+constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f;
+
+// Backgrounds (fillBackground).
+/// Side of the cells that are crossed in one step where they are empty, pixels.
+constexpr int kCell = 32;
+/// Directions that surface is looked for in.
+constexpr int kRays = 32;
+/// Pixels averaged where a ray meets surface, while they differ by no more than this share of q.
+constexpr int kAveraged = 2;
+constexpr float kSameSurface = 0.03f;
+/// The farthest hits weigh most. Depths are compared over their range and this share of q, so that
+/// equal depths weigh the same; the nearest keep a little weight.
+constexpr float kLeastRange = 0.05f, kNearestWeight = 0.01f;
 
 struct Hit {
     glm::vec3 colour{0.0f};
@@ -32,7 +62,7 @@ void putIn(OpenFrame& frame, const std::vector<std::vector<Fill>>& rows) {
             const float open = 1.0f - pixel.a;
             pixel += glm::vec4(fill.colour * open, open);
             float& q = frame.q.at(fill.x, fill.y);
-            if (!(q > 0.0f) || open > 0.5f) q = fill.q;
+            if (!(q > 0.0f) || open > kMostlyOpen) q = fill.q;
         }
     }
 }
@@ -59,10 +89,9 @@ bool enclosed(unsigned directionsMet) {
 
 /// The depth of a hidden stretch of the ray through (x, y) between two depths, 0 = none.
 float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float qNear, float qFar) {
-    constexpr int kSteps = 48;
     int unknown = 0;
-    for (int step = 0; step < kSteps; ++step) {
-        const float q = qNear + (qFar - qNear) * static_cast<float>(step) / (kSteps - 1);
+    for (int step = 0; step < kDepths; ++step) {
+        const float q = qNear + (qFar - qNear) * static_cast<float>(step) / (kDepths - 1);
         bool free = false;
         for (const LocalSource& s : sources) {
             if (seesPast(s, x, y, q)) {
@@ -71,7 +100,7 @@ float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float 
             }
         }
         unknown = free ? 0 : unknown + 1;
-        if (unknown == 2) return q;
+        if (unknown == kHiddenDepths) return q;
     }
     return 0.0f;
 }
@@ -79,7 +108,6 @@ float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float 
 }  // namespace
 
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
-    constexpr int kReach = 12;
     const int width = frame.q.width(), height = frame.q.height();
     std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
     parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
@@ -91,7 +119,8 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
                 unsigned met = 0;  // a bit for each direction
                 float nearest = 0, farthest = std::numeric_limits<float>::max();
                 for (std::size_t k = 0;
-                     k < kDirections.size() && count + 8 > static_cast<int>(k) + 5; ++k) {
+                     k < kDirections.size() && count + 8 - static_cast<int>(k) >= kLeastDirections;
+                     ++k) {
                     for (int step = 1; step <= kReach; ++step) {
                         const int nx = x + kDirections[k][0] * step,
                                   ny = y + kDirections[k][1] * step;
@@ -109,16 +138,18 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
                 }
                 if (!enclosed(met)) continue;
                 const float scale = frame.space.axis.relativeScale(nearest);
-                const float q = hiddenDepth(sources, static_cast<float>(x) + 0.5f,
-                                            static_cast<float>(y) + 0.5f, nearest + 0.02f * scale,
-                                            std::max(farthest - 0.05f * scale, 0.5f * farthest));
+                const float q =
+                    hiddenDepth(sources, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f,
+                                nearest + kInFront * scale,
+                                std::max(farthest - kBehind * scale, kFarthestShare * farthest));
                 if (!(q > 0.0f)) continue;
                 glm::vec3 sum(0.0f);
                 float weights = 0;
                 for (int k = 0; k < count; ++k) {
                     const Hit& hit = hits[static_cast<std::size_t>(k)];
                     float weight = 1.0f / (hit.distance * hit.distance);
-                    if (hit.q > q + 0.01f * frame.space.axis.relativeScale(q)) weight *= 0.1f;
+                    if (hit.q > q + kForeground * frame.space.axis.relativeScale(q))
+                        weight *= kForegroundWeight;
                     sum += weight * hit.colour;
                     weights += weight;
                 }
@@ -131,7 +162,6 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
 
 void fillBackground(OpenFrame frame) {
     const int width = frame.q.width(), height = frame.q.height();
-    constexpr int kCell = 32;
     const int cellsX = (width + kCell - 1) / kCell, cellsY = (height + kCell - 1) / kCell;
     // Cells without any surface are crossed in one step.
     std::vector<char> occupied(static_cast<std::size_t>(cellsX) * cellsY, 0);
@@ -144,7 +174,6 @@ void fillBackground(OpenFrame frame) {
         }
     }
     if (!any) return;
-    constexpr int kRays = 32;
     std::array<glm::vec2, kRays> rays;
     for (int k = 0; k < kRays; ++k) {
         const float angle = static_cast<float>(k) * (6.2831853f / kRays);
@@ -163,7 +192,7 @@ void fillBackground(OpenFrame frame) {
                     float along = 1;
                     Hit hit;
                     int averaged = 0;
-                    while (averaged < 2) {
+                    while (averaged < kAveraged) {
                         const float px = static_cast<float>(x) + 0.5f + dx * along;
                         const float py = static_cast<float>(y) + 0.5f + dy * along;
                         if (!(px >= 0 && py >= 0 && px < static_cast<float>(width) &&
@@ -184,7 +213,8 @@ void fillBackground(OpenFrame frame) {
                         if (averaged == 0) {
                             hit = here;
                         } else {
-                            if (std::abs(here.q - hit.q) > 0.03f * frame.space.axis.relativeScale(hit.q))
+                            if (std::abs(here.q - hit.q) >
+                                kSameSurface * frame.space.axis.relativeScale(hit.q))
                                 break;
                             hit.colour += here.colour;
                         }
@@ -200,12 +230,13 @@ void fillBackground(OpenFrame frame) {
                     farthest = std::min(farthest, hits[static_cast<std::size_t>(k)].q);
                     nearest = std::max(nearest, hits[static_cast<std::size_t>(k)].q);
                 }
-                const float range = nearest - farthest + 0.05f * frame.space.axis.relativeScale(nearest);
+                const float range =
+                    nearest - farthest + kLeastRange * frame.space.axis.relativeScale(nearest);
                 glm::vec3 sum(0.0f);
                 float weights = 0, depth = 0;
                 for (int k = 0; k < count; ++k) {
                     const Hit& hit = hits[static_cast<std::size_t>(k)];
-                    const float behind = (nearest - hit.q) / range + 0.01f;
+                    const float behind = (nearest - hit.q) / range + kNearestWeight;
                     const float weight = behind * behind / (hit.distance * std::sqrt(hit.distance));
                     sum += weight * hit.colour;
                     depth += weight * hit.q;

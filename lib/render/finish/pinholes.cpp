@@ -9,6 +9,12 @@ namespace stx {
 
 namespace {
 
+// Chosen by trial on the project's image sets and meshes.
+/// Neighbours with a depth that close a pixel, of eight; among pruned views, and how often then.
+constexpr int kEnclosing = 7, kEnclosingPruned = 5, kRoundsPruned = 2;
+/// Neighbours nearer than this share of the farthest are on a surface in front.
+constexpr float kSameDepth = 0.97f;
+
 /// Closes pixels of whose eight neighbours at least `enclosing` have a depth.
 void closeEnclosed(Frame& frame, int enclosing) {
     struct Closed {
@@ -38,7 +44,7 @@ void closeEnclosed(Frame& frame, int enclosing) {
         for (int j = y - 1; j <= y + 1; ++j) {
             for (int i = x - 1; i <= x + 1; ++i) {
                 const float depth = frame.depth.at(i, j);
-                if (!hasPoint(depth) || depth < 0.97f * farthest) continue;
+                if (!hasPoint(depth) || depth < kSameDepth * farthest) continue;
                 n += 1;
                 c.depth += depth;
                 c.colour += frame.colour.at(i, j);
@@ -79,9 +85,9 @@ void closeEnclosed(Frame& frame, int enclosing) {
 }  // namespace
 
 void closePinholes(Frame& frame, bool pruned) {
-    closeEnclosed(frame, 7);
+    closeEnclosed(frame, kEnclosing);
     if (!pruned) return;
-    for (int round = 0; round < 2; ++round) closeEnclosed(frame, 5);
+    for (int round = 0; round < kRoundsPruned; ++round) closeEnclosed(frame, kEnclosingPruned);
 }
 
 }  // namespace stx

@@ -8,9 +8,9 @@ namespace stx {
 /// without depth of whose eight neighbours at least seven have one get the mean of those at the
 /// back. Slits and larger gaps stay open: they may be real. Deterministic on any number of threads.
 ///
-/// `pruned`: the views were pruned. Then each piece of surface is told by the samples of one view
-/// only, which leave open slits a pixel or two wide where the others would have helped out: those
-/// close, too (five neighbours are enough, twice). Where that fills the corner of a silhouette,
+/// `pruned`: the views were pruned. Then each piece of surface has the samples of one view only,
+/// which leave open slits a pixel or two wide where the others would have helped out: those close,
+/// too (five neighbours are enough, twice). Where that fills the corner of a silhouette,
 /// Silhouettes takes it away again.
 void closePinholes(Frame& frame, bool pruned);
 

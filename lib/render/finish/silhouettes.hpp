@@ -8,7 +8,7 @@
 namespace stx {
 
 /// Gives splatted pictures the silhouettes that the references saw. A splat at the rim of an object
-/// sticks out by part of a pixel and covers whole pixels; but each reference's alpha tells along
+/// sticks out by part of a pixel and covers whole pixels; but each reference's alpha shows along
 /// which rays there is nothing at all. Pixels near the background get the share of their area that
 /// no reference sees through as coverage, so silhouettes are thin and smooth.
 class Silhouettes {

@@ -84,8 +84,8 @@ class PageSet {
 
     PageSet(const Bundle& bundle);  // NOLINT: a bundle is a set of pages
     /// The pages of an atlas. Where the rectangles do not have kPadding pixels of padding to
-    /// themselves (see Atlas::paddingHolds()) it is unpacked first, which costs the views' memory. Errors: an atlas that
-    /// fails check(), memory over the limit.
+    /// themselves (see Atlas::paddingHolds()) it is unpacked first, which costs the views' memory.
+    /// Errors: an atlas that fails check(), memory over the limit.
     [[nodiscard]] static Result<PageSet> of(const Atlas& atlas, Job& job);
 
     [[nodiscard]] std::span<const Page> pages() const { return data_->pages; }
@@ -115,8 +115,8 @@ class PageSet {
         const ViewIndex& index = data_->index[view];
         const std::size_t block = static_cast<std::size_t>(y / kBlock) * index.blocksX +
                                   static_cast<unsigned>(x / kBlock);
-        return std::span(index.near).subspan(index.begin[block],
-                                             index.begin[block + 1] - index.begin[block]);
+        return std::span(index.near)
+            .subspan(index.begin[block], index.begin[block + 1] - index.begin[block]);
     }
     /// Whether the object is at a pixel that no rectangle shows: another view gives its distance.
     [[nodiscard]] bool objectOutside(std::size_t view, int x, int y) const {

@@ -5,9 +5,29 @@
 namespace stx::splat {
 namespace {
 
+// Where no source is named the value was chosen by trial on the project's image sets and meshes.
+
 // Relative depth behind the front that still belongs to it (Lee & Park blend all; 1 to 3 % is known
 // to be good): for blocks whose tilt is known, and for others.
 constexpr float kTolerance = 0.01f, kToleranceRough = 0.02f;
+// A block is smooth, and one tilt serves for all of it, when its tilts (tangents) spread less than
+// this and its farthest point is nearer than this many times the distance of the nearest.
+constexpr float kSmoothSlopes = 0.35f, kSmoothDepths = 1.2f;
+// The corners of a block differ a little from its middle, and so do the squared sizes of splats.
+constexpr double kCornerRoom = 1.08;
+// No splat's core is smaller, squared pixels: half the diagonal of a pixel.
+constexpr double kLeastCore2 = 0.5;
+// A block whose depths spread further reaches behind the camera: nearest over farthest.
+constexpr double kCrossing = 1e-6;
+// A plane seen this nearly edge-on (area over squared length of a cell) gives no slope.
+constexpr double kEdgeOn = 1e-3;
+// Weight of a view that looks from the other side; others weigh the fourth power of the cosine.
+constexpr double kLeastQuality = 0.01;
+// Splats of a block reach this many pixels beyond its points: those of 2x2 pixels, and large ones,
+// in parts of the radius that closes the lattice. A large splat ends at sqrt(kReach2) *
+// kSigmaSource = 1.12 sample spacings, 1.6 such radii; the rest is room for the filter and for
+// rounding.
+constexpr double kReachSmall = 1.0, kReachPixels = 2.0, kReachRadii = 2.4;
 
 // How the picture of a source pixel's cell is spanned.
 struct Cell {
@@ -87,7 +107,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     task.opaque = block.opaque;
     const PixelMap& m = s.map;
 
-    // Where its corners land. All in front of the camera, they bound the block.
+    // Where its corners are in the picture. All in front of the camera, they bound the block.
     double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, zMin = 1e300, zMax = -1e300;
     for (int corner = 0; corner < 4; ++corner) {
         const double u = (corner & 1) ? block.u1 - 1 : block.u0,
@@ -105,7 +125,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
         }
     }
     if (!(zMax > 0)) return false;
-    const bool crossing = !(zMin > 1e-6 * zMax);
+    const bool crossing = !(zMin > kCrossing * zMax);
     task.zMin = crossing ? 0.0f : static_cast<float>(zMin);
 
     // The cells of the block: one where the surface is smooth, else the corners of what occurs.
@@ -113,7 +133,8 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     const float unit = 1.0f / kSlopeScale;
     const float su0 = block.slopeMin.u * unit, su1 = block.slopeMax.u * unit;
     const float sv0 = block.slopeMin.v * unit, sv1 = block.slopeMax.v * unit;
-    const bool smooth = su1 - su0 < 0.35f && sv1 - sv0 < 0.35f && block.zMax < 1.2f * block.zMin;
+    const bool smooth = su1 - su0 < kSmoothSlopes && sv1 - sv0 < kSmoothSlopes &&
+                        block.zMax < kSmoothDepths * block.zMin;
     double cover2 = 0, det = -1e300, stretch2 = 0;
     Cell middle = cellAt(s, uc, vc, 0.5 * (block.zMin + block.zMax), 0.5 * (su0 + su1),
                          0.5 * (sv0 + sv1), novel.orthographic);
@@ -136,19 +157,18 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
             if (!first || !smooth)
                 consider(cellAt(s, uc, vc, block.zMax, su, sv, novel.orthographic));
         }
-        // The block's corners differ a little from its middle.
-        cover2 *= 1.08;
+        cover2 *= kCornerRoom;
     }
     if (cullBackFaces && !(det > 0)) return false;
     cover2 *= block.size * block.size;
     task.small = cover2 < kSmallCover2;
     task.uniform = task.small && smooth && block.linked;
-    task.core2 = static_cast<float>(std::max(0.5, 1.08 * cover2));
+    task.core2 = static_cast<float>(std::max(kLeastCore2, kCornerRoom * cover2));
 
     task.tolerance = smooth ? kTolerance : kToleranceRough;
     task.slopeX = task.slopeY = 0;
     task.uAcross = task.vAcross = task.uDown = task.vDown = 0;
-    if (const double d = middle.det(); smooth && d > 1e-3 * stretch2) {
+    if (const double d = middle.det(); smooth && d > kEdgeOn * stretch2) {
         constexpr double steepest = kSteepestPlane;
         task.slopeX = static_cast<float>(
             std::clamp((middle.zu * middle.v.y - middle.zv * middle.u.y) / d, -steepest, steepest));
@@ -162,7 +182,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     }
 
     // Views that saw the surface close (dense samples) and head-on count more, and those that saw
-    // it from about where we stand, since looks change with the angle.
+    // it from about the same place, since looks change with the angle.
     const double density = 1.0 / std::max(1.0, stretch2);
     task.density = std::max(static_cast<float>(density * density), kLeastDensity);
     const auto& c = rectangle.camera();
@@ -174,7 +194,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     };
     const double cosAngle = glm::dot(directionFrom(c), directionFrom(novel));
     const double angle = std::max(0.0, cosAngle);
-    task.quality = static_cast<float>(0.01 + angle * angle * angle * angle);
+    task.quality = static_cast<float>(kLeastQuality + angle * angle * angle * angle);
 
     // The plane of a splat comes nearer than its point: by its slope over a pixel either way if
     // small, else down to half (see the kernels). A little less for rounding.
@@ -189,7 +209,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
         task.y1 = novel.height - 1;
         return true;
     }
-    const double reach = task.small ? 1.0 : 2.0 + 2.4 * std::sqrt(cover2);
+    const double reach = task.small ? kReachSmall : kReachPixels + kReachRadii * std::sqrt(cover2);
     x0 -= reach;
     y0 -= reach;
     x1 += reach;

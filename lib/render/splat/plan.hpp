@@ -8,7 +8,7 @@
 
 namespace stx::splat {
 
-/// Where the pixels of `source` land in the picture of `novel`.
+/// Where the pixels of `source` are in the picture of `novel`.
 [[nodiscard]] PixelMap pixelMap(const Camera& source, const Camera& novel);
 
 /// What to do for one block in one frame. False when nothing of it can be seen: it lies outside, or

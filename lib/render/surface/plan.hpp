@@ -19,14 +19,14 @@ using Ray = std::array<float, 12>;
 /// The vector from a camera's eye to the point (x, y, q) of a frame (orthographic: along its axis).
 [[nodiscard]] Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame);
 
-/// How colours are fitted; see shadePieces().
+/// How colours are fitted; see shadePieces(). Chosen by trial on the project's image sets.
 struct ShadeSettings {
     int mostSources = 4;    ///< sources that one piece takes colours from
     float kernel = 3.0f;    ///< squared radius of the fit, target pixels
     float ridge = 0.0015f;  ///< holds the linear and quadratic terms down
 };
 
-/// What a quality means for a scene.
+/// What a quality means for a scene; chosen by trial on the project's image sets.
 struct Effort {
     int samplesPerPixel = 3;  ///< along one side of a pixel
     int mostGeometry = 8;     ///< sources that one tile is built from, at most kMostTileSources

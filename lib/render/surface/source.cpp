@@ -8,11 +8,22 @@
 namespace stx::surface {
 namespace {
 
+// Where no source is named the value was chosen by trial on the project's image sets and meshes.
+
 /// Neighbours whose q differ by less than this share of it are one surface; by more than the
-/// second, never; between them, when the slope goes on.
-constexpr float kLinkAlways = 0.005f, kLinkNever = 0.03f;
-/// A leaf may leave its plane by this many pixels of parallax at a right angle.
+/// second, never; between them, when the slope goes on within this share of the step.
+constexpr float kLinkAlways = 0.005f, kLinkNever = 0.03f, kSameSlope = 0.5f;
+/// Steps of the depth code that neighbours may differ by all the same: one, and rounding.
+constexpr float kLinkSteps = 1.5f;
+/// A leaf may leave its plane by this many pixels of parallax at a right angle; of noisy depth by
+/// this many times the noise, up to three times as many pixels.
 constexpr float kPlanarPixels = 0.08f;
+constexpr double kPlanarNoise = 1.5;
+constexpr float kPlanarMost = 3.0f;
+/// Depth noisier than this share of q counts as this noisy.
+constexpr float kMostNoise = 0.01f;
+/// Of orthographic cameras: depth range in parts of the window's larger side.
+constexpr double kOrthographicRange = 1.2;
 
 /// Whether neighbours b and c lie on one surface, given the pixels before and after them (0 =
 /// none). Small steps always do; larger ones when the surface goes on with the same slope.
@@ -20,9 +31,10 @@ bool linked(const DepthAxis& axis, float codeStep, float a, float b, float c, fl
     if (!(b > 0.0f && c > 0.0f)) return false;
     const float step = c - b, size = std::abs(step);
     const float scale = axis.relativeScale(std::max(b, c));
-    if (size < kLinkAlways * scale + 1.5f * codeStep * axis.qPerUnit(std::max(b, c))) return true;
+    if (size < kLinkAlways * scale + kLinkSteps * codeStep * axis.qPerUnit(std::max(b, c)))
+        return true;
     if (size >= kLinkNever * scale) return false;
-    const float agree = 0.5f * size;
+    const float agree = kSameSlope * size;
     return (a > 0.0f && std::abs(step - (b - a)) < agree) ||
            (d > 0.0f && std::abs(step - (d - c)) < agree);
 }
@@ -280,11 +292,11 @@ float unevenness(const Source& s, const Draft& d) {
 }
 
 void findLeaves(Source& s, const Draft& d) {
-    s.noise = std::min(unevenness(s, d), 0.01f);
+    s.noise = std::min(unevenness(s, d), kMostNoise);
     const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
     const double perPixel = 1.0 / (focal * (s.space.axis.inverse ? 1.0 : s.space.axis.unit));
-    s.flat = static_cast<float>(
-        std::clamp<double>(1.5 * s.noise, kPlanarPixels * perPixel, 3 * kPlanarPixels * perPixel));
+    s.flat = static_cast<float>(std::clamp<double>(kPlanarNoise * s.noise, kPlanarPixels * perPixel,
+                                                   kPlanarMost * kPlanarPixels * perPixel));
     std::vector<std::vector<Leaf>> rows(static_cast<std::size_t>(s.blocksY));
     parallelFor(0, s.blocksY, [&](std::int64_t by) {
         auto& leaves = rows[static_cast<std::size_t>(by)];
@@ -356,7 +368,7 @@ PixelSpace::PixelSpace(const Camera& c, double farthest) : camera(c) {
     axis.inverse = !c.orthographic;
     if (c.orthographic) {
         // A depth range as wide as the window makes shares of it mean what they do in perspective.
-        axis.unit = 1.2 * std::max(c.width / c.fx, c.height / c.fy);
+        axis.unit = kOrthographicRange * std::max(c.width / c.fx, c.height / c.fy);
         axis.origin = farthest + axis.unit;
     }
     // Columns of camera points (X, Y, Z, 1) up to scale over (x, y, q, 1), and back.

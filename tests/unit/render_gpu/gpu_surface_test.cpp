@@ -1,7 +1,7 @@
 #include "lib/render/surface/gpu/gpu_surface.hpp"
 
-#include "lib/render/surface/gpu/surface_textures.hpp"
 #include "lib/render/surface/cpu/cpu_surface.hpp"
+#include "lib/render/surface/gpu/surface_textures.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 
 namespace stx {

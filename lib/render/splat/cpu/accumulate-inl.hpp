@@ -1,4 +1,4 @@
-// Where points land in the picture. Compiled for each SIMD target: included by splat_kernels.cpp
+// Where points are in the picture. Compiled for each SIMD target: included by kernels.cpp
 // once for each.
 
 #if defined(STX_SPLAT_LAND_INL_HPP) == defined(HWY_TARGET_TOGGLE)
@@ -51,7 +51,7 @@ HWY_INLINE VF loadDepth(DF d, const float* from, int count) {
     return hn::Load(d, padded);
 }
 
-// Points of a row and where they land: the pixel to the upper left of each (only where `inside`
+// Points of a row and their places: the pixel to the upper left of each (only where `inside`
 // the band), how far into the next it lies (0..1), its novel depth.
 struct Landed {
     VI offset;

@@ -9,7 +9,7 @@
 
 namespace stx::splat {
 
-/// Where the pixels of a source land: with (u, v) a pixel's index and z its depth,
+/// Where the pixels of a source are in the novel view: with (u, v) a pixel's index and z its depth,
 /// H = (a0 + au u + av v) z + (b0 + bu u + bv v), and then x = H.x / H.z, y = H.y / H.z (or H.x,
 /// H.y when the novel camera is orthographic), novel depth H.z. Pixel centres are whole numbers.
 struct PixelMap {

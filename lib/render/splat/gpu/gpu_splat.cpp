@@ -125,7 +125,7 @@ Result<Begun> GpuSplatRenderer::begin(const Camera& camera, int slot) {
 
 void GpuSplatRenderer::beginExpected(const std::optional<Camera>& next, int slot) {
     if (!next || !checkSize(*next) || !inOnePiece(*next)) return;
-    // What fails here fails again, and is told, when the frame is asked for.
+    // What fails here fails again, with a message, when the frame is asked for.
     if (auto begun = begin(*next, slot)) begun_ = std::move(*begun);
 }
 

@@ -9,7 +9,7 @@ namespace stx::gpu {
 namespace {
 
 /// Steps of a weight in the integer sums. A sparse view's weight may be a thousandth of this; where
-/// such views are alone the steps still have to tell them apart.
+/// such views are alone their weights must still differ.
 constexpr double kLargestWeight = 1048576.0;
 
 /// Source pixels that fall on one novel pixel where the block is seen as its view saw it.

@@ -184,7 +184,7 @@ std::vector<TilePlan> GpuSurfaceBackend::planTiles(const SurfaceFrame& work) con
     return plans;
 }
 
-/// The end of the batch that begins at a tile; tells its tiles where their parts begin.
+/// The end of the batch that begins at a tile; sets where the parts of its tiles begin.
 std::size_t GpuSurfaceBackend::batchEnd(std::span<TilePlan> plans, std::size_t begin) const {
     std::uint32_t locals = 0, slots = 0, meshes = 0, edges = 0;
     std::size_t end = begin;
