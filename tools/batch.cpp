@@ -13,6 +13,8 @@
 #include <map>
 #include <optional>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/files/temporaries.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
@@ -125,18 +127,18 @@ struct Worker {
 };
 
 /// The processes of one batch; ends them when it goes.
-class Batch {
+class BatchRun {
   public:
-    Batch(const std::vector<BatchItem>& items, const BatchOptions& options, const BatchWork& work,
-          Program& program)
+    BatchRun(const std::vector<BatchItem>& items, const BatchOptions& options,
+             const BatchWork& work, Program& program)
         : items_(items),
           options_(options),
           work_(work),
           program_(program),
           entries_(items.size()) {}
-    ~Batch() { stopWorkers(); }
-    Batch(const Batch&) = delete;
-    Batch& operator=(const Batch&) = delete;
+    ~BatchRun() { stopWorkers(); }
+    BatchRun(const BatchRun&) = delete;
+    BatchRun& operator=(const BatchRun&) = delete;
 
     Result<int> run();
 
@@ -161,7 +163,7 @@ class Batch {
     std::size_t next_ = 0, done_ = 0, skipped_ = 0, failed_ = 0;
 };
 
-Result<Worker> Batch::startWorker() {
+Result<Worker> BatchRun::startWorker() {
     int toWorker[2], fromWorker[2];
     if (::pipe2(toWorker, O_CLOEXEC) != 0)
         return fail(ErrorCode::failed, "cannot make a pipe: {}", std::strerror(errno));
@@ -189,7 +191,7 @@ Result<Worker> Batch::startWorker() {
     return worker;
 }
 
-void Batch::finish(std::size_t item, Json entry) {
+void BatchRun::finish(std::size_t item, Json entry) {
     const std::string status = entry.value("status", "error");
     ++done_;
     if (status == "skipped") ++skipped_;
@@ -204,7 +206,7 @@ void Batch::finish(std::size_t item, Json entry) {
                           static_cast<std::int64_t>(items_.size()), "inputs");
 }
 
-void Batch::takeReport(Worker& worker) {
+void BatchRun::takeReport(Worker& worker) {
     std::uint32_t size = 0;
     std::string text;
     bool good = worker.item && receiveAll(worker.out.get(), &size, sizeof(size));
@@ -234,14 +236,14 @@ void Batch::takeReport(Worker& worker) {
     finish(*std::exchange(worker.item, std::nullopt), std::move(entry));
 }
 
-void Batch::endWorker(Worker& worker) {
+void BatchRun::endWorker(Worker& worker) {
     worker.in.close();
     while (worker.pid > 0 && ::waitpid(worker.pid, nullptr, 0) < 0 && errno == EINTR) {
     }
     worker.pid = -1;
 }
 
-void Batch::stopWorkers() {
+void BatchRun::stopWorkers() {
     for (auto& w : workers_) {
         w.in.close();
         if (w.pid > 0) ::kill(w.pid, SIGTERM);
@@ -258,7 +260,7 @@ void Batch::stopWorkers() {
     }
 }
 
-Result<void> Batch::giveItems() {
+Result<void> BatchRun::giveItems() {
     for (auto& w : workers_) {
         if (!w.item && w.pid > 0 && w.done >= kInputsPerWorker) endWorker(w);
     }
@@ -290,7 +292,7 @@ Result<void> Batch::giveItems() {
     return {};
 }
 
-Result<int> Batch::run() {
+Result<int> BatchRun::run() {
     for (;;) {
         STX_CHECK(giveItems());
         std::vector<pollfd> waiting;
@@ -307,7 +309,7 @@ Result<int> Batch::run() {
             }
         }
     }
-    // What is done is told even when the workers take long to stop.
+    // What is done is reported even when the workers take long to stop.
     auto written = writeLines();
     stopWorkers();
     if (!written) return propagate(written);
@@ -329,14 +331,15 @@ Result<int> Batch::run() {
     return fail(code, "{}", counts);
 }
 
-Result<void> Batch::writeLines() const {
+Result<void> BatchRun::writeLines() const {
     if (program_.common.report.empty()) return {};
     std::string lines;
     for (const auto& entry : entries_) {
         if (entry.is_object())
             lines += entry.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     }
-    return writeFile(program_.common.report, std::as_bytes(std::span(lines)));
+    return writeFile(program_.common.report, std::as_bytes(std::span(lines)),
+                     program_.outputOptions());
 }
 
 }  // namespace
@@ -394,7 +397,8 @@ Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
 
 Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& options,
                      const BatchWork& work, Program& program) {
-    // What can be told before any work is told then; with --keep-going each input is on its own.
+    // What can be refused before any work is refused then; with --keep-going each input is on its
+    // own.
     if (!options.keepGoing) {
         std::error_code ec;
         for (const auto& item : items) {
@@ -402,7 +406,7 @@ Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& op
             STX_CHECK(checkTarget(item.output, program));
         }
     }
-    return Batch(items, options, work, program).run();
+    return BatchRun(items, options, work, program).run();
 }
 
 }  // namespace stx::tools

@@ -12,54 +12,52 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 
 }  // namespace
 
-void addCameraOptions(CLI::App& command, CameraOptions& o) {
+void addCameraOptions(Command command, CameraOptions& o) {
     const char* group = "Camera";
     command
-        .add_option("--eye", o.eye,
-                    "Where the camera stands; scene units (write --eye=-1,2,3 for a leading minus)")
-        ->type_name("X,Y,Z")
-        ->group(group);
+        .option("--eye", o.eye,
+                "Position of the camera in scene units (write --eye=-1,2,3 for a leading minus)")
+        .takes("X,Y,Z")
+        .group(group);
+    command.option("--target", o.target, "What it looks at (default: the middle of the object)")
+        .takes("X,Y,Z")
+        .group(group);
+    command.option("--up", o.up, "What is up in the picture (default 0,1,0)")
+        .takes("X,Y,Z")
+        .group(group);
     command
-        .add_option("--target", o.target, "What it looks at (default: the middle of the object)")
-        ->type_name("X,Y,Z")
-        ->group(group);
-    command.add_option("--up", o.up, "What is up in the picture (default 0,1,0)")
-        ->type_name("X,Y,Z")
-        ->group(group);
+        .option("--fov", o.fovDeg,
+                "Vertical field of view in degrees, above 0 and below 180 (default 40)")
+        .takes("DEG")
+        .group(group);
     command
-        .add_option("--fov", o.fovDeg,
-                    "Vertical field of view in degrees, above 0 and below 180 (default 40)")
-        ->type_name("DEG")
-        ->group(group);
+        .option("--ortho", o.orthoHeight,
+                "Orthographic camera with a window of this height, in scene units")
+        .takes("HEIGHT")
+        .group(group);
+    command.option("--view", o.view, "The camera of reference view K, from 0")
+        .takes("K")
+        .notNegative()
+        .group(group);
+    command.option("--orbit", o.orbit, "N cameras on a circle around the object")
+        .takes("N")
+        .range(1, 1000000)
+        .group(group);
     command
-        .add_option("--ortho", o.orthoHeight,
-                    "Orthographic camera with a window of this height, in scene units")
-        ->type_name("HEIGHT")
-        ->group(group);
-    command.add_option("--view", o.view, "The camera of reference view K, from 0")
-        ->type_name("K")
-        ->check(CLI::NonNegativeNumber)
-        ->group(group);
-    command.add_option("--orbit", o.orbit, "N cameras on a circle around the object")
-        ->type_name("N")
-        ->check(CLI::Range(1, 1000000))
-        ->group(group);
+        .option("--elevation", o.elevationDeg,
+                "Height of the orbit above the horizon in degrees (default 15)")
+        .takes("DEG")
+        .range(-90.0, 90.0)
+        .group(group);
     command
-        .add_option("--elevation", o.elevationDeg,
-                    "Height of the orbit above the horizon in degrees (default 15)")
-        ->type_name("DEG")
-        ->check(CLI::Range(-90.0, 90.0))
-        ->group(group);
+        .option("--cameras", o.cameraFile,
+                "Every camera of a file (transforms.json, MIV JSON, cameras.json)")
+        .takes("FILE")
+        .group(group);
     command
-        .add_option("--cameras", o.cameraFile,
-                    "Every camera of a file (transforms.json, MIV JSON, cameras.json)")
-        ->type_name("FILE")
-        ->group(group);
-    command
-        .add_option("--size", o.size,
-                    "Size of the picture (default: that of the camera, else 512x512)")
-        ->type_name("WxH")
-        ->group(group);
+        .option("--size", o.size, "Size of the picture (default: that of the camera, else 512x512)")
+        .takes("WxH")
+        .group(group);
 }
 
 Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraContext& context,
@@ -133,10 +131,10 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
 Result<int> checkCameraOptions(const CameraOptions& options, Program& program) {
     CameraOptions o = options;
     o.view = -1;  // needs the input
-    CameraContext standIn;
-    standIn.bounds.add(glm::dvec3(-1));
-    standIn.bounds.add(glm::dvec3(1));
-    STX_TRY(const auto cameras, makeCameras(o, standIn, program));
+    CameraContext unitCube;
+    unitCube.bounds.add(glm::dvec3(-1));
+    unitCube.bounds.add(glm::dvec3(1));
+    STX_TRY(const auto cameras, makeCameras(o, unitCube, program));
     return static_cast<int>(cameras.size());
 }
 

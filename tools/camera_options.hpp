@@ -4,11 +4,10 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "lib/base/result.hpp"
 #include "lib/geometry/bounds.hpp"
 #include "lib/geometry/camera.hpp"
+#include "tools/command_line.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -25,7 +24,7 @@ struct CameraOptions {
     std::string size;
 };
 
-void addCameraOptions(CLI::App& command, CameraOptions& options);
+void addCameraOptions(Command command, CameraOptions& options);
 
 /// The number of cameras asked for. Errors (usage, io) that need no input to be seen: so they come
 /// before an hour of loading.

@@ -1,10 +1,12 @@
 #include <chrono>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
 #include "lib/surface/normals.hpp"
-#include "tools/program.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
@@ -48,26 +50,24 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
 
 }  // namespace
 
-Command addBake(CLI::App& app, Program& program) {
-    auto* c =
-        app.add_subcommand("bake",
-                           "Normals and splat axes from depth: SimpleTexture to SimpleTextureV2\n\n"
-                           "  stx bake model.exr -o baked.exr");
+void addBake(CommandLine& line, Program& program) {
+    Command c = line.add("bake",
+                         "Normals and splat axes from depth: SimpleTexture to SimpleTextureV2\n\n"
+                         "  stx bake model.exr -o baked.exr");
     auto o = std::make_shared<BakeOptions>();
-    c->add_option("BUNDLE", o->input, "Bundle to bake")->required();
-    c->add_option("-o,--output", o->output, "Bundle to write (.exr, .mp4, .xmt, .bt)")
-        ->required()
-        ->type_name("OUT");
-    c->add_option("--method", o->method,
-                  "robust: local fit that respects edges and depth steps; paper: differences to "
-                  "the 4 neighbours (default robust)")
-        ->check(CLI::IsMember({"robust", "paper"}));
-    c->add_option(
-         "--discontinuity", o->settings.discontinuity,
-         "Relative depth difference beyond the slope that parts two surfaces (default 0.01)")
-        ->check(CLI::Range(1e-6, 1.0));
-    addCommonOptions(*c, program, kOutput | kOutside);
-    return {c, [o](Program& p) { return bakeBundle(*o, p); }};
+    c.option("BUNDLE", o->input, "Bundle to bake").required();
+    c.option("-o,--output", o->output, "Bundle to write (.exr, .mp4, .xmt, .bt)")
+        .required()
+        .takes("OUT");
+    c.option("--method", o->method,
+             "robust: local fit that respects edges and depth steps; paper: differences to "
+             "the 4 neighbours (default robust)")
+        .oneOf({"robust", "paper"});
+    c.option("--discontinuity", o->settings.discontinuity,
+             "Relative depth difference beyond the slope that parts two surfaces (default 0.01)")
+        .range(1e-6, 1.0);
+    c.sharedOptions(program.common, kOutput | kOutside);
+    c.runs([o](Program& p) { return bakeBundle(*o, p); });
 }
 
 }  // namespace stx::tools

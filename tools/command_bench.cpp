@@ -1,7 +1,9 @@
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "lib/render/bench/bench.hpp"
-#include "tools/program.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
@@ -9,19 +11,38 @@ namespace {
 struct BenchCommandOptions {
     BenchSettings settings;
     int table = 0;
-    std::string plot, splat = "data";
+    std::string plot;
 };
+
+/// Rounded as people read them.
+double thousandths(double value) {
+    return std::round(value * 1000) / 1000;
+}
+
+nlohmann::ordered_json toJson(const BenchReport& report) {
+    auto rows = nlohmann::ordered_json::array();
+    for (const BenchRow& row : report.rows)
+        rows.push_back({{"table", row.table},
+                        {"references", row.references},
+                        {"points", row.points},
+                        {"path", row.path},
+                        {"splat", row.splat},
+                        {"fps", thousandths(row.fps)},
+                        {"mpps", thousandths(row.mpps)}});
+    return {{"$schema", "bench.schema.json"},
+            {"device", report.device},
+            {"processor", report.processor},
+            {"threads", report.threads},
+            {"rows", std::move(rows)}};
+}
 
 Result<int> bench(const BenchCommandOptions& o, Program& program) {
     BenchSettings settings = o.settings;
     settings.table1 = o.table != 2;
     settings.table2 = o.table != 1;
-    settings.splat = o.splat == "paper" ? SplatRule::paper : SplatRule::data;
     STX_TRY(const auto report, runBench(settings, program.job));
     if (program.common.format == "json") {
-        nlohmann::ordered_json out = {{"$schema", "bench.schema.json"}};
-        out.update(nlohmann::ordered_json::parse(benchJson(report)));
-        program.printJson(out);
+        program.printJson(toJson(report));
     } else {
         program.print(benchText(report));
     }
@@ -34,29 +55,29 @@ Result<int> bench(const BenchCommandOptions& o, Program& program) {
 
 }  // namespace
 
-Command addBench(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand("bench",
-                                 "The paper's two tables on this machine: shader, conventional "
-                                 "OpenGL, software, and ours\n\n"
-                                 "  stx bench\n"
-                                 "  stx bench --table 1 --format json --plot speed.svg");
+void addBench(CommandLine& line, Program& program) {
+    Command c = line.add("bench",
+                         "The paper's two tables on this machine: shader, conventional "
+                         "OpenGL, software, and ours\n\n"
+                         "  stx bench\n"
+                         "  stx bench --table 1 --format json --plot speed.svg");
     auto o = std::make_shared<BenchCommandOptions>();
-    c->add_option("--table", o->table, "Only table 1 (synthetic views) or 2 (full frames)")
-        ->check(CLI::IsMember({1, 2}));
-    c->add_option("--paths", o->settings.paths,
-                  "Only these paths: shader, gl, software, compute, points, surface, "
-                  "surface-gpu")
-        ->delimiter(',');
-    c->add_option("--splat", o->splat,
-                  "Rule of the splats' size: data, or paper, Lee & Park's own (default data)")
-        ->check(CLI::IsMember({"data", "paper"}));
-    c->add_option("--repeats", o->settings.repeats, "Frames measured for each row (default 5)")
-        ->check(CLI::Range(1, 1000));
-    c->add_option("--device", o->settings.device,
-                  "Number of the GPU to use, see 'stx render --list-devices'");
-    c->add_option("--plot", o->plot, "Draw the figures")->type_name("FILE.svg");
-    addCommonOptions(*c, program, kFormat | kOutput);
-    return {c, [o](Program& p) { return bench(*o, p); }};
+    c.option("--table", o->table, "Only table 1 (synthetic views) or 2 (full frames)")
+        .oneOf({1, 2});
+    c.option("--paths", o->settings.paths,
+             "Only these paths: shader, gl, software, compute, points, surface, "
+             "surface-gpu")
+        .commaSeparated();
+    c.choice<SplatRule>(
+        "--splat", o->settings.splat, {{"data", SplatRule::data}, {"paper", SplatRule::paper}},
+        "Rule of the splats' size: data, or paper, Lee & Park's own (default data)");
+    c.option("--repeats", o->settings.repeats, "Frames measured for each row (default 5)")
+        .range(1, 1000);
+    c.option("--device", o->settings.device,
+             "Number of the GPU to use, see 'stx render --list-devices'");
+    c.option("--plot", o->plot, "Draw the figures").takes("FILE.svg");
+    c.sharedOptions(program.common, kFormat | kOutput);
+    c.runs([o](Program& p) { return bench(*o, p); });
 }
 
 }  // namespace stx::tools

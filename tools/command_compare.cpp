@@ -1,9 +1,11 @@
 #include <cmath>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/metrics/compare.hpp"
-#include "tools/program.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
@@ -58,6 +60,12 @@ std::string decibels(std::optional<double> v) {
 }
 
 Result<int> compareImages(const CompareOptions& o, Program& program) {
+    const bool sequences = frameName(o.a, 0) && frameName(o.b, 0);
+    if (sequences && !o.errorPicture.empty() && !frameName(o.errorPicture, 0))
+        return fail(ErrorCode::usage,
+                    "--error-picture is '{}', one file for all frames; a numbered name is "
+                    "expected, as in 'error_%04d.png'",
+                    o.errorPicture);
     std::optional<Image<std::uint8_t>> mask;
     if (!o.mask.empty()) {
         STX_TRY(const auto loaded, openPicture(o.mask, program.job));
@@ -72,7 +80,7 @@ Result<int> compareImages(const CompareOptions& o, Program& program) {
     Comparison total;
     auto perFrame = nlohmann::ordered_json::array();
     int worstFrame = -1;
-    if (frameName(o.a, 0) && frameName(o.b, 0)) {
+    if (sequences) {
         SequenceComparison sequence(255.0);
         for (int frame = o.firstFrame; o.frames == 0 || frame < o.firstFrame + o.frames; ++frame) {
             STX_CHECK(program.job.checkCancelled());
@@ -82,8 +90,7 @@ Result<int> compareImages(const CompareOptions& o, Program& program) {
                 !std::filesystem::exists(b, ec))
                 break;
             CompareOptions one = o;
-            one.errorPicture =
-                o.errorPicture.empty() ? "" : frameName(o.errorPicture, frame).value_or("");
+            one.errorPicture = frameName(o.errorPicture, frame).value_or("");
             STX_TRY(const auto c, comparePair(a, b, one, maskImage, program));
             sequence.add(c);
             auto entry = toJson(c);
@@ -121,32 +128,28 @@ Result<int> compareImages(const CompareOptions& o, Program& program) {
 
 }  // namespace
 
-Command addCompare(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand("compare",
-                                 "PSNR, SSIM and the worst pixel of two images or sequences; exit "
-                                 "code 7 when they differ\n\n"
-                                 "  stx compare novel.png truth.png --error-picture error.png\n"
-                                 "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40");
+void addCompare(CommandLine& line, Program& program) {
+    Command c = line.add("compare",
+                         "PSNR, SSIM and the worst pixel of two images or sequences; exit "
+                         "code 7 when they differ\n\n"
+                         "  stx compare novel.png truth.png --error-picture error.png\n"
+                         "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40");
     auto o = std::make_shared<CompareOptions>();
-    c->add_option("A", o->a, "Image, or sequence as name_%04d.png")->required();
-    c->add_option("B", o->b, "The same")->required();
-    c->add_option("--mask", o->mask, "Image; only pixels that are white in it count")
-        ->type_name("IMAGE");
-    c->add_option("--error-picture", o->errorPicture, "Write where they differ as a PNG")
-        ->type_name("FILE.png");
-    c->add_option("--gain", o->gain, "Of the error picture (default 8)")
-        ->check(CLI::Range(0.001, 1e6));
-    c->add_option("--background", o->background,
-                  "Colour behind transparent pixels, 0..1 (default 0,0,0)")
-        ->type_name("R,G,B");
-    c->add_option("--min-psnr", o->minPsnr, "Exit code 0 when the PSNR of RGB is at least this")
-        ->type_name("DB");
-    c->add_option("--first-frame", o->firstFrame, "First frame of sequences (default 0)")
-        ->check(CLI::NonNegativeNumber);
-    c->add_option("--frames", o->frames, "Number of frames (default: all that exist)")
-        ->check(CLI::NonNegativeNumber);
-    addCommonOptions(*c, program, kFormat | kOutput);
-    return {c, [o](Program& p) { return compareImages(*o, p); }};
+    c.option("A", o->a, "Image, or sequence as name_%04d.png").required();
+    c.option("B", o->b, "The same").required();
+    c.option("--mask", o->mask, "Image; only pixels that are white in it count").takes("IMAGE");
+    c.option("--error-picture", o->errorPicture, "Write where they differ as a PNG")
+        .takes("FILE.png");
+    c.option("--gain", o->gain, "Of the error picture (default 8)").range(0.001, 1e6);
+    c.option("--background", o->background,
+             "Colour behind transparent pixels, 0..1 (default 0,0,0)")
+        .takes("R,G,B");
+    c.option("--min-psnr", o->minPsnr, "Exit code 0 when the PSNR of RGB is at least this")
+        .takes("DB");
+    c.option("--first-frame", o->firstFrame, "First frame of sequences (default 0)").notNegative();
+    c.option("--frames", o->frames, "Number of frames (default: all that exist)").notNegative();
+    c.sharedOptions(program.common, kFormat | kOutput);
+    c.runs([o](Program& p) { return compareImages(*o, p); });
 }
 
 }  // namespace stx::tools

@@ -1,7 +1,6 @@
 // `stx completion`: what a shell needs to complete stx's commands and options, and the manual page.
 
-#include "tools/option_table.hpp"
-#include "tools/program.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
@@ -173,7 +172,7 @@ std::string roff(const std::string& text) {
     return out;
 }
 
-std::string manualPage(const CLI::App& app, const std::vector<CommandRow>& table) {
+std::string manualPage(const std::vector<CommandRow>& table, const std::string& exitCodes) {
     std::string out = fmt::format(
         ".TH STX 1 \"\" \"stx {}\"\n.SH NAME\nstx \\- {}\n.SH SYNOPSIS\n.B stx\n.I COMMAND\n"
         "[OPTIONS]\n.SH COMMANDS\n",
@@ -194,30 +193,30 @@ std::string manualPage(const CLI::App& app, const std::vector<CommandRow>& table
             out += fmt::format(".TP\n{}{}\n{}\n", fmt::join(names, ", "), value, roff(option.help));
         }
     }
-    return out + fmt::format(".SH EXIT STATUS\n{}\n", roff(app.get_footer()));
+    return out + fmt::format(".SH EXIT STATUS\n{}\n", roff(exitCodes));
 }
 
 }  // namespace
 
-Command addCompletion(CLI::App& app, Program&) {
-    auto* c = app.add_subcommand(
-        "completion",
-        "What a shell needs to complete stx's commands and options; or the manual page\n\n"
-        "  source <(stx completion bash)\n"
-        "  stx completion fish > ~/.config/fish/completions/stx.fish\n"
-        "  stx completion man > stx.1");
+void addCompletion(CommandLine& line, Program&) {
+    Command c =
+        line.add("completion",
+                 "What a shell needs to complete stx's commands and options; or the manual page\n\n"
+                 "  source <(stx completion bash)\n"
+                 "  stx completion fish > ~/.config/fish/completions/stx.fish\n"
+                 "  stx completion man > stx.1");
     auto kind = std::make_shared<std::string>();
-    c->add_option("SHELL", *kind, "For which shell; man: the manual page")
-        ->required()
-        ->check(CLI::IsMember({"bash", "zsh", "fish", "man"}));
-    return {c, [&app, kind](Program& program) -> Result<int> {
-                const auto table = optionTable(app);
-                program.print(*kind == "bash"   ? bashCompletion(table)
-                              : *kind == "zsh"  ? zshCompletion(table)
-                              : *kind == "fish" ? fishCompletion(table)
-                                                : manualPage(app, table));
-                return 0;
-            }};
+    c.option("SHELL", *kind, "For which shell; man: the manual page")
+        .required()
+        .oneOf({"bash", "zsh", "fish", "man"});
+    c.runs([&line, kind](Program& program) -> Result<int> {
+        const auto table = line.table();
+        program.print(*kind == "bash"   ? bashCompletion(table)
+                      : *kind == "zsh"  ? zshCompletion(table)
+                      : *kind == "fish" ? fishCompletion(table)
+                                        : manualPage(table, line.exitCodes()));
+        return 0;
+    });
 }
 
 }  // namespace stx::tools

@@ -2,14 +2,16 @@
 #include <chrono>
 #include <cmath>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
 #include "lib/capture/capture.hpp"
 #include "tools/batch.hpp"
+#include "tools/commands.hpp"
 #include "tools/mesh_views.hpp"
-#include "tools/program.hpp"
 
 namespace stx::tools {
 namespace {
@@ -19,7 +21,7 @@ struct ConvertOptions {
     std::string output;
     std::shared_ptr<MeshViewOptions> mesh = std::make_shared<MeshViewOptions>();
     std::string colour = "png";
-    int quality = 92;
+    std::optional<int> quality;
     bool pointTexture = false;
     OpenOptions open;
     std::string frames;  ///< A-B
@@ -37,7 +39,7 @@ Result<void> setTextOptions(const std::string& option, const std::string& text,
 SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    save.jpegQuality = o.colour == "jpeg" ? o.quality : 0;
+    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
     save.pointTexture = o.pointTexture;
     return save;
 }
@@ -46,7 +48,7 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
                           Program& program) {
     OpenOptions open = o.open;
     open.set.texturePattern = open.texture;
-    if (o.mesh->depthBitsGiven) open.set.depthBits = o.mesh->depthBits;
+    open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
     STX_TRY(auto opened, openRenderable(input, open, program.job));
     if (auto* mesh = std::get_if<Mesh>(&opened)) {
         auto bundle = captureMesh(*mesh, *o.mesh, program);
@@ -55,10 +57,10 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
         return bundle;
     }
     auto& bundle = std::get<Bundle>(opened);
-    if (o.mesh->depthBitsGiven) {
+    if (const auto bits = o.mesh->depthBits) {
         for (auto& view : bundle.views) {
-            if (view.depthBits == o.mesh->depthBits) continue;
-            view.depthBits = o.mesh->depthBits;
+            if (view.depthBits == *bits) continue;
+            view.depthBits = *bits;
             fitDepthRange(view);
         }
         noteDepthLoss(bundle, program.job);
@@ -75,7 +77,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     // Only the report has the points, for which the images must be decoded.
     const bool countPoints = !program.common.report.empty();
     STX_TRY(auto bundle, convertDocument(input, target, saveOptions(o, program),
-                                         o.mesh->depthBitsGiven, countPoints, program.job));
+                                         o.mesh->depthBits.has_value(), countPoints, program.job));
     if (!bundle) {
         STX_TRY(bundle, makeBundle(input, o, program));
         STX_CHECK(program.job.checkCancelled());
@@ -144,6 +146,8 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
 }
 
 Result<int> convert(const ConvertOptions& o, Program& program) {
+    if (o.quality && o.colour != "jpeg")
+        return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
     if (!o.frames.empty()) return convertFrames(o, program);
     STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
     STX_TRY(const auto items, planBatch(inputs, o.output));
@@ -173,8 +177,8 @@ Result<int> convert(const ConvertOptions& o, Program& program) {
 
 }  // namespace
 
-Command addConvert(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand(
+void addConvert(CommandLine& line, Program& program) {
+    Command c = line.add(
         "convert",
         "Mesh, image set or bundle to bundle; the output's ending picks the container\n"
         "(.mp4, .xmt, .bt: MPEG-4; .exr: OpenEXR)\n\n"
@@ -183,118 +187,111 @@ Command addConvert(CLI::App& app, Program& program) {
         "  stx convert capture/transforms.json -o capture.exr\n"
         "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
     auto o = std::make_shared<ConvertOptions>();
-    c->add_option("IN", o->inputs, "Files or folders to convert; @FILE: those named in its lines")
-        ->required();
-    c->add_option("-o,--output", o->output, "What to write; {stem} stands for an input's name")
-        ->required()
-        ->type_name("OUT");
-    addMeshViewOptions(*c, o->mesh);
-    c->add_option("--texture", o->open.texture, "Texture of a mesh that names none")
-        ->type_name("IMAGE")
-        ->group("Views of a mesh");
+    c.option("IN", o->inputs, "Files or folders to convert; @FILE: those named in its lines")
+        .required();
+    c.option("-o,--output", o->output, "What to write; {stem} stands for an input's name")
+        .required()
+        .takes("OUT");
+    addMeshViewOptions(c, o->mesh);
+    c.option("--texture", o->open.texture, "Texture of a mesh that names none")
+        .takes("IMAGE")
+        .group("Views of a mesh");
     const char* coding = "Coding";
-    c->add_option("--colour", o->colour, "png (exact) or jpeg, in MPEG-4 containers (default png)")
-        ->check(CLI::IsMember({"png", "jpeg"}))
-        ->group(coding);
-    c->add_option("--quality", o->quality, "Of JPEG (default 92)")
-        ->check(CLI::Range(1, 100))
-        ->group(coding);
-    c->add_flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)")
-        ->group(coding);
+    c.option("--colour", o->colour, "png (exact) or jpeg, in MPEG-4 containers (default png)")
+        .oneOf({"png", "jpeg"})
+        .group(coding);
+    c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100).group(coding);
+    c.flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)").group(coding);
     const char* many = "Many inputs";
-    c->add_option("--jobs,-j", o->batch.jobs,
-                  "Inputs at a time, each in a process of its own (default 1)")
-        ->check(CLI::Range(1, 1024))
-        ->type_name("N")
-        ->group(many);
-    c->add_flag("--keep-going,-k", o->batch.keepGoing, "Go on with the others when an input fails")
-        ->group(many);
-    c->add_flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
-        ->group(many);
+    c.option("--jobs,-j", o->batch.jobs,
+             "Inputs at a time, each in a process of its own (default 1)")
+        .range(1, 1024)
+        .takes("N")
+        .group(many);
+    c.flag("--keep-going,-k", o->batch.keepGoing, "Go on with the others when an input fails")
+        .group(many);
+    c.flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
+        .group(many);
     const char* sets = "Image sets";
     std::vector<std::string> kinds;
     for (const ImageSetKind& kind : imageSetKinds()) kinds.emplace_back(kind.name);
-    c->add_option("--from", o->open.set.from,
-                  "Kind of image set, when it cannot be told from the files")
-        ->check(CLI::IsMember(kinds))
-        ->group(sets);
-    c->add_option("--frame", o->open.set.frame, "Frame of a set that has time, from 0 (default 0)")
-        ->check(CLI::NonNegativeNumber)
-        ->group(sets);
-    c->add_option("--frames", o->frames, "One bundle for each of them; OUT has {frame} in it")
-        ->type_name("A-B")
-        ->group(sets);
-    c->add_option("--every", o->open.set.every, "Take each N-th view of a recording (default 1)")
-        ->check(CLI::Range(1, 1000000))
-        ->type_name("N")
-        ->group(sets);
+    c.option("--from", o->open.set.from, "Kind of image set, when the files do not show it")
+        .oneOf(kinds)
+        .group(sets);
+    c.option("--frame", o->open.set.frame, "Frame of a set that has time, from 0 (default 0)")
+        .notNegative()
+        .group(sets);
+    c.option("--frames", o->frames, "One bundle for each of them; OUT has {frame} in it")
+        .takes("A-B")
+        .group(sets);
+    c.option("--every", o->open.set.every, "Take each N-th view of a recording (default 1)")
+        .range(1, 1000000)
+        .takes("N")
+        .group(sets);
     const auto numbers = [&](const char* name, const char* type, const char* help,
                              std::vector<double*> to) {
-        c->add_option_function<std::string>(
-             name,
-             [name, to](const std::string& text) {
-                 if (auto ok = setTextOptions(name, text, to); !ok)
-                     throw CLI::ValidationError(name, ok.error().message);
-             },
+        c.option(
+             name, [name, to](const std::string& text) { return setTextOptions(name, text, to); },
              help)
-            ->type_name(type)
-            ->group(sets);
+            .takes(type)
+            .group(sets);
     };
     auto& set = o->open.set;
     numbers("--depth-range", "MIN,MAX", "What the depth of MSR 3D Video sets spans",
             {&set.depthMin, &set.depthMax});
-    numbers("--intrinsics", "FX,FY,CX,CY", "Of TUM and 7-Scenes recordings that do not tell",
+    numbers("--intrinsics", "FX,FY,CX,CY", "Of TUM and 7-Scenes recordings that do not hold them",
             {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
-    c->add_option("--depth", set.depthPattern,
-                  "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
-                  "likewise")
-        ->type_name("PATTERN")
-        ->group(sets);
-    c->add_option("--focal", set.focal, "Focal length of older Middlebury sets, pixels")
-        ->check(CLI::PositiveNumber)
-        ->group(sets);
-    c->add_option("--baseline", set.baseline, "From the first to the last view of those sets")
-        ->check(CLI::PositiveNumber)
-        ->group(sets);
-    c->add_option("--disparity-offset", set.disparityOffset,
-                  "Added to their disparities (dmin of 2006; default 0)")
-        ->group(sets);
-    c->add_option("--disparity-scale", set.disparityScale,
-                  "Stored value of one pixel of disparity (default 1)")
-        ->check(CLI::PositiveNumber)
-        ->group(sets);
-    c->add_option("--mixed-pixels", set.mixedPixels,
-                  "Flying points at depth edges: auto (dropped from sensors' depth), drop, keep")
-        ->transform(CLI::CheckedTransformer(
-            std::map<std::string, MixedPixels>{{"auto", MixedPixels::automatic},
-                                               {"drop", MixedPixels::drop},
-                                               {"keep", MixedPixels::keep}}))
-        ->group(sets);
-    c->add_flag("--refine-poses", set.refinePoses,
-                "Move the cameras so that overlapping views agree in depth and colour")
-        ->group(sets);
-    c->add_option("--dequantise", set.dequantise,
-                  "Smooth the stairs of depth stored in integers, within half a step: auto (8-bit "
-                  "depth), on, off")
-        ->transform(CLI::CheckedTransformer(std::map<std::string, Dequantise>{
-            {"auto", Dequantise::automatic}, {"on", Dequantise::on}, {"off", Dequantise::off}}))
-        ->group(sets);
-    c->add_option("--align-edges", set.alignEdges,
-                  "Move depth edges to where the picture has them, by up to 2 pixels: auto (older "
-                  "Middlebury sets), on, off")
-        ->transform(CLI::CheckedTransformer(std::map<std::string, AlignEdges>{
-            {"auto", AlignEdges::automatic}, {"on", AlignEdges::on}, {"off", AlignEdges::off}}))
-        ->group(sets);
-    c->add_option_function<std::string>(
+    c.option("--depth", set.depthPattern,
+             "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
+             "likewise")
+        .takes("PATTERN")
+        .group(sets);
+    c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels")
+        .positive()
+        .group(sets);
+    c.option("--baseline", set.baseline, "From the first to the last view of those sets")
+        .positive()
+        .group(sets);
+    c.option("--disparity-offset", set.disparityOffset,
+             "Added to their disparities (dmin of 2006; default 0)")
+        .group(sets);
+    c.option("--disparity-scale", set.disparityScale,
+             "Stored value of one pixel of disparity (default 1)")
+        .positive()
+        .group(sets);
+    c.choice<MixedPixels>(
+         "--mixed-pixels", set.mixedPixels,
+         {{"auto", MixedPixels::automatic},
+          {"drop", MixedPixels::drop},
+          {"keep", MixedPixels::keep}},
+         "Flying points at depth edges: auto (dropped from sensors' depth), drop, keep")
+        .group(sets);
+    c.flag("--refine-poses", set.refinePoses,
+           "Move the cameras so that overlapping views agree in depth and colour")
+        .group(sets);
+    c.choice<Dequantise>(
+         "--dequantise", set.dequantise,
+         {{"auto", Dequantise::automatic}, {"off", Dequantise::off}, {"on", Dequantise::on}},
+         "Smooth the stairs of depth stored in integers, within half a step: auto (8-bit "
+         "depth), on, off")
+        .group(sets);
+    c.choice<AlignEdges>(
+         "--align-edges", set.alignEdges,
+         {{"auto", AlignEdges::automatic}, {"off", AlignEdges::off}, {"on", AlignEdges::on}},
+         "Move depth edges to where the picture has them, by up to 2 pixels: auto (older "
+         "Middlebury sets), on, off")
+        .group(sets);
+    c.option(
          "--yuv",
-         [o](const std::string& text) {
+         [o](const std::string& text) -> Result<void> {
              o->open.set.yuv = {text.starts_with("bt601"), text.ends_with("full")};
+             return {};
          },
          "Colour of YUV files (default bt709)")
-        ->check(CLI::IsMember({"bt709", "bt601", "bt709-full", "bt601-full"}))
-        ->group(sets);
-    addCommonOptions(*c, program, kOutput | kOutside);
-    return {c, [o](Program& p) { return convert(*o, p); }};
+        .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"})
+        .group(sets);
+    c.sharedOptions(program.common, kOutput | kOutside);
+    c.runs([o](Program& p) { return convert(*o, p); });
 }
 
 }  // namespace stx::tools

@@ -1,11 +1,13 @@
 #include <chrono>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/open.hpp"
 #include "lib/base/parallel.hpp"
-#include "tools/program.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
@@ -99,30 +101,26 @@ Result<int> extract(const ExtractOptions& o, Program& program) {
 
 }  // namespace
 
-Command addExtract(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand(
-        "extract",
-        "Images and cameras of a bundle as plain files, or its points as .ply or .drc\n\n"
-        "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
-        "  stx extract model.mp4 -o folder --cameras miv\n"
-        "  stx extract model.mp4 -o points.ply");
+void addExtract(CommandLine& line, Program& program) {
+    Command c =
+        line.add("extract",
+                 "Images and cameras of a bundle as plain files, or its points as .ply or .drc\n\n"
+                 "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
+                 "  stx extract model.mp4 -o folder --cameras miv\n"
+                 "  stx extract model.mp4 -o points.ply");
     auto o = std::make_shared<ExtractOptions>();
-    c->add_option("BUNDLE", o->input, "Bundle or atlas")->required();
-    c->add_option("-o,--output", o->output, "Folder, points.ply or points.drc")
-        ->required()
-        ->type_name("OUT");
-    c->add_option("--cameras", o->cameras,
-                  "Camera file in the folder: transforms (nerfstudio) or miv (default transforms)")
-        ->check(CLI::IsMember({"transforms", "miv"}));
-    c->add_option("--depth", o->depth,
-                  "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
-        ->check(CLI::IsMember({"exr", "png"}));
-    c->add_option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats")
-        ->check(CLI::Range(0, 30));
-    c->add_option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats")
-        ->check(CLI::Range(0, 30));
-    addCommonOptions(*c, program, kOutput | kOutside);
-    return {c, [o](Program& p) { return extract(*o, p); }};
+    c.option("BUNDLE", o->input, "Bundle or atlas").required();
+    c.option("-o,--output", o->output, "Folder, points.ply or points.drc").required().takes("OUT");
+    c.option("--cameras", o->cameras,
+             "Camera file in the folder: transforms (nerfstudio) or miv (default transforms)")
+        .oneOf({"transforms", "miv"});
+    c.option("--depth", o->depth,
+             "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
+        .oneOf({"exr", "png"});
+    c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
+    c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
+    c.sharedOptions(program.common, kOutput | kOutside);
+    c.runs([o](Program& p) { return extract(*o, p); });
 }
 
 }  // namespace stx::tools

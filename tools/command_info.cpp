@@ -1,5 +1,5 @@
 #include "formats/info.hpp"
-#include "tools/program.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
@@ -20,18 +20,17 @@ Result<int> info(const InfoCommandOptions& o, Program& program) {
 
 }  // namespace
 
-Command addInfo(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand("info",
-                                 "What is in a file: container, nodes, views, cameras, bytes\n\n"
-                                 "  stx info model.mp4\n"
-                                 "  stx info model.exr --format json --bounds");
+void addInfo(CommandLine& line, Program& program) {
+    Command c = line.add("info",
+                         "What is in a file: container, nodes, views, cameras, bytes\n\n"
+                         "  stx info model.mp4\n"
+                         "  stx info model.exr --format json --bounds");
     auto o = std::make_shared<InfoCommandOptions>();
-    c->add_option("FILE", o->input, "Bundle, atlas, mesh or image set")->required();
-    c->add_flag(
-        "--bounds", o->info.bounds,
-        "Compute the bounds and point counts from the pixels where the file does not tell them");
-    addCommonOptions(*c, program, kFormat | kOutside);
-    return {c, [o](Program& p) { return info(*o, p); }};
+    c.option("FILE", o->input, "Bundle, atlas, mesh or image set").required();
+    c.flag("--bounds", o->info.bounds,
+           "Compute the bounds and point counts from the pixels where the file does not hold them");
+    c.sharedOptions(program.common, kFormat | kOutside);
+    c.runs([o](Program& p) { return info(*o, p); });
 }
 
 }  // namespace stx::tools

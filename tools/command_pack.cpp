@@ -1,26 +1,27 @@
 #include <chrono>
 #include <cmath>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "lib/packing/packing.hpp"
-#include "lib/packing/prune_quality.hpp"
-#include "tools/program.hpp"
+#include "lib/quality/prune_quality.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
 
 struct PackOptions {
     std::string input, output;
-    std::string layout = "grid";
     PackSettings settings;
     bool prune = false;
     std::string budget;
     PruneSettings pruning;
     double minPsnr = 0;
     std::string colour = "png";
-    int quality = 92;
+    std::optional<int> quality;
 };
 
 /// "4M", "250k" or "1000000" pixels.
@@ -38,8 +39,27 @@ Result<std::int64_t> parsePixels(const std::string& text) {
     return static_cast<std::int64_t>((*value)[0] * factor);
 }
 
+/// Packs so that the images that are written, not only the pages, are within settings.maxSize.
+Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std::string& output,
+                          const AtlasSaveOptions& save, Job& job) {
+    STX_TRY(auto atlas, pack(bundle, settings, job));
+    if (largestImageSide(atlas, output, save) <= settings.maxSize) return atlas;
+    // Some image holds two pictures of a page: beside each other, or one below the other.
+    const int limit = settings.maxSize;
+    settings.maxSize = limit / 2;
+    Job quiet;  // the same notes again
+    quiet.limits = job.limits;
+    auto smaller = pack(bundle, settings, quiet);
+    if (!smaller && smaller.error().code == ErrorCode::invalidInput)
+        smaller.error().message += fmt::format(
+            "; an image here holds two pictures, so that each gets half of the {} pixels", limit);
+    return smaller;
+}
+
 Result<int> packBundle(const PackOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
+    if (o.quality && o.colour != "jpeg")
+        return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
     PruneSettings pruning = o.pruning;
@@ -60,14 +80,12 @@ Result<int> packBundle(const PackOptions& o, Program& program) {
         if (o.minPsnr > 0 && std::isfinite(report->psnr))
             pruned += fmt::format(", {:.1f} dB measured", report->psnr);
     }
-    settings.layout =
-        o.layout == "tight" ? PackSettings::Layout::tight : PackSettings::Layout::grid;
-    auto atlas = pack(bundle, settings, program.job);
+    AtlasSaveOptions save;
+    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
+    save.output = program.outputOptions();
+    auto atlas = packForFile(bundle, settings, o.output, save, program.job);
     if (!atlas) return tl::unexpected(atlas.error().at(fmt::format("'{}'", o.input)));
     STX_CHECK(program.job.checkCancelled());
-    AtlasSaveOptions save;
-    save.jpegQuality = o.colour == "jpeg" ? o.quality : 0;
-    save.output = program.outputOptions();
     STX_CHECK(writeAtlas(*atlas, o.output, program.job, save));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -93,47 +111,46 @@ Result<int> packBundle(const PackOptions& o, Program& program) {
 
 }  // namespace
 
-Command addPack(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand(
+void addPack(CommandLine& line, Program& program) {
+    Command c = line.add(
         "pack",
         "Merge the reference views into at most 4 textures: colour, depth, normal, splat\n\n"
         "  stx pack model.exr -o atlas           a folder: atlas.json and images\n"
         "  stx pack model.exr -o atlas.exr --layout tight");
     auto o = std::make_shared<PackOptions>();
-    c->add_option("BUNDLE", o->input, "Bundle to pack")->required();
-    c->add_option("-o,--output", o->output, "Folder, or one .exr file")
-        ->required()
-        ->type_name("ATLAS");
-    c->add_option("--layout", o->layout,
-                  "grid: equal cells in view order; tight: trimmed and packed (default grid)")
-        ->check(CLI::IsMember({"grid", "tight"}));
-    c->add_option(
+    c.option("BUNDLE", o->input, "Bundle to pack").required();
+    c.option("-o,--output", o->output, "Folder, or one .exr file").required().takes("ATLAS");
+    c.choice<PackSettings::Layout>(
+        "--layout", o->settings.layout,
+        {{"grid", PackSettings::Layout::grid}, {"tight", PackSettings::Layout::tight}},
+        "grid: equal cells in view order; tight: trimmed and packed (default grid)");
+    c.option(
          "--padding", o->settings.padding,
          "Pixels around each rectangle, filled from what surrounds it in its view; 1, 3, 7 keep "
          "mip levels 1, 2, 3 clean (default 2)")
-        ->check(CLI::Range(0, 64));
-    c->add_option("--max-size", o->settings.maxSize, "Largest side of a texture (default 16384)")
-        ->check(CLI::Range(16, 65536));
-    c->add_option("--colour", o->colour,
-                  "png (exact) or jpeg, in a folder; alpha stays exact (default png)")
-        ->check(CLI::IsMember({"png", "jpeg"}));
-    c->add_option("--quality", o->quality, "Of JPEG (default 92)")->check(CLI::Range(1, 100));
+        .range(0, 64);
+    c.option("--max-size", o->settings.maxSize,
+             "Largest side of an image that is written (default 16384)")
+        .range(16, 65535);
+    c.option("--colour", o->colour,
+             "png (exact) or jpeg, in a folder; alpha stays exact (default png)")
+        .oneOf({"png", "jpeg"});
+    c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     const char* pruning = "Pruning";
-    c->add_flag("--prune", o->prune,
-                "Leave out pixels that another kept view shows as well or better")
-        ->group(pruning);
-    c->add_option("--budget", o->budget, "Keep at most so many object pixels, as in 4M")
-        ->type_name("PIXELS")
-        ->group(pruning);
-    c->add_option(
+    c.flag("--prune", o->prune, "Leave out pixels that another kept view shows as well or better")
+        .group(pruning);
+    c.option("--budget", o->budget, "Keep at most so many object pixels, as in 4M")
+        .takes("PIXELS")
+        .group(pruning);
+    c.option(
          "--min-psnr", o->minPsnr,
          "Prune only as far as pictures of what is kept reach this against pictures of all: RGB, "
          "the worst of up to 8, rendered from poses of the views and half way between them")
-        ->type_name("DB")
-        ->check(CLI::Range(0.0, 200.0))
-        ->group(pruning);
-    addCommonOptions(*c, program, kOutput | kOutside);
-    return {c, [o](Program& p) { return packBundle(*o, p); }};
+        .takes("DB")
+        .range(0.0, 200.0)
+        .group(pruning);
+    c.sharedOptions(program.common, kOutput | kOutside);
+    c.runs([o](Program& p) { return packBundle(*o, p); });
 }
 
 }  // namespace stx::tools

@@ -1,13 +1,15 @@
 #include <chrono>
 #include <cmath>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/render/renderer.hpp"
 #include "tools/camera_options.hpp"
+#include "tools/commands.hpp"
 #include "tools/frame_writer.hpp"
-#include "tools/program.hpp"
 
 namespace stx::tools {
 namespace {
@@ -15,9 +17,8 @@ namespace {
 struct RenderOptions {
     std::string input, output;
     CameraOptions camera;
-    std::string backend = "auto", mode = "surface", quality = "normal", splat = "data",
-                fill = "background", pipeline = "auto";
-    double splatCoefficient = 0;
+    Backend backend = Backend::automatic;
+    RenderSettings settings;  ///< without the lighting
     std::string background = "none";
     std::vector<std::string> lights;
     std::string ambient = "0.2", specular = "0";
@@ -76,19 +77,7 @@ Result<std::optional<glm::vec3>> parseBackground(const std::string& text) {
 }
 
 Result<RenderSettings> settingsOf(const RenderOptions& o) {
-    RenderSettings s;
-    s.mode = o.mode == "splat" ? RenderMode::splat : RenderMode::surface;
-    s.quality = o.quality == "draft"  ? Quality::draft
-                : o.quality == "best" ? Quality::best
-                                      : Quality::normal;
-    s.splat = o.splat == "paper"   ? SplatRule::paper
-              : o.splat == "point" ? SplatRule::point
-                                   : SplatRule::data;
-    s.splatCoefficient = o.splatCoefficient;
-    s.fill = o.fill == "none" ? Fill::none : Fill::background;
-    s.pipeline = o.pipeline == "compute"  ? GpuPipeline::compute
-                 : o.pipeline == "raster" ? GpuPipeline::raster
-                                          : GpuPipeline::automatic;
+    RenderSettings s = o.settings;
     // What only OpenEXR can hold.
     if (const auto format = frameFormat(o.output); format && *format == FrameFormat::exr)
         s.normals = true;
@@ -105,18 +94,11 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
             return fail(ErrorCode::usage, "{} is negative; light is 0 or more", option);
     }
     for (const auto& [option, value] : {std::pair{"--shininess", o.shininess},
-                                        std::pair{"--splat-coefficient", o.splatCoefficient}}) {
+                                        std::pair{"--splat-coefficient", s.splatCoefficient}}) {
         if (!std::isfinite(value))
             return fail(ErrorCode::usage, "{} is {}; a finite number is expected", option, value);
     }
     return s;
-}
-
-Backend backendOf(const std::string& name) {
-    if (name == "gpu") return Backend::gpu;
-    if (name == "gl") return Backend::gl;
-    if (name == "cpu") return Backend::cpu;
-    return Backend::automatic;
 }
 
 Result<int> printDevices(Program& program) {
@@ -147,11 +129,11 @@ Result<int> render(const RenderOptions& o, Program& program) {
     STX_TRY(const auto settings, settingsOf(o));
     STX_TRY(const auto background, parseBackground(o.background));
     STX_CHECK(checkTarget(o.output, program));
-    STX_TRY(const int count, checkCameraOptions(o.camera, program));
-    if (count > 1 && !frameName(o.output, 0) && o.output != "-")
+    STX_TRY(const int wanted, checkCameraOptions(o.camera, program));
+    if (wanted > 1 && !frameName(o.output, 0) && o.output != "-")
         return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
-                    count);
-    STX_CHECK(checkFrames(o, count, program));
+                    wanted);
+    STX_CHECK(checkFrames(o, wanted, program));
     FrameWriter::Settings writing;
     writing.pattern = o.output;
     writing.background = background;
@@ -173,7 +155,8 @@ Result<int> render(const RenderOptions& o, Program& program) {
     if (const auto* atlas = std::get_if<Atlas>(&model)) addViews(*atlas);
     context.bounds = boundsOf(model);
     STX_TRY(const auto cameras, makeCameras(o.camera, context, program));
-    STX_CHECK(checkFrames(o, static_cast<int>(cameras.size()), program));
+    const auto count = static_cast<int>(cameras.size());
+    STX_CHECK(checkFrames(o, count, program));
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         if (auto ok = cameras[i].check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera {}", i)));
@@ -181,12 +164,13 @@ Result<int> render(const RenderOptions& o, Program& program) {
             static_cast<std::uint64_t>(cameras[i].width) * cameras[i].height, 64, "the picture"));
     }
     STX_TRY(const auto renderer,
-            rendererOf(std::move(model), settings, program.job, backendOf(o.backend), o.device));
+            rendererOf(std::move(model), settings, program.job, o.backend, o.device));
     program.sayNotes();
 
     FrameWriter writer(writing, program.job);
     auto views = nlohmann::ordered_json::array();
     double total = 0;
+    int drawn = 0;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         const auto name = writer.nameOf(static_cast<int>(i));
         std::error_code ec;
@@ -203,6 +187,7 @@ Result<int> render(const RenderOptions& o, Program& program) {
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
                 .count();
         total += milliseconds;
+        ++drawn;
         views.push_back({{"output", name}, {"milliseconds", milliseconds}});
         STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), cameras[i]));
         program.job.progress(static_cast<std::int64_t>(i) + 1,
@@ -210,104 +195,108 @@ Result<int> render(const RenderOptions& o, Program& program) {
     }
     STX_CHECK(writer.finish());
     program.sayNotes();
-    program.say(fmt::format("{} → {}, {} picture{} {}x{}, {}, {:.1f} ms each",
+    program.say(fmt::format("{} → {}, {} picture{} {}x{}, {}{}{}",
                             std::filesystem::path(o.input).filename().string(), o.output,
                             cameras.size(), cameras.size() == 1 ? "" : "s", cameras[0].width,
                             cameras[0].height, renderer->backend(),
-                            total / static_cast<double>(cameras.size())));
-    STX_CHECK(program.writeReport({{"$schema", "render-report.schema.json"},
-                                   {"backend", renderer->backend()},
-                                   {"device", renderer->device()},
-                                   {"mode", o.mode},
-                                   {"points", points},
-                                   {"views", views}}));
+                            drawn > 0 ? fmt::format(", {:.1f} ms each", total / drawn) : "",
+                            drawn < count ? fmt::format(", {} skipped", count - drawn) : ""));
+    STX_CHECK(
+        program.writeReport({{"$schema", "render-report.schema.json"},
+                             {"backend", renderer->backend()},
+                             {"device", renderer->device()},
+                             {"mode", settings.mode == RenderMode::splat ? "splat" : "surface"},
+                             {"points", points},
+                             {"views", views}}));
     return 0;
 }
 
 }  // namespace
 
-Command addRender(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand(
+void addRender(CommandLine& line, Program& program) {
+    Command c = line.add(
         "render",
         "Novel views of a bundle, an atlas or a mesh\n\n"
         "  stx render model.mp4 -o view.png --eye 0,1,4 --target 0,0,0\n"
         "  stx render atlas -o orbit_%04d.png --orbit 60 --elevation 20\n"
         "  stx render model.exr -o - --orbit 250 --file-format y4m | ffmpeg -i - orbit.mp4");
     auto o = std::make_shared<RenderOptions>();
-    c->add_option("IN", o->input, "Bundle, atlas or mesh");
-    c->add_option("-o,--output", o->output,
-                  ".png, .jpg or .exr; name_%04d.png for several; - for a y4m stream")
-        ->type_name("IMAGE");
-    addCameraOptions(*c, o->camera);
+    c.option("IN", o->input, "Bundle, atlas or mesh");
+    c.option("-o,--output", o->output,
+             ".png, .jpg or .exr; name_%04d.png for several; - for a y4m stream")
+        .takes("IMAGE");
+    addCameraOptions(c, o->camera);
     const char* drawing = "Drawing";
-    c->add_option("--backend", o->backend,
-                  "auto, gpu, gl or cpu (default auto: a real GPU, else cpu)")
-        ->check(CLI::IsMember({"auto", "gpu", "gl", "cpu"}))
-        ->group(drawing);
-    c->add_option("--device", o->device, "Number of the GPU to use, see --list-devices")
-        ->group(drawing);
-    c->add_flag("--list-devices", o->listDevices, "Print the GPUs there are and stop")
-        ->group(drawing);
-    c->add_option(
-         "--pipeline", o->pipeline,
+    c.choice<Backend>("--backend", o->backend,
+                      {{"auto", Backend::automatic},
+                       {"gpu", Backend::gpu},
+                       {"gl", Backend::gl},
+                       {"cpu", Backend::cpu}},
+                      "auto, gpu, gl or cpu (default auto: a real GPU, else cpu)")
+        .group(drawing);
+    c.option("--device", o->device, "Number of the GPU to use, see --list-devices").group(drawing);
+    c.flag("--list-devices", o->listDevices, "Print the GPUs there are and stop").group(drawing);
+    c.choice<GpuPipeline>(
+         "--pipeline", o->settings.pipeline,
+         {{"auto", GpuPipeline::automatic},
+          {"compute", GpuPipeline::compute},
+          {"raster", GpuPipeline::raster}},
          "Of splats on a GPU: auto, compute (atomics; OpenGL 4.5) or raster (vertex texture "
          "fetch; OpenGL 3.3) (default auto: by what the device has)")
-        ->check(CLI::IsMember({"auto", "compute", "raster"}))
-        ->group(drawing);
-    c->add_option("--mode", o->mode, "surface: best pictures; splat: the paper's (default surface)")
-        ->check(CLI::IsMember({"surface", "splat"}))
-        ->group(drawing);
-    c->add_option("--quality", o->quality,
-                  "Of surface mode: draft, normal or best (default normal)")
-        ->check(CLI::IsMember({"draft", "normal", "best"}))
-        ->group(drawing);
-    c->add_option("--splat", o->splat,
-                  "Size and shape of splats: data, paper or point (default data)")
-        ->check(CLI::IsMember({"data", "paper", "point"}))
-        ->group(drawing);
-    c->add_option("--splat-coefficient", o->splatCoefficient,
-                  "Of --splat paper: pixels times scene units (default: fitted)")
-        ->check(CLI::NonNegativeNumber)
-        ->group(drawing);
-    c->add_option("--fill", o->fill,
-                  "What no view saw in full scenes: background or none (default background)")
-        ->check(CLI::IsMember({"background", "none"}))
-        ->group(drawing);
-    c->add_option("--background", o->background,
-                  "Colour behind the object, 0..1 each; none keeps alpha (default none)")
-        ->type_name("R,G,B|none")
-        ->group(drawing);
+        .group(drawing);
+    c.choice<RenderMode>("--mode", o->settings.mode,
+                         {{"surface", RenderMode::surface}, {"splat", RenderMode::splat}},
+                         "surface: best pictures; splat: the paper's (default surface)")
+        .group(drawing);
+    c.choice<Quality>(
+         "--quality", o->settings.quality,
+         {{"draft", Quality::draft}, {"normal", Quality::normal}, {"best", Quality::best}},
+         "Of surface mode: draft, normal or best (default normal)")
+        .group(drawing);
+    c.choice<SplatRule>(
+         "--splat", o->settings.splat,
+         {{"data", SplatRule::data}, {"paper", SplatRule::paper}, {"point", SplatRule::point}},
+         "Size and shape of splats: data, paper or point (default data)")
+        .group(drawing);
+    c.option("--splat-coefficient", o->settings.splatCoefficient,
+             "Of --splat paper: pixels times scene units (default: fitted)")
+        .notNegative()
+        .group(drawing);
+    c.choice<Fill>("--fill", o->settings.fill,
+                   {{"background", Fill::background}, {"none", Fill::none}},
+                   "What no view saw in full scenes: background or none (default background)")
+        .group(drawing);
+    c.option("--background", o->background,
+             "Colour behind the object, 0..1 each; none keeps alpha (default none)")
+        .takes("R,G,B|none")
+        .group(drawing);
     const char* lighting = "Lighting (Phong; off without --light)";
-    c->add_option("--light", o->lights,
-                  "dir:X,Y,Z[,r,g,b] shines along X,Y,Z; point:X,Y,Z[,r,g,b] stands there; @camera "
-                  "appended: in camera space. Repeat for more")
-        ->type_name("LIGHT")
-        ->group(lighting);
-    c->add_option("--ambient", o->ambient, "Ambient light, grey or r,g,b (default 0.2)")
-        ->group(lighting);
-    c->add_option("--specular", o->specular, "Specular reflection, grey or r,g,b (default 0)")
-        ->group(lighting);
-    c->add_option("--shininess", o->shininess, "Phong exponent, above 0 (default 32)")
-        ->check(CLI::PositiveNumber)
-        ->group(lighting);
+    c.option("--light", o->lights,
+             "dir:X,Y,Z[,r,g,b] shines along X,Y,Z; point:X,Y,Z[,r,g,b] is at X,Y,Z; @camera "
+             "appended: in camera space. Repeat for more")
+        .takes("LIGHT")
+        .group(lighting);
+    c.option("--ambient", o->ambient, "Ambient light, grey or r,g,b (default 0.2)").group(lighting);
+    c.option("--specular", o->specular, "Specular reflection, grey or r,g,b (default 0)")
+        .group(lighting);
+    c.option("--shininess", o->shininess, "Phong exponent, above 0 (default 32)")
+        .positive()
+        .group(lighting);
     const char* output = "Output";
-    c->add_option("--file-format", o->fileFormat, "Of a stream on stdout: y4m")
-        ->check(CLI::IsMember({"y4m"}))
-        ->group(output);
-    c->add_option("--format", o->fileFormat, "The same as --file-format")
-        ->check(CLI::IsMember({"y4m"}))
-        ->group(output);
-    c->add_option("--fps", o->framesPerSecond,
-                  "Frame rate told to readers of the stream (default 25)")
-        ->check(CLI::Range(0.001, 1000.0))
-        ->group(output);
-    c->add_flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
-        ->group(output);
-    c->add_option("--texture", o->open.texture, "Texture of a mesh that names none")
-        ->type_name("IMAGE")
-        ->group(output);
-    addCommonOptions(*c, program, kOutput | kOutside);
-    return {c, [o](Program& p) { return render(*o, p); }};
+    c.option("--file-format", o->fileFormat, "Of a stream on stdout: y4m")
+        .oneOf({"y4m"})
+        .group(output);
+    c.option("--format", o->fileFormat, "The same as --file-format").oneOf({"y4m"}).group(output);
+    c.option("--fps", o->framesPerSecond, "Frame rate written into the stream (default 25)")
+        .range(0.001, 1000.0)
+        .group(output);
+    c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
+        .group(output);
+    c.option("--texture", o->open.texture, "Texture of a mesh that names none")
+        .takes("IMAGE")
+        .group(output);
+    c.sharedOptions(program.common, kOutput | kOutside);
+    c.runs([o](Program& p) { return render(*o, p); });
 }
 
 }  // namespace stx::tools

@@ -1,11 +1,13 @@
 #include <chrono>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
 #include "lib/selection/selection.hpp"
+#include "tools/commands.hpp"
 #include "tools/mesh_views.hpp"
-#include "tools/program.hpp"
 
 namespace stx::tools {
 namespace {
@@ -13,8 +15,7 @@ namespace {
 struct SelectOptions {
     std::string input, output, plot;
     SelectSettings settings;
-    double sharePercent = 95.0;
-    bool shareGiven = false;
+    std::optional<double> sharePercent;  ///< nothing: 95, or as the count says
 };
 
 /// A mesh has no views to choose from: the best ones around it are captured.
@@ -43,7 +44,7 @@ Result<int> select(const SelectOptions& o, Program& program) {
     if (const auto* mesh = std::get_if<Mesh>(&opened)) return selectAroundMesh(*mesh, o, program);
     const auto& bundle = std::get<Bundle>(opened);
     SelectSettings settings = o.settings;
-    settings.share = settings.count > 0 && !o.shareGiven ? 1.0 : o.sharePercent / 100.0;
+    settings.share = o.sharePercent.value_or(settings.count > 0 ? 100.0 : 95.0) / 100.0;
     STX_TRY(const auto selection, selectViews(bundle, settings, program.job));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
@@ -79,35 +80,26 @@ Result<int> select(const SelectOptions& o, Program& program) {
 
 }  // namespace
 
-Command addSelect(CLI::App& app, Program& program) {
-    auto* c =
-        app.add_subcommand("select",
-                           "Keep the fewest reference views that still cover the surface\n\n"
-                           "  stx select model.exr -o fewer.exr --count 12\n"
-                           "  stx select model.exr -o fewer.exr --share 98 --plot quality.svg");
+void addSelect(CommandLine& line, Program& program) {
+    Command c = line.add("select",
+                         "Keep the fewest reference views that still cover the surface\n\n"
+                         "  stx select model.exr -o fewer.exr --count 12\n"
+                         "  stx select model.exr -o fewer.exr --share 98 --plot quality.svg");
     auto o = std::make_shared<SelectOptions>();
-    c->add_option("IN", o->input, "Bundle to choose from, or a mesh to look at from all sides")
-        ->required();
-    c->add_option("-o,--output", o->output, "Bundle to write")->required()->type_name("OUT");
-    c->add_option("--count", o->settings.count, "Number of views to keep")
-        ->check(CLI::Range(1, 65536))
-        ->type_name("N");
-    c->add_option_function<double>(
-         "--share",
-         [o](const double& v) {
-             o->sharePercent = v;
-             o->shareGiven = true;
-         },
-         "Keep as many as reach this much of the quality of all views, in percent (default 95)")
-        ->check(CLI::Range(0.1, 100.0))
-        ->type_name("PERCENT");
-    c->add_option("--density", o->settings.targetDensity,
-                  "Wanted samples per scene unit (default: what the views typically have)")
-        ->check(CLI::NonNegativeNumber);
-    c->add_option("--plot", o->plot, "Draw quality against the number of views")
-        ->type_name("FILE.svg");
-    addCommonOptions(*c, program, kOutput | kOutside);
-    return {c, [o](Program& p) { return select(*o, p); }};
+    c.option("IN", o->input, "Bundle to choose from, or a mesh to look at from all sides")
+        .required();
+    c.option("-o,--output", o->output, "Bundle to write").required().takes("OUT");
+    c.option("--count", o->settings.count, "Number of views to keep").range(1, 65536).takes("N");
+    c.option("--share", o->sharePercent,
+             "Keep as many as reach this much of the quality of all views, in percent (default 95)")
+        .range(0.1, 100.0)
+        .takes("PERCENT");
+    c.option("--density", o->settings.targetDensity,
+             "Wanted samples per scene unit (default: what the views typically have)")
+        .notNegative();
+    c.option("--plot", o->plot, "Draw quality against the number of views").takes("FILE.svg");
+    c.sharedOptions(program.common, kOutput | kOutside);
+    c.runs([o](Program& p) { return select(*o, p); });
 }
 
 }  // namespace stx::tools

@@ -1,6 +1,8 @@
+#include <nlohmann/json.hpp>
+
 #include "formats/validate/validate.hpp"
 #include "lib/base/printable.hpp"
-#include "tools/program.hpp"
+#include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
@@ -51,18 +53,18 @@ Result<int> run(const ValidateCommandOptions& o, Program& program) {
 
 }  // namespace
 
-Command addValidate(CLI::App& app, Program& program) {
-    auto* c = app.add_subcommand("validate",
-                                 "Every rule that a file breaks, by number; silent, with exit code "
-                                 "0, when it breaks none\n\n"
-                                 "  stx validate model.mp4\n"
-                                 "  stx validate --rules");
+void addValidate(CommandLine& line, Program& program) {
+    Command c = line.add("validate",
+                         "Every rule that a file breaks, by number; silent, with exit code "
+                         "0, when it breaks none\n\n"
+                         "  stx validate model.mp4\n"
+                         "  stx validate --rules");
     auto o = std::make_shared<ValidateCommandOptions>();
-    c->add_option("FILE", o->input, "Bundle or atlas");
-    c->add_flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
-    c->add_flag("--rules", o->rules, "Print the catalogue of rules and stop");
-    addCommonOptions(*c, program, kFormat | kOutside);
-    return {c, [o](Program& p) { return run(*o, p); }};
+    c.option("FILE", o->input, "Bundle or atlas");
+    c.flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
+    c.flag("--rules", o->rules, "Print the catalogue of rules and stop");
+    c.sharedOptions(program.common, kFormat | kOutside);
+    c.runs([o](Program& p) { return run(*o, p); });
 }
 
 }  // namespace stx::tools

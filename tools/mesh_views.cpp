@@ -5,9 +5,7 @@
 #include <numbers>
 
 #include "formats/imagesets/camera_file.hpp"
-#include "lib/metrics/compare.hpp"
-#include "lib/render/mesh/mesh_renderer.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/quality/capture_quality.hpp"
 #include "lib/selection/selection.hpp"
 
 namespace stx::tools {
@@ -63,40 +61,6 @@ Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& prog
     return framing;
 }
 
-Image<glm::u8vec4> onBlack(const Frame& frame) {
-    Image<glm::u8vec4> out(frame.colour.width(), frame.colour.height());
-    for (std::size_t i = 0; i < out.count(); ++i) {
-        const glm::vec3 c = glm::clamp(glm::vec3(frame.colour.pixels()[i]), 0.0f, 1.0f);
-        out.pixels()[i] = glm::u8vec4(glm::u8vec3(c * 255.0f + 0.5f), 255);
-    }
-    return out;
-}
-
-/// Mean PSNR of views between the references against the mesh itself: what `auto:DBdB` asks for.
-Result<double> measureQuality(const Mesh& mesh, const std::vector<Camera>& cameras,
-                              const CaptureSettings& capture, Program& program) {
-    constexpr int kNovelViews = 6, kSide = 256;
-    Job quiet;  // the same notes again and again would help nobody
-    quiet.limits = program.job.limits;
-    STX_TRY(const auto bundle, captureBundle(mesh, cameras, capture, quiet));
-    STX_TRY(const auto renderer, makeRenderer(Backend::cpu, bundle, {}, -1, quiet));
-    const auto truth = makeMeshRenderer(mesh, {}, quiet);
-    ViewFraming framing;
-    framing.width = framing.height = kSide;
-    ViewLayout layout;
-    layout.count = kNovelViews;
-    STX_TRY(const auto novel, layoutCameras(layout, framing, drawnPoints(mesh)));
-    SequenceComparison total(255.0);
-    for (const auto& camera : novel) {
-        STX_CHECK(program.job.checkCancelled());
-        STX_TRY(const auto ours, renderer->render(camera));
-        STX_TRY(const auto theirs, truth->render(camera));
-        STX_TRY(const auto comparison, compare(onBlack(ours), onBlack(theirs)));
-        total.add(comparison);
-    }
-    return total.total().psnrRgb.value_or(100.0);
-}
-
 Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wanted,
                                         const MeshViewOptions& o, const CaptureSettings& capture,
                                         Program& program) {
@@ -109,12 +73,8 @@ Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wante
     auto cameras = std::move(chosen.cameras);
     if (wanted.count == 0) {
         const auto most = static_cast<int>(cameras.size());
-        double reached = 0;
-        STX_TRY(const int count, leastViews(most, wanted.decibels, [&](int n) -> Result<double> {
-                    STX_TRY(reached, measureQuality(mesh, {cameras.begin(), cameras.begin() + n},
-                                                    capture, program));
-                    return reached;
-                }));
+        STX_TRY(const int count,
+                fewestCameras(mesh, cameras, capture, wanted.decibels, program.job));
         cameras.resize(count);
         if (count == most)
             program.job.note(
@@ -154,56 +114,49 @@ Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions
 
 }  // namespace
 
-void addMeshViewOptions(CLI::App& command, const std::shared_ptr<MeshViewOptions>& o) {
+void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>& o) {
     const char* group = "Views of a mesh";
     command
-        .add_option("--views", o->views,
-                    "cube, ring:N, sphere:N, octahedral:N, auto:N (the N best), auto:DBdB (the "
-                    "fewest that reach "
-                    "this PSNR) or a camera file (default sphere:16)")
-        ->group(group);
-    command.add_option("--size", o->size, "Size of each view (default 512x512)")
-        ->type_name("WxH")
-        ->group(group);
+        .option("--views", o->views,
+                "cube, ring:N, sphere:N, octahedral:N, auto:N (the N best), auto:DBdB (the "
+                "fewest that reach "
+                "this PSNR) or a camera file (default sphere:16)")
+        .group(group);
+    command.option("--size", o->size, "Size of each view (default 512x512)")
+        .takes("WxH")
+        .group(group);
     command
-        .add_option("--projection", o->projection,
-                    "perspective or orthographic (default perspective; cube: orthographic)")
-        ->check(CLI::IsMember({"perspective", "orthographic"}))
-        ->group(group);
+        .option("--projection", o->projection,
+                "perspective or orthographic (default perspective; cube: orthographic)")
+        .oneOf({"perspective", "orthographic"})
+        .group(group);
     command
-        .add_option("--elevation", o->elevationDeg,
-                    "Of a ring above the horizon, in degrees (default 15)")
-        ->check(CLI::Range(-90.0, 90.0))
-        ->type_name("DEG")
-        ->group(group);
+        .option("--elevation", o->elevationDeg,
+                "Of a ring above the horizon, in degrees (default 15)")
+        .range(-90.0, 90.0)
+        .takes("DEG")
+        .group(group);
     command
-        .add_option("--fov", o->fovDeg,
-                    "Angle that the whole object fills, in degrees: sets the distance (default 35)")
-        ->type_name("DEG")
-        ->group(group);
+        .option("--fov", o->fovDeg,
+                "Angle that the whole object fills, in degrees: sets the distance (default 35)")
+        .takes("DEG")
+        .group(group);
     command
-        .add_option("--supersampling", o->supersampling,
-                    "Colour samples per pixel and axis, 1 to 8 (default 4)")
-        ->check(CLI::Range(1, 8))
-        ->group(group);
+        .option("--supersampling", o->supersampling,
+                "Colour samples per pixel and axis, 1 to 8 (default 4)")
+        .range(1, 8)
+        .group(group);
     command
-        .add_option("--normals", o->normals,
-                    "mesh: keep the model's own normals (SimpleTextureV2); or none (default none)")
-        ->check(CLI::IsMember({"mesh", "none"}))
-        ->group(group);
-    command.add_option("--plot", o->plot, "With auto: draw quality against the number of views")
-        ->type_name("FILE.svg")
-        ->group(group);
-    command
-        .add_option_function<int>(
-            "--depth-bits",
-            [o](const int& bits) {
-                o->depthBits = bits;
-                o->depthBitsGiven = true;
-            },
-            "8, 16 or 32 (float, .exr only); default 16")
-        ->check(CLI::IsMember({8, 16, 32}))
-        ->group("Coding");
+        .option("--normals", o->normals,
+                "mesh: keep the model's own normals (SimpleTextureV2); or none (default none)")
+        .oneOf({"mesh", "none"})
+        .group(group);
+    command.option("--plot", o->plot, "With auto: draw quality against the number of views")
+        .takes("FILE.svg")
+        .group(group);
+    command.option("--depth-bits", o->depthBits, "8, 16 or 32 (float, .exr only); default 16")
+        .oneOf({8, 16, 32})
+        .group("Coding");
 }
 
 Result<void> checkMeshViewOptions(const MeshViewOptions& o, Program& program) {
@@ -222,7 +175,7 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     STX_CHECK(mesh.check());
     CaptureSettings capture;
     capture.supersampling = o.supersampling;
-    capture.depthBits = o.depthBits;
+    capture.depthBits = o.depthBits.value_or(16);
     capture.meshNormals = o.normals == "mesh";
     STX_TRY(const auto automatic, parseAuto(o.views));
     std::vector<Camera> cameras;

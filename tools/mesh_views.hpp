@@ -3,10 +3,9 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "tools/command_line.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -18,16 +17,15 @@ struct MeshViewOptions {
     std::string projection;  ///< empty: perspective, except the faces of a cube
     std::optional<double> elevationDeg;
     double fovDeg = 35.0;
-    int depthBits = 16;
-    bool depthBitsGiven = false;
+    std::optional<int> depthBits;  ///< nothing: 16, or what an image set has
     int supersampling = 4;
     std::string normals = "none";
     std::string plot;  ///< SVG of quality against the number of views, of --views auto
 };
 
-void addMeshViewOptions(CLI::App& command, const std::shared_ptr<MeshViewOptions>& options);
+void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>& options);
 
-/// Errors (usage) that can be told before a mesh is read.
+/// Errors (usage) that are found before a mesh is read.
 [[nodiscard]] Result<void> checkMeshViewOptions(const MeshViewOptions& options, Program& program);
 
 /// Captures a mesh by a layout, a camera file, or the best views (auto:N, auto:DBdB).

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cstdio>
 
+#include <nlohmann/json.hpp>
+
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
 
@@ -47,7 +49,7 @@ void Program::sayNotes() {
 Result<void> Program::writeReport(const nlohmann::ordered_json& report) const {
     if (common.report.empty()) return {};
     const std::string text = textOf(report);
-    return writeFile(common.report, std::as_bytes(std::span(text)));
+    return writeFile(common.report, std::as_bytes(std::span(text)), outputOptions());
 }
 
 namespace {
@@ -88,8 +90,9 @@ int Program::run(const std::function<Result<int>()>& body) {
     const ThreadLimit threads(common.threads);
     Result<int> code = 0;
     try {
-        // A report that cannot be written is told before the work, not after it.
-        const auto report = common.report.empty() ? Result<void>() : checkFolderOf(common.report);
+        // A report that cannot be written is an error before the work, not after it.
+        const auto report =
+            common.report.empty() ? Result<void>() : checkTarget(common.report, *this);
         code = report ? body() : tl::unexpected(report.error());
     } catch (const std::bad_alloc&) {
         code = fail(ErrorCode::failed, "out of memory; use smaller images or fewer --threads");
@@ -108,38 +111,6 @@ int Program::run(const std::function<Result<int>()>& body) {
         return static_cast<int>(ErrorCode::io);
     }
     return *code;
-}
-
-void addCommonOptions(CLI::App& command, Program& program, unsigned which) {
-    auto& c = program.common;
-    command.add_option("--threads", c.threads, "Threads to use; 0 = all processors")
-        ->check(CLI::Range(0, 1024))
-        ->group("Shared options");
-    command
-        .add_option("--max-memory", c.maxMemoryMiB,
-                    "Refuse inputs that would need more memory, in MiB (default 4096)")
-        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 24))
-        ->group("Shared options");
-    command.add_flag("--quiet,-q", c.quiet, "Say nothing but errors")->group("Shared options");
-    command.add_flag("-v,--verbose", c.verbose, "Say more")->group("Shared options");
-    if (which & kOutput) {
-        command.add_flag("--no-clobber", c.noClobber, "Refuse to replace existing files")
-            ->group("Shared options");
-        command.add_option("--report", c.report, "Write what was done as JSON to this file")
-            ->type_name("FILE.json")
-            ->group("Shared options");
-    }
-    if (which & kFormat) {
-        command.add_option("--format", c.format, "text or json (default text)")
-            ->check(CLI::IsMember({"text", "json"}))
-            ->group("Shared options");
-    }
-    if (which & kOutside) {
-        command
-            .add_flag("--allow-outside", c.allowOutside,
-                      "Let names inside the input reach files outside its folder")
-            ->group("Shared options");
-    }
 }
 
 Result<std::vector<double>> parseNumbers(std::string_view text, std::size_t count,

@@ -7,9 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <glm/glm.hpp>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "formats/files/files.hpp"
 #include "lib/base/job.hpp"
@@ -56,37 +55,8 @@ class Program {
   private:
     void write(std::string_view text);
     bool outputFailed_ = false;
-    bool outputUnwanted_ =
-        false;  ///< its reader has closed the pipe, as head does: no error to tell
+    bool outputUnwanted_ = false;  ///< its reader has closed the pipe, as head does: not an error
 };
-
-/// Which of the shared options a command has beside --threads, --max-memory, --quiet, -v.
-enum CommonOption : unsigned {
-    kOutput = 1,   ///< --no-clobber, --report
-    kFormat = 2,   ///< --format text|json
-    kOutside = 4,  ///< --allow-outside
-};
-void addCommonOptions(CLI::App& command, Program& program, unsigned which);
-
-/// Makes `command` call `body` and keep its exit code in `exitCode`.
-using Body = std::function<Result<int>(Program&)>;
-
-/// A command's file: adds its options to the app; returns what to run once they are parsed.
-struct Command {
-    CLI::App* app = nullptr;
-    Body body;
-};
-Command addConvert(CLI::App& app, Program& program);
-Command addSelect(CLI::App& app, Program& program);
-Command addPack(CLI::App& app, Program& program);
-Command addBake(CLI::App& app, Program& program);
-Command addRender(CLI::App& app, Program& program);
-Command addExtract(CLI::App& app, Program& program);
-Command addInfo(CLI::App& app, Program& program);
-Command addValidate(CLI::App& app, Program& program);
-Command addCompare(CLI::App& app, Program& program);
-Command addBench(CLI::App& app, Program& program);
-Command addCompletion(CLI::App& app, Program& program);
 
 // ---- Values of options. All parse the C locale's numbers and refuse trailing text. ----
 

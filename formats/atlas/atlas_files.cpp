@@ -494,6 +494,13 @@ Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,
     return writeExr(atlas, path, job, options.output);
 }
 
+int largestImageSide(const Atlas& atlas, const fs::path& path, const AtlasSaveOptions& options) {
+    int side = 0;
+    for (const auto& t : headerOf(atlas, isExrName(path), options.jpegQuality > 0).textures)
+        side = std::max({side, t.width, t.height});
+    return side;
+}
+
 Result<Atlas> readAtlas(const fs::path& path, Job& job) {
     return isFolderPath(path) ? readFolder(path, job) : readExr(path, job);
 }

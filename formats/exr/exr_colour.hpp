@@ -18,9 +18,4 @@ namespace stx {
 /// The inverse for linear floats: exact where alpha is 1, else to the last bit but one.
 [[nodiscard]] Texture textureFromPremultiplied(const Image<glm::vec4>& premultiplied);
 
-/// Nearest 8-bit sRGB code of linear light, the inverse of linearFromSrgb8().
-[[nodiscard]] std::uint8_t srgb8FromLinear(float linear);
-/// Linear light of an 8-bit sRGB code.
-[[nodiscard]] float linearFromSrgb8(std::uint8_t code);
-
 }  // namespace stx

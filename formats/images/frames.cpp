@@ -15,24 +15,8 @@ namespace stx {
 
 namespace {
 
-std::uint8_t to8(float coded) {
-    if (!(coded > 0.0f)) return 0;
-    return static_cast<std::uint8_t>(std::min(coded, 1.0f) * 255.0f + 0.5f);
-}
-
 glm::vec3 linearFrom(glm::vec3 coded) {
     return {linearFromSrgb(coded.r), linearFromSrgb(coded.g), linearFromSrgb(coded.b)};
-}
-
-/// The picture with the background behind it, in the frame's own colour space, premultiplied.
-glm::vec4 over(glm::vec4 p, const std::optional<glm::vec3>& background) {
-    if (!background) return p;
-    return {glm::vec3(p) + *background * (1.0f - std::clamp(p.a, 0.0f, 1.0f)), 1.0f};
-}
-
-std::optional<glm::vec3> inSpaceOf(const Frame& frame, const std::optional<glm::vec3>& coded) {
-    if (!coded || !frame.linear) return coded;
-    return linearFrom(*coded);
 }
 
 /// Premultiplied linear light of an image that is premultiplied in the frame's colour space.
@@ -110,27 +94,6 @@ Result<FrameFormat> frameFormat(const std::filesystem::path& path) {
     return fail(ErrorCode::usage,
                 "cannot write a picture as '{}'; its name must end in .png, .jpg or .exr",
                 path.string());
-}
-
-Image<glm::u8vec4> rgba8From(const Frame& frame, const std::optional<glm::vec3>& background) {
-    Image<glm::u8vec4> out(frame.colour.width(), frame.colour.height());
-    const auto behind = inSpaceOf(frame, background);
-    parallelFor(0, out.height(), [&](std::int64_t y) {
-        const auto from = frame.colour.row(static_cast<int>(y));
-        const auto to = out.row(static_cast<int>(y));
-        for (std::size_t x = 0; x < to.size(); ++x) {
-            glm::vec4 p = over(from[x], behind);
-            if (!(p.a > 0.0f)) continue;
-            if (p.a != 1.0f) p = {glm::vec3(p) / p.a, p.a};
-            if (frame.linear) {
-                to[x] = {srgb8FromLinear(p.r), srgb8FromLinear(p.g), srgb8FromLinear(p.b),
-                         to8(p.a)};
-            } else {
-                to[x] = {to8(p.r), to8(p.g), to8(p.b), to8(p.a)};
-            }
-        }
-    });
-    return out;
 }
 
 Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format, const FrameOptions& options) {

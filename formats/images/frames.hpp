@@ -7,7 +7,7 @@
 
 #include "formats/files/files.hpp"
 #include "lib/geometry/camera.hpp"
-#include "lib/render/frame.hpp"
+#include "lib/render/frame_picture.hpp"
 
 namespace stx {
 
@@ -42,9 +42,5 @@ struct FrameOptions {
 /// PNG or JPEG as bytes. Error (failed) for EXR, which is written to files only.
 [[nodiscard]] Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format,
                                         const FrameOptions& options = {});
-
-/// 8-bit sRGB with straight alpha of a frame; opaque where a background is given.
-[[nodiscard]] Image<glm::u8vec4> rgba8From(const Frame& frame,
-                                           const std::optional<glm::vec3>& background = {});
 
 }  // namespace stx

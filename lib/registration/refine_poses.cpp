@@ -86,14 +86,14 @@ struct Residual {
     glm::dvec3 gradient;
 };
 
-struct Comparison {
+struct PointResiduals {
     glm::dvec3 point;  ///< in the world
     Residual depth, colour;
 };
 
 /// The points of pair.from that pair.to sees, too, with both differences there.
-std::vector<Comparison> compare(const Bundle& bundle, const std::vector<Pyramid>& greys,
-                                const Pair& pair, int level, double tolerance) {
+std::vector<PointResiduals> compare(const Bundle& bundle, const std::vector<Pyramid>& greys,
+                                    const Pair& pair, int level, double tolerance) {
     const ReferenceView& from = bundle.views[static_cast<std::size_t>(pair.from)];
     const ReferenceView& to = bundle.views[static_cast<std::size_t>(pair.to)];
     const Pyramid& fromGrey = greys[static_cast<std::size_t>(pair.from)];
@@ -104,7 +104,7 @@ std::vector<Comparison> compare(const Bundle& bundle, const std::vector<Pyramid>
     const double wanted = kPointsPerPair * (1 << (kLevels - 1 - level));
     const int step = std::max(1, static_cast<int>(std::sqrt(pixels / wanted)));
 
-    std::vector<Comparison> all;
+    std::vector<PointResiduals> all;
     for (int y = step / 2; y < from.camera.height; y += step) {
         for (int x = step / 2; x < from.camera.width; x += step) {
             if (!hasPoint(from.depth.at(x, y))) continue;
@@ -145,8 +145,9 @@ double medianOf(std::vector<double> values) {
 }
 
 /// Adds one kind of difference to a pair's equations, weighed by its robust spread.
-void accumulate(const std::vector<Comparison>& points, Residual Comparison::*kind, double bias,
-                double leastSpread, const PoseSystem& system, PairEquations& equations) {
+void accumulate(const std::vector<PointResiduals>& points, Residual PointResiduals::*kind,
+                double bias, double leastSpread, const PoseSystem& system,
+                PairEquations& equations) {
     std::vector<double> sizes(points.size());
     for (std::size_t i = 0; i < points.size(); ++i)
         sizes[i] = std::abs((points[i].*kind).value - bias);
@@ -171,8 +172,8 @@ double step(Bundle& bundle, const std::vector<Pyramid>& greys, const std::vector
         for (std::size_t k = 0; k < points.size(); ++k) colours[k] = points[k].colour.value;
         // Cameras expose each picture for itself: a common difference says nothing of poses.
         const double exposure = medianOf(std::move(colours));
-        accumulate(points, &Comparison::depth, 0, kLeastDepth, system, equations[at]);
-        accumulate(points, &Comparison::colour, exposure, kLeastColour, system, equations[at]);
+        accumulate(points, &PointResiduals::depth, 0, kLeastDepth, system, equations[at]);
+        accumulate(points, &PointResiduals::colour, exposure, kLeastColour, system, equations[at]);
     });
     return system.solveAndMove(pairs, equations, bundle);
 }

@@ -21,6 +21,10 @@ Result<std::unique_ptr<Renderer>> makeCpu(const PageSet& set, const RenderSettin
     return makeCpuSurfaceRenderer(set, settings, job);
 }
 
+struct DeviceChoice {
+    bool exists = true, hardware = false;
+};
+
 #ifdef STX_WITH_GPU
 Result<std::unique_ptr<Renderer>> makeGpu(const PageSet& set, const RenderSettings& settings,
                                           int device, Job& job) {
@@ -37,15 +41,16 @@ Result<std::unique_ptr<Renderer>> makeGl(const PageSet& set, const RenderSetting
     return gl::makeGlRenderer(set, settings, device, job);
 }
 
-/// A hardware GPU among the devices, or the one asked for if it is.
-bool hasHardware(int device) {
-    if (!gpu::mayHaveHardware()) return false;
+/// What is known of the device asked for; -1: of all.
+DeviceChoice deviceChoice(int device) {
+    if (device == -1 && !gpu::mayHaveHardware()) return {};
     std::vector<std::string> tried;
     const auto devices = gpu::enumerateDevices(tried);
-    if (device >= 0)
-        return device < static_cast<int>(devices.size()) &&
-               !devices[static_cast<std::size_t>(device)].software;
-    return std::any_of(devices.begin(), devices.end(), [](const Device& d) { return !d.software; });
+    if (device == -1)
+        return {true, std::any_of(devices.begin(), devices.end(),
+                                  [](const Device& d) { return !d.software; })};
+    if (device < 0 || device >= static_cast<int>(devices.size())) return {false, false};
+    return {true, !devices[static_cast<std::size_t>(device)].software};
 }
 #else
 constexpr const char* kNoGpu =
@@ -57,8 +62,8 @@ Result<std::unique_ptr<Renderer>> makeGpu(const PageSet&, const RenderSettings&,
 Result<std::unique_ptr<Renderer>> makeGl(const PageSet&, const RenderSettings&, int, Job&) {
     return fail(ErrorCode::unsupported, kNoGpu, "gl");
 }
-bool hasHardware(int) {
-    return false;
+DeviceChoice deviceChoice(int device) {
+    return {device == -1, false};
 }
 #endif
 
@@ -84,7 +89,10 @@ Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const PageSet& set,
         case Backend::automatic:
             break;
     }
-    if (hasHardware(device)) {
+    const DeviceChoice choice = deviceChoice(device);
+    // Fails, and says which devices there are.
+    if (!choice.exists) return makeGpu(set, settings, device, job);
+    if (choice.hardware) {
         auto made = makeGpu(set, settings, device, job);
         if (made)
             return withFallback(

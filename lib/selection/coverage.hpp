@@ -16,7 +16,7 @@ struct SurfaceSample {
     bool twoSided = false;     ///< seen from behind as well
 };
 
-/// A view that might be chosen: where it would stand and what it would see.
+/// A view that might be chosen: where its camera would be and what it would see.
 struct CandidateView {
     Camera camera;                        ///< at its full resolution: gives the sampling density
     Camera depthCamera;                   ///< the same view at the resolution of `depth`

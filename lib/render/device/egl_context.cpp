@@ -269,9 +269,13 @@ Result<std::shared_ptr<EglContext>> EglContext::create(int device, Profile profi
     if (all.empty())
         return fail(ErrorCode::unsupported, "no OpenGL 3.3 without a display here; tried: {}; {}",
                     join(tried), kPackages);
-    if (device >= static_cast<int>(all.size()) || device < -1)
-        return fail(ErrorCode::usage, "device {} does not exist; there are {}, 0 to {}", device,
-                    all.size(), all.size() - 1);
+    if (device >= static_cast<int>(all.size()) || device < -1) {
+        std::vector<std::string> names;
+        for (const auto& one : all)
+            names.push_back(fmt::format("{} ({})", one->device.index, one->device.name));
+        return fail(ErrorCode::usage, "device {} does not exist; the devices are {}", device,
+                    fmt::join(names, ", "));
+    }
     return std::shared_ptr<EglContext>(
         new EglContext(std::move(all[static_cast<std::size_t>(std::max(device, 0))])));
 }

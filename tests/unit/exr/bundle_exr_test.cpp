@@ -5,8 +5,8 @@
 #include <array>
 #include <cstdio>
 
-#include "formats/exr/exr_colour.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"

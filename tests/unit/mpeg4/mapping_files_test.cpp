@@ -24,7 +24,7 @@ void mustWrite(const Result<void>& result) {
     ASSERT_TRUE(result) << result.error().text();
 }
 
-TEST(Mpeg4Files, aBundleIsTheSameFromEveryContainer) {
+TEST(Mpeg4Files, ABundleIsTheSameFromEveryContainer) {
     const TemporaryFolder folder("containers");
     const Bundle bundle = twoViews();
     Job job;
@@ -50,7 +50,7 @@ TEST(Mpeg4Files, aBundleIsTheSameFromEveryContainer) {
     EXPECT_TRUE(fs::exists(folder / "a_images" / "view1_texture.png"));
 }
 
-TEST(Mpeg4Files, mp4ThroughATextIsTheSameFile) {
+TEST(Mpeg4Files, Mp4ThroughATextIsTheSameFile) {
     const TemporaryFolder folder("roundtrip");
     Job job;
     mustWrite(writeMpeg4Bundle(twoViews(), folder / "a.mp4", job));
@@ -66,7 +66,7 @@ TEST(Mpeg4Files, mp4ThroughATextIsTheSameFile) {
     }
 }
 
-TEST(Mpeg4Files, imagesOfAnMp4AreNamedByWhatTheyAreFor) {
+TEST(Mpeg4Files, ImagesOfAnMp4AreNamedByWhatTheyAreFor) {
     const TemporaryFolder folder("names");
     Job job;
     mustWrite(writeMpeg4Bundle(twoViews(), folder / "a.mp4", job));
@@ -78,7 +78,7 @@ TEST(Mpeg4Files, imagesOfAnMp4AreNamedByWhatTheyAreFor) {
                                         "view2_splatV.png"}));
 }
 
-TEST(Mpeg4Files, streamsOfSeveralPicturesSurviveTheTexts) {
+TEST(Mpeg4Files, StreamsOfSeveralPicturesSurviveTheTexts) {
     const TemporaryFolder folder("movie");
     Job job;
     Bundle bundle;
@@ -116,7 +116,7 @@ TEST(Mpeg4Files, streamsOfSeveralPicturesSurviveTheTexts) {
     EXPECT_FALSE(fs::exists(folder / "b.bt"));
 }
 
-TEST(Mpeg4Files, nothingIsReplacedWithNoClobber) {
+TEST(Mpeg4Files, NothingIsReplacedWithNoClobber) {
     Job job;
     const auto document = sceneOf(twoViews());
     const TemporaryFolder folder("clobber");
@@ -130,7 +130,7 @@ TEST(Mpeg4Files, nothingIsReplacedWithNoClobber) {
     EXPECT_FALSE(fs::exists(folder / "a.xmt"));
 }
 
-TEST(Mpeg4Files, writingTwiceReplacesTextAndImages) {
+TEST(Mpeg4Files, WritingTwiceReplacesTextAndImages) {
     const TemporaryFolder folder("twice");
     Job job;
     Bundle bundle = twoViews();
@@ -148,7 +148,7 @@ TEST(Mpeg4Files, writingTwiceReplacesTextAndImages) {
     EXPECT_TRUE(fs::exists(folder / "a_images" / "letter.txt"));
 }
 
-TEST(Mpeg4Files, imageNamesStayInsideTheFolder) {
+TEST(Mpeg4Files, ImageNamesStayInsideTheFolder) {
     const TemporaryFolder folder("inside");
     Job job;
     fs::create_directories(folder / "sub");
@@ -176,7 +176,7 @@ TEST(Mpeg4Files, imageNamesStayInsideTheFolder) {
     EXPECT_EQ(readMpeg4(folder / "sub" / "a.bt", job).error().code, ErrorCode::io);
 }
 
-TEST(Mpeg4Files, endingsAreChecked) {
+TEST(Mpeg4Files, EndingsAreChecked) {
     const TemporaryFolder folder("endings");
     Job job;
     const auto refused = writeMpeg4Bundle(twoViews(), folder / "a.avi", job);
@@ -188,7 +188,7 @@ TEST(Mpeg4Files, endingsAreChecked) {
 
 class ReferenceMp4 : public testing::TestWithParam<const char*> {};
 
-TEST_P(ReferenceMp4, isTheSceneOfItsBtAndSurvivesTheTexts) {
+TEST_P(ReferenceMp4, IsTheSceneOfItsBtAndSurvivesTheTexts) {
     REQUIRE_SHARED(reference, "reference");
     const std::string name = GetParam();
     Job job;
@@ -245,7 +245,7 @@ INSTANTIATE_TEST_SUITE_P(All, ReferenceMp4,
                                          "20_minimal", "xmt_01_depthimage_simpletexture"),
                          [](const auto& param) { return std::string(param.param); });
 
-TEST(ReferenceBundles, readAsTheirTextsSay) {
+TEST(ReferenceBundles, ReadAsTheirTextsSay) {
     REQUIRE_SHARED(reference, "reference/mp4");
     Job job;
     const auto one = readMpeg4Bundle(reference / "01_depthimage_simpletexture.mp4", job);

@@ -38,7 +38,7 @@ std::string depthImage(const std::string& fields = "") {
            " diTexture " + kPixels + " }";
 }
 
-TEST(Mapping, aBundleComesBackWithItsDepthCodes) {
+TEST(Mapping, ABundleComesBackWithItsDepthCodes) {
     for (const int bits : {8, 16}) {
         Bundle bundle;
         bundle.title = "two views";
@@ -68,7 +68,7 @@ TEST(Mapping, aBundleComesBackWithItsDepthCodes) {
     }
 }
 
-TEST(Mapping, fieldsThatAreTrapsAreAlwaysWritten) {
+TEST(Mapping, FieldsThatAreTrapsAreAlwaysWritten) {
     Bundle bundle;
     bundle.views = {makeView(4, 4, 16)};
     for (const bool v2 : {false, true}) {
@@ -85,7 +85,7 @@ TEST(Mapping, fieldsThatAreTrapsAreAlwaysWritten) {
     }
 }
 
-TEST(Mapping, softCoverageSurvivesInPngAndIsSaidToBeLostInJpeg) {
+TEST(Mapping, SoftCoverageSurvivesInPngAndIsSaidToBeLostInJpeg) {
     Bundle bundle;
     bundle.views = {makeView(16, 16, 16)};
     bundle.views[0].texture.rgba8()->at(3, 3).a = 100;
@@ -104,7 +104,7 @@ TEST(Mapping, softCoverageSurvivesInPngAndIsSaidToBeLostInJpeg) {
     EXPECT_EQ(back.views[0].texture.rgba8()->at(0, 0).a, 0) << "no point, no coverage";
 }
 
-TEST(Mapping, floatDepthBecomes16BitsAndTheErrorIsSaid) {
+TEST(Mapping, FloatDepthBecomes16BitsAndTheErrorIsSaid) {
     Bundle bundle;
     bundle.views = {makeView(16, 16, 32)};
     float& d = bundle.views[0].depth.at(1, 1);
@@ -121,7 +121,7 @@ TEST(Mapping, floatDepthBecomes16BitsAndTheErrorIsSaid) {
     EXPECT_NE(back.views[0].depth.at(1, 1), d);
 }
 
-TEST(Mapping, normalsAndSplatsComeBack) {
+TEST(Mapping, NormalsAndSplatsComeBack) {
     Bundle bundle;
     bundle.views = {makeView(12, 10, 16)};
     addVectors(bundle.views[0]);
@@ -154,7 +154,7 @@ TEST(Mapping, normalsAndSplatsComeBack) {
     EXPECT_NE(job.takeNotes().at(0).find("left out"), std::string::npos);
 }
 
-TEST(Mapping, splatMinMaxOfPositiveRangeScalesLengths) {
+TEST(Mapping, SplatMinMaxOfPositiveRangeScalesLengths) {
     DecodedImage image;
     image.width = 1;
     image.height = 1;
@@ -170,7 +170,7 @@ TEST(Mapping, splatMinMaxOfPositiveRangeScalesLengths) {
     EXPECT_NEAR(s->at(0, 0).y, 0.5f * (2 * 128 / 255.0f - 1), 1e-6f);
 }
 
-TEST(Mapping, offCentreCamerasArePaddedAndComeBack) {
+TEST(Mapping, OffCentreCamerasArePaddedAndComeBack) {
     Bundle bundle;
     bundle.views = {makeView(20, 16, 16, 1), makeView(20, 16, 16, 2), makeView(20, 16, 16, 3)};
     bundle.views[0].camera.cx = 12.3;  // 4.6 pixels to the right of... the centre is at 10
@@ -217,7 +217,7 @@ TEST(Mapping, offCentreCamerasArePaddedAndComeBack) {
     EXPECT_EQ(wide.views[1].worldPoint(1, 1), back.views[1].worldPoint(0, 1)) << "no rest: exact";
 }
 
-TEST(Mapping, principalPointsFarOutAreRefused) {
+TEST(Mapping, PrincipalPointsFarOutAreRefused) {
     Bundle bundle;
     bundle.views = {makeView(4, 4, 16)};
     bundle.views[0].camera.cx = 1e6;
@@ -227,7 +227,7 @@ TEST(Mapping, principalPointsFarOutAreRefused) {
     EXPECT_EQ(document.error().code, ErrorCode::unsupported);
 }
 
-TEST(Mapping, moreImagesThanObjectDescriptorsAreRefused) {
+TEST(Mapping, MoreImagesThanObjectDescriptorsAreRefused) {
     Bundle bundle;
     const ReferenceView view = makeView(1, 2, 8);
     for (int i = 0; i < 511; ++i) bundle.views.push_back(view);
@@ -239,7 +239,7 @@ TEST(Mapping, moreImagesThanObjectDescriptorsAreRefused) {
     EXPECT_TRUE(sceneFromBundle(bundle, {}, job));
 }
 
-TEST(Mapping, namesThatTextsCannotHoldComeBack) {
+TEST(Mapping, NamesThatTextsCannotHoldComeBack) {
     Bundle bundle;
     for (const char* name : {"image 001.png", "N7", "view", "view", "\xC3\xA9t\xC3\xA9", "7", ""}) {
         bundle.views.push_back(makeView(2, 2, 8));
@@ -250,7 +250,7 @@ TEST(Mapping, namesThatTextsCannotHoldComeBack) {
         EXPECT_EQ(back.views[i].name, bundle.views[i].name);
 }
 
-TEST(Mapping, pixelTexturesRunFromTheBottomUp) {
+TEST(Mapping, PixelTexturesRunFromTheBottomUp) {
     const Bundle bundle = mustRead(depthImage());
     ASSERT_EQ(bundle.views.size(), 1u);
     const ReferenceView& view = bundle.views[0];
@@ -261,7 +261,7 @@ TEST(Mapping, pixelTexturesRunFromTheBottomUp) {
     EXPECT_EQ(view.texture.rgba8()->at(1, 0), glm::u8vec4(255, 255, 255, 255));
 }
 
-TEST(Mapping, alphaIsDepthWhereThereIsNoDepthImage) {
+TEST(Mapping, AlphaIsDepthWhereThereIsNoDepthImage) {
     const Bundle bundle = mustRead(
         "DepthImage { nearPlane 1 farPlane 9 diTexture SimpleTexture { texture PixelTexture { "
         "image 2 1 4 "
@@ -277,7 +277,7 @@ TEST(Mapping, alphaIsDepthWhereThereIsNoDepthImage) {
         std::string::npos);
 }
 
-TEST(Mapping, transformsAreFoldedIntoTheCamera) {
+TEST(Mapping, TransformsAreFoldedIntoTheCamera) {
     // The same point through the matrices, and through the folded camera.
     const std::string inner = depthImage("position 0.5 1 -2 orientation 0 1 0 0.7");
     const Bundle local = mustRead(inner);
@@ -302,7 +302,7 @@ TEST(Mapping, transformsAreFoldedIntoTheCamera) {
             << bad;
 }
 
-TEST(Mapping, transformMatrixIsThatOfVrml) {
+TEST(Mapping, TransformMatrixIsThatOfVrml) {
     // Scaling along a turned axis around a centre: done by hand.
     const glm::dmat4 m =
         transformMatrix({1, 0, 0}, {0, 0, 1, std::acos(0.0)}, {2, 1, 1}, {0, 0, 1, 0}, {0, 0, 5});
@@ -313,7 +313,7 @@ TEST(Mapping, transformMatrixIsThatOfVrml) {
     EXPECT_NEAR(p.z, 5.0, 1e-12);
 }
 
-TEST(Mapping, switchShowsOnlyItsChoiceAndUsesCountEach) {
+TEST(Mapping, SwitchShowsOnlyItsChoiceAndUsesCountEach) {
     const std::string two =
         "DEF A " + depthImage("position 1 0 0") + " DEF B " + depthImage("position 2 0 0");
     const Bundle one = mustRead("Switch { whichChoice 1 choice [ " + two + " ] }");
@@ -327,7 +327,7 @@ TEST(Mapping, switchShowsOnlyItsChoiceAndUsesCountEach) {
     EXPECT_EQ(used.views[2].camera.position.x, 6.0);
 }
 
-TEST(Mapping, manyUsesOfUsesAreRefused) {
+TEST(Mapping, ManyUsesOfUsesAreRefused) {
     std::string nodes = "DEF A0 " + depthImage();
     for (int i = 1; i < 40; ++i)
         nodes += " DEF A" + std::to_string(i) + " Group { children [ USE A" +
@@ -335,7 +335,7 @@ TEST(Mapping, manyUsesOfUsesAreRefused) {
     EXPECT_NE(errorOf(nodes).find("views"), std::string::npos) << errorOf(nodes);
 }
 
-TEST(Mapping, badCamerasAreNamed) {
+TEST(Mapping, BadCamerasAreNamed) {
     const auto with = [](const std::string& fields) {
         return std::string("DEF CAM DepthImage { ") + fields + " diTexture " + kPixels + " }";
     };
@@ -358,7 +358,7 @@ TEST(Mapping, badCamerasAreNamed) {
         std::string::npos);
 }
 
-TEST(PointTexture, layersComeFromTheLowerLeft) {
+TEST(PointTexture, LayersComeFromTheLowerLeft) {
     REQUIRE_SHARED(path, "reference/bt/04_pointtexture.bt");
     Job job;
     const auto bundle = readMpeg4Bundle(path, job);
@@ -379,7 +379,7 @@ TEST(PointTexture, layersComeFromTheLowerLeft) {
     EXPECT_EQ(bundle->views[1].texture.rgba8()->at(2, 1), glm::u8vec4(0, 0, 255, 255));
 }
 
-TEST(PointTexture, isWrittenWithItsLayers) {
+TEST(PointTexture, IsWrittenWithItsLayers) {
     Bundle bundle;
     bundle.views = {makeView(9, 7, 16, 1), makeView(9, 7, 16, 1), makeView(5, 4, 8, 3)};
     addVectors(bundle.views[2]);
@@ -416,7 +416,7 @@ TEST(PointTexture, isWrittenWithItsLayers) {
             1e-6f);
 }
 
-TEST(PointTexture, listsThatDoNotFitAreRefused) {
+TEST(PointTexture, ListsThatDoNotFitAreRefused) {
     const auto with = [](const std::string& fields) {
         return "DepthImage { diTexture PointTexture { " + fields + " } }";
     };
@@ -432,7 +432,7 @@ TEST(PointTexture, listsThatDoNotFitAreRefused) {
         EXPECT_NE(errorOf(with(fields)).find(message), std::string::npos) << errorOf(with(fields));
 }
 
-TEST(OctreeImage, voxelsGiveTheDepthOfItsImages) {
+TEST(OctreeImage, VoxelsGiveTheDepthOfItsImages) {
     // One of eight octants is there: the one at -x -y -z. Seen from +z, its front is at z = 0.
     const Bundle bundle = mustRead(
         "OctreeImage { octreeResolution 2 octree [1] images [ DEF FRONT DepthImage { position 0 0 "
@@ -449,7 +449,7 @@ TEST(OctreeImage, voxelsGiveTheDepthOfItsImages) {
     EXPECT_EQ(view.texture.rgba8()->at(0, 1), glm::u8vec4(255, 0, 0, 255));
 }
 
-TEST(OctreeImage, everyPointLiesOnTheHullOfItsVoxels) {
+TEST(OctreeImage, EveryPointLiesOnTheHullOfItsVoxels) {
     // Levels of 4^3 voxels from random bytes; all six sides are compared with a brute-force search.
     std::mt19937 random(7);
     std::vector<std::int32_t> bytes;
@@ -515,7 +515,7 @@ TEST(OctreeImage, everyPointLiesOnTheHullOfItsVoxels) {
     }
 }
 
-TEST(OctreeImage, damagedTreesAreRefused) {
+TEST(OctreeImage, DamagedTreesAreRefused) {
     EXPECT_FALSE(Octree::parse(std::vector<std::int32_t>{255, 1}, 4, Limits()));
     EXPECT_FALSE(Octree::parse(std::vector<std::int32_t>{256}, 2, Limits()));
     EXPECT_FALSE(Octree::parse(std::vector<std::int32_t>{1}, 0, Limits()));

@@ -131,7 +131,7 @@ class LooseComparison {
 
 constexpr const char* kMinimal = R"(Group { children [ DepthImage { position 0 0 2 } ] })";
 
-TEST(TextValues, readNumbersInEverySpelling) {
+TEST(TextValues, ReadNumbersInEverySpelling) {
     EXPECT_EQ(floatFromText("1"), 1.0f);
     EXPECT_EQ(floatFromText("+1.5"), 1.5f);
     EXPECT_EQ(floatFromText("-.5"), -0.5f);
@@ -155,7 +155,7 @@ TEST(TextValues, readNumbersInEverySpelling) {
     EXPECT_FALSE(boolFromText("yes"));
 }
 
-TEST(TextValues, floatsReadBackToTheBit) {
+TEST(TextValues, FloatsReadBackToTheBit) {
     std::uint32_t bits = 12345;
     for (int i = 0; i < 100000; ++i) {
         bits = bits * 1664525u + 1013904223u;
@@ -168,14 +168,14 @@ TEST(TextValues, floatsReadBackToTheBit) {
     }
 }
 
-TEST(TextValues, findTheObjectDescriptorInAnyUrl) {
+TEST(TextValues, FindTheObjectDescriptorInAnyUrl) {
     for (const char* url : {"10", "od:10", "od://10", "OD:10", "od://od10", "od:od10"})
         EXPECT_EQ(odFromUrl(url), 10) << url;
     for (const char* url : {"10 ", "", "od:", "0", "1024", "http://10", "color.jpg", "od:10x"})
         EXPECT_FALSE(odFromUrl(url)) << url;
 }
 
-TEST(Bt, readsValuesInEverySpelling) {
+TEST(Bt, ReadsValuesInEverySpelling) {
     const Document d = mustReadBt(R"(
 # a comment
 Group { children [   # another { [ "
@@ -208,7 +208,7 @@ Group { children [   # another { [ "
     EXPECT_EQ(urls[2].objectDescriptorId, 12);
 }
 
-TEST(Bt, errorsSayWhereWhatAndWhatWasExpected) {
+TEST(Bt, ErrorsSayWhereWhatAndWhatWasExpected) {
     EXPECT_EQ(errorOf("Group {\n children [\n  Depth { }\n ]\n}"),
               "'test.bt':3:3: there is no node type 'Depth' in the table");
     EXPECT_EQ(errorOf("Group { children [ DepthImage { position 0 0 x } ] }"),
@@ -235,7 +235,7 @@ TEST(Bt, errorsSayWhereWhatAndWhatWasExpected) {
               std::string::npos);
 }
 
-TEST(Bt, refusesNodesThatHoldThemselvesOrNestTooDeeply) {
+TEST(Bt, RefusesNodesThatHoldThemselvesOrNestTooDeeply) {
     EXPECT_NE(errorOf("DEF A Group { children [ USE A ] }").find("would hold itself"),
               std::string::npos);
     EXPECT_NE(errorOf("Group { children [ DEF A Group { children [ USE B ] } DEF B Group { "
@@ -256,7 +256,7 @@ TEST(Bt, refusesNodesThatHoldThemselvesOrNestTooDeeply) {
     EXPECT_NE(errorOf(forward + "DEF A2000 Group { } ] }").find("nest deeper"), std::string::npos);
 }
 
-TEST(Bt, doesNotBelieveTheSizeOfAnImage) {
+TEST(Bt, DoesNotBelieveTheSizeOfAnImage) {
     EXPECT_NE(errorOf("Group { children Shape { appearance Appearance { texture PixelTexture { "
                       "image 4095 4095 4 0 } } } }")
                   .find("bytes of text follow"),
@@ -267,7 +267,7 @@ TEST(Bt, doesNotBelieveTheSizeOfAnImage) {
               std::string::npos);
 }
 
-TEST(Bt, readsCommandsOfEveryKind) {
+TEST(Bt, ReadsCommandsOfEveryKind) {
     const std::string text = R"(Group { children [
   DEF TR Transform { children [ DEF A Group { } ] }
   DEF I PositionInterpolator { key [0 1] keyValue [0 0 0 1 1 1] }
@@ -307,7 +307,7 @@ AT 200 { REPLACE SCENE BY Group { } }
     EXPECT_EQ(btOf(viaXmt), btOf(d));
 }
 
-TEST(Bt, aMissingBraceBetweenBlocksIsMendedAndSaid) {
+TEST(Bt, AMissingBraceBetweenBlocksIsMendedAndSaid) {
     Job job;
     const auto d = readBt(
         "RAP AT 0 { UPDATE OD [ ObjectDescriptor { objectDescriptorID 5 } ]\n"
@@ -318,7 +318,7 @@ TEST(Bt, aMissingBraceBetweenBlocksIsMendedAndSaid) {
     EXPECT_EQ(job.takeNotes().size(), 1u);
 }
 
-TEST(Xmt, refusesWhatIsNoXmt) {
+TEST(Xmt, RefusesWhatIsNoXmt) {
     EXPECT_NE(xmtErrorOf("<XMT-A><Body>").find("no well-formed XML"), std::string::npos);
     EXPECT_NE(xmtErrorOf("<svg/>").find("expected <XMT-A>"), std::string::npos);
     EXPECT_NE(xmtErrorOf("<XMT-A><Body/></XMT-A>").find("no scene"), std::string::npos);
@@ -339,7 +339,7 @@ TEST(Xmt, refusesWhatIsNoXmt) {
     EXPECT_NE(xmtErrorOf(body(deep)).find("nest deeper"), std::string::npos);
 }
 
-TEST(Xmt, entitiesAreNeverExpanded) {
+TEST(Xmt, EntitiesAreNeverExpanded) {
     std::string lol =
         "<?xml version=\"1.0\"?><!DOCTYPE x [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;\">"
         "<!ENTITY f SYSTEM \"file:///etc/passwd\">]>"
@@ -350,7 +350,7 @@ TEST(Xmt, entitiesAreNeverExpanded) {
     EXPECT_EQ(child(rootOf(d), 0)->get<std::string>("title"), "&b;&f;&");
 }
 
-TEST(Xmt, stringIdsOfDescriptorsWin) {
+TEST(Xmt, StringIdsOfDescriptorsWin) {
     const Document d = mustReadXmt(
         "<XMT-A><Body><Replace><Scene><Group><children><Shape><appearance><Appearance><texture>"
         "<ImageTexture url=\"&quot;od://tex&quot; &quot;od:tex2&quot; 'od:12' "
@@ -370,7 +370,7 @@ TEST(Xmt, stringIdsOfDescriptorsWin) {
     EXPECT_EQ(urls[3].objectDescriptorId, 34);
 }
 
-TEST(Text, stringsSurviveBothForms) {
+TEST(Text, StringsSurviveBothForms) {
     Document d = mustReadBt(kMinimal);
     NodePtr info = makeNode("WorldInfo");
     info->set("title",
@@ -381,7 +381,7 @@ TEST(Text, stringsSurviveBothForms) {
     EXPECT_TRUE(sameFrames(d.frames, mustReadXmt(xmtOf(d)).frames)) << xmtOf(d);
 }
 
-TEST(Text, imagesSurviveBothForms) {
+TEST(Text, ImagesSurviveBothForms) {
     Document d = mustReadBt(kMinimal);
     for (int components = 1; components <= 4; ++components) {
         for (const glm::ivec2 size : {glm::ivec2(3, 2), glm::ivec2(0, 0), glm::ivec2(5, 0)}) {
@@ -403,7 +403,7 @@ TEST(Text, imagesSurviveBothForms) {
     EXPECT_TRUE(sameFrames(d.frames, mustReadXmt(xmtOf(d)).frames)) << xmtOf(d);
 }
 
-TEST(Text, charactersThatXmlCannotHoldAreReplacedAndSaid) {
+TEST(Text, CharactersThatXmlCannotHoldAreReplacedAndSaid) {
     Document d = mustReadBt(kMinimal);
     NodePtr info = makeNode("WorldInfo");
     info->set("title", std::string("a\x01\xFFz"));
@@ -418,7 +418,7 @@ TEST(Text, charactersThatXmlCannotHoldAreReplacedAndSaid) {
 
 class ReferenceBt : public testing::TestWithParam<const char*> {};
 
-TEST_P(ReferenceBt, readsAndComesBackThroughBothForms) {
+TEST_P(ReferenceBt, ReadsAndComesBackThroughBothForms) {
     REQUIRE_SHARED(folder, "reference/bt");
     const fs::path path = folder / (std::string(GetParam()) + ".bt");
     const std::string text = textOfFile(path);
@@ -437,7 +437,7 @@ TEST_P(ReferenceBt, readsAndComesBackThroughBothForms) {
     EXPECT_EQ(descriptorsOf(d), descriptorsOf(viaXmt));
 }
 
-TEST_P(ReferenceBt, isTheSceneOfTheOtherImplementationsDumps) {
+TEST_P(ReferenceBt, IsTheSceneOfTheOtherImplementationsDumps) {
     REQUIRE_SHARED(folder, "reference");
     const Document d = [&] {
         if (std::string(GetParam()) == "13_transform_root") return Document();
@@ -479,7 +479,7 @@ INSTANTIATE_TEST_SUITE_P(All, ReferenceBt,
                                          "18_long_mf_vector", "19_png16_rgba", "20_minimal"),
                          [](const auto& param) { return std::string(param.param); });
 
-TEST(ReferenceXmt, isTheSceneOfTheBt) {
+TEST(ReferenceXmt, IsTheSceneOfTheBt) {
     REQUIRE_SHARED(folder, "reference");
     const Document xmt = mustReadXmt(textOfFile(folder / "xmt/01_depthimage_simpletexture.xmt"));
     const Document bt = mustReadBt(textOfFile(folder / "bt/01_depthimage_simpletexture.bt"));
@@ -487,7 +487,7 @@ TEST(ReferenceXmt, isTheSceneOfTheBt) {
     EXPECT_EQ(xmt.findObjectDescriptor(10)->streams.at(0).fileName, "../images/color16x12.jpg");
 }
 
-TEST(Xmt, isWellFormedForXmllint) {
+TEST(Xmt, IsWellFormedForXmllint) {
     if (std::system("xmllint --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "needs xmllint";
     REQUIRE_SHARED(folder, "reference/bt");
     const fs::path out = fs::path(testing::TempDir()) / "stx_xmllint.xmt";

@@ -5,7 +5,7 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/packing/packing.hpp"
-#include "lib/packing/prune_quality.hpp"
+#include "lib/quality/prune_quality.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "tests/shared_data.hpp"

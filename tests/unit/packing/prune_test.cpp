@@ -1,4 +1,4 @@
-#include "lib/packing/prune_quality.hpp"
+#include "lib/quality/prune_quality.hpp"
 
 #include <gtest/gtest.h>
 

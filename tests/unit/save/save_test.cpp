@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-TEST(SaveBundle, refusesWrongDepthsInEveryContainer) {
+TEST(SaveBundle, RefusesWrongDepthsInEveryContainer) {
     const TemporaryFolder folder;
     for (const float wrong : {kNan, -1.0f}) {
         for (const int bits : {8, 16, 32}) {
@@ -37,7 +37,7 @@ TEST(SaveBundle, refusesWrongDepthsInEveryContainer) {
     }
 }
 
-TEST(SaveBundle, refusesWrongHeaders) {
+TEST(SaveBundle, RefusesWrongHeaders) {
     const TemporaryFolder folder;
     Job job;
     Bundle bundle = smallBundle(2, 16, false, false);
@@ -50,7 +50,7 @@ TEST(SaveBundle, refusesWrongHeaders) {
     EXPECT_FALSE(saveBundle(bundle, folder / "a.exr", {}, job));
 }
 
-TEST(OpenBundle, refusesWrongDepthsOfAFile) {
+TEST(OpenBundle, RefusesWrongDepthsOfAFile) {
     const TemporaryFolder folder;
     const auto path = folder / "a.exr";
     Job job;

@@ -25,7 +25,7 @@ Atlas goodAtlas() {
     return atlas;
 }
 
-TEST(ValidateAtlas, atlasesInMemoryKeepTheRules) {
+TEST(ValidateAtlas, AtlasesInMemoryKeepTheRules) {
     const Atlas good = goodAtlas();
     EXPECT_TRUE(validate(good).empty()) << textOf(validate(good));
     Atlas atlas = good;
@@ -80,7 +80,7 @@ const std::vector<Sample>& samples() {
     return all;
 }
 
-TEST(ValidateAtlas, everyRuleIsReportedOfAFolder) {
+TEST(ValidateAtlas, EveryRuleIsReportedOfAFolder) {
     const TemporaryFolder folder;
     const auto path = folder / "atlas";
     Job job;
@@ -111,7 +111,7 @@ TEST(ValidateAtlas, everyRuleIsReportedOfAFolder) {
     EXPECT_EQ(numbersWith("{ \"version\": 1 }"), Numbers{1001});
 }
 
-TEST(ValidateAtlas, fiveTexturesOnTwoPagesAreTooMany) {
+TEST(ValidateAtlas, FiveTexturesOnTwoPagesAreTooMany) {
     const TemporaryFolder folder;
     const auto path = folder / "atlas";
     Job job;
@@ -134,7 +134,7 @@ TEST(ValidateAtlas, fiveTexturesOnTwoPagesAreTooMany) {
     EXPECT_NE(textOf(findings).find("6 textures"), std::string::npos);
 }
 
-TEST(ValidateAtlas, imagesOfAFolderHaveTheSizeOfThePage) {
+TEST(ValidateAtlas, ImagesOfAFolderHaveTheSizeOfThePage) {
     const TemporaryFolder folder;
     const auto path = folder / "atlas";
     Job job;
@@ -172,7 +172,7 @@ void writeExrAtlas(const fs::path& path, const std::string& index, const Image<f
     ASSERT_TRUE(file->commit());
 }
 
-TEST(ValidateAtlas, everyRuleIsReportedOfAnExrFile) {
+TEST(ValidateAtlas, EveryRuleIsReportedOfAnExrFile) {
     const TemporaryFolder folder;
     const auto path = folder / "atlas.exr";
     Job job;

@@ -91,7 +91,7 @@ void halveChannel(const std::filesystem::path& path, const std::string& channel)
     std::ofstream(path, std::ios::binary) << text;
 }
 
-TEST(ValidateBundle, bundlesInMemoryKeepTheRules) {
+TEST(ValidateBundle, BundlesInMemoryKeepTheRules) {
     Bundle bundle;
     bundle.views = {goodView()};
     EXPECT_TRUE(validate(bundle).empty()) << textOf(validate(bundle));
@@ -107,7 +107,7 @@ TEST(ValidateBundle, bundlesInMemoryKeepTheRules) {
 
 using Change = std::function<void(ReferenceView&)>;
 
-TEST(ValidateBundle, everyRuleIsReportedOfAnExrFile) {
+TEST(ValidateBundle, EveryRuleIsReportedOfAnExrFile) {
     const float inf = std::numeric_limits<float>::infinity();
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const std::vector<std::pair<Numbers, Change>> samples = {
@@ -148,7 +148,7 @@ TEST(ValidateBundle, everyRuleIsReportedOfAnExrFile) {
     }
 }
 
-TEST(ValidateBundle, allFindingsOfAllViewsComeAtOnce) {
+TEST(ValidateBundle, AllFindingsOfAllViewsComeAtOnce) {
     ReferenceView first = goodView(1), second = goodView(2);
     first.nearPlane = -1;
     first.depthBits = 12;
@@ -165,7 +165,7 @@ TEST(ValidateBundle, allFindingsOfAllViewsComeAtOnce) {
     EXPECT_EQ(numbersOf(without), (Numbers{3002, 3003, 4011})) << textOf(without);
 }
 
-TEST(ValidateBundle, channelsOfAnExrFileHaveOneSizeAndComeTogether) {
+TEST(ValidateBundle, ChannelsOfAnExrFileHaveOneSizeAndComeTogether) {
     const TemporaryFolder folder;
     const auto path = folder / "a.exr";
     Job job;
@@ -185,7 +185,7 @@ TEST(ValidateBundle, channelsOfAnExrFileHaveOneSizeAndComeTogether) {
     EXPECT_EQ(numbersOf(validateFile(path, {}, job)), Numbers{4003});
 }
 
-TEST(ValidateBundle, emptyObjectsAndDamagedFilesAreFindings) {
+TEST(ValidateBundle, EmptyObjectsAndDamagedFilesAreFindings) {
     const TemporaryFolder folder;
     const auto path = folder / "a.exr";
     Job job;

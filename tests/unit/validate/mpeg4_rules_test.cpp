@@ -188,7 +188,7 @@ std::map<int, std::function<Document()>> brokenDocuments() {
     return broken;
 }
 
-TEST(Validate, isSilentWhenNoRuleIsBroken) {
+TEST(Validate, IsSilentWhenNoRuleIsBroken) {
     for (const bool v2 : {false, true}) {
         Job job;
         const auto findings = validate(sound(v2), {}, {}, job);
@@ -205,7 +205,7 @@ TEST(Validate, isSilentWhenNoRuleIsBroken) {
     }
 }
 
-TEST(Validate, everyRuleHasASampleThatBreaksIt) {
+TEST(Validate, EveryRuleHasASampleThatBreaksIt) {
     const auto broken = brokenDocuments();
     for (const auto& [number, make] : broken) {
         Job job;
@@ -225,7 +225,7 @@ TEST(Validate, everyRuleHasASampleThatBreaksIt) {
             << rule.number << " has no sample";
 }
 
-TEST(Validate, aBrokenRuleBringsNoOthersThatHaveNothingToDoWithIt) {
+TEST(Validate, ABrokenRuleBringsNoOthersThatHaveNothingToDoWithIt) {
     const auto broken = brokenDocuments();
     const std::map<int, Numbers> company = {
         {4007, {4006}},                        // no point in the only view
@@ -247,7 +247,7 @@ TEST(Validate, aBrokenRuleBringsNoOthersThatHaveNothingToDoWithIt) {
     }
 }
 
-TEST(Validate, structureIsCheckedWithoutDecoding) {
+TEST(Validate, StructureIsCheckedWithoutDecoding) {
     ValidateOptions options;
     options.pixels = false;
     PresentationImages images;
@@ -261,7 +261,7 @@ TEST(Validate, structureIsCheckedWithoutDecoding) {
         numbersOf(validate(brokenDocuments().at(4001)(), options, images, job)).contains(4001));
 }
 
-TEST(Validate, filesThatCannotBeReadBreakRule1001) {
+TEST(Validate, FilesThatCannotBeReadBreakRule1001) {
     const TemporaryFolder folder("unreadable");
     Job job;
     std::ofstream(folder / "a.bt") << "Group { children [ Depth { } ] }";
@@ -280,7 +280,7 @@ TEST(Validate, filesThatCannotBeReadBreakRule1001) {
     EXPECT_EQ(numbersOf(*renamed), Numbers{1002}) << textOf(*renamed);
 }
 
-TEST(Validate, numbersAscendAndBelongToTheirRange) {
+TEST(Validate, NumbersAscendAndBelongToTheirRange) {
     int last = 1000;
     for (const Rule& rule : ruleCatalogue()) {
         EXPECT_GT(rule.number, last);
@@ -291,7 +291,7 @@ TEST(Validate, numbersAscendAndBelongToTheirRange) {
     EXPECT_EQ(findRule(9999), nullptr);
 }
 
-TEST(Validate, referenceFilesBreakWhatTheyAreKnownToBreak) {
+TEST(Validate, ReferenceFilesBreakWhatTheyAreKnownToBreak) {
     REQUIRE_SHARED(folder, "reference");
     Job job;
     const auto rules = [&](const char* name) {

@@ -1,10 +1,10 @@
-#include "lib/packing/prune_quality.hpp"
+#include "lib/quality/prune_quality.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "lib/metrics/compare.hpp"
+#include "lib/quality/view_quality.hpp"
 #include "lib/render/surface/cpu/cpu_surface.hpp"
 
 namespace stx {
@@ -14,16 +14,6 @@ constexpr int kPoses = 4;
 constexpr int kMostSide = 1024;
 /// Estimates between which the search goes on, dB. The first gives nothing back.
 constexpr double kLeast = 1, kMost = 72, kNear = 1.5;
-
-Image<glm::u8vec4> pictureOf(const Frame& frame) {
-    Image<glm::u8vec4> out(frame.colour.width(), frame.colour.height());
-    for (std::size_t i = 0; i < out.count(); ++i) {
-        glm::vec3 c = glm::clamp(glm::vec3(frame.colour.pixels()[i]), 0.0f, 1.0f);
-        if (frame.linear) c = {srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)};
-        out.pixels()[i] = glm::u8vec4(glm::u8vec3(c * 255.0f + 0.5f), 255);
-    }
-    return out;
-}
 
 Camera pose(const Camera& camera) {
     const double scale = static_cast<double>(kMostSide) / std::max(camera.width, camera.height);
@@ -62,49 +52,26 @@ std::vector<Camera> posesOf(const Bundle& bundle) {
     return poses;
 }
 
-}  // namespace
-
-Result<PruneQuality> PruneQuality::of(const Bundle& whole, Job& job) {
-    STX_CHECK(whole.check());
-    PruneQuality quality;
-    quality.cameras_ = posesOf(whole);
-    const auto renderer = makeCpuSurfaceRenderer(whole, {}, job);
-    for (const Camera& camera : quality.cameras_) {
-        STX_CHECK(job.checkCancelled());
-        STX_TRY(const auto frame, renderer->render(camera));
-        quality.pictures_.push_back(pictureOf(frame));
-    }
-    return quality;
-}
-
-Result<double> PruneQuality::measure(const Bundle& pruned, Job& job) const {
-    const auto renderer = makeCpuSurfaceRenderer(pruned, {}, job);
-    double worst = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < cameras_.size(); ++i) {
-        STX_CHECK(job.checkCancelled());
-        STX_TRY(const auto frame, renderer->render(cameras_[i]));
-        STX_TRY(const auto difference, compare(pictureOf(frame), pictures_[i]));
-        if (difference.psnrRgb) worst = std::min(worst, *difference.psnrRgb);
-    }
-    return worst;
-}
-
-Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,
-                                   Job& job) {
-    if (!(wantedPsnr > 0) || std::isinf(wantedPsnr))
-        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be over 0", wantedPsnr);
-    STX_TRY(const auto quality, PruneQuality::of(bundle, job));
+/// The search of pruneToQuality(). Leaves the notes of what it settles on in the job.
+Result<PruneReport> search(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,
+                           Job& job) {
+    STX_TRY(const auto quality,
+            ViewQuality::against(*makeCpuSurfaceRenderer(bundle, {}, job), posesOf(bundle), job));
     Bundle best;
     PruneReport report;
+    std::vector<std::string> notes;
     const auto reaches = [&](double estimate) -> Result<bool> {
+        (void)job.takeNotes();  // of the attempt before
         Bundle candidate = bundle;
         PruneSettings now = settings;
         now.minPsnr = estimate;
         STX_TRY(auto pruned, prune(candidate, now, job));
-        STX_TRY(pruned.psnr, quality.measure(candidate, job));
+        STX_TRY(const auto psnr, quality.measure(*makeCpuSurfaceRenderer(candidate, {}, job), job));
+        pruned.psnr = psnr.worst;
         if (!(pruned.psnr >= wantedPsnr)) return false;
         best = std::move(candidate);
         report = pruned;
+        notes = job.takeNotes();
         return true;
     };
     STX_TRY(bool found, reaches(kLeast));
@@ -118,6 +85,7 @@ Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings
             (good ? holds : fails) = middle;
         }
     }
+    (void)job.takeNotes();
     if (!found) {
         const auto pixels = bundle.pointCount();
         if (settings.budget > 0 && settings.budget < pixels)
@@ -132,7 +100,23 @@ Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings
         report.psnr = std::numeric_limits<double>::infinity();
         return report;
     }
+    for (auto& note : notes) job.note(std::move(note));
     bundle = std::move(best);
+    return report;
+}
+
+}  // namespace
+
+Result<PruneReport> pruneToQuality(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,
+                                   Job& job) {
+    if (!(wantedPsnr > 0) || std::isinf(wantedPsnr))
+        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be over 0", wantedPsnr);
+    STX_CHECK(bundle.check());
+    auto earlier = job.takeNotes();
+    auto report = search(bundle, settings, wantedPsnr, job);
+    auto ours = job.takeNotes();
+    for (auto& note : earlier) job.note(std::move(note));
+    for (auto& note : ours) job.note(std::move(note));
     return report;
 }
 

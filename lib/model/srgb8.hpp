@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace stx {
+
+/// Tables between the 256 codes of 8-bit sRGB (IEC 61966-2-1) and linear light: exact, and many
+/// times faster than the power. For loops over pixels; srgb8Tables() gives the only ones.
+class Srgb8Tables {
+  public:
+    Srgb8Tables();
+
+    /// Linear light of a code.
+    [[nodiscard]] float linear(std::uint8_t code) const { return linear_[code]; }
+    /// The nearest code of linear light; 0 for NaN.
+    [[nodiscard]] std::uint8_t code(float linear) const {
+        if (!(linear > 0.0f)) return 0;
+        if (linear >= 1.0f) return 255;
+        int code = guess_[static_cast<int>(linear * (kSlots - 1))];
+        while (linear >= lower_[code + 1]) ++code;
+        while (linear < lower_[code]) --code;
+        return static_cast<std::uint8_t>(code);
+    }
+
+  private:
+    static constexpr int kSlots = 4096;
+    std::array<float, 256> linear_{};
+    std::array<float, 257> lower_{};  ///< where the nearest code becomes this one
+    std::array<std::uint8_t, kSlots> guess_{};
+};
+
+[[nodiscard]] const Srgb8Tables& srgb8Tables();
+
+/// Nearest 8-bit sRGB code of linear light, the inverse of linearFromSrgb8().
+[[nodiscard]] inline std::uint8_t srgb8FromLinear(float linear) {
+    return srgb8Tables().code(linear);
+}
+/// Linear light of an 8-bit sRGB code.
+[[nodiscard]] inline float linearFromSrgb8(std::uint8_t code) {
+    return srgb8Tables().linear(code);
+}
+
+}  // namespace stx

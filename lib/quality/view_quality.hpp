@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/geometry/camera.hpp"
+#include "lib/model/texture.hpp"
+#include "lib/render/renderer.hpp"
+
+namespace stx {
+
+/// How good rendered views are: PSNR against a truth drawn from the same cameras. Pictures are
+/// compared as people see them: 8-bit sRGB, on black.
+class ViewQuality {
+  public:
+    /// PSNR of RGB, dB; infinity when nothing differs.
+    struct Psnr {
+        double all = 0;    ///< from the mean squared error over all pictures
+        double worst = 0;  ///< of the worst picture
+    };
+
+    /// Draws the truth, which is not needed afterwards. Errors: those of render(), cancelled.
+    [[nodiscard]] static Result<ViewQuality> against(Renderer& truth, std::vector<Camera> cameras,
+                                                     const Job& job);
+
+    /// Draws and compares. Errors: those of render(), cancelled.
+    [[nodiscard]] Result<Psnr> measure(Renderer& renderer, const Job& job) const;
+
+  private:
+    std::vector<Camera> cameras_;
+    std::vector<Rgba8Image> truth_;
+};
+
+}  // namespace stx

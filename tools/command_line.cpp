@@ -1,0 +1,284 @@
+#include "tools/command_line.hpp"
+
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+#include "tools/program.hpp"
+
+namespace stx::tools {
+namespace {
+
+constexpr const char* kHelp = "Print this help and stop";
+
+/// What CLI11 says of a validator, "{png,jpeg}".
+std::vector<std::string> choicesIn(const std::string& text) {
+    std::vector<std::string> choices;
+    const auto open = text.find('{'), close = text.find('}');
+    if (open == std::string::npos || close == std::string::npos || close < open) return choices;
+    std::stringstream list(text.substr(open + 1, close - open - 1));
+    for (std::string word; std::getline(list, word, ',');) choices.push_back(word);
+    return choices;
+}
+
+/// What CLI11 says of a range, "INT in [1 - 8]" or "POSITIVE", for people.
+std::string rangeIn(const std::string& text) {
+    const auto open = text.find("in ["), dash = text.find(" - ", open), end = text.find(']', dash);
+    if (open != std::string::npos && end != std::string::npos)
+        return fmt::format("{} to {}", text.substr(open + 4, dash - open - 4),
+                           text.substr(dash + 3, end - dash - 3));
+    if (text.find("NONNEGATIVE") != std::string::npos) return "0 or more";
+    if (text.find("POSITIVE") != std::string::npos) return "above 0";
+    return {};
+}
+
+OptionRow optionRow(const CLI::Option& option) {
+    OptionRow row;
+    for (const auto& name : option.get_snames()) row.names.push_back("-" + name);
+    for (const auto& name : option.get_lnames()) row.names.push_back("--" + name);
+    row.positional = row.names.empty();
+    if (row.positional) row.names.push_back(option.get_name(true));
+    row.help = option.get_description();
+    row.group = option.get_group();
+    row.required = option.get_required();
+    row.many = option.get_items_expected_max() > 1;
+    if (option.get_items_expected_max() > 0) {
+        const std::string type = option.get_type_name();
+        const auto colon = type.find(':');
+        row.value = type.substr(0, colon);
+        if (row.value == "TEXT") row.value = "WORD";
+        if (row.value == "INT" || row.value == "UINT" || row.value == "FLOAT") row.value = "N";
+        if (colon != std::string::npos) {
+            row.choices = choicesIn(type.substr(colon));
+            if (row.choices.empty()) row.range = rangeIn(type.substr(colon));
+        }
+    }
+    return row;
+}
+
+/// Help that lists choices and ranges in words.
+class HelpFormatter : public CLI::Formatter {
+  public:
+    std::string make_option_opts(const CLI::Option* option) const override {
+        const OptionRow row = optionRow(*option);
+        std::string text;
+        if (!row.choices.empty())
+            text += fmt::format(" {}", fmt::join(row.choices, "|"));
+        else if (!row.value.empty() && !row.positional)
+            text += " " + row.value;
+        if (!row.range.empty()) text += fmt::format(" ({})", row.range);
+        if (row.many) text += " ...";
+        if (row.required) text += " (required)";
+        return text;
+    }
+};
+
+/// The command that was named, or the program itself.
+const CLI::App& chosen(const CLI::App& app) {
+    const CLI::App* where = &app;
+    for (const auto* sub : app.get_subcommands()) where = sub;
+    return *where;
+}
+
+Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
+    const CLI::App& where = chosen(app);
+    std::string message = error.what();
+    std::replace(message.begin(), message.end(), '\n', ' ');
+    while (!message.empty() && (message.back() == ' ' || message.back() == '.')) message.pop_back();
+
+    std::vector<std::string> known;
+    std::string unknown;
+    if (&where == &app) {
+        for (const auto* sub : app.get_subcommands([](const CLI::App*) { return true; }))
+            known.push_back(sub->get_name());
+        if (argc > 1 && argv[1][0] != '-') unknown = argv[1];
+        if (!unknown.empty() && std::find(known.begin(), known.end(), unknown) == known.end())
+            message = fmt::format("there is no command '{}'", unknown);
+    } else if (const auto rest = where.remaining(); !rest.empty()) {
+        unknown = rest[0].substr(0, rest[0].find('='));
+        for (const auto* option : where.get_options()) {
+            for (const auto& name : option->get_lnames()) known.push_back("--" + name);
+        }
+        if (unknown.rfind("--", 0) == 0)
+            message = fmt::format("there is no option '{}'", unknown);
+        else
+            message = fmt::format("unexpected argument '{}'", unknown);
+    }
+    if (!unknown.empty()) {
+        const auto near = nearestWord(unknown, known);
+        if (!near.empty() && near != unknown) message += fmt::format(" (did you mean '{}'?)", near);
+    }
+    const std::string name = &where == &app ? "stx" : "stx " + where.get_name();
+    return {ErrorCode::usage, fmt::format("{}. See '{} --help'.", message, name), {}};
+}
+
+}  // namespace
+
+Option& Option::group(const std::string& heading) {
+    option_->group(heading);
+    return *this;
+}
+Option& Option::takes(const std::string& what) {
+    option_->type_name(what);
+    return *this;
+}
+Option& Option::required() {
+    option_->required();
+    return *this;
+}
+Option& Option::commaSeparated() {
+    option_->delimiter(',');
+    return *this;
+}
+Option& Option::oneOf(const std::vector<std::string>& words) {
+    option_->check(CLI::IsMember(words));
+    return *this;
+}
+Option& Option::oneOf(std::initializer_list<int> numbers) {
+    option_->check(CLI::IsMember(numbers));
+    return *this;
+}
+Option& Option::range(int least, int most) {
+    option_->check(CLI::Range(least, most));
+    return *this;
+}
+Option& Option::range(double least, double most) {
+    option_->check(CLI::Range(least, most));
+    return *this;
+}
+Option& Option::notNegative() {
+    option_->check(CLI::NonNegativeNumber);
+    return *this;
+}
+Option& Option::positive() {
+    option_->check(CLI::PositiveNumber);
+    return *this;
+}
+
+Option Command::option(const std::string& names, std::string& to, const std::string& help) {
+    return Option(app_->add_option(names, to, help));
+}
+Option Command::option(const std::string& names, std::vector<std::string>& to,
+                       const std::string& help) {
+    return Option(app_->add_option(names, to, help));
+}
+Option Command::option(const std::string& names, int& to, const std::string& help) {
+    return Option(app_->add_option(names, to, help));
+}
+Option Command::option(const std::string& names, double& to, const std::string& help) {
+    return Option(app_->add_option(names, to, help));
+}
+Option Command::option(const std::string& names, std::optional<int>& to, const std::string& help) {
+    return Option(app_->add_option(names, to, help));
+}
+Option Command::option(const std::string& names, std::optional<double>& to,
+                       const std::string& help) {
+    return Option(app_->add_option(names, to, help));
+}
+Option Command::option(const std::string& names,
+                       std::function<Result<void>(const std::string&)> parse,
+                       const std::string& help) {
+    return Option(app_->add_option_function<std::string>(
+        names,
+        [names, parse = std::move(parse)](const std::string& text) {
+            if (auto ok = parse(text); !ok) throw CLI::ValidationError(names, ok.error().message);
+        },
+        help));
+}
+Option Command::flag(const std::string& names, bool& to, const std::string& help) {
+    return Option(app_->add_flag(names, to, help));
+}
+Option Command::flag(const std::string& names, int& count, const std::string& help) {
+    return Option(app_->add_flag(names, count, help));
+}
+
+void Command::sharedOptions(CommonOptions& to, unsigned which) {
+    const char* group = "Shared options";
+    option("--threads", to.threads, "Threads to use; 0 = all processors")
+        .range(0, 1024)
+        .group(group);
+    app_->add_option("--max-memory", to.maxMemoryMiB,
+                     "Refuse inputs that would need more memory, in MiB (default 4096)")
+        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 24))
+        ->group(group);
+    flag("--quiet,-q", to.quiet, "Say nothing but errors").group(group);
+    flag("-v,--verbose", to.verbose, "Say more").group(group);
+    if (which & kOutput) {
+        flag("--no-clobber", to.noClobber, "Refuse to replace existing files").group(group);
+        option("--report", to.report, "Write what was done as JSON to this file")
+            .takes("FILE.json")
+            .group(group);
+    }
+    if (which & kFormat)
+        option("--format", to.format, "text or json (default text)")
+            .oneOf({"text", "json"})
+            .group(group);
+    if (which & kOutside)
+        flag("--allow-outside", to.allowOutside,
+             "Let names inside the input reach files outside its folder")
+            .group(group);
+}
+
+void Command::runs(Body body) {
+    app_->set_help_flag("-h,--help", kHelp);  // again, to be listed last
+    *body_ = std::move(body);
+}
+
+CommandLine::CommandLine()
+    : app_(std::make_unique<CLI::App>(
+          "The MPEG-4 AFX SimpleTexture toolkit: depth image-based representation of 3D objects.",
+          "stx")) {
+    app_->set_version_flag("--version,-V", "stx " STX_VERSION);
+    app_->set_help_flag("-h,--help", kHelp);
+    app_->require_subcommand(1);
+    app_->formatter(std::make_shared<HelpFormatter>());
+    app_->get_formatter()->column_width(34);
+    app_->footer(
+        "Exit codes: 0 ok, 1 usage, 2 cannot read or write a file, 3 invalid input,\n"
+        "4 failed while working, 5 not supported here, 7 a difference or a broken rule.");
+}
+
+CommandLine::~CommandLine() = default;
+
+Command CommandLine::add(const std::string& name, const std::string& help) {
+    CLI::App* app = app_->add_subcommand(name, help);
+    entries_.push_back({app, std::make_unique<Command::Body>()});
+    return {app, *entries_.back().body};
+}
+
+Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
+    try {
+        app_->parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+        const CLI::App& where = chosen(*app_);
+        return Request{where.help(&where == app_.get() ? "" : "stx"), {}};
+    } catch (const CLI::CallForVersion&) {
+        return Request{"stx " STX_VERSION "\n", {}};
+    } catch (const CLI::ParseError& e) {
+        return tl::unexpected(usageError(*app_, e, argc, argv));
+    }
+    for (const auto& entry : entries_)
+        if (entry.app->parsed()) return Request{{}, *entry.body};
+    return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");
+}
+
+std::vector<CommandRow> CommandLine::table() const {
+    std::vector<CommandRow> table;
+    for (const auto& entry : entries_) {
+        const std::string text = entry.app->get_description();
+        const auto blank = text.find("\n\n");
+        CommandRow row{entry.app->get_name(), text.substr(0, blank), {}, {}};
+        if (blank != std::string::npos) row.examples = text.substr(blank + 2);
+        for (const CLI::Option* option :
+             std::as_const(*entry.app).get_options([](const CLI::Option*) { return true; }))
+            row.options.push_back(optionRow(*option));
+        table.push_back(std::move(row));
+    }
+    return table;
+}
+
+std::string CommandLine::exitCodes() const {
+    return app_->get_footer();
+}
+
+}  // namespace stx::tools

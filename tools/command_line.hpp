@@ -1,0 +1,157 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lib/base/result.hpp"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+/// The command line, made and parsed with CLI11, which only command_line.cpp includes: reading its
+/// header costs each file more than compiling a whole command. Help, shell completion and the
+/// manual page are all made from the one place where a command adds an option.
+namespace stx::tools {
+
+class Program;
+struct CommonOptions;
+
+/// An option that was just added, to say more about it.
+class Option {
+  public:
+    explicit Option(CLI::Option* option) : option_(option) {}
+
+    /// The heading of the help that it is listed under.
+    Option& group(const std::string& heading);
+    /// What it takes, for people: "WxH".
+    Option& takes(const std::string& what);
+    Option& required();
+    /// One value with commas in it is several.
+    Option& commaSeparated();
+    Option& oneOf(const std::vector<std::string>& words);
+    Option& oneOf(std::initializer_list<const char*> words) {
+        return oneOf(std::vector<std::string>(words.begin(), words.end()));
+    }
+    Option& oneOf(std::initializer_list<int> numbers);
+    Option& range(int least, int most);
+    Option& range(double least, double most);
+    Option& notNegative();
+    Option& positive();
+
+  private:
+    CLI::Option* option_;
+};
+
+/// Which of the shared options a command has beside --threads, --max-memory, --quiet, -v.
+enum SharedOptions : unsigned {
+    kOutput = 1,   ///< --no-clobber, --report
+    kFormat = 2,   ///< --format text|json
+    kOutside = 4,  ///< --allow-outside
+};
+
+/// One command and its options. `names` are as in "-o,--output"; a name without dashes is of a
+/// positional. What options are written to must outlive the parsing. Copies are the same command.
+class Command {
+  public:
+    using Body = std::function<Result<int>(Program&)>;
+
+    Command(CLI::App* app, Body& body) : app_(app), body_(&body) {}
+
+    Option option(const std::string& names, std::string& to, const std::string& help);
+    Option option(const std::string& names, std::vector<std::string>& to, const std::string& help);
+    Option option(const std::string& names, int& to, const std::string& help);
+    Option option(const std::string& names, double& to, const std::string& help);
+    Option option(const std::string& names, std::optional<int>& to, const std::string& help);
+    Option option(const std::string& names, std::optional<double>& to, const std::string& help);
+    /// A text that `parse` takes or refuses.
+    Option option(const std::string& names, std::function<Result<void>(const std::string&)> parse,
+                  const std::string& help);
+    /// A word for each value.
+    template <class Value>
+    Option choice(const std::string& names, Value& to,
+                  const std::vector<std::pair<std::string, Value>>& words,
+                  const std::string& help) {
+        std::vector<std::string> list;
+        for (const auto& w : words) list.push_back(w.first);
+        const auto take = [&to, words](const std::string& text) -> Result<void> {
+            for (const auto& w : words)
+                if (w.first == text) to = w.second;
+            return {};
+        };
+        return option(names, take, help).oneOf(list);
+    }
+    Option flag(const std::string& names, bool& to, const std::string& help);
+    /// How often it is given.
+    Option flag(const std::string& names, int& count, const std::string& help);
+    /// Those of SharedOptions that `which` names, and those that every command has.
+    void sharedOptions(CommonOptions& to, unsigned which);
+    /// What it does once its options are parsed; gives the exit code.
+    void runs(Body body);
+
+  private:
+    CLI::App* app_;
+    Body* body_;
+};
+
+/// An option as a row of a table.
+struct OptionRow {
+    std::vector<std::string> names;    ///< with their dashes; of a positional: its name alone
+    std::string value;                 ///< what it takes, "WxH"; empty for a flag
+    std::vector<std::string> choices;  ///< all values it takes, when they can be listed
+    std::string range;                 ///< "1 to 8"; empty when any
+    std::string help;
+    std::string group;  ///< heading that it is listed under
+    bool required = false;
+    bool positional = false;
+    bool many = false;  ///< takes several values
+};
+
+struct CommandRow {
+    std::string name;
+    std::string summary;   ///< one paragraph
+    std::string examples;  ///< lines of commands, as they are
+    std::vector<OptionRow> options;
+};
+
+/// All commands of the program `stx`.
+class CommandLine {
+  public:
+    CommandLine();
+    ~CommandLine();
+    CommandLine(const CommandLine&) = delete;
+    CommandLine& operator=(const CommandLine&) = delete;
+
+    /// A new command. `help` is a summary, an empty line and examples.
+    [[nodiscard]] Command add(const std::string& name, const std::string& help);
+
+    /// What the arguments ask for: a text to print (help, the version), or a command's body.
+    struct Request {
+        std::string text;
+        Command::Body body;
+    };
+    /// Errors (usage) in one line that says where to read on, with the nearest known word for an
+    /// unknown one.
+    [[nodiscard]] Result<Request> parse(int argc, char** argv) const;
+
+    [[nodiscard]] std::vector<CommandRow> table() const;
+    /// What the exit codes mean: the last lines of the help.
+    [[nodiscard]] std::string exitCodes() const;
+
+  private:
+    struct Entry {
+        CLI::App* app;
+        std::unique_ptr<Command::Body> body;
+    };
+    std::unique_ptr<CLI::App> app_;
+    std::vector<Entry> entries_;
+};
+
+}  // namespace stx::tools
