@@ -73,8 +73,8 @@ struct AtlasSaveOptions {
 [[nodiscard]] Result<void> writeAtlas(const Atlas& atlas, const std::filesystem::path& path,
                                       Job& job, const AtlasSaveOptions& options = {});
 
-/// Longest side of the images that writeAtlas() makes of an atlas that passes check(), pixels: where
-/// an image holds two pictures of a page (AtlasTexture::secondX), it is larger than the page.
+/// Longest side of the images that writeAtlas() makes of an atlas that passes check(), pixels:
+/// where an image holds two pictures of a page (AtlasTexture::secondX), it is larger than the page.
 [[nodiscard]] int largestImageSide(const Atlas& atlas, const std::filesystem::path& path,
                                    const AtlasSaveOptions& options = {});
 

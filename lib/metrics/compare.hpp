@@ -15,7 +15,8 @@ struct CompareSettings {
     /// Only pixels of the mask that are >= 128 count. Null: all pixels. Same size as the pictures.
     const Image<std::uint8_t>* mask = nullptr;
     /// What both pictures are laid over first where their alpha is below full: colours of 0..1 in
-    /// the pictures' own coding. Alpha itself is not compared: what nobody sees is not a difference.
+    /// the pictures' own coding. Alpha itself is not compared: what nobody sees is not a
+    /// difference.
     glm::vec3 background{0.0f};
     /// Float pictures: the value that counts as full white. 8-bit pictures: always 255.
     double peak = 1.0;
