@@ -208,14 +208,16 @@ void PageSet::markOutside(std::size_t of, std::vector<std::uint64_t>& bits) cons
                 const int reach = 1 + static_cast<int>(std::min(coarser, kMostReach - 1.0));
                 const int cx = static_cast<int>(std::floor(at.x)),
                           cy = static_cast<int>(std::floor(at.y));
+                const int left = std::max(0, cx - reach);
+                const int count = std::min(camera.width - 1, cx + reach) - left + 1;
+                if (count <= 0) continue;
+                const std::uint64_t run = (std::uint64_t{1} << count) - 1;
                 for (int ny = std::max(0, cy - reach);
                      ny <= std::min(camera.height - 1, cy + reach); ++ny) {
-                    for (int nx = std::max(0, cx - reach);
-                         nx <= std::min(camera.width - 1, cx + reach); ++nx) {
-                        const std::size_t i =
-                            static_cast<std::size_t>(ny) * camera.width + static_cast<unsigned>(nx);
-                        bits[i / 64] |= std::uint64_t{1} << (i % 64);
-                    }
+                    const std::size_t bit = static_cast<std::size_t>(ny) * camera.width + left;
+                    const std::size_t shift = bit % 64;
+                    bits[bit / 64] |= run << shift;
+                    if (shift + count > 64) bits[bit / 64 + 1] |= run >> (64 - shift);
                 }
             }
         }

@@ -110,6 +110,13 @@ class PageSet {
     }
     /// The same for all pixels from (x0, y0) to (x1, y1), inclusive, at most kBlock apart.
     [[nodiscard]] const PageRectangle* find(std::size_t view, int x0, int y0, int x1, int y1) const;
+    /// Whether all pixels from (x0, y0) to (x1, y1), inclusive, can be read from a rectangle's
+    /// texels, padding included.
+    [[nodiscard]] bool reads(const PageRectangle& r, int x0, int y0, int x1, int y1) const {
+        const int padding = data_->padding;
+        return x0 >= r.x0 - padding && y0 >= r.y0 - padding && x1 < r.x1 + padding &&
+               y1 < r.y1 + padding;
+    }
     /// Numbers of the rectangles in or beside the block of a view that holds a pixel.
     [[nodiscard]] std::span<const std::uint32_t> near(std::size_t view, int x, int y) const {
         const ViewIndex& index = data_->index[view];
@@ -184,13 +191,8 @@ inline const PageRectangle* PageSet::find(std::size_t view, int x0, int y0, int 
     const PageView& v = data_->views[view];
     const PageRectangle* all = data_->rectangles.data();
     if (v.whole) return all + v.firstRectangle;
-    const int padding = data_->padding;
-    for (const std::uint32_t number : near(view, x0, y0)) {
-        const PageRectangle& r = all[number];
-        if (x0 >= r.x0 - padding && y0 >= r.y0 - padding && x1 < r.x1 + padding &&
-            y1 < r.y1 + padding)
-            return &r;
-    }
+    for (const std::uint32_t number : near(view, x0, y0))
+        if (reads(all[number], x0, y0, x1, y1)) return all + number;
     return nullptr;
 }
 

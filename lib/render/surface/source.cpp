@@ -411,12 +411,22 @@ Warp warpFrom(const glm::dmat4& m) {
 Place Source::placeInRectangles(int x, int y) const {
     const int x0 = std::max(x, 0), y0 = std::max(y, 0);
     const int x1 = std::min(x + 1, width - 1), y1 = std::min(y + 1, height - 1);
-    // A pixel further around, so that gradients can be read where there are points; beyond that
-    // padding has none.
-    const PageRectangle* r = set->find(number, std::max(x0 - 1, 0), std::max(y0 - 1, 0),
-                                       std::min(x1 + 1, width - 1), std::min(y1 + 1, height - 1));
-    if (!r) r = set->find(number, x0, y0, x1, y1);
-    if (r) return {pages + r->page, r->first + x * r->stepX + y * r->stepY, r->stepX, r->stepY, 0};
+    // Better one that shows a pixel more around, so that gradients can be read where there are
+    // points; in the padding beyond there are none.
+    const int left = std::max(x0 - 1, 0), right = std::min(x1 + 1, width - 1);
+    const int above = std::max(y0 - 1, 0), below = std::min(y1 + 1, height - 1);
+    const PageRectangle* found = nullptr;
+    for (const std::uint32_t candidate : set->near(number, x0, y0)) {
+        const PageRectangle& r = set->rectangles()[candidate];
+        if (set->reads(r, left, above, right, below)) {
+            found = &r;
+            break;
+        }
+        if (!found && set->reads(r, x0, y0, x1, y1)) found = &r;
+    }
+    if (found)
+        return {pages + found->page, found->first + x * found->stepX + y * found->stepY,
+                found->stepX, found->stepY, 0};
     Place none;
     for (int j = y0; j <= y1; ++j)
         for (int i = x0; i <= x1; ++i)
