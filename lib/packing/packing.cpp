@@ -81,62 +81,21 @@ std::int64_t objectPixels(const ReferenceView& view) {
     return n;
 }
 
-/// Marks where the points of other views fall in a view, a little generously. What is missing from
-/// the view is there: others show it.
-void markShown(const std::vector<ReferenceView>& views, std::size_t of,
-               Image<std::uint8_t>& shown) {
-    constexpr int kMostReach = 6;  // pixels
-    const Camera& camera = views[of].camera;
-    const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        const ReferenceView& other = views[i];
-        if (i == of) continue;
-        const glm::dmat4 fromOther = cameraFromWorld * other.camera.worldFromCamera();
-        for (int y = 0; y < other.depth.height(); ++y) {
-            for (int x = 0; x < other.depth.width(); ++x) {
-                const float dist = other.depth.at(x, y);
-                if (!hasPoint(dist)) continue;
-                const glm::dvec3 p(fromOther *
-                                   glm::dvec4(other.camera.unproject(x + 0.5, y + 0.5, dist), 1.0));
-                if (!camera.orthographic && !(p.z < 0)) continue;
-                const glm::dvec3 at = camera.project(p);
-                if (!(at.x > -kMostReach && at.y > -kMostReach &&
-                      at.x < camera.width + kMostReach && at.y < camera.height + kMostReach))
-                    continue;
-                const double coarser =
-                    other.camera.sampleSpacing(dist).x / camera.sampleSpacing(-p.z).x;
-                const int reach = 1 + static_cast<int>(std::min(coarser, kMostReach - 1.0));
-                const int cx = static_cast<int>(std::floor(at.x)),
-                          cy = static_cast<int>(std::floor(at.y));
-                for (int ny = std::max(0, cy - reach);
-                     ny <= std::min(camera.height - 1, cy + reach); ++ny) {
-                    for (int nx = std::max(0, cx - reach);
-                         nx <= std::min(camera.width - 1, cx + reach); ++nx)
-                        shown.at(nx, ny) = 1;
-                }
-            }
-        }
-    }
-}
-
-/// Pixels of a pruned view that neither a rectangle nor padding gives: full alpha where other views
-/// show something, else background.
-void fillPruned(const std::vector<ReferenceView>& views, const Image<std::uint8_t>& told,
-                std::size_t of, Texture& texture) {
-    Image<std::uint8_t> shown(told.width(), told.height(), 0);
-    markShown(views, of, shown);
-    for (int y = 0; y < told.height(); ++y) {
-        for (int x = 0; x < told.width(); ++x) {
-            if (told.at(x, y) || !shown.at(x, y)) continue;
-            if (auto* image = texture.rgba8()) image->at(x, y).a = 255;
-            if (auto* image = texture.rgbaFloat()) image->at(x, y).a = 1.0f;
-        }
+/// Pixels of a view that neither rectangles nor padding show: full alpha where other views show
+/// something, else background.
+void fillOutside(const Atlas& atlas, const Image<std::uint8_t>& given, std::size_t view,
+                 Texture& texture) {
+    const auto shown = shownByOthers(atlas, view);
+    for (std::size_t i = 0; i < given.count(); ++i) {
+        if (given.data()[i] || !(shown[i / 64] >> (i % 64) & 1)) continue;
+        if (auto* image = texture.rgba8()) image->data()[i].a = 255;
+        if (auto* image = texture.rgbaFloat()) image->data()[i].a = 1.0f;
     }
 }
 
 /// Colour and alpha of the padding of a rectangle, back into its view: what surrounds it there.
 void copyPadding(const AtlasRectangle& r, const Atlas& atlas, ReferenceView& view,
-                 Image<std::uint8_t>& told) {
+                 Image<std::uint8_t>& given) {
     const AtlasPage& page = atlas.pages[r.page];
     for (int y = r.viewY - atlas.padding; y < r.viewY + r.height + atlas.padding; ++y) {
         for (int x = r.viewX - atlas.padding; x < r.viewX + r.width + atlas.padding; ++x) {
@@ -146,7 +105,7 @@ void copyPadding(const AtlasRectangle& r, const Atlas& atlas, ReferenceView& vie
                 image->at(x, y) = page.texture.rgba8()->at(p.x, p.y);
             if (auto* image = view.texture.rgbaFloat())
                 image->at(x, y) = page.texture.rgbaFloat()->at(p.x, p.y);
-            told.at(x, y) = 1;
+            given.at(x, y) = 1;
         }
     }
 }
@@ -232,6 +191,50 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     return atlas;
 }
 
+std::vector<std::uint64_t> shownByOthers(const Atlas& atlas, std::size_t of) {
+    constexpr int kMostReach = 6;  // pixels
+    const Camera& camera = atlas.views[of].camera;
+    std::vector<std::uint64_t> bits(
+        (static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
+    const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
+    for (const AtlasRectangle& r : atlas.rectangles) {
+        if (r.view == static_cast<int>(of)) continue;
+        const Camera& other = atlas.views[r.view].camera;
+        const Image<float>& depth = atlas.pages[r.page].depth;
+        const glm::dmat4 fromOther = cameraFromWorld * other.worldFromCamera();
+        for (int y = r.viewY; y < r.viewY + r.height; ++y) {
+            for (int x = r.viewX; x < r.viewX + r.width; ++x) {
+                const glm::ivec2 texel = r.atlasFromView(x, y);
+                const float dist = depth.at(texel.x, texel.y);
+                if (!hasPoint(dist)) continue;
+                const glm::dvec3 p(fromOther *
+                                   glm::dvec4(other.unproject(x + 0.5, y + 0.5, dist), 1.0));
+                if (!camera.orthographic && !(p.z < 0)) continue;
+                const glm::dvec3 at = camera.project(p);
+                if (!(at.x > -kMostReach && at.y > -kMostReach &&
+                      at.x < camera.width + kMostReach && at.y < camera.height + kMostReach))
+                    continue;
+                const double coarser = other.sampleSpacing(dist).x / camera.sampleSpacing(-p.z).x;
+                const int reach = 1 + static_cast<int>(std::min(coarser, kMostReach - 1.0));
+                const int cx = static_cast<int>(std::floor(at.x)),
+                          cy = static_cast<int>(std::floor(at.y));
+                const int left = std::max(0, cx - reach);
+                const int count = std::min(camera.width - 1, cx + reach) - left + 1;
+                if (count <= 0) continue;
+                const std::uint64_t run = (std::uint64_t{1} << count) - 1;
+                for (int ny = std::max(0, cy - reach);
+                     ny <= std::min(camera.height - 1, cy + reach); ++ny) {
+                    const std::size_t bit = static_cast<std::size_t>(ny) * camera.width + left;
+                    const std::size_t shift = bit % 64;
+                    bits[bit / 64] |= run << shift;
+                    if (shift + count > 64) bits[bit / 64 + 1] |= run >> (64 - shift);
+                }
+            }
+        }
+    }
+    return bits;
+}
+
 Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     STX_CHECK(atlas.check());
     const AtlasPage& first = atlas.pages[0];
@@ -250,7 +253,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     bundle.title = atlas.title;
     bundle.bounds = atlas.bounds;
     bundle.views.resize(atlas.views.size());
-    std::vector<Image<std::uint8_t>> toldOf(atlas.views.size());
+    std::vector<Image<std::uint8_t>> givenOf(atlas.views.size());
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {
         ReferenceView& view = bundle.views[i];
         view = withoutImages(atlas.views[i]);
@@ -262,10 +265,10 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
             view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
             view.splatV = view.splatU;
         }
-        Image<std::uint8_t>& told = toldOf[i];  // 1 = by padding, 2 = by a rectangle
-        told = Image<std::uint8_t>(width, height, 0);
+        Image<std::uint8_t>& given = givenOf[i];  // 1 = by padding, 2 = by a rectangle
+        given = Image<std::uint8_t>(width, height, 0);
         if (partial) {
-            for (const AtlasRectangle* r : ofView[i]) copyPadding(*r, atlas, view, told);
+            for (const AtlasRectangle* r : ofView[i]) copyPadding(*r, atlas, view, given);
         }
         std::int64_t covered = 0;
         for (const AtlasRectangle* r : ofView[i]) {
@@ -285,12 +288,12 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
                 copy(page.splatV, view.splatV);
             }
             forEachPixel(*r, view.depth.size(), 0, [&](glm::ivec2, glm::ivec2 v) {
-                covered += told.at(v.x, v.y) == 2 ? 0 : 1;
-                told.at(v.x, v.y) = 2;
+                covered += given.at(v.x, v.y) == 2 ? 0 : 1;
+                given.at(v.x, v.y) = 2;
             });
         }
         // Whole views come back as they were, colours under alpha 0 included.
-        if (covered < static_cast<std::int64_t>(told.count())) bleedColour(view.texture);
+        if (covered < static_cast<std::int64_t>(given.count())) bleedColour(view.texture);
         // An atlas keeps room for normals when any view has them; give them back only to those.
         dropIfZero(view.normal);
         dropIfZero(view.splatU);
@@ -299,8 +302,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     STX_CHECK(job.checkCancelled());
     if (partial) {
         parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
-            fillPruned(bundle.views, toldOf[i], static_cast<std::size_t>(i),
-                       bundle.views[i].texture);
+            fillOutside(atlas, givenOf[i], static_cast<std::size_t>(i), bundle.views[i].texture);
         });
     }
     return bundle;

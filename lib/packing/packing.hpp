@@ -39,6 +39,10 @@ struct PackSettings {
 /// that would be needed and what to change; cancelled; memory over the limit.
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
 
+/// A bit for each pixel of a view, row by row: set where points of other views fall, a little
+/// generously. The object is there even where no rectangle shows it. The atlas must pass check().
+[[nodiscard]] std::vector<std::uint64_t> shownByOthers(const Atlas& atlas, std::size_t view);
+
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle
 /// are coloured from the nearest covered ones and are background (alpha 0). When the atlas lacks
 /// pixels of the object (keptPixels < sourcePixels: pruned, or missed by a sensor), those where

@@ -146,7 +146,7 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
         std::vector<std::vector<std::uint64_t>> bits(data->views.size());
         parallelFor(0, static_cast<std::int64_t>(bits.size()), [&](std::int64_t i) {
             const auto view = static_cast<std::size_t>(i);
-            set.markOutside(view, bits[view]);
+            bits[view] = shownByOthers(atlas, view);
         });
         for (std::size_t i = 0; i < bits.size(); ++i) data->index[i].outside = std::move(bits[i]);
     }
@@ -178,49 +178,6 @@ void PageSet::buildIndex(Data& data) {
             index.near.insert(index.near.end(), list.begin(), list.end());
         }
         index.begin.push_back(static_cast<std::uint32_t>(index.near.size()));
-    }
-}
-
-/// Marks where the points of other views fall in a view, a little generously: what was left out of
-/// the view is there, since others show it.
-void PageSet::markOutside(std::size_t of, std::vector<std::uint64_t>& bits) const {
-    constexpr int kMostReach = 6;  // pixels
-    const Camera& camera = views()[of].camera;
-    bits.assign((static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
-    const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
-    for (const PageRectangle& r : rectangles()) {
-        if (r.view == static_cast<int>(of)) continue;
-        const Camera& other = views()[static_cast<std::size_t>(r.view)].camera;
-        const Image<float>& depth = *pages()[static_cast<std::size_t>(r.page)].depth;
-        const glm::dmat4 fromOther = cameraFromWorld * other.worldFromCamera();
-        for (int y = r.y0; y < r.y1; ++y) {
-            for (int x = r.x0; x < r.x1; ++x) {
-                const float dist = depth.data()[r.texel(x, y)];
-                if (!hasPoint(dist)) continue;
-                const glm::dvec3 p(fromOther *
-                                   glm::dvec4(other.unproject(x + 0.5, y + 0.5, dist), 1.0));
-                if (!camera.orthographic && !(p.z < 0)) continue;
-                const glm::dvec3 at = camera.project(p);
-                if (!(at.x > -kMostReach && at.y > -kMostReach &&
-                      at.x < camera.width + kMostReach && at.y < camera.height + kMostReach))
-                    continue;
-                const double coarser = other.sampleSpacing(dist).x / camera.sampleSpacing(-p.z).x;
-                const int reach = 1 + static_cast<int>(std::min(coarser, kMostReach - 1.0));
-                const int cx = static_cast<int>(std::floor(at.x)),
-                          cy = static_cast<int>(std::floor(at.y));
-                const int left = std::max(0, cx - reach);
-                const int count = std::min(camera.width - 1, cx + reach) - left + 1;
-                if (count <= 0) continue;
-                const std::uint64_t run = (std::uint64_t{1} << count) - 1;
-                for (int ny = std::max(0, cy - reach);
-                     ny <= std::min(camera.height - 1, cy + reach); ++ny) {
-                    const std::size_t bit = static_cast<std::size_t>(ny) * camera.width + left;
-                    const std::size_t shift = bit % 64;
-                    bits[bit / 64] |= run << shift;
-                    if (shift + count > 64) bits[bit / 64 + 1] |= run >> (64 - shift);
-                }
-            }
-        }
     }
 }
 

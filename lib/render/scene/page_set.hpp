@@ -182,7 +182,6 @@ class PageSet {
     static void addBundle(const Bundle& bundle, Data& data);
     static void addRectangle(const AtlasRectangle& from, int padding, Data& data);
     static void buildIndex(Data& data);
-    void markOutside(std::size_t view, std::vector<std::uint64_t>& bits) const;
 
     std::shared_ptr<const Data> data_;
 };

@@ -50,11 +50,12 @@ inline RenderSettings splatSettings(SplatRule rule = SplatRule::data) {
     return s;
 }
 
-/// One frame of a renderer made for it.
-inline Result<Frame> drawOn(Backend backend, const Bundle& bundle, const RenderSettings& settings,
-                            const Camera& camera) {
+/// One frame, of a bundle or an atlas, of a renderer made for it.
+template <class Model>
+Result<Frame> drawOn(Backend backend, const Model& model, const RenderSettings& settings,
+                     const Camera& camera) {
     Job job;
-    STX_TRY(auto renderer, makeRenderer(backend, bundle, settings, -1, job));
+    STX_TRY(auto renderer, makeRenderer(backend, model, settings, -1, job));
     return renderer->render(camera);
 }
 

@@ -2,7 +2,11 @@
 
 #include <thread>
 
+#include "lib/packing/packing.hpp"
+#include "lib/packing/prune.hpp"
+#include "tests/torus_bundle.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
+#include "tests/unit/surface/analytic.hpp"
 
 namespace stx {
 namespace {
@@ -51,6 +55,31 @@ TEST_P(GpuRenderers, AgreeWithTheCpuFromNearAndFar) {
         camera.cx += 21;
         camera.cy -= 13;
         agree(bundle, settings(), camera, fmt::format("zoom_{}", zoom));
+    }
+}
+
+/// Rectangles of several views on one texture, some of them turned, with pixels pruned between
+/// them.
+TEST_P(GpuRenderers, DrawAtlasesFromTheirTextures) {
+    Bundle bundle = torusViews(128);
+    Job job;
+    const auto report = prune(bundle, {}, job);
+    ASSERT_TRUE(report);
+    PackSettings packing;
+    packing.layout = PackSettings::Layout::tight;
+    packing.sourcePixels = report->sourcePixels;
+    const auto atlas = pack(bundle, packing, job);
+    ASSERT_TRUE(atlas);
+    EXPECT_TRUE(std::any_of(atlas->rectangles.begin(), atlas->rectangles.end(),
+                            [](const AtlasRectangle& r) { return r.turned; }));
+    const Camera camera = analytic::lookingAt({1, 2, 2}, 160);
+    for (const bool lit : {false, true}) {
+        RenderSettings s = settings();
+        if (lit) s.lighting.lights.emplace_back();
+        const auto expected = test::drawOn(Backend::cpu, *atlas, s, camera);
+        ASSERT_TRUE(expected);
+        test::expectAgreement(test::drawOn(Backend::gpu, *atlas, s, camera), *expected,
+                              lit ? "lit" : "unlit", 20);
     }
 }
 
