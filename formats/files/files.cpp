@@ -221,7 +221,7 @@ Result<void> OutputFile::commit() {
         if (const int error = f.fd.close()) return failIo("write", f.target, error);
         return {};
     }
-    // A full disk may only be told here, not by write().
+    // A full disk may only show here, not by write().
     if (::fsync(f.fd.get()) != 0 && errno != EINVAL && errno != ENOTSUP)
         return failIo("write", f.target, errno);
     if (f.options.noClobber) {

@@ -33,8 +33,8 @@ std::optional<BifsConfig> parse(ByteSpan bytes, int version) {
 }  // namespace
 
 Result<BifsConfig> decodeBifsConfig(ByteSpan bytes, std::uint8_t objectTypeIndication) {
-    const int told = objectTypeIndication == oti::kSystemsV2 ? 2 : 1;
-    for (const int version : {told, 3 - told})
+    const int stated = objectTypeIndication == oti::kSystemsV2 ? 2 : 1;
+    for (const int version : {stated, 3 - stated})
         if (const auto config = parse(bytes, version)) {
             if (!config->isCommandStream)
                 return fail(ErrorCode::unsupported,

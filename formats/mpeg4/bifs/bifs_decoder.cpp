@@ -61,7 +61,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
     }
 
     Result<Route> readRoute() {
-        STX_CHECK(spend(sizeof(Route)));
+        STX_CHECK(useBudget(sizeof(Route)));
         Route route;
         if (in.flag()) {
             route.id = in.read(config.routeIdBits) + 1;
@@ -220,7 +220,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
     Result<Command> readCommand() {
         ++command;
         deepest = 0;
-        STX_CHECK(spend(sizeof(Command)));
+        STX_CHECK(useBudget(sizeof(Command)));
         switch (in.read(2)) {
             case 0:
                 return readInsert();

@@ -22,7 +22,7 @@ Result<std::string> BifsNodeReader::readString() {
     if (length > in.left() / 8)
         return error(ErrorCode::invalidInput,
                      "a string of {} bytes does not fit into the {} bits left", length, in.left());
-    STX_CHECK(spend(length));
+    STX_CHECK(useBudget(length));
     std::string text(static_cast<std::size_t>(length), '\0');
     for (char& c : text) c = static_cast<char>(in.read(8));
     return text;
@@ -34,7 +34,7 @@ Result<std::string> BifsNodeReader::readName() {
         text.push_back(static_cast<char>(c));
     }
     STX_CHECK(check("a name"));
-    STX_CHECK(spend(text.size()));
+    STX_CHECK(useBudget(text.size()));
     return text;
 }
 
@@ -49,7 +49,7 @@ Result<PixelImage> BifsNodeReader::readImage() {
         return error(ErrorCode::invalidInput,
                      "an image of {}x{}x{} does not fit into the {} bits left", image.width,
                      image.height, image.components, in.left());
-    STX_CHECK(spend(size));
+    STX_CHECK(useBudget(size));
     image.pixels.resize(static_cast<std::size_t>(size));
     for (std::uint8_t& value : image.pixels) value = static_cast<std::uint8_t>(in.read(8));
     return image;
@@ -195,7 +195,7 @@ Result<void> BifsNodeReader::readItems(const NodeInfo& node, const FieldInfo& fi
     return readEach(
         node, field, coding ? fewestBits(itemType(field.type), *coding) : 1,
         [&](std::uint64_t left) -> Result<void> {
-            STX_CHECK(spend(sizeof(T)));
+            STX_CHECK(useBudget(sizeof(T)));
             if (items.empty() && left > 0)
                 items.reserve(static_cast<std::size_t>(std::min<std::uint64_t>(left, 1u << 20)));
             if (!coding) return tl::unexpected(coding.error());
@@ -217,7 +217,7 @@ Result<void> BifsNodeReader::readNodes(const NodeInfo& node, const FieldInfo& fi
                          field.name);
         deepest = std::max(deepest, height);
         guard.coded(child);
-        STX_CHECK(spend(sizeof(NodePtr)));
+        STX_CHECK(useBudget(sizeof(NodePtr)));
         items.push_back(std::move(child));
         return {};
     });
@@ -257,7 +257,7 @@ Result<NodePtr> BifsNodeReader::readNode(Ndt expected, int depth, int& height) {
 
     STX_TRY(const NodeInfo* info, readNodeCode(expected));
     NodePtr node = makeNode(*info);
-    STX_CHECK(spend(sizeof(Node) + 64));
+    STX_CHECK(useBudget(sizeof(Node) + 64));
     if (in.flag()) {
         node->defId = in.read(config.nodeIdBits) + 1;
         if (useNames) {
@@ -343,7 +343,7 @@ Result<void> BifsNodeReader::readFields(Node& node, int depth) {
 Result<void> BifsNodeReader::readInto(Node& node, int index, int depth) {
     const FieldInfo& field = node.info->fields[static_cast<std::size_t>(index)];
     STX_TRY(FieldValue value, readField(*node.info, field, depth));
-    STX_CHECK(spend(sizeof(Node::SetField)));
+    STX_CHECK(useBudget(sizeof(Node::SetField)));
     node.set(index, std::move(value));
     return {};
 }

@@ -45,7 +45,7 @@ struct BifsNodeReader {
         return {};
     }
 
-    Result<void> spend(std::uint64_t bytes) {
+    Result<void> useBudget(std::uint64_t bytes) {
         memory += bytes;
         if (memory > limits.maxMemoryBytes)
             return error(ErrorCode::invalidInput,

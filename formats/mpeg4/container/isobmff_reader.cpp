@@ -239,7 +239,7 @@ class Reader {
     }
 
     /// Memory that the document takes by naming a track again and again.
-    Result<void> spend(std::uint64_t bytes, const std::string& place) {
+    Result<void> useBudget(std::uint64_t bytes, const std::string& place) {
         spent_ += bytes;
         if (spent_ > job_.limits.maxMemoryBytes)
             return failAt(place, ErrorCode::invalidInput,
@@ -249,7 +249,7 @@ class Reader {
     }
 
     Result<void> fill(ElementaryStream& stream, const std::string& place) {
-        STX_CHECK(spend(sizeof(ElementaryStream), place));
+        STX_CHECK(useBudget(sizeof(ElementaryStream), place));
         if (!stream.url.empty()) return {};
         Mp4Track* track = findTrack(stream.esId);
         if (track == nullptr) {
@@ -269,8 +269,8 @@ class Reader {
             return {};
         }
         STX_TRY(const std::vector<Sample>* samples, samplesOf(*track));
-        STX_CHECK(spend(samples->size() * sizeof(Sample) + track->stream.decoderSpecificInfo.size(),
-                        place));
+        STX_CHECK(useBudget(
+            samples->size() * sizeof(Sample) + track->stream.decoderSpecificInfo.size(), place));
         stream = track->stream;
         stream.samples = *samples;
         return {};

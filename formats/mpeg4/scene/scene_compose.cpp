@@ -71,7 +71,7 @@ class Composer {
 
     // ---- checks
 
-    Result<void> spend(std::uint64_t visits) {
+    Result<void> useBudget(std::uint64_t visits) {
         visits_ += visits;
         if (visits_ > kMaxVisits)
             return fail(ErrorCode::unsupported,
@@ -88,7 +88,7 @@ class Composer {
         if (const NodePtr* node = std::get_if<NodePtr>(&value)) collect(*node);
         if (const NodeList* list = std::get_if<NodeList>(&value))
             for (const NodePtr& node : *list) collect(node);
-        STX_CHECK(spend(nodes.size()));
+        STX_CHECK(useBudget(nodes.size()));
         return nodes;
     }
 
@@ -146,7 +146,7 @@ class Composer {
             }
         });
         STX_CHECK(fits);
-        STX_CHECK(spend(visits));
+        STX_CHECK(useBudget(visits));
         if (scene_.root == target) {
             if (!mayStandIn(replacement.get(), Ndt::SFTopNode))
                 return fail(ErrorCode::invalidInput, "{} may not be the root of a scene",
@@ -270,17 +270,17 @@ class Composer {
     }
 
     Result<void> apply(InsertRoute& c) {
-        STX_CHECK(spend(1));
+        STX_CHECK(useBudget(1));
         scene_.routes.push_back(c.route);
         return {};
     }
     Result<void> apply(DeleteRoute& c) {
-        STX_CHECK(spend(scene_.routes.size()));
+        STX_CHECK(useBudget(scene_.routes.size()));
         std::erase_if(scene_.routes, [&](const Route& r) { return r.id == c.routeId; });
         return {};
     }
     Result<void> apply(ReplaceRoute& c) {
-        STX_CHECK(spend(scene_.routes.size()));
+        STX_CHECK(useBudget(scene_.routes.size()));
         for (Route& route : scene_.routes)
             if (route.id == c.routeId) route = c.route;
         return {};

@@ -42,7 +42,7 @@ struct Cell {
     }
 };
 
-Cell cellAt(const Source& s, double u, double v, double z, double slopeU, double slopeV,
+Cell cellAt(const RectangleImages& s, double u, double v, double z, double slopeU, double slopeV,
             bool orthographic) {
     const PixelMap& m = s.map;
     const glm::dvec3 a = m.a0 + m.au * u + m.av * v;
@@ -98,7 +98,7 @@ PixelMap pixelMap(const Camera& source, const Camera& novel) {
     return m;
 }
 
-bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const Source& s,
+bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const RectangleImages& s,
                const Camera& novel, bool cullBackFaces, BlockTask& task) {
     task.u0 = block.u0;
     task.v0 = block.v0;

@@ -14,7 +14,7 @@ namespace stx::splat {
 /// What to do for one block in one frame. False when nothing of it can be seen: it lies outside, or
 /// all of it faces away (only where `cullBackFaces`).
 [[nodiscard]] bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block,
-                             const Source& source, const Camera& novel, bool cullBackFaces,
+                             const RectangleImages& source, const Camera& novel, bool cullBackFaces,
                              BlockTask& task);
 
 }  // namespace stx::splat

@@ -9,7 +9,7 @@
 
 namespace stx::splat {
 
-/// Source pixels are worked on in square blocks of this side.
+/// RectangleImages pixels are worked on in square blocks of this side.
 inline constexpr int kBlock = 16;
 
 /// Tilt of the surface at a pixel: change of dist per sample spacing, along x and down y (the

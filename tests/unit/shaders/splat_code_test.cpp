@@ -141,7 +141,7 @@ Drawn drawScalar(const Inputs& in) {
 }
 
 Drawn drawVectors(const Inputs& in) {
-    Source source;
+    RectangleImages source;
     source.depth = in.depth.data();
     source.rgba8 = reinterpret_cast<const std::uint8_t*>(in.colour.data());
     source.slopes = in.slopes.data();
@@ -201,8 +201,9 @@ Drawn drawOnDevice(const Inputs& in, test::Device& device) {
     gpu::SplatVariant variant;
     variant.sizes = true;
     for (const int pass : {1, 2})
-        device.run(gpu::splatHeader(variant, pass,
-                                    in.coefficient > 0 ? gpu::Rule::paper : gpu::Rule::ellipse),
+        device.run(gpu::splatHeader(
+                       variant, pass,
+                       in.coefficient > 0 ? gpu::SplatShape::paper : gpu::SplatShape::ellipse),
                    gpu::splatStages(false, gpu::SplatProgram::splats), 1);
     Drawn out;
     out.front = device.read<float>(3, kPadded);

@@ -53,16 +53,16 @@ HWY_INLINE VF loadDepth(DF d, const float* from, int count) {
 
 // Points of a row and their places: the pixel to the upper left of each (only where `inside`
 // the band), how far into the next it lies (0..1), its novel depth.
-struct Landed {
+struct Projection {
     VI offset;
     VF x, y, fx, fy, z;
     VF a[3], inverse;  // H = a z + ..., and 1 / H.z (1 when orthographic)
     hn::Mask<DF> inFront, inside;
 };
 
-HWY_INLINE Landed land(DF d, const RowMap& m, int i, VF z, const Band& band) {
+HWY_INLINE Projection project(DF d, const RowMap& m, int i, VF z, const Band& band) {
     const VF index = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(i)));
-    Landed out;
+    Projection out;
     const auto h = [&](int k) HWY_ATTR {
         out.a[k] = hn::MulAdd(index, hn::Set(d, m.au[k]), hn::Set(d, m.a[k]));
         const VF b = hn::MulAdd(index, hn::Set(d, m.bu[k]), hn::Set(d, m.b[k]));
@@ -98,7 +98,7 @@ HWY_INLINE Landed land(DF d, const RowMap& m, int i, VF z, const Band& band) {
 }
 
 // Which of the lanes have alpha above a threshold of 0..255.
-HWY_INLINE hn::Mask<DF> alphaAbove(DF d, const Source& s, std::size_t pixel, int count,
+HWY_INLINE hn::Mask<DF> alphaAbove(DF d, const RectangleImages& s, std::size_t pixel, int count,
                                    int threshold) {
     HWY_ALIGN float alpha[kBlock];
     const int lanes = static_cast<int>(hn::Lanes(d));

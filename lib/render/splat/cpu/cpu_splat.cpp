@@ -76,17 +76,17 @@ class CpuSplatRenderer final : public Renderer {
     std::size_t blockCount_ = 0;
 
     // Of the frame being drawn.
-    std::vector<Source> sources_;
+    std::vector<RectangleImages> sources_;
     std::vector<BlockTask> tasks_;
     std::vector<std::uint8_t> seen_;
     std::vector<std::vector<std::uint32_t>> bins_;  // tasks of each band, in order
     tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 
-Source sourceOf(const PageRectangle& r, const Page& page, const PreparedPage& prepared,
-                const Camera& novel) {
+RectangleImages sourceOf(const PageRectangle& r, const Page& page, const PreparedPage& prepared,
+                         const Camera& novel) {
     const std::size_t first = static_cast<std::size_t>(r.pageY) * page.width() + r.pageX;
-    Source s;
+    RectangleImages s;
     s.depth = page.depth->data() + first;
     if (const auto* image = page.texture->rgba8())
         s.rgba8 = reinterpret_cast<const std::uint8_t*>(image->data() + first);

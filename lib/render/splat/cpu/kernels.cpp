@@ -7,7 +7,7 @@
 #include <hwy/highway.h>
 
 #include "lib/render/splat/cpu/accumulate-inl.hpp"
-#include "lib/render/splat/cpu/paint-inl.hpp"
+#include "lib/render/splat/cpu/point_colour-inl.hpp"
 #include "lib/render/splat/cpu/shape-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -26,7 +26,7 @@ HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Band& band) {
     });
 }
 
-HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const Paint& paint, float tolerance,
+HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const PointColour& point, float tolerance,
                               bool normals, const Band& band) {
     const int lanes = static_cast<int>(hn::Lanes(d));
     HWY_ALIGN float weights[kBlock];
@@ -48,17 +48,17 @@ HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const Paint& paint, float 
                 bits &= bits - 1;
                 const std::size_t at = start + x + k;
                 const Four colour =
-                    plus(plus(paint.colour, x + k - e.x, paint.across), y - e.y, paint.down);
+                    plus(plus(point.colour, x + k - e.x, point.across), y - e.y, point.down);
                 addTo(band.colour + 4 * at, weights[k], colour);
-                band.missing[at] += weights[k] * paint.missing;
-                if (normals) addTo(band.normals + 4 * at, weights[k], paint.normal);
+                band.missing[at] += weights[k] * point.missing;
+                if (normals) addTo(band.normals + 4 * at, weights[k], point.normal);
             }
         }
     });
 }
 
 template <bool kUniform>
-void depthBlock(const Source& s, const BlockTask& t, const Band& band) {
+void depthBlock(const RectangleImages& s, const BlockTask& t, const Band& band) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -114,7 +114,7 @@ HWY_INLINE VF lowPass(DF d, VF x2) {
 }
 
 template <bool kUniform, bool kOpaque, bool kNormals>
-void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
+void colourBlock(const RectangleImages& s, const BlockTask& t, const Band& band) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -148,11 +148,11 @@ void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
                     forLarge(d, p, large, [&](int k, const Ellipse& e) HWY_ATTR {
-                        Paint paint = paintOf(s, pixel + k, kOpaque);
+                        PointColour point = pointColourOf(s, pixel + k, kOpaque);
                         if (e.uAcross != 0 || e.vDown != 0)
                             addGradient(s, pixel + k, e.uAcross, e.vAcross, e.uDown, e.vDown,
-                                        paint);
-                        colourEllipse(d, e, paint, t.tolerance, kNormals, band);
+                                        point);
+                        colourEllipse(d, e, point, t.tolerance, kNormals, band);
                     });
             }
             if (hn::AllFalse(d, p.small)) continue;
@@ -187,25 +187,25 @@ void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
                 hn::Store(p.vDown, d, vDown);
             }
             forBits(bits, [&](int k) HWY_ATTR {
-                Paint paint = paintOf(s, pixel + k, kOpaque);
+                PointColour point = pointColourOf(s, pixel + k, kOpaque);
                 if (uAcross[k] != 0 || vDown[k] != 0)
-                    addGradient(s, pixel + k, uAcross[k], vAcross[k], uDown[k], vDown[k], paint);
-                const Four c00 = plus(plus(paint.colour, -fractionX[k], paint.across),
-                                      -fractionY[k], paint.down);
-                const Four c01 = plus(c00, paint.down);
+                    addGradient(s, pixel + k, uAcross[k], vAcross[k], uDown[k], vDown[k], point);
+                const Four c00 = plus(plus(point.colour, -fractionX[k], point.across),
+                                      -fractionY[k], point.down);
+                const Four c01 = plus(c00, point.down);
                 const std::size_t at = static_cast<std::size_t>(offset[k]);
                 const std::size_t under = at + static_cast<std::size_t>(band.stride);
-                addToPair(band.colour + 4 * at, w00[k], c00, w10[k], plus(c00, paint.across));
-                addToPair(band.colour + 4 * under, w01[k], c01, w11[k], plus(c01, paint.across));
+                addToPair(band.colour + 4 * at, w00[k], c00, w10[k], plus(c00, point.across));
+                addToPair(band.colour + 4 * under, w01[k], c01, w11[k], plus(c01, point.across));
                 if (!kOpaque) {
-                    band.missing[at] += w00[k] * paint.missing;
-                    band.missing[at + 1] += w10[k] * paint.missing;
-                    band.missing[under] += w01[k] * paint.missing;
-                    band.missing[under + 1] += w11[k] * paint.missing;
+                    band.missing[at] += w00[k] * point.missing;
+                    band.missing[at + 1] += w10[k] * point.missing;
+                    band.missing[under] += w01[k] * point.missing;
+                    band.missing[under + 1] += w11[k] * point.missing;
                 }
                 if (kNormals) {
-                    addToPair(band.normals + 4 * at, w00[k], paint.normal, w10[k], paint.normal);
-                    addToPair(band.normals + 4 * under, w01[k], paint.normal, w11[k], paint.normal);
+                    addToPair(band.normals + 4 * at, w00[k], point.normal, w10[k], point.normal);
+                    addToPair(band.normals + 4 * under, w01[k], point.normal, w11[k], point.normal);
                 }
             });
         }
@@ -216,8 +216,8 @@ void colourBlock(const Source& s, const BlockTask& t, const Band& band) {
 
 // Calls draw(pixel, splat) for each point of a block as a round splat.
 template <class F>
-HWY_INLINE void forRound(const Source& s, const BlockTask& t, const Shape& shape, const Band& band,
-                         int alphaThreshold, const F& draw) {
+HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Shape& shape,
+                         const Band& band, int alphaThreshold, const F& draw) {
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int u = t.u0; u < t.u1; ++u) {
@@ -243,7 +243,7 @@ HWY_INLINE void forRound(const Source& s, const BlockTask& t, const Shape& shape
 
 // --- Points of one pixel ---------------------------------------------------------------------
 
-void pointsImpl(const Source& s, const BlockTask& t, const Band& band) {
+void pointsImpl(const RectangleImages& s, const BlockTask& t, const Band& band) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -256,7 +256,7 @@ void pointsImpl(const Source& s, const BlockTask& t, const Band& band) {
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Landed p = land(d, map, i, loadDepth(d, s.depth + pixel, count), band);
+            Projection p = project(d, map, i, loadDepth(d, s.depth + pixel, count), band);
             if (!t.opaque) p.inside = hn::And(p.inside, alphaAbove(d, s, pixel, count, 0));
             std::uint32_t bits = bitsOf(d, p.inside);
             if (!bits) continue;
@@ -280,7 +280,7 @@ void pointsImpl(const Source& s, const BlockTask& t, const Band& band) {
     }
 }
 
-void depthImpl(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
+void depthImpl(const RectangleImages& s, const BlockTask& t, const Shape& shape, const Band& band) {
     const DF d;
     if (shape.coefficient > 0) {
         forRound(s, t, shape, band, 127,
@@ -293,7 +293,7 @@ void depthImpl(const Source& s, const BlockTask& t, const Shape& shape, const Ba
 }
 
 template <bool kUniform>
-void colourOfBlock(const Source& s, const BlockTask& t, const Band& band) {
+void colourOfBlock(const RectangleImages& s, const BlockTask& t, const Band& band) {
     if (t.opaque && !s.normals)
         colourBlock<kUniform, true, false>(s, t, band);
     else if (t.opaque)
@@ -304,11 +304,12 @@ void colourOfBlock(const Source& s, const BlockTask& t, const Band& band) {
         colourBlock<kUniform, false, true>(s, t, band);
 }
 
-void colourImpl(const Source& s, const BlockTask& t, const Shape& shape, const Band& band) {
+void colourImpl(const RectangleImages& s, const BlockTask& t, const Shape& shape,
+                const Band& band) {
     const DF d;
     if (shape.coefficient > 0) {
         forRound(s, t, shape, band, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
-            colourEllipse(d, e, paintOf(s, pixel, t.opaque), t.tolerance, s.normals, band);
+            colourEllipse(d, e, pointColourOf(s, pixel, t.opaque), t.tolerance, s.normals, band);
         });
     } else if (t.uniform) {
         colourOfBlock<true>(s, t, band);
@@ -327,13 +328,15 @@ HWY_EXPORT(depthImpl);
 HWY_EXPORT(colourImpl);
 HWY_EXPORT(pointsImpl);
 
-void drawDepth(const Source& source, const BlockTask& task, const Shape& shape, const Band& band) {
+void drawDepth(const RectangleImages& source, const BlockTask& task, const Shape& shape,
+               const Band& band) {
     HWY_DYNAMIC_DISPATCH(depthImpl)(source, task, shape, band);
 }
-void drawColour(const Source& source, const BlockTask& task, const Shape& shape, const Band& band) {
+void drawColour(const RectangleImages& source, const BlockTask& task, const Shape& shape,
+                const Band& band) {
     HWY_DYNAMIC_DISPATCH(colourImpl)(source, task, shape, band);
 }
-void drawPoints(const Source& source, const BlockTask& task, const Band& band) {
+void drawPoints(const RectangleImages& source, const BlockTask& task, const Band& band) {
     HWY_DYNAMIC_DISPATCH(pointsImpl)(source, task, band);
 }
 

@@ -17,7 +17,7 @@ struct PixelMap {
 };
 
 /// The images of a rectangle, as the loops read them: from its first texel on.
-struct Source {
+struct RectangleImages {
     const float* depth = nullptr;
     const std::uint8_t* rgba8 = nullptr;  ///< one of rgba8 and rgbaFloat
     const float* rgbaFloat = nullptr;
@@ -74,10 +74,12 @@ struct Shape {
 };
 
 /// First pass: nearest depth.
-void drawDepth(const Source& source, const BlockTask& task, const Shape& shape, const Band& band);
+void drawDepth(const RectangleImages& source, const BlockTask& task, const Shape& shape,
+               const Band& band);
 /// Second pass: sums of weighted colours (and normals) near the front.
-void drawColour(const Source& source, const BlockTask& task, const Shape& shape, const Band& band);
+void drawColour(const RectangleImages& source, const BlockTask& task, const Shape& shape,
+                const Band& band);
 /// SplatRule::point in one pass.
-void drawPoints(const Source& source, const BlockTask& task, const Band& band);
+void drawPoints(const RectangleImages& source, const BlockTask& task, const Band& band);
 
 }  // namespace stx::splat

@@ -20,7 +20,7 @@ namespace stx::splat::HWY_NAMESPACE {
 
 // The splats of some neighbouring pixels.
 struct Splats {
-    Landed at;
+    Projection at;
     hn::Mask<DF> small, large;
     VF slopeX, slopeY;  // of novel depth, relative, per pixel
     VF core2;           // of small ones, squared pixels
@@ -32,8 +32,8 @@ struct Splats {
 };
 
 // Slopes, sizes and links of up to a vector of pixels.
-HWY_INLINE void loadShape(DF d, const Source& s, std::size_t pixel, int count, VF& u, VF& v,
-                          VF& size, hn::Mask<DF>& linked, hn::Mask<DF>& rim) {
+HWY_INLINE void loadShape(DF d, const RectangleImages& s, std::size_t pixel, int count, VF& u,
+                          VF& v, VF& size, hn::Mask<DF>& linked, hn::Mask<DF>& rim) {
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     static_assert(sizeof(Slope) == 4 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
@@ -60,11 +60,11 @@ HWY_INLINE void loadShape(DF d, const Source& s, std::size_t pixel, int count, V
 
 // kUniform: all points of the block are small and share its tilt.
 template <bool kUniform>
-HWY_INLINE Splats splatsOf(DF d, const Source& s, const BlockTask& t, const RowMap& map, int i,
-                           std::size_t pixel, int count, const Band& band) {
+HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, const RowMap& map,
+                           int i, std::size_t pixel, int count, const Band& band) {
     Splats out;
     const VF depth = loadDepth(d, s.depth + pixel, count);
-    out.at = land(d, map, i, depth, band);
+    out.at = project(d, map, i, depth, band);
     const VF one = hn::Set(d, 1.0f);
     if (kUniform) {
         out.small = out.at.inside;

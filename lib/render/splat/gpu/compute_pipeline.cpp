@@ -47,7 +47,7 @@ class ComputeSplats final : public SplatPipeline {
         return variant_.sums == Sums::pairs ? (n + 1) / 2 * 2 : n;
     }
     [[nodiscard]] std::int64_t bytesEach() const { return variant_.normals ? 48 : 20; }
-    Result<GLuint> program(SplatProgram kind, int pass, Rule rule);
+    Result<GLuint> program(SplatProgram kind, int pass, SplatShape rule);
     Result<void> buildPrograms();
     void bind(const SplatFrame& frame);
     void setDraw(int firstTask, int tasks, FrameUniforms& uniforms) const;
@@ -71,7 +71,7 @@ class ComputeSplats final : public SplatPipeline {
     int lastTasks_ = 0;
 };
 
-Result<GLuint> ComputeSplats::program(SplatProgram kind, int pass, Rule rule) {
+Result<GLuint> ComputeSplats::program(SplatProgram kind, int pass, SplatShape rule) {
     const std::string key =
         fmt::format("{} {} {}", static_cast<int>(kind), pass, static_cast<int>(rule));
     if (const auto found = programs_.find(key); found != programs_.end())
@@ -84,15 +84,15 @@ Result<GLuint> ComputeSplats::program(SplatProgram kind, int pass, Rule rule) {
 }
 
 Result<void> ComputeSplats::buildPrograms() {
-    std::vector<Rule> rules{Rule::uniform, Rule::small, Rule::ellipse};
-    if (rule_ == SplatRule::point) rules = {Rule::point};
-    if (rule_ == SplatRule::paper) rules = {Rule::paper};
-    for (const Rule rule : rules)
+    std::vector<SplatShape> rules{SplatShape::uniform, SplatShape::small, SplatShape::ellipse};
+    if (rule_ == SplatRule::point) rules = {SplatShape::point};
+    if (rule_ == SplatRule::paper) rules = {SplatShape::paper};
+    for (const SplatShape rule : rules)
         for (const int pass : {1, 2}) STX_CHECK(program(SplatProgram::splats, pass, rule));
-    STX_CHECK(program(SplatProgram::resolve, 0, Rule::point));
+    STX_CHECK(program(SplatProgram::resolve, 0, SplatShape::point));
     if (!variant_.cull) return {};
-    STX_CHECK(program(SplatProgram::tiles, 0, Rule::point));
-    STX_CHECK(program(SplatProgram::cull, 0, Rule::point));
+    STX_CHECK(program(SplatProgram::tiles, 0, SplatShape::point));
+    STX_CHECK(program(SplatProgram::cull, 0, SplatShape::point));
     return {};
 }
 
@@ -143,7 +143,7 @@ void ComputeSplats::setDraw(int firstTask, int tasks, FrameUniforms& uniforms) c
 }
 
 Result<void> ComputeSplats::drawTasks(int pass, SplatFrame& frame) {
-    const auto dispatch = [&](Rule rule, int first, int count) -> Result<void> {
+    const auto dispatch = [&](SplatShape rule, int first, int count) -> Result<void> {
         if (count == 0) return {};
         STX_TRY(const GLuint name, program(SplatProgram::splats, pass, rule));
         glUseProgram(name);
@@ -155,13 +155,13 @@ Result<void> ComputeSplats::drawTasks(int pass, SplatFrame& frame) {
     };
     const int large = frame.uniformTasks + frame.smallTasks;
     const int all = static_cast<int>(frame.tasks.size());
-    const Rule first = rule_ == SplatRule::point   ? Rule::point
-                       : rule_ == SplatRule::paper ? Rule::paper
-                                                   : Rule::uniform;
+    const SplatShape first = rule_ == SplatRule::point   ? SplatShape::point
+                             : rule_ == SplatRule::paper ? SplatShape::paper
+                                                         : SplatShape::uniform;
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
     STX_CHECK(dispatch(first, 0, frame.uniformTasks));
-    STX_CHECK(dispatch(Rule::small, frame.uniformTasks, frame.smallTasks));
-    return dispatch(Rule::ellipse, large, all - large);
+    STX_CHECK(dispatch(SplatShape::small, frame.uniformTasks, frame.smallTasks));
+    return dispatch(SplatShape::ellipse, large, all - large);
 }
 
 /// Marks the tasks that lie behind what the visibility pass found, by the farthest front distance
@@ -174,12 +174,12 @@ Result<void> ComputeSplats::cull(SplatFrame& frame) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 10, visible_.buffer.get());
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 11, tiles_.buffer.get());
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    STX_TRY(const GLuint farthest, program(SplatProgram::tiles, 0, Rule::point));
+    STX_TRY(const GLuint farthest, program(SplatProgram::tiles, 0, SplatShape::point));
     glUseProgram(farthest);
     setDraw(0, static_cast<int>(frame.tasks.size()), frame.uniforms);
     glDispatchCompute(static_cast<GLuint>(tiles.x), static_cast<GLuint>(tiles.y), 1);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    STX_TRY(const GLuint mark, program(SplatProgram::cull, 0, Rule::point));
+    STX_TRY(const GLuint mark, program(SplatProgram::cull, 0, SplatShape::point));
     glUseProgram(mark);
     glDispatchCompute(static_cast<GLuint>((frame.tasks.size() + 63) / 64), 1, 1);
     return {};
@@ -206,7 +206,7 @@ Result<void> ComputeSplats::resolve(SplatFrame& frame, int slot) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 8, normal_.buffer.get());
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 9, albedo_.buffer.get());
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    STX_TRY(const GLuint name, program(SplatProgram::resolve, 0, Rule::point));
+    STX_TRY(const GLuint name, program(SplatProgram::resolve, 0, SplatShape::point));
     glUseProgram(name);
     setDraw(0, 0, frame.uniforms);
     glDispatchCompute(static_cast<GLuint>((size.x + 15) / 16),

@@ -63,11 +63,11 @@ class RasterSplats final : public SplatPipeline {
     }
 
   private:
-    Result<GLuint> program(SplatProgram kind, int pass, Rule rule);
+    Result<GLuint> program(SplatProgram kind, int pass, SplatShape rule);
     Result<void> makeTargets(glm::ivec2 size);
     void setDraw(int tasks, FrameUniforms& uniforms) const;
     Result<void> drawTasks(int pass, SplatFrame& frame);
-    Result<void> drawRun(int pass, Rule rule, SplatFrame& frame, int first, int count);
+    Result<void> drawRun(int pass, SplatShape rule, SplatFrame& frame, int first, int count);
     Result<void> resolve(SplatFrame& frame, int slot);
 
     const EglContext& context_;
@@ -91,7 +91,7 @@ class RasterSplats final : public SplatPipeline {
     std::array<Slot, 2> slots_;
 };
 
-Result<GLuint> RasterSplats::program(SplatProgram kind, int pass, Rule rule) {
+Result<GLuint> RasterSplats::program(SplatProgram kind, int pass, SplatShape rule) {
     const std::string key =
         fmt::format("{} {} {}", static_cast<int>(kind), pass, static_cast<int>(rule));
     if (const auto found = programs_.find(key); found != programs_.end())
@@ -127,12 +127,12 @@ Result<void> RasterSplats::prepare() {
     // The tasks of a draw must fit into a texture buffer, too.
     tasksAtOnce_ = std::min(context_.abilities().verticesAtOnce / (256 * 6),
                             texels / static_cast<int>(sizeof(TaskEntry) / 16));
-    std::vector<Rule> rules{Rule::uniform, Rule::small, Rule::ellipse};
-    if (rule_ == SplatRule::point) rules = {Rule::point};
-    if (rule_ == SplatRule::paper) rules = {Rule::paper};
-    for (const Rule rule : rules)
+    std::vector<SplatShape> rules{SplatShape::uniform, SplatShape::small, SplatShape::ellipse};
+    if (rule_ == SplatRule::point) rules = {SplatShape::point};
+    if (rule_ == SplatRule::paper) rules = {SplatShape::paper};
+    for (const SplatShape rule : rules)
         for (const int pass : {1, 2}) STX_CHECK(program(SplatProgram::splats, pass, rule));
-    STX_CHECK(program(SplatProgram::resolve, 0, Rule::point));
+    STX_CHECK(program(SplatProgram::resolve, 0, SplatShape::point));
     return context_.check("preparing the renderer");
 }
 
@@ -196,11 +196,12 @@ void RasterSplats::setDraw(int tasks, FrameUniforms& uniforms) const {
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.get());
 }
 
-Result<void> RasterSplats::drawRun(int pass, Rule rule, SplatFrame& frame, int first, int count) {
+Result<void> RasterSplats::drawRun(int pass, SplatShape rule, SplatFrame& frame, int first,
+                                   int count) {
     if (count == 0) return {};
     STX_TRY(const GLuint name, program(SplatProgram::splats, pass, rule));
     glUseProgram(name);
-    const bool quads = rule == Rule::ellipse || rule == Rule::paper;
+    const bool quads = rule == SplatShape::ellipse || rule == SplatShape::paper;
     for (int done = 0; done < count; done += tasksAtOnce_) {
         const int tasks = std::min(tasksAtOnce_, count - done);
         tasks_->upload(kTasks, GL_RGBA32UI, frame.tasks.data() + first + done,
@@ -217,12 +218,12 @@ Result<void> RasterSplats::drawRun(int pass, Rule rule, SplatFrame& frame, int f
 Result<void> RasterSplats::drawTasks(int pass, SplatFrame& frame) {
     const int large = frame.uniformTasks + frame.smallTasks;
     const int all = static_cast<int>(frame.tasks.size());
-    const Rule rule = rule_ == SplatRule::point   ? Rule::point
-                      : rule_ == SplatRule::paper ? Rule::paper
-                                                  : Rule::uniform;
+    const SplatShape rule = rule_ == SplatRule::point   ? SplatShape::point
+                            : rule_ == SplatRule::paper ? SplatShape::paper
+                                                        : SplatShape::uniform;
     STX_CHECK(drawRun(pass, rule, frame, 0, frame.uniformTasks));
-    STX_CHECK(drawRun(pass, Rule::small, frame, frame.uniformTasks, frame.smallTasks));
-    return drawRun(pass, Rule::ellipse, frame, large, all - large);
+    STX_CHECK(drawRun(pass, SplatShape::small, frame, frame.uniformTasks, frame.smallTasks));
+    return drawRun(pass, SplatShape::ellipse, frame, large, all - large);
 }
 
 Result<void> RasterSplats::resolve(SplatFrame& frame, int slot) {
@@ -236,7 +237,7 @@ Result<void> RasterSplats::resolve(SplatFrame& frame, int slot) {
     bindTexture(kNormalSums, GL_TEXTURE_2D, normal_.get());
     lights_->upload(kLights, GL_RGBA32F, frame.lights.data(),
                     frame.lights.size() * sizeof(LightEntry));
-    STX_TRY(const GLuint name, program(SplatProgram::resolve, 0, Rule::point));
+    STX_TRY(const GLuint name, program(SplatProgram::resolve, 0, SplatShape::point));
     glUseProgram(name);
     setDraw(0, frame.uniforms);
     glDrawArrays(GL_TRIANGLES, 0, 3);

@@ -12,7 +12,7 @@ namespace {
 /// such views are alone their weights must still differ.
 constexpr double kLargestWeight = 1048576.0;
 
-/// Source pixels that fall on one novel pixel where the block is seen as its view saw it.
+/// RectangleImages pixels that fall on one novel pixel where the block is seen as its view saw it.
 double density(const splat::PreparedRectangle& info, const splat::BlockInfo& block,
                const splat::BlockTask& task, const Camera& novel) {
     const auto& c = info.camera();
@@ -62,7 +62,7 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
     for (std::size_t k = 0; k < scene.rectangles.size(); ++k) {
         const splat::PreparedRectangle& info = scene.rectangles[k];
         const Camera& c = info.camera();
-        splat::Source source;
+        splat::RectangleImages source;
         source.orthographic = c.orthographic;
         source.fx = static_cast<float>(c.fx);
         source.fy = static_cast<float>(c.fy);

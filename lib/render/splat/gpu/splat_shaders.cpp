@@ -4,7 +4,7 @@
 #include "lib/render/splat/prepared.hpp"
 
 namespace stx::gpu {
-std::string splatHeader(const SplatVariant& v, int pass, Rule rule) {
+std::string splatHeader(const SplatVariant& v, int pass, SplatShape rule) {
     // The raster pipeline is for devices without compute shaders: OpenGL 3.3 has all it needs.
     std::string text = v.raster ? "#version 330 core\n" : "#version 450 core\n";
     if (!v.raster && v.sums == Sums::pairs)
@@ -56,7 +56,7 @@ std::vector<ShaderStage> splatStages(bool raster, SplatProgram program) {
 
 std::vector<ShaderText> allSplatShaders() {
     std::vector<ShaderText> out;
-    const auto add = [&](const SplatVariant& v, SplatProgram program, int pass, Rule rule) {
+    const auto add = [&](const SplatVariant& v, SplatProgram program, int pass, SplatShape rule) {
         for (const auto& stage : splatStages(v.raster, program))
             out.push_back(shaderText(
                 fmt::format("{} pass {} rule {} sums {}{}{}{}{}{}{}", stage.name, pass,
@@ -78,18 +78,19 @@ std::vector<ShaderText> allSplatShaders() {
                 v.normals = bits & 2;
                 v.sizes = v.cull = bits & 4;
                 v.cull = v.cull && !raster;
-                for (const Rule rule :
-                     {Rule::point, Rule::uniform, Rule::ellipse, Rule::paper, Rule::small})
+                for (const SplatShape rule :
+                     {SplatShape::point, SplatShape::uniform, SplatShape::ellipse,
+                      SplatShape::paper, SplatShape::small})
                     for (const int pass : {1, 2}) add(v, SplatProgram::splats, pass, rule);
                 v.sizes = v.cull = false;
                 v.lit = v.normals && (bits & 4);
                 v.linear = bits & 1;
-                add(v, SplatProgram::resolve, 0, Rule::point);
+                add(v, SplatProgram::resolve, 0, SplatShape::point);
             }
         }
     }
-    add({}, SplatProgram::tiles, 0, Rule::point);
-    add({}, SplatProgram::cull, 0, Rule::point);
+    add({}, SplatProgram::tiles, 0, SplatShape::point);
+    add({}, SplatProgram::cull, 0, SplatShape::point);
     return out;
 }
 

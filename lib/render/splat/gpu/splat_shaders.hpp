@@ -14,7 +14,7 @@ enum class Sums {
     pairs = 2,     ///< two channels to a 64-bit atomic: GL_NV_shader_atomic_int64
 };
 /// How splats get their shape (RULE of the shaders).
-enum class Rule { point = 0, uniform = 1, ellipse = 2, paper = 3, small = 4 };
+enum class SplatShape { point = 0, uniform = 1, ellipse = 2, paper = 3, small = 4 };
 
 /// Tiles of the frame that hidden tasks are looked for in, pixels a side.
 inline constexpr int kCullTile = 16;
@@ -32,7 +32,7 @@ struct SplatVariant {
 };
 
 /// #version, extensions, #defines and constants of a shader; `pass` 1 = visibility, 2 = blending.
-[[nodiscard]] std::string splatHeader(const SplatVariant& variant, int pass, Rule rule);
+[[nodiscard]] std::string splatHeader(const SplatVariant& variant, int pass, SplatShape rule);
 
 enum class SplatProgram { splats, resolve, tiles, cull };
 /// The stages of a program, without their header.

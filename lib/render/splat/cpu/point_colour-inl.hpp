@@ -1,11 +1,11 @@
 // What points add to the picture: four values at a time. Included by splat_kernels.cpp once for
 // each SIMD target.
 
-#if defined(STX_SPLAT_PAINT_INL_HPP) == defined(HWY_TARGET_TOGGLE)
-#ifdef STX_SPLAT_PAINT_INL_HPP
-#undef STX_SPLAT_PAINT_INL_HPP
+#if defined(STX_SPLAT_POINT_COLOUR_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef STX_SPLAT_POINT_COLOUR_INL_HPP
+#undef STX_SPLAT_POINT_COLOUR_INL_HPP
 #else
-#define STX_SPLAT_PAINT_INL_HPP
+#define STX_SPLAT_POINT_COLOUR_INL_HPP
 #endif
 
 #include <algorithm>
@@ -140,15 +140,15 @@ HWY_INLINE void forBits(std::uint32_t bits, const F& draw) {
 }
 
 // What a point adds for each unit of weight.
-struct Paint {
+struct PointColour {
     Four colour;  // R, G, B times alpha, alpha; all times 255
     Four normal;
     float missing;      // 255 - alpha
     Four across, down;  // change of colour per output pixel
 };
 
-HWY_INLINE Paint paintOf(const Source& s, std::size_t pixel, bool opaque) {
-    Paint p;
+HWY_INLINE PointColour pointColourOf(const RectangleImages& s, std::size_t pixel, bool opaque) {
+    PointColour p;
     p.missing = 0;
     if (s.rgba8) {
         p.colour = fourFrom(s.rgba8 + 4 * pixel);
@@ -173,8 +173,8 @@ HWY_INLINE Paint paintOf(const Source& s, std::size_t pixel, bool opaque) {
 
 // How the colour of an opaque point changes over the picture, from its four neighbours, given the
 // source pixels that go by per output pixel.
-HWY_INLINE void addGradient(const Source& s, std::size_t pixel, float uAcross, float vAcross,
-                            float uDown, float vDown, Paint& p) {
+HWY_INLINE void addGradient(const RectangleImages& s, std::size_t pixel, float uAcross,
+                            float vAcross, float uDown, float vDown, PointColour& p) {
     const std::size_t row = static_cast<std::size_t>(s.stride);
     Four u, v;
     if (s.rgba8) {
