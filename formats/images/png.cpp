@@ -48,7 +48,7 @@ Result<std::vector<ByteSpan>> pixelChunks(ByteSpan bytes) {
             keep = true;
             paletteEntries = length / 3;
         }
-        // One of a wrong length is no reason to refuse the picture (libpng thinks so, too).
+        // One of a wrong length does not refuse the picture; libpng reads it, too.
         if (kind == "tRNS")
             keep =
                 (colourType == SPNG_COLOR_TYPE_GRAYSCALE && length == 2) ||

@@ -280,14 +280,12 @@ class Reader {
         const bool visual = track.stream.streamType == StreamType::visual;
         if (visual && track.facts.sampleEntry == "mp4s")
             addDeviation(Deviation::imageInSystemsEntry,
-                         "an image stands in a sample entry 'mp4s'; 'mp4v' is expected",
-                         track.path);
+                         "an image is in a sample entry 'mp4s'; 'mp4v' is expected", track.path);
         if (visual && !track.hasEsds)
             addDeviation(
                 Deviation::imageInNativeEntry,
-                fmt::format(
-                    "an image stands in a sample entry '{}' without 'esds'; 'mp4v' is expected",
-                    printable(track.facts.sampleEntry)),
+                fmt::format("an image is in a sample entry '{}' without 'esds'; 'mp4v' is expected",
+                            printable(track.facts.sampleEntry)),
                 track.path);
         if (track.facts.esIdInEsds != 0)
             addDeviation(Deviation::esIdNotZero,

@@ -171,13 +171,6 @@ struct Source {
         const Place p = placeOf(x, y);
         return p.page ? p.page->texture->at(p.texel(0, 0)) : glm::vec4(0.0f);
     }
-    [[nodiscard]] int edgeDistance(int x, int y) const { return infoAt(placeOf(x, y), 0, 0) >> 4; }
-    [[nodiscard]] bool linkRight(int x, int y) const {
-        return infoAt(placeOf(x, y), 0, 0) & Info::kLinkRight;
-    }
-    [[nodiscard]] bool linkDown(int x, int y) const {
-        return infoAt(placeOf(x, y), 0, 0) & Info::kLinkDown;
-    }
     [[nodiscard]] glm::vec2 gradient(int x, int y) const {
         return gradientAt(placeOf(x, y), 0, 0, x, y);
     }
