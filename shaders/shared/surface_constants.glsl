@@ -28,6 +28,8 @@ CONSTANT float kExtensionReach = 0.02f;
 CONSTANT float kSame = 0.002f;
 // Samples of one pixel are one piece until q jumps by more.
 CONSTANT float kJump = 0.0015f;
+// The slope of a piece is fitted to its samples when it has as many.
+CONSTANT int kFittedSamples = 6;
 // Samples of one source in a pixel are one surface within this.
 CONSTANT float kOneSurface = 0.01f;
 // Neighbouring samples of one source are linked within this.
@@ -40,11 +42,14 @@ CONSTANT float kExtensionWeight = 0.01f;
 // touches another's silhouette: less still (the largest value at which spot, Fox, CesiumMilkTruck
 // and 2CylinderEngine open at no pixel).
 CONSTANT float kFreeAlpha = 0.45f, kFreeAlphaPruned = 0.36f;
+// Alpha from which on a pixel is covered in full, rounding apart.
+CONSTANT float kSolidAlpha = 0.99f;
 // A point this share of its depth in front of a surface is in front of it.
 CONSTANT float kClearlyBehind = 0.0002f;
 // And this share of the change of q over a pixel more, where the surface is steep.
 CONSTANT float kSlopeDoubt = 0.0625f;
-// Votes that reject a sample: one where it is near an edge of its source, else two.
+// Votes that reject a sample, beside one for each other source that shows it: one where it is near an
+// edge of its source, else two.
 CONSTANT int kVotesNearEdge = 1, kVotesElsewhere = 2;
 // Flags in the lowest bits of a sample's q, where they do not matter to its value: beyond the
 // source's own mesh; from within two pixels of an edge.

@@ -50,30 +50,41 @@ vec2 slopeInside(int k, int i, int j) {
     return vec2(right - left, down - up) * (float(S) / float(max(S - 1, 1)));
 }
 
-// Whether others see past the point (x, y, q), which source `own` shows; (i, j) is its sample. The
-// flags are an argument of their own: the bits of a computed q mean nothing.
+// Whether more sources see past the point (x, y, q), which source `own` shows, than show it; (i, j)
+// is its sample. The flags are an argument of their own: the bits of a computed q mean nothing.
 bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
-    int enough = (flags & kNearEdgeBit) != 0u ? kVotesNearEdge : kVotesElsewhere;
-    int votes = 0;
-    for (int k = 0; k < int(tile.count); ++k) {
-        int s = sourceOf(k);
-        if (k == own) {
-            if (!hasAlpha(s) || (flags & kNearEdgeBit) == 0u) continue;
-            vec4 h = warp(s, x, y, q);
-            ivec2 size = sizeOf(s);
-            vec2 at = vec2(clamp(h.x / h.w, 0.0f, float(size.x)), clamp(h.y / h.w, 0.0f, float(size.y)));
-            if (alphaAt(s, at) < freeAlphaOf(s)) return true;
-            continue;
-        }
-        uint other = sampleOf(k, i, j);
-        if (other != 0u && (other & kExtensionBit) == 0u &&
-            abs(uintBitsToFloat(other) - q) < sameWithin(q))
-            continue;
-        int vote = voteOf(s, x, y, q);
-        if (vote == kFreeByAlpha) return true;
-        if (vote == kFreeByDepth && ++votes >= enough) return true;
+    bool nearEdge = (flags & kNearEdgeBit) != 0u;
+    bool silhouette = false;  // beside background in its own source, not at an edge inside the object
+    int self = sourceOf(own);
+    if (nearEdge && hasAlpha(self)) {
+        vec4 h = warp(self, x, y, q);
+        ivec2 size = sizeOf(self);
+        vec2 at = vec2(clamp(h.x / h.w, 0.0f, float(size.x)), clamp(h.y / h.w, 0.0f, float(size.y)));
+        float alpha = alphaAt(self, at);
+        if (isBackground(self, ivec2(floor(at - 0.5f)), alpha)) return true;
+        silhouette = alpha < kSolidAlpha;
     }
-    return false;
+    int votes = 0, enough = kWholeVote * (nearEdge ? kVotesNearEdge : kVotesElsewhere);
+    uint others = 0u;  // do not show it
+    float within = sameWithin(q);
+    for (int k = 0; k < int(tile.count); ++k) {
+        if (k == own) continue;
+        uint value = sampleOf(k, i, j);
+        if (value == 0u || !(abs(uintBitsToFloat(value) - q) < within)) {
+            others |= 1u << k;
+        } else if ((value & kExtensionBit) == 0u) {
+            enough += kWholeVote;
+        } else {
+            // The rims of thin parts are extensions in all sources, which show them where they do not see
+            // past them. Extensions inside the object are guesses, which support nothing.
+            int vote = voteOf(sourceOf(k), x, y, q);
+            votes += vote;
+            if (vote == kNoVote && silhouette) enough += kWholeVote;
+        }
+    }
+    for (int k = 0; k < int(tile.count) && votes < enough; ++k)
+        if ((others >> k & 1u) != 0u) votes += voteOf(sourceOf(k), x, y, q);
+    return votes >= enough;
 }
 
 // The first surface at a sample that is not rejected: its q and who sees it.
@@ -157,6 +168,27 @@ int pieceEnd(int begin) {
     return end;
 }
 
+// dq/dx, dq/dy of the plane that fits the samples begin..end of a pixel best, which are n with this
+// mean position in the pixel and this mean q; false when they do not tell.
+bool fitSlope(int begin, int end, vec2 middle, float q, OUT(vec2) slope) {
+    float scale = 1.0f / float(S);
+    float xx = 0.0f, xy = 0.0f, yy = 0.0f, xq = 0.0f, yq = 0.0f;
+    for (int k = begin; k < end; ++k) {
+        float dx = (float(shownAt[k] % S) + 0.5f) * scale - middle.x;
+        float dy = (float(shownAt[k] / S) + 0.5f) * scale - middle.y;
+        float dq = shownQ[k] - q;
+        xx += dx * dx;
+        xy += dx * dy;
+        yy += dy * dy;
+        xq += dx * dq;
+        yq += dy * dq;
+    }
+    float det = xx * yy - xy * xy;
+    if (!(det > 0.01f * xx * yy)) return false;
+    slope = vec2(xq * yy - yq * xy, yq * xx - xq * xy) / det;
+    return true;
+}
+
 // The piece of the samples begin..end of a pixel.
 Piece pieceOf(int column, int row, int begin, int end) {
     float scale = 1.0f / float(S);
@@ -169,9 +201,12 @@ Piece pieceOf(int column, int row, int begin, int end) {
         seenBy |= shownTo[k];
     }
     float n = 1.0f / float(end - begin);
-    int middle = (begin + end) / 2;
-    vec2 g = slopeAt(findLSB(shownTo[middle]), column * S + shownAt[middle] % S,
-                     row * S + shownAt[middle] / S);
+    vec2 g;
+    if (end - begin < kFittedSamples || !fitSlope(begin, end, vec2(x, y) * n, q * n, g)) {
+        int middle = (begin + end) / 2;
+        g = slopeAt(findLSB(shownTo[middle]), column * S + shownAt[middle] % S,
+                    row * S + shownAt[middle] / S);
+    }
     Piece piece;
     piece.x = float(tile.x + column) + x * n;
     piece.y = float(tile.y + row) + y * n;

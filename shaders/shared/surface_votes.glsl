@@ -8,10 +8,13 @@
 //   Place placeOf(s, corner)   where the 2x2 pixels from `corner` on are kept, and in that place
 //   float qAt(s, place, i, j), vec2 gradientAt(s, place, i, j), float alphaOf(s, place, i, j)
 // Pixels of a place that are not inside the source are never asked for.
+//   Taps tapPlaceOf(s, corner), a Place of the 4x4 pixels from `corner` on, around a point among the
+//   middle four, and bool canRead(place, pixel) which of them are there
 
+// What a source says of a point, in halves of a vote.
 CONSTANT int kNoVote = 0;  // the point is hidden from it, on its surface, or out of its frame
-CONSTANT int kFreeByDepth = 1;  // it sees a surface clearly behind the point
-CONSTANT int kFreeByAlpha = 2;  // it sees background there
+CONSTANT int kHalfVote = 1;  // it sees past the point, but where its own surfaces end or jump
+CONSTANT int kWholeVote = 2;  // it sees a surface clearly behind the point, or background there
 
 bool inside(ivec2 at, ivec2 size) {
     return at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
@@ -34,6 +37,24 @@ float alphaAt(int s, vec2 at) {
     return alphaAmong(s, placeOf(s, corner), corner, at - 0.5f - f);
 }
 
+// The largest alpha of the 4x4 pixels around the 2x2 from `corner` on.
+float largestAlphaAround(int s, ivec2 corner) {
+    Taps place = tapPlaceOf(s, corner - 1);
+    float largest = 0.0f;
+    for (int t = 0; t < 16; ++t)
+        if (canRead(place, corner - 1 + ivec2(t % 4, t / 4)))
+            largest = max(largest, alphaOf(s, place, t % 4, t / 4));
+    return largest;
+}
+
+// Whether a source with this bilinear alpha between the 2x2 pixels from `corner` on sees background
+// there. Only beside what covers a pixel in full does a part of its alpha tell: thin parts and leaves
+// never reach an alpha of 1.
+bool isBackground(int s, ivec2 corner, float alpha) {
+    if (!(alpha < freeAlphaOf(s))) return false;
+    return !(alpha > 0.0f) || !(largestAlphaAround(s, corner) < kSolidAlpha);
+}
+
 // The vote of a source on the point at (x, y, q) of the frame.
 int voteOf(int s, float x, float y, float q) {
     vec4 h = warp(s, x, y, q);
@@ -47,9 +68,10 @@ int voteOf(int s, float x, float y, float q) {
     vec2 f = floor(at - 0.5f);
     ivec2 corner = ivec2(f);
     Place place = placeOf(s, corner);
-    if (hasAlpha(s) && alphaAmong(s, place, corner, at - 0.5f - f) < freeAlphaOf(s))
-        return kFreeByAlpha;
-    bool any = false;
+    if (hasAlpha(s) && isBackground(s, corner, alphaAmong(s, place, corner, at - 0.5f - f)))
+        return kWholeVote;
+    float least = 3.0e38f, most = 0.0f;
+    bool gaps = false;
     for (int j = 0; j < 2; ++j) {
         for (int i = 0; i < 2; ++i) {
             ivec2 c = corner + ivec2(i, j);
@@ -57,8 +79,12 @@ int voteOf(int s, float x, float y, float q) {
             float there = qAt(s, place, i, j);
             // What was pruned from here may be the very surface that is asked about.
             if (there < 0.0f) return kNoVote;
-            if (!(there > 0.0f)) continue;
-            any = true;
+            if (!(there > 0.0f)) {
+                gaps = true;
+                continue;
+            }
+            least = min(least, there);
+            most = max(most, there);
             // The cheap half of the test first: most surfaces are not behind the point at all.
             float margin = clearlyBehindOf(s) * relativeScale(axisOf(s), p) +
                            stepOf(s) * qPerUnit(axisOf(s), p);
@@ -69,5 +95,7 @@ int voteOf(int s, float x, float y, float q) {
             if (p < predicted + margin + kSlopeDoubt * (abs(g.x) + abs(g.y))) return kNoVote;
         }
     }
-    return any ? kFreeByDepth : kNoVote;
+    if (!(most > 0.0f)) return kNoVote;
+    bool linked = !(most - least > kLinkedSamples * relativeScale(axisOf(s), most));
+    return linked && !gaps ? kWholeVote : kHalfVote;
 }

@@ -28,6 +28,11 @@ struct SourcePixels {
         int x, y;
     };
 
+    /// Of 4x4 pixels, with what can be read of them: from the first two of `bounds` to the others.
+    struct Taps : Place {
+        ivec4 bounds;
+    };
+
     std::span<const LocalSource> locals;
 
     [[nodiscard]] const Source& at(int s) const {
@@ -45,6 +50,13 @@ struct SourcePixels {
     [[nodiscard]] Place placeOf(int s, ivec2 corner) const {
         return {at(s).placeOf(corner.x, corner.y), corner.x, corner.y};
     }
+    [[nodiscard]] Taps tapPlaceOf(int s, ivec2 corner) const {
+        const TapPlace taps = at(s).tapPlaceOf(corner.x, corner.y);
+        return {{taps, corner.x, corner.y}, {taps.x0, taps.y0, taps.x1, taps.y1}};
+    }
+    [[nodiscard]] static bool canRead(const Taps& p, ivec2 at) {
+        return at.x >= p.bounds.x && at.y >= p.bounds.y && at.x < p.bounds.z && at.y < p.bounds.w;
+    }
     [[nodiscard]] float qAt(int s, const Place& p, int i, int j) const {
         return at(s).qAt(p.kept, i, j);
     }
@@ -54,11 +66,14 @@ struct SourcePixels {
     [[nodiscard]] float alphaOf(int s, const Place& p, int i, int j) const {
         return at(s).alphaAt(p.kept, i, j);
     }
+    [[nodiscard]] float edgeDistanceOf(int s, const Place& p, int i, int j) const {
+        return static_cast<float>(at(s).infoAt(p.kept, i, j) >> 4);
+    }
     [[nodiscard]] static float relativeScale(Axis axis, float q) { return axis.relativeScale(q); }
     [[nodiscard]] static float qPerUnit(Axis axis, float q) { return axis.qPerUnit(q); }
 };
 
-/// Free-space votes: voteOf(source, x, y, q) is kNoVote, kFreeByDepth or kFreeByAlpha.
+/// Free-space votes: voteOf(source, x, y, q) is kNoVote, kHalfVote or kWholeVote.
 struct Votes : SourcePixels {
 #include "shaders/shared/surface_votes.glsl"
 };

@@ -112,11 +112,11 @@ INSTANTIATE_TEST_SUITE_P(
     Models, ModelGolden,
     testing::Values(
         Model{"amphora", "", {41.3, 41.35, 35.25}},
-        Model{"spot", "data/meshes/obj/spot/spot_triangulated.obj", {49.5, 50.0, 35.65}},
+        Model{"spot", "data/meshes/obj/spot/spot_triangulated.obj", {49.45, 50.0, 35.65}},
         Model{"Fox", "data/meshes/gltf/draco-repo/Fox/glTF/Fox.gltf", {47.3, 49.3, 35.45}},
         Model{"CesiumMilkTruck",
               "data/meshes/gltf/draco-repo/CesiumMilkTruck/glTF/CesiumMilkTruck.gltf",
-              {40.85, 42.85, 32.4}},
+              {41.0, 42.45, 32.4}},
         Model{"Engine",
               "data/meshes/gltf-draco/2CylinderEngine/2CylinderEngine.gltf",
               {34.85, 34.95, 26.6}}),

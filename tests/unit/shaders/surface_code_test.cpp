@@ -81,22 +81,8 @@ struct ScalarShade : SourcePixels {
     std::vector<SourceEntry> sources;
 
     [[nodiscard]] static int sourceOf(int k) { return k; }
-    [[nodiscard]] float edgeDistanceOf(int s, const Place& p, int i, int j) const {
-        return static_cast<float>(at(s).infoAt(p.kept, i, j) >> 4);
-    }
     [[nodiscard]] vec4 colourOf(int, const Place& p, int i, int j) const {
         return p.kept.page ? p.kept.page->texture->at(p.kept.texel(i, j)) : vec4(0.0f);
-    }
-    /// With what can be read of it.
-    struct Taps : Place {
-        glm::ivec4 bounds;
-    };
-    [[nodiscard]] Taps tapPlaceOf(int s, ivec2 corner) const {
-        const TapPlace taps = at(s).tapPlaceOf(corner.x, corner.y);
-        return {{taps, corner.x, corner.y}, {taps.x0, taps.y0, taps.x1, taps.y1}};
-    }
-    [[nodiscard]] static bool canRead(const Taps& p, ivec2 at) {
-        return at.x >= p.bounds.x && at.y >= p.bounds.y && at.x < p.bounds.z && at.y < p.bounds.w;
     }
 #include "shaders/shared/surface_shade.glsl"
 #include "shaders/shared/surface_votes.glsl"

@@ -1,0 +1,108 @@
+// Scenes that sources disagree about: leaves and thin parts, which no pixel shows whole, creases,
+// and a sheet without thickness. Novel views against pictures of another program and against the
+// mesh.
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "formats/imagesets/camera_file.hpp"
+#include "formats/imagesets/image_sets.hpp"
+#include "formats/open.hpp"
+#include "lib/capture/capture.hpp"
+#include "lib/geometry/view_layout.hpp"
+#include "lib/metrics/compare.hpp"
+#include "lib/render/frame_picture.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
+#include "lib/render/renderer.hpp"
+#include "tests/golden/render/spheres_miv.hpp"
+#include "tests/shared_data.hpp"
+
+namespace stx {
+namespace {
+
+// Within this of the figures once reached, dB.
+constexpr double kTolerance = 0.2;
+
+RenderSettings settingsOf(Quality quality) {
+    RenderSettings s;
+    s.quality = quality;
+    return s;
+}
+
+/// PSNR of RGB on black, dB.
+double psnr(const Frame& frame, const Image<glm::u8vec4>& truth) {
+    const auto compared = compare(rgba8From(frame, glm::vec3(0.0f)), truth, {});
+    return compared ? compared->psnrRgb.value_or(99) : 0;
+}
+
+struct Set {
+    const char* name;
+    double draft, normal, best;  ///< dB, mean of the novel views
+};
+
+class HardScenes : public testing::TestWithParam<Set> {};
+
+TEST_P(HardScenes, NovelViewsStayAsGood) {
+    const Set& set = GetParam();
+    REQUIRE_SHARED(folder, std::string("data/imagesets/") + set.name);
+    Job job;
+    const auto bundle = readImageSet(folder / "transforms.json", {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    const auto cameras = readCameraFile(folder / "transforms_test.json", job);
+    ASSERT_TRUE(cameras) << cameras.error().text();
+    const auto mean = [&](Quality quality) {
+        const auto renderer = makeRenderer(Backend::cpu, *bundle, settingsOf(quality), -1, job);
+        double sum = 0;
+        for (std::size_t i = 0; i < cameras->size(); ++i) {
+            const auto frame = (*renderer)->render((*cameras)[i].camera);
+            sum += psnr(*frame, spheres::picture(folder / fmt::format("test/rgb_{:03}.png", i)));
+        }
+        return sum / static_cast<double>(cameras->size());
+    };
+    const double draft = mean(Quality::draft), normal = mean(Quality::normal),
+                 best = mean(Quality::best);
+    std::printf("%s: draft %.2f dB, normal %.2f dB, best %.2f dB\n", set.name, draft, normal, best);
+    EXPECT_GT(draft, set.draft - kTolerance);
+    EXPECT_GT(normal, set.normal - kTolerance);
+    EXPECT_GT(best, set.best - kTolerance);
+    EXPECT_GE(normal, draft);
+    EXPECT_GE(best, normal);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sets, HardScenes,
+                         testing::Values(Set{"statue", 38.0, 43.0, 43.25},
+                                         Set{"oaktree", 25.9, 30.9, 31.6}),
+                         [](const auto& set) { return std::string(set.param.name); });
+
+// A sheet whose border every view shows: each more view could bite another piece out of it.
+TEST(HardScenesPlane, BetterQualityIsNoWorseOnATwoSidedSheet) {
+    REQUIRE_SHARED(path, "data/meshes/gltf/draco-repo/TwoSidedPlane/glTF/TwoSidedPlane.gltf");
+    Job job;
+    auto opened = openRenderable(path, {}, job);
+    ASSERT_TRUE(opened) << opened.error().text();
+    const Mesh mesh = std::get<Mesh>(std::move(*opened));
+    const double degree = std::numbers::pi / 180;
+    const auto views =
+        layoutCameras(*parseViewLayout("sphere:16"),
+                      {.width = 512, .height = 512, .fovRad = 35 * degree}, mesh.positions);
+    const auto bundle = captureBundle(mesh, *views, {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    const glm::dvec3 eye(0, 3, 1);
+    const Camera camera = Camera::fromFieldOfView(eye, *lookAt(eye, {0, 0, 0}, {0, 1, 0}),
+                                                  {50 * degree, 50 * degree}, false, 512, 512);
+    const auto truth = makeMeshRenderer(mesh, settingsOf(Quality::best), job)->render(camera);
+    double last = 30;
+    for (const Quality quality : {Quality::draft, Quality::normal, Quality::best}) {
+        const auto renderer = makeRenderer(Backend::cpu, *bundle, settingsOf(quality), -1, job);
+        const auto frame = (*renderer)->render(camera);
+        const double reached = psnr(*frame, rgba8From(*truth, glm::vec3(0.0f)));
+        EXPECT_GE(reached, last);
+        last = reached;
+    }
+    EXPECT_GT(last, 54.6 - 3 * kTolerance);
+}
+
+}  // namespace
+}  // namespace stx
