@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "lib/model/srgb8.hpp"
+
 namespace stx {
 namespace {
 
@@ -20,33 +22,6 @@ int wrapped(int i, int n, MeshTexture::Wrap wrap) {
             break;
     }
     return ((i % n) + n) % n;
-}
-
-/// sRGB coding by table: interpolation between 4096 steps is far below an 8-bit step beyond the
-/// toe.
-float srgbFast(float linear) {
-    static const auto table = [] {
-        std::array<float, 4097> t{};
-        for (int i = 0; i <= 4096; ++i) t[i] = srgbFromLinear(i / 4096.0f);
-        return t;
-    }();
-    if (!(linear > 0.0f)) return 0.0f;
-    if (linear >= 1.0f) return 1.0f;
-    if (linear < 0.01f) return srgbFromLinear(linear);
-    const float s = linear * 4096.0f;
-    const int i = static_cast<int>(s);
-    return table[i] + (table[i + 1] - table[i]) * (s - i);
-}
-
-float linearFast(float coded) {
-    static const auto table = [] {
-        std::array<float, 1025> t{};
-        for (int i = 0; i <= 1024; ++i) t[i] = linearFromSrgb(i / 1024.0f);
-        return t;
-    }();
-    const float s = std::clamp(coded, 0.0f, 1.0f) * 1024.0f;
-    const int i = std::min(static_cast<int>(s), 1023);
-    return table[i] + (table[i + 1] - table[i]) * (s - i);
 }
 
 template <class T>
@@ -90,8 +65,8 @@ MaterialSampler::MaterialSampler(const Mesh& mesh) : mesh_(mesh) {
         seeThrough_.push_back(m.alpha != Material::Alpha::opaque);
         plainTexture_.push_back(mesh.colours.empty() && m.baseColour == glm::vec4(1.0f));
         constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0);
-        constantColour_.emplace_back(srgbFast(m.baseColour.x), srgbFast(m.baseColour.y),
-                                     srgbFast(m.baseColour.z));
+        constantColour_.emplace_back(srgbByTable(m.baseColour.x), srgbByTable(m.baseColour.y),
+                                     srgbByTable(m.baseColour.z));
     }
 }
 
@@ -107,8 +82,8 @@ glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b) const {
     if (!mesh_.colours.empty()) factor *= mix3(mesh_.colours, t, b);
     glm::vec4 out;
     for (int k = 0; k < 3; ++k) {
-        const float light = (m.baseColourTexture >= 0 ? linearFast(texel[k]) : 1.0f) * factor[k];
-        out[k] = srgbFast(light);
+        const float light = (m.baseColourTexture >= 0 ? linearByTable(texel[k]) : 1.0f) * factor[k];
+        out[k] = srgbByTable(light);
     }
     out.w = texel.w * factor.w;
     return out;

@@ -189,7 +189,7 @@ glm::vec3 Rasterizer::lit(const Lighting& lighting, const SetUp& s, glm::vec3 al
     const glm::vec3 toEye = -glm::vec3(camera_.viewDirection(x, y));
     glm::vec3 n = sampler_.normal(s.triangle, barycentric(s, x, y));
     if (glm::dot(n, toEye) < 0.0f) n = -n;
-    return glm::clamp(shadePhong(lighting, albedo, position, n, toEye), 0.0f, 1.0f);
+    return shadePhong(lighting, albedo, position, n, toEye, false);
 }
 
 /// Whether all samples of a pixel see the same triangle, or none.

@@ -1,7 +1,11 @@
 #include "lib/model/srgb8.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+
+#include "lib/model/texture.hpp"
 
 namespace stx {
 
@@ -25,6 +29,33 @@ Srgb8Tables::Srgb8Tables() {
 const Srgb8Tables& srgb8Tables() {
     static const Srgb8Tables tables;
     return tables;
+}
+
+// Interpolation between 4096 steps is far below an 8-bit step beyond the toe.
+float srgbByTable(float linear) {
+    static const auto table = [] {
+        std::array<float, 4097> t{};
+        for (int i = 0; i <= 4096; ++i) t[i] = srgbFromLinear(i / 4096.0f);
+        return t;
+    }();
+    if (!(linear > 0.0f)) return 0.0f;
+    if (linear >= 1.0f) return 1.0f;
+    if (linear < 0.01f) return srgbFromLinear(linear);
+    const float s = linear * 4096.0f;
+    const int i = static_cast<int>(s);
+    return table[i] + (table[i + 1] - table[i]) * (s - i);
+}
+
+float linearByTable(float coded) {
+    static const auto table = [] {
+        std::array<float, 1025> t{};
+        for (int i = 0; i <= 1024; ++i) t[i] = linearFromSrgb(i / 1024.0f);
+        return t;
+    }();
+    if (!(coded > 0.0f)) return 0.0f;
+    const float s = std::min(coded, 1.0f) * 1024.0f;
+    const int i = std::min(static_cast<int>(s), 1023);
+    return table[i] + (table[i + 1] - table[i]) * (s - i);
 }
 
 }  // namespace stx

@@ -41,4 +41,9 @@ class Srgb8Tables {
     return srgb8Tables().linear(code);
 }
 
+/// srgbFromLinear() and linearFromSrgb() of values 0..1 (others are clamped), by tables: within a
+/// thousandth of an 8-bit step, and many times faster.
+[[nodiscard]] float srgbByTable(float linear);
+[[nodiscard]] float linearByTable(float coded);
+
 }  // namespace stx

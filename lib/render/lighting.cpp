@@ -1,5 +1,6 @@
 #include "lib/render/lighting.hpp"
 
+#include "lib/model/srgb8.hpp"
 #include "shaders/shared/language.hpp"
 
 namespace stx {
@@ -20,14 +21,22 @@ struct Phong {
     [[nodiscard]] vec4 lightVector(int i) const {
         return {light(i).vector, light(i).kind == Light::Kind::point ? 1.0f : 0.0f};
     }
+    [[nodiscard]] static vec3 decoded(vec3 c) {
+        return {linearByTable(c.x), linearByTable(c.y), linearByTable(c.z)};
+    }
+    [[nodiscard]] static vec3 coded(vec3 c) {
+        return {srgbByTable(c.x), srgbByTable(c.y), srgbByTable(c.z)};
+    }
 #include "shaders/shared/phong.glsl"
 };
 
 }  // namespace
 
 glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
-                     glm::vec3 normal, glm::vec3 toEye) {
-    return Phong{lighting}.shadePhong(albedo, position, normal, toEye);
+                     glm::vec3 normal, glm::vec3 toEye, bool linear) {
+    Phong phong{lighting};
+    return linear ? phong.shadePhong(albedo, position, normal, toEye)
+                  : phong.shadeCoded(albedo, position, normal, toEye);
 }
 
 Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera) {

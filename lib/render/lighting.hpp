@@ -16,7 +16,7 @@ struct Light {
     bool inCameraSpace = false;  ///< moves with the camera (a headlight)
 };
 
-/// Phong lighting; off while there is no light.
+/// Phong lighting, all amounts linear light; off while there is no light.
 struct Lighting {
     std::vector<Light> lights;
     glm::vec3 ambient{0.2f};
@@ -26,10 +26,11 @@ struct Lighting {
     [[nodiscard]] bool on() const { return !lights.empty(); }
 };
 
-/// Phong: albedo * (ambient + sum of diffuse) + sum of specular. All vectors in one space;
-/// `toEye` and `normal` unit, `position` the lit point. The shaders share its code.
+/// Phong: albedo * (ambient + sum of diffuse) + sum of specular, in linear light. All vectors in
+/// one space; `toEye` and `normal` unit, `position` the lit point. Unless `linear`, albedo and
+/// result are sRGB-coded, 0..1: decoded, lit, coded again. The shaders share its code.
 [[nodiscard]] glm::vec3 shadePhong(const Lighting& lighting, glm::vec3 albedo, glm::vec3 position,
-                                   glm::vec3 normal, glm::vec3 toEye);
+                                   glm::vec3 normal, glm::vec3 toEye, bool linear);
 
 /// The lights with camera-space ones turned into the world of a camera.
 [[nodiscard]] Lighting lightsInWorld(const Lighting& lighting, const glm::dmat4& worldFromCamera);

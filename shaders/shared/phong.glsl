@@ -1,6 +1,7 @@
 // Phong lighting with any number of lights. From outside: vec3 ambientLight(), vec3 specularLight()
 // (the material's), float shininess(), int lightCount(), vec3 lightColour(i),
 //   vec4 lightVector(i)  w = 0: the way the light travels, w = 1: its position
+//   vec3 decoded(vec3), vec3 coded(vec3)  sRGB to linear light and back, 0..1
 // All vectors in one space; `normal` and `toEye` of length 1.
 vec3 shadePhong(vec3 albedo, vec3 position, vec3 normal, vec3 toEye) {
     vec3 diffuse = ambientLight(), gloss = vec3(0.0f);
@@ -17,4 +18,9 @@ vec3 shadePhong(vec3 albedo, vec3 position, vec3 normal, vec3 toEye) {
         if (mirrored > 0.0f) gloss += lightColour(i) * pow(mirrored, shininess());
     }
     return albedo * diffuse + gloss * specularLight();
+}
+
+// Light adds up only as linear light: sRGB-coded colours are decoded for it, and coded again.
+vec3 shadeCoded(vec3 albedo, vec3 position, vec3 normal, vec3 toEye) {
+    return coded(shadePhong(decoded(albedo), position, normal, toEye));
 }

@@ -113,7 +113,11 @@ void resolvePixel(ivec2 at, out vec4 colour, out float dist, out vec3 normal, ou
         vec3 world = worldPosition(vec2(at) + 0.5, dist < kNone ? dist : 1.0);
         vec3 ahead = worldPosition(vec2(at) + 0.5, 1.0) - frame.novelPosition.xyz;
         vec3 toEye = orthographic() ? frame.novelAxisZ.xyz : -normalize(ahead);
+        #if LINEAR
         colour.rgb = shadePhong(colour.rgb / colour.a, world, normal, toEye) * colour.a;
+#else
+        colour.rgb = shadeCoded(colour.rgb / colour.a, world, normal, toEye) * colour.a;
+#endif
     }
 #endif
 }

@@ -187,7 +187,7 @@ void SurfaceRenderer::light(const Camera& camera, Frame& frame) const {
                 const glm::dvec3 world =
                     camera.position + worldFromCamera * camera.unproject(x + 0.5, y + 0.5, dist);
                 const glm::vec3 lit = shadePhong(lighting, glm::vec3(pixel) / pixel.a,
-                                                 glm::vec3(world), normal, toEye);
+                                                 glm::vec3(world), normal, toEye, frame.linear);
                 pixel = glm::vec4(lit * pixel.a, pixel.a);
             }
         }

@@ -141,8 +141,9 @@ TEST_P(GpuRenderers, LightAsTheCpuDoes) {
             const glm::vec3 place(camera.position +
                                   camera.orientation *
                                       camera.unproject(x + 0.5, y + 0.5, frame->depth.at(x, y)));
-            const glm::vec3 lit = shadePhong(world, glm::vec3(albedo), place, normal,
-                                             glm::vec3(-camera.viewDirection(x + 0.5, y + 0.5)));
+            const glm::vec3 lit =
+                shadePhong(world, glm::vec3(albedo), place, normal,
+                           glm::vec3(-camera.viewDirection(x + 0.5, y + 0.5)), false);
             EXPECT_LT(glm::length(lit - glm::vec3(frame->colour.at(x, y))), 2e-3f) << x << "," << y;
             ++looked;
         }

@@ -257,7 +257,7 @@ void CpuSplatRenderer::shade(Picture& picture, int x, int y, glm::vec3 normal) c
         camera.orientation * camera.unproject(x + 0.5, y + 0.5, hasPoint(depth) ? depth : 1.0);
     const glm::vec3 toEye(-camera.viewDirection(x + 0.5, y + 0.5));
     const glm::vec3 lit = shadePhong(picture.lighting, glm::vec3(albedo) / albedo.a,
-                                     glm::vec3(position), normal, toEye);
+                                     glm::vec3(position), normal, toEye, frame.linear);
     frame.colour.at(x, y) = glm::vec4(lit * albedo.a, albedo.a);
 }
 

@@ -1,0 +1,41 @@
+// Light adds up as linear light, whatever coding colours have.
+
+#include <gtest/gtest.h>
+
+#include "lib/model/texture.hpp"
+#include "lib/render/lighting.hpp"
+
+namespace stx {
+namespace {
+
+Lighting oneLight(float amount) {
+    Lighting lighting;
+    lighting.lights = {{Light::Kind::directional, {0, 0, -1}, glm::vec3(amount), false}};
+    lighting.ambient = glm::vec3(0.0f);
+    return lighting;
+}
+
+glm::vec3 lit(const Lighting& lighting, float albedo, bool linear) {
+    return shadePhong(lighting, glm::vec3(albedo), {0, 0, 0}, {0, 0, 1}, {0, 0, 1}, linear);
+}
+
+TEST(Lighting, HalfTheLightIsHalfTheLightOfACodedColourToo) {
+    for (const float coded : {0.02f, 0.2f, 0.5f, 0.8f, 1.0f}) {
+        const float expected = srgbFromLinear(0.5f * linearFromSrgb(coded));
+        EXPECT_NEAR(lit(oneLight(0.5f), coded, false).x, expected, 1e-4f) << coded;
+    }
+    EXPECT_FLOAT_EQ(lit(oneLight(0.5f), 0.6f, true).x, 0.3f);
+}
+
+TEST(Lighting, FullLightLeavesACodedColourAsItIs) {
+    for (const float coded : {0.0f, 0.003f, 0.1f, 0.5f, 1.0f})
+        EXPECT_NEAR(lit(oneLight(1.0f), coded, false).x, coded, 1e-4f) << coded;
+}
+
+TEST(Lighting, LinearColoursMayGrowBeyondOneAndCodedOnesStopThere) {
+    EXPECT_FLOAT_EQ(lit(oneLight(3.0f), 0.5f, true).x, 1.5f);
+    EXPECT_FLOAT_EQ(lit(oneLight(3.0f), 0.9f, false).x, 1.0f);
+}
+
+}  // namespace
+}  // namespace stx
