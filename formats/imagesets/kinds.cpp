@@ -31,6 +31,11 @@ Result<Json> readJson(const path& file, const Limits& limits) {
 Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view) {
     STX_TRY(const auto name, findText(camera, "stx:name", where));
     view.exactName = name.value_or("");
+    if (const auto it = camera.find("stx:pruned"); it != camera.end()) {
+        if (!it->is_boolean())
+            return failAt(where, ErrorCode::invalidInput, "'stx:pruned' must be true or false");
+        view.pruned = it->get<bool>();
+    }
     STX_TRY(const auto q, findNumbers(camera, "stx:quaternion", 4, where));
     if (q) {
         const glm::dquat exact((*q)[3], (*q)[0], (*q)[1], (*q)[2]);

@@ -58,6 +58,7 @@ struct SetView {
     /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
     int depthBits = 0;      ///< with planes: 8, 16, 32
+    bool pruned = false;    ///< see ReferenceView::pruned
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
 };
 

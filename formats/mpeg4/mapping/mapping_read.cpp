@@ -65,9 +65,12 @@ class BundleReader {
             if (!read[i])
                 return tl::unexpected(
                     read[i].error().at(fmt::format("view {} '{}'", i, plans[i].name)));
-            for (ReferenceView& view : *read[i]) {
+            for (std::size_t layer = 0; layer < read[i]->size(); ++layer) {
+                ReferenceView& view = (*read[i])[layer];
                 const auto pad = notes.paddings.find(plans[i].defName);
                 if (pad != notes.paddings.end()) removePadding(view, pad->second);
+                const auto pruned = notes.pruned.find({plans[i].defName, static_cast<int>(layer)});
+                if (pruned != notes.pruned.end()) markPruned(view, plans[i], pruned->second);
                 applySimilarity(view, plans[i].worldFromLocal);
                 bundle.views.push_back(std::move(view));
             }
@@ -81,6 +84,18 @@ class BundleReader {
     }
 
   private:
+    /// A mask that is damaged costs quality only, so that it is a note.
+    void markPruned(ReferenceView& view, const Plan& plan, const std::string& where) {
+        if (where == kPrunedInAlpha || !options_.pixels) {
+            view.pruned = true;
+            return;
+        }
+        // The list of a PointTexture has no colours for pruned pixels; neighbours' serve.
+        if (plan.texture->info->find("depthNbBits") >= 0) bleedColour(view.texture);
+        if (const auto ok = applyPrunedMask(view, where, job_.limits); !ok)
+            job_.note(fmt::format("view '{}': {}; borders of what was pruned may show", view.name,
+                                  ok.error().text()));
+    }
     std::string freeName(const NodePtr& node, const ViewNotes& notes) {
         std::string name = node->defName;
         if (const auto own = notes.names.find(name); own != notes.names.end()) name = own->second;

@@ -29,6 +29,7 @@ struct ViewImages {
     float nearPlane = 0, farPlane = 0;
     float longestSplat = 0;
     Bytes texture, depth, normal, splatU, splatV;
+    std::string pruned;  ///< of a pruned view: what its note says
     double worstDepth = 0;
     bool clamped = false;
     bool coverageLost = false;
@@ -57,6 +58,10 @@ class SceneWriter {
                 if (!images[i + k])
                     return tl::unexpected(images[i + k].error().at(viewName(i + k)));
             children.push_back(depthImage(i, layers, *images[i], notes));
+            for (std::size_t k = 0; k < layers; ++k)
+                if (!images[i + k]->pruned.empty())
+                    notes.pruned[{children.back()->defName, static_cast<int>(k)}] =
+                        std::move(images[i + k]->pruned);
             for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
             i += layers - 1;
         }
@@ -165,16 +170,23 @@ class SceneWriter {
                     out.worstDepth =
                         std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
             }
-            out.coverageLost =
-                !alphaFollowsDepth(rgba8FromTexture(view.texture, out.clamped), view.depth);
+            const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
+            out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
+            if (view.pruned) {
+                STX_TRY(out.pruned, prunedMask(colour, view.depth));
+            }
             return out;
         }
         STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
         const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
         const bool alpha = !alphaFollowsDepth(colour, view.depth);
+        if (view.pruned) out.pruned = kPrunedInAlpha;
         const Rgba8Image wide = padded(colour, out.padding);
         if (options_.texture == SceneWriteOptions::Texture::jpeg) {
-            out.coverageLost = alpha;
+            out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
+            if (view.pruned) {
+                STX_TRY(out.pruned, prunedMask(colour, view.depth));
+            }
             STX_TRY(out.texture, colourJpeg(wide, options_.jpegQuality));
         } else {
             STX_TRY(out.texture, colourPng(wide, alpha));

@@ -207,9 +207,12 @@ Rgba8Image rgba8FromTexture(const Texture& texture, bool& clamped) {
     return out;
 }
 
-bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth) {
-    for (std::size_t i = 0; i < texture.count(); ++i)
-        if (texture.pixels()[i].a != (hasPoint(depth.pixels()[i]) ? 255 : 0)) return false;
+bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth, bool prunedToo) {
+    for (std::size_t i = 0; i < texture.count(); ++i) {
+        const int alpha = texture.pixels()[i].a;
+        const bool point = hasPoint(depth.pixels()[i]);
+        if (alpha != (point ? 255 : 0) && !(prunedToo && !point && alpha == 255)) return false;
+    }
     return true;
 }
 

@@ -46,8 +46,9 @@ namespace stx::mpeg4 {
 /// than 1.
 [[nodiscard]] Rgba8Image rgba8FromTexture(const Texture& texture, bool& clamped);
 /// Whether alpha is 255 where the depth has a point and 0 elsewhere, so that it need not be
-/// written.
-[[nodiscard]] bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth);
+/// written. `prunedToo`: it may be 255 elsewhere, too.
+[[nodiscard]] bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth,
+                                     bool prunedToo = false);
 /// An image with `padding` around it, its edge repeated (alpha 0 in what is new).
 [[nodiscard]] Rgba8Image padded(const Rgba8Image& image, const Padding& padding);
 /// PNG of colour, with alpha when asked.
