@@ -53,7 +53,7 @@ Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::p
     Job quiet;
     quiet.limits = job.limits;
     mpeg4::SceneReadOptions read;
-    read.folder = input.parent_path();
+    read.folder = folderOf(input);
     read.pixels = pixels;
     auto bundle = mpeg4::bundleFromScene(document, read, quiet);
     return bundle ? std::move(*bundle) : Bundle();

@@ -92,8 +92,16 @@ Result<PictureSource> sourceInside(const path& folder, const std::string& name,
     PictureSource source;
     source.name = name;
     auto file = resolveInside(folder, name, limits);
-    if (!file) return tl::unexpected(where.empty() ? file.error() : file.error().at(where));
-    source.path = std::move(*file);
+    if (file) {
+        source.path = std::move(*file);
+        return source;
+    }
+    Error error = where.empty() ? file.error() : file.error().at(where);
+    std::error_code ec;
+    if (error.code != ErrorCode::io || std::filesystem::exists(folder / name, ec))
+        return tl::unexpected(std::move(error));
+    source.path = folder / name;
+    source.missing = std::move(error);
     return source;
 }
 

@@ -21,6 +21,7 @@ struct PictureSource {
     std::string name;              ///< for messages, not quoted
     std::optional<YuvFormat> yuv;  ///< raw planes; else by the file (images, PFM)
     int frame = 0;                 ///< of raw planes
+    std::optional<Error> missing;  ///< why there is no such file; reading it then ends with this
     bool colmap = false;           ///< COLMAP's depth maps: `w&h&c&` and floats
 };
 

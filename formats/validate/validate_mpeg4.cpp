@@ -458,7 +458,9 @@ class DocumentValidator {
             normals->channels < 3)
             return;
         ReferenceView view;
-        const auto distances = depthFromImage(*codes, channel, nearPlane, farPlane);
+        const auto info = images_->probe(depthNode ? *depthNode : *colourNode);
+        const int greyBits = info ? info->greyBits : 0;
+        const auto distances = depthFromImage(*codes, channel, greyBits, nearPlane, farPlane);
         if (!distances) return;
         view.depth = *distances;
         const auto vectors = normalsFromImage(*normals, view.depth);
@@ -517,7 +519,7 @@ std::vector<Finding> validate(const Mpeg4Document& document, const ValidateOptio
 Result<std::vector<Finding>> validateMpeg4File(const std::filesystem::path& path,
                                                const ValidateOptions& options, Job& job) {
     PresentationImages images;
-    images.folder = path.has_parent_path() ? path.parent_path() : ".";
+    images.folder = folderOf(path);
     const auto document = readMpeg4(path, job);
     Findings findings;
     if (!document) {

@@ -34,8 +34,10 @@ struct SceneReadOptions {
     std::filesystem::path folder;
     ImageDecoder decode = decodeImage;
     /// Without pixels only headers are read: the views have cameras, planes and depthBits, but
-    /// empty images, and a PointTexture gives one view.
+    /// empty images.
     bool pixels = true;
+    /// A scene that shows no view gives a bundle without any, instead of an error.
+    bool mayBeEmpty = false;
 };
 
 /// The object of a presentation as it is at its first moment: a view for each DepthImage (and

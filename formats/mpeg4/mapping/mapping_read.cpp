@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
@@ -42,8 +43,13 @@ class BundleReader {
         STX_TRY(const auto shown, shownScene(scene.root, job_.limits));
         if (shown.hasShapes)
             job_.note("the scene has Shapes, which are no views; they are left out");
-        const ViewNotes notes = ViewNotes::parse(shown.info);
+        const ViewNotes notes = notesOf(shown);
         STX_TRY(const auto plans, makePlans(shown, notes));
+        if (plans.empty() && options_.mayBeEmpty) {
+            Bundle nothing;
+            nothing.title = shown.title;
+            return nothing;
+        }
         if (plans.empty())
             return fail(ErrorCode::invalidInput,
                         "the scene shows no DepthImage with a texture; there is nothing to see");
@@ -84,6 +90,38 @@ class BundleReader {
     }
 
   private:
+    /// What all WorldInfo say. Bounds are moved as the WorldInfo is; they hold only when each
+    /// object is moved with one.
+    ViewNotes notesOf(const ShownScene& shown) {
+        ViewNotes all;
+        std::vector<glm::dmat4> places;
+        for (const ShownInfo& info : shown.infos) {
+            ViewNotes notes = ViewNotes::parse(info.text);
+            all.names.merge(notes.names);
+            all.paddings.merge(notes.paddings);
+            all.pruned.merge(notes.pruned);
+            if (!notes.bounds) continue;
+            places.push_back(info.worldFromLocal);
+            if (!all.bounds) all.bounds.emplace();
+            for (int corner = 0; corner < 8; ++corner) {
+                const Bounds& b = *notes.bounds;
+                const glm::dvec4 p(corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y,
+                                   corner & 4 ? b.max.z : b.min.z, 1.0);
+                all.bounds->add(glm::dvec3(info.worldFromLocal * p));
+            }
+        }
+        const bool moved =
+            std::any_of(shown.nodes.begin(), shown.nodes.end(), [&](const ShownNode& node) {
+                return std::find(places.begin(), places.end(), node.worldFromLocal) == places.end();
+            });
+        if (all.bounds && moved) {
+            job_.note(
+                "the bounds that WorldInfo states are left out: a Transform moves views away "
+                "from them");
+            all.bounds.reset();
+        }
+        return all;
+    }
     /// A mask that is damaged costs quality only, so that it is a note.
     void markPruned(ReferenceView& view, const Plan& plan, const std::string& where) {
         if (where == kPrunedInAlpha || !options_.pixels) {
@@ -234,7 +272,7 @@ class BundleReader {
         if (plan.texture->info->find("depthNbBits") >= 0) {
             STX_TRY(const auto view, cameraOf(plan, plan.texture->get<std::int32_t>("width"),
                                               plan.texture->get<std::int32_t>("height")));
-            return std::vector<ReferenceView>{view};
+            return headersFromPointTexture(*plan.texture, view, job_.limits);
         }
         const NodePtr& depth = plan.texture->get<NodePtr>("depth");
         const NodePtr& colour = plan.texture->get<NodePtr>("texture");
@@ -273,7 +311,9 @@ class BundleReader {
             if (depth.channels == 2 || depth.channels == 4)
                 job_.note("a depth image has an alpha channel, which is left out");
             depthBits = depth.bits();
-            STX_TRY(view.depth, depthFromImage(depth, 0, view.nearPlane, view.farPlane));
+            const auto stored = images_->probe(*depthNode);
+            STX_TRY(view.depth, depthFromImage(depth, 0, stored ? stored->greyBits : 0,
+                                               view.nearPlane, view.farPlane));
         } else {
             if (!hasAlpha)
                 return fail(
@@ -282,7 +322,7 @@ class BundleReader {
             STX_TRY(view, cameraOf(plan, colour.width, colour.height));
             depthBits = colour.bits();
             STX_TRY(view.depth,
-                    depthFromImage(colour, colour.channels - 1, view.nearPlane, view.farPlane));
+                    depthFromImage(colour, colour.channels - 1, 0, view.nearPlane, view.farPlane));
         }
         if (!plan.octree) view.depthBits = depthBits;
 

@@ -25,8 +25,7 @@ class Walker {
         } else if (type == "WorldInfo") {
             const auto& title = node->get<std::string>("title");
             if (scene_.title.empty()) scene_.title = title;
-            const auto& info = node->get<std::vector<std::string>>("info");
-            scene_.info.insert(scene_.info.end(), info.begin(), info.end());
+            scene_.infos.push_back({node->get<std::vector<std::string>>("info"), world});
         } else if (type == "Shape") {
             scene_.hasShapes = true;
         } else if (type == "Switch") {

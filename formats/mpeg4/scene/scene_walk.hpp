@@ -15,13 +15,19 @@ struct ShownNode {
     int parent = 0;                  ///< the same for nodes under the very same grouping node's use
 };
 
+/// The strings of a WorldInfo, and where they are said.
+struct ShownInfo {
+    std::vector<std::string> text;
+    glm::dmat4 worldFromLocal{1.0};  ///< of all Transforms above it
+};
+
 /// What a scene shows, from top to bottom: all children of grouping nodes, only the chosen one of a
 /// Switch; a node that is used twice appears twice. Errors when that is more than `limits` allow.
 struct ShownScene {
     std::vector<ShownNode> nodes;
-    std::string title;              ///< of the first WorldInfo with one
-    std::vector<std::string> info;  ///< of all WorldInfo
-    bool hasShapes = false;         ///< there is a Shape, which is not a view
+    std::string title;             ///< of the first WorldInfo with one
+    std::vector<ShownInfo> infos;  ///< of each WorldInfo
+    bool hasShapes = false;        ///< there is a Shape, which is not a view
 };
 [[nodiscard]] Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits);
 
