@@ -233,8 +233,9 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
         case FileKind::exr:
             if (auto ok = describeExr(path, out, job); !ok) {
                 // Of another program: then it may be a set by itself.
-                if (ok.error().code != ErrorCode::invalidInput || !describeSet(path, out, job))
-                    return propagate(ok);
+                const auto reader = ExrReader::open(path, job.limits);
+                const bool ours = !reader || isExrBundle(*reader);
+                if (ours || !describeSet(path, out, job)) return propagate(ok);
             }
             break;
         case FileKind::mpeg4:

@@ -102,14 +102,14 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     }
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+    for (const SetView& view : set.views)
+        for (const PictureSource* source : {&view.texture, &view.depth})
+            if (source->missing) return tl::unexpected(*source->missing);
     if (options.frame >= set.frames)
         return failAt(where, ErrorCode::invalidInput,
                       "frame {} is asked for, but the set has {} (from 0)", options.frame,
                       set.frames);
     STX_CHECK(checkViewCount(set.views.size(), job.limits, where));
-    for (const SetView& view : set.views)
-        for (const PictureSource* source : {&view.texture, &view.depth})
-            if (source->missing) return tl::unexpected(*source->missing);
     std::uint64_t pixels = 0;
     for (const SetView& view : set.views)
         pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
