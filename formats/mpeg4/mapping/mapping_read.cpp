@@ -278,7 +278,7 @@ class BundleReader {
         const NodePtr& colour = plan.texture->get<NodePtr>("texture");
         STX_TRY(const auto info, images_->probe(depth && !plan.octree ? *depth : *colour));
         STX_TRY(auto view, cameraOf(plan, info.width, info.height));
-        view.depthBits = info.bits;
+        if (!plan.octree) view.depthBits = info.bits;
         return std::vector<ReferenceView>{view};
     }
 
