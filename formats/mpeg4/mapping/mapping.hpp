@@ -68,14 +68,15 @@ struct SceneWriteOptions {
     int octreeLevels = 0;
 };
 
-/// A presentation of a bundle: Group { WorldInfo, DepthImage... }, the WorldInfo with title and
-/// bounds (computed where the bundle has none); with octreeLevels Group { WorldInfo, OctreeImage },
-/// under a Transform where the object is not in the unit cube. Field values are rounded to float,
-/// planes outwards. A principal point off the centre is centred by padding with pixels without a
-/// point (see placement.hpp) and noted; reading the scene back here undoes it. What is lossy is
-/// noted: float depth and 8 bits with the largest error, JPEG, linear colour, what V1 cannot hold.
-/// Errors: (unsupported) more images than MPEG-4 has object descriptors for, or images that padding
-/// makes too large; (usage) options out of range; what Bundle::check() says.
+/// A presentation of a bundle: Group { WorldInfo, DepthImage..., Viewpoint, NavigationInfo }, the
+/// WorldInfo with title and bounds (computed where the bundle has none); with octreeLevels Group {
+/// WorldInfo, OctreeImage }, under a Transform where the object is not in the unit cube. Field
+/// values are rounded to float, planes outwards. A principal point off the centre is centred by
+/// padding with pixels without a point (see placement.hpp) and noted; reading the scene back here
+/// undoes it. What is lossy is noted: float depth and 8 bits with the largest error, JPEG, linear
+/// colour, what V1 cannot hold. Errors: (unsupported) more images than MPEG-4 has object
+/// descriptors for, or images that padding makes too large; (usage) options out of range; what
+/// Bundle::check() says.
 [[nodiscard]] Result<Document> sceneFromBundle(const Bundle& bundle,
                                                const SceneWriteOptions& options, Job& job);
 

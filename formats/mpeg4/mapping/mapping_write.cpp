@@ -53,6 +53,7 @@ class SceneWriter {
             STX_TRY(auto children, depthImages(notes));
             root = groupOf(std::move(children), notes);
         }
+        addNavigation(*root);
 
         Document document;
         document.sceneStream.esId = 1;
@@ -132,6 +133,28 @@ class SceneWriter {
         NodePtr group = makeNode(type);
         group->set("children", std::move(children));
         return group;
+    }
+
+    /// For players: the whole object in sight from the side of the first view, and turned around
+    /// it.
+    void addNavigation(Node& root) const {
+        if (bounds_.empty()) return;
+        NodePtr viewpoint = makeNode("Viewpoint");
+        const double angle = viewpoint->get<float>("fieldOfView");
+        const double away = std::max(bounds_.radius(), 1e-6) / std::sin(angle / 2);
+        // From the rounded orientation: a bundle that was read gives the same bytes again.
+        const glm::vec4 turn(axisAngleFromQuat(bundle_.views[0].camera.orientation));
+        const glm::dvec3 back = quatFromAxisAngle(glm::dvec4(turn)) * glm::dvec3(0, 0, 1);
+        viewpoint->set("position", glm::vec3(bounds_.centre() + back * away));
+        viewpoint->set("orientation", Rotation{glm::vec3(turn), turn.w});
+        viewpoint->set("description", std::string("all"));
+        NodePtr navigation = makeNode("NavigationInfo");
+        navigation->set("type", std::vector<std::string>{"EXAMINE", "ANY"});
+        navigation->set("headlight", false);
+        NodeList children = root.get<NodeList>("children");
+        children.push_back(viewpoint);
+        children.push_back(navigation);
+        root.set("children", std::move(children));
     }
 
     /// The WorldInfo is in the frame of the octree's cube, so that its bounds follow it.

@@ -92,6 +92,36 @@ TEST(SceneHeaders, ASceneThatShowsNothingMayBeDescribed) {
     EXPECT_NE(errorOf("WorldInfo { title \"empty\" }").find("nothing to see"), std::string::npos);
 }
 
+/// A player that opens our file sees the whole object, from the side of the first view.
+TEST(WrittenScenes, HaveAViewpointWithTheBoundsInSight) {
+    Bundle bundle;
+    bundle.views = {makeView(8, 6, 16, 1)};
+    bundle.bounds.emplace();
+    bundle.bounds->add({-1, 2, 3});
+    bundle.bounds->add({4, 5, 9});
+    const Document document = sceneOf(bundle);
+    NodePtr viewpoint, navigation;
+    for (const Command& command : document.frames[0].commands)
+        forEachNode(command, [&](const NodePtr& node) {
+            if (node->is("Viewpoint")) viewpoint = node;
+            if (node->is("NavigationInfo")) navigation = node;
+        });
+    ASSERT_TRUE(viewpoint && navigation);
+    EXPECT_EQ(navigation->get<std::vector<std::string>>("type").at(0), "EXAMINE");
+    const auto turn = viewpoint->get<Rotation>("orientation");
+    const glm::dquat orientation = quatFromAxisAngle({glm::dvec3(turn.axis), turn.angle});
+    EXPECT_GT(std::abs(glm::dot(orientation, bundle.views[0].camera.orientation)), 1 - 1e-6);
+    const double half = viewpoint->get<float>("fieldOfView") / 2;
+    for (int corner = 0; corner < 8; ++corner) {
+        const Bounds& b = *bundle.bounds;
+        const glm::dvec3 p(corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y,
+                           corner & 4 ? b.max.z : b.min.z);
+        const glm::dvec3 seen = glm::inverse(orientation) *
+                                (p - glm::dvec3(viewpoint->get<glm::vec3>("position")));
+        EXPECT_LT(std::atan2(std::hypot(seen.x, seen.y), -seen.z), half + 1e-6) << corner;
+    }
+}
+
 /// ISO/IEC 14496-16: d of a grey image with b bits runs to dmax = 2^b - 1.
 TEST(DepthOfFewBits, RunsToTheLargestCodeOfItsOwnBits) {
     for (const int bits : {1, 2, 4}) {
