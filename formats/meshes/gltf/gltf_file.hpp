@@ -74,5 +74,4 @@ class GltfFile {
     MeshBuilder* builder_ = nullptr;
 };
 
-
 }  // namespace stx::gltf

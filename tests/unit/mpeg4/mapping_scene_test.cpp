@@ -116,8 +116,8 @@ TEST(WrittenScenes, HaveAViewpointWithTheBoundsInSight) {
         const Bounds& b = *bundle.bounds;
         const glm::dvec3 p(corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y,
                            corner & 4 ? b.max.z : b.min.z);
-        const glm::dvec3 seen = glm::inverse(orientation) *
-                                (p - glm::dvec3(viewpoint->get<glm::vec3>("position")));
+        const glm::dvec3 seen =
+            glm::inverse(orientation) * (p - glm::dvec3(viewpoint->get<glm::vec3>("position")));
         EXPECT_LT(std::atan2(std::hypot(seen.x, seen.y), -seen.z), half + 1e-6) << corner;
     }
 }
