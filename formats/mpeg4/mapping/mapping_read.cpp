@@ -40,8 +40,13 @@ class BundleReader {
                             document_.frames.size() - 1));
         STX_TRY(const auto scene, composeScene(document_.frames, start));
         STX_TRY(const auto shown, shownScene(scene.root, job_.limits));
-        if (shown.hasShapes)
-            job_.note("the scene has Shapes, which are no views; they are left out");
+        if (!shown.leftOut.empty())
+            job_.note(fmt::format("the scene has nodes that are no views; they are left out: {}",
+                                  fmt::join(shown.leftOut, ", ")));
+        if (!shown.asGroups.empty())
+            job_.note(fmt::format(
+                "nodes that place or choose their children by themselves are read as Group: {}",
+                fmt::join(shown.asGroups, ", ")));
         const ViewNotes notes = ViewNotes::parse(shown.info);
         STX_TRY(const auto plans, makePlans(shown, notes));
         if (plans.empty())

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,12 +17,15 @@ struct ShownNode {
 };
 
 /// What a scene shows, from top to bottom: all children of grouping nodes, only the chosen one of a
-/// Switch; a node that is used twice appears twice. Errors when that is more than `limits` allow.
+/// Switch and the finest of a LOD; a node that is used twice appears twice. Errors when that is
+/// more than `limits` allow.
 struct ShownScene {
     std::vector<ShownNode> nodes;
     std::string title;              ///< of the first WorldInfo with one
     std::vector<std::string> info;  ///< of all WorldInfo
-    bool hasShapes = false;         ///< there is a Shape, which is not a view
+    std::set<std::string> leftOut;  ///< types of nodes that are no views, groups or settings
+    /// Types of grouping nodes that turn, move or choose their children; read as plain groups.
+    std::set<std::string> asGroups;
 };
 [[nodiscard]] Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits);
 

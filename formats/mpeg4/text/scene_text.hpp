@@ -32,7 +32,7 @@ enum class FieldUse { in, out };
 /// no two nodes have the same.
 class TextNames {
   public:
-    /// Errors when nodes nest too deeply or contain themselves.
+    /// Errors when nodes nest too deeply or contain themselves, or hold what texts cannot.
     [[nodiscard]] static Result<TextNames> make(const Document& document, const Limits& limits);
 
     /// Null: the node has no name.
