@@ -248,6 +248,8 @@ using Command =
 struct CommandFrame {
     std::uint64_t time = 0;  ///< in units of the stream's timescale
     std::vector<Command> commands;
+    /// Whether a reader may begin here. The first of a stream always is such a place.
+    bool randomAccess = false;
 };
 
 /// A scene at one moment.

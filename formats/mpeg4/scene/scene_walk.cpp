@@ -9,6 +9,14 @@ class Walker {
 
     Result<void> visit(const NodePtr& node, const glm::dmat4& world, int parent, int depth) {
         if (!node) return {};
+        path_.push_back(node.get());
+        auto done = visitNode(node, world, parent, depth);
+        path_.pop_back();
+        return done;
+    }
+
+  private:
+    Result<void> visitNode(const NodePtr& node, const glm::dmat4& world, int parent, int depth) {
         // A few nodes that USE each other in turn can be shown in any number of places.
         if (++visits_ > kMaxVisits)
             return fail(ErrorCode::invalidInput,
@@ -22,6 +30,7 @@ class Walker {
                 return fail(ErrorCode::invalidInput, "the scene shows more than {} views",
                             limits_.maxViews);
             scene_.nodes.push_back({node, world, parent});
+            scene_.above.insert(path_.begin(), path_.end());
         } else if (type == "WorldInfo") {
             const auto& title = node->get<std::string>("title");
             if (scene_.title.empty()) scene_.title = title;
@@ -55,7 +64,6 @@ class Walker {
         return {};
     }
 
-  private:
     /// Settings, clocks and what they drive show nothing by themselves.
     static bool isSetting(std::string_view type) {
         for (const std::string_view setting : {"QuantizationParameter", "Viewpoint", "Viewport",
@@ -92,6 +100,7 @@ class Walker {
     static constexpr std::int64_t kMaxVisits = 1 << 21;
     const Limits& limits_;
     ShownScene& scene_;
+    std::vector<const Node*> path_;  ///< from the root to the node that is visited
     std::int64_t visits_ = 0;
     int groups_ = 0;
 };

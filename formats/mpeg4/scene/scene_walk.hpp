@@ -2,6 +2,7 @@
 
 #include <set>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "formats/mpeg4/scene/placement.hpp"
@@ -21,8 +22,9 @@ struct ShownNode {
 /// more than `limits` allow.
 struct ShownScene {
     std::vector<ShownNode> nodes;
-    std::string title;              ///< of the first WorldInfo with one
-    std::vector<std::string> info;  ///< of all WorldInfo
+    std::string title;                      ///< of the first WorldInfo with one
+    std::vector<std::string> info;          ///< of all WorldInfo
+    std::unordered_set<const Node*> above;  ///< the nodes that one of `nodes` is in
     std::set<std::string> leftOut;  ///< types of nodes that are no views, groups or settings
     /// Types of grouping nodes that turn, move or choose their children; read as plain groups.
     std::set<std::string> asGroups;

@@ -25,6 +25,19 @@ enum class FieldUse { in, out };
 [[nodiscard]] Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view owner,
                                           std::string_view fieldName, const std::string& where);
 
+/// The commands at a time, and a mark on them as a place where a reader may begin.
+template <class Frame>
+[[nodiscard]] std::size_t commandsAt(const std::vector<Frame>& frames, std::uint64_t time) {
+    for (const Frame& frame : frames)
+        if (frame.time == time) return frame.commands.size();
+    return 0;
+}
+template <class Frame>
+void markRandomAccess(std::vector<Frame>& frames, std::uint64_t time) {
+    for (Frame& frame : frames)
+        if (frame.time == time) frame.randomAccess = true;
+}
+
 /// What every text ends with: names resolved, streams and ids filled in as writers need them.
 [[nodiscard]] Result<void> finishDocument(Document& document, NodeNames& names);
 

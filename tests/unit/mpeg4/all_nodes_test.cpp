@@ -212,5 +212,47 @@ TEST(AllNodes, ASceneWithManyKindsOfNodesShowsItsDepthImages) {
     }
 }
 
+TEST(MotionNotes, RoutesAndPicturesInTimeAreSaid) {
+    Bundle bundle;
+    bundle.views = {makeView(8, 6, 8, 1)};
+    Document document = sceneOf(bundle);
+    auto& scene = std::get<ReplaceScene>(document.frames[0].commands[0]);
+    const auto notesOf = [&] {
+        Job job;
+        const auto read = bundleFromScene(document, {}, job);
+        EXPECT_TRUE(read);
+        return fmt::format("{}", fmt::join(job.takeNotes(), "|"));
+    };
+    const std::string still = notesOf();
+    EXPECT_EQ(still.find("in time"), std::string::npos) << still;
+
+    // The view goes into a Transform that an interpolator moves; a Viewpoint may move as it likes.
+    const NodePtr transform = makeNode("Transform");
+    const NodePtr path = makeNode("PositionInterpolator");
+    const NodePtr eye = makeNode("Viewpoint");
+    auto& children = scene.root->edit<NodeList>("children");
+    transform->set("children", NodeList{children.back()});
+    children.back() = transform;
+    children.push_back(path);
+    children.push_back(eye);
+    const auto route = [&](const NodePtr& to, const char* field) {
+        return Route{0, "", path, path->info->find("value_changed"), to, to->info->find(field)};
+    };
+    scene.routes = {route(eye, "position")};
+    EXPECT_EQ(notesOf(), still);
+    scene.routes.push_back(route(transform, "translation"));
+    EXPECT_NE(notesOf().find("1 ROUTE(s) change the views in time"), std::string::npos)
+        << notesOf();
+    scene.routes.clear();
+
+    auto& ods = std::get<UpdateObjectDescriptors>(document.odFrames[0].commands[0]).descriptors;
+    auto& samples = ods[0].streams[0].samples;
+    samples.push_back(samples[0]);
+    samples[1].time = 1000;
+    EXPECT_NE(notesOf().find("1 image(s) of the views have several pictures in time"),
+              std::string::npos)
+        << notesOf();
+}
+
 }  // namespace
 }  // namespace stx::mpeg4
