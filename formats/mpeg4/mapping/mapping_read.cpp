@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/octree.hpp"
@@ -41,8 +42,13 @@ class BundleReader {
                             document_.frames.size() - 1));
         STX_TRY(const auto scene, composeScene(document_.frames, start));
         STX_TRY(const auto shown, shownScene(scene.root, job_.limits));
-        if (shown.hasShapes)
-            job_.note("the scene has Shapes, which are no views; they are left out");
+        if (!shown.leftOut.empty())
+            job_.note(fmt::format("the scene has nodes that are no views; they are left out: {}",
+                                  fmt::join(shown.leftOut, ", ")));
+        if (!shown.asGroups.empty())
+            job_.note(fmt::format(
+                "nodes that place or choose their children by themselves are read as Group: {}",
+                fmt::join(shown.asGroups, ", ")));
         const ViewNotes notes = notesOf(shown);
         STX_TRY(const auto plans, makePlans(shown, notes));
         if (plans.empty() && options_.mayBeEmpty) {
@@ -50,6 +56,7 @@ class BundleReader {
             nothing.title = shown.title;
             return nothing;
         }
+        noteMotion(scene, shown);
         if (plans.empty())
             return fail(ErrorCode::invalidInput,
                         "the scene shows no DepthImage with a texture; there is nothing to see");
@@ -134,6 +141,39 @@ class BundleReader {
             job_.note(fmt::format("view '{}': {}; borders of what was pruned may show", view.name,
                                   ok.error().text()));
     }
+
+    /// Says what would change the views in time, besides commands.
+    void noteMotion(const Scene& scene, const ShownScene& shown) {
+        std::unordered_map<int, std::size_t> pictures;
+        for (const ObjectDescriptor* od : document_.objectDescriptors())
+            if (!od->streams.empty()) pictures[od->id] = od->streams[0].samples.size();
+        std::unordered_set<const Node*> inViews = shown.above;
+        std::unordered_set<int> moving;
+        // Views share nodes, so all are walked as one graph.
+        const NodePtr all = makeNode("Group");
+        for (const ShownNode& view : shown.nodes)
+            all->edit<NodeList>("children").push_back(view.node);
+        forEachNode(all, [&](const NodePtr& node) {
+            inViews.insert(node.get());
+            const int url = node->info->find("url");
+            const auto* urls = url < 0 ? nullptr : std::get_if<std::vector<Url>>(&node->value(url));
+            if (urls == nullptr || urls->empty()) return;
+            const auto found = pictures.find(urls->front().objectDescriptorId);
+            if (found != pictures.end() && found->second > 1) moving.insert(found->first);
+        });
+        const auto routes =
+            std::count_if(scene.routes.begin(), scene.routes.end(),
+                          [&](const Route& route) { return inViews.contains(route.to.get()); });
+        if (routes > 0)
+            job_.note(fmt::format("{} ROUTE(s) change the views in time; only their start is read",
+                                  routes));
+        if (!moving.empty())
+            job_.note(
+                fmt::format("{} image(s) of the views have several pictures in time; only "
+                            "the first of each is read",
+                            moving.size()));
+    }
+
     std::string freeName(const NodePtr& node, const ViewNotes& notes) {
         std::string name = node->defName;
         if (const auto own = notes.names.find(name); own != notes.names.end()) name = own->second;

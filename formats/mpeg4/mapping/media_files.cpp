@@ -1,3 +1,4 @@
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -47,6 +48,7 @@ bool isPlainFileName(std::string_view name) {
 }
 
 std::string_view endingOf(const ElementaryStream& stream) {
+    if (needsTrackFile(stream)) return ".mp4";
     switch (stream.objectTypeIndication) {
         case oti::kJpeg:
             return ".jpg";
@@ -136,21 +138,30 @@ class MediaLoader {
     Result<void> loadTrack(ElementaryStream& stream, const std::string& file,
                            const std::string& track) {
         const auto id = integerFromText(track);
-        if (!id || *id < 1)
+        if (!id || *id < 1 || *id > 0xFFFFFFFF)
             return fail(ErrorCode::invalidInput, "'{}' names no track; expected FILE.mp4#NUMBER",
                         excerpt(stream.fileName));
         STX_TRY(const auto path, resolveInside(folder_, file, job_.limits));
         STX_TRY(const auto source, ByteSource::open(path));
-        STX_TRY(const auto other, readMp4(source, job_));
-        const ElementaryStream* found = nullptr;
-        for (const ObjectDescriptor* od : other.objectDescriptors())
-            for (const ElementaryStream& candidate : od->streams)
-                if (candidate.esId == static_cast<std::uint32_t>(*id)) found = &candidate;
-        if (!found) return fail(ErrorCode::invalidInput, "'{}' has no media track {}", file, *id);
-        stream.samples = found->samples;
-        stream.timescale = found->timescale;
-        stream.width = found->width;
-        stream.height = found->height;
+        STX_TRY(auto found, readMp4Stream(source, static_cast<std::uint32_t>(*id), job_));
+        // What the text says of the start of the stream delays the track.
+        const double start = stream.samples.empty()
+                                 ? 0
+                                 : static_cast<double>(stream.samples[0].time) / stream.timescale;
+        const auto delay = static_cast<std::uint64_t>(std::llround(start * found.timescale));
+        for (Sample& sample : found.samples) sample.time += delay;
+        stream.samples = std::move(found.samples);
+        stream.timescale = found.timescale;
+        stream.edits = std::move(found.edits);
+        stream.width = found.width;
+        stream.height = found.height;
+        stream.sampleEntry = std::move(found.sampleEntry);
+        stream.handler = std::move(found.handler);
+        if (stream.objectTypeIndication == 0)
+            stream.objectTypeIndication = found.objectTypeIndication;
+        if (stream.streamType == StreamType::none) stream.streamType = found.streamType;
+        if (stream.decoderSpecificInfo.empty())
+            stream.decoderSpecificInfo = std::move(found.decoderSpecificInfo);
         return {};
     }
 
@@ -161,6 +172,23 @@ class MediaLoader {
 };
 
 }  // namespace
+
+bool needsTrackFile(const ElementaryStream& stream) {
+    if (stream.samples.empty()) return false;
+    const bool image =
+        stream.objectTypeIndication == oti::kJpeg || stream.objectTypeIndication == oti::kPng;
+    if (!stream.sampleEntry.empty() || !stream.edits.edits.empty()) return true;
+    if (!image && stream.samples.size() > 1) return true;
+    const Sample& first = stream.samples.front();
+    std::uint64_t time = first.time;
+    for (const Sample& sample : stream.samples) {
+        if (sample.time != time || sample.duration != first.duration || !sample.sync ||
+            sample.compositionOffset != 0)
+            return true;
+        time += sample.duration;
+    }
+    return false;
+}
 
 Result<void> loadMedia(Document& document, const std::filesystem::path& folder, Job& job) {
     std::size_t files = 0;
@@ -214,7 +242,7 @@ std::vector<std::string> mediaFileNames(const Document& document) {
             for (int n = 1; !taken.insert(key(name)).second; ++n)
                 name = fmt::format("{}_od{}{}{}", stem, odId, n > 1 ? fmt::format("_{}", n) : "",
                                    tail);
-            if (stream.samples.size() > 1) {
+            if (stream.samples.size() > 1 && ending != ".mp4") {
                 const auto at = name.rfind('.');
                 name.insert(at, "_%04d");
             }
