@@ -43,6 +43,7 @@ Json viewJson(const ReferenceView& view) {
               {"nearPlane", view.nearPlane},
               {"farPlane", view.farPlane}};
     addLens(view.camera, j);
+    if (view.pruned) j["pruned"] = true;
     return j;
 }
 
@@ -318,14 +319,15 @@ std::string describeAsText(const Json& info) {
             }
             out += fmt::format(
                 "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, fieldOfView {:.6g} {:.6g}, "
-                "at {:.6g} {:.6g} {:.6g}{}\n",
+                "at {:.6g} {:.6g} {:.6g}{}{}\n",
                 i++, text(v["name"]), text(v["width"]), text(v["height"]), text(v["depthBits"]),
                 v["nearPlane"].get<double>(), v["farPlane"].get<double>(),
                 v["orthographic"].get<bool>() ? "orthographic" : "perspective",
                 v["fieldOfView"][0].get<double>(), v["fieldOfView"][1].get<double>(),
                 v["position"][0].get<double>(), v["position"][1].get<double>(),
                 v["position"][2].get<double>(),
-                v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "");
+                v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "",
+                v.contains("pruned") ? ", pruned" : "");
         }
     }
     if (info.contains("streams")) {
