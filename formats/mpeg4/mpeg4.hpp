@@ -46,8 +46,8 @@ struct Mpeg4WriteOptions {
 
 namespace mpeg4 {
 
-/// Whether a text has to keep a stream in an .mp4 of its own: it is no image, or its times say more
-/// than a start and a rate.
+/// Whether a text has to keep a stream in an .mp4 of its own, named as `file.mp4#1`, which other
+/// programs read, too: it has several pictures, or a sample entry or edits of its own.
 [[nodiscard]] bool needsTrackFile(const ElementaryStream& stream);
 
 /// Opens the files that the streams of a document (from a text) name, found in `folder`. Streams

@@ -59,10 +59,15 @@ std::string_view endingOf(const ElementaryStream& stream) {
     }
 }
 
-/// What the object descriptors of a scene are for: `front_depth` for the depth of DepthImage
-/// `front`.
-std::map<int, std::string> rolesOf(const Document& document) {
-    std::map<int, std::string> roles;
+/// What an image is for: the depth of DepthImage `front`.
+struct Role {
+    std::string view, field;
+    [[nodiscard]] std::string name() const { return view + "_" + field; }
+};
+
+/// What the object descriptors of a scene are for.
+std::map<int, Role> rolesOf(const Document& document) {
+    std::map<int, Role> roles;
     int count = 0;
     const auto visit = [&](const NodePtr& node) {
         const int index = node->info->find("diTexture");
@@ -80,7 +85,7 @@ std::map<int, std::string> rolesOf(const Document& document) {
                 for (const Url& one : *urls)
                     if (one.objectDescriptorId != 0)
                         roles.try_emplace(one.objectDescriptorId,
-                                          base + "_" + (*texture)->info->fields[field.index].name);
+                                          Role{base, (*texture)->info->fields[field.index].name});
         }
     };
     for (const CommandFrame& frame : document.frames)
@@ -113,7 +118,7 @@ class MediaLoader {
             return fail(ErrorCode::invalidInput, "'{}' is no name of {} file(s)",
                         excerpt(stream.fileName), stream.samples.size());
         for (std::size_t i = 0; i < names.size(); ++i) {
-            STX_TRY(const auto path, resolveInside(folder_, names[i], job_.limits));
+            STX_TRY(const auto path, find(names[i]));
             STX_TRY(stream.samples[i].data, open(path));
         }
         if (stream.samples.empty()) return {};
@@ -123,6 +128,16 @@ class MediaLoader {
         if (stream.objectTypeIndication == 0) stream.objectTypeIndication = typeOf(bytes);
         if (stream.streamType == StreamType::none) stream.streamType = StreamType::visual;
         return {};
+    }
+    /// Where it is named, else beside the text: other programs write names as seen from where they
+    /// ran, and files get moved together.
+    Result<std::filesystem::path> find(const std::string& name) const {
+        auto path = resolveInside(folder_, name, job_.limits);
+        if (path) return path;
+        const auto slash = name.find_last_of("/\\");
+        if (slash == std::string::npos) return path;
+        auto beside = resolveInside(folder_, name.substr(slash + 1), job_.limits);
+        return beside ? beside : path;
     }
     Result<ByteRange> open(const std::filesystem::path& path) {
         if (!many_) {
@@ -141,7 +156,7 @@ class MediaLoader {
         if (!id || *id < 1 || *id > 0xFFFFFFFF)
             return fail(ErrorCode::invalidInput, "'{}' names no track; expected FILE.mp4#NUMBER",
                         excerpt(stream.fileName));
-        STX_TRY(const auto path, resolveInside(folder_, file, job_.limits));
+        STX_TRY(const auto path, find(file));
         STX_TRY(const auto source, ByteSource::open(path));
         STX_TRY(auto found, readMp4Stream(source, static_cast<std::uint32_t>(*id), job_));
         // What the text says of the start of the stream delays the track.
@@ -175,19 +190,10 @@ class MediaLoader {
 
 bool needsTrackFile(const ElementaryStream& stream) {
     if (stream.samples.empty()) return false;
-    const bool image =
-        stream.objectTypeIndication == oti::kJpeg || stream.objectTypeIndication == oti::kPng;
     if (!stream.sampleEntry.empty() || !stream.edits.edits.empty()) return true;
-    if (!image && stream.samples.size() > 1) return true;
+    if (stream.samples.size() > 1) return true;
     const Sample& first = stream.samples.front();
-    std::uint64_t time = first.time;
-    for (const Sample& sample : stream.samples) {
-        if (sample.time != time || sample.duration != first.duration || !sample.sync ||
-            sample.compositionOffset != 0)
-            return true;
-        time += sample.duration;
-    }
-    return false;
+    return !first.sync || first.compositionOffset != 0;
 }
 
 Result<void> loadMedia(Document& document, const std::filesystem::path& folder, Job& job) {
@@ -228,7 +234,7 @@ std::vector<std::string> mediaFileNames(const Document& document) {
                               (ending == ".bin" && !own.empty());
             if (!isPlainFileName(name) || !fits) {
                 const auto role = roles.find(odId);
-                name = (role != roles.end() ? role->second : fmt::format("od{}", odId)) +
+                name = (role != roles.end() ? role->second.name() : fmt::format("od{}", odId)) +
                        std::string(ending);
             }
             const auto end = name.rfind('.');
@@ -242,10 +248,6 @@ std::vector<std::string> mediaFileNames(const Document& document) {
             for (int n = 1; !taken.insert(key(name)).second; ++n)
                 name = fmt::format("{}_od{}{}{}", stem, odId, n > 1 ? fmt::format("_{}", n) : "",
                                    tail);
-            if (stream.samples.size() > 1 && ending != ".mp4") {
-                const auto at = name.rfind('.');
-                name.insert(at, "_%04d");
-            }
             names.push_back(name);
             return {};
         });
