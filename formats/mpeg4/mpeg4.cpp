@@ -177,7 +177,9 @@ Result<void> writeMpeg4(const Mpeg4Document& document, const std::filesystem::pa
     STX_TRY(auto file, OutputFile::create(path, options.output));
     Mp4WriteOptions mp4;
     mp4.style = options.style;
-    STX_CHECK(writeMp4(document, file, job, mp4));
+    Document named = document;
+    nameTracks(named);
+    STX_CHECK(writeMp4(named, file, job, mp4));
     return file.commit();
 }
 

@@ -56,6 +56,11 @@ namespace mpeg4 {
 [[nodiscard]] Result<void> loadMedia(Document& document, const std::filesystem::path& folder,
                                      Job& job);
 
+/// In a scene that was made from a bundle, says what the tracks of its images are for: each gets a
+/// name, they are alternatives to each other, and only colour is enabled, so that players that know
+/// no scenes show no depth as a video. Other scenes stay as they are.
+void nameTracks(Document& document);
+
 /// Names for the files of all streams, each once: their own name where it is a plain one, else what
 /// they are for (`front_depth.png`, from the DEF name of the DepthImage), else by object
 /// descriptor. In the order of the streams in document.odFrames; empty for streams without samples.

@@ -176,6 +176,7 @@ class Writer {
         track.handler = visual ? "vide" : out.streamType == StreamType::audio ? "soun" : "gesm";
         if (ownEntry && out.handler.size() == 4) track.handler = out.handler;
         track.handlerName = visual ? "MPEG-4 image" : "MPEG-4 stream";
+        if (!stream.trackName.empty()) track.handlerName = stream.trackName;
         STX_CHECK(finish(track, what));
         return track;
     }

@@ -266,9 +266,12 @@ Result<void> writeTrack(ByteWriter& out, const Track& track, std::uint32_t times
     const BoxScope trak(out, "trak");
     {
         const std::uint64_t duration = movieDuration(track, timescale);
-        const BoxScope tkhd(out, "tkhd", needsWide(duration) ? 1 : 0, isSystems(track) ? 1 : 7);
+        const std::uint32_t flags = isSystems(track) ? 1 : track.stream.enabled ? 7 : 6;
+        const BoxScope tkhd(out, "tkhd", needsWide(duration) ? 1 : 0, flags);
         writeTimes(out, needsWide(duration), track.id, true, duration);
-        out.zeros(16);
+        out.zeros(10);  // and the layer
+        out.u16(static_cast<std::uint16_t>(track.stream.alternateGroup));
+        out.zeros(4);
         writeMatrix(out);
         out.u32(static_cast<std::uint32_t>(track.stream.width) << 16);
         out.u32(static_cast<std::uint32_t>(track.stream.height) << 16);

@@ -54,6 +54,9 @@ struct SceneReadOptions {
 /// or "none"; the richest where there are several.
 [[nodiscard]] const char* nodeKindOf(const Document& document);
 
+/// The first string of the WorldInfo of scenes that are made from bundles.
+inline constexpr const char* kMadeByUs = "made by stx";
+
 struct SceneWriteOptions {
     enum class Texture { png, jpeg };
     enum class Nodes { automatic, v1, v2 };  ///< automatic: V2 for views with normals or splats

@@ -127,7 +127,7 @@ class SceneWriter {
         NodePtr worldInfo = makeNode("WorldInfo");
         worldInfo->set("title", bundle_.title);
         std::vector<std::string> info = notes.text();
-        info.insert(info.begin(), "made by stx");
+        info.insert(info.begin(), kMadeByUs);
         worldInfo->set("info", std::move(info));
         children.insert(children.begin(), worldInfo);
         NodePtr group = makeNode(type);

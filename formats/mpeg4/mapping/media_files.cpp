@@ -207,6 +207,28 @@ Result<void> loadMedia(Document& document, const std::filesystem::path& folder, 
         document, [&](ElementaryStream& stream, int odId) { return loader.load(stream, odId); });
 }
 
+void nameTracks(Document& document) {
+    bool ours = false;
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands)
+            forEachNode(command, [&](const NodePtr& node) {
+                if (!node->is("WorldInfo")) return;
+                const auto& info = node->get<std::vector<std::string>>("info");
+                ours = ours || (!info.empty() && info.front() == kMadeByUs);
+            });
+    if (!ours) return;
+    const auto roles = rolesOf(document);
+    const auto done = forEachStream(document, [&](ElementaryStream& stream, int odId) {
+        const auto role = roles.find(odId);
+        if (role == roles.end()) return Result<void>();
+        stream.trackName = role->second.view + " " + role->second.field;
+        stream.alternateGroup = 1;
+        stream.enabled = role->second.field == "texture";
+        return Result<void>();
+    });
+    (void)done;  // the body never fails
+}
+
 std::vector<std::string> mediaFileNames(const Document& document) {
     std::vector<std::string> names;
     std::set<std::string> taken;

@@ -176,6 +176,49 @@ TEST(Mpeg4Files, DumpsOfAnotherProgramAreReadBesideTheirFile) {
     }
 }
 
+/// Players that know no scenes take every image track for a video.
+TEST(Mpeg4Files, OnlyColourTracksAreEnabledInScenesOfOurs) {
+    const TemporaryFolder folder("enabled");
+    Job job;
+    const Document scene = sceneOf(twoViews());
+    mustWrite(writeMpeg4(scene, folder / "a.mp4", job));
+    const Bytes bytes = bytesOfFile(folder / "a.mp4");
+    const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    int enabled = 0, disabled = 0;
+    for (std::size_t at = file.find("tkhd"); at != std::string_view::npos;
+         at = file.find("tkhd", at + 1)) {
+        const std::string_view name = file.substr(file.find("hdlr", at) + 28);
+        const bool image = name.starts_with("view");
+        const int flags = file[at + 7], group = file[at + 4 + 4 + 20 + 8 + 3];
+        if (!image) {
+            EXPECT_EQ(flags, 1) << "scene and descriptors";
+            continue;
+        }
+        EXPECT_EQ(group, 1) << name.substr(0, 20);
+        const bool colour = name.substr(0, name.find('\0')).ends_with(" texture");
+        EXPECT_EQ(flags, colour ? 7 : 6) << name.substr(0, 20);
+        ++(colour ? enabled : disabled);
+    }
+    EXPECT_EQ(enabled, 2);
+    EXPECT_EQ(disabled, 5);
+    // Through a text the same; a scene of others stays as it is.
+    mustWrite(writeMpeg4(scene, folder / "a.bt", job));
+    const auto text = readMpeg4(folder / "a.bt", job);
+    ASSERT_TRUE(text);
+    mustWrite(writeMpeg4(*text, folder / "b.mp4", job));
+    EXPECT_EQ(bytesOfFile(folder / "b.mp4"), bytes);
+    Document foreign = scene;
+    for (CommandFrame& frame : foreign.frames)
+        for (Command& command : frame.commands)
+            forEachNode(command, [](const NodePtr& node) {
+                if (node->is("WorldInfo")) node->set("info", std::vector<std::string>());
+            });
+    mustWrite(writeMpeg4(foreign, folder / "c.mp4", job));
+    const auto plain = writeMp4(foreign, job);
+    ASSERT_TRUE(plain);
+    EXPECT_EQ(bytesOfFile(folder / "c.mp4"), *plain);
+}
+
 TEST(Mpeg4Files, NothingIsReplacedWithNoClobber) {
     Job job;
     const auto document = sceneOf(twoViews());
