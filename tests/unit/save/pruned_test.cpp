@@ -2,7 +2,10 @@
 // distance") in every container that a bundle can be written to.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "formats/imagesets/export.hpp"
+#include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/save.hpp"
 #include "lib/packing/prune.hpp"
 #include "lib/quality/view_quality.hpp"
@@ -128,6 +131,32 @@ TEST(Pruned, ADamagedMaskIsANote) {
     const auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("no base64"), std::string::npos) << notes[0];
+}
+
+/// Whatever is in the mask, the file is read; what is marked has no depth.
+TEST(Pruned, MasksWithChangedBytesCostNothingButTheMark) {
+    const Bundle bundle = prunedTorus();
+    ReferenceView view = bundle.views[0];
+    const auto mask = mpeg4::prunedMask(*view.texture.rgba8(), view.depth);
+    ASSERT_TRUE(mask);
+    std::mt19937 random(3);
+    int applied = 0;
+    for (int i = 0; i < 2000; ++i) {
+        std::string changed = *mask;
+        for (unsigned n = random() % 3 + 1; n > 0; --n)
+            changed[random() % changed.size()] = static_cast<char>(random() % 128);
+        if (i % 4 == 0) changed.resize(random() % changed.size());
+        ReferenceView marked = view;
+        marked.pruned = false;
+        if (!mpeg4::applyPrunedMask(marked, changed, Limits())) {
+            EXPECT_FALSE(marked.pruned);
+            EXPECT_EQ(marked.texture, view.texture);
+        } else {
+            ++applied;
+        }
+        EXPECT_EQ(marked.depth, view.depth);
+    }
+    EXPECT_LT(applied, 200) << "a PNG has checksums";
 }
 
 }  // namespace
