@@ -105,7 +105,9 @@ std::optional<Grid> gridOfPictures(const Bundle& bundle, int resolution) {
         if (std::abs(view.camera.fx / f - 1) > 1e-5 || std::abs(view.camera.fy / f - 1) > 1e-5)
             return {};
     const glm::dvec3 size = bundle.bounds->max - bundle.bounds->min;
-    glm::dvec3 count = glm::round(size * f);
+    const glm::dvec3 count = glm::round(size * f);
+    // Coarser voxels than were asked for are no octree of so many levels.
+    if (std::max({count.x, count.y, count.z}) * 2 <= resolution) return {};
     for (int axis = 0; axis < 3; ++axis)
         if (count[axis] < 1 || count[axis] > resolution ||
             std::abs(size[axis] * f - count[axis]) > 0.01)
