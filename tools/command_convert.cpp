@@ -23,6 +23,7 @@ struct ConvertOptions {
     std::string colour = "png";
     std::optional<int> quality;
     bool pointTexture = false;
+    int octreeLevels = 0;
     OpenOptions open;
     std::string frames;  ///< A-B
     BatchOptions batch;
@@ -41,6 +42,7 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     save.noClobber = program.common.noClobber;
     save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
     save.pointTexture = o.pointTexture;
+    save.octreeLevels = o.octreeLevels;
     return save;
 }
 
@@ -202,6 +204,11 @@ void addConvert(CommandLine& line, Program& program) {
         .group(coding);
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100).group(coding);
     c.flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)").group(coding);
+    c.option("--octree-image", o->octreeLevels,
+             "Write an OctreeImage (MPEG-4): 2^LEVELS voxels on a side, a picture for each view")
+        .range(1, 16)
+        .takes("LEVELS")
+        .group(coding);
     const char* many = "Many inputs";
     c.option("--jobs,-j", o->batch.jobs,
              "Inputs at a time, each in a process of its own (default 1)")

@@ -101,6 +101,7 @@ void addOwnKeys(Json& json, const ReferenceView& view) {
     json["nearPlane"] = view.nearPlane;
     json["farPlane"] = view.farPlane;
     json["depthBits"] = view.depthBits;
+    if (view.pruned) json["stx:pruned"] = true;
 }
 
 Json transformsFrame(const ReferenceView& view, const std::string& name, const char* depthEnding) {

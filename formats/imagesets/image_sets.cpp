@@ -10,12 +10,9 @@
 #include "lib/registration/refine_poses.hpp"
 
 namespace stx {
-namespace {
 
-using namespace imagesets;
-
-Result<SetDescription> describe(const std::filesystem::path& path, const ImageSetOptions& options,
-                                Job& job) {
+Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
+                                                         const ImageSetOptions& options, Job& job) {
     std::string kind = options.from;
     if (kind.empty()) {
         STX_TRY(kind, recogniseImageSet(path));
@@ -32,6 +29,10 @@ Result<SetDescription> describe(const std::filesystem::path& path, const ImageSe
     }
     return entry->describe(path, options, job);
 }
+
+namespace {
+
+using namespace imagesets;
 
 Result<void> checkOptions(const ImageSetOptions& o) {
     if (o.depthBits != 8 && o.depthBits != 16 && o.depthBits != 32)
@@ -91,7 +92,7 @@ Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
 Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
                             Job& job) {
     STX_CHECK(checkOptions(options));
-    STX_TRY(SetDescription set, describe(path, options, job));
+    STX_TRY(SetDescription set, describeSet(path, options, job));
     const std::string where = inQuotes(path.string());
     if (options.every > 1) {
         std::vector<SetView> some;
@@ -101,6 +102,9 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     }
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+    for (const SetView& view : set.views)
+        for (const PictureSource* source : {&view.texture, &view.depth})
+            if (source->missing) return tl::unexpected(*source->missing);
     if (options.frame >= set.frames)
         return failAt(where, ErrorCode::invalidInput,
                       "frame {} is asked for, but the set has {} (from 0)", options.frame,
@@ -153,7 +157,7 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
 Result<int> imageSetFrameCount(const std::filesystem::path& path, const ImageSetOptions& options,
                                Job& job) {
     STX_CHECK(checkOptions(options));
-    STX_TRY(const SetDescription set, describe(path, options, job));
+    STX_TRY(const SetDescription set, describeSet(path, options, job));
     return set.frames;
 }
 

@@ -31,6 +31,11 @@ Result<Json> readJson(const path& file, const Limits& limits) {
 Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view) {
     STX_TRY(const auto name, findText(camera, "stx:name", where));
     view.exactName = name.value_or("");
+    if (const auto it = camera.find("stx:pruned"); it != camera.end()) {
+        if (!it->is_boolean())
+            return failAt(where, ErrorCode::invalidInput, "'stx:pruned' must be true or false");
+        view.pruned = it->get<bool>();
+    }
     STX_TRY(const auto q, findNumbers(camera, "stx:quaternion", 4, where));
     if (q) {
         const glm::dquat exact((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
@@ -87,8 +92,16 @@ Result<PictureSource> sourceInside(const path& folder, const std::string& name,
     PictureSource source;
     source.name = name;
     auto file = resolveInside(folder, name, limits);
-    if (!file) return tl::unexpected(where.empty() ? file.error() : file.error().at(where));
-    source.path = std::move(*file);
+    if (file) {
+        source.path = std::move(*file);
+        return source;
+    }
+    Error error = where.empty() ? file.error() : file.error().at(where);
+    std::error_code ec;
+    if (error.code != ErrorCode::io || std::filesystem::exists(folder / name, ec))
+        return tl::unexpected(std::move(error));
+    source.path = folder / name;
+    source.missing = std::move(error);
     return source;
 }
 

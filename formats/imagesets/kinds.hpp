@@ -25,6 +25,10 @@ using std::filesystem::path;
 [[nodiscard]] Result<SetDescription> describeCamerasJson(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describePanorama(const path&, const ImageSetOptions&, Job&);
 
+/// By options.from, or whatever kind the path is recognised as. Files that the set names and that
+/// are not there are no errors yet: PictureSource::missing.
+[[nodiscard]] Result<SetDescription> describeSet(const path&, const ImageSetOptions&, Job&);
+
 /// What a JSON file with cameras is.
 enum class JsonKind { transforms, miv, cameras, none };
 [[nodiscard]] JsonKind jsonKindOf(const Json& file);
@@ -45,7 +49,8 @@ enum class JsonKind { transforms, miv, cameras, none };
 [[nodiscard]] std::string firstThere(const path& folder, const std::vector<std::string>& names);
 /// `name` as given, or with the ending of a usual image format.
 [[nodiscard]] std::string withImageEnding(const path& folder, const std::string& name);
-/// resolveInside with the place of the error; fills path and name.
+/// resolveInside with the place of the error; fills path and name. A file that is not there is no
+/// error, but PictureSource::missing.
 [[nodiscard]] Result<PictureSource> sourceInside(const path& folder, const std::string& name,
                                                  const std::string& where, const Limits& limits);
 /// Names of the regular files in a folder, sorted.

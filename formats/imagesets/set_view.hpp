@@ -21,6 +21,7 @@ struct PictureSource {
     std::string name;              ///< for messages, not quoted
     std::optional<YuvFormat> yuv;  ///< raw planes; else by the file (images, PFM)
     int frame = 0;                 ///< of raw planes
+    std::optional<Error> missing;  ///< why there is no such file; reading it then ends with this
     bool colmap = false;           ///< COLMAP's depth maps: `w&h&c&` and floats
 };
 
@@ -58,6 +59,7 @@ struct SetView {
     /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
     int depthBits = 0;      ///< with planes: 8, 16, 32
+    bool pruned = false;    ///< see ReferenceView::pruned
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
 };
 

@@ -15,6 +15,7 @@ struct SaveOptions {
     bool noClobber = false;     ///< error (io) when the target exists
     int jpegQuality = 0;        ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
     bool pointTexture = false;  ///< MPEG-4: PointTexture nodes instead of SimpleTexture
+    int octreeLevels = 0;       ///< MPEG-4: an OctreeImage of 1..16 levels; 0 = none
 };
 
 }  // namespace stx

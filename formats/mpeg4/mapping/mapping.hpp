@@ -34,8 +34,10 @@ struct SceneReadOptions {
     std::filesystem::path folder;
     ImageDecoder decode = decodeImage;
     /// Without pixels only headers are read: the views have cameras, planes and depthBits, but
-    /// empty images, and a PointTexture gives one view.
+    /// empty images.
     bool pixels = true;
+    /// A scene that shows no view gives a bundle without any, instead of an error.
+    bool mayBeEmpty = false;
 };
 
 /// The object of a presentation as it is at its first moment: a view for each DepthImage (and
@@ -52,6 +54,9 @@ struct SceneReadOptions {
 /// or "none"; the richest where there are several.
 [[nodiscard]] const char* nodeKindOf(const Document& document);
 
+/// The first string of the WorldInfo of scenes that are made from bundles.
+inline constexpr const char* kMadeByUs = "made by stx";
+
 struct SceneWriteOptions {
     enum class Texture { png, jpeg };
     enum class Nodes { automatic, v1, v2 };  ///< automatic: V2 for views with normals or splats
@@ -62,15 +67,19 @@ struct SceneWriteOptions {
     Nodes nodes = Nodes::automatic;
     /// PointTexture instead of SimpleTexture; the colours are in the scene itself.
     bool pointTexture = false;
+    /// OctreeImage of so many levels instead of depth images, see octree_write.hpp; 0: none.
+    int octreeLevels = 0;
 };
 
-/// A presentation of a bundle: Group { WorldInfo, DepthImage... }, the WorldInfo with title and
-/// bounds (computed where the bundle has none). Field values are rounded to float, planes outwards.
-/// A principal point off the centre is centred by padding with pixels without a point (see
-/// placement.hpp) and noted; reading the scene back here undoes it. What is lossy is noted: float
-/// depth and 8 bits with the largest error, JPEG, linear colour, what V1 cannot hold. Errors:
-/// (unsupported) more images than MPEG-4 has object descriptors for, or images that padding makes
-/// too large; (usage) options out of range; what Bundle::check() says.
+/// A presentation of a bundle: Group { WorldInfo, DepthImage..., Viewpoint, NavigationInfo }, the
+/// WorldInfo with title and bounds (computed where the bundle has none); with octreeLevels Group {
+/// WorldInfo, OctreeImage }, under a Transform where the object is not in the unit cube. Field
+/// values are rounded to float, planes outwards. A principal point off the centre is centred by
+/// padding with pixels without a point (see placement.hpp) and noted; reading the scene back here
+/// undoes it. What is lossy is noted: float depth and 8 bits with the largest error, JPEG, linear
+/// colour, what V1 cannot hold. Errors: (unsupported) more images than MPEG-4 has object
+/// descriptors for, or images that padding makes too large; (usage) options out of range; what
+/// Bundle::check() says.
 [[nodiscard]] Result<Document> sceneFromBundle(const Bundle& bundle,
                                                const SceneWriteOptions& options, Job& job);
 

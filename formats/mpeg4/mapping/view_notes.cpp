@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "formats/files/base64.hpp"
+#include "formats/images/images.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 
 namespace stx::mpeg4 {
@@ -66,6 +68,11 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             pad.cx = *cx;
             pad.cy = *cy;
             notes.paddings[std::string(w[1])] = pad;
+        } else if (line.starts_with("pruned ")) {
+            const auto w = words(line, 4);
+            const auto layer = w.size() == 4 ? integerFromText(w[2]) : std::nullopt;
+            if (layer && *layer >= 0 && *layer <= 1 << 20)
+                notes.pruned[{std::string(w[1]), static_cast<int>(*layer)}] = w[3];
         }
     }
     return notes;
@@ -81,6 +88,8 @@ std::vector<std::string> ViewNotes::text() const {
     for (const auto& [defName, pad] : paddings)
         info.push_back(fmt::format("padding {} {} {} {} {} {} {}", defName, pad.left, pad.top,
                                    pad.right, pad.bottom, pad.cx, pad.cy));
+    for (const auto& [key, where] : pruned)
+        info.push_back(fmt::format("pruned {} {} {}", key.first, key.second, where));
     return info;
 }
 
@@ -100,6 +109,36 @@ void removePadding(ReferenceView& view, const ViewNotes::Pad& pad) {
     c.height = height;
     c.cx = pad.cx;
     c.cy = pad.cy;
+}
+
+Result<std::string> prunedMask(const Rgba8Image& texture, const Image<float>& depth) {
+    std::vector<std::uint8_t> grey(texture.count());
+    for (std::size_t i = 0; i < grey.size(); ++i)
+        grey[i] = texture.pixels()[i].a == 255 && !hasPoint(depth.pixels()[i]) ? 255 : 0;
+    STX_TRY(const auto png, encodePng(texture.width(), texture.height(), 1, 8, grey.data(), false));
+    return encodeBase64(png);
+}
+
+Result<void> applyPrunedMask(ReferenceView& view, const std::string& mask, const Limits& limits) {
+    const auto png = decodeBase64(mask);
+    if (!png) return fail(ErrorCode::invalidInput, "the mask of its pruned pixels is no base64");
+    STX_TRY(const auto header, probeImage(*png));
+    if (header.format != "png" || header.channels != 1 || header.bits != 8 ||
+        header.width != view.depth.width() || header.height != view.depth.height())
+        return fail(ErrorCode::invalidInput,
+                    "the mask of its pruned pixels is a {} of {}x{}; a grey PNG of {}x{} is "
+                    "expected",
+                    header.format, header.width, header.height, view.depth.width(),
+                    view.depth.height());
+    STX_TRY(const auto image, decodeImage(*png, "the mask of pruned pixels", limits));
+    const auto* grey = std::get_if<std::vector<std::uint8_t>>(&image.values);
+    Rgba8Image* texture = view.texture.rgba8();
+    if (!grey || !texture || grey->size() != texture->count())
+        return fail(ErrorCode::invalidInput, "the mask of its pruned pixels does not fit it");
+    for (std::size_t i = 0; i < grey->size(); ++i)
+        if ((*grey)[i] != 0 && !hasPoint(view.depth.pixels()[i])) texture->pixels()[i].a = 255;
+    view.pruned = true;
+    return {};
 }
 
 }  // namespace stx::mpeg4
