@@ -7,6 +7,7 @@
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/origin.hpp"
 #include "lib/registration/refine_poses.hpp"
 
 namespace stx {
@@ -86,6 +87,38 @@ Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
     return {};
 }
 
+/// Cameras of an export of ours count from its origin, to the bit as they were.
+void useOrigin(SetDescription& set) {
+    if (!set.origin) return;
+    for (SetView& view : set.views) {
+        const glm::dvec3 local = view.camera.position - *set.origin;
+        // Equal but for the rounding of the sum, unless somebody moved the camera since.
+        const double slack = 1e-12 * (1 + glm::length(*set.origin));
+        view.camera.position =
+            view.localPosition && glm::distance(*view.localPosition, local) <= slack
+                ? *view.localPosition
+                : local;
+    }
+}
+
+/// Bounds, and an origin where the coordinates of a set are too large for floats.
+void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
+    bundle.bounds = bundle.computeBounds();
+    if (set.origin) {
+        bundle.origin = *set.origin;
+        return;
+    }
+    const auto origin = originFor(*bundle.bounds);
+    if (origin == glm::dvec3(0.0)) return;
+    bundle.origin = origin;
+    for (ReferenceView& view : bundle.views) view.camera.position -= origin;
+    bundle.bounds = Bounds{bundle.bounds->min - origin, bundle.bounds->max - origin};
+    job.note(fmt::format(
+        "the coordinates are too large for 32-bit floats: the origin {} {} {} is subtracted, and "
+        "kept beside them",
+        origin.x, origin.y, origin.z));
+}
+
 }  // namespace
 
 Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
@@ -93,6 +126,7 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     STX_CHECK(checkOptions(options));
     STX_TRY(SetDescription set, describe(path, options, job));
     const std::string where = inQuotes(path.string());
+    useOrigin(set);
     if (options.every > 1) {
         std::vector<SetView> some;
         for (std::size_t i = 0; i < set.views.size(); i += static_cast<std::size_t>(options.every))
@@ -144,9 +178,9 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
         for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));
     }
     makeNamesUnique(bundle.views);
+    findOrigin(bundle, set, job);
     STX_CHECK(attendToPoses(bundle, set, options, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
-    bundle.bounds = bundle.computeBounds();
     return bundle;
 }
 

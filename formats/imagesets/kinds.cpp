@@ -38,6 +38,8 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
             std::abs(glm::dot(exact, view.camera.orientation)) > 1 - 1e-9)
             view.camera.orientation = exact;
     }
+    STX_TRY(const auto position, findNumbers(camera, "stx:position", 3, where));
+    if (position) view.localPosition = glm::dvec3((*position)[0], (*position)[1], (*position)[2]);
     STX_TRY(const auto window, findNumbers(camera, "stx:window", 4, where));
     if (window) {
         Camera& c = view.camera;
@@ -63,6 +65,12 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
     view.planes = DepthCode{*nearPlane, *farPlane, *bits == 8 ? 255u : 65535u};
     view.depthBits = *bits == 8 ? 8 : *bits == 32 ? 32 : 16;
     return {};
+}
+
+Result<std::optional<glm::dvec3>> originOf(const Json& file, const std::string& where) {
+    STX_TRY(const auto n, findNumbers(file, "stx:origin", 3, where));
+    if (!n) return std::optional<glm::dvec3>();
+    return std::optional(glm::dvec3((*n)[0], (*n)[1], (*n)[2]));
 }
 
 std::string firstThere(const path& folder, const std::vector<std::string>& names) {

@@ -36,10 +36,14 @@ enum class JsonKind { transforms, miv, cameras, none };
 [[nodiscard]] Result<std::vector<SetView>> mivViews(const Json& file, Job& job);
 [[nodiscard]] Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job);
 
-/// What our own export writes beside a camera (stx:name, stx:quaternion, stx:window, nearPlane,
-/// farPlane, depthBits), so that a bundle comes back to the bit. Values that contradict the camera
-/// are passed over.
+/// What our own export writes beside a camera (stx:name, stx:quaternion, stx:position, stx:window,
+/// nearPlane, farPlane, depthBits), so that a bundle comes back to the bit. Values that contradict
+/// the camera are passed over.
 [[nodiscard]] Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view);
+
+/// stx:origin of such an export.
+[[nodiscard]] Result<std::optional<glm::dvec3>> originOf(const Json& file,
+                                                         const std::string& where);
 
 /// The file in `folder` that has one of these names, in that order; empty when there is none.
 [[nodiscard]] std::string firstThere(const path& folder, const std::vector<std::string>& names);

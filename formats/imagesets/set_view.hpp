@@ -57,12 +57,15 @@ struct SetView {
     bool measured = false;  ///< stereo's disparities, whose edges lie beside the picture's
     /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
-    int depthBits = 0;      ///< with planes: 8, 16, 32
+    int depthBits = 0;                        ///< with planes: 8, 16, 32
+    std::optional<glm::dvec3> localPosition;  ///< of an export of ours that has an origin
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
 };
 
 struct SetDescription {
     std::string title;
+    std::optional<glm::dvec3>
+        origin;  ///< of an export of ours; cameras are in the world all the same
     std::vector<SetView> views;
     int frames = 1;
 };

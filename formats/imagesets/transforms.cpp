@@ -200,6 +200,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     STX_TRY(set.views, within(where, transformsViews(json, job)));
     STX_TRY(const auto title, within(where, findText(json, "stx:title", "")));
     set.title = title.value_or("");
+    STX_TRY(set.origin, originOf(json, where));
     STX_TRY(auto scale, within(where, findNumber(json, "integer_depth_scale", "")));
     if (!scale) {
         STX_TRY(scale, within(where, findNumber(json, "depth_unit_scale_factor", "")));

@@ -54,9 +54,11 @@ struct PointCloud {
     std::span<const glm::u8vec4> colours;  ///< sRGB, straight alpha
     std::span<const glm::vec3> normals;    ///< unit
     bool alpha = false;                    ///< write the colours' alpha, too
+    glm::dvec3 origin{0.0};                ///< added to the positions, gives the world's
 };
 
-/// How writePoints() codes .drc; .ply is always exact.
+/// How writePoints() codes .drc; .ply is always exact (with an origin: world coordinates as
+/// doubles; .drc has floats only, so it stays at the origin, with a note).
 struct PointWriteOptions {
     int positionBits = 16;  ///< bits per coordinate of the cloud's largest extent, 1..30; 0 = exact
     int normalBits = 10;    ///< bits per component, 2..30; 0 = exact

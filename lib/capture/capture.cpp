@@ -95,6 +95,7 @@ Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& camera
     if (bundle.views.empty())
         return fail(ErrorCode::invalidInput,
                     "none of the {} cameras sees the model; check their poses and units", n);
+    bundle.origin = mesh.origin;
     bundle.bounds = mesh.bounds();
     return bundle;
 }

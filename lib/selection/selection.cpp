@@ -96,6 +96,7 @@ Bundle keepViews(const Bundle& bundle, const std::vector<int>& views) {
     Bundle kept;
     kept.title = bundle.title;
     kept.bounds = bundle.bounds;
+    kept.origin = bundle.origin;
     for (const int v : sorted) kept.views.push_back(bundle.views[v]);
     return kept;
 }

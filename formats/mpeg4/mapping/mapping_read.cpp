@@ -61,6 +61,7 @@ class BundleReader {
         Bundle bundle;
         bundle.title = shown.title;
         bundle.bounds = notes.bounds;
+        bundle.origin = notes.origin;
         for (std::size_t i = 0; i < plans.size(); ++i) {
             if (!read[i])
                 return tl::unexpected(

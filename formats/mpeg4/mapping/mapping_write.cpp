@@ -49,6 +49,7 @@ class SceneWriter {
         STX_CHECK(job_.checkCancelled());
         NodeList children = {nullptr};  // WorldInfo, known at the end
         ViewNotes notes;
+        notes.origin = bundle_.origin;
         notes.bounds = bundle_.bounds ? bundle_.bounds : bundle_.computeBounds();
         for (std::size_t i = 0; i < bundle_.views.size(); ++i) {
             if (!images[i]) return tl::unexpected(images[i].error().at(viewName(i)));

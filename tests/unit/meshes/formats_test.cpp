@@ -30,8 +30,8 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
     const std::vector<glm::vec2> outline = {{0, 0}, {6, 0}, {6, 4}, {5, 1}, {4, 4},
                                             {3, 1}, {2, 4}, {1, 1}, {0, 4}};
     for (const bool reversed : {false, true}) {
-        std::vector<glm::vec3> corners;
-        for (const auto& p : outline) corners.emplace_back(p.x, p.y * 0.5f, p.y + p.x);
+        std::vector<glm::dvec3> corners;
+        for (const auto& p : outline) corners.emplace_back(p.x, p.y * 0.5, p.y + p.x);
         if (reversed) std::reverse(corners.begin(), corners.end());
         std::vector<glm::uvec3> triangles;
         triangulate(corners, triangles);
@@ -39,8 +39,7 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
         double sum = 0;
         glm::dvec3 whole(0.0);
         for (const auto& t : triangles) {
-            const auto area = glm::cross(glm::dvec3(corners[t.y] - corners[t.x]),
-                                         glm::dvec3(corners[t.z] - corners[t.x]));
+            const auto area = glm::cross(corners[t.y] - corners[t.x], corners[t.z] - corners[t.x]);
             sum += glm::length(area);
             whole += area;
         }
@@ -49,7 +48,7 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
 }
 
 TEST(Triangulate, NonsenseStillEnds) {
-    std::vector<glm::vec3> corners(50, glm::vec3(1));
+    std::vector<glm::dvec3> corners(50, glm::dvec3(1));
     std::vector<glm::uvec3> triangles;
     triangulate(corners, triangles);
     EXPECT_EQ(triangles.size(), 48u);
