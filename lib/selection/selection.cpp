@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/capture/capture.hpp"
 #include "lib/capture/rasterizer.hpp"
 #include "lib/selection/coverage.hpp"
 
@@ -115,7 +116,7 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
     ViewLayout layout;
     layout.kind = ViewLayout::Kind::sphere;
     layout.count = candidates.directions;
-    STX_TRY(const auto cameras, layoutCameras(layout, candidates.framing, mesh.positions));
+    STX_TRY(const auto cameras, layoutCameras(layout, candidates.framing, drawnPoints(mesh)));
 
     const auto count = static_cast<std::int64_t>(cameras.size());
     std::vector<CandidateView> views(cameras.size());
