@@ -228,6 +228,10 @@ void addConvert(CommandLine& line, Program& program) {
         .range(1, 1000000)
         .takes("N")
         .group(sets);
+    c.flag("--strict", o->open.set.strict,
+           "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
+           "it out")
+        .group(sets);
     const auto numbers = [&](const char* name, const char* type, const char* help,
                              std::vector<double*> to) {
         c.option(

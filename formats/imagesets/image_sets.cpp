@@ -101,6 +101,20 @@ void useOrigin(SetDescription& set) {
     }
 }
 
+/// Leaves out views whose files are not there, and says so. Errors when none is left, or `strict`.
+Result<void> dropMissing(SetDescription& set, bool strict, Job& job) {
+    const auto isMissing = [](const SetView& view) { return view.missing.has_value(); };
+    const auto first = std::ranges::find_if(set.views, isMissing);
+    if (first == set.views.end()) return {};
+    const auto all = set.views.size();
+    const Error error = *first->missing;
+    const auto dropped = std::erase_if(set.views, isMissing);
+    if (strict || set.views.empty()) return tl::unexpected(error);
+    job.note(fmt::format("{} of {} views {} left out, as files are missing; the first: {}", dropped,
+                         all, dropped == 1 ? "is" : "are", error.text()));
+    return {};
+}
+
 /// Bounds, and an origin where the coordinates of a set are too large for floats.
 void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
     bundle.bounds = bundle.computeBounds();
@@ -135,6 +149,7 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     }
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+    STX_CHECK(dropMissing(set, options.strict, job));
     if (options.frame >= set.frames)
         return failAt(where, ErrorCode::invalidInput,
                       "frame {} is asked for, but the set has {} (from 0)", options.frame,

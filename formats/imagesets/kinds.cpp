@@ -100,6 +100,20 @@ Result<PictureSource> sourceInside(const path& folder, const std::string& name,
     return source;
 }
 
+Result<void> findPictures(const path& folder, const std::string& texture, const std::string& depth,
+                          const std::string& where, const Limits& limits, SetView& view) {
+    for (const auto& [name, to] : {std::pair{&texture, &view.texture}, {&depth, &view.depth}}) {
+        auto source = sourceInside(folder, *name, where, limits);
+        if (source) {
+            *to = std::move(*source);
+        } else {
+            if (source.error().code != ErrorCode::io) return tl::unexpected(source.error());
+            if (!view.missing) view.missing = source.error();
+        }
+    }
+    return {};
+}
+
 std::vector<std::string> filesIn(const path& folder) {
     std::vector<std::string> names;
     std::error_code ec;

@@ -52,6 +52,11 @@ enum class JsonKind { transforms, miv, cameras, none };
 /// resolveInside with the place of the error; fills path and name.
 [[nodiscard]] Result<PictureSource> sourceInside(const path& folder, const std::string& name,
                                                  const std::string& where, const Limits& limits);
+/// The same for the two files of a view. One that does not exist is no error: it is in
+/// view.missing.
+[[nodiscard]] Result<void> findPictures(const path& folder, const std::string& texture,
+                                        const std::string& depth, const std::string& where,
+                                        const Limits& limits, SetView& view);
 /// Names of the regular files in a folder, sorted.
 [[nodiscard]] std::vector<std::string> filesIn(const path& folder);
 /// Errors when there are more views than limits.maxViews.

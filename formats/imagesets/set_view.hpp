@@ -51,6 +51,10 @@ struct SetView {
     /// Reads both, for kinds whose images are not files of their own.
     std::function<Result<StoredView>(const SetView&, Job&)> load;
 
+    /// Why one of its files is not there; the view is left out then, unless the set is read
+    /// strictly.
+    std::optional<Error> missing;
+
     Distances distances;  ///< null: the stored values are distances already
 
     bool sensor = false;    ///< mixed pixels at depth edges are to be expected

@@ -66,6 +66,7 @@ Result<void> MeshBuilder::charge(std::uint64_t count, std::uint64_t bytesEach,
 
 Result<void> MeshBuilder::add(MeshPart part) {
     STX_CHECK(job_.checkCancelled());
+    if (part.points) dropBrokenPoints(part);
     const auto count = part.positions.size();
     if (count == 0) return {};
     for (std::size_t i = 0; i < count; ++i) {
@@ -113,6 +114,33 @@ Result<void> MeshBuilder::add(MeshPart part) {
             mesh_.points.push_back(base + static_cast<std::uint32_t>(i));
     }
     return {};
+}
+
+void MeshBuilder::dropBrokenPoints(MeshPart& part) {
+    const auto count = part.positions.size();
+    std::vector<bool> broken(count);
+    std::uint64_t found = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        broken[i] = !finite(part.positions[i]);
+        found += broken[i] ? 1 : 0;
+    }
+    points_ += count;
+    brokenPoints_ += found;
+    if (found == 0) return;
+    const auto keep = [&](auto& values) {
+        if (values.empty()) return;
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            if (!broken[i]) values[kept++] = values[i];
+        }
+        values.resize(kept);
+    };
+    keep(part.positions);
+    keep(part.normals);
+    keep(part.tangents);
+    keep(part.colours);
+    keep(part.uvs);
+    keep(part.normalUvs);
 }
 
 void MeshBuilder::repair(MeshPart& part) {
@@ -260,7 +288,15 @@ Result<Mesh> MeshBuilder::finish() {
     }
     if (flatTriangles_ > 0)
         job_.note(fmt::format("{} triangles have no area and are left out", flatTriangles_));
+    if (brokenPoints_ > 0 && brokenPoints_ < points_)
+        job_.note(fmt::format("{} of {} points are at no finite place and are skipped",
+                              brokenPoints_, points_));
     if (mesh_.triangles.empty() && mesh_.points.empty()) {
+        if (brokenPoints_ > 0)
+            return fail(ErrorCode::invalidInput,
+                        "none of the model's {} points is at a finite place; positions must be "
+                        "finite numbers",
+                        points_);
         if (flatTriangles_ > 0)
             return fail(ErrorCode::invalidInput,
                         "the model has {} triangles, but none with an area, and no points",

@@ -37,7 +37,7 @@ class MeshBuilder {
                                       std::string_view what);
 
     /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite,
-    /// an index out of range.
+    /// an index out of range. Points of a cloud at no finite place are skipped and counted.
     /// Triangles without area are left out and counted; normals that are not directions are
     /// replaced by those of the triangles; uvs and colours that are not finite become 0.
     [[nodiscard]] Result<void> add(MeshPart part);
@@ -51,6 +51,7 @@ class MeshBuilder {
 
   private:
     void repair(MeshPart& part);
+    void dropBrokenPoints(MeshPart& part);
     void fillNormals();
     void roundPositions();
 
@@ -59,6 +60,7 @@ class MeshBuilder {
     std::vector<glm::dvec3> positions_;  ///< of all parts
     std::uint64_t charged_ = 0;
     std::uint64_t flatTriangles_ = 0;
+    std::uint64_t points_ = 0, brokenPoints_ = 0;
 };
 
 /// Gives each vertex the normal of its triangle; a vertex of several unlike triangles is doubled.

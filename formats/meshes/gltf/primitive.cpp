@@ -200,7 +200,8 @@ Result<Primitive> readPrimitive(GltfFile& model, MeshBuilder& builder, Materials
     const auto count = position->count;
     STX_CHECK(checkCount(position, count, 3, where, "POSITION"));
     part.positions = vectors<glm::dvec3>(*position);
-    for (std::size_t i = 0; i < count; ++i) {
+    // Points that are nowhere are left out later; a triangle needs all of its corners.
+    for (std::size_t i = 0; mode != 0 && i < count; ++i) {
         const auto p = part.positions[i];
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
             return fail(ErrorCode::invalidInput,

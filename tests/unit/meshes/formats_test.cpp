@@ -137,6 +137,30 @@ TEST(Ply, FaceColoursAndStrips) {
     }
 }
 
+TEST(Clouds, PointsThatAreNowhereAreSkippedAndCounted) {
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+        "float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+    const auto cloud = readGoodText(
+        header + "0 0 0 255 0 0\nnan nan nan 0 0 0\n1 0 0 0 0 255\n0 inf 0 9 9 9\n", "a.ply");
+    ASSERT_EQ(cloud.mesh.points.size(), 2u);
+    EXPECT_EQ(cloud.mesh.positions[1], glm::vec3(1, 0, 0));
+    EXPECT_EQ(cloud.mesh.colours[1], glm::vec4(0, 0, 1, 1));
+    EXPECT_TRUE(cloud.hasNote("2 of 4 points are at no finite place and are skipped"));
+    std::string none = header;
+    for (int i = 0; i < 4; ++i) none += "nan 0 0 0 0 0\n";
+    EXPECT_NE(readBadText(none, "a.ply").text().find("none of the model's 4 points"),
+              std::string::npos);
+
+    GltfText gltf;
+    const auto nan = std::numeric_limits<float>::quiet_NaN();
+    const int position =
+        gltf.accessor(std::vector<float>{0, 0, 0, nan, 0, 0, 1, 1, 0}, 5126, "VEC3", 3);
+    gltf.root["meshes"][0]["primitives"].push_back(
+        {{"attributes", {{"POSITION", position}}}, {"mode", 0}});
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.points.size(), 2u);
+}
+
 class WritePoints : public testing::Test {
   protected:
     WritePoints() {
