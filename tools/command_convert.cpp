@@ -193,7 +193,7 @@ void addConvert(CommandLine& line, Program& program) {
         .required()
         .takes("OUT");
     addMeshViewOptions(c, o->mesh);
-    c.option("--texture", o->open.texture, "Texture of a mesh that names none")
+    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group("Views of a mesh");
     const char* coding = "Coding";

@@ -299,7 +299,7 @@ void addRender(CommandLine& line, Program& program) {
         .group(output);
     c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
         .group(output);
-    c.option("--texture", o->open.texture, "Texture of a mesh that names none")
+    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group(output);
     c.sharedOptions(program.common, kOutput | kOutside);

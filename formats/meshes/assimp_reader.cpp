@@ -97,7 +97,7 @@ class SceneConverter {
             files_.job().note(
                 fmt::format("material '{}': option {} of map_Kd is dropped", m.name, option));
 
-        if (hasMap) {
+        if (hasMap && !files_.replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(source, aiTextureType_DIFFUSE, path));
             if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap)
                 m.alpha = Material::Alpha::blend;
@@ -130,10 +130,8 @@ class SceneConverter {
             state.wrapU = wrap(mode);
         if (material.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode) == aiReturn_SUCCESS)
             state.wrapV = wrap(mode);
-        std::string name = path.C_Str();
         // Names are relative to the material file for some programs, to the model for others.
-        if (!materialFolder_.empty() && !files_.read(name)) name = materialFolder_ + "/" + name;
-        return files_.textureFromFile(name, state, builder_.textures());
+        return files_.textureFromFile(path.C_Str(), state, builder_.textures(), materialFolder_);
     }
 
     Result<void> convertNode(const aiNode& node, const glm::dmat4& parent) {
@@ -242,9 +240,8 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         const aiScene* scene = importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
         if (system->error()) return tl::unexpected(*system->error());
         if (!system->missing().empty() && system->sideTexts().empty())
-            files.job().note(
-                fmt::format("material file '{}' cannot be read; its materials become plain white",
-                            system->missing()));
+            files.job().note(fmt::format("material file {}; its materials become plain white",
+                                         system->missing()));
         if (!scene) {
             std::string reason = importer.GetErrorString();
             std::replace(reason.begin(), reason.end(), '\n', ' ');

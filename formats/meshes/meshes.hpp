@@ -13,8 +13,8 @@ namespace stx {
 
 /// What a caller knows about a model and the file does not say.
 struct MeshOptions {
-    /// Base colour texture for every material that has none (`--texture FILE`); empty = none.
-    /// Opened as it is given: the caller named it, not the model.
+    /// Base colour texture of all materials, in place of those that the model names (`--texture
+    /// FILE`); empty = none. Opened as it is given: the caller named it, not the model.
     std::filesystem::path texture;
 };
 
@@ -31,7 +31,8 @@ struct MeshOptions {
 /// area. `normals` is empty when the file has none: a triangle's own normal counts then. Colours of
 /// glTF are linear as the standard says; those of OBJ, MTL, PLY, STL and .drc are taken as sRGB, as
 /// the programs that write them do, and made linear. A material of a format without the notion is
-/// double-sided. Texture names resolve inside the model's folder only.
+/// double-sided. Texture names resolve inside the model's folder only; what is named
+/// elsewhere is looked for beside the model and in `textures` there.
 ///
 /// What is dropped (animations, lines, cameras, maps other than base colour and normal, a texture
 /// that is missing or broken, triangles without area) is said with job.note().

@@ -385,7 +385,7 @@ class PlyReader {
             files_.job().note("the PLY file names a texture but has no texture coordinates for it");
         for (const auto& name : header_.textureFiles) {
             Material m{.name = name};
-            if ((!uvs_.empty() || hasCornerUvs_)) {
+            if ((!uvs_.empty() || hasCornerUvs_) && !files_.replacesColour()) {
                 STX_TRY(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
             }
             materials.push_back(std::move(m));
