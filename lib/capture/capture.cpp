@@ -25,6 +25,24 @@ Texture straightTexture(const Image<glm::vec4>& premultiplied) {
     return texture;
 }
 
+/// Says what becomes of glass: a view has one depth a pixel.
+void noteTranslucent(const Mesh& mesh, Job& job) {
+    std::string first;
+    int count = 0;
+    for (const auto& m : mesh.materials) {
+        if (m.alpha != Material::Alpha::blend || !(m.baseColour.a < 1.0f)) continue;
+        if (count++ == 0) first = m.name;
+    }
+    if (count == 0) return;
+    job.note(fmt::format(
+        "material '{}'{} translucent: a pixel has the depth of the surface that shows most there; "
+        "its colour mixes all of them, its alpha says how much they hide",
+        first,
+        count == 1   ? " is"
+        : count == 2 ? " and one more are"
+                     : fmt::format(" and {} more are", count - 1)));
+}
+
 }  // namespace
 
 void fitDepthRange(ReferenceView& view) {
@@ -78,6 +96,7 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
         dropStrays(*rest, strays);
     }
     const Mesh& mesh = rest ? *rest : whole;
+    noteTranslucent(mesh, job);
     std::uint64_t pixels = 0;
     for (const auto& c : cameras) {
         STX_CHECK(c.check());
