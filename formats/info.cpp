@@ -19,8 +19,9 @@ Json vectorJson(glm::dvec3 v) {
     return {v.x, v.y, v.z};
 }
 
-Json boundsJson(const Bounds& b) {
-    return {{"min", vectorJson(b.min)}, {"max", vectorJson(b.max)}};
+/// In the world: `origin` is what `b` counts from.
+Json boundsJson(const Bounds& b, glm::dvec3 origin) {
+    return {{"min", vectorJson(b.min + origin)}, {"max", vectorJson(b.max + origin)}};
 }
 
 void addLens(const Camera& camera, Json& j) {
@@ -32,13 +33,17 @@ void addLens(const Camera& camera, Json& j) {
             {"fx", camera.fx}, {"fy", camera.fy}, {"cx", camera.cx}, {"cy", camera.cy}};
 }
 
-Json viewJson(const ReferenceView& view) {
+void addOrigin(Json& out, glm::dvec3 origin) {
+    if (origin != glm::dvec3(0.0)) out["origin"] = vectorJson(origin);
+}
+
+Json viewJson(const ReferenceView& view, glm::dvec3 origin) {
     const auto axisAngle = axisAngleFromQuat(view.camera.orientation);
     Json j = {{"name", view.name},
               {"width", view.camera.width},
               {"height", view.camera.height},
               {"depthBits", view.depthBits},
-              {"position", vectorJson(view.camera.position)},
+              {"position", vectorJson(view.camera.position + origin)},
               {"orientation", {axisAngle.x, axisAngle.y, axisAngle.z, axisAngle.w}},
               {"nearPlane", view.nearPlane},
               {"farPlane", view.farPlane}};
@@ -59,7 +64,8 @@ void addFromPixels(Json& out, const Bundle& bundle) {
     }
     out["points"] = points;
     if (!out.contains("bounds"))
-        out["bounds"] = boundsJson(bundle.bounds ? *bundle.bounds : bundle.computeBounds());
+        out["bounds"] =
+            boundsJson(bundle.bounds ? *bundle.bounds : bundle.computeBounds(), bundle.origin);
 }
 
 Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
@@ -71,7 +77,7 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     auto streams = Json::array();
     std::int64_t points = 0;
     for (const auto& v : header.views) {
-        auto j = viewJson(v.view);
+        auto j = viewJson(v.view, header.origin);
         if (v.points >= 0) j["points"] = v.points;
         points = v.points < 0 || points < 0 ? -1 : points + v.points;
         j["normals"] = v.normals;
@@ -82,7 +88,8 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     }
     out["views"] = std::move(views);
     if (points >= 0) out["points"] = points;
-    if (header.bounds) out["bounds"] = boundsJson(*header.bounds);
+    addOrigin(out, header.origin);
+    if (header.bounds) out["bounds"] = boundsJson(*header.bounds, header.origin);
     out["streams"] = std::move(streams);
     return {};
 }
@@ -112,9 +119,10 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     out["nodeKind"] = mpeg4::nodeKindOf(document);
     if (!bundle.title.empty()) out["title"] = bundle.title;
     auto views = Json::array();
-    for (const auto& v : bundle.views) views.push_back(viewJson(v));
+    for (const auto& v : bundle.views) views.push_back(viewJson(v, bundle.origin));
     out["views"] = std::move(views);
-    if (bundle.bounds) out["bounds"] = boundsJson(*bundle.bounds);
+    addOrigin(out, bundle.origin);
+    if (bundle.bounds) out["bounds"] = boundsJson(*bundle.bounds, bundle.origin);
     auto streams = Json::array();
     const auto add = [&](const mpeg4::ElementaryStream& stream, const std::string& name,
                          const char* kind) {
@@ -162,7 +170,7 @@ Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
     out["nodeKind"] = second ? "SimpleTextureV2" : "SimpleTexture";
     if (!header.atlas.title.empty()) out["title"] = header.atlas.title;
     auto views = Json::array();
-    for (const auto& v : header.atlas.views) views.push_back(viewJson(v));
+    for (const auto& v : header.atlas.views) views.push_back(viewJson(v, header.atlas.origin));
     out["views"] = std::move(views);
     out["textures"] = std::move(textures);
     auto rectangles = Json::array();
@@ -179,7 +187,8 @@ Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
     out["rectangles"] = std::move(rectangles);
     out["used"] = header.used();
     out["pixels"] = {{"source", header.atlas.sourcePixels}, {"kept", header.atlas.keptPixels}};
-    if (header.atlas.bounds) out["bounds"] = boundsJson(*header.atlas.bounds);
+    addOrigin(out, header.atlas.origin);
+    if (header.atlas.bounds) out["bounds"] = boundsJson(*header.atlas.bounds, header.atlas.origin);
     return {};
 }
 
@@ -258,7 +267,8 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
                                     {"width", t.pixels.width()},
                                     {"height", t.pixels.height()}});
             out["textures"] = std::move(textures);
-            out["bounds"] = boundsJson(mesh.bounds());
+            addOrigin(out, mesh.origin);
+            out["bounds"] = boundsJson(mesh.bounds(), mesh.origin);
             return out;
         }
         case FileKind::imageSet:
@@ -288,6 +298,7 @@ std::string describeAsText(const Json& info) {
         if (info.contains(key) && !(key == std::string_view("frames") && info[key] == 1))
             out += fmt::format("{}: {}\n", key, text(info[key]));
     }
+    if (info.contains("origin")) out += fmt::format("origin: {}\n", text(info["origin"]));
     if (info.contains("bounds"))
         out += fmt::format("bounds: {} to {}\n", text(info["bounds"]["min"]),
                            text(info["bounds"]["max"]));

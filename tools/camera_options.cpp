@@ -15,8 +15,11 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 void addCameraOptions(Command command, CameraOptions& o) {
     const char* group = "Camera";
     command
-        .option("--eye", o.eye,
-                "Position of the camera in scene units (write --eye=-1,2,3 for a leading minus)")
+        .option(
+            "--eye", o.eye,
+            "Position of the camera in the world, in scene units (write --eye=-1,2,3 for a leading "
+            "minus). Where 'stx info' names an origin, it counts in: --eye, --target, --cameras "
+            "and point lights are in the coordinates of the model that was converted")
         .takes("X,Y,Z")
         .group(group);
     command.option("--target", o.target, "What it looks at (default: the middle of the object)")
@@ -94,7 +97,10 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     if (!o.cameraFile.empty()) {
         STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job));
         std::vector<Camera> out;
-        for (auto& c : cameras) out.push_back(size ? c.camera.resized(size->x, size->y) : c.camera);
+        for (auto& c : cameras) {
+            c.camera.position -= context.origin;
+            out.push_back(size ? c.camera.resized(size->x, size->y) : c.camera);
+        }
         return out;
     }
 
@@ -113,6 +119,7 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));
+        target -= context.origin;
     }
     const double radius = context.bounds.radius();
     if (!pose)
@@ -123,6 +130,7 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
         eye = front[0].position;
     } else {
         STX_TRY(eye, parseVec3(o.eye, "--eye"));
+        eye -= context.origin;
     }
     STX_TRY(const auto camera, cameraAt(eye, target, lens));
     return std::vector<Camera>{camera};

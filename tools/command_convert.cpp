@@ -195,7 +195,7 @@ void addConvert(CommandLine& line, Program& program) {
         .required()
         .takes("OUT");
     addMeshViewOptions(c, o->mesh);
-    c.option("--texture", o->open.texture, "Texture of a mesh that names none")
+    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group("Views of a mesh");
     const char* coding = "Coding";
@@ -234,6 +234,10 @@ void addConvert(CommandLine& line, Program& program) {
     c.option("--every", o->open.set.every, "Take each N-th view of a recording (default 1)")
         .range(1, 1000000)
         .takes("N")
+        .group(sets);
+    c.flag("--strict", o->open.set.strict,
+           "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
+           "it out")
         .group(sets);
     const auto numbers = [&](const char* name, const char* type, const char* help,
                              std::vector<double*> to) {

@@ -71,6 +71,7 @@ Result<int> extract(const ExtractOptions& o, Program& program) {
         cloud.positions = points.positions;
         cloud.colours = points.colours;
         cloud.normals = points.normals;
+        cloud.origin = bundle.origin;
         PointWriteOptions options = o.points;
         options.file.noClobber = program.common.noClobber;
         STX_CHECK(writePoints(o.output, cloud, program.job, options));

@@ -104,7 +104,10 @@ Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions
         if (!std::filesystem::is_regular_file(o.views, ec)) return propagate(layout);
         STX_TRY(const auto named, readCameraFile(o.views, program.job));
         std::vector<Camera> cameras;
-        for (const auto& n : named) cameras.push_back(n.camera);
+        for (const auto& n : named) {
+            cameras.push_back(n.camera);
+            cameras.back().position -= mesh.origin;
+        }
         return cameras;
     }
     STX_TRY(const auto framing, framingOf(o, layout->kind == ViewLayout::Kind::cube, program));

@@ -43,6 +43,8 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
             std::abs(glm::dot(exact, view.camera.orientation)) > 1 - 1e-9)
             view.camera.orientation = exact;
     }
+    STX_TRY(const auto position, findNumbers(camera, "stx:position", 3, where));
+    if (position) view.localPosition = glm::dvec3((*position)[0], (*position)[1], (*position)[2]);
     STX_TRY(const auto window, findNumbers(camera, "stx:window", 4, where));
     if (window) {
         Camera& c = view.camera;
@@ -68,6 +70,12 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
     view.planes = DepthCode{*nearPlane, *farPlane, *bits == 8 ? 255u : 65535u};
     view.depthBits = *bits == 8 ? 8 : *bits == 32 ? 32 : 16;
     return {};
+}
+
+Result<std::optional<glm::dvec3>> originOf(const Json& file, const std::string& where) {
+    STX_TRY(const auto n, findNumbers(file, "stx:origin", 3, where));
+    if (!n) return std::optional<glm::dvec3>();
+    return std::optional(glm::dvec3((*n)[0], (*n)[1], (*n)[2]));
 }
 
 std::string firstThere(const path& folder, const std::vector<std::string>& names) {
@@ -103,6 +111,17 @@ Result<PictureSource> sourceInside(const path& folder, const std::string& name,
     source.path = folder / name;
     source.missing = std::move(error);
     return source;
+}
+
+Result<void> findPictures(const path& folder, const std::string& texture, const std::string& depth,
+                          const std::string& where, const Limits& limits, SetView& view) {
+    for (const auto& [name, to] : {std::pair{&texture, &view.texture}, {&depth, &view.depth}}) {
+        auto source = sourceInside(folder, *name, where, limits);
+        if (!source) return tl::unexpected(source.error());
+        if (source->missing && !view.missing) view.missing = source->missing;
+        *to = std::move(*source);
+    }
+    return {};
 }
 
 std::vector<std::string> filesIn(const path& folder) {

@@ -40,10 +40,14 @@ enum class JsonKind { transforms, miv, cameras, none };
 [[nodiscard]] Result<std::vector<SetView>> mivViews(const Json& file, Job& job);
 [[nodiscard]] Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job);
 
-/// What our own export writes beside a camera (stx:name, stx:quaternion, stx:window, nearPlane,
-/// farPlane, depthBits), so that a bundle comes back to the bit. Values that contradict the camera
-/// are passed over.
+/// What our own export writes beside a camera (stx:name, stx:quaternion, stx:position, stx:window,
+/// nearPlane, farPlane, depthBits), so that a bundle comes back to the bit. Values that contradict
+/// the camera are passed over.
 [[nodiscard]] Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view);
+
+/// stx:origin of such an export.
+[[nodiscard]] Result<std::optional<glm::dvec3>> originOf(const Json& file,
+                                                         const std::string& where);
 
 /// The file in `folder` that has one of these names, in that order; empty when there is none.
 [[nodiscard]] std::string firstThere(const path& folder, const std::vector<std::string>& names);
@@ -53,6 +57,11 @@ enum class JsonKind { transforms, miv, cameras, none };
 /// error, but PictureSource::missing.
 [[nodiscard]] Result<PictureSource> sourceInside(const path& folder, const std::string& name,
                                                  const std::string& where, const Limits& limits);
+/// The same for the two files of a view. One that does not exist is no error: it is in
+/// view.missing.
+[[nodiscard]] Result<void> findPictures(const path& folder, const std::string& texture,
+                                        const std::string& depth, const std::string& where,
+                                        const Limits& limits, SetView& view);
 /// Names of the regular files in a folder, sorted.
 [[nodiscard]] std::vector<std::string> filesIn(const path& folder);
 /// Errors when there are more views than limits.maxViews.

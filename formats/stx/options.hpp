@@ -7,7 +7,7 @@
 namespace stx {
 
 struct OpenOptions {
-    std::string texture;  ///< texture of a mesh that names none; empty = none
+    std::string texture;  ///< texture of a mesh, in place of those that it names; empty = none
     ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
 };
 

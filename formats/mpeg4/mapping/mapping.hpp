@@ -44,9 +44,9 @@ struct SceneReadOptions {
 /// DepthImageV2) that is shown. Transforms are folded into the cameras; of a Switch only the chosen
 /// child counts; a node used twice gives two views. A PointTexture gives as many views with the
 /// same camera as a pixel has depths; an OctreeImage gives a view for each of its images, with the
-/// depths of the voxels that it sees first. Views are named by DEF name. Title and bounds come from
-/// WorldInfo. Errors (invalidInput) name the view and what is wrong; Transforms that scale
-/// unevenly, shear or mirror are refused. Notes say what is left out.
+/// depths of the voxels that it sees first. Views are named by DEF name. Title, bounds and
+/// origin come from WorldInfo. Errors (invalidInput) name the view and what is wrong; Transforms
+/// that scale unevenly, shear or mirror are refused. Notes say what is left out.
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
 

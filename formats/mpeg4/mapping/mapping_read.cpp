@@ -74,6 +74,7 @@ class BundleReader {
         Bundle bundle;
         bundle.title = shown.title;
         bundle.bounds = notes.bounds;
+        bundle.origin = notes.origin;
         for (std::size_t i = 0; i < plans.size(); ++i) {
             if (!read[i])
                 return tl::unexpected(
@@ -107,6 +108,7 @@ class BundleReader {
             all.names.merge(notes.names);
             all.paddings.merge(notes.paddings);
             all.pruned.merge(notes.pruned);
+            if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
             if (!notes.bounds) continue;
             places.push_back(info.worldFromLocal);
             if (!all.bounds) all.bounds.emplace();

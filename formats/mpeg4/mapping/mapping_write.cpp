@@ -44,6 +44,7 @@ class SceneWriter {
     Result<Document> write() {
         STX_CHECK(checkRequest());
         ViewNotes notes;
+        notes.origin = bundle_.origin;
         bounds_ = bundle_.bounds ? *bundle_.bounds : bundle_.computeBounds();
         notes.bounds = bounds_;
         NodePtr root;

@@ -21,6 +21,19 @@ std::vector<std::string_view> words(std::string_view text, std::size_t most) {
     return list;
 }
 
+/// The finite numbers behind the first word; none when there are not exactly `count`.
+std::vector<double> numbers(std::string_view text, std::size_t count) {
+    const auto w = words(text, count + 2);
+    if (w.size() != count + 1) return {};
+    std::vector<double> list;
+    for (std::size_t i = 1; i < w.size(); ++i) {
+        const auto value = doubleFromText(w[i]);
+        if (!value || !std::isfinite(*value)) return {};
+        list.push_back(*value);
+    }
+    return list;
+}
+
 template <class T>
 Image<T> cropped(const Image<T>& image, int left, int top, int width, int height) {
     if (image.empty()) return image;
@@ -36,19 +49,14 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
     ViewNotes notes;
     for (const std::string& line : info) {
         if (line.starts_with("bounds ")) {
-            const auto w = words(line, 8);
-            glm::dvec3 corners[2];
-            bool good = w.size() == 7;
-            for (int i = 0; good && i < 6; ++i) {
-                const auto value = doubleFromText(w[static_cast<std::size_t>(i) + 1]);
-                good = value && std::isfinite(*value);
-                if (good) corners[i / 3][i % 3] = *value;
-            }
-            if (!good) continue;
+            const auto n = numbers(line, 6);
+            if (n.empty()) continue;
             Bounds bounds;
-            bounds.add(corners[0]);
-            bounds.add(corners[1]);
+            bounds.add({n[0], n[1], n[2]});
+            bounds.add({n[3], n[4], n[5]});
             notes.bounds = bounds;
+        } else if (line.starts_with("origin ")) {
+            if (const auto n = numbers(line, 3); !n.empty()) notes.origin = {n[0], n[1], n[2]};
         } else if (line.starts_with("name ")) {
             const auto w = words(line, 3);
             if (w.size() == 3) notes.names[std::string(w[1])] = w[2];
@@ -83,6 +91,8 @@ std::vector<std::string> ViewNotes::text() const {
     if (bounds && !bounds->empty())
         info.push_back(fmt::format("bounds {} {} {} {} {} {}", bounds->min.x, bounds->min.y,
                                    bounds->min.z, bounds->max.x, bounds->max.y, bounds->max.z));
+    if (origin != glm::dvec3(0.0))
+        info.push_back(fmt::format("origin {} {} {}", origin.x, origin.y, origin.z));
     for (const auto& [defName, own] : names)
         info.push_back(fmt::format("name {} {}", defName, own));
     for (const auto& [defName, pad] : paddings)
