@@ -37,8 +37,9 @@ struct CameraContext {
     std::vector<Camera> views;  ///< of the reference views; empty for a mesh
 };
 
-/// The cameras asked for, in order, counted from the context's origin. Without any camera option: one from the front, slightly above.
-/// Errors (usage) on contradicting options and on views that do not exist.
+/// The cameras asked for, in order, counted from the context's origin. Without any camera option:
+/// one from the front, slightly above. Errors (usage) on contradicting options and on views that do
+/// not exist.
 [[nodiscard]] Result<std::vector<Camera>> makeCameras(const CameraOptions& options,
                                                       const CameraContext& context,
                                                       Program& program);

@@ -6,27 +6,28 @@
 namespace stx {
 namespace {
 
-/// Pixels around a point that must be points, too, for it to be inside of the object; outlines,
-/// also those of hair and leaves, are narrower.
+/// Pixels around a translucent point that must be such, too, for it to be inside of glass; what is
+/// partly covered along an outline is narrower.
 constexpr int kInside = 2;
-/// How far full alpha reaches from there towards the outline.
-constexpr int kReach = 3;
+/// How far full alpha reaches from there: over the border of the glass.
+constexpr int kReach = 4;
 
-/// 1 for the translucent pixels that lie inside of the object.
+/// 1 for the points inside of translucent surfaces.
 Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>& depth) {
     const int w = depth.width(), h = depth.height();
     Image<std::uint8_t> inside(w, h, std::uint8_t{0});
-    parallelFor(0, h, [&](std::int64_t row) {
+    const auto isTranslucent = [&](int x, int y) {
+        const float alpha = texture.at(x, y).w;
+        return alpha > 0.0f && alpha < 1.0f && hasPoint(depth.at(x, y));
+    };
+    parallelFor(kInside, h - kInside, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
-        for (int x = 0; x < w; ++x) {
-            const float alpha = texture.at(x, y).w;
-            if (!(alpha > 0.0f && alpha < 1.0f) || x < kInside || y < kInside || x + kInside >= w ||
-                y + kInside >= h)
-                continue;
+        for (int x = kInside; x + kInside < w; ++x) {
+            if (!isTranslucent(x, y)) continue;
             bool all = true;
             for (int dy = -kInside; all && dy <= kInside; ++dy) {
                 for (int dx = -kInside; all && dx <= kInside; ++dx)
-                    all = hasPoint(depth.at(x + dx, y + dy));
+                    all = isTranslucent(x + dx, y + dy);
             }
             inside.at(x, y) = all ? 1 : 0;
         }
