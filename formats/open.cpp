@@ -136,7 +136,8 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         case FileKind::image:
         case FileKind::unknown:
             return fail(ErrorCode::invalidInput,
-                        "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, DRC) nor a bundle "
+                        "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC) nor "
+                        "a bundle "
                         "(.mp4, .xmt, .bt, .exr) "
                         "nor an atlas nor an image set",
                         path.string());

@@ -5,12 +5,15 @@
 
 #include <new>
 
+#include "formats/meshes/alpha_map.hpp"
 #include "formats/meshes/assimp_files.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
 #include "formats/meshes/readers.hpp"
+#include "formats/meshes/scene_claims.hpp"
 #include "formats/meshes/text_coordinates.hpp"
 #include "formats/meshes/triangulate.hpp"
+#include "formats/meshes/try_apart.hpp"
 #include "formats/meshes/vertex_colours.hpp"
 #include "lib/model/texture.hpp"
 
@@ -23,6 +26,12 @@ const char* endingOf(AssimpFormat format) {
             return "obj";
         case AssimpFormat::stl:
             return "stl";
+        case AssimpFormat::off:
+            return "off";
+        case AssimpFormat::dae:
+            return "dae";
+        case AssimpFormat::fbx:
+            return "fbx";
     }
     return "";
 }
@@ -52,8 +61,13 @@ class SceneConverter {
     Result<Mesh> convert() {
         for (unsigned i = 0; i < scene_.mNumMaterials; ++i)
             STX_CHECK(convertMaterial(*scene_.mMaterials[i]));
-        if (builder_.materials().empty()) builder_.materials().push_back({.name = "default"});
+        if (builder_.materials().empty()) {
+            builder_.materials().push_back({.name = "default", .hasColour = false});
+            mtlOf_.emplace_back();
+        }
         if (scene_.mRootNode) STX_CHECK(convertNode(*scene_.mRootNode, glm::dmat4(1.0)));
+        if (scene_.mNumAnimations > 0)
+            files_.job().note(fmt::format("dropped: animations ({})", scene_.mNumAnimations));
         if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
         if (points_ > 0)
             files_.job().note(fmt::format("dropped: points in a mesh of triangles ({})", points_));
@@ -72,8 +86,11 @@ class SceneConverter {
         const bool hasMap = source.GetTexture(aiTextureType_DIFFUSE, 0, &path) == aiReturn_SUCCESS;
         aiColor4D diffuse(1, 1, 1, 1);
         // Assimp invents a grey where the file says nothing.
-        const bool given = format_ == AssimpFormat::obj ? mtl.hasDiffuse : false;
+        const bool scene = format_ == AssimpFormat::dae || format_ == AssimpFormat::fbx;
+        const bool given = format_ == AssimpFormat::obj ? mtl.hasDiffuse : scene;
+        m.hasColour = false;
         if (given && source.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == aiReturn_SUCCESS) {
+            m.hasColour = true;
             if (hasMap && diffuse.r == 0 && diffuse.g == 0 && diffuse.b == 0) {
                 files_.job().note(fmt::format(
                     "material '{}' has a texture and a black Kd; Kd is taken as white", m.name));
@@ -102,19 +119,53 @@ class SceneConverter {
             if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap)
                 m.alpha = Material::Alpha::blend;
         }
+        if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap && !files_.replacesColour())
+            STX_CHECK(addAlphaMap(source, m));
+        STX_CHECK(addEmission(source, mtl, scene, m));
         if (source.GetTexture(aiTextureType_NORMALS, 0, &path) == aiReturn_SUCCESS) {
             STX_TRY(m.normalTexture, texture(source, aiTextureType_NORMALS, path));
         }
-        if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap)
-            files_.job().note(
-                fmt::format("material '{}': map_d '{}' is dropped", m.name, mtl.alphaMap));
         for (const auto& [type, label] : {std::pair{aiTextureType_HEIGHT, "bump map"},
-                                          {aiTextureType_DISPLACEMENT, "displacement map"},
-                                          {aiTextureType_EMISSIVE, "emissive map"}}) {
+                                          {aiTextureType_DISPLACEMENT, "displacement map"}}) {
             if (source.GetTextureCount(type) > 0)
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
         builder_.materials().push_back(std::move(m));
+        mtlOf_.push_back(mtl);
+        return {};
+    }
+
+    /// map_d becomes the alpha of the base colour texture.
+    Result<void> addAlphaMap(const aiMaterial& source, Material& m) {
+        aiString path;
+        if (source.GetTexture(aiTextureType_OPACITY, 0, &path) != aiReturn_SUCCESS) return {};
+        STX_TRY(const int map, texture(source, aiTextureType_OPACITY, path));
+        if (map < 0) return {};
+        auto& textures = builder_.textures();
+        const auto& like = textures[static_cast<std::size_t>(
+            m.baseColourTexture >= 0 ? m.baseColourTexture : map)];
+        STX_CHECK(builder_.charge(like.pixels.count(), sizeof(glm::u8vec4), "the alpha maps"));
+        m.baseColourTexture = textureWithAlpha(textures, m.baseColourTexture, map);
+        m.alpha = Material::Alpha::blend;
+        return {};
+    }
+
+    /// Ke and map_Ke, and what other formats have of the kind.
+    Result<void> addEmission(const aiMaterial& source, const MtlMaterial& mtl, bool scene,
+                             Material& m) {
+        aiColor4D emission(0, 0, 0, 1);
+        const bool given = (scene || mtl.hasEmission) &&
+                           source.Get(AI_MATKEY_COLOR_EMISSIVE, emission) == aiReturn_SUCCESS;
+        aiString path;
+        const bool hasMap = source.GetTexture(aiTextureType_EMISSIVE, 0, &path) == aiReturn_SUCCESS;
+        if (!given && !hasMap) return {};
+        if (hasMap && emission.r == 0 && emission.g == 0 && emission.b == 0)
+            emission = aiColor4D(1, 1, 1, 1);
+        const auto linear = [](float v) { return linearFromSrgb(std::clamp(v, 0.0f, 1.0f)); };
+        m.emissive = {linear(emission.r), linear(emission.g), linear(emission.b)};
+        if (!hasMap) return {};
+        STX_TRY(m.emissiveTexture, texture(source, aiTextureType_EMISSIVE, path));
+        if (m.emissiveTexture < 0) m.emissive = glm::vec3(0.0f);
         return {};
     }
 
@@ -130,8 +181,22 @@ class SceneConverter {
             state.wrapU = wrap(mode);
         if (material.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode) == aiReturn_SUCCESS)
             state.wrapV = wrap(mode);
+        if (const auto* inside = scene_.GetEmbeddedTexture(path.C_Str()))
+            return embeddedTexture(*inside, path.C_Str(), state);
         // Names are relative to the material file for some programs, to the model for others.
         return files_.textureFromFile(path.C_Str(), state, builder_.textures(), materialFolder_);
+    }
+
+    /// A picture inside the model's own file: a PNG or JPEG as it is, or plain texels.
+    Result<int> embeddedTexture(const aiTexture& inside, const std::string& name,
+                                SamplerState state) {
+        if (inside.mHeight != 0) {
+            files_.job().note(fmt::format(
+                "texture '{}' inside the model is no PNG or JPEG; the plain colour is used", name));
+            return -1;
+        }
+        const auto* first = reinterpret_cast<const std::byte*>(inside.pcData);
+        return files_.textureFromBytes({first, inside.mWidth}, name, state, builder_.textures());
     }
 
     Result<void> convertNode(const aiNode& node, const glm::dmat4& parent) {
@@ -151,14 +216,22 @@ class SceneConverter {
         STX_CHECK(builder_.charge(count, 80, part.where));
         part.material = mesh.mMaterialIndex < builder_.materials().size() ? mesh.mMaterialIndex : 0;
         const bool moved = worldFromMesh != glm::dmat4(1.0);
+        const bool mirrored = glm::determinant(glm::dmat3(worldFromMesh)) < 0;
         for (std::size_t i = 0; i < count; ++i) {
             const glm::dvec3 p(toVec3(mesh.mVertices[i]));
             part.positions.push_back(moved ? glm::dvec3(worldFromMesh * glm::dvec4(p, 1.0)) : p);
         }
         // A facet's normal in STL is often wrong or zero, and says no more than its corners.
         if (mesh.mNormals && format_ != AssimpFormat::stl) {
-            for (std::size_t i = 0; i < count; ++i)
-                part.normals.push_back(toVec3(mesh.mNormals[i]));
+            // Cofactors: the inverse transpose but for a factor.
+            const glm::dmat3 m(worldFromMesh);
+            const glm::dmat3 forNormals(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
+                                        glm::cross(m[0], m[1]));
+            for (std::size_t i = 0; i < count; ++i) {
+                const auto n = toVec3(mesh.mNormals[i]);
+                part.normals.push_back(
+                    moved ? glm::vec3(forNormals * glm::dvec3(n) * (mirrored ? -1.0 : 1.0)) : n);
+            }
         }
         if (const auto* colours = mesh.mColors[0]) {
             for (std::size_t i = 0; i < count; ++i)
@@ -167,8 +240,11 @@ class SceneConverter {
         }
         if (const auto* uvs = mesh.mTextureCoords[0]) {
             // v runs up in these formats, down in Mesh.
-            for (std::size_t i = 0; i < count; ++i)
-                part.uvs.emplace_back(uvs[i].x, 1.0f - uvs[i].y);
+            const auto& mtl = mtlOf_[std::min<std::size_t>(part.material, mtlOf_.size() - 1)];
+            for (std::size_t i = 0; i < count; ++i) {
+                const auto uv = glm::vec2(uvs[i].x, uvs[i].y) * mtl.uvScale + mtl.uvOffset;
+                part.uvs.emplace_back(uv.x, 1.0f - uv.y);
+            }
         }
         std::size_t points = 0;
         part.triangles.reserve(mesh.mNumFaces);
@@ -193,17 +269,23 @@ class SceneConverter {
                 ++lines_;
             }
         }
+        if (mirrored) {
+            for (auto& t : part.triangles) std::swap(t.y, t.z);
+        }
         if (!part.triangles.empty()) points_ += points;
         part.points = part.triangles.empty() && (points > 0 || mesh.mNumFaces == 0);
         if (part.triangles.empty() && !part.points) return {};
         const auto& material = builder_.materials()[part.material];
-        if (material.baseColourTexture >= 0 && part.uvs.empty()) {
+        if ((material.baseColourTexture >= 0 || material.emissiveTexture >= 0) &&
+            part.uvs.empty()) {
             files_.job().note(
                 fmt::format("{} has the textured material '{}' but no texture coordinates; the "
                             "plain colour is used",
                             part.where, material.name));
             auto plain = material;
             plain.baseColourTexture = plain.normalTexture = -1;
+            if (plain.emissiveTexture >= 0) plain.emissive = glm::vec3(0.0f);
+            plain.emissiveTexture = -1;
             part.material = static_cast<std::uint32_t>(builder_.materials().size());
             builder_.materials().push_back(std::move(plain));
         }
@@ -216,6 +298,7 @@ class SceneConverter {
     ModelFiles& files_;
     MeshBuilder builder_;
     std::map<std::string, MtlMaterial> mtl_;
+    std::vector<MtlMaterial> mtlOf_;  ///< of each material
     std::string materialFolder_;
     std::size_t lines_ = 0, points_ = 0;
 };
@@ -226,22 +309,34 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
                             ModelFiles& files) {
     // Assimp's text parsers hold a file of n bytes in some 30 n bytes.
     STX_CHECK(files.job().limits.checkAllocation(bytes.size(), 30, "reading the model"));
+    if (format == AssimpFormat::dae) STX_CHECK(checkColladaClaims(bytes, files.job().limits));
+    if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, files.job().limits));
     try {
-        const auto shifted =
-            shiftLargeCoordinates(bytes, format == AssimpFormat::obj ? "v" : "vertex");
+        std::optional<ShiftedText> shifted;
+        if (format == AssimpFormat::obj) shifted = shiftLargeCoordinates(bytes, "v");
+        if (format == AssimpFormat::stl) shifted = shiftLargeCoordinates(bytes, "vertex");
         if (shifted) bytes = shifted->text;
-        Assimp::Importer importer;
         // The importer chooses by the ending.
         auto modelName = fileName;
         const auto dot = modelName.find_last_of('.');
         modelName = modelName.substr(0, dot) + "." + endingOf(format);
+        // Damaged files crash its readers of these.
+        if (format == AssimpFormat::dae || format == AssimpFormat::fbx)
+            STX_CHECK(tryApart(
+                [&] {
+                    Assimp::Importer importer;
+                    importer.SetIOHandler(new AssimpFiles(bytes, modelName, files));
+                    (void)importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
+                },
+                files.job().limits));
+        Assimp::Importer importer;
         auto* system = new AssimpFiles(bytes, modelName, files);
         importer.SetIOHandler(system);  // which owns it
         const aiScene* scene = importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
         if (system->error()) return tl::unexpected(*system->error());
         if (!system->missing().empty() && system->sideTexts().empty())
-            files.job().note(fmt::format("material file {}; its materials become plain white",
-                                         system->missing()));
+            files.job().note(
+                fmt::format("material file {}; its materials have no colour", system->missing()));
         if (!scene) {
             std::string reason = importer.GetErrorString();
             std::replace(reason.begin(), reason.end(), '\n', ' ');

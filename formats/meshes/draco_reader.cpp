@@ -56,7 +56,7 @@ Result<Mesh> readDraco(ByteSpan bytes, Job& job) {
     if (dropped > 0) job.note(fmt::format("dropped: {} attributes of the Draco stream", dropped));
     if (part.positions.empty() && count > 0)
         return fail(ErrorCode::invalidInput, "the Draco stream has no positions");
-    builder.materials().emplace_back();
+    builder.materials().push_back({.name = "default", .hasColour = false});
     STX_CHECK(builder.add(std::move(part)));
     return builder.finish();
 }

@@ -11,7 +11,7 @@
 namespace stx {
 namespace {
 
-enum class Format { none, gltf, glb, obj, ply, stl, draco };
+enum class Format { none, gltf, glb, obj, ply, stl, draco, off, dae, fbx };
 
 std::string lowerCase(std::string text) {
     for (auto& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -27,6 +27,7 @@ Format formatOfBytes(ByteSpan head) {
     auto text = textOf(head);
     if (text.starts_with("glTF")) return Format::glb;
     if (text.starts_with("DRACO")) return Format::draco;
+    if (text.starts_with("Kaydara FBX Binary")) return Format::fbx;
     if (text.starts_with("ply") && text.size() > 3 &&
         (text[3] == '\n' || text[3] == '\r' || text[3] == ' '))
         return Format::ply;
@@ -41,6 +42,9 @@ Format formatOfEnding(const std::filesystem::path& path) {
     if (ending == ".ply") return Format::ply;
     if (ending == ".stl") return Format::stl;
     if (ending == ".drc") return Format::draco;
+    if (ending == ".off") return Format::off;
+    if (ending == ".dae") return Format::dae;
+    if (ending == ".fbx") return Format::fbx;
     return Format::none;
 }
 
@@ -102,6 +106,21 @@ Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job)
     return {};
 }
 
+/// A model of which nobody says what colour it has is grey: white without shadows is a flat shape.
+void giveGrey(Mesh& mesh, Job& job) {
+    constexpr float kGrey = 0.5f;  // linear; 188 of 255 as sRGB
+    const bool hasColour =
+        !mesh.colours.empty() ||
+        std::any_of(mesh.materials.begin(), mesh.materials.end(), [](auto& m) {
+            return m.hasColour || m.baseColourTexture >= 0 || m.emissive != glm::vec3(0.0f);
+        });
+    if (hasColour) return;
+    for (auto& m : mesh.materials) m.baseColour = glm::vec4(glm::vec3(kGrey), m.baseColour.a);
+    job.note(
+        "the model has no colour: it is drawn in plain grey; lights show its form (stx render "
+        "--light dir:-1,-1,-1)");
+}
+
 Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path, Job& job,
                         bool replacesColour) {
     const auto folder =
@@ -124,12 +143,18 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
             return readPly(bytes, files);
         case Format::stl:
             return readWithAssimp(bytes, AssimpFormat::stl, name, files);
+        case Format::off:
+            return readWithAssimp(bytes, AssimpFormat::off, name, files);
+        case Format::dae:
+            return readWithAssimp(bytes, AssimpFormat::dae, name, files);
+        case Format::fbx:
+            return readWithAssimp(bytes, AssimpFormat::fbx, name, files);
         case Format::none:
             break;
     }
-    return fail(
-        ErrorCode::invalidInput,
-        "the file is no model that is known here: glTF, GLB, OBJ, PLY, STL or Draco (.drc)");
+    return fail(ErrorCode::invalidInput,
+                "the file is no model that is known here: glTF, GLB, OBJ, PLY, STL, OFF, COLLADA "
+                "(.dae), FBX or Draco (.drc)");
 }
 
 }  // namespace
@@ -173,6 +198,7 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
                     beside.filename().string()));
         }
     }
+    giveGrey(*mesh, job);
     return mesh;
 }
 

@@ -19,13 +19,14 @@ struct MeshOptions {
 };
 
 /// True when the file looks like a model that readMesh() takes: by its first bytes (GLB, glTF, PLY,
-/// .drc, ASCII STL), else by its ending (OBJ, STL). `head` is the beginning of the file, 512 bytes
-/// are plenty; it may be empty, then only the ending counts.
+/// .drc, FBX, ASCII STL), else by its ending (OBJ, STL, OFF, DAE). `head` is the beginning of the
+/// file, 512 bytes are plenty; it may be empty, then only the ending counts.
 [[nodiscard]] bool isMesh(const std::filesystem::path& path, ByteSpan head = {});
 
 /// Reads a model: glTF 2.0 and GLB (with Draco, quantisation, sparse accessors, texture transforms,
-/// instances, skins in rest pose, morph targets at their default weights), OBJ with MTL, PLY, STL
-/// (ASCII and binary), Draco .drc meshes and point clouds. "-" reads stdin.
+/// meshopt compression, instances, skins in rest pose, morph targets at their default weights), OBJ
+/// with MTL, PLY, STL (ASCII and binary), OFF, COLLADA, FBX, Draco .drc meshes and point clouds.
+/// "-" reads stdin.
 ///
 /// The result has passed Mesh::check(): world space, all transforms applied, no triangle without
 /// area. `normals` is empty when the file has none: a triangle's own normal counts then. Colours of
@@ -34,8 +35,9 @@ struct MeshOptions {
 /// double-sided. Texture names resolve inside the model's folder only; what is named
 /// elsewhere is looked for beside the model and in `textures` there.
 ///
-/// What is dropped (animations, lines, cameras, maps other than base colour and normal, a texture
-/// that is missing or broken, triangles without area) is said with job.note().
+/// What is dropped (animations, lines, cameras, maps other than base colour, emission and normal, a
+/// texture that is missing or broken, properties of vertices that are not known, triangles without
+/// area) is said with job.note(). A model without any colour becomes grey, with a note.
 ///
 /// Errors: io (missing or unreadable file, missing buffer), invalidInput (a broken rule, named with
 /// the object it is in; neither triangles nor points; more than the memory limit), unsupported (a

@@ -1,8 +1,34 @@
 #include "formats/meshes/mtl_notes.hpp"
 
+#include <charconv>
+#include <cmath>
+
 #include "formats/meshes/text_encoding.hpp"
 
 namespace stx {
+namespace {
+
+/// `-s u v w`: one to three numbers behind an option; v stays as it is when only u is given.
+void readVector(std::string_view text, std::string_view option, glm::vec2& to) {
+    auto at = text.find(option);
+    // A word of its own, not the end of a name.
+    if (at == std::string_view::npos || (at > 0 && text[at - 1] != ' ' && text[at - 1] != '\t'))
+        return;
+    text.remove_prefix(at + option.size());
+    for (int k = 0; k < 2; ++k) {
+        while (!text.empty() && (text.front() == ' ' || text.front() == '\t'))
+            text.remove_prefix(1);
+        float value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const auto used = static_cast<std::size_t>(end - text.data());
+        const bool whole = used == text.size() || text[used] == ' ' || text[used] == '\t';
+        if (error != std::errc() || !whole || !std::isfinite(value)) return;
+        to[k] = value;
+        text.remove_prefix(used);
+    }
+}
+
+}  // namespace
 
 void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& materials) {
     MtlMaterial* current = nullptr;
@@ -22,13 +48,19 @@ void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& material
             current->hasDiffuse = true;
         } else if (key == "d") {
             current->hasDissolve = true;
+        } else if (key == "Ke") {
+            current->hasEmission = true;
         } else if (key == "Tr") {
             current->hasTransparency = true;
         } else if (key == "map_Kd" || key == "map_d") {
             const auto last = value.find_last_of(" \t");
             const auto file = last == std::string_view::npos ? value : value.substr(last + 1);
             (key == "map_Kd" ? current->diffuseMap : current->alphaMap) = file;
-            for (const std::string_view option : {"-s ", "-o ", "-t ", "-mm ", "-boost "}) {
+            if (key == "map_Kd") {
+                readVector(value, "-s ", current->uvScale);
+                readVector(value, "-o ", current->uvOffset);
+            }
+            for (const std::string_view option : {"-t ", "-mm ", "-boost "}) {
                 if (key == "map_Kd" && value.find(option) != std::string_view::npos)
                     current->droppedOptions.emplace_back(trimmed(option));
             }

@@ -155,6 +155,10 @@ Role roleOf(const PlyProperty& p, bool ofFaces) {
     if (n == "nz") return Role::nz;
     if (n == "u" || n == "s" || n == "texture_u" || n == "texture_s") return Role::u;
     if (n == "v" || n == "t" || n == "texture_v" || n == "texture_t") return Role::v;
+    // Gaussian splats: the first coefficient of spherical harmonics of each colour.
+    if (n == "f_dc_0") return Role::red;
+    if (n == "f_dc_1") return Role::green;
+    if (n == "f_dc_2") return Role::blue;
     return Role::none;
 }
 
@@ -246,6 +250,27 @@ class PlyReader {
         return {};
     }
 
+    /// Says what of the vertices is not used.
+    void noteDropped(const PlyElement& element, bool splats) {
+        if (splats)
+            files_.job().note(
+                "the file holds Gaussian splats: their centres are read as points of their mean "
+                "colour; size, direction, opacity and what depends on the view are dropped");
+        std::string names;
+        int count = 0;
+        for (const auto& p : element.properties) {
+            if (splats || roleOf(p, false) != Role::none) continue;
+            constexpr int kMostNamed = 6;
+            if (count++ < kMostNamed) names += (names.empty() ? "" : ", ") + p.name;
+        }
+        if (count > 0)
+            files_.job().note(fmt::format("dropped: PLY properties of vertices ({}{})", names,
+                                          count > 6 ? ", …" : ""));
+        const bool alpha = std::any_of(colours_.begin(), colours_.end(),
+                                       [](const glm::vec4& c) { return c.a < 1.0f; });
+        if (alpha) files_.job().note("dropped: the alpha of PLY colours; all is opaque");
+    }
+
     Result<void> readVertices(const PlyElement& element) {
         std::vector<Role> roles;
         for (const auto& p : element.properties) roles.push_back(roleOf(p, false));
@@ -288,7 +313,16 @@ class PlyReader {
                 colours_.emplace_back(f(Role::red), f(Role::green), f(Role::blue), f(Role::alpha));
             if (hasUvs) uvs_.emplace_back(f(Role::u), 1.0f - f(Role::v));
         }
-        linearFromSrgbColours(colours_, floatColours_);
+        const bool splats = std::any_of(element.properties.begin(), element.properties.end(),
+                                        [](const PlyProperty& p) { return p.name == "f_dc_0"; });
+        if (splats) {
+            // 1 / (2 sqrt(pi)), as Kerbl et al. 2023 code a colour.
+            constexpr float kHarmonic = 0.28209479f;
+            for (auto& c : colours_)
+                c = glm::vec4(glm::clamp(glm::vec3(c) * kHarmonic + 0.5f, 0.0f, 1.0f), 1.0f);
+        }
+        linearFromSrgbColours(colours_, floatColours_ && !splats);
+        noteDropped(element, splats);
         return {};
     }
 
@@ -384,13 +418,13 @@ class PlyReader {
         if (!header_.textureFiles.empty() && uvs_.empty() && !hasCornerUvs_)
             files_.job().note("the PLY file names a texture but has no texture coordinates for it");
         for (const auto& name : header_.textureFiles) {
-            Material m{.name = name};
+            Material m{.name = name, .hasColour = false};
             if ((!uvs_.empty() || hasCornerUvs_) && !files_.replacesColour()) {
                 STX_TRY(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
             }
             materials.push_back(std::move(m));
         }
-        if (materials.empty()) materials.push_back({.name = "default"});
+        if (materials.empty()) materials.push_back({.name = "default", .hasColour = false});
         builder_.materials() = materials;
         if (faces_.empty()) {
             MeshPart part;

@@ -13,8 +13,9 @@ using namespace stx;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size < 1) return 0;
     const auto* from = reinterpret_cast<const std::byte*>(data) + 1;
-    static constexpr const char* kNames[] = {"m.gltf", "m.glb", "m.ply", "m.obj", "m.stl", "m.drc"};
-    const int kind = data[0] % 7;
+    static constexpr const char* kNames[] = {"m.gltf", "m.glb", "m.ply", "m.obj", "m.stl",
+                                             "m.drc",  "",      "m.off", "m.dae", "m.fbx"};
+    const int kind = data[0] % 10;
     if (kind == 6) {
         std::map<std::string, MtlMaterial> materials;
         scanMtl({reinterpret_cast<const char*>(from), size - 1}, materials);
@@ -33,7 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!mesh->check()) std::abort();
     if (!mesh->triangles.empty() && mesh->materials.empty()) std::abort();
     for (const Material& material : mesh->materials)
-        for (const int texture : {material.baseColourTexture, material.normalTexture})
+        for (const int texture :
+             {material.baseColourTexture, material.normalTexture, material.emissiveTexture})
             if (texture >= static_cast<int>(mesh->textures.size())) std::abort();
     return 0;
 }

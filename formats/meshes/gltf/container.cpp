@@ -19,6 +19,7 @@ std::uint32_t readU32(ByteSpan bytes, std::size_t at) {
 constexpr std::string_view kKnownExtensions[] = {
     "KHR_draco_mesh_compression",
     "KHR_mesh_quantization",
+    "KHR_texture_basisu",  // not read: a note, and the plain colour
     "KHR_texture_transform",
     "KHR_materials_unlit",
     "KHR_materials_pbrSpecularGlossiness",
@@ -37,6 +38,7 @@ constexpr std::string_view kKnownExtensions[] = {
     "KHR_animation_pointer",
     "KHR_xmp_json_ld",
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
     "EXT_mesh_features",
     "EXT_instance_features",
@@ -221,6 +223,12 @@ Result<ByteSpan> GltfFile::buffer(std::uint64_t index, const std::string& user) 
 Result<BufferView> GltfFile::bufferView(std::uint64_t index, const std::string& user) {
     STX_TRY(const Json* object, element(root_, "bufferViews", index, user));
     const auto where = fmt::format("bufferViews[{}]", index);
+    STX_TRY(const Json* packed, getExtension(*object, "EXT_meshopt_compression", where));
+    if (packed) {
+        STX_TRY(const auto bytes, unpacked(*packed, index, where));
+        STX_TRY(const auto stride, getUint(*object, "byteStride", where));
+        return BufferView{bytes, stride.value_or(0)};
+    }
     STX_TRY(const auto bufferIndex, getUint(*object, "buffer", where));
     if (!bufferIndex) return fail(ErrorCode::invalidInput, "{} names no buffer", where);
     STX_TRY(const auto length, getUint(*object, "byteLength", where));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -59,6 +60,9 @@ class GltfFile {
     [[nodiscard]] Result<void> parse(ByteSpan bytes);
     [[nodiscard]] Result<void> checkAsset();
     [[nodiscard]] Result<ByteSpan> buffer(std::uint64_t index, const std::string& user);
+    /// The bytes of a bufferView that EXT_meshopt_compression packs.
+    [[nodiscard]] Result<ByteSpan> unpacked(const Json& extension, std::uint64_t view,
+                                            const std::string& viewWhere);
     [[nodiscard]] Result<Layout> layout(std::uint64_t index, const std::string& user,
                                         std::initializer_list<std::string_view> types);
     /// All elements' components as doubles would lose nothing; Component is float or uint32.
@@ -70,6 +74,7 @@ class GltfFile {
     bool hasBinaryChunk_ = false;
     std::vector<std::optional<ByteSpan>> buffers_;
     std::vector<std::unique_ptr<Bytes>> owned_;
+    std::map<std::uint64_t, Bytes> unpacked_;  ///< by bufferView
     ModelFiles* files_ = nullptr;
     MeshBuilder* builder_ = nullptr;
 };

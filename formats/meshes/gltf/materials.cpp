@@ -20,7 +20,8 @@ Result<MaterialUse> Materials::use(std::optional<std::uint64_t> index, const std
         STX_TRY(result, read(*index, user));
     } else {
         result.index = static_cast<std::uint32_t>(builder_.materials().size());
-        builder_.materials().push_back({.name = "default", .doubleSided = false});
+        builder_.materials().push_back(
+            {.name = "default", .doubleSided = false, .hasColour = false});
     }
     known_.emplace(key, result);
     return result;
@@ -33,7 +34,12 @@ MaterialUse Materials::withoutTextures(const MaterialUse& use, bool keepBase, bo
     const auto [it, isNew] = plain_.try_emplace({use.index, keepBase, keepNormal}, 0);
     if (isNew) {
         auto material = builder_.materials()[use.index];
-        if (!keepBase) material.baseColourTexture = -1;
+        if (!keepBase) {
+            material.baseColourTexture = -1;
+            // A map of what shines, which is dark for the most part.
+            if (material.emissiveTexture >= 0) material.emissive = glm::vec3(0.0f);
+            material.emissiveTexture = -1;
+        }
         if (!keepNormal) material.normalTexture = -1;
         it->second = static_cast<std::uint32_t>(builder_.materials().size());
         builder_.materials().push_back(std::move(material));
@@ -93,6 +99,15 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
         STX_TRY(const auto webpSource, getUint(*webp, "source", textureWhere));
         if (webpSource) source = webpSource;
     }
+    STX_TRY(const Json* basis, getExtension(*object, "KHR_texture_basisu", textureWhere));
+    if (!source && basis) {
+        model_.job().note(
+            fmt::format("{} is in Basis Universal (KHR_texture_basisu), which cannot be decoded "
+                        "here: the plain "
+                        "colour is used; export PNG or JPEG textures, or give one with --texture",
+                        textureWhere));
+        return -1;
+    }
     if (!source) {
         model_.job().note(fmt::format(
             "{} names no image that can be read; the plain colour is used", textureWhere));
@@ -122,6 +137,33 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
     return result;
 }
 
+Result<void> Materials::readEmissive(const Json& object, const std::string& where, Material& m,
+                                     MaterialUse& use) {
+    glm::dvec3 factor(0.0);
+    STX_CHECK(getNumbers(object, "emissiveFactor", where, {&factor.x, 3}));
+    STX_TRY(const Json* stronger, getExtension(object, "KHR_materials_emissive_strength", where));
+    if (stronger) {
+        STX_TRY(const auto strength, getNumber(*stronger, "emissiveStrength", where));
+        factor *= std::clamp(strength.value_or(1.0), 0.0, 1e6);
+    }
+    STX_TRY(const Json* info, getObject(object, "emissiveTexture", where));
+    if (factor == glm::dvec3(0.0)) return {};
+    m.emissive = glm::clamp(glm::vec3(factor), 0.0f, 1e6f);
+    if (!info) return {};
+    UvSource uv;
+    STX_TRY(m.emissiveTexture, texture(*info, where + ".emissiveTexture", uv));
+    if (m.emissiveTexture < 0) {
+        m.emissive = glm::vec3(0.0f);
+    } else if (!use.baseColour.used) {
+        use.baseColour = uv;
+    } else if (!(uv == use.baseColour)) {
+        ++dropped["emissive maps with texture coordinates of their own"];
+        m.emissive = glm::vec3(0.0f);
+        m.emissiveTexture = -1;
+    }
+    return {};
+}
+
 Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user) {
     STX_TRY(const Json* object, element(model_.root(), "materials", index, user));
     const auto where = fmt::format("materials[{}]", index);
@@ -135,11 +177,13 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
     const Json* base = glossy ? glossy : pbr;
     const auto baseWhere = where + (glossy ? ".extensions.KHR_materials_pbrSpecularGlossiness"
                                            : ".pbrMetallicRoughness");
+    m.hasColour = false;
     if (base) {
         glm::dvec4 factor(1.0);
         STX_CHECK(getNumbers(*base, glossy ? "diffuseFactor" : "baseColorFactor", baseWhere,
                              {&factor.x, 4}));
         m.baseColour = glm::vec4(factor);
+        m.hasColour = base->contains(glossy ? "diffuseFactor" : "baseColorFactor");
         const char* key = glossy ? "diffuseTexture" : "baseColorTexture";
         STX_TRY(const Json* info, getObject(*base, key, baseWhere));
         if (info && !model_.files().replacesColour()) {
@@ -155,11 +199,7 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
         m.normalScale = static_cast<float>(scale.value_or(1.0));
     }
     if (object->contains("occlusionTexture")) ++dropped["occlusion maps"];
-    if (object->contains("emissiveTexture")) ++dropped["emissive maps"];
-    glm::dvec3 emissive(0.0);
-    STX_CHECK(getNumbers(*object, "emissiveFactor", where, {&emissive.x, 3}));
-    if (emissive != glm::dvec3(0.0) && !object->contains("emissiveTexture"))
-        ++dropped["emissive colours"];
+    STX_CHECK(readEmissive(*object, where, m, use));
     STX_TRY(const auto alphaMode, getString(*object, "alphaMode", where));
     if (alphaMode == "MASK") {
         m.alpha = Material::Alpha::mask;

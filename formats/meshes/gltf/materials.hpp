@@ -42,6 +42,8 @@ class Materials {
 
   private:
     [[nodiscard]] Result<MaterialUse> read(std::uint64_t index, const std::string& user);
+    [[nodiscard]] Result<void> readEmissive(const Json& object, const std::string& where,
+                                            Material& m, MaterialUse& use);
     [[nodiscard]] Result<int> texture(const Json& info, const std::string& where, UvSource& uv);
 
     GltfFile& model_;

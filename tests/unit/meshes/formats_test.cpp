@@ -92,7 +92,7 @@ TEST(Obj, MissingMaterialFileIsSaid) {
     const auto model =
         readGoodText("mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n", "a.obj");
     EXPECT_TRUE(model.hasNote("gone.mtl"));
-    EXPECT_EQ(model.mesh.materials.at(model.mesh.triangleMaterial[0]).baseColour, glm::vec4(1));
+    EXPECT_FALSE(model.mesh.materials.at(model.mesh.triangleMaterial[0]).hasColour);
 }
 
 TEST(Ply, BigEndianIsRead) {

@@ -210,7 +210,7 @@ TEST(Malformed, MaterialFilesOutsideAreNotRead) {
     write("secret.mtl", "newmtl red\nKd 1 0 0\n");
     write("model/a.obj", "mtllib ../secret.mtl\n" + triangle);
     const auto without = readGood(folder / "model/a.obj");
-    EXPECT_EQ(without.mesh.materials.at(without.mesh.triangleMaterial[0]).baseColour, glm::vec4(1));
+    EXPECT_FALSE(without.mesh.materials.at(without.mesh.triangleMaterial[0]).hasColour);
     EXPECT_TRUE(without.hasNote("--allow-outside"));
     // The same name with the file beside the model.
     write("model/secret.mtl", "newmtl red\nKd 0 0 1\n");

@@ -1,0 +1,133 @@
+#include "formats/meshes/scene_claims.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace stx {
+namespace {
+
+Result<void> tooDeep(const Limits& limits) {
+    return fail(ErrorCode::invalidInput,
+                "the file's elements are nested deeper than {}; no model is", limits.maxNesting);
+}
+
+/// A binary FBX file: after a header of 27 bytes, records of (end, properties, bytes of them,
+/// name), the records inside of one between its properties and its end.
+class FbxRecords {
+  public:
+    FbxRecords(ByteSpan bytes, const Limits& limits) : bytes_(bytes), limits_(limits) {
+        const auto version = number(23, 4);
+        wide_ = version && *version >= 7500;
+    }
+
+    Result<void> check() {
+        std::vector<std::uint64_t> ends = {bytes_.size()};
+        std::uint64_t at = 27;
+        const std::uint64_t field = wide_ ? 8 : 4, header = 3 * field + 1;
+        while (!ends.empty()) {
+            const auto end = at < ends.back() ? number(at, field) : std::nullopt;
+            if (!end || *end == 0) {  // the list of records ends here
+                at = ends.back();
+                ends.pop_back();
+                continue;
+            }
+            const auto count = number(at + field, field), length = number(at + 2 * field, field);
+            const auto name = number(at + 3 * field, 1);
+            if (!count || !length || !name || *end <= at || *end > bytes_.size()) return {};
+            const auto properties = at + header + *name;
+            STX_CHECK(checkArrays(properties, *count, *end));
+            if (*length > bytes_.size() || properties + *length >= *end) {
+                at = *end;
+                continue;
+            }
+            ends.push_back(*end);
+            if (ends.size() > static_cast<std::size_t>(limits_.maxNesting)) return tooDeep(limits_);
+            at = properties + *length;
+        }
+        return {};
+    }
+
+  private:
+    [[nodiscard]] std::optional<std::uint64_t> number(std::uint64_t at, std::uint64_t size) const {
+        if (at > bytes_.size() || size > bytes_.size() - at) return std::nullopt;
+        std::uint64_t value = 0;
+        std::memcpy(&value, bytes_.data() + at, size);
+        return value;
+    }
+
+    /// Adds up what the arrays among the properties of a record take.
+    Result<void> checkArrays(std::uint64_t at, std::uint64_t count, std::uint64_t end) {
+        for (std::uint64_t i = 0; i < count && at < end; ++i) {
+            const auto type = static_cast<char>(bytes_[at++]);
+            const std::string_view single = "YCBIFDL";
+            constexpr std::uint64_t kSizes[] = {2, 1, 1, 4, 4, 8, 8};
+            if (const auto k = single.find(type); k != std::string_view::npos) {
+                at += kSizes[k];
+                continue;
+            }
+            const auto length = number(at, 4);
+            if (!length) return {};
+            if (type == 'S' || type == 'R') {
+                at += 4 + *length;
+                continue;
+            }
+            const auto packed = number(at + 8, 4);
+            if (!packed || std::string_view("fdlibc").find(type) == std::string_view::npos)
+                return {};
+            const std::uint64_t each = type == 'd' || type == 'l'   ? 8
+                                       : type == 'b' || type == 'c' ? 1
+                                                                    : 4;
+            claimed_ += *length * each;
+            STX_CHECK(limits_.checkAllocation(claimed_, 2, "the arrays of the FBX file"));
+            at += 12 + *packed;
+        }
+        return {};
+    }
+
+    ByteSpan bytes_;
+    const Limits& limits_;
+    bool wide_ = false;  ///< numbers of 64 bits, from version 7.5 on
+    std::uint64_t claimed_ = 0;
+};
+
+}  // namespace
+
+Result<void> checkColladaClaims(ByteSpan bytes, const Limits& limits) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    int depth = 0;
+    for (std::size_t at = text.find('<'); at != std::string_view::npos; at = text.find('<', at)) {
+        const auto rest = text.substr(at);
+        if (rest.starts_with("<!--")) {
+            at = text.find("-->", at);
+        } else if (rest.starts_with("<![CDATA[")) {
+            at = text.find("]]>", at);
+        } else {
+            const auto end = text.find('>', at);
+            if (end == std::string_view::npos) return {};
+            const bool closes = rest.starts_with("</"), aside = rest[1] == '?' || rest[1] == '!';
+            if (closes)
+                --depth;
+            else if (!aside && text[end - 1] != '/' && ++depth > limits.maxNesting)
+                return tooDeep(limits);
+            at = end;
+        }
+        if (at == std::string_view::npos) return {};
+    }
+    return {};
+}
+
+Result<void> checkFbxClaims(ByteSpan bytes, const Limits& limits) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (text.starts_with("Kaydara FBX Binary")) return FbxRecords(bytes, limits).check();
+    int depth = 0;
+    for (const char c : text) {
+        if (c == '{' && ++depth > limits.maxNesting) return tooDeep(limits);
+        if (c == '}') --depth;
+    }
+    return {};
+}
+
+}  // namespace stx
