@@ -88,6 +88,17 @@ def own_files(args, folder):
     made.append(os.path.join(folder, "atlas", "atlas.json"))
     must([args.stx, "pack", made[0], "-o", os.path.join(folder, "atlas.exr")], folder)
     made.append(os.path.join(folder, "atlas.exr"))
+    return made + models(folder)
+
+
+def models(folder):
+    """Models whose readers are not ours, from the seeds of fuzzing (their first byte says what they are)."""
+    seeds = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../fuzz/corpus/meshes")
+    made = []
+    for name in ("small.off", "small.dae", "small.fbx"):
+        with open(os.path.join(seeds, name), "rb") as file:
+            write(os.path.join(folder, name), file.read()[1:])
+        made.append(os.path.join(folder, name))
     return made
 
 
