@@ -25,6 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     config.usePredictiveMFField = config.version == 2 && (data[0] >> 6 & 1) != 0;
     config.nodeIdBits = data[0] & 31;
     config.routeIdBits = data[1] & 31;
+    config.protoIdBits = data[1] >> 5;
     Limits limits;
     limits.maxMemoryBytes = 64u << 20;
 
@@ -45,11 +46,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         at += 1 + length;
     }
     if (frames.empty()) return 0;
+    const auto look = [&](const NodePtr& node) { quantised |= node->is("QuantizationParameter"); };
+    const std::function<void(const std::vector<ProtoPtr>&)> lookInto =
+        [&](const std::vector<ProtoPtr>& protos) {
+            for (const ProtoPtr& proto : protos) {
+                for (const NodePtr& node : proto->body) forEachNode(node, look);
+                lookInto(proto->protos);
+            }
+        };
     for (const CommandFrame& frame : frames)
-        for (const Command& command : frame.commands)
-            forEachNode(command, [&](const NodePtr& node) {
-                quantised |= node->is("QuantizationParameter");
-            });
+        for (const Command& command : frame.commands) {
+            forEachNode(command, look);
+            if (const auto* scene = std::get_if<ReplaceScene>(&command)) lookInto(scene->protos);
+        }
     (void)composeScene(frames);
 
     const NodeIds ids = assignNodeIds(frames);

@@ -6,6 +6,7 @@
 #include "formats/mpeg4/bifs/descriptors.hpp"
 #include "formats/mpeg4/container/byte_io.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/text/bt.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;
@@ -68,6 +69,31 @@ NodeList oneOfEach() {
     return nodes;
 }
 
+/// A PROTO with a Script in it, its instance, and a Script with fields of its own.
+std::vector<CommandFrame> protos() {
+    Job job;
+    const auto document = readBt(R"(
+EXTERNPROTO Far [ field SFColor c 1 0 0 ] ["far.mp4#Far"]
+PROTO View [ field SFVec3f place 0 0 10 exposedField SFVec3f shift 0 0 0 eventIn SFBool hit ] {
+  PROTO Inner [ field MFNode more [] ] { Group { children IS more } }
+  DEF T Transform { translation IS shift children [ DepthImage { position IS place } Inner { } ] }
+  DEF S Script { eventIn SFBool go IS hit eventOut SFVec3f out url "javascript: function go() { out = 1; }" }
+  ROUTE S.out TO T.translation
+}
+Group { children [
+  DEF A View { place 1 2 3 } USE A View { shift 5 0 0 } Far { }
+  DEF S Script { eventIn SFBool go field SFInt32 count 3 field SFNode target USE A url
+    "javascript: function go(v) { for (var i = 0; i < 10; i++) { if (v && !(i % 2)) count += -i * 2.5e-1; else break; }
+     switch (count) { case 1: return 'x'; default: o.f(a[1], new B()); } while (true) i = v ? 1 : 2; }" }
+  DEF TOUCH TouchSensor { }
+] }
+ROUTE TOUCH.isActive TO S.go
+)",
+                                 "seed.bt", job);
+    if (!document) std::fprintf(stderr, "%s\n", document.error().text().c_str());
+    return document ? document->frames : std::vector<CommandFrame>();
+}
+
 std::vector<std::vector<CommandFrame>> scenes() {
     std::vector<std::vector<CommandFrame>> all;
     all.push_back({scene({view("DepthImage", "SimpleTexture")})});
@@ -126,6 +152,7 @@ std::vector<std::vector<CommandFrame>> scenes() {
     simple->set("texture", pixels);
     depthImage->set("diTexture", simple);
     all.push_back({scene({depthImage})});
+    all.push_back(protos());
     return all;
 }
 
@@ -137,8 +164,8 @@ void saveScene(const std::vector<CommandFrame>& frames, std::size_t number) {
         const BifsConfig config = fitBifsConfig({}, ids);
         BifsEncoder encoder(config, style, ids);
         ByteWriter units;
-        units.u8(static_cast<std::uint8_t>(config.nodeIdBits));
-        units.u8(static_cast<std::uint8_t>(config.routeIdBits));
+        units.u8(static_cast<std::uint8_t>(config.nodeIdBits | (config.version == 2 ? 128 : 0)));
+        units.u8(static_cast<std::uint8_t>(config.routeIdBits | config.protoIdBits << 5));
         for (const CommandFrame& frame : frames) {
             const auto bytes = encoder.encode(frame.commands);
             if (!bytes)

@@ -23,7 +23,8 @@ class BifsDecoder {
     BifsDecoder(BifsDecoder&&) noexcept;
 
     /// The commands of one access unit. Errors (invalidInput, where = "bit N") on anything that the
-    /// syntax or the table does not have; (unsupported) on PROTO and predictive MF coding.
+    /// syntax or the table does not have; (unsupported) on predictive MF coding and on extended
+    /// commands.
     [[nodiscard]] Result<std::vector<Command>> decode(ByteSpan accessUnit);
     /// Bits that the last access unit left after its last command (at most 7 in tidy files).
     [[nodiscard]] std::uint64_t bitsLeft() const;

@@ -71,6 +71,11 @@ BifsConfig fitBifsConfig(BifsConfig config, const NodeIds& ids) {
     if (ids.highestRoute > 0)
         config.routeIdBits =
             std::max(config.routeIdBits, std::max(1, significantBits(ids.highestRoute - 1)));
+    if (!ids.protos.empty()) {
+        // PROTOs came with version 2.
+        config.version = 2;
+        config.protoIdBits = std::max({config.protoIdBits, 1, significantBits(ids.highestProto)});
+    }
     return config;
 }
 

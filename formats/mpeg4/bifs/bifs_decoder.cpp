@@ -9,29 +9,6 @@ struct BifsDecoder::Impl : BifsNodeReader {
 
     std::uint64_t bitsLeft = 0;
 
-    Result<NodePtr> readTarget() {
-        const std::uint32_t id = in.read(config.nodeIdBits) + 1;
-        STX_CHECK(check("a command"));
-        const auto known = defined.find(id);
-        if (known == defined.end())
-            return error(ErrorCode::invalidInput,
-                         "a command names node id {}, which is not defined", id);
-        return known->second.node;
-    }
-
-    Result<int> readFieldId(const NodeInfo& node, int bits, const std::vector<int>& fields,
-                            std::string_view mode) {
-        const std::uint32_t id = in.read(bits);
-        STX_CHECK(check("a command"));
-        if (id >= fields.size())
-            return error(ErrorCode::invalidInput, "{} has no field with {} id {}", node.name, mode,
-                         id);
-        return fields[id];
-    }
-    Result<int> readInField(const Node& node) {
-        return readFieldId(*node.info, node.info->inBits, node.info->inFields, "IN");
-    }
-
     Result<Position> readPosition(int explicitBits) {
         Position position;
         switch (in.read(2)) {
@@ -51,60 +28,20 @@ struct BifsDecoder::Impl : BifsNodeReader {
         return position;
     }
 
-    Result<void> readEnds(Route& route) {
-        STX_TRY(route.from, readTarget());
-        STX_TRY(route.fromField, readFieldId(*route.from->info, route.from->info->outBits,
-                                             route.from->info->outFields, "OUT"));
-        STX_TRY(route.to, readTarget());
-        STX_TRY(route.toField, readInField(*route.to));
-        return {};
-    }
-
-    Result<Route> readRoute() {
-        STX_CHECK(useBudget(sizeof(Route)));
-        Route route;
-        if (in.flag()) {
-            route.id = in.read(config.routeIdBits) + 1;
-            if (useNames) {
-                STX_TRY(route.name, readName());
-            }
-        }
-        STX_CHECK(readEnds(route));
-        return route;
-    }
-
     Result<ReplaceScene> readScene() {
         ReplaceScene scene;
         in.read(6);
         useNames = in.flag();
         scene.useNames = useNames;
         defined.clear();
-        if (in.flag())
-            return error(ErrorCode::unsupported,
-                         "the scene declares PROTOs, which are not supported");
+        protoScopes.assign(1, {});
+        protoCount = 0;
+        STX_CHECK(readProtos(1));
+        scene.protos = protoScopes.front();
         int height = 0;
         STX_TRY(scene.root, readNode(Ndt::SFTopNode, 1, height));
-        const bool hasRoutes = in.flag();
         STX_CHECK(check("the scene"));
-        if (!hasRoutes) return scene;
-        if (in.flag()) {
-            do {
-                STX_TRY(Route route, readRoute());
-                scene.routes.push_back(std::move(route));
-            } while (in.flag());
-        } else {
-            const int bits = static_cast<int>(in.read(5));
-            const std::uint64_t count = in.read(bits);
-            for (std::uint64_t i = 0; i < count; ++i) {
-                // A route may take a single bit where ids have none.
-                if (in.failed() || count - i > in.left())
-                    return error(ErrorCode::invalidInput,
-                                 "{} routes do not fit into the {} bits left", count, in.left());
-                STX_TRY(Route route, readRoute());
-                scene.routes.push_back(std::move(route));
-            }
-        }
-        STX_CHECK(check("the routes"));
+        STX_TRY(scene.routes, readRoutes());
         return scene;
     }
 

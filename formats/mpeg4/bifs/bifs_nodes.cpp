@@ -180,27 +180,6 @@ Result<FieldValue> BifsNodeReader::readSingle(const NodeInfo& node, const FieldI
     return value;
 }
 
-template <class ReadOne>
-Result<void> BifsNodeReader::readEach(const NodeInfo& node, const FieldInfo& field,
-                                      std::uint64_t fewest, const ReadOne& readOne) {
-    const auto place = [&] { return fmt::format("{}.{}", node.name, field.name); };
-    if (in.flag()) {
-        while (!in.flag()) {
-            if (in.failed()) break;
-            STX_CHECK(readOne(0));
-        }
-        return check(place());
-    }
-    const int bits = static_cast<int>(in.read(5));
-    const std::uint64_t count = in.read(bits);
-    if (in.failed() || count * fewest > in.left())
-        return error(ErrorCode::invalidInput,
-                     "{} has {} items, which do not fit into the {} bits left", place(), count,
-                     in.left());
-    for (std::uint64_t i = 0; i < count; ++i) STX_CHECK(readOne(count - i));
-    return check(place());
-}
-
 template <class T>
 Result<void> BifsNodeReader::readItems(const NodeInfo& node, const FieldInfo& field,
                                        std::vector<T>& items) {
@@ -269,8 +248,7 @@ Result<NodePtr> BifsNodeReader::readNode(Ndt expected, int depth, int& height) {
                      limits.maxNesting);
     if (in.flag()) return readUse(expected, depth, height);
 
-    STX_TRY(const NodeInfo* info, readNodeCode(expected));
-    NodePtr node = makeNode(*info);
+    STX_TRY(NodePtr node, readNodeCode(expected));
     STX_CHECK(useBudget(sizeof(Node) + 64));
     if (in.flag()) {
         node->defId = in.read(config.nodeIdBits) + 1;
@@ -285,7 +263,7 @@ Result<NodePtr> BifsNodeReader::readNode(Ndt expected, int depth, int& height) {
     }
 
     const int outerDeepest = std::exchange(deepest, 0);
-    STX_CHECK(readFields(*node, depth));
+    STX_CHECK(proto ? readBodyFields(node, depth) : readFields(*node, depth));
     height = deepest + 1;
     deepest = outerDeepest;
     if (node->defId != 0) defined[node->defId].height = height;
@@ -313,7 +291,7 @@ Result<NodePtr> BifsNodeReader::readUse(Ndt expected, int depth, int& height) {
     return known->second.node;
 }
 
-Result<const NodeInfo*> BifsNodeReader::readNodeCode(Ndt expected) {
+Result<NodePtr> BifsNodeReader::readNodeCode(Ndt expected) {
     for (int version = 1; version <= kNdtVersions; ++version) {
         const auto bits = codeBits(expected, version);
         if (!bits)
@@ -323,14 +301,20 @@ Result<const NodeInfo*> BifsNodeReader::readNodeCode(Ndt expected) {
         const int code = static_cast<int>(in.read(*bits));
         STX_CHECK(check("a node code"));
         if (code == 0) continue;
-        if (version == 2 && code == 1)
-            return error(ErrorCode::unsupported,
-                         "an instance of a PROTO; PROTOs are not supported");
+        if (version == 2 && code == 1) {
+            const std::uint32_t id = in.read(config.protoIdBits);
+            STX_CHECK(check("an instance of a PROTO"));
+            for (auto scope = protoScopes.rbegin(); scope != protoScopes.rend(); ++scope)
+                for (const ProtoPtr& declared : *scope)
+                    if (declared->id == id) return makeInstance(declared);
+            return error(ErrorCode::invalidInput,
+                         "an instance of PROTO {}, which is not declared before it", id);
+        }
         const NodeInfo* info = findNode(expected, version, code);
         if (info == nullptr)
             return error(ErrorCode::unsupported, "node code {} of {} version {} is not known", code,
                          name(expected), version);
-        return info;
+        return makeNode(*info);
     }
     return error(ErrorCode::invalidInput, "a node code of {} that is 0 in every version",
                  name(expected));
@@ -356,6 +340,7 @@ Result<void> BifsNodeReader::readFields(Node& node, int depth) {
 
 Result<void> BifsNodeReader::readInto(Node& node, int index, int depth) {
     const FieldInfo& field = node.info->fields[static_cast<std::size_t>(index)];
+    if (field.type == FieldType::MFScript) return readScripts(node, index, depth);
     STX_TRY(FieldValue value, readField(*node.info, field, depth));
     STX_CHECK(useBudget(sizeof(Node::SetField)));
     node.set(index, std::move(value));

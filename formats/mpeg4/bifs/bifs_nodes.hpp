@@ -108,11 +108,68 @@ struct BifsNodeReader {
 
     Result<NodePtr> readUse(Ndt expected, int depth, int& height);
 
-    Result<const NodeInfo*> readNodeCode(Ndt expected);
+    /// A node of the type that its code says.
+    Result<NodePtr> readNodeCode(Ndt expected);
 
     Result<void> readFields(Node& node, int depth);
 
     Result<void> readInto(Node& node, int index, int depth);
+
+    /// The programs of a Script, with the fields that it has of its own.
+    Result<void> readScripts(Node& script, int index, int depth);
+    Result<ScriptText> readScriptItem(Node& script, int depth);
+    Result<std::string> readScriptField(Node& script, int depth);
+
+    // ---- targets and routes
+
+    Result<NodePtr> readTarget();
+    Result<int> readFieldId(const NodeInfo& node, int bits, const std::vector<int>& fields,
+                            std::string_view mode);
+    Result<int> readInField(const Node& node) {
+        return readFieldId(*node.info, node.info->inBits, node.info->inFields, "IN");
+    }
+    Result<void> readEnds(Route& route);
+    Result<Route> readRoute();
+    /// All routes of a scene or a body.
+    Result<std::vector<Route>> readRoutes();
+
+    // ---- PROTOs
+
+    /// The declarations of the scene, and of the bodies around what is read, innermost last.
+    std::vector<std::vector<ProtoPtr>> protoScopes = std::vector<std::vector<ProtoPtr>>(1);
+    Proto* proto = nullptr;  ///< whose interface or body is being read
+    std::size_t protoCount = 0;
+
+    /// Adds declarations to the innermost scope.
+    Result<void> readProtos(int depth);
+    Result<ProtoPtr> readProto(int depth);
+    Result<void> readInterface(Proto& declared, int depth);
+    Result<void> readBody(Proto& declared, int depth);
+    Result<void> readInterfaceQuantisation(Proto& declared);
+    /// `IS`: the number of a field of the interface that `node`'s field is linked to.
+    Result<void> readLink(const NodePtr& node, int field);
+    Result<void> readBodyFields(const NodePtr& node, int depth);
 };
+
+template <class ReadOne>
+Result<void> BifsNodeReader::readEach(const NodeInfo& node, const FieldInfo& field,
+                                      std::uint64_t fewest, const ReadOne& readOne) {
+    const auto place = [&] { return fmt::format("{}.{}", node.name, field.name); };
+    if (in.flag()) {
+        while (!in.flag()) {
+            if (in.failed()) break;
+            STX_CHECK(readOne(0));
+        }
+        return check(place());
+    }
+    const int bits = static_cast<int>(in.read(5));
+    const std::uint64_t count = in.read(bits);
+    if (in.failed() || count * fewest > in.left())
+        return error(ErrorCode::invalidInput,
+                     "{} has {} items, which do not fit into the {} bits left", place(), count,
+                     in.left());
+    for (std::uint64_t i = 0; i < count; ++i) STX_CHECK(readOne(count - i));
+    return check(place());
+}
 
 }  // namespace stx::mpeg4

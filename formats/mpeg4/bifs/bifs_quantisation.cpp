@@ -136,6 +136,7 @@ Result<std::optional<QuantisedCoding>> QuantisationScope::codingOf(const FieldIn
                     field.name);
 
     const std::string prefix(prefixOf(field.quantisation));
+    if (prefix.empty()) return std::nullopt;
     if (!active_->get<bool>(prefix + "Quant")) return std::nullopt;
     coding.bits = active_->get<std::int32_t>(prefix + "NbBits");
     if (coding.bits < 1 || coding.bits > 31)

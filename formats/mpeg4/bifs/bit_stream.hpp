@@ -65,6 +65,11 @@ class BitWriter {
         write(static_cast<std::uint32_t>(value >> 32), 32);
         write(static_cast<std::uint32_t>(value), 32);
     }
+    /// The bits of another writer.
+    void append(const BitWriter& other) {
+        for (const std::byte b : other.bytes_) write(std::to_integer<std::uint32_t>(b), 8);
+        if (other.held_ > 0) write(static_cast<std::uint32_t>(other.window_), other.held_);
+    }
     /// All bytes so far, the last one filled up.
     [[nodiscard]] Bytes finish() {
         if (held_ > 0) write(0, 8 - held_);

@@ -100,17 +100,22 @@ int idBits(std::size_t count) {
     return count < 2 ? 0 : static_cast<int>(std::bit_width(count - 1));
 }
 
-NodeInfo makeNodeInfo(const NodeRow& row) {
+}  // namespace
+
+NodeInfo makeNodeInfo(std::string name, std::vector<NodeCode> codes,
+                      const std::vector<FieldInfo>& fields, int ownFields) {
     NodeInfo node;
-    node.name = row.name;
-    node.codes = row.codes;
+    node.name = std::move(name);
+    node.codes = std::move(codes);
     int dynamicFields = 0;
-    for (FieldInfo info : row.fields) {
+    int valueFields = 0;
+    for (FieldInfo info : fields) {
         info.index = static_cast<int>(node.fields.size());
         const bool exposedField = info.kind == FieldKind::exposedField;
         if (exposedField || info.kind == FieldKind::field) {
-            info.defId = static_cast<int>(node.defFields.size());
-            node.defFields.push_back(info.index);
+            info.defId = valueFields++;
+            if (info.index < static_cast<int>(fields.size()) - ownFields)
+                node.defFields.push_back(info.index);
         }
         if (exposedField || info.kind == FieldKind::eventIn) {
             info.inId = static_cast<int>(node.inFields.size());
@@ -129,6 +134,8 @@ NodeInfo makeNodeInfo(const NodeRow& row) {
     return node;
 }
 
+namespace {
+
 std::uint32_t codeKey(Ndt type, int version, int code) {
     return static_cast<std::uint32_t>(type) << 16 | static_cast<std::uint32_t>(version) << 8 |
            static_cast<std::uint32_t>(code);
@@ -140,7 +147,8 @@ struct Tables {
     std::unordered_map<std::uint32_t, const NodeInfo*> byCode;
 
     Tables() {
-        for (const NodeRow& row : makeNodeRows()) nodes.push_back(makeNodeInfo(row));
+        for (const NodeRow& row : makeNodeRows())
+            nodes.push_back(makeNodeInfo(row.name, row.codes, row.fields));
         for (const NodeInfo& info : nodes) {
             byName.emplace(info.name, &info);
             for (const NodeCode& code : info.codes)
@@ -272,6 +280,8 @@ int NodeInfo::findIgnoringCase(std::string_view fieldName) const {
 }
 
 const NodeCode* NodeInfo::codeIn(Ndt type) const {
+    static const NodeCode protoCode{Ndt::none, 2, 1};
+    if (isProto) return &protoCode;
     for (const NodeCode& code : codes)
         if (code.type == type) return &code;
     return nullptr;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -182,12 +183,21 @@ struct NodeCode {
     int code = 0;
 };
 
-/// One node type. Compare by address: each exists once.
+struct FieldDefaults;
+
+/// One node type. Those of the table exist once each; a Script with fields of its own and a PROTO
+/// bring types of their own. Compare with sameType (scene.hpp).
 struct NodeInfo {
     std::string name;
     std::vector<NodeCode> codes;
+    /// Of a type that is not in the table: the defaults of its fields.
+    std::shared_ptr<const FieldDefaults> defaults;
+    bool isProto =
+        false;  ///< an instance may stand anywhere; its code is followed by the PROTO's id
     std::vector<FieldInfo> fields;  ///< in table order, which is the order of all ids
-    std::vector<int> defFields;     ///< index into fields for each DEF id
+    /// Index into fields for each DEF id. Fields that a Script has of its own are not among them:
+    /// they are coded with its program.
+    std::vector<int> defFields;
     std::vector<int> inFields;
     std::vector<int> outFields;
     int defBits = 0;  ///< width of a DEF id
@@ -201,6 +211,10 @@ struct NodeInfo {
     /// How this node is coded where a `type` is expected; null when it may not be there.
     [[nodiscard]] const NodeCode* codeIn(Ndt type) const;
 };
+
+/// A type with all ids of its fields. The last `ownFields` of them are a Script's own.
+[[nodiscard]] NodeInfo makeNodeInfo(std::string name, std::vector<NodeCode> codes,
+                                    const std::vector<FieldInfo>& fields, int ownFields = 0);
 
 /// All node types, in table order.
 [[nodiscard]] std::span<const NodeInfo> allNodes();

@@ -105,6 +105,7 @@ FieldValue emptyValue(FieldType type) {
 }
 
 const FieldValue& defaultValue(const NodeInfo& node, int fieldIndex) {
+    if (node.defaults) return node.defaults->values.at(static_cast<std::size_t>(fieldIndex));
     static const auto* const defaults = [] {
         auto* all = new std::unordered_map<const NodeInfo*, std::vector<FieldValue>>;
         for (const NodeInfo& info : allNodes()) {
@@ -114,6 +115,15 @@ const FieldValue& defaultValue(const NodeInfo& node, int fieldIndex) {
         return all;
     }();
     return defaults->at(&node).at(static_cast<std::size_t>(fieldIndex));
+}
+
+bool sameType(const NodeInfo& a, const NodeInfo& b) {
+    if (&a == &b) return true;
+    if (!a.defaults || !b.defaults || a.name != b.name || a.isProto != b.isProto) return false;
+    return std::equal(a.fields.begin(), a.fields.end(), b.fields.begin(), b.fields.end(),
+                      [](const FieldInfo& x, const FieldInfo& y) {
+                          return x.name == y.name && x.kind == y.kind && x.type == y.type;
+                      });
 }
 
 std::size_t itemCount(const FieldValue& value) {
@@ -186,6 +196,39 @@ void Node::clear(int fieldIndex) {
 
 NodePtr makeNode(const NodeInfo& type) {
     return std::make_shared<Node>(type);
+}
+
+bool addScriptField(Node& script, FieldInfo field, std::optional<FieldValue> value) {
+    if (!script.is("Script") || script.info->find(field.name) >= 0) return false;
+    if (field.kind == FieldKind::exposedField || (value && typeOf(*value) != field.type))
+        return false;
+    const NodeInfo& old = *script.info;
+    std::vector<FieldInfo> fields = old.fields;
+    const auto index = static_cast<int>(fields.size());
+    const bool hasValue = field.kind == FieldKind::field;
+    auto defaults = std::make_shared<FieldDefaults>();
+    for (const FieldInfo& known : fields)
+        defaults->values.push_back(defaultValue(old, known.index));
+    defaults->values.push_back(emptyValue(field.type));
+    fields.push_back(std::move(field));
+    auto type = std::make_shared<NodeInfo>(
+        makeNodeInfo(old.name, old.codes, fields, ownFieldCount(script) + 1));
+    type->defaults = std::move(defaults);
+    script.info = type.get();
+    script.ownType = std::move(type);
+    if (value && hasValue) return script.set(index, std::move(*value));
+    return true;
+}
+
+int ownFieldCount(const Node& script) {
+    if (!script.ownType || !script.is("Script")) return 0;
+    return static_cast<int>(script.info->fields.size() - findNode("Script")->fields.size());
+}
+
+NodePtr makeInstance(const ProtoPtr& proto) {
+    NodePtr node = makeNode(proto->type);
+    node->proto = proto;
+    return node;
 }
 
 NodePtr makeNode(std::string_view typeName) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -30,6 +31,7 @@
 namespace stx::mpeg4 {
 
 struct Node;
+struct Proto;
 /// A node, shared by all its USEs; null is NULL. Graphs have no cycles: readers refuse a node that
 /// USEs one it is in, and who builds scenes must not make one.
 using NodePtr = std::shared_ptr<Node>;
@@ -104,17 +106,27 @@ inline constexpr bool kIsList<std::vector<T>> = true;
 [[nodiscard]] FieldValue emptyValue(FieldType type);
 /// The default of a field that has one; emptyValue for events. Lives forever.
 [[nodiscard]] const FieldValue& defaultValue(const NodeInfo& node, int fieldIndex);
+/// The values of FieldInfo::defaultText for types that are not in the table, in order of fields.
+struct FieldDefaults {
+    std::vector<FieldValue> values;
+};
+/// Whether two types are one: the same of the table, or of the same name with the same fields.
+[[nodiscard]] bool sameType(const NodeInfo& a, const NodeInfo& b);
 /// Items of an MF value; 1 for an SF value.
 [[nodiscard]] std::size_t itemCount(const FieldValue& value);
 
 /// A node of the scene. Only fields that were set are stored; the others have their defaults.
-struct Node {
+struct Node : std::enable_shared_from_this<Node> {
     explicit Node(const NodeInfo& type) : info(&type) {}
     Node(const Node&) = default;
     Node& operator=(const Node&) = default;
     ~Node();  ///< takes no stack for deep graphs
 
     const NodeInfo* info;
+    /// Of a Script with fields of its own: what `info` points to.
+    std::shared_ptr<const NodeInfo> ownType;
+    /// Of an instance of a PROTO, whose type `info` points to.
+    std::shared_ptr<const Proto> proto;
     /// DEF: the id in BIFS, 1-based; 0 where none was coded. Writers give free ids to nodes that
     /// need one (a name, several uses, a route or a command that names them): see assignNodeIds.
     std::uint32_t defId = 0;
@@ -168,6 +180,15 @@ struct Node {
 [[nodiscard]] NodePtr makeNode(std::string_view typeName);
 [[nodiscard]] NodePtr makeNode(const NodeInfo& type);
 
+/// Adds a field to those that a Script has of its own, with its value where it has one. Field,
+/// eventIn or eventOut. False, changing nothing, when the node is no Script or has such a field.
+[[nodiscard]] bool addScriptField(Node& script, FieldInfo field, std::optional<FieldValue> value);
+/// How many of its fields are a Script's own: the last ones.
+[[nodiscard]] int ownFieldCount(const Node& script);
+
+/// An instance of a PROTO with the defaults of its interface.
+[[nodiscard]] NodePtr makeInstance(const std::shared_ptr<const Proto>& proto);
+
 /// Whether `node` may be in a field that takes `expected` (null may be in any).
 [[nodiscard]] bool mayStandIn(const Node* node, Ndt expected);
 
@@ -182,6 +203,26 @@ struct Route {
     int toField = 0;
 };
 
+/// A PROTO or EXTERNPROTO: an interface, and nodes whose fields it gives values to.
+struct Proto {
+    std::string name;
+    std::uint32_t id = 0;
+    NodeInfo type;  ///< the interface: isProto, with defaults
+    bool isExtern = false;
+    std::vector<Url> urls;  ///< of an EXTERNPROTO, which has nothing of what follows
+    std::vector<std::shared_ptr<const Proto>> protos;
+    NodeList body;  ///< the first is what an instance shows
+    std::vector<Route> routes;
+    /// `field IS protoField`: a field of a node of the body has the value of one of the interface.
+    struct Link {
+        NodePtr node;
+        int field = 0;
+        int protoField = 0;
+    };
+    std::vector<Link> links;
+};
+using ProtoPtr = std::shared_ptr<const Proto>;
+
 /// Where an item goes or is: an index from 0, or the end.
 struct Position {
     static constexpr int kLast = -1;
@@ -195,6 +236,7 @@ struct ReplaceScene {
     bool useNames = false;  ///< DEF names are coded beside the ids
     NodePtr root;           ///< an SFTopNode; may be null
     std::vector<Route> routes;
+    std::vector<ProtoPtr> protos = {};
 };
 struct ReplaceNode {
     NodePtr target;
@@ -284,6 +326,10 @@ struct SameOptions {
 /// A deep copy that shares where the original shares.
 [[nodiscard]] NodePtr cloneNode(const NodePtr& node);
 
+/// What an instance of a PROTO shows: a copy of the first node of the body, with the values of the
+/// instance where the body has a link. Null for an EXTERNPROTO. `copied`: how many nodes were.
+[[nodiscard]] NodePtr bodyOf(const Node& instance, std::size_t& copied);
+
 /// The scene after the commands of all frames with time <= `until` on copies of their nodes. Errors
 /// (invalidInput) when a command does not fit the scene it meets: an index out of range, a node
 /// that is not there, or a cycle.
@@ -294,12 +340,17 @@ struct SameOptions {
 struct NodeIds {
     std::unordered_map<const Node*, std::uint32_t> nodes;  ///< 1-based
     std::unordered_map<std::string, std::uint32_t> routesByName;
+    std::unordered_map<const Proto*, std::uint32_t> protos;
     std::uint32_t highestNode = 0;
     std::uint32_t highestRoute = 0;
+    std::uint32_t highestProto = 0;
 };
 /// An id for every node that needs one (a defId, a DEF name, more than one use, an end of a route,
 /// the target of a command): its defId where it has one, else one that no other node has, in order
 /// of appearance. The same for routes with a name.
+/// PROTOs keep their id where no other has it. The highest ids count the bodies of PROTOs, too.
 [[nodiscard]] NodeIds assignNodeIds(const std::vector<CommandFrame>& frames);
+/// The ids of the nodes in the body of a PROTO, which are apart from all others.
+[[nodiscard]] NodeIds idsOfBody(const Proto& proto);
 
 }  // namespace stx::mpeg4

@@ -168,7 +168,7 @@ class Composer {
             }
         }
         // Routes stay where the new node has the same fields.
-        const bool keeps = replacement && replacement->info == target->info;
+        const bool keeps = replacement && sameType(*replacement->info, *target->info);
         std::erase_if(scene_.routes, [&](Route& r) {
             if (r.from != target && r.to != target) return false;
             if (!keeps) return true;

@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "formats/mpeg4/scene/proto_links.hpp"
 #include "formats/mpeg4/scene/scene.hpp"
 
 // Walking, comparing, copying and numbering. Nothing here recurses: graphs may be deep.
@@ -120,7 +121,44 @@ class GraphComparison {
                nodes(a.to, b.to);
     }
 
+    bool protos(const std::vector<ProtoPtr>& a, const std::vector<ProtoPtr>& b) {
+        return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                          [&](const ProtoPtr& x, const ProtoPtr& y) { return proto(*x, *y); });
+    }
+
   private:
+    bool proto(const Proto& a, const Proto& b) {
+        const auto nodesOf = [&](const NodePtr& x, const NodePtr& y) { return nodes(x, y); };
+        const auto routesOf = [&](const Route& x, const Route& y) { return routes(x, y); };
+        if ((options_.names && a.name != b.name) || a.type.fields.size() != b.type.fields.size() ||
+            a.isExtern != b.isExtern || a.urls != b.urls || !protos(a.protos, b.protos))
+            return false;
+        for (std::size_t i = 0; i < a.type.fields.size(); ++i) {
+            const FieldInfo& x = a.type.fields[i];
+            const FieldInfo& y = b.type.fields[i];
+            if (x.kind != y.kind || x.type != y.type || (options_.names && x.name != y.name) ||
+                !values(defaultValue(a.type, x.index), defaultValue(b.type, y.index)))
+                return false;
+        }
+        return std::equal(a.body.begin(), a.body.end(), b.body.begin(), b.body.end(), nodesOf) &&
+               std::equal(a.routes.begin(), a.routes.end(), b.routes.begin(), b.routes.end(),
+                          routesOf) &&
+               sameLinks(a, b);
+    }
+
+    /// The nodes of the bodies answer to each other already; links may be in any order.
+    bool sameLinks(const Proto& a, const Proto& b) const {
+        if (a.links.size() != b.links.size()) return false;
+        const ProtoLinks other = linksOf(b);
+        return std::all_of(a.links.begin(), a.links.end(), [&](const Proto::Link& link) {
+            const auto node = bOfA_.find(link.node.get());
+            if (node == bOfA_.end()) return false;
+            const auto& links = linksOf(other, *node->second);
+            const auto found = links.find(link.field);
+            return found != links.end() && found->second == link.protoField;
+        });
+    }
+
     bool pair(const NodePtr& a, const NodePtr& b) {
         if (!a || !b) return !a && !b;
         const auto [forth, fresh] = bOfA_.emplace(a.get(), b.get());
@@ -143,11 +181,12 @@ class GraphComparison {
     }
 
     bool contents(const Node& a, const Node& b) {
-        if (a.info != b.info || (options_.ids && a.defId != b.defId) ||
+        if (!sameType(*a.info, *b.info) || (options_.ids && a.defId != b.defId) ||
             (options_.names && a.defName != b.defName))
             return false;
-        for (const int index : a.info->defFields)
-            if ((a.isSet(index) || b.isSet(index)) && !shallow(a.value(index), b.value(index)))
+        for (const FieldInfo& field : a.info->fields)
+            if ((a.isSet(field.index) || b.isSet(field.index)) &&
+                !shallow(a.value(field.index), b.value(field.index)))
                 return false;
         return true;
     }
@@ -173,6 +212,7 @@ bool sameCommand(const C& a, const C& b, GraphComparison& compare, SameOptions o
         for (std::size_t i = 0; i < a.routes.size(); ++i)
             if (!compare.routes(a.routes[i], b.routes[i])) return false;
         if (options.names && a.useNames != b.useNames) return false;
+        if (!compare.protos(a.protos, b.protos)) return false;
     }
     if constexpr (requires { a.replacement; })
         if (!compare.nodes(a.replacement, b.replacement)) return false;
@@ -277,9 +317,12 @@ Result<int> nestingDepth(const NodePtr& root) {
     return deepest;
 }
 
-NodePtr cloneNode(const NodePtr& node) {
+namespace {
+
+/// Copies of all nodes below `root`, by their originals, linked like these.
+std::unordered_map<const Node*, NodePtr> copiesOf(const NodePtr& root) {
     std::unordered_map<const Node*, NodePtr> copies;
-    forEachNode(node,
+    forEachNode(root,
                 [&](const NodePtr& n) { copies.emplace(n.get(), std::make_shared<Node>(*n)); });
     const auto relink = [&](NodePtr& n) {
         if (n) n = copies.at(n.get());
@@ -290,10 +333,35 @@ NodePtr cloneNode(const NodePtr& node) {
             if (NodeList* list = std::get_if<NodeList>(&field.value))
                 for (NodePtr& child : *list) relink(child);
         }
-    return node ? copies.at(node.get()) : nullptr;
+    return copies;
 }
 
-NodeIds assignNodeIds(const std::vector<CommandFrame>& frames) {
+}  // namespace
+
+NodePtr cloneNode(const NodePtr& node) {
+    return node ? copiesOf(node).at(node.get()) : nullptr;
+}
+
+NodePtr bodyOf(const Node& instance, std::size_t& copied) {
+    copied = 0;
+    if (!instance.proto || instance.proto->body.empty()) return nullptr;
+    const Proto& proto = *instance.proto;
+    const NodePtr holder = makeNode("Group");
+    holder->set("children", proto.body);
+    const auto copies = copiesOf(holder);
+    copied = copies.size();
+    for (const Proto::Link& link : proto.links) {
+        const auto found = copies.find(link.node.get());
+        // A field of an event has no value to give.
+        if (found != copies.end())
+            (void)found->second->set(link.field, instance.value(link.protoField));
+    }
+    return copies.at(proto.body.front().get());
+}
+
+namespace {
+
+NodeIds nodeIdsOf(const std::vector<CommandFrame>& frames) {
     NodeIds ids;
     std::vector<const Node*> inOrder;
     std::unordered_map<const Node*, int> uses;
@@ -363,6 +431,40 @@ NodeIds assignNodeIds(const std::vector<CommandFrame>& frames) {
         ids.routesByName.emplace(route->name, nextRoute++);
     }
     return ids;
+}
+
+/// Gives ids to PROTOs and all in their bodies, and counts what their bodies need.
+void addProtos(const std::vector<ProtoPtr>& protos, NodeIds& ids,
+               std::unordered_set<std::uint32_t>& taken) {
+    for (const ProtoPtr& proto : protos) {
+        if (ids.protos.contains(proto.get())) continue;
+        std::uint32_t id = proto->id;
+        while (!taken.insert(id).second) ++id;
+        ids.protos.emplace(proto.get(), id);
+        ids.highestProto = std::max(ids.highestProto, id);
+        const NodeIds body = idsOfBody(*proto);
+        ids.highestNode = std::max(ids.highestNode, body.highestNode);
+        ids.highestRoute = std::max(ids.highestRoute, body.highestRoute);
+        addProtos(proto->protos, ids, taken);
+    }
+}
+
+}  // namespace
+
+NodeIds assignNodeIds(const std::vector<CommandFrame>& frames) {
+    NodeIds ids = nodeIdsOf(frames);
+    std::unordered_set<std::uint32_t> taken;
+    for (const CommandFrame& frame : frames)
+        for (const Command& command : frame.commands)
+            if (const auto* scene = std::get_if<ReplaceScene>(&command))
+                addProtos(scene->protos, ids, taken);
+    return ids;
+}
+
+NodeIds idsOfBody(const Proto& proto) {
+    const NodePtr holder = makeNode("Group");
+    holder->set("children", proto.body);
+    return nodeIdsOf({{0, {ReplaceScene{false, holder, proto.routes}}}});
 }
 
 }  // namespace stx::mpeg4

@@ -25,7 +25,13 @@ class Walker {
         if (depth > limits_.maxNesting)
             return fail(ErrorCode::invalidInput, "nodes nest deeper than {}", limits_.maxNesting);
         const std::string& type = node->info->name;
-        if (type == "DepthImage" || type == "DepthImageV2" || type == "OctreeImage") {
+        if (node->proto) {
+            std::size_t copied = 0;
+            const NodePtr body = bodyOf(*node, copied);
+            visits_ += static_cast<std::int64_t>(copied);
+            if (body) return visit(body, world, parent, depth + 1);
+            scene_.leftOut.insert(type);
+        } else if (type == "DepthImage" || type == "DepthImageV2" || type == "OctreeImage") {
             if (scene_.nodes.size() >= static_cast<std::size_t>(limits_.maxViews))
                 return fail(ErrorCode::invalidInput, "the scene shows more than {} views",
                             limits_.maxViews);

@@ -87,6 +87,10 @@ Result<void> BtReader::readReplace(std::uint64_t time) {
     if (isScene) {
         STX_CHECK(takeWord("BY"));
         ReplaceScene scene;
+        // A scene that takes the place of another has PROTOs of its own.
+        if (!document_.frames.empty()) protoScopes_.front().clear();
+        while (isWord("PROTO") || isWord("EXTERNPROTO")) STX_CHECK(readProto(1));
+        scene.protos = protoScopes_.front();
         const std::string where = lexer_.where();
         int height = 0;
         STX_TRY(scene.root, readNode(1, height, nullptr, -1, -1));

@@ -26,8 +26,7 @@ Result<void> BtReader::readTopLevel() {
         return {};
     }
     if (isWord("RAP") || isWord("AT")) return readBlock();
-    if (isWord("PROTO") || isWord("EXTERNPROTO"))
-        return failAt(lexer_.where(), ErrorCode::unsupported, "PROTO is not supported");
+    if (isWord("PROTO") || isWord("EXTERNPROTO")) return readProto(1);
     if (isWord("ROUTE")) return readSceneRoute("");
     if (isWord("DEF")) {
         STX_CHECK(takeWord("DEF"));
@@ -52,6 +51,7 @@ Result<void> BtReader::readTopNode(const std::string& defName, const std::string
     int height = 0;
     STX_TRY(scene.root, readNodeBody(defName, where, 1, height));
     STX_CHECK(checkNodePlace(scene.root.get(), Ndt::SFTopNode, "the scene", "root", where));
+    scene.protos = protoScopes_.front();
     addCommand(document_.frames, 0, std::move(scene));
     return {};
 }
@@ -281,44 +281,41 @@ Result<NodePtr> BtReader::readNodeBody(const std::string& defName, const std::st
                       job_.limits.maxNesting);
     const std::string typeWhere = lexer_.where();
     STX_TRY(const auto type, takeName("a node such as DepthImage"));
-    const NodeInfo* info = findNode(type);
-    if (!info)
+    NodePtr node = makeNamedNode(type);
+    if (!node)
         return failAt(typeWhere, ErrorCode::invalidInput, "there is no node type '{}' in the table",
                       excerpt(type));
     STX_CHECK(names_.countNode());
-    NodePtr node = makeNode(*info);
     if (!defName.empty()) STX_CHECK(names_.define(defName, node, where, inCommand_));
     STX_CHECK(take(Kind::openBrace, fmt::format("'{{' behind {}", type)));
     int below = 0;
     while (lexer_.peek().kind != Kind::closeBrace) {
         const std::string fieldWhere = lexer_.where();
-        STX_TRY(const auto fieldName, takeName(fmt::format("a field of {} or '}}'", type)));
-        const int index = info->findIgnoringCase(fieldName);
-        if (index < 0)
-            return failAt(fieldWhere, ErrorCode::invalidInput, "{} has no field '{}'", type,
-                          excerpt(fieldName));
-        const FieldInfo& field = info->fields[index];
+        int index = -1;
+        if (node->is("Script") && isDeclaration()) {
+            STX_TRY(index, readOwnField(*node));
+            const FieldInfo& own = node->info->fields[index];
+            if (own.kind != FieldKind::field && !isWord("IS")) continue;
+        } else {
+            STX_TRY(const auto fieldName, takeName(fmt::format("a field of {} or '}}'", type)));
+            index = node->info->findIgnoringCase(fieldName);
+            if (index < 0)
+                return failAt(fieldWhere, ErrorCode::invalidInput, "{} has no field '{}'", type,
+                              excerpt(fieldName));
+        }
+        if (isWord("IS")) {
+            STX_CHECK(readLink(node, index));
+            continue;
+        }
+        const FieldInfo& field = node->info->fields[index];
+        if (linked_.contains({node.get(), index}))
+            return failAt(fieldWhere, ErrorCode::invalidInput, "{}.{} has an IS already", type,
+                          field.name);
         if (!field.hasValue())
             return failAt(fieldWhere, ErrorCode::invalidInput, "{}.{} is an {} and takes no value",
                           type, field.name, name(field.kind));
-        if (isWord("IS"))
-            return failAt(lexer_.where(), ErrorCode::unsupported, "PROTO (IS) is not supported");
         int fieldHeight = 0;
-        if (field.type == FieldType::SFNode) {
-            const std::string childWhere = lexer_.where();
-            STX_TRY(auto child, readNode(depth + 1, fieldHeight, node, index, -1));
-            STX_CHECK(checkNodePlace(child.get(), field.nodeType, type, field.name, childWhere));
-            node->set(index, std::move(child));
-        } else if (field.type == FieldType::MFNode) {
-            STX_CHECK(readNodeList(node, index, depth + 1, fieldHeight, true));
-        } else {
-            auto value = readFieldValue(lexer_, field.type, false);
-            if (!value) {
-                value.error().message += fmt::format(" for {}.{}", type, field.name);
-                return propagate(value);
-            }
-            node->set(index, std::move(*value));
-        }
+        STX_CHECK(readValueInto(node, index, depth, fieldHeight));
         below = std::max(below, fieldHeight);
     }
     STX_TRY([[maybe_unused]] const auto brace, lexer_.take());

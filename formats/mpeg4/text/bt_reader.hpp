@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -112,6 +113,23 @@ class BtReader {
     Result<NodePtr> readNodeBody(const std::string& defName, const std::string& where, int depth,
                                  int& height);
 
+    // ---- PROTOs, and the fields of Scripts that are declared like theirs (bt_protos.cpp)
+    /// The type of a name: that of a PROTO around here, else of the table. Null: there is none.
+    NodePtr makeNamedNode(std::string_view type) const;
+    [[nodiscard]] bool isDeclaration() const;
+    /// `field SFInt32 size`, without a value.
+    Result<FieldInfo> readDeclaration();
+    /// Adds `eventIn SFBool start` to a Script; gives its index.
+    Result<int> readOwnField(Node& script);
+    /// PROTO or EXTERNPROTO with all that is in it, into the innermost scope.
+    Result<void> readProto(int depth);
+    Result<void> readInterface(Proto& proto, int depth);
+    Result<void> readProtoBody(Proto& proto, int depth);
+    /// `IS name`: links a field to one of the PROTO's interface.
+    Result<void> readLink(const NodePtr& node, int field);
+    /// The value of a field of any type; with an owner as readNode.
+    Result<void> readValueInto(const NodePtr& node, int index, int depth, int& height);
+
     Result<void> readNodeList(const NodePtr& owner, int index, int depth, int& height, bool waits);
 
     struct OdUpdate {
@@ -130,6 +148,10 @@ class BtReader {
     std::map<std::string, std::uint32_t> routeIds_;
     std::uint64_t lastTime_ = 0;
     bool haveScene_ = false;
+    std::vector<std::vector<ProtoPtr>> protoScopes_ = std::vector<std::vector<ProtoPtr>>(1);
+    Proto* proto_ = nullptr;                        ///< whose body is read
+    std::set<std::pair<const Node*, int>> linked_;  ///< fields with an IS
+    std::size_t protoCount_ = 0;
     bool inCommand_ = false;
     bool rap_ = false;  ///< the block that is read is a place where a reader may begin
 };

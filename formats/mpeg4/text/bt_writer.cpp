@@ -1,5 +1,6 @@
 #include <iterator>
 
+#include "formats/mpeg4/scene/proto_links.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/scene_text.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
@@ -24,6 +25,7 @@ class BtWriter {
                 if (const auto* scene = std::get_if<ReplaceScene>(&frame.commands[0]);
                     scene && scene->root) {
                     line("");
+                    writeProtos(scene->protos);
                     indent();
                     writeNode(scene->root);
                     out_ += '\n';
@@ -87,22 +89,75 @@ class BtWriter {
             out_ += "DEF " + *defName + ' ';
         }
         out_ += node->info->name;
-        if (node->setFields.empty()) {
+        const std::map<int, int>& links = linksOf(links_, *node);
+        const int own = ownFieldCount(*node);
+        if (node->setFields.empty() && links.empty() && own == 0) {
             out_ += " { }";
             return;
         }
         out_ += " {\n";
         ++depth_;
-        for (const Node::SetField& field : node->setFields) {
+        for (const FieldInfo& field : node->info->fields) {
+            const bool isOwn = field.index >= static_cast<int>(node->info->fields.size()) - own;
+            const auto link = links.find(field.index);
+            if (!isOwn && link == links.end() && !node->isSet(field.index)) continue;
             indent();
-            out_ += node->info->fields[field.index].name;
+            if (isOwn) out_ += fmt::format("{} {} ", name(field.kind), name(field.type));
+            out_ += field.name;
             out_ += ' ';
-            writeValue(field.value);
+            if (link != links.end())
+                out_ += "IS " + proto_->type.fields[link->second].name;
+            else if (field.hasValue())
+                writeValue(node->value(field.index));
             out_ += '\n';
         }
         --depth_;
         indent();
         out_ += '}';
+    }
+    void writeProtos(const std::vector<ProtoPtr>& protos) {
+        for (const ProtoPtr& proto : protos) writeProto(*proto);
+    }
+    void writeProto(const Proto& proto) {
+        line("{} {} [", proto.isExtern ? "EXTERNPROTO" : "PROTO", proto.name);
+        ++depth_;
+        for (const FieldInfo& field : proto.type.fields) {
+            indent();
+            out_ += fmt::format("{} {} {} ", name(field.kind), name(field.type), field.name);
+            if (field.hasValue()) writeValue(defaultValue(proto.type, field.index));
+            out_ += '\n';
+        }
+        --depth_;
+        indent();
+        if (proto.isExtern) {
+            out_ += "] ";
+            writeValue(FieldValue(proto.urls));
+            out_ += '\n';
+            return;
+        }
+        out_ += "] {\n";
+        ++depth_;
+        TextNames outerNames = std::exchange(names_, TextNames::ofBody(proto));
+        const Proto* const outerProto = std::exchange(proto_, &proto);
+        ProtoLinks outerLinks = std::exchange(links_, linksOf(proto));
+        writeProtos(proto.protos);
+        for (const NodePtr& node : proto.body) {
+            indent();
+            writeNode(node);
+            out_ += '\n';
+        }
+        for (const Route& route : proto.routes) {
+            indent();
+            writeRouteName(route);
+            out_ += "ROUTE ";
+            writeRoute(route);
+            out_ += '\n';
+        }
+        proto_ = outerProto;
+        links_ = std::move(outerLinks);
+        names_ = std::move(outerNames);
+        --depth_;
+        line("}}");
     }
     void writeValue(const FieldValue& value) {
         if (const auto* node = std::get_if<NodePtr>(&value)) {
@@ -154,6 +209,11 @@ class BtWriter {
     }
     void write(const ReplaceScene& c) {
         beginCommand("REPLACE SCENE BY ");
+        if (!c.protos.empty()) {
+            out_ += '\n';
+            writeProtos(c.protos);
+            indent();
+        }
         writeNode(c.root);
         for (const Route& route : c.routes) {
             out_ += '\n';
@@ -342,6 +402,8 @@ class BtWriter {
 
     const Document& document_;
     TextNames names_;
+    const Proto* proto_ = nullptr;  ///< whose body is written
+    ProtoLinks links_;
     std::string out_;
     int depth_ = 0;
 };

@@ -19,6 +19,17 @@ void addTo(std::vector<Frame>& frames, std::uint64_t time, Item item) {
 
 }  // namespace
 
+NodePtr holderOf(FieldInfo field) {
+    field.kind = FieldKind::field;
+    auto type = std::make_shared<NodeInfo>(makeNodeInfo("the interface", {}, {field}));
+    auto defaults = std::make_shared<FieldDefaults>();
+    defaults->values.push_back(emptyValue(field.type));
+    type->defaults = std::move(defaults);
+    const NodePtr holder = makeNode(*type);
+    holder->ownType = std::move(type);
+    return holder;
+}
+
 void addCommand(std::vector<CommandFrame>& frames, std::uint64_t time, Command command) {
     addTo(frames, time, std::move(command));
 }
@@ -62,7 +73,7 @@ Result<void> finishDocument(Document& document, NodeNames& names) {
     for (CommandFrame& frame : document.frames)
         for (Command& command : frame.commands)
             if (auto* replace = std::get_if<ReplaceScene>(&command))
-                replace->useNames = names.anyNames();
+                replace->useNames = names.anyNames() || !replace->protos.empty();
     ElementaryStream& scene = document.sceneStream;
     scene.streamType = StreamType::sceneDescription;
     // The config that is written follows its version, whatever number the text asks for.
@@ -128,12 +139,25 @@ Result<TextNames> TextNames::make(const Document& document, const Limits& limits
             STX_CHECK(fits);
         }
     }
-    const NodeIds ids = assignNodeIds(document.frames);
+    result.nameAll(document.frames);
+    return result;
+}
+
+TextNames TextNames::ofBody(const Proto& proto) {
+    const NodePtr holder = makeNode("Group");
+    holder->set("children", proto.body);
+    TextNames result;
+    result.nameAll({{0, {ReplaceScene{false, holder, proto.routes}}}});
+    return result;
+}
+
+void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
+    const NodeIds ids = assignNodeIds(frames);
     std::unordered_map<std::string, int> taken;
-    for (const CommandFrame& frame : document.frames)
+    for (const CommandFrame& frame : frames)
         for (const Command& command : frame.commands)
             forEachNode(command, [&](const NodePtr& node) {
-                if (result.names_.contains(node.get())) return;
+                if (names_.contains(node.get())) return;
                 std::string text = textNameOf(*node);
                 if (text.empty()) {
                     const auto id = ids.nodes.find(node.get());
@@ -150,9 +174,8 @@ Result<TextNames> TextNames::make(const Document& document, const Limits& limits
                 // Two nodes of one name are different nodes only when commands replaced one.
                 while (taken.contains(text)) text = fmt::format("{}_{}", base, ++taken[base]);
                 taken[text] = 1;
-                result.names_[node.get()] = text;
+                names_[node.get()] = text;
             });
-    return result;
 }
 
 const std::string* TextNames::find(const Node& node) const {

@@ -10,6 +10,9 @@
 /// Steps that the readers of BT and XMT-A share.
 namespace stx::mpeg4 {
 
+/// A node with this one field, to read a value into.
+[[nodiscard]] NodePtr holderOf(FieldInfo field);
+
 /// Adds a command to the frame of its time, keeping frames in order of time and commands of one
 /// time in order of the text.
 void addCommand(std::vector<CommandFrame>& frames, std::uint64_t time, Command command);
@@ -48,12 +51,17 @@ class TextNames {
     /// Errors when nodes nest too deeply or contain themselves, or hold what texts cannot.
     [[nodiscard]] static Result<TextNames> make(const Document& document, const Limits& limits);
 
+    /// The names in the body of a PROTO, which are apart from those of the scene.
+    [[nodiscard]] static TextNames ofBody(const Proto& proto);
+
     /// Null: the node has no name.
     [[nodiscard]] const std::string* find(const Node& node) const;
     /// Whether a node is met for the first time, and is written as DEF; later ones are USE.
     [[nodiscard]] bool firstTime(const Node& node);
 
   private:
+    void nameAll(const std::vector<CommandFrame>& frames);
+
     std::unordered_map<const Node*, std::string> names_;
     std::unordered_set<const Node*> written_;
 };

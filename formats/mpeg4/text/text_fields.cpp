@@ -340,9 +340,9 @@ Result<NodePtr> NodeNames::use(const std::string& name, int depth, const std::st
                       "USE '{}' stands inside the node of that name, which would hold itself",
                       excerpt(name));
     height = known->second;
-    if (depth + height > limits_.maxNesting)
+    if (depth + height > limits_->maxNesting)
         return failAt(where, ErrorCode::invalidInput, "nodes nest deeper than {} here",
-                      limits_.maxNesting);
+                      limits_->maxNesting);
     return found->second.node;
 }
 
@@ -360,7 +360,7 @@ Result<NodePtr> NodeNames::target(const std::string& name, const std::string& wh
 
 Result<void> NodeNames::countNode() {
     // A node is a few hundred bytes, a few characters of text are enough to ask for one.
-    return limits_.checkAllocation(++count_, 256, "the nodes of the scene");
+    return limits_->checkAllocation(++count_, 256, "the nodes of the scene");
 }
 
 Result<int> NodeNames::heightOf(const NodePtr& node, int depth,
@@ -368,12 +368,12 @@ Result<int> NodeNames::heightOf(const NodePtr& node, int depth,
     if (!node) return 0;
     if (const auto found = known.find(node.get()); found != known.end()) {
         depth += found->second;
-        if (depth <= limits_.maxNesting) return found->second;
+        if (depth <= limits_->maxNesting) return found->second;
     }
-    if (depth > limits_.maxNesting)
+    if (depth > limits_->maxNesting)
         return fail(ErrorCode::invalidInput,
                     "nodes nest deeper than {}, or a node holds itself through a USE",
-                    limits_.maxNesting);
+                    limits_->maxNesting);
     int below = 0;
     for (const Node::SetField& field : node->setFields) {
         if (const auto* child = std::get_if<NodePtr>(&field.value)) {

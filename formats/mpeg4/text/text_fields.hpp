@@ -36,7 +36,16 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 /// The nodes of a text by their DEF names, while it is read.
 class NodeNames {
   public:
-    explicit NodeNames(const Limits& limits) : limits_(limits) {}
+    explicit NodeNames(const Limits& limits) : limits_(&limits) {}
+
+    /// Names of a PROTO's body, which are apart, but count as part of the same text.
+    [[nodiscard]] NodeNames ofBody() const {
+        NodeNames names(*limits_);
+        names.count_ = count_;
+        return names;
+    }
+    /// Goes on counting where the names of a body ended.
+    void countOn(const NodeNames& body) { count_ = body.count_; }
 
     /// DEF: from here on `node` is open until closed() is called with the height of its tree.
     /// Errors when the name is that of another node, unless `again`: commands may bring a node that
@@ -80,7 +89,7 @@ class NodeNames {
     Result<int> heightOf(const NodePtr& node, int depth,
                          std::unordered_map<const Node*, int>& known) const;
 
-    const Limits& limits_;
+    const Limits* limits_;
     std::unordered_map<std::string, Entry> byName_;
     std::unordered_map<const Node*, int> heights_;  ///< of DEF'd nodes; absent while open
     std::vector<Pending> pending_;

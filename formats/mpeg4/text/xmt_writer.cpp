@@ -1,9 +1,11 @@
 #include <iterator>
 
+#include "formats/mpeg4/scene/proto_links.hpp"
 #include "formats/mpeg4/text/scene_text.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
+#include "formats/mpeg4/text/xmt_types.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -166,17 +168,23 @@ class XmtWriter {
             empty("NULL");
             return;
         }
-        const std::string& type = node->info->name;
+        const std::string type = node->proto ? "ProtoInstance" : node->info->name;
         Attributes attributes;
+        if (node->proto) attributes.push_back({"name", node->info->name});
         if (const std::string* defName = names_.find(*node)) {
             if (!names_.firstTime(*node)) {
-                empty(type, {{"USE", *defName}});
+                attributes.push_back({"USE", *defName});
+                empty(type, attributes);
                 return;
             }
             attributes.push_back({"DEF", *defName});
         }
-        bool hasNodes = false;
+        const std::map<int, int>& links = linksOf(links_, *node);
+        const int own = ownFieldCount(*node);
+        const int ownFrom = static_cast<int>(node->info->fields.size()) - own;
+        bool hasNodes = own > 0 || !links.empty() || (node->proto && !node->setFields.empty());
         for (const Node::SetField& field : node->setFields) {
+            if (node->proto || field.index >= ownFrom || links.contains(field.index)) continue;
             if (std::holds_alternative<NodePtr>(field.value) ||
                 std::holds_alternative<NodeList>(field.value))
                 hasNodes = true;
@@ -189,8 +197,16 @@ class XmtWriter {
             return;
         }
         open(type, attributes);
+        for (int i = ownFrom; i < ownFrom + own; ++i)
+            writeDeclaration(node->info->fields[i],
+                             links.contains(i) || !node->isSet(i) ? nullptr : &node->value(i));
         for (const Node::SetField& field : node->setFields) {
             const std::string& fieldName = node->info->fields[field.index].name;
+            if (field.index >= ownFrom || links.contains(field.index)) continue;
+            if (node->proto) {
+                writeDeclared("fieldValue", {{"name", fieldName}}, &field.value);
+                continue;
+            }
             if (const auto* child = std::get_if<NodePtr>(&field.value)) {
                 open(fieldName);
                 writeNode(*child);
@@ -205,7 +221,57 @@ class XmtWriter {
                 close(fieldName);
             }
         }
+        if (!links.empty()) {
+            open("IS");
+            for (const auto& [field, protoField] : links)
+                empty("connect", {{"nodeField", node->info->fields[field].name},
+                                  {"protoField", proto_->type.fields[protoField].name}});
+            close("IS");
+        }
         close(type);
+    }
+
+    // ---- PROTOs
+    /// An element with the value of a declared field: an attribute, or nodes in it. Null: none.
+    void writeDeclared(std::string_view tag, Attributes attributes, const FieldValue* value) {
+        const NodePtr* node = value ? std::get_if<NodePtr>(value) : nullptr;
+        const NodeList* list = value ? std::get_if<NodeList>(value) : nullptr;
+        if ((node && *node) || (list && !list->empty())) {
+            open(tag, attributes);
+            open(node ? "node" : "nodes");
+            if (node) writeNode(*node);
+            if (list)
+                for (const NodePtr& item : *list) writeNode(item);
+            close(node ? "node" : "nodes");
+            close(tag);
+            return;
+        }
+        if (value && !node && !list) attributes.push_back({"value", valueText(*value)});
+        empty(tag, attributes);
+    }
+    void writeDeclaration(const FieldInfo& field, const FieldValue* value) {
+        writeDeclared("field",
+                      {{"name", field.name},
+                       {"type", std::string(xmtNameOf(field.type))},
+                       {"vrml97Hint", std::string(name(field.kind))}},
+                      field.hasValue() ? value : nullptr);
+    }
+    void writeProto(const Proto& proto) {
+        Attributes attributes = {{"name", proto.name}};
+        if (proto.isExtern) attributes.push_back({"locations", valueText(FieldValue(proto.urls))});
+        open("ProtoDeclare", attributes);
+        for (const FieldInfo& field : proto.type.fields)
+            writeDeclaration(field, &defaultValue(proto.type, field.index));
+        TextNames outerNames = std::exchange(names_, TextNames::ofBody(proto));
+        const Proto* const outerProto = std::exchange(proto_, &proto);
+        ProtoLinks outerLinks = std::exchange(links_, linksOf(proto));
+        for (const ProtoPtr& inner : proto.protos) writeProto(*inner);
+        for (const NodePtr& node : proto.body) writeNode(node);
+        for (const Route& route : proto.routes) writeRoute(route);
+        links_ = std::move(outerLinks);
+        proto_ = outerProto;
+        names_ = std::move(outerNames);
+        close("ProtoDeclare");
     }
 
     // ---- Commands
@@ -246,6 +312,7 @@ class XmtWriter {
     void write(const ReplaceScene& c) {
         open("Replace");
         open("Scene");
+        for (const ProtoPtr& proto : c.protos) writeProto(*proto);
         if (c.root) writeNode(c.root);
         for (const Route& route : c.routes) writeRoute(route);
         close("Scene");
@@ -457,6 +524,8 @@ class XmtWriter {
 
     const Document& document_;
     TextNames names_;
+    const Proto* proto_ = nullptr;  ///< whose body is written
+    ProtoLinks links_;
     Job& job_;
     std::string out_;
     int depth_ = 0;
