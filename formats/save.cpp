@@ -37,6 +37,7 @@ Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const Save
     scene.octreeLevels = options.octreeLevels;
     Mpeg4WriteOptions write;
     write.output.noClobber = options.noClobber;
+    write.bifsVersion = options.bifsVersion;
     return writeMpeg4Bundle(bundle, target, job, scene, write);
 }
 
@@ -51,6 +52,7 @@ Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::p
     STX_TRY(const auto document, readMpeg4(input, job));
     Mpeg4WriteOptions write;
     write.output.noClobber = options.noClobber;
+    write.bifsVersion = options.bifsVersion;
     STX_CHECK(writeMpeg4(document, target, job, write));
     // A presentation need not be a bundle to be converted, so what is wrong with its views is
     // neither an error nor a note here.

@@ -24,6 +24,7 @@ struct ConvertOptions {
     std::optional<int> quality;
     bool pointTexture = false;
     int octreeLevels = 0;
+    int bifsVersion = 0;
     OpenOptions open;
     std::string frames;  ///< A-B
     BatchOptions batch;
@@ -43,6 +44,7 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
     save.pointTexture = o.pointTexture;
     save.octreeLevels = o.octreeLevels;
+    save.bifsVersion = o.bifsVersion;
     return save;
 }
 
@@ -208,6 +210,10 @@ void addConvert(CommandLine& line, Program& program) {
              "Write an OctreeImage (MPEG-4): 2^LEVELS voxels on a side, a picture for each view")
         .range(1, 16)
         .takes("LEVELS")
+        .group(coding);
+    c.option("--bifs-version", o->bifsVersion,
+             "Of an MPEG-4 scene's stream: 1 or 2 (default 1, or as the input has it)")
+        .range(1, 2)
         .group(coding);
     const char* many = "Many inputs";
     c.option("--jobs,-j", o->batch.jobs,

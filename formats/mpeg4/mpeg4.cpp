@@ -172,6 +172,15 @@ Result<void> writeMpeg4(const Mpeg4Document& document, const std::filesystem::pa
     if (!container)
         return fail(ErrorCode::usage, "'{}' has no ending of an MPEG-4 file: .mp4, .bt or .xmt",
                     path.string());
+    if (options.bifsVersion != 0 && options.bifsVersion != document.bifsConfig.version) {
+        Mpeg4Document other = document;
+        other.bifsConfig.version = options.bifsVersion;
+        other.sceneStream.objectTypeIndication =
+            options.bifsVersion == 2 ? oti::kSystemsV2 : oti::kSystemsV1;
+        Mpeg4WriteOptions same = options;
+        same.bifsVersion = 0;
+        return writeMpeg4(other, path, job, same);
+    }
     if (*container != Mpeg4Container::mp4)
         return writeText(document, path, *container, job, options.output);
     STX_TRY(auto file, OutputFile::create(path, options.output));

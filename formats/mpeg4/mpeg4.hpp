@@ -27,6 +27,9 @@ enum class Mpeg4Container { mp4, bt, xmt };
 struct Mpeg4WriteOptions {
     OutputFile::Options output;
     mpeg4::BifsStyle style;  ///< for .mp4: mask and vector forms
+    /// Of the scene's BIFSConfig and its objectTypeIndication: 1 or 2; 0: as the document has it. A
+    /// scene with PROTOs always has 2.
+    int bifsVersion = 0;
 };
 
 /// Writes a presentation into the container of the path's ending, whole or not at all. Beside

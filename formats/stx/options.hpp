@@ -16,6 +16,7 @@ struct SaveOptions {
     int jpegQuality = 0;        ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
     bool pointTexture = false;  ///< MPEG-4: PointTexture nodes instead of SimpleTexture
     int octreeLevels = 0;       ///< MPEG-4: an OctreeImage of 1..16 levels; 0 = none
+    int bifsVersion = 0;  ///< MPEG-4: 1 or 2, of the scene's stream; 0 = as it is, 1 for new ones
 };
 
 }  // namespace stx
