@@ -263,7 +263,10 @@ Result<NodePtr> BifsNodeReader::readNode(Ndt expected, int depth, int& height) {
     }
 
     const int outerDeepest = std::exchange(deepest, 0);
-    STX_CHECK(proto ? readBodyFields(node, depth) : readFields(*node, depth));
+    {
+        const QuantisationScope::NodeGuard guard(quantisation);
+        STX_CHECK(proto ? readBodyFields(node, depth) : readFields(*node, depth));
+    }
     height = deepest + 1;
     deepest = outerDeepest;
     if (node->defId != 0) defined[node->defId].height = height;
@@ -342,6 +345,7 @@ Result<void> BifsNodeReader::readInto(Node& node, int index, int depth) {
     const FieldInfo& field = node.info->fields[static_cast<std::size_t>(index)];
     if (field.type == FieldType::MFScript) return readScripts(node, index, depth);
     STX_TRY(FieldValue value, readField(*node.info, field, depth));
+    quantisation.coded(field, value);
     STX_CHECK(useBudget(sizeof(Node::SetField)));
     node.set(index, std::move(value));
     return {};

@@ -130,10 +130,16 @@ Result<std::optional<QuantisedCoding>> QuantisationScope::codingOf(const FieldIn
         coding.minimum[0] = std::max(coding.minimum[0], -2147483648.0);
         return coding;
     }
-    if (field.quantisation == Quantisation::coordIndex)
-        return fail(ErrorCode::unsupported,
-                    "quantised {} is not supported; write it without a QuantizationParameter",
-                    field.name);
+    if (field.quantisation == Quantisation::coordIndex) {
+        if (coordinates_ == 0)
+            return fail(ErrorCode::invalidInput,
+                        "{} is quantised by the number of coordinates, and none come before it",
+                        field.name);
+        coding.kind = QuantisedCoding::Kind::linearInt;
+        coding.bits = significantBits(coordinates_);
+        coding.minimum[0] = std::max(coding.minimum[0], -2147483648.0);
+        return coding;
+    }
 
     const std::string prefix(prefixOf(field.quantisation));
     if (prefix.empty()) return std::nullopt;
@@ -163,6 +169,14 @@ Result<std::optional<QuantisedCoding>> QuantisationScope::codingOf(const FieldIn
                         prefix);
     }
     return coding;
+}
+
+void QuantisationScope::coded(const FieldInfo& field, const FieldValue& value) {
+    if (field.nodeType != Ndt::SFCoordinateNode && field.nodeType != Ndt::SFCoordinate2DNode)
+        return;
+    const NodePtr* node = std::get_if<NodePtr>(&value);
+    const int point = node && *node ? (*node)->info->find("point") : -1;
+    if (point >= 0) coordinates_ = itemCount((*node)->value(point));
 }
 
 void QuantisationScope::ListGuard::coded(const NodePtr& item) {

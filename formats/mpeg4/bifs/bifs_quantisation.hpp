@@ -28,8 +28,25 @@ class QuantisationScope {
         return active_ && active_->get<bool>("useEfficientCoding");
     }
     /// How a field is quantised now; nothing when it is coded in full. Errors (invalidInput) on a
-    /// number of bits that cannot be, (unsupported) on coordinate indices.
+    /// number of bits that cannot be, and on indices whose coordinates were not coded before.
     [[nodiscard]] Result<std::optional<QuantisedCoding>> codingOf(const FieldInfo& field) const;
+
+    /// Tells of each field that was coded: indices have as many bits as the coordinates of their
+    /// geometry need.
+    void coded(const FieldInfo& field, const FieldValue& value);
+    /// The coordinates of one node's fields, while it is coded.
+    class NodeGuard {
+      public:
+        explicit NodeGuard(QuantisationScope& scope)
+            : scope_(scope), outer_(std::exchange(scope.coordinates_, 0)) {}
+        NodeGuard(const NodeGuard&) = delete;
+        NodeGuard& operator=(const NodeGuard&) = delete;
+        ~NodeGuard() { scope_.coordinates_ = outer_; }
+
+      private:
+        QuantisationScope& scope_;
+        std::size_t outer_;
+    };
 
     /// Follows one list of nodes: put every item in after it was coded.
     class ListGuard {
@@ -48,6 +65,7 @@ class QuantisationScope {
 
   private:
     NodePtr active_;
+    std::size_t coordinates_ = 0;
 };
 
 [[nodiscard]] float readQuantised(BitReader& in, const QuantisedCoding& coding, int component);

@@ -175,7 +175,10 @@ Result<void> BifsNodeWriter::writeNode(const NodePtr& node, Ndt expected, int de
         out.write(id - 1, config.nodeIdBits);
         if (useNames) STX_CHECK(writeName(node->defName));
     }
-    STX_CHECK(proto ? writeBodyFields(*node, depth) : writeFields(*node, depth));
+    {
+        const QuantisationScope::NodeGuard guard(quantisation);
+        STX_CHECK(proto ? writeBodyFields(*node, depth) : writeFields(*node, depth));
+    }
     if (id != 0) written[id] = node.get();
     return {};
 }
@@ -203,6 +206,7 @@ Result<void> BifsNodeWriter::writeFieldOf(const Node& node, const Node::SetField
     const FieldInfo& field = node.info->fields[static_cast<std::size_t>(set.index)];
     const auto* scripts = std::get_if<std::vector<ScriptText>>(&set.value);
     auto done = scripts ? writeScripts(node, *scripts, depth) : writeField(field, set.value, depth);
+    quantisation.coded(field, set.value);
     if (!done)
         return tl::unexpected(done.error().at(fmt::format("{}.{}", node.info->name, field.name)));
     return {};

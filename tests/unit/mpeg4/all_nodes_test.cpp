@@ -150,6 +150,41 @@ TEST(AllNodes, CommandsInsideOfANodeAreKeptInBifsAndRefusedInTexts) {
     EXPECT_TRUE(readBt("Group { children [ Conditional { buffer { } } ] }", "test.bt", job));
 }
 
+TEST(AllNodes, IndicesAreQuantisedByTheirCoordinates) {
+    const NodePtr root = makeNode("Group");
+    const NodePtr quantisation = makeNode("QuantizationParameter");
+    const NodePtr shape = makeNode("Shape");
+    const NodePtr faces = makeNode("IndexedFaceSet");
+    const NodePtr points = makeNode("Coordinate");
+    points->set("point", std::vector<glm::vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+    faces->set("coord", points);
+    faces->set("coordIndex", std::vector<std::int32_t>{0, 1, 2, -1, 1, 3, 2, -1});
+    shape->set("geometry", faces);
+    root->set("children", NodeList{quantisation, shape});
+    const std::vector<CommandFrame> frames{{0, {ReplaceScene{false, root, {}}}}};
+    const BifsConfig config = fitBifsConfig({}, {});
+    std::size_t quantised = 0;
+    for (const BifsStyle style : {BifsStyle::maskAndVector(), BifsStyle::shortest()}) {
+        const auto bytes = BifsEncoder(config, style, {}).encode(frames[0].commands);
+        ASSERT_TRUE(bytes) << bytes.error().text();
+        quantised = bytes->size();
+        auto decoded = BifsDecoder(config, Limits()).decode(*bytes);
+        ASSERT_TRUE(decoded) << decoded.error().text();
+        EXPECT_TRUE(sameFrames(frames, {{0, std::move(*decoded)}}));
+    }
+    root->set("children", NodeList{shape});
+    const auto plain = BifsEncoder(config, BifsStyle::shortest(), {}).encode(frames[0].commands);
+    ASSERT_TRUE(plain);
+    // Eight indices of 3 bits for 32, and a node of its own.
+    EXPECT_LT(quantised + 20, plain->size());
+
+    faces->clear(faces->info->find("coord"));
+    root->set("children", NodeList{quantisation, shape});
+    const auto none = BifsEncoder(config, {}, {}).encode(frames[0].commands);
+    ASSERT_FALSE(none);
+    EXPECT_NE(none.error().text().find("number of coordinates"), std::string::npos);
+}
+
 /// The kinds of nodes that stand beside a DepthImage in scenes that people make.
 constexpr const char* kManyKinds = R"(
   Background2D { backColor 0.1 0.2 0.3 }
