@@ -179,6 +179,7 @@ class SceneWriter {
             vectorsLost_ = vectorsLost_ || view.hasNormals() || view.hasSplats();
         if (vectorsLost_) job_.note("an OctreeImage has no normals and splats: they are left out");
         notes.bounds = parts.used;
+        sayTotals();
         if (parts.isUnitCube()) return groupOf({octree}, notes);
         notes.bounds->min = (notes.bounds->min - parts.centre) / parts.side;
         notes.bounds->max = (notes.bounds->max - parts.centre) / parts.side;

@@ -143,6 +143,21 @@ TEST(OctreeWriting, PerspectiveViewsBecomePicturesOfTheVoxels) {
     expectSamePictures(bundleOf(again), back);
 }
 
+TEST(OctreeWriting, SaysWhatIsLost) {
+    Bundle bundle;
+    bundle.views = {makeView(8, 6, 16, 1)};
+    addVectors(bundle.views[0]);
+    SceneWriteOptions options;
+    options.octreeLevels = 3;
+    options.texture = SceneWriteOptions::Texture::jpeg;
+    Job job;
+    ASSERT_TRUE(sceneFromBundle(bundle, options, job));
+    std::string all;
+    for (const std::string& note : job.takeNotes()) all += note + "\n";
+    for (const char* what : {"voxels of", "no normals and splats", "JPEG of quality 92"})
+        EXPECT_NE(all.find(what), std::string::npos) << what << " is not in\n" << all;
+}
+
 TEST(OctreeWriting, SaysWhatItCannotDo) {
     Job job;
     SceneWriteOptions options;
