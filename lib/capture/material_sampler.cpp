@@ -69,7 +69,8 @@ MaterialSampler::MaterialSampler(const Mesh& mesh) : mesh_(mesh) {
         constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0 &&
                             (!shines || m.emissiveTexture < 0));
         const auto light = glm::vec3(m.baseColour) + m.emissive;
-        constantColour_.emplace_back(srgbByTable(light.x), srgbByTable(light.y), srgbByTable(light.z));
+        constantColour_.emplace_back(srgbByTable(light.x), srgbByTable(light.y),
+                                     srgbByTable(light.z));
     }
 }
 

@@ -23,13 +23,13 @@ Result<void> checkPacked(const Packed& p, const std::string& where) {
         return fail(ErrorCode::invalidInput, "{}.byteStride is {}, expected {}", where, p.stride,
                     attributes ? "a multiple of 4 up to 256" : "2 or 4");
     if (triangles && p.count % 3 != 0)
-        return fail(ErrorCode::invalidInput, "{}.count is {}, which is no whole number of triangles",
-                    where, p.count);
-    const bool filterFits = p.filter == "NONE" ||
-                            (attributes && p.filter == "OCTAHEDRAL" &&
-                             (p.stride == 4 || p.stride == 8)) ||
-                            (attributes && p.filter == "QUATERNION" && p.stride == 8) ||
-                            (attributes && p.filter == "EXPONENTIAL");
+        return fail(ErrorCode::invalidInput,
+                    "{}.count is {}, which is no whole number of triangles", where, p.count);
+    const bool filterFits =
+        p.filter == "NONE" ||
+        (attributes && p.filter == "OCTAHEDRAL" && (p.stride == 4 || p.stride == 8)) ||
+        (attributes && p.filter == "QUATERNION" && p.stride == 8) ||
+        (attributes && p.filter == "EXPONENTIAL");
     if (!filterFits)
         return fail(ErrorCode::invalidInput,
                     "{}.filter '{}' does not go with mode {} and byteStride {}", where, p.filter,

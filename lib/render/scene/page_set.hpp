@@ -101,8 +101,8 @@ class PageSet {
     [[nodiscard]] bool pruned() const { return data_->pruned; }
     [[nodiscard]] std::int64_t pointCount() const;
     /// The same with translucent surfaces made opaque, for renderers to whom alpha says how much of
-    /// a pixel the object covers at its outline: points with translucent points all around them, and
-    /// those beside such, get full alpha. `changed` tells whether there were any.
+    /// a pixel the object covers at its outline: points with translucent points all around them,
+    /// and those beside such, get full alpha. `changed` tells whether there were any.
     [[nodiscard]] PageSet solid(bool& changed) const;
 
     /// World bounds of all points: those that the file gives, else computed from the pixels.
