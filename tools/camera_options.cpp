@@ -10,6 +10,22 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
+/// The camera's view in a picture of another size. Its pixels keep their shape and nothing of the
+/// view is cut: a picture of another aspect shows more beside it, or above and below.
+Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
+    if (!size) return camera;
+    const double scale = std::min(static_cast<double>(size->x) / camera.width,
+                                  static_cast<double>(size->y) / camera.height);
+    Camera c = camera;
+    c.width = size->x;
+    c.height = size->y;
+    c.fx *= scale;
+    c.fy *= scale;
+    c.cx = c.width * 0.5 + (camera.cx - camera.width * 0.5) * scale;
+    c.cy = c.height * 0.5 + (camera.cy - camera.height * 0.5) * scale;
+    return c;
+}
+
 }  // namespace
 
 void addCameraOptions(Command command, CameraOptions& o) {
@@ -55,7 +71,9 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .takes("FILE")
         .group(group);
     command
-        .option("--size", o.size, "Size of the picture (default: that of the camera, else 512x512)")
+        .option("--size", o.size,
+                "Size of the picture (default: that of the camera, else 512x512). Where its shape "
+                "is not the camera's, more is seen on the longer side: nothing is squeezed or cut")
         .takes("WxH")
         .group(group);
 }
@@ -87,14 +105,12 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
             return fail(ErrorCode::usage,
                         "--view is {}, but the input has {} reference views, from 0", o.view,
                         context.views.size());
-        Camera c = context.views[o.view];
-        if (size) c = c.resized(size->x, size->y);
-        return std::vector<Camera>{c};
+        return std::vector<Camera>{inPicture(context.views[o.view], size)};
     }
     if (!o.cameraFile.empty()) {
         STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job));
         std::vector<Camera> out;
-        for (auto& c : cameras) out.push_back(size ? c.camera.resized(size->x, size->y) : c.camera);
+        for (const auto& c : cameras) out.push_back(inPicture(c.camera, size));
         return out;
     }
 
