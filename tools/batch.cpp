@@ -102,6 +102,7 @@ Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
     // Less patient than the process that waits for this one.
     watchStopSignals(program.job.cancelled, 400);
     program.job.onProgress = nullptr;
+    program.progress.leaveToParent(!program.common.quiet && ::isatty(STDERR_FILENO) != 0);
     const ThreadLimit limit(threads);
     std::uint32_t index = 0;
     while (receiveAll(in, &index, sizeof(index)) && index < items.size()) {
@@ -198,8 +199,8 @@ void BatchRun::finish(std::size_t item, Json entry) {
     if (status == "error") {
         ++failed_;
         // Not hushed by --quiet: nothing else tells which input it was.
-        fmt::print(stderr, "error: '{}': {}\n", printable(items_[item].input),
-                   printable(entry.value("message", "")));
+        program_.complain(
+            fmt::format("error: '{}': {}", items_[item].input, entry.value("message", "")));
     }
     entries_[item] = std::move(entry);
     program_.job.progress(static_cast<std::int64_t>(done_),
@@ -338,8 +339,7 @@ Result<void> BatchRun::writeLines() const {
         if (entry.is_object())
             lines += entry.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     }
-    return writeFile(program_.common.report, std::as_bytes(std::span(lines)),
-                     program_.outputOptions());
+    return program_.writeReportText(lines);
 }
 
 }  // namespace

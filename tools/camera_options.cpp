@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// The camera's view in a picture of another size. Its pixels keep their shape and nothing of the
-/// view is cut: a picture of another aspect shows more beside it, or above and below.
+}  // namespace
+
 Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
     if (!size) return camera;
     const double scale = std::min(static_cast<double>(size->x) / camera.width,
@@ -25,8 +25,6 @@ Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
     c.cy = c.height * 0.5 + (camera.cy - camera.height * 0.5) * scale;
     return c;
 }
-
-}  // namespace
 
 void addCameraOptions(Command command, CameraOptions& o) {
     const char* group = "Camera";
@@ -108,7 +106,7 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
         return std::vector<Camera>{inPicture(context.views[o.view], size)};
     }
     if (!o.cameraFile.empty()) {
-        STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job));
+        STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job, size));
         std::vector<Camera> out;
         for (const auto& c : cameras) out.push_back(inPicture(c.camera, size));
         return out;
@@ -144,13 +142,23 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     return std::vector<Camera>{camera};
 }
 
-Result<int> checkCameraOptions(const CameraOptions& options, Program& program) {
+Result<int> checkCameraOptions(const CameraOptions& options, const Command& command,
+                               Program& program) {
     CameraOptions o = options;
+    const bool own = o.view >= 0 || !o.cameraFile.empty();
+    if (own)
+        STX_CHECK(command.refuse({"--fov", "--ortho"},
+                                 fmt::format("does not go with {}, whose cameras have their own",
+                                             o.view >= 0 ? "--view" : "--cameras")));
+    if (own || !o.eye.empty() || !o.target.empty() || (o.orbit == 0 && !o.up.empty()))
+        STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
     o.view = -1;  // needs the input
     CameraContext unitCube;
     unitCube.bounds.add(glm::dvec3(-1));
     unitCube.bounds.add(glm::dvec3(1));
-    STX_TRY(const auto cameras, makeCameras(o, unitCube, program));
+    Program quiet;  // the same notes come again, when the cameras are made
+    quiet.job.limits = program.job.limits;
+    STX_TRY(const auto cameras, makeCameras(o, unitCube, quiet));
     return static_cast<int>(cameras.size());
 }
 

@@ -53,12 +53,18 @@ Points pointsOf(const Bundle& bundle) {
     return out;
 }
 
-Result<int> extract(const ExtractOptions& o, Program& program) {
+Result<int> extract(const ExtractOptions& o, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     const auto ending = std::filesystem::path(o.output).extension();
     if (!ending.empty() && ending != ".ply" && ending != ".drc")
         return fail(ErrorCode::usage, "-o '{}' ends in '{}'; a folder, .ply or .drc is expected",
                     o.output, ending.string());
+    if (!ending.empty())
+        STX_CHECK(
+            command.refuse({"--cameras", "--depth"},
+                           fmt::format("is of a folder; -o {} is a file of points", o.output)));
+    if (ending != ".drc")
+        STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
     STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
@@ -74,7 +80,7 @@ Result<int> extract(const ExtractOptions& o, Program& program) {
         PointWriteOptions options = o.points;
         options.file.noClobber = program.common.noClobber;
         STX_CHECK(writePoints(o.output, cloud, program.job, options));
-        what = fmt::format("{} points", points.positions.size());
+        what = counted(points.positions.size(), "point");
     } else {
         ExportOptions options;
         options.kind =
@@ -82,14 +88,15 @@ Result<int> extract(const ExtractOptions& o, Program& program) {
         options.noClobber = program.common.noClobber;
         options.floatDepth = o.depth == "exr";
         STX_CHECK(exportImages(bundle, o.output, options, program.job));
-        what = fmt::format("{} views", bundle.views.size());
+        what = counted(bundle.views.size(), "view");
     }
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
-    program.say(fmt::format(
-        "{} ({}) → {} ({}), {}, {:.2g} s", std::filesystem::path(o.input).filename().string(),
-        humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)), what, seconds));
+    program.say(fmt::format("{} ({}) → {} ({}), {}, {}",
+                            std::filesystem::path(o.input).filename().string(),
+                            humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
+                            what, humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "extract-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
@@ -120,7 +127,7 @@ void addExtract(CommandLine& line, Program& program) {
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.sharedOptions(program.common, kOutput | kOutside);
-    c.runs([o](Program& p) { return extract(*o, p); });
+    c.runs([o, c](Program& p) { return extract(*o, c, p); });
 }
 
 }  // namespace stx::tools

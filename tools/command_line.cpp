@@ -293,14 +293,14 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         app_->parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
         const CLI::App& where = chosen(*app_);
-        return Request{where.help(&where == app_.get() ? "" : "stx"), {}};
+        return Request{where.help(&where == app_.get() ? "" : "stx"), {}, {}};
     } catch (const CLI::CallForVersion&) {
-        return Request{"stx " STX_VERSION "\n", {}};
+        return Request{"stx " STX_VERSION "\n", {}, {}};
     } catch (const CLI::ParseError& e) {
         return tl::unexpected(usageError(*app_, e, argc, argv));
     }
     for (const auto& entry : entries_)
-        if (entry.app->parsed()) return Request{{}, *entry.body};
+        if (entry.app->parsed()) return Request{{}, *entry.body, entry.app->get_name()};
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");
 }
 

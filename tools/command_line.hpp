@@ -147,6 +147,7 @@ class CommandLine {
     struct Request {
         std::string text;
         Command::Body body;
+        std::string command;  ///< its name
     };
     /// Errors (usage) in one line that says where to read on, with the nearest known word for an
     /// unknown one.

@@ -5,7 +5,8 @@
 
 namespace stx {
 
-Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job) {
+Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job,
+                                                std::optional<glm::ivec2> size) {
     using namespace imagesets;
     const std::string where = inQuotes(path.string());
     STX_TRY(const Json file, readJson(path, job.limits));
@@ -29,6 +30,7 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
     if (!views) return tl::unexpected(views.error().at(where));
     if (views->empty()) return failAt(where, ErrorCode::invalidInput, "there is no camera in it");
     std::vector<NamedCamera> out;
+    bool sizeMissing = false;
     for (const SetView& view : *views) {
         if (view.panorama)
             return failAt(where, ErrorCode::invalidInput,
@@ -38,16 +40,21 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
         Camera camera = view.camera;
         if (camera.width == 0) {
             // Blender's files have an angle only, the size is that of the images.
-            camera.width = camera.height = 512;
-            camera.fx = 256 / std::tan(view.angleX * 0.5);
-            camera.fy = view.angleY > 0 ? 256 / std::tan(view.angleY * 0.5) : camera.fx;
-            camera.cx = camera.cy = 256;
-            job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));
+            const glm::ivec2 used = size.value_or(glm::ivec2(512));
+            camera.width = used.x;
+            camera.height = used.y;
+            camera.cx = used.x * 0.5;
+            camera.cy = used.y * 0.5;
+            camera.fx = camera.cx / std::tan(view.angleX * 0.5);
+            camera.fy = view.angleY > 0 ? camera.cy / std::tan(view.angleY * 0.5) : camera.fx;
+            sizeMissing = true;
         }
         if (auto ok = camera.check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera '{}'", view.name)).at(where));
         out.push_back({view.name, camera});
     }
+    if (sizeMissing && !size)
+        job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));
     return out;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,10 @@ struct NamedCamera {
 
 /// The cameras of a file, in its order, without any image: transforms.json (NeRF, nerfstudio,
 /// Blender), MIV/RVS JSON, or our own cameras.json; distinguished by their keys. Each camera has
-/// its own intrinsics and size. Errors: io, invalidInput with file and key.
+/// its own intrinsics and size; `size` is for those whose file does not tell it (without it
+/// 512x512, with a note). Errors: io, invalidInput with file and key.
 [[nodiscard]] Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path,
-                                                              Job& job);
+                                                              Job& job,
+                                                              std::optional<glm::ivec2> size = {});
 
 }  // namespace stx

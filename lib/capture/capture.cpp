@@ -1,5 +1,6 @@
 #include "lib/capture/capture.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
@@ -92,6 +93,12 @@ Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& camera
         }
         bundle.views.push_back(std::move(*views[i]));
     }
+    const auto tooSmall = [](const Camera& c) { return std::max(c.width, c.height) < 16; };
+    if (bundle.views.empty() && std::all_of(cameras.begin(), cameras.end(), tooSmall))
+        return fail(ErrorCode::invalidInput,
+                    "no pixel of the views meets the model: {}x{} pixels are too few; take 16x16 "
+                    "or more",
+                    cameras[0].width, cameras[0].height);
     if (bundle.views.empty())
         return fail(ErrorCode::invalidInput,
                     "none of the {} cameras sees the model; check their poses and units", n);
