@@ -17,7 +17,7 @@ namespace stx::tools {
 namespace {
 
 /// Bytes of a name that are no UTF-8 become U+FFFD.
-std::string textOf(const nlohmann::ordered_json& json) {
+std::string jsonText(const nlohmann::ordered_json& json) {
     return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -28,7 +28,7 @@ void Program::print(std::string_view text) {
 }
 
 void Program::printJson(const nlohmann::ordered_json& json) {
-    write(textOf(json));
+    write(jsonText(json));
 }
 
 void Program::write(std::string_view text) {
@@ -94,7 +94,7 @@ void Program::sayNotes() {
 }
 
 Result<void> Program::writeReport(const nlohmann::ordered_json& report) {
-    return writeReportText(textOf(report));
+    return writeReportText(jsonText(report));
 }
 
 Result<void> Program::writeReportText(std::string_view text) {
@@ -110,11 +110,11 @@ void Program::reportError(const Error& error) {
         {"command", command},
         {"status", "error"},
         {"exitCode", signal != 0 ? 128 + signal : static_cast<int>(error.code)},
-        {"message", error.text()}};
+        {"message", textOf(error)}};
     // In one line: of many inputs the report is lines of JSON.
     const auto written = writeReportText(
         report.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
-    if (!written) complain("stx: " + written.error().text());
+    if (!written) complain("stx: " + textOf(written.error()));
 }
 
 namespace {
@@ -158,7 +158,7 @@ int Program::run(const std::function<Result<int>()>& body) {
     job.onProgress = nullptr;
     sayNotes();
     if (!code) {
-        complain("stx: " + code.error().text());
+        complain("stx: " + textOf(code.error()));
         if (!reportWritten_) reportError(code.error());
         return static_cast<int>(code.error().code);
     }
@@ -276,6 +276,26 @@ std::optional<std::string> frameName(const std::string& pattern, int frame) {
            pattern.substr(at + 1);
 }
 
+std::string textOf(const Error& error) {
+    std::string where = error.where;
+    // `'a': 'a': line 3`, at its beginning, where callers add.
+    for (std::size_t end; (end = where.find("': ")) != std::string::npos;) {
+        const auto first = where.substr(0, end + 3);
+        if (!first.starts_with('\'') || where.compare(first.size(), first.size(), first) != 0)
+            break;
+        where.erase(0, first.size());
+    }
+    // `'a'` or `'a': 'a'` before a message that names it.
+    const auto quoted = where.substr(
+        0, where.find("': ") == std::string::npos ? where.size() : where.find("': ") + 1);
+    if (quoted.size() > 2 && quoted.starts_with('\'') && quoted.ends_with('\'') &&
+        error.message.find(quoted) != std::string::npos) {
+        where.erase(0, quoted.size());
+        if (where.starts_with(": ")) where.erase(0, 2);
+    }
+    return where.empty() ? error.message : where + ": " + error.message;
+}
+
 std::string humanBytes(std::uint64_t bytes) {
     if (bytes < 1000) return fmt::format("{} B", bytes);
     if (bytes < 1000000) return fmt::format("{:.3g} kB", bytes / 1e3);
@@ -325,6 +345,29 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
         if (it->is_regular_file(ec)) sum += it->file_size(ec);
     }
     return sum;
+}
+
+Result<std::string> folderTarget(const std::string& target, const std::vector<std::string>& files,
+                                 std::string_view expected) {
+    // What people give to other programs; a folder's name may have any other dot in it.
+    static const std::vector<std::string> kFiles = {
+        ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr",  ".hdr", ".svg", ".mp4",
+        ".bt",  ".xmt", ".json", ".txt", ".obj",  ".glb",  ".gltf", ".stl", ".ply", ".drc",
+        ".off", ".dae", ".fbx",  ".zip", ".tar",  ".gz",   ".yuv",  ".y4m", ".pfm", ".bin"};
+    std::string path = target;
+    while (path.size() > 1 && path.back() == '/') path.pop_back();
+    std::error_code ec;
+    if (path != target || std::filesystem::is_directory(path, ec)) return path;
+    const auto ending = std::filesystem::path(path).extension().string();
+    const auto among = [&](const std::vector<std::string>& list) {
+        return std::find(list.begin(), list.end(), ending) != list.end();
+    };
+    if (among(kFiles) && !among(files))
+        return fail(ErrorCode::usage,
+                    "-o '{}' ends in '{}', like a file; {} is expected (a slash at its end makes "
+                    "any name a folder's)",
+                    target, ending, expected);
+    return path;
 }
 
 Result<void> checkTarget(const std::filesystem::path& target, const Program& program) {

@@ -86,6 +86,9 @@ class Program {
 /// The file of one frame of a sequence named `name_%04d.png`; nothing when the name has no number.
 [[nodiscard]] std::optional<std::string> frameName(const std::string& pattern, int frame);
 
+/// Error::text() with each file named once: what knows a file's name says it, and so does its
+/// caller.
+[[nodiscard]] std::string textOf(const Error& error);
 /// "1.2 MB", for messages.
 [[nodiscard]] std::string humanBytes(std::uint64_t bytes);
 /// "0.25 s", "12 s", "3 min 20 s", "2 h 5 min".
@@ -94,6 +97,12 @@ class Program {
 [[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
 /// Size of a file, or of all files in a folder.
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
+/// A target that may be a folder, without slashes at its end. Error (usage) when it ends like a
+/// file, neither exists as a folder nor has a slash, and is none of `files` (".ply"); `expected` is
+/// for the message.
+[[nodiscard]] Result<std::string> folderTarget(const std::string& target,
+                                               const std::vector<std::string>& files,
+                                               std::string_view expected);
 /// Errors early when the target's folder is missing or not writable, or, under --no-clobber, when
 /// the target exists: before an hour of work, not after it.
 [[nodiscard]] Result<void> checkTarget(const std::filesystem::path& target, const Program& program);

@@ -204,7 +204,9 @@ void MeshBuilder::fillNormals() {
 
 Result<Mesh> MeshBuilder::finish() {
     if (flatTriangles_ > 0)
-        job_.note(fmt::format("{} triangles have no area and are left out", flatTriangles_));
+        job_.note(flatTriangles_ == 1
+                      ? "1 triangle has no area and is left out"
+                      : fmt::format("{} triangles have no area and are left out", flatTriangles_));
     if (mesh_.triangles.empty() && mesh_.points.empty()) {
         if (flatTriangles_ > 0)
             return fail(ErrorCode::invalidInput,

@@ -100,8 +100,9 @@ Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& camera
                     "or more",
                     cameras[0].width, cameras[0].height);
     if (bundle.views.empty())
-        return fail(ErrorCode::invalidInput,
-                    "none of the {} cameras sees the model; check their poses and units", n);
+        return fail(
+            ErrorCode::invalidInput, "{} the model; check the poses and units",
+            n == 1 ? "the camera does not see" : fmt::format("none of the {} cameras sees", n));
     bundle.bounds = mesh.bounds();
     return bundle;
 }
