@@ -14,7 +14,7 @@ struct CompareOptions {
     std::string a, b;
     std::string mask, errorPicture, background = "black";
     double gain = 8.0;
-    std::optional<double> minPsnr;
+    std::optional<double> minPsnr, minSsim;
     int firstFrame = 0;
     int frames = 0;
 };
@@ -127,7 +127,9 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
             total.worst.difference, total.differentPixels, total.pixels));
     }
     if (total.identical()) return 0;
-    if (o.minPsnr && total.psnrRgb && *total.psnrRgb >= *o.minPsnr) return 0;
+    const bool near = !o.minPsnr || (total.psnrRgb && *total.psnrRgb >= *o.minPsnr);
+    const bool alike = !o.minSsim || total.ssimY >= *o.minSsim;
+    if ((o.minPsnr || o.minSsim) && near && alike) return 0;
     return static_cast<int>(ErrorCode::difference);
 }
 
@@ -152,6 +154,10 @@ void addCompare(CommandLine& line, Program& program) {
         .takes("COLOUR");
     c.option("--min-psnr", o->minPsnr, "Exit code 0 when the PSNR of RGB is at least this")
         .takes("DB");
+    c.option("--min-ssim", o->minSsim,
+             "Exit code 0 when the SSIM of Y is at least this (with --min-psnr: when both are)")
+        .range(-1.0, 1.0)
+        .takes("SSIM");
     c.option("--first-frame", o->firstFrame, "First frame of sequences (default 0)").notNegative();
     c.option("--frames", o->frames, "Number of frames (default: all that exist)").notNegative();
     c.sharedOptions(program.common, kFormat | kOutput);

@@ -185,7 +185,7 @@ Error withReport(const Error& error, const BatchItem& item, Program& program) {
                                           {"output", item.output},
                                           {"status", "error"},
                                           {"exitCode", static_cast<int>(error.code)},
-                                          {"message", error.text()}};
+                                          {"message", textOf(error)}};
     // The first error is the one to tell.
     (void)program.writeReport({{"$schema", "convert-report.schema.json"},
                                {"conversions", nlohmann::ordered_json::array({entry})}});
@@ -246,9 +246,12 @@ void addConvert(CommandLine& line, Program& program) {
         "  stx convert capture/transforms.json -o capture.exr\n"
         "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
     auto o = std::make_shared<ConvertOptions>();
-    c.option("IN", o->inputs, "Files or folders to convert; @FILE: those named in its lines")
+    c.option("IN", o->inputs,
+             "Files or folders to convert; @FILE: those named in its lines, # begins a comment")
         .required();
-    c.option("-o,--output", o->output, "What to write; {stem} stands for an input's name")
+    c.option("-o,--output", o->output,
+             "What to write; {stem} stands for an input's name, {dir} for its folder, {parent} for "
+             "that folder's name")
         .required()
         .takes("OUT");
     addMeshViewOptions(c, o->mesh);

@@ -53,12 +53,15 @@ Points pointsOf(const Bundle& bundle) {
     return out;
 }
 
-Result<int> extract(const ExtractOptions& o, const Command& command, Program& program) {
+Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
-    const auto ending = std::filesystem::path(o.output).extension();
-    if (!ending.empty() && ending != ".ply" && ending != ".drc")
-        return fail(ErrorCode::usage, "-o '{}' ends in '{}'; a folder, .ply or .drc is expected",
-                    o.output, ending.string());
+    ExtractOptions o = options;
+    STX_TRY(o.output, folderTarget(options.output, {".ply", ".drc"}, "a folder, .ply or .drc"));
+    const auto dotted = std::filesystem::path(o.output).extension();
+    std::error_code ec;
+    const bool points = (dotted == ".ply" || dotted == ".drc") && o.output == options.output &&
+                        !std::filesystem::is_directory(o.output, ec);
+    const auto ending = points ? dotted : std::filesystem::path();
     if (!ending.empty())
         STX_CHECK(
             command.refuse({"--cameras", "--depth"},
@@ -69,25 +72,25 @@ Result<int> extract(const ExtractOptions& o, const Command& command, Program& pr
     preloadCodecs(o.input);
     STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
     std::string what;
-    if (ending == ".ply" || ending == ".drc") {
+    if (points) {
         STX_CHECK(program.job.limits.checkAllocation(
             static_cast<std::uint64_t>(bundle.pointCount()), 28, "the points"));
-        const auto points = pointsOf(bundle);
+        const auto found = pointsOf(bundle);
         PointCloud cloud;
-        cloud.positions = points.positions;
-        cloud.colours = points.colours;
-        cloud.normals = points.normals;
-        PointWriteOptions options = o.points;
-        options.file.noClobber = program.common.noClobber;
-        STX_CHECK(writePoints(o.output, cloud, program.job, options));
-        what = counted(points.positions.size(), "point");
+        cloud.positions = found.positions;
+        cloud.colours = found.colours;
+        cloud.normals = found.normals;
+        PointWriteOptions write = o.points;
+        write.file.noClobber = program.common.noClobber;
+        STX_CHECK(writePoints(o.output, cloud, program.job, write));
+        what = counted(found.positions.size(), "point");
     } else {
-        ExportOptions options;
-        options.kind =
+        ExportOptions write;
+        write.kind =
             o.cameras == "miv" ? ExportOptions::Kind::miv : ExportOptions::Kind::transforms;
-        options.noClobber = program.common.noClobber;
-        options.floatDepth = o.depth == "exr";
-        STX_CHECK(exportImages(bundle, o.output, options, program.job));
+        write.noClobber = program.common.noClobber;
+        write.floatDepth = o.depth == "exr";
+        STX_CHECK(exportImages(bundle, o.output, write, program.job));
         what = counted(bundle.views.size(), "view");
     }
     const double seconds =

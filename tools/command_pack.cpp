@@ -56,7 +56,9 @@ Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std
     return smaller;
 }
 
-Result<int> packBundle(const PackOptions& o, Program& program) {
+Result<int> packBundle(const PackOptions& options, Program& program) {
+    PackOptions o = options;
+    STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
     const auto start = std::chrono::steady_clock::now();
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");

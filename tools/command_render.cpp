@@ -24,11 +24,36 @@ struct RenderOptions {
     std::string ambient = "0.2", specular = "0";
     double shininess = 32;
     std::string fileFormat;
-    double framesPerSecond = 25;
+    std::string framesPerSecond = "25";
     bool skipExisting = false, listDevices = false;
     int device = -1;
     OpenOptions open;
 };
+
+/// "25", "29.97" or "30000/1001", as a fraction.
+Result<std::pair<int, int>> parseRate(const std::string& text) {
+    const auto wrong = [&] {
+        return fail(ErrorCode::usage,
+                    "--fps is '{}'; 0.001 to 1000, or a fraction as in 30000/1001, is expected",
+                    text);
+    };
+    const auto slash = text.find('/');
+    const auto top = parseNumbers(text.substr(0, slash), 1, "--fps");
+    if (!top) return wrong();
+    double numerator = (*top)[0], denominator = 1;
+    if (slash != std::string::npos) {
+        const auto bottom = parseNumbers(text.substr(slash + 1), 1, "--fps");
+        if (!bottom) return wrong();
+        denominator = (*bottom)[0];
+        const auto whole = [](double v) { return v >= 1 && v <= 1e9 && v == std::floor(v); };
+        if (!whole(numerator) || !whole(denominator)) return wrong();
+    } else if (numerator != std::floor(numerator)) {
+        numerator = std::round(numerator * 1000);
+        denominator = 1000;
+    }
+    if (!(numerator / denominator >= 0.001 && numerator / denominator <= 1000)) return wrong();
+    return std::pair(static_cast<int>(numerator), static_cast<int>(denominator));
+}
 
 /// "0.2" or "r,g,b".
 Result<glm::vec3> parseGreyOrRgb(const std::string& text, const char* option) {
@@ -171,7 +196,7 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     writing.pattern = o.output;
     writing.background = background;
     writing.stream = o.fileFormat;
-    writing.framesPerSecond = o.framesPerSecond;
+    STX_TRY(writing.rate, parseRate(o.framesPerSecond));
     writing.noClobber = program.common.noClobber;
     STX_CHECK(FrameWriter::check(writing));
 
@@ -321,8 +346,9 @@ void addRender(CommandLine& line, Program& program) {
         .oneOf({"y4m"})
         .group(output);
     c.option("--format", o->fileFormat, "The same as --file-format").oneOf({"y4m"}).group(output);
-    c.option("--fps", o->framesPerSecond, "Frame rate written into the stream (default 25)")
-        .range(0.001, 1000.0)
+    c.option("--fps", o->framesPerSecond,
+             "Frame rate written into the stream, as in 30 or 30000/1001 (default 25)")
+        .takes("RATE")
         .group(output);
     c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
         .group(output);
