@@ -4,6 +4,7 @@
 
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/geometry/view_layout.hpp"
 
 namespace stx::tools {
 namespace {
@@ -36,8 +37,11 @@ void addCameraOptions(Command command, CameraOptions& o) {
     command.option("--target", o.target, "What it looks at (default: the middle of the object)")
         .takes("X,Y,Z")
         .group(group);
-    command.option("--up", o.up, "What is up in the picture (default 0,1,0)")
-        .takes("X,Y,Z")
+    command
+        .option("--up", o.up,
+                "What is up in the picture, and the axis of an orbit: Z, X,Y,Z or with a minus "
+                "--up=-Y (default Y; of an orbit: what the reference views have)")
+        .takes("AXIS")
         .group(group);
     command
         .option("--fov", o.fovDeg,
@@ -64,8 +68,30 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .range(-90.0, 90.0)
         .group(group);
     command
-        .option("--cameras", o.cameraFile,
-                "Every camera of a file (transforms.json, MIV JSON, cameras.json)")
+        .option("--radius", o.orbitRadius,
+                "Of the orbit, in scene units (default: the object fills the picture)")
+        .takes("R")
+        .positive()
+        .group(group);
+    command
+        .option("--start", o.startDeg,
+                "Where the orbit begins, in degrees from the front, counter-clockwise from above "
+                "(default 0)")
+        .takes("DEG")
+        .range(-360.0, 360.0)
+        .group(group);
+    command
+        .option("--arc", o.arcDeg,
+                "How far the orbit goes, in degrees; less than 360: the last camera is at its end "
+                "(default 360)")
+        .takes("DEG")
+        .range(-360.0, 360.0)
+        .group(group);
+    command
+        .option(
+            "--cameras", o.cameraFile,
+            "Every camera of a file (transforms.json, camera_path.json, MIV JSON, cameras.json) or "
+            "of a COLMAP model")
         .takes("FILE")
         .group(group);
     command
@@ -78,13 +104,15 @@ void addCameraOptions(Command command, CameraOptions& o) {
 
 Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraContext& context,
                                         Program& program) {
-    const bool pose = !o.eye.empty() || !o.target.empty() || !o.up.empty();
+    // An orbit may have a target and an axis.
+    const bool pose = !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty()));
     const int ways = (pose ? 1 : 0) + (o.view >= 0 ? 1 : 0) + (o.orbit > 0 ? 1 : 0) +
                      (o.cameraFile.empty() ? 0 : 1);
     if (ways > 1)
         return fail(
             ErrorCode::usage,
-            "--eye/--target/--up, --view, --orbit and --cameras exclude each other; give one");
+            "--eye/--target/--up, --view, --orbit and --cameras exclude each other; give one (an "
+            "orbit may have --target and --up)");
     std::optional<glm::ivec2> size;
     if (!o.size.empty()) {
         STX_TRY(size, parseSize(o.size, program.job.limits));
@@ -121,16 +149,27 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     lens.orthoHeight = o.orthoHeight.value_or(0);
     glm::dvec3 target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
     if (!o.up.empty()) {
-        STX_TRY(lens.up, parseVec3(o.up, "--up"));
-        if (!(glm::length(lens.up) > 0))
-            return fail(ErrorCode::usage, "--up is 0,0,0; it must point somewhere");
+        STX_TRY(lens.up, parseDirection(o.up, "--up"));
+    } else if (!pose) {
+        lens.up = upOfCameras(context.views);
+        if (lens.up != glm::dvec3(0, 1, 0))
+            program.job.note(fmt::format(
+                "the reference views stand upright along {}{}, and so does the orbit; --up changes "
+                "that",
+                lens.up.x + lens.up.y + lens.up.z < 0 ? "-" : "+",
+                lens.up.x != 0   ? "X"
+                : lens.up.y != 0 ? "Y"
+                                 : "Z"));
     }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));
     }
     const double radius = context.bounds.radius();
     if (!pose)
-        return orbitCameras(target, radius, std::max(o.orbit, 1), o.elevationDeg * kDegree, lens);
+        return orbitCameras(target, radius,
+                            {std::max(o.orbit, 1), o.elevationDeg * kDegree, o.startDeg * kDegree,
+                             o.arcDeg * kDegree, o.orbitRadius},
+                            lens);
     glm::dvec3 eye;
     if (o.eye.empty()) {
         STX_TRY(const auto front, orbitCameras(target, radius, 1, 0.0, lens));
@@ -150,8 +189,9 @@ Result<int> checkCameraOptions(const CameraOptions& options, const Command& comm
         STX_CHECK(command.refuse({"--fov", "--ortho"},
                                  fmt::format("does not go with {}, whose cameras have their own",
                                              o.view >= 0 ? "--view" : "--cameras")));
-    if (own || !o.eye.empty() || !o.target.empty() || (o.orbit == 0 && !o.up.empty()))
+    if (own || !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty())))
         STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
+    if (o.orbit == 0) STX_CHECK(command.refuse({"--radius", "--start", "--arc"}, "is of --orbit"));
     o.view = -1;  // needs the input
     CameraContext unitCube;
     unitCube.bounds.add(glm::dvec3(-1));

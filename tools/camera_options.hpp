@@ -19,7 +19,8 @@ struct CameraOptions {
     std::optional<double> orthoHeight;  ///< orthographic novel camera: window height in scene units
     int view = -1;
     int orbit = 0;
-    double elevationDeg = 15.0;
+    double elevationDeg = 15.0, startDeg = 0.0, arcDeg = 360.0;
+    double orbitRadius = 0;  ///< 0 = the object fills the picture
     std::string cameraFile;
     std::string size;
 };

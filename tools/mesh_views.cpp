@@ -59,6 +59,7 @@ Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& prog
         return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 170 degrees",
                     o.fovDeg);
     framing.fovRad = o.fovDeg * std::numbers::pi / 180.0;
+    STX_TRY(framing.up, parseDirection(o.up, "--up"));
     return framing;
 }
 
@@ -109,7 +110,7 @@ Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions
     std::error_code ec;
     auto layout = parseViewLayout(o.views);
     if (!layout) {
-        if (!std::filesystem::is_regular_file(o.views, ec)) return propagate(layout);
+        if (!std::filesystem::exists(o.views, ec)) return propagate(layout);
         std::optional<glm::ivec2> size;
         if (!o.size.empty()) {
             STX_TRY(size, parseSize(o.size, program.job.limits));
@@ -151,6 +152,12 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
         .takes("DEG")
         .group(group);
     command
+        .option("--up", o->up,
+                "The model's up axis, on which rings, spheres and octahedra stand: Z, X,Y,Z or "
+                "with a minus --up=-Y (default Y)")
+        .takes("AXIS")
+        .group(group);
+    command
         .option("--fov", o->fovDeg,
                 "Angle that the whole object fills, in degrees: sets the distance (default 35)")
         .takes("DEG")
@@ -184,7 +191,7 @@ Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& comma
     if (automatic || layout) return {};
     std::error_code ec;
     if (std::filesystem::exists(o.views, ec))
-        return command.refuse({"--elevation", "--projection", "--fov"},
+        return command.refuse({"--elevation", "--projection", "--fov", "--up"},
                               "does not go with a camera file, whose cameras have their own");
     // A word without a dot or a slash is meant as a layout.
     if (o.views.find_first_of("./") == std::string::npos) return tl::unexpected(layout.error());

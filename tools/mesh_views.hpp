@@ -21,6 +21,7 @@ struct MeshViewOptions {
     std::optional<int> depthBits;  ///< nothing: 16, or what an image set has
     int supersampling = 4;
     std::string normals = "none";
+    std::string up = "Y";
     std::string plot;  ///< SVG of quality against the number of views, of --views auto
     /// Heading of the help that they are under.
     static constexpr const char* kHeading = "Views of a mesh";

@@ -217,6 +217,27 @@ glm::vec3 colourOf(unsigned rgb) {
 
 }  // namespace
 
+Result<glm::dvec3> parseDirection(std::string_view text, std::string_view option) {
+    std::string_view name = text;
+    const bool minus = name.starts_with('-');
+    if (minus || name.starts_with('+')) name.remove_prefix(1);
+    if (name.size() == 1) {
+        const auto axis = std::string_view("xyzXYZ").find(name[0]);
+        if (axis != std::string_view::npos) {
+            glm::dvec3 v(0);
+            v[static_cast<int>(axis % 3)] = minus ? -1 : 1;
+            return v;
+        }
+    }
+    const auto v = parseVec3(text, option);
+    if (!v)
+        return fail(ErrorCode::usage, "{} is '{}'; an axis (Z, -Y) or X,Y,Z is expected", option,
+                    text);
+    if (!(glm::length(*v) > 0))
+        return fail(ErrorCode::usage, "{} is {}; it must point somewhere", option, text);
+    return *v;
+}
+
 Result<glm::vec3> parseColour(std::string_view text, std::string_view option) {
     for (const auto& known : kColours)
         if (known.name == text) return colourOf(known.rgb);

@@ -83,6 +83,9 @@ class Program {
 /// A colour, sRGB-coded 0..1: "R,G,B" in 0..1, "#rrggbb", "#rgb", or one of CSS's basic names.
 [[nodiscard]] Result<glm::vec3> parseColour(std::string_view text, std::string_view option);
 
+/// A direction: "X,Y,Z", or an axis: "Z", "-Y". Errors (usage) also when it has no length.
+[[nodiscard]] Result<glm::dvec3> parseDirection(std::string_view text, std::string_view option);
+
 /// The file of one frame of a sequence named `name_%04d.png`; nothing when the name has no number.
 [[nodiscard]] std::optional<std::string> frameName(const std::string& pattern, int frame);
 
