@@ -281,7 +281,7 @@ void addRender(CommandLine& line, Program& program) {
     auto o = std::make_shared<RenderOptions>();
     c.option("IN", o->input, "Bundle, atlas or mesh");
     c.option("-o,--output", o->output,
-             ".png, .jpg or .exr; name_%04d.png for several; - for a y4m stream")
+             ".png, .jpg, .exr, .tif or .webp; name_%04d.png for several; - for a y4m stream")
         .takes("IMAGE");
     addCameraOptions(c, o->camera);
     const char* drawing = "Drawing";
