@@ -328,6 +328,11 @@ void addConvert(CommandLine& line, Program& program) {
           {"keep", MixedPixels::keep}},
          "Flying points at depth edges: auto (dropped from sensors' depth), drop, keep")
         .group(sets);
+    c.choice<bool>(
+         "--view-size", set.raiseDepth, {{"picture", true}, {"depth", false}},
+         "Of views whose depth is smaller than their picture: picture (the depth is raised "
+         "along the picture's edges) or depth (default picture)")
+        .group(sets);
     c.flag("--refine-poses", set.refinePoses,
            "Move the cameras so that overlapping views agree in depth and colour")
         .group(sets);

@@ -66,6 +66,9 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_CHECK(
             command.refuse({"--cameras", "--depth"},
                            fmt::format("is of a folder; -o {} is a file of points", o.output)));
+    if (o.cameras == "colmap")
+        STX_CHECK(command.refuse({"--depth"},
+                                 "does not go with --cameras colmap, whose depth is floats"));
     if (ending != ".drc")
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
@@ -86,8 +89,9 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         what = counted(found.positions.size(), "point");
     } else {
         ExportOptions write;
-        write.kind =
-            o.cameras == "miv" ? ExportOptions::Kind::miv : ExportOptions::Kind::transforms;
+        write.kind = o.cameras == "miv"      ? ExportOptions::Kind::miv
+                     : o.cameras == "colmap" ? ExportOptions::Kind::colmap
+                                             : ExportOptions::Kind::transforms;
         write.noClobber = program.common.noClobber;
         write.floatDepth = o.depth == "exr";
         STX_CHECK(exportImages(bundle, o.output, write, program.job));
@@ -121,9 +125,11 @@ void addExtract(CommandLine& line, Program& program) {
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle or atlas").required();
     c.option("-o,--output", o->output, "Folder, points.ply or points.drc").required().takes("OUT");
-    c.option("--cameras", o->cameras,
-             "Camera file in the folder: transforms (nerfstudio) or miv (default transforms)")
-        .oneOf({"transforms", "miv"});
+    c.option(
+         "--cameras", o->cameras,
+         "Camera file in the folder: transforms (nerfstudio), miv, or colmap (a dense workspace) "
+         "(default transforms)")
+        .oneOf({"transforms", "miv", "colmap"});
     c.option("--depth", o->depth,
              "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
         .oneOf({"exr", "png"});

@@ -2,36 +2,22 @@
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
+#include "lib/base/counted.hpp"
 
 namespace stx {
+namespace {
 
-Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job,
-                                                std::optional<glm::ivec2> size) {
+/// What can be drawn of the views of a file.
+Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>& views,
+                                           const std::string& where, Job& job,
+                                           std::optional<glm::ivec2> size) {
     using namespace imagesets;
-    const std::string where = inQuotes(path.string());
-    STX_TRY(const Json file, readJson(path, job.limits));
-    Result<std::vector<SetView>> views =
-        fail(ErrorCode::invalidInput,
-             "there is neither a list 'frames' (transforms.json) nor a list "
-             "'cameras' (MIV, cameras.json) in it");
-    switch (jsonKindOf(file)) {
-        case JsonKind::transforms:
-            views = transformsViews(file, job);
-            break;
-        case JsonKind::miv:
-            views = mivViews(file, job);
-            break;
-        case JsonKind::cameras:
-            views = camerasJsonViews(file, job);
-            break;
-        case JsonKind::none:
-            break;
-    }
-    if (!views) return tl::unexpected(views.error().at(where));
-    if (views->empty()) return failAt(where, ErrorCode::invalidInput, "there is no camera in it");
+    if (views.empty()) return failAt(where, ErrorCode::invalidInput, "there is no camera in it");
     std::vector<NamedCamera> out;
     bool sizeMissing = false;
-    for (const SetView& view : *views) {
+    int lenses = 0;
+    for (const SetView& view : views) {
+        if (!view.lens.ideal()) ++lenses;
         if (view.panorama)
             return failAt(where, ErrorCode::invalidInput,
                           "camera '{}' is equirectangular; only perspective and orthographic "
@@ -55,7 +41,47 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
     }
     if (sizeMissing && !size)
         job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));
+    if (lenses > 0)
+        job.note(fmt::format("{}: pictures are drawn without the lens distortion of {}", where,
+                             counted(lenses, "camera")));
     return out;
+}
+
+}  // namespace
+
+Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job,
+                                                std::optional<glm::ivec2> size) {
+    using namespace imagesets;
+    const std::string where = inQuotes(path.string());
+    std::error_code ec;
+    const auto ending = path.extension();
+    if (std::filesystem::is_directory(path, ec) || ending == ".bin" || ending == ".txt") {
+        STX_TRY(const auto views, colmapViews(path, job));
+        return camerasOf(views, where, job, size);
+    }
+    STX_TRY(const Json file, readJson(path, job.limits));
+    Result<std::vector<SetView>> views =
+        fail(ErrorCode::invalidInput,
+             "there is no list 'frames' (transforms.json), 'cameras' (MIV, cameras.json) or "
+             "'camera_path' (nerfstudio) in it");
+    switch (jsonKindOf(file)) {
+        case JsonKind::cameraPath:
+            views = cameraPathViews(file, job);
+            break;
+        case JsonKind::transforms:
+            views = transformsViews(file, job);
+            break;
+        case JsonKind::miv:
+            views = mivViews(file, job);
+            break;
+        case JsonKind::cameras:
+            views = camerasJsonViews(file, job);
+            break;
+        case JsonKind::none:
+            break;
+    }
+    if (!views) return tl::unexpected(views.error().at(where));
+    return camerasOf(*views, where, job, size);
 }
 
 }  // namespace stx
