@@ -45,6 +45,7 @@ Result<std::vector<SetView>> cameraPathViews(const Json& file, Job& job) {
         }
         STX_TRY(rotation, repairRotation(rotation, c.fy, where, job));
         c.orientation = glm::normalize(glm::quat_cast(rotation));
+        if (auto ok = c.check(); !ok) return tl::unexpected(ok.error().at(where));
         views.push_back(std::move(view));
     }
     job.note(
