@@ -31,13 +31,15 @@ Result<ViewLayout> parseViewLayout(std::string_view text) {
     const auto digits =
         colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
     const auto parsed = std::from_chars(digits.data(), digits.data() + digits.size(), layout.count);
-    if (digits.empty() || parsed.ec != std::errc() || parsed.ptr != digits.data() + digits.size())
+    const bool large = parsed.ec == std::errc::result_out_of_range;
+    if (digits.empty() || (parsed.ec != std::errc() && !large) ||
+        parsed.ptr != digits.data() + digits.size())
         return fail(ErrorCode::usage, "'{}' needs a number of views, as in {}:16", text, word);
     const int most = layout.kind == ViewLayout::Kind::octahedral ? 64 : 4096;
     const int least = layout.kind == ViewLayout::Kind::octahedral ? 2 : 1;
-    if (layout.count < least || layout.count > most)
-        return fail(ErrorCode::usage, "'{}' asks for {} views; {} to {} are possible", text,
-                    layout.count, least, most);
+    if (large || layout.count < least || layout.count > most)
+        return fail(ErrorCode::usage, "'{}' asks for {} views; {} to {} are possible", text, digits,
+                    least, most);
     return layout;
 }
 

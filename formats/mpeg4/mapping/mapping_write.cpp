@@ -323,7 +323,10 @@ class SceneWriter {
                 "top, right, bottom), the rest of {:.3g} pixels is moved",
                 viewName(i), p.left, p.top, p.right, p.bottom, p.shift));
         const int bits = bitsOf(view);
-        if (view.depthBits == 32 || bits == 8 || bits < view.depthBits) {
+        // Depth that is on the codes already is off by what floats are, which is not worth a word.
+        constexpr double kOnCodes = 0.01;  // of a step
+        if (view.depthBits == 32 || bits < view.depthBits ||
+            images.worstDepth > kOnCodes * view.depthCode().step()) {
             worst_ = std::max(worst_, images.worstDepth);
             lossyBits_ = lossyBits_ == 0 ? bits : std::min(lossyBits_, bits);
         }
