@@ -83,6 +83,11 @@ Result<void> exportColmap(const Bundle& bundle, const path& folder,
                         bundle.views[i].name);
         if (bundle.views[i].texture.isLinear())
             job.note("linear colours are written as 8-bit sRGB");
+        if (bundle.views[i].pruned)
+            job.note(
+                "the views are pruned, which a COLMAP workspace cannot say: what reads it takes "
+                "the "
+                "pixels left out for empty ones (--cameras transforms keeps the mark)");
         own.push_back(fmt::format("images/{}.png", names[i]));
         own.push_back(fmt::format("stereo/depth_maps/{}.png.geometric.bin", names[i]));
     }
