@@ -2,6 +2,7 @@
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/open.hpp"
@@ -18,42 +19,53 @@ Json vectorJson(glm::dvec3 v) {
     return {v.x, v.y, v.z};
 }
 
-Json boundsJson(const Bounds& b) {
-    return {{"min", vectorJson(b.min)}, {"max", vectorJson(b.max)}};
+/// In the world: `origin` is what `b` counts from.
+Json boundsJson(const Bounds& b, glm::dvec3 origin) {
+    return {{"min", vectorJson(b.min + origin)}, {"max", vectorJson(b.max + origin)}};
 }
 
-Json viewJson(const ReferenceView& view) {
+void addLens(const Camera& camera, Json& j) {
+    const auto fov = camera.fieldOfView();
+    j["fieldOfView"] = {fov.x, fov.y};
+    j["orthographic"] = camera.orthographic;
+    if (!camera.centred(1e-6))
+        j["intrinsics"] = {
+            {"fx", camera.fx}, {"fy", camera.fy}, {"cx", camera.cx}, {"cy", camera.cy}};
+}
+
+void addOrigin(Json& out, glm::dvec3 origin) {
+    if (origin != glm::dvec3(0.0)) out["origin"] = vectorJson(origin);
+}
+
+Json viewJson(const ReferenceView& view, glm::dvec3 origin) {
     const auto axisAngle = axisAngleFromQuat(view.camera.orientation);
-    const auto fov = view.camera.fieldOfView();
     Json j = {{"name", view.name},
               {"width", view.camera.width},
               {"height", view.camera.height},
               {"depthBits", view.depthBits},
-              {"position", vectorJson(view.camera.position)},
+              {"position", vectorJson(view.camera.position + origin)},
               {"orientation", {axisAngle.x, axisAngle.y, axisAngle.z, axisAngle.w}},
-              {"fieldOfView", {fov.x, fov.y}},
               {"nearPlane", view.nearPlane},
-              {"farPlane", view.farPlane},
-              {"orthographic", view.camera.orthographic}};
-    if (!view.camera.centred(1e-6))
-        j["intrinsics"] = {{"fx", view.camera.fx},
-                           {"fy", view.camera.fy},
-                           {"cx", view.camera.cx},
-                           {"cy", view.camera.cy}};
+              {"farPlane", view.farPlane}};
+    addLens(view.camera, j);
+    if (view.pruned) j["pruned"] = true;
     return j;
 }
 
 /// Fills in what only the pixels show.
 void addFromPixels(Json& out, const Bundle& bundle) {
     std::int64_t points = 0;
-    for (std::size_t i = 0; i < bundle.views.size() && i < out["views"].size(); ++i) {
+    // A panorama becomes several views.
+    const bool each = bundle.views.size() == out["views"].size();
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         const auto n = bundle.views[i].pointCount();
-        out["views"][i]["points"] = n;
+        if (each) out["views"][i]["points"] = n;
         points += n;
     }
     out["points"] = points;
     if (!out.contains("bounds"))
-        out["bounds"] = boundsJson(bundle.bounds ? *bundle.bounds : bundle.computeBounds());
+        out["bounds"] =
+            boundsJson(bundle.bounds ? *bundle.bounds : bundle.computeBounds(), bundle.origin);
 }
 
 Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
@@ -65,7 +77,7 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     auto streams = Json::array();
     std::int64_t points = 0;
     for (const auto& v : header.views) {
-        auto j = viewJson(v.view);
+        auto j = viewJson(v.view, header.origin);
         if (v.points >= 0) j["points"] = v.points;
         points = v.points < 0 || points < 0 ? -1 : points + v.points;
         j["normals"] = v.normals;
@@ -76,7 +88,8 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     }
     out["views"] = std::move(views);
     if (points >= 0) out["points"] = points;
-    if (header.bounds) out["bounds"] = boundsJson(*header.bounds);
+    addOrigin(out, header.origin);
+    if (header.bounds) out["bounds"] = boundsJson(*header.bounds, header.origin);
     out["streams"] = std::move(streams);
     return {};
 }
@@ -99,15 +112,17 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
                        : container == Mpeg4Container::xmt ? "xmt"
                                                           : "mp4";
     mpeg4::SceneReadOptions options;
-    options.folder = path.parent_path();
+    options.folder = folderOf(path);
     options.pixels = false;
+    options.mayBeEmpty = true;
     STX_TRY(const auto bundle, mpeg4::bundleFromScene(document, options, job));
     out["nodeKind"] = mpeg4::nodeKindOf(document);
     if (!bundle.title.empty()) out["title"] = bundle.title;
     auto views = Json::array();
-    for (const auto& v : bundle.views) views.push_back(viewJson(v));
+    for (const auto& v : bundle.views) views.push_back(viewJson(v, bundle.origin));
     out["views"] = std::move(views);
-    if (bundle.bounds) out["bounds"] = boundsJson(*bundle.bounds);
+    addOrigin(out, bundle.origin);
+    if (bundle.bounds) out["bounds"] = boundsJson(*bundle.bounds, bundle.origin);
     auto streams = Json::array();
     const auto add = [&](const mpeg4::ElementaryStream& stream, const std::string& name,
                          const char* kind) {
@@ -117,9 +132,20 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     };
     if (!document.sceneStream.samples.empty()) add(document.sceneStream, "scene", "bifs");
     if (!document.odStream.samples.empty()) add(document.odStream, "object descriptors", "od");
-    for (const auto* descriptor : document.objectDescriptors()) {
-        for (const auto& stream : descriptor->streams)
-            add(stream, fmt::format("od {}", descriptor->id), streamKind(stream));
+    // Those of the start, which the views are of, and what comes later with its time.
+    for (const auto& frame : document.odFrames) {
+        for (const auto& command : frame.commands) {
+            const auto* update = std::get_if<mpeg4::UpdateObjectDescriptors>(&command);
+            if (!update) continue;
+            for (const auto& descriptor : update->descriptors) {
+                for (const auto& stream : descriptor.streams) {
+                    add(stream, fmt::format("od {}", descriptor.id), streamKind(stream));
+                    if (&frame != &document.odFrames.front())
+                        streams.back()["time"] =
+                            static_cast<double>(frame.time) / document.odStream.timescale;
+                }
+            }
+        }
     }
     out["streams"] = std::move(streams);
     return {};
@@ -144,7 +170,7 @@ Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
     out["nodeKind"] = second ? "SimpleTextureV2" : "SimpleTexture";
     if (!header.atlas.title.empty()) out["title"] = header.atlas.title;
     auto views = Json::array();
-    for (const auto& v : header.atlas.views) views.push_back(viewJson(v));
+    for (const auto& v : header.atlas.views) views.push_back(viewJson(v, header.atlas.origin));
     out["views"] = std::move(views);
     out["textures"] = std::move(textures);
     auto rectangles = Json::array();
@@ -161,7 +187,40 @@ Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
     out["rectangles"] = std::move(rectangles);
     out["used"] = header.used();
     out["pixels"] = {{"source", header.atlas.sourcePixels}, {"kept", header.atlas.keptPixels}};
-    if (header.atlas.bounds) out["bounds"] = boundsJson(*header.atlas.bounds);
+    addOrigin(out, header.atlas.origin);
+    if (header.atlas.bounds) out["bounds"] = boundsJson(*header.atlas.bounds, header.atlas.origin);
+    return {};
+}
+
+Result<void> describeSet(const fs::path& path, Json& out, Job& job) {
+    STX_TRY(const auto set, summariseImageSet(path, job));
+    out["container"] = "imageset";
+    out["bytes"] = set.bytes;
+    out["imageSet"] = set.kind;
+    if (!set.title.empty()) out["title"] = set.title;
+    out["frames"] = set.frames;
+    auto views = Json::array();
+    int missing = 0;
+    for (const auto& view : set.views) {
+        const Camera& c = view.camera;
+        Json j = {{"name", view.name}, {"width", c.width}, {"height", c.height}};
+        if (!view.colour.empty()) j["colour"] = view.colour;
+        if (!view.depth.empty()) j["depth"] = view.depth;
+        if (!view.missing.empty()) j["missing"] = view.missing;
+        missing += static_cast<int>(view.missing.size());
+        if (set.camerasKnown) {
+            const auto turn = axisAngleFromQuat(c.orientation);
+            j["position"] = vectorJson(c.position);
+            j["orientation"] = {turn.x, turn.y, turn.z, turn.w};
+            if (view.panorama)
+                j["panorama"] = true;
+            else if (c.width > 0)
+                addLens(c, j);
+        }
+        views.push_back(std::move(j));
+    }
+    out["views"] = std::move(views);
+    out["missing"] = missing;
     return {};
 }
 
@@ -182,7 +241,12 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
     out["bytes"] = bytes;
     switch (kind) {
         case FileKind::exr:
-            STX_CHECK(describeExr(path, out, job));
+            if (auto ok = describeExr(path, out, job); !ok) {
+                // Of another program: then it may be a set by itself.
+                const auto reader = ExrReader::open(path, job.limits);
+                const bool ours = !reader || isExrBundle(*reader);
+                if (ours || !describeSet(path, out, job)) return propagate(ok);
+            }
             break;
         case FileKind::mpeg4:
             STX_CHECK(describeMpeg4(path, out, job));
@@ -203,13 +267,17 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
                                     {"width", t.pixels.width()},
                                     {"height", t.pixels.height()}});
             out["textures"] = std::move(textures);
-            out["bounds"] = boundsJson(mesh.bounds());
+            addOrigin(out, mesh.origin);
+            out["bounds"] = boundsJson(mesh.bounds(), mesh.origin);
             return out;
         }
         case FileKind::imageSet:
+            STX_CHECK(describeSet(path, out, job));
+            break;
         case FileKind::image:
         case FileKind::unknown:
-            return fail(ErrorCode::invalidInput, "'{}' is neither a mesh, a bundle nor an atlas",
+            return fail(ErrorCode::invalidInput,
+                        "'{}' is neither a mesh, a bundle, an atlas nor an image set",
                         path.string());
     }
     if (options.bounds && (!out.contains("bounds") || !out.contains("points"))) {
@@ -238,10 +306,12 @@ std::string describeAsText(const Json& info) {
     };
     std::string out = fmt::format("{}: {}, {} bytes\n", text(info["file"]), text(info["container"]),
                                   text(info["bytes"]));
-    for (const char* key :
-         {"nodeKind", "title", "triangles", "vertices", "materials", "points", "used"}) {
-        if (info.contains(key)) out += fmt::format("{}: {}\n", key, text(info[key]));
+    for (const char* key : {"imageSet", "nodeKind", "title", "frames", "missing", "triangles",
+                            "vertices", "materials", "points", "used"}) {
+        if (info.contains(key) && !(key == std::string_view("frames") && info[key] == 1))
+            out += fmt::format("{}: {}\n", key, text(info[key]));
     }
+    if (info.contains("origin")) out += fmt::format("origin: {}\n", text(info["origin"]));
     if (info.contains("bounds"))
         out += fmt::format("bounds: {} to {}\n", text(info["bounds"]["min"]),
                            text(info["bounds"]["max"]));
@@ -258,21 +328,35 @@ std::string describeAsText(const Json& info) {
     }
     if (info.contains("views")) {
         std::size_t i = 0;
+        if (info["views"].empty()) out += "no views: the scene shows no DepthImage with images\n";
         for (const auto& v : info["views"]) {
+            if (!v.contains("nearPlane")) {  // of an image set
+                out += fmt::format("view {} '{}': {}x{}", i++, text(v["name"]), text(v["width"]),
+                                   text(v["height"]));
+                if (v.contains("colour")) out += fmt::format(", colour {}", text(v["colour"]));
+                if (v.contains("depth")) out += fmt::format(", depth {}", text(v["depth"]));
+                if (v.contains("missing"))
+                    for (const auto& name : v["missing"])
+                        out += fmt::format(", {} is missing", text(name));
+                out += "\n";
+                continue;
+            }
             out += fmt::format(
                 "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, at {:.10g} {:.10g} "
-                "{:.10g}{}\n",
+                "{:.10g}{}{}\n",
                 i++, text(v["name"]), text(v["width"]), text(v["height"]), text(v["depthBits"]),
                 v["nearPlane"].get<double>(), v["farPlane"].get<double>(), lensText(v),
                 v["position"][0].get<double>(), v["position"][1].get<double>(),
                 v["position"][2].get<double>(),
-                v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "");
+                v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "",
+                v.contains("pruned") ? ", pruned" : "");
         }
     }
     if (info.contains("streams")) {
         for (const auto& s : info["streams"])
-            out += fmt::format("{} '{}': {} bytes\n", text(s["kind"]), text(s["name"]),
-                               text(s["bytes"]));
+            out += fmt::format(
+                "{} '{}': {} bytes{}\n", text(s["kind"]), text(s["name"]), text(s["bytes"]),
+                s.contains("time") ? fmt::format(", from {:g} s on", s["time"].get<double>()) : "");
     }
     return out;
 }

@@ -24,6 +24,9 @@ Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const Save
                         Job& job) {
     // Both writers check the bundle: see Bundle::check().
     STX_TRY(const auto container, containerOf(target));
+    if (container == FileKind::exr && options.octreeLevels > 0)
+        return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
+                    target.string());
     if (container == FileKind::exr) return writeExrBundle(bundle, target, job, {options.noClobber});
     mpeg4::SceneWriteOptions scene;
     if (options.jpegQuality > 0) {
@@ -31,6 +34,7 @@ Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const Save
         scene.jpegQuality = options.jpegQuality;
     }
     scene.pointTexture = options.pointTexture;
+    scene.octreeLevels = options.octreeLevels;
     Mpeg4WriteOptions write;
     write.output.noClobber = options.noClobber;
     return writeMpeg4Bundle(bundle, target, job, scene, write);
@@ -42,7 +46,7 @@ Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::p
     STX_TRY(const auto from, recognise(input));
     STX_TRY(const auto to, containerOf(target));
     if (from != FileKind::mpeg4 || to != FileKind::mpeg4 || changesDepth ||
-        options.jpegQuality != 0 || options.pointTexture)
+        options.jpegQuality != 0 || options.pointTexture || options.octreeLevels > 0)
         return std::nullopt;
     STX_TRY(const auto document, readMpeg4(input, job));
     Mpeg4WriteOptions write;
@@ -53,7 +57,7 @@ Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::p
     Job quiet;
     quiet.limits = job.limits;
     mpeg4::SceneReadOptions read;
-    read.folder = input.parent_path();
+    read.folder = folderOf(input);
     read.pixels = pixels;
     auto bundle = mpeg4::bundleFromScene(document, read, quiet);
     return bundle ? std::move(*bundle) : Bundle();

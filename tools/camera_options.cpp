@@ -30,8 +30,11 @@ Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
 void addCameraOptions(Command command, CameraOptions& o) {
     const char* group = "Camera";
     command
-        .option("--eye", o.eye,
-                "Position of the camera in scene units (write --eye=-1,2,3 for a leading minus)")
+        .option(
+            "--eye", o.eye,
+            "Position of the camera in the world, in scene units (write --eye=-1,2,3 for a leading "
+            "minus). Where 'stx info' names an origin, it counts in: --eye, --target, --cameras "
+            "and point lights are in the coordinates of the model that was converted")
         .takes("X,Y,Z")
         .group(group);
     command.option("--target", o.target, "What it looks at (default: the middle of the object)")
@@ -136,7 +139,10 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     if (!o.cameraFile.empty()) {
         STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job, size));
         std::vector<Camera> out;
-        for (const auto& c : cameras) out.push_back(inPicture(c.camera, size));
+        for (auto& c : cameras) {
+            c.camera.position -= context.origin;
+            out.push_back(inPicture(c.camera, size));
+        }
         return out;
     }
 
@@ -163,6 +169,7 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));
+        target -= context.origin;
     }
     const double radius = context.bounds.radius();
     if (!pose)
@@ -176,6 +183,7 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
         eye = front[0].position;
     } else {
         STX_TRY(eye, parseVec3(o.eye, "--eye"));
+        eye -= context.origin;
     }
     STX_TRY(const auto camera, cameraAt(eye, target, lens));
     return std::vector<Camera>{camera};

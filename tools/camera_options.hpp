@@ -39,10 +39,11 @@ void addCameraOptions(Command command, CameraOptions& options);
 /// What the cameras are made for: the object and its reference views.
 struct CameraContext {
     Bounds bounds;              ///< of the object
+    glm::dvec3 origin{0.0};     ///< what bounds and views count from; options are in the world
     std::vector<Camera> views;  ///< of the reference views; empty for a mesh
 };
 
-/// The cameras asked for, in order. Without any camera option: one from the front, slightly above.
+/// The cameras asked for, in order, counted from the context's origin. Without any camera option: one from the front, slightly above.
 /// Errors (usage) on contradicting options and on views that do not exist.
 [[nodiscard]] Result<std::vector<Camera>> makeCameras(const CameraOptions& options,
                                                       const CameraContext& context,

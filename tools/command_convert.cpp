@@ -23,6 +23,7 @@ struct ConvertOptions {
     std::string colour = "png";
     std::optional<int> quality;
     bool pointTexture = false;
+    int octreeLevels = 0;
     OpenOptions open;
     std::string frames;  ///< A-B
     /// Options that were given.
@@ -43,6 +44,7 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     save.noClobber = program.common.noClobber;
     save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
     save.pointTexture = o.pointTexture;
+    save.octreeLevels = o.octreeLevels;
     return save;
 }
 
@@ -255,7 +257,7 @@ void addConvert(CommandLine& line, Program& program) {
         .required()
         .takes("OUT");
     addMeshViewOptions(c, o->mesh);
-    c.option("--texture", o->open.texture, "Texture of a mesh that names none")
+    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group(MeshViewOptions::kHeading);
     const char* coding = "Coding";
@@ -264,6 +266,11 @@ void addConvert(CommandLine& line, Program& program) {
         .group(coding);
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100).group(coding);
     c.flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)").group(coding);
+    c.option("--octree-image", o->octreeLevels,
+             "Write an OctreeImage (MPEG-4): 2^LEVELS voxels on a side, a picture for each view")
+        .range(1, 16)
+        .takes("LEVELS")
+        .group(coding);
     const char* many = "Many inputs";
     c.option("--jobs,-j", o->batch.jobs,
              "Inputs at a time, each in a process of its own (default 1)")
@@ -289,6 +296,10 @@ void addConvert(CommandLine& line, Program& program) {
     c.option("--every", o->open.set.every, "Take each N-th view of a recording (default 1)")
         .range(1, 1000000)
         .takes("N")
+        .group(sets);
+    c.flag("--strict", o->open.set.strict,
+           "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
+           "it out")
         .group(sets);
     const auto numbers = [&](const char* name, const char* type, const char* help,
                              std::vector<double*> to) {

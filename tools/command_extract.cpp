@@ -83,6 +83,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         cloud.positions = found.positions;
         cloud.colours = found.colours;
         cloud.normals = found.normals;
+        cloud.origin = bundle.origin;
         PointWriteOptions write = o.points;
         write.file.noClobber = program.common.noClobber;
         STX_CHECK(writePoints(o.output, cloud, program.job, write));

@@ -65,8 +65,9 @@ Result<glm::vec3> parseGreyOrRgb(const std::string& text, const char* option) {
     return glm::vec3(static_cast<float>(v[0]));
 }
 
-/// dir:X,Y,Z[,r,g,b] or point:X,Y,Z[,r,g,b], with a trailing @camera for camera space.
-Result<Light> parseLight(const std::string& text) {
+/// dir:X,Y,Z[,r,g,b] or point:X,Y,Z[,r,g,b], with a trailing @camera for camera space. A point in
+/// the world comes back counted from `origin`.
+Result<Light> parseLight(const std::string& text, glm::dvec3 origin) {
     Light light;
     std::string body = text;
     if (const auto at = body.rfind("@camera"); at != std::string::npos && at + 7 == body.size()) {
@@ -83,7 +84,9 @@ Result<Light> parseLight(const std::string& text) {
     body = body.substr(body.find(':') + 1);
     const auto commas = std::count(body.begin(), body.end(), ',');
     STX_TRY(const auto v, parseNumbers(body, commas >= 3 ? 6 : 3, "--light"));
-    light.vector = glm::vec3(v[0], v[1], v[2]);
+    const glm::dvec3 vector(v[0], v[1], v[2]);
+    const bool inWorld = light.kind == Light::Kind::point && !light.inCameraSpace;
+    light.vector = glm::vec3(inWorld ? vector - origin : vector);
     if (v.size() == 6) light.colour = glm::vec3(v[3], v[4], v[5]);
     if (light.kind == Light::Kind::directional && light.vector == glm::vec3(0.0f))
         return fail(ErrorCode::usage, "--light '{}' has no direction", text);
@@ -139,7 +142,7 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
     if (const auto format = frameFormat(o.output); format && *format == FrameFormat::exr)
         s.normals = true;
     for (const auto& text : o.lights) {
-        STX_TRY(const auto light, parseLight(text));
+        STX_TRY(const auto light, parseLight(text, glm::dvec3(0.0)));
         s.lighting.lights.push_back(light);
     }
     STX_TRY(s.lighting.ambient, parseGreyOrRgb(o.ambient, "--ambient"));
@@ -184,7 +187,7 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     if (o.input.empty() || o.output.empty())
         return fail(ErrorCode::usage, "an input and -o OUTPUT are needed. See 'stx render --help'");
     STX_CHECK(checkOptions(o, command));
-    STX_TRY(const auto settings, settingsOf(o));
+    STX_TRY(auto settings, settingsOf(o));
     STX_TRY(const auto background, parseBackground(o.background));
     STX_CHECK(checkTarget(o.output, program));
     STX_TRY(const int wanted, checkCameraOptions(o.camera, command, program));
@@ -213,6 +216,10 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     if (const auto* bundle = std::get_if<Bundle>(&model)) addViews(*bundle);
     if (const auto* atlas = std::get_if<Atlas>(&model)) addViews(*atlas);
     context.bounds = boundsOf(model);
+    context.origin = originOf(model);
+    for (std::size_t i = 0; i < o.lights.size(); ++i) {
+        STX_TRY(settings.lighting.lights[i], parseLight(o.lights[i], context.origin));
+    }
     STX_TRY(const auto cameras, makeCameras(o.camera, context, program));
     const auto count = static_cast<int>(cameras.size());
     STX_CHECK(checkFrames(o, count, program));
@@ -352,7 +359,7 @@ void addRender(CommandLine& line, Program& program) {
         .group(output);
     c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
         .group(output);
-    c.option("--texture", o->open.texture, "Texture of a mesh that names none")
+    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group(output);
     c.sharedOptions(program.common, kOutput | kOutside);

@@ -60,7 +60,7 @@ void addValidate(CommandLine& line, Program& program) {
                          "  stx validate model.mp4\n"
                          "  stx validate --rules");
     auto o = std::make_shared<ValidateCommandOptions>();
-    c.option("FILE", o->input, "Bundle or atlas");
+    c.option("FILE", o->input, "Bundle, atlas, image set or mesh");
     c.flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
     c.flag("--rules", o->rules, "Print the catalogue of rules and stop");
     c.sharedOptions(program.common, kFormat | kOutside);

@@ -117,7 +117,10 @@ Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions
         }
         STX_TRY(const auto named, readCameraFile(o.views, program.job, size));
         std::vector<Camera> cameras;
-        for (const auto& n : named) cameras.push_back(inPicture(n.camera, size));
+        for (const auto& n : named) {
+            cameras.push_back(inPicture(n.camera, size));
+            cameras.back().position -= mesh.origin;
+        }
         return cameras;
     }
     STX_TRY(const auto framing, framingOf(o, layout->kind == ViewLayout::Kind::cube, program));

@@ -51,6 +51,7 @@ AtlasHeader headerOf(const Atlas& atlas, bool inOneExr, bool jpeg = false) {
     a.layout = atlas.layout;
     a.padding = atlas.padding;
     a.bounds = atlas.bounds;
+    a.origin = atlas.origin;
     a.title = atlas.title;
     a.sourcePixels = atlas.sourcePixels;
     a.keptPixels = atlas.keptPixels;

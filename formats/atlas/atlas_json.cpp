@@ -311,6 +311,7 @@ std::string atlasJson(const AtlasHeader& header) {
     top["linear"] = header.linear;
     if (atlas.bounds && !atlas.bounds->empty())
         top["bounds"] = {{"min", arrayOf(atlas.bounds->min)}, {"max", arrayOf(atlas.bounds->max)}};
+    if (atlas.origin != glm::dvec3(0.0)) top["origin"] = arrayOf(atlas.origin);
     top["pixels"] = {{"source", atlas.sourcePixels}, {"kept", atlas.keptPixels}};
     std::string text = "{\n";
     for (const auto& [key, value] : top.items())
@@ -354,6 +355,11 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
         STX_CHECK(bounds->vector("min", min));
         STX_CHECK(bounds->vector("max", max));
         atlas.bounds = Bounds{{min[0], min[1], min[2]}, {max[0], max[1], max[2]}};
+    }
+    if (json.contains("origin")) {
+        std::array<double, 3> origin{};
+        STX_CHECK(top.vector("origin", origin));
+        atlas.origin = {origin[0], origin[1], origin[2]};
     }
     if (const auto pixels = top.object("pixels")) {
         STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));

@@ -14,7 +14,8 @@
 //              (double) · stx:depthBits (int) · stx:points (double) · stx:pruned (int, 1; of
 //              pruned views only)
 //   part 0:    stx:version (int) · stx:kind ("bundle") · stx:colour ("sRGB8" or "linear") ·
-//              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d)
+//              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d) · stx:origin (v3d; where it
+//              is not 0: added to positions and bounds, gives the world's)
 namespace stx {
 
 namespace {
@@ -91,6 +92,7 @@ Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
     first["stx:kind"] = std::string("bundle");
     first["stx:colour"] = std::string(bundle.views[0].texture.isLinear() ? "linear" : "sRGB8");
     if (!bundle.title.empty()) first["stx:title"] = bundle.title;
+    if (bundle.origin != glm::dvec3(0.0)) first["stx:origin"] = bundle.origin;
     const Bounds bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
     if (!bounds.empty()) {
         first["stx:boundsMin"] = bounds.min;
@@ -250,6 +252,9 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
     const auto* min = first.attribute<glm::dvec3>("stx:boundsMin");
     const auto* max = first.attribute<glm::dvec3>("stx:boundsMax");
     if (min && max) header.bounds = Bounds{*min, *max};
+    if (const auto* origin = first.attribute<glm::dvec3>("stx:origin");
+        origin && std::isfinite(origin->x + origin->y + origin->z))
+        header.origin = *origin;
     header.linear = isLinearExr(reader);
     for (const int i : exrViewParts(reader)) {
         const ExrPart& part = reader.parts()[i];
@@ -297,6 +302,7 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     Bundle bundle;
     bundle.title = header.title;
     bundle.bounds = header.bounds;
+    bundle.origin = header.origin;
     for (auto& view : header.views) bundle.views.push_back(std::move(view.view));
 
     const auto count = static_cast<std::int64_t>(parts.size());

@@ -19,6 +19,9 @@ struct ImageInfo {
     int width = 0, height = 0;
     int channels = 0;  ///< as decoded: 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA; palettes are spread
     int bits = 0;      ///< per channel as decoded: 8 or 16 (JPEG: 8 or 12)
+    /// Of a stored value where that is less: PNG's grey of 1, 2 or 4 bits is spread to 8 by
+    /// decoding, code 1 of 4 bits becomes 17; else 0.
+    int greyBits = 0;
 };
 
 /// Header of a PNG or JPEG (others: error unsupported). Loads no library; a few microseconds.

@@ -42,6 +42,7 @@ Result<ImageInfo> probePng(ByteSpan bytes) {
     switch (type) {
         case 0:
             info.channels = 1;
+            if (byteAt(bytes, 24) < 8) info.greyBits = static_cast<int>(byteAt(bytes, 24));
             break;
         case 2:
             info.channels = 3;

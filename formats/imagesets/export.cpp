@@ -95,16 +95,20 @@ Result<void> writeIntegerDepth(const ReferenceView& view, const path& file, cons
 }
 
 /// What brings a view back to the bit; other programs do not look at it.
-void addOwnKeys(Json& json, const ReferenceView& view) {
+void addOwnKeys(Json& json, const ReferenceView& view, glm::dvec3 origin) {
     const glm::dquat& q = view.camera.orientation;
     json["stx:name"] = view.name;
+    const glm::dvec3& p = view.camera.position;
+    if (origin != glm::dvec3(0.0)) json["stx:position"] = {p.x, p.y, p.z};
     json["stx:quaternion"] = {q.x, q.y, q.z, q.w};
     json["nearPlane"] = view.nearPlane;
     json["farPlane"] = view.farPlane;
     json["depthBits"] = view.depthBits;
+    if (view.pruned) json["stx:pruned"] = true;
 }
 
-Json transformsFrame(const ReferenceView& view, const std::string& name, const char* depthEnding) {
+Json transformsFrame(const ReferenceView& view, const std::string& name, const char* depthEnding,
+                     glm::dvec3 origin) {
     const Camera& c = view.camera;
     Json frame;
     frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(view));
@@ -116,10 +120,11 @@ Json transformsFrame(const ReferenceView& view, const std::string& name, const c
     frame["fl_y"] = c.fy;
     frame["cx"] = c.cx;
     frame["cy"] = c.cy;
-    const glm::dmat4 m = c.worldFromCamera();
+    glm::dmat4 m = c.worldFromCamera();
+    m[3] += glm::dvec4(origin, 0.0);
     for (int row = 0; row < 4; ++row)
         frame["transform_matrix"].push_back({m[0][row], m[1][row], m[2][row], m[3][row]});
-    addOwnKeys(frame, view);
+    addOwnKeys(frame, view, origin);
     return frame;
 }
 
@@ -165,11 +170,12 @@ Result<MivRange> mivRange(const ReferenceView& view) {
     return range;
 }
 
-Result<Json> mivCamera(const ReferenceView& view, const std::string& name) {
+Result<Json> mivCamera(const ReferenceView& view, const std::string& name, glm::dvec3 origin) {
     const Camera& c = view.camera;
     Json camera;
     camera["Name"] = name;
-    camera["Position"] = {-c.position.z, -c.position.x, c.position.y};
+    const glm::dvec3 world = c.position + origin;
+    camera["Position"] = {-world.z, -world.x, world.y};
     const glm::dvec3 rotation = mivRotation(c.orientation);
     camera["Rotation"] = {rotation.x, rotation.y, rotation.z};
     camera["Depthmap"] = 1;
@@ -191,7 +197,7 @@ Result<Json> mivCamera(const ReferenceView& view, const std::string& name) {
     camera["BitDepthDepth"] = 16;
     camera["ColorSpace"] = "YUV420";
     camera["DepthColorSpace"] = "YUV420";
-    addOwnKeys(camera, view);
+    addOwnKeys(camera, view, origin);
     if (c.orthographic) camera["stx:window"] = {c.fx, c.fy, c.cx, c.cy};
     return camera;
 }
@@ -229,14 +235,16 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
             job.note(fmt::format("depth is rounded to steps of {:.3g} scene units", unit));
         }
     }
+    const glm::dvec3& o = bundle.origin;
+    if (o != glm::dvec3(0.0)) json["stx:origin"] = {o.x, o.y, o.z};
     const char* depthEnding = options.floatDepth ? ".exr" : ".png";
     for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         const ReferenceView& view = bundle.views[i];
         if (!miv) {
-            json["frames"].push_back(transformsFrame(view, names[i], depthEnding));
+            json["frames"].push_back(transformsFrame(view, names[i], depthEnding, bundle.origin));
             continue;
         }
-        STX_TRY(auto camera, mivCamera(view, names[i]));
+        STX_TRY(auto camera, mivCamera(view, names[i], bundle.origin));
         json["cameras"].push_back(std::move(camera));
         if (!options.floatDepth) {
             STX_TRY(const MivRange range, mivRange(view));

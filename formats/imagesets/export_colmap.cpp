@@ -62,7 +62,7 @@ std::pair<std::string, std::string> modelOf(const Bundle& bundle,
         if (fresh) cameras += fmt::format("{} {}\n", camera->second, line);
         // Half a turn about x: from our axes to x right, y down, z forward.
         const glm::dquat q = glm::conjugate(c.orientation * glm::dquat(0, 1, 0, 0));
-        const glm::dvec3 t = -(q * c.position);
+        const glm::dvec3 t = -(q * (c.position + bundle.origin));
         images += fmt::format("{} {} {} {} {} {} {} {} {} {}.png\n\n", i + 1, q.w, q.x, q.y, q.z,
                               t.x, t.y, t.z, camera->second, names[i]);
     }

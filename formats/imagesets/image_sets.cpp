@@ -7,15 +7,13 @@
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/origin.hpp"
 #include "lib/registration/refine_poses.hpp"
 
 namespace stx {
-namespace {
 
-using namespace imagesets;
-
-Result<SetDescription> describe(const std::filesystem::path& path, const ImageSetOptions& options,
-                                Job& job) {
+Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
+                                                         const ImageSetOptions& options, Job& job) {
     std::string kind = options.from;
     if (kind.empty()) {
         STX_TRY(kind, recogniseImageSet(path));
@@ -32,6 +30,10 @@ Result<SetDescription> describe(const std::filesystem::path& path, const ImageSe
     }
     return entry->describe(path, options, job);
 }
+
+namespace {
+
+using namespace imagesets;
 
 Result<void> checkOptions(const ImageSetOptions& o) {
     if (o.depthBits != 8 && o.depthBits != 16 && o.depthBits != 32)
@@ -86,13 +88,60 @@ Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
     return {};
 }
 
+/// Cameras of an export of ours count from its origin, to the bit as they were.
+void useOrigin(SetDescription& set) {
+    if (!set.origin) return;
+    for (SetView& view : set.views) {
+        const glm::dvec3 local = view.camera.position - *set.origin;
+        // Equal but for the rounding of the sum, unless somebody moved the camera since.
+        const double slack = 1e-12 * (1 + glm::length(*set.origin));
+        view.camera.position =
+            view.localPosition && glm::distance(*view.localPosition, local) <= slack
+                ? *view.localPosition
+                : local;
+    }
+}
+
+/// Leaves out views whose files are not there, and says so. Errors when none is left, or `strict`.
+Result<void> dropMissing(SetDescription& set, bool strict, Job& job) {
+    const auto isMissing = [](const SetView& view) { return view.missing.has_value(); };
+    const auto first = std::ranges::find_if(set.views, isMissing);
+    if (first == set.views.end()) return {};
+    const auto all = set.views.size();
+    const Error error = *first->missing;
+    const auto dropped = std::erase_if(set.views, isMissing);
+    if (strict || set.views.empty()) return tl::unexpected(error);
+    job.note(fmt::format("{} of {} views {} left out, as files are missing; the first: {}", dropped,
+                         all, dropped == 1 ? "is" : "are", error.text()));
+    return {};
+}
+
+/// Bounds, and an origin where the coordinates of a set are too large for floats.
+void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
+    bundle.bounds = bundle.computeBounds();
+    if (set.origin) {
+        bundle.origin = *set.origin;
+        return;
+    }
+    const auto origin = originFor(*bundle.bounds);
+    if (origin == glm::dvec3(0.0)) return;
+    bundle.origin = origin;
+    for (ReferenceView& view : bundle.views) view.camera.position -= origin;
+    bundle.bounds = Bounds{bundle.bounds->min - origin, bundle.bounds->max - origin};
+    job.note(fmt::format(
+        "the coordinates are too large for 32-bit floats: the origin {} {} {} is subtracted, and "
+        "kept beside them",
+        origin.x, origin.y, origin.z));
+}
+
 }  // namespace
 
 Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
                             Job& job) {
     STX_CHECK(checkOptions(options));
-    STX_TRY(SetDescription set, describe(path, options, job));
+    STX_TRY(SetDescription set, describeSet(path, options, job));
     const std::string where = inQuotes(path.string());
+    useOrigin(set);
     if (options.every > 1) {
         std::vector<SetView> some;
         for (std::size_t i = 0; i < set.views.size(); i += static_cast<std::size_t>(options.every))
@@ -101,6 +150,10 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     }
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+    STX_CHECK(dropMissing(set, options.strict, job));
+    for (const SetView& view : set.views)
+        for (const PictureSource* source : {&view.texture, &view.depth})
+            if (source->missing) return tl::unexpected(*source->missing);
     if (options.frame >= set.frames)
         return failAt(where, ErrorCode::invalidInput,
                       "frame {} is asked for, but the set has {} (from 0)", options.frame,
@@ -144,16 +197,16 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
         for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));
     }
     makeNamesUnique(bundle.views);
+    findOrigin(bundle, set, job);
     STX_CHECK(attendToPoses(bundle, set, options, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
-    bundle.bounds = bundle.computeBounds();
     return bundle;
 }
 
 Result<int> imageSetFrameCount(const std::filesystem::path& path, const ImageSetOptions& options,
                                Job& job) {
     STX_CHECK(checkOptions(options));
-    STX_TRY(const SetDescription set, describe(path, options, job));
+    STX_TRY(const SetDescription set, describeSet(path, options, job));
     return set.frames;
 }
 

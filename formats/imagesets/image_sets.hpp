@@ -42,6 +42,8 @@ struct ImageSetOptions {
     std::string from;  ///< one of imageSetKinds(); empty = recognise
     int frame = 0;     ///< of sets that have time, from 0
     int every = 1;     ///< takes each N-th view, for recordings of thousands
+    /// A view whose files are missing is an error, not a note (transforms, TUM, 7-Scenes).
+    bool strict = false;
     /// Depth range that the set itself does not have (MSR), scene units; 0, 0 = not given.
     double depthMin = 0, depthMax = 0;
     /// Names of the images relative to the set's folder with {name} {w} {h} {format} {frame}

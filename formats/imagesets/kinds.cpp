@@ -32,6 +32,11 @@ Result<Json> readJson(const path& file, const Limits& limits) {
 Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view) {
     STX_TRY(const auto name, findText(camera, "stx:name", where));
     view.exactName = name.value_or("");
+    if (const auto it = camera.find("stx:pruned"); it != camera.end()) {
+        if (!it->is_boolean())
+            return failAt(where, ErrorCode::invalidInput, "'stx:pruned' must be true or false");
+        view.pruned = it->get<bool>();
+    }
     STX_TRY(const auto q, findNumbers(camera, "stx:quaternion", 4, where));
     if (q) {
         const glm::dquat exact((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
@@ -39,6 +44,8 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
             std::abs(glm::dot(exact, view.camera.orientation)) > 1 - 1e-9)
             view.camera.orientation = exact;
     }
+    STX_TRY(const auto position, findNumbers(camera, "stx:position", 3, where));
+    if (position) view.localPosition = glm::dvec3((*position)[0], (*position)[1], (*position)[2]);
     STX_TRY(const auto window, findNumbers(camera, "stx:window", 4, where));
     if (window) {
         Camera& c = view.camera;
@@ -66,6 +73,12 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
     return {};
 }
 
+Result<std::optional<glm::dvec3>> originOf(const Json& file, const std::string& where) {
+    STX_TRY(const auto n, findNumbers(file, "stx:origin", 3, where));
+    if (!n) return std::optional<glm::dvec3>();
+    return std::optional(glm::dvec3((*n)[0], (*n)[1], (*n)[2]));
+}
+
 std::string firstThere(const path& folder, const std::vector<std::string>& names) {
     for (const std::string& name : names) {
         std::error_code ec;
@@ -88,9 +101,28 @@ Result<PictureSource> sourceInside(const path& folder, const std::string& name,
     PictureSource source;
     source.name = name;
     auto file = resolveInside(folder, name, limits);
-    if (!file) return tl::unexpected(where.empty() ? file.error() : file.error().at(where));
-    source.path = std::move(*file);
+    if (file) {
+        source.path = std::move(*file);
+        return source;
+    }
+    Error error = where.empty() ? file.error() : file.error().at(where);
+    std::error_code ec;
+    if (error.code != ErrorCode::io || std::filesystem::exists(folder / name, ec))
+        return tl::unexpected(std::move(error));
+    source.path = folder / name;
+    source.missing = std::move(error);
     return source;
+}
+
+Result<void> findPictures(const path& folder, const std::string& texture, const std::string& depth,
+                          const std::string& where, const Limits& limits, SetView& view) {
+    for (const auto& [name, to] : {std::pair{&texture, &view.texture}, {&depth, &view.depth}}) {
+        auto source = sourceInside(folder, *name, where, limits);
+        if (!source) return tl::unexpected(source.error());
+        if (source->missing && !view.missing) view.missing = source->missing;
+        *to = std::move(*source);
+    }
+    return {};
 }
 
 std::vector<std::string> filesIn(const path& folder) {

@@ -25,6 +25,10 @@ using std::filesystem::path;
 [[nodiscard]] Result<SetDescription> describeCamerasJson(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describePanorama(const path&, const ImageSetOptions&, Job&);
 
+/// By options.from, or whatever kind the path is recognised as. Files that the set names and that
+/// are not there are no errors yet: PictureSource::missing.
+[[nodiscard]] Result<SetDescription> describeSet(const path&, const ImageSetOptions&, Job&);
+
 /// What a JSON file with cameras is.
 enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 [[nodiscard]] JsonKind jsonKindOf(const Json& file);
@@ -40,18 +44,28 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 /// Those of a COLMAP model (its folder, the workspace, or one of its files), by their names.
 [[nodiscard]] Result<std::vector<SetView>> colmapViews(const path& given, Job& job);
 
-/// What our own export writes beside a camera (stx:name, stx:quaternion, stx:window, nearPlane,
-/// farPlane, depthBits), so that a bundle comes back to the bit. Values that contradict the camera
-/// are passed over.
+/// What our own export writes beside a camera (stx:name, stx:quaternion, stx:position, stx:window,
+/// nearPlane, farPlane, depthBits), so that a bundle comes back to the bit. Values that contradict
+/// the camera are passed over.
 [[nodiscard]] Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view);
+
+/// stx:origin of such an export.
+[[nodiscard]] Result<std::optional<glm::dvec3>> originOf(const Json& file,
+                                                         const std::string& where);
 
 /// The file in `folder` that has one of these names, in that order; empty when there is none.
 [[nodiscard]] std::string firstThere(const path& folder, const std::vector<std::string>& names);
 /// `name` as given, or with the ending of a usual image format.
 [[nodiscard]] std::string withImageEnding(const path& folder, const std::string& name);
-/// resolveInside with the place of the error; fills path and name.
+/// resolveInside with the place of the error; fills path and name. A file that is not there is no
+/// error, but PictureSource::missing.
 [[nodiscard]] Result<PictureSource> sourceInside(const path& folder, const std::string& name,
                                                  const std::string& where, const Limits& limits);
+/// The same for the two files of a view. One that does not exist is no error: it is in
+/// view.missing.
+[[nodiscard]] Result<void> findPictures(const path& folder, const std::string& texture,
+                                        const std::string& depth, const std::string& where,
+                                        const Limits& limits, SetView& view);
 /// Names of the regular files in a folder, sorted.
 [[nodiscard]] std::vector<std::string> filesIn(const path& folder);
 /// Errors when there are more views than limits.maxViews.

@@ -43,15 +43,15 @@ Result<Camera> cameraOfSize(const SetView& set, int width, int height) {
     return c;
 }
 
-/// Where there is no point there is no object. Partly covered pixels of the set's own alpha stay:
-/// they are the silhouette of points beside them.
-void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha) {
+/// Where there is no point there is no object, unless the view was pruned. Partly covered pixels of
+/// the set's own alpha stay: they are the silhouette of points beside them.
+void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool pruned) {
     const auto work = [&](auto& image, auto full) {
         for (std::size_t i = 0; i < depth.count(); ++i) {
             auto& alpha = image.data()[i].a;
             if (!ownAlpha) alpha = full;
             if (alpha == 0) depth.data()[i] = kNoDepth;
-            if (!hasPoint(depth.data()[i]) && alpha == full) alpha = 0;
+            if (!hasPoint(depth.data()[i]) && alpha == full && !pruned) alpha = 0;
         }
     };
     if (auto* bytes = texture.rgba8())
@@ -108,8 +108,11 @@ void setPlanes(ReferenceView& view, const SetView& set, const ImageSetOptions& o
 Result<ReferenceView> finish(const SetView& set, std::string name, const Camera& camera,
                              Texture texture, Image<float> depth, bool ownAlpha,
                              const ImageSetOptions& options, Job& job) {
-    coverOnlyPoints(texture, depth, ownAlpha);
+    // Without alpha of its own, a picture does not say where points were pruned.
+    const bool pruned = set.pruned && ownAlpha;
+    coverOnlyPoints(texture, depth, ownAlpha, pruned);
     ReferenceView view;
+    view.pruned = pruned;
     view.name = std::move(name);
     view.camera = camera;
     view.texture = std::move(texture);

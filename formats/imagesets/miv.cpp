@@ -313,6 +313,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
     SetDescription set;
     STX_TRY(const auto title, within(where, findText(json, "Content_name", "")));
     set.title = title.value_or("");
+    STX_TRY(set.origin, originOf(json, where));
     int frames = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {
         SetView& view = all[i];
@@ -334,12 +335,21 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
             if (sources.empty() && options.texturePattern.empty() && options.depthPattern.empty())
                 continue;
             const Placeholders p{view.name, view.camera.width, view.camera.height, options.frame};
-            return failAt(place, ErrorCode::io, "there is no {} image; looked for '{}'{}",
-                          texture.empty() ? "texture" : "depth",
-                          filled((texture.empty() ? textures : depths).front(), p),
-                          (texture.empty() ? textures : depths).size() > 1
-                              ? " and the other usual names"
-                              : "");
+            const auto miss = [&](PictureSource& source, const char* what, const auto& names) {
+                source.name = filled(names.front(), p);
+                source.missing =
+                    Error{ErrorCode::io,
+                          fmt::format("there is no {} image; looked for '{}'{}", what, source.name,
+                                      names.size() > 1 ? " and the other usual names" : ""),
+                          place};
+            };
+            view.texture.name = texture;
+            view.depth.name = depth;
+            if (texture.empty()) miss(view.texture, "texture", textures);
+            if (depth.empty()) miss(view.depth, "depth", depths);
+            if (!view.exactName.empty()) view.name = view.exactName;
+            set.views.push_back(std::move(view));
+            continue;
         }
         STX_TRY(const MivDepth range, depthOf(camera, place));
         STX_TRY(view.texture,

@@ -293,8 +293,11 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
     for (const Frame& frame : frames) {
         SetView view;
         view.name = path(frame.texture).stem().string();
-        STX_TRY(view.texture, sourceInside(folder, frame.texture, where, job.limits));
-        STX_TRY(view.depth, sourceInside(folder, frame.depth, where, job.limits));
+        STX_CHECK(findPictures(folder, frame.texture, frame.depth, where, job.limits, view));
+        if (view.missing) {
+            set.views.push_back(std::move(view));
+            continue;
+        }
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
         }

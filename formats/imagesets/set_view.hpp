@@ -21,6 +21,7 @@ struct PictureSource {
     std::string name;              ///< for messages, not quoted
     std::optional<YuvFormat> yuv;  ///< raw planes; else by the file (images, PFM)
     int frame = 0;                 ///< of raw planes
+    std::optional<Error> missing;  ///< why there is no such file; reading it then ends with this
     bool colmap = false;           ///< COLMAP's depth maps: `w&h&c&` and floats
 };
 
@@ -51,18 +52,26 @@ struct SetView {
     /// Reads both, for kinds whose images are not files of their own.
     std::function<Result<StoredView>(const SetView&, Job&)> load;
 
+    /// Why one of its files is not there; the view is left out then, unless the set is read
+    /// strictly.
+    std::optional<Error> missing;
+
     Distances distances;  ///< null: the stored values are distances already
 
     bool sensor = false;    ///< mixed pixels at depth edges are to be expected
     bool measured = false;  ///< stereo's disparities, whose edges lie beside the picture's
     /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
-    int depthBits = 0;      ///< with planes: 8, 16, 32
+    int depthBits = 0;                        ///< with planes: 8, 16, 32
+    std::optional<glm::dvec3> localPosition;  ///< of an export of ours that has an origin
+    bool pruned = false;                      ///< see ReferenceView::pruned
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
 };
 
 struct SetDescription {
     std::string title;
+    std::optional<glm::dvec3>
+        origin;  ///< of an export of ours; cameras are in the world all the same
     std::vector<SetView> views;
     int frames = 1;
 };

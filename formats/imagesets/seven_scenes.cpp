@@ -38,8 +38,12 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
                           n.size());
         SetView view;
         view.name = stem;
-        STX_TRY(view.texture, sourceInside(given, stem + ".color.png", where, job.limits));
-        STX_TRY(view.depth, sourceInside(given, stem + ".depth.png", where, job.limits));
+        STX_CHECK(
+            findPictures(given, stem + ".color.png", stem + ".depth.png", where, job.limits, view));
+        if (view.missing) {
+            set.views.push_back(std::move(view));
+            continue;
+        }
         if (!size) {
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
         }

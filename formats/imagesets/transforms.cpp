@@ -204,6 +204,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     STX_TRY(set.views, within(where, transformsViews(json, job)));
     STX_TRY(const auto title, within(where, findText(json, "stx:title", "")));
     set.title = title.value_or("");
+    STX_TRY(set.origin, originOf(json, where));
     STX_TRY(auto scale, within(where, findNumber(json, "integer_depth_scale", "")));
     if (!scale) {
         STX_TRY(scale, within(where, findNumber(json, "depth_unit_scale_factor", "")));
@@ -217,18 +218,17 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
         const Json& frame = json["frames"][i];
         const std::string place = fmt::format("{}: frames[{}]", where, i);
         STX_TRY(const std::string texture, needText(frame, "file_path", place));
-        STX_TRY(view.texture,
-                sourceInside(folder, withImageEnding(folder, texture), place, job.limits));
+        const std::string textureFile = withImageEnding(folder, texture);
         STX_TRY(auto depth, findText(frame, "depth_file_path", place));
         if (!depth) {
             STX_TRY(depth, findText(frame, "depth_path", place));
         }
-        if (!depth && view.texture.path.extension() == ".exr") depth = view.texture.name;
+        if (!depth && path(textureFile).extension() == ".exr") depth = textureFile;
         if (!depth)
             return failAt(place, ErrorCode::invalidInput,
                           "'depth_file_path' is missing; each frame needs its depth");
-        STX_TRY(view.depth,
-                sourceInside(folder, withImageEnding(folder, *depth), place, job.limits));
+        STX_CHECK(findPictures(folder, textureFile, withImageEnding(folder, *depth), place,
+                               job.limits, view));
         view.distances = distancesOf(unit);
     }
     return set;

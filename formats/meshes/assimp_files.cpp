@@ -49,34 +49,32 @@ std::string AssimpFiles::relative(const char* name) const {
     return std::string(text);
 }
 
-void AssimpFiles::remember(const std::string& file, const Error& error) const {
-    if (error.code == ErrorCode::io) {
-        if (missing_.empty()) missing_ = file;
-    } else if (!error_) {
-        error_ = error.at(fmt::format("material file '{}'", file));
-    }
-}
-
 bool AssimpFiles::Exists(const char* name) const {
     const auto file = relative(name);
     if (file == modelName_) return true;
-    const auto bytes = files_.read(file);
-    if (!bytes) remember(file, bytes.error());
-    return bytes.has_value();
+    const auto path = files_.find(file);
+    if (!path && missing_.empty())
+        missing_ = fmt::format("'{}' {}", file, whyNotThere(path.error()));
+    return path.has_value();
 }
 
 Assimp::IOStream* AssimpFiles::Open(const char* name, const char*) {
     const auto file = relative(name);
     if (file == modelName_) return new MemoryStream(model_);
-    auto bytes = files_.read(file);
+    const auto path = files_.find(file);
+    if (!path) {
+        if (missing_.empty()) missing_ = fmt::format("'{}' {}", file, whyNotThere(path.error()));
+        return nullptr;
+    }
+    auto bytes = readFile(*path, files_.job().limits);
     if (!bytes) {
-        remember(file, bytes.error());
+        if (!error_) error_ = bytes.error().at(fmt::format("material file '{}'", file));
         return nullptr;
     }
     if (auto text = utf8FromMarked(*bytes)) *bytes = std::move(*text);
     if (sideTexts_.empty()) {
-        const auto slash = file.find_last_of("/\\");
-        if (slash != std::string::npos) materialFolder_ = file.substr(0, slash);
+        const auto folder = path->parent_path().lexically_relative(files_.folder());
+        if (folder != ".") materialFolder_ = folder.generic_string();
     }
     sideTexts_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
     return new MemoryStream(std::move(*bytes));

@@ -26,9 +26,9 @@ class AssimpFiles final : public Assimp::IOSystem {
     Assimp::IOStream* Open(const char* name, const char* mode) override;
     void Close(Assimp::IOStream* stream) override { delete stream; }
 
-    /// A name that left the model's folder.
+    /// A file that is there but cannot be read.
     [[nodiscard]] const std::optional<Error>& error() const { return error_; }
-    /// The first name beside the model that does not exist; empty when all do.
+    /// The first name that does not exist beside the model, and why; empty when all do.
     [[nodiscard]] const std::string& missing() const { return missing_; }
     /// Folder of the first material file, relative to the model's; empty when it is the same.
     [[nodiscard]] const std::string& materialFolder() const { return materialFolder_; }
@@ -36,7 +36,6 @@ class AssimpFiles final : public Assimp::IOSystem {
     [[nodiscard]] const std::vector<std::string>& sideTexts() const { return sideTexts_; }
 
   private:
-    void remember(const std::string& file, const Error& error) const;
     [[nodiscard]] std::string relative(const char* name) const;
 
     ByteSpan model_;

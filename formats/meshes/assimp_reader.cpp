@@ -9,6 +9,7 @@
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
 #include "formats/meshes/readers.hpp"
+#include "formats/meshes/text_coordinates.hpp"
 #include "formats/meshes/triangulate.hpp"
 #include "formats/meshes/vertex_colours.hpp"
 #include "lib/model/texture.hpp"
@@ -30,23 +31,29 @@ glm::vec3 toVec3(const aiVector3D& v) {
     return {v.x, v.y, v.z};
 }
 
+glm::dmat4 toMatrix(const aiMatrix4x4& m) {
+    return glm::transpose(glm::dmat4(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2,
+                                     m.c3, m.c4, m.d1, m.d2, m.d3, m.d4));
+}
+
 class SceneConverter {
   public:
     SceneConverter(const aiScene& scene, AssimpFormat format, ModelFiles& files,
-                   const AssimpFiles& system)
+                   const AssimpFiles& system, glm::dvec3 origin)
         : scene_(scene),
           format_(format),
           files_(files),
           builder_(files.job()),
           materialFolder_(system.materialFolder()) {
         for (const auto& text : system.sideTexts()) scanMtl(text, mtl_);
+        builder_.setOrigin(origin);
     }
 
     Result<Mesh> convert() {
         for (unsigned i = 0; i < scene_.mNumMaterials; ++i)
             STX_CHECK(convertMaterial(*scene_.mMaterials[i]));
         if (builder_.materials().empty()) builder_.materials().push_back({.name = "default"});
-        if (scene_.mRootNode) STX_CHECK(convertNode(*scene_.mRootNode, aiMatrix4x4()));
+        if (scene_.mRootNode) STX_CHECK(convertNode(*scene_.mRootNode, glm::dmat4(1.0)));
         if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
         if (points_ > 0)
             files_.job().note(fmt::format("dropped: points in a mesh of triangles ({})", points_));
@@ -90,7 +97,7 @@ class SceneConverter {
             files_.job().note(
                 fmt::format("material '{}': option {} of map_Kd is dropped", m.name, option));
 
-        if (hasMap) {
+        if (hasMap && !files_.replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(source, aiTextureType_DIFFUSE, path));
             if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap)
                 m.alpha = Material::Alpha::blend;
@@ -123,14 +130,12 @@ class SceneConverter {
             state.wrapU = wrap(mode);
         if (material.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode) == aiReturn_SUCCESS)
             state.wrapV = wrap(mode);
-        std::string name = path.C_Str();
         // Names are relative to the material file for some programs, to the model for others.
-        if (!materialFolder_.empty() && !files_.read(name)) name = materialFolder_ + "/" + name;
-        return files_.textureFromFile(name, state, builder_.textures());
+        return files_.textureFromFile(path.C_Str(), state, builder_.textures(), materialFolder_);
     }
 
-    Result<void> convertNode(const aiNode& node, const aiMatrix4x4& parent) {
-        const auto worldFromNode = parent * node.mTransformation;
+    Result<void> convertNode(const aiNode& node, const glm::dmat4& parent) {
+        const auto worldFromNode = parent * toMatrix(node.mTransformation);
         for (unsigned i = 0; i < node.mNumMeshes; ++i)
             STX_CHECK(convertMesh(*scene_.mMeshes[node.mMeshes[i]], worldFromNode));
         for (unsigned i = 0; i < node.mNumChildren; ++i)
@@ -138,17 +143,18 @@ class SceneConverter {
         return {};
     }
 
-    Result<void> convertMesh(const aiMesh& mesh, const aiMatrix4x4& worldFromMesh) {
+    Result<void> convertMesh(const aiMesh& mesh, const glm::dmat4& worldFromMesh) {
         MeshPart part;
         part.where =
             mesh.mName.length > 0 ? fmt::format("mesh '{}'", mesh.mName.C_Str()) : "the mesh";
         const std::size_t count = mesh.mNumVertices;
         STX_CHECK(builder_.charge(count, 80, part.where));
         part.material = mesh.mMaterialIndex < builder_.materials().size() ? mesh.mMaterialIndex : 0;
-        const bool moved = !worldFromMesh.IsIdentity();
-        for (std::size_t i = 0; i < count; ++i)
-            part.positions.push_back(
-                toVec3(moved ? worldFromMesh * mesh.mVertices[i] : mesh.mVertices[i]));
+        const bool moved = worldFromMesh != glm::dmat4(1.0);
+        for (std::size_t i = 0; i < count; ++i) {
+            const glm::dvec3 p(toVec3(mesh.mVertices[i]));
+            part.positions.push_back(moved ? glm::dvec3(worldFromMesh * glm::dvec4(p, 1.0)) : p);
+        }
         // A facet's normal in STL is often wrong or zero, and says no more than its corners.
         if (mesh.mNormals && format_ != AssimpFormat::stl) {
             for (std::size_t i = 0; i < count; ++i)
@@ -166,7 +172,7 @@ class SceneConverter {
         }
         std::size_t points = 0;
         part.triangles.reserve(mesh.mNumFaces);
-        std::vector<glm::vec3> corners;
+        std::vector<glm::dvec3> corners;
         std::vector<glm::uvec3> cut;
         for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
             const auto& face = mesh.mFaces[f];
@@ -221,6 +227,9 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     // Assimp's text parsers hold a file of n bytes in some 30 n bytes.
     STX_CHECK(files.job().limits.checkAllocation(bytes.size(), 30, "reading the model"));
     try {
+        const auto shifted =
+            shiftLargeCoordinates(bytes, format == AssimpFormat::obj ? "v" : "vertex");
+        if (shifted) bytes = shifted->text;
         Assimp::Importer importer;
         // The importer chooses by the ending.
         auto modelName = fileName;
@@ -231,16 +240,17 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         const aiScene* scene = importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
         if (system->error()) return tl::unexpected(*system->error());
         if (!system->missing().empty() && system->sideTexts().empty())
-            files.job().note(
-                fmt::format("material file '{}' cannot be read; its materials become plain white",
-                            system->missing()));
+            files.job().note(fmt::format("material file {}; its materials become plain white",
+                                         system->missing()));
         if (!scene) {
             std::string reason = importer.GetErrorString();
             std::replace(reason.begin(), reason.end(), '\n', ' ');
             return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
                         endingOf(format), reason.empty() ? "no reason given" : reason);
         }
-        return SceneConverter(*scene, format, files, *system).convert();
+        return SceneConverter(*scene, format, files, *system,
+                              shifted ? shifted->origin : glm::dvec3(0.0))
+            .convert();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::invalidInput, "the model needs more memory than there is");
     } catch (const std::exception& e) {

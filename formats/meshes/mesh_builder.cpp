@@ -5,6 +5,9 @@
 #include <limits>
 #include <unordered_map>
 
+#include "lib/geometry/origin.hpp"
+#include "lib/model/strays.hpp"
+
 namespace stx {
 namespace {
 
@@ -14,13 +17,17 @@ bool finite(glm::vec2 v) {
 bool finite(glm::vec3 v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
+/// As a float, too.
+bool finite(glm::dvec3 v) {
+    return finite(glm::vec3(v));
+}
 bool finite(glm::vec4 v) {
     return finite(glm::vec3(v)) && std::isfinite(v.w);
 }
 
-glm::dvec3 areaNormal(const std::vector<glm::vec3>& positions, glm::uvec3 t) {
-    const glm::dvec3 a(positions[t.x]), b(positions[t.y]), c(positions[t.z]);
-    return glm::cross(b - a, c - a);
+glm::dvec3 areaNormal(const std::vector<glm::dvec3>& positions, glm::uvec3 t) {
+    const auto a = positions[t.x];
+    return glm::cross(positions[t.y] - a, positions[t.z] - a);
 }
 
 /// Appends `from` to `to`, which is as long as `before`, or empty when no part had it so far.
@@ -59,6 +66,7 @@ Result<void> MeshBuilder::charge(std::uint64_t count, std::uint64_t bytesEach,
 
 Result<void> MeshBuilder::add(MeshPart part) {
     STX_CHECK(job_.checkCancelled());
+    if (part.points) dropBrokenPoints(part);
     const auto count = part.positions.size();
     if (count == 0) return {};
     for (std::size_t i = 0; i < count; ++i) {
@@ -76,9 +84,11 @@ Result<void> MeshBuilder::add(MeshPart part) {
                         "{}: triangle {} uses vertex {}, but there are only {} vertices",
                         part.where, i, largest, count);
     }
-    const auto before = mesh_.positions.size();
-    STX_CHECK(charge(count, sizeof(glm::vec3) * 2 + sizeof(glm::vec4) * 2 + sizeof(glm::vec2) * 2,
-                     part.where));
+    const auto before = positions_.size();
+    STX_CHECK(charge(
+        count,
+        sizeof(glm::dvec3) + sizeof(glm::vec3) * 2 + sizeof(glm::vec4) * 2 + sizeof(glm::vec2) * 2,
+        part.where));
     STX_CHECK(charge(part.triangles.size(), sizeof(glm::uvec3) + 4, part.where));
     if (before + count > std::numeric_limits<std::uint32_t>::max())
         return fail(ErrorCode::invalidInput, "{}: the model has more than 2^32 vertices",
@@ -94,7 +104,7 @@ Result<void> MeshBuilder::add(MeshPart part) {
     if (!part.normalUvs.empty() || !mesh_.normalUvs.empty())
         append(mesh_.normalUvs, before, normalUvs, added, glm::vec2(0));
     append(mesh_.uvs, before, part.uvs, added, glm::vec2(0));
-    mesh_.positions.insert(mesh_.positions.end(), part.positions.begin(), part.positions.end());
+    positions_.insert(positions_.end(), part.positions.begin(), part.positions.end());
 
     const auto base = static_cast<std::uint32_t>(before);
     for (const auto& t : part.triangles) mesh_.triangles.push_back(t + base);
@@ -104,6 +114,33 @@ Result<void> MeshBuilder::add(MeshPart part) {
             mesh_.points.push_back(base + static_cast<std::uint32_t>(i));
     }
     return {};
+}
+
+void MeshBuilder::dropBrokenPoints(MeshPart& part) {
+    const auto count = part.positions.size();
+    std::vector<bool> broken(count);
+    std::uint64_t found = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        broken[i] = !finite(part.positions[i]);
+        found += broken[i] ? 1 : 0;
+    }
+    points_ += count;
+    brokenPoints_ += found;
+    if (found == 0) return;
+    const auto keep = [&](auto& values) {
+        if (values.empty()) return;
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            if (!broken[i]) values[kept++] = values[i];
+        }
+        values.resize(kept);
+    };
+    keep(part.positions);
+    keep(part.normals);
+    keep(part.tangents);
+    keep(part.colours);
+    keep(part.uvs);
+    keep(part.normalUvs);
 }
 
 void MeshBuilder::repair(MeshPart& part) {
@@ -177,17 +214,17 @@ void MeshBuilder::repair(MeshPart& part) {
 
 void MeshBuilder::fillNormals() {
     if (mesh_.normals.empty()) return;
-    std::vector<bool> given(mesh_.positions.size());
+    std::vector<bool> given(positions_.size());
     for (std::size_t i = 0; i < given.size(); ++i) given[i] = mesh_.normals[i] != kNoNormal;
     for (auto& t : mesh_.triangles) {
         if (given[t.x] && given[t.y] && given[t.z]) continue;
-        const glm::vec3 face(glm::normalize(areaNormal(mesh_.positions, t)));
+        const glm::vec3 face(glm::normalize(areaNormal(positions_, t)));
         for (int k = 0; k < 3; ++k) {
             const auto v = t[k];
             if (v < given.size() && given[v]) continue;
             if (mesh_.normals[v] != kNoNormal && mesh_.normals[v] != face) {
-                t[k] = static_cast<std::uint32_t>(mesh_.positions.size());
-                copyVertex(mesh_.positions, v);
+                t[k] = static_cast<std::uint32_t>(positions_.size());
+                copyVertex(positions_, v);
                 copyVertex(mesh_.normals, v);
                 copyVertex(mesh_.tangents, v);
                 copyVertex(mesh_.colours, v);
@@ -202,12 +239,66 @@ void MeshBuilder::fillNormals() {
     }
 }
 
+/// Doubles become floats, from an origin where floats would lose too much.
+void MeshBuilder::roundPositions() {
+    const auto triangles = mesh_.triangles.size(), count = triangles + mesh_.points.size();
+    const auto strays = findStrays(count, [&](std::uint64_t i) -> Piece {
+        if (i >= triangles) {
+            const auto p = positions_[mesh_.points[i - triangles]];
+            return {p, p};
+        }
+        const auto& t = mesh_.triangles[i];
+        const auto a = positions_[t.x], b = positions_[t.y], c = positions_[t.z];
+        return {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
+    });
+    noteStrays(strays, count,
+               triangles == 0         ? "points"
+               : mesh_.points.empty() ? "triangles"
+                                      : "triangles and points",
+               mesh_.origin, job_);
+    const auto origin = originFor(strays.bounds);
+    mesh_.origin += origin;
+    if (mesh_.origin != glm::dvec3(0.0))
+        job_.note(fmt::format(
+            "the coordinates are too large for 32-bit floats: the origin {} {} {} is subtracted "
+            "before they are rounded, and kept beside them",
+            mesh_.origin.x, mesh_.origin.y, mesh_.origin.z));
+    mesh_.positions.reserve(positions_.size());
+    for (auto& p : positions_) {
+        mesh_.positions.emplace_back(p - origin);
+        p = glm::dvec3(mesh_.positions.back());
+    }
+    // Rounding takes the area of the narrowest ones.
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < triangles; ++i) {
+        if (areaNormal(positions_, mesh_.triangles[i]) == glm::dvec3(0.0)) continue;
+        mesh_.triangles[kept] = mesh_.triangles[i];
+        mesh_.triangleMaterial[kept++] = mesh_.triangleMaterial[i];
+    }
+    flatTriangles_ += triangles - kept;
+    mesh_.triangles.resize(kept);
+    mesh_.triangleMaterial.resize(kept);
+    positions_ = {};
+}
+
 Result<Mesh> MeshBuilder::finish() {
+    if (!mesh_.triangles.empty() || !mesh_.points.empty()) {
+        fillNormals();
+        roundPositions();
+    }
     if (flatTriangles_ > 0)
         job_.note(flatTriangles_ == 1
                       ? "1 triangle has no area and is left out"
                       : fmt::format("{} triangles have no area and are left out", flatTriangles_));
+    if (brokenPoints_ > 0 && brokenPoints_ < points_)
+        job_.note(fmt::format("{} of {} points are at no finite place and are skipped",
+                              brokenPoints_, points_));
     if (mesh_.triangles.empty() && mesh_.points.empty()) {
+        if (brokenPoints_ > 0)
+            return fail(ErrorCode::invalidInput,
+                        "none of the model's {} points is at a finite place; positions must be "
+                        "finite numbers",
+                        points_);
         if (flatTriangles_ > 0)
             return fail(ErrorCode::invalidInput,
                         "the model has {} triangles, but none with an area, and no points",
@@ -215,7 +306,6 @@ Result<Mesh> MeshBuilder::finish() {
         return fail(ErrorCode::invalidInput,
                     "the model has neither triangles nor points; there is nothing to see");
     }
-    fillNormals();
     STX_CHECK(mesh_.check());
     return std::move(mesh_);
 }
@@ -250,9 +340,8 @@ void addTangents(MeshPart& part) {
     if (uvs.empty() || part.normals.empty()) return;
     std::vector<glm::dvec3> along(part.positions.size(), glm::dvec3(0)), across = along;
     for (const auto& t : part.triangles) {
-        const glm::dvec3 p0(part.positions[t.x]);
-        const auto e1 = glm::dvec3(part.positions[t.y]) - p0,
-                   e2 = glm::dvec3(part.positions[t.z]) - p0;
+        const auto p0 = part.positions[t.x];
+        const auto e1 = part.positions[t.y] - p0, e2 = part.positions[t.z] - p0;
         const auto d1 = glm::dvec2(uvs[t.y]) - glm::dvec2(uvs[t.x]);
         const auto d2 = glm::dvec2(uvs[t.z]) - glm::dvec2(uvs[t.x]);
         const double det = d1.x * d2.y - d2.x * d1.y;
@@ -280,19 +369,18 @@ void addTangents(MeshPart& part) {
 }
 
 void weldVertices(MeshPart& part) {
+    // The bits of position (doubles), normal, colour and uv.
     struct Key {
-        float values[3 + 3 + 4 + 2];
+        std::uint32_t words[6 + 3 + 4 + 2];
         bool operator==(const Key& other) const {
-            return std::memcmp(values, other.values, sizeof values) == 0;
+            return std::memcmp(words, other.words, sizeof words) == 0;
         }
     };
     struct Hash {
         std::size_t operator()(const Key& key) const {
             std::uint64_t h = 1469598103934665603ull;
-            for (const float f : key.values) {
-                std::uint32_t bits;
-                std::memcpy(&bits, &f, sizeof bits);
-                h = (h ^ bits) * 1099511628211ull;
+            for (const auto word : key.words) {
+                h = (h ^ word) * 1099511628211ull;
                 h ^= h >> 29;
             }
             return h;
@@ -306,10 +394,10 @@ void weldVertices(MeshPart& part) {
     const auto place = [&](std::uint32_t v) {
         if (target[v] != ~0u) return target[v];
         Key key{};
-        std::memcpy(key.values, &part.positions[v], 12);
-        if (!part.normals.empty()) std::memcpy(key.values + 3, &part.normals[v], 12);
-        if (!part.colours.empty()) std::memcpy(key.values + 6, &part.colours[v], 16);
-        if (!part.uvs.empty()) std::memcpy(key.values + 10, &part.uvs[v], 8);
+        std::memcpy(key.words, &part.positions[v], 24);
+        if (!part.normals.empty()) std::memcpy(key.words + 6, &part.normals[v], 12);
+        if (!part.colours.empty()) std::memcpy(key.words + 9, &part.colours[v], 16);
+        if (!part.uvs.empty()) std::memcpy(key.words + 13, &part.uvs[v], 8);
         const auto [it, isNew] =
             known.try_emplace(key, static_cast<std::uint32_t>(out.positions.size()));
         if (isNew) {

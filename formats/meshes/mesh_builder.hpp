@@ -11,7 +11,8 @@ namespace stx {
 /// One primitive of a model in world space; arrays are empty or as long as `positions`.
 struct MeshPart {
     std::string where;  ///< for messages: `meshes[2].primitives[0]`
-    std::vector<glm::vec3> positions;
+    /// Doubles, so that coordinates far from 0 are not rounded before the origin is known.
+    std::vector<glm::dvec3> positions;
     std::vector<glm::vec3> normals;
     std::vector<glm::vec4> tangents;
     std::vector<glm::vec4> colours;
@@ -36,22 +37,30 @@ class MeshBuilder {
                                       std::string_view what);
 
     /// Appends a part. Errors (invalidInput) name part and vertex: a position that is not finite,
-    /// an index out of range. Triangles without area are left out and counted; normals that are not
-    /// directions are replaced by those of the triangles; uvs and colours that are not finite
-    /// become 0.
+    /// an index out of range. Points of a cloud at no finite place are skipped and counted.
+    /// Triangles without area are left out and counted; normals that are not directions are
+    /// replaced by those of the triangles; uvs and colours that are not finite become 0.
     [[nodiscard]] Result<void> add(MeshPart part);
 
-    /// The mesh, checked. Attributes that only some parts have are filled in for the others.
+    /// The positions of all parts count from here in the world: a reader took it away already.
+    void setOrigin(glm::dvec3 origin) { mesh_.origin = origin; }
+
+    /// The mesh, checked. Attributes that only some parts have are filled in for the others. Large
+    /// coordinates count from an origin then (originFor()), and what lies far off is said.
     [[nodiscard]] Result<Mesh> finish();
 
   private:
     void repair(MeshPart& part);
+    void dropBrokenPoints(MeshPart& part);
     void fillNormals();
+    void roundPositions();
 
     Job& job_;
-    Mesh mesh_;
+    Mesh mesh_;                          ///< its positions come at the end
+    std::vector<glm::dvec3> positions_;  ///< of all parts
     std::uint64_t charged_ = 0;
     std::uint64_t flatTriangles_ = 0;
+    std::uint64_t points_ = 0, brokenPoints_ = 0;
 };
 
 /// Gives each vertex the normal of its triangle; a vertex of several unlike triangles is doubled.

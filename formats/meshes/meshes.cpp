@@ -89,7 +89,7 @@ std::filesystem::path textureBeside(const std::filesystem::path& model) {
     return found;
 }
 
-/// Gives every material without a base colour texture this one.
+/// Gives every material this base colour texture.
 Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
     auto pixels = decodeRgba8(bytes, path.filename().string(), job.limits);
@@ -97,16 +97,16 @@ Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job)
     const int index = static_cast<int>(mesh.textures.size());
     mesh.textures.push_back({std::move(*pixels)});
     for (auto& material : mesh.materials) {
-        if (material.baseColourTexture < 0) material.baseColourTexture = index;
+        material.baseColourTexture = index;
     }
     return {};
 }
 
-Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path,
-                        Job& job) {
+Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path, Job& job,
+                        bool replacesColour) {
     const auto folder =
         path.parent_path().empty() || path == "-" ? std::filesystem::path(".") : path.parent_path();
-    ModelFiles files(folder, job);
+    ModelFiles files(folder, job, replacesColour);
     const auto name = path.filename().string();
     if (format == Format::glb && !textOf(bytes).starts_with("glTF"))
         return fail(
@@ -154,7 +154,7 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
     }
     const auto format =
         formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
-    auto mesh = readFormat(format, bytes, path, job);
+    auto mesh = readFormat(format, bytes, path, job, !options.texture.empty());
     if (!mesh) return tl::unexpected(mesh.error().at(where));
 
     if (!options.texture.empty()) {

@@ -13,8 +13,8 @@ namespace stx {
 
 /// What a caller knows about a model and the file does not say.
 struct MeshOptions {
-    /// Base colour texture for every material that has none (`--texture FILE`); empty = none.
-    /// Opened as it is given: the caller named it, not the model.
+    /// Base colour texture of all materials, in place of those that the model names (`--texture
+    /// FILE`); empty = none. Opened as it is given: the caller named it, not the model.
     std::filesystem::path texture;
 };
 
@@ -31,7 +31,8 @@ struct MeshOptions {
 /// area. `normals` is empty when the file has none: a triangle's own normal counts then. Colours of
 /// glTF are linear as the standard says; those of OBJ, MTL, PLY, STL and .drc are taken as sRGB, as
 /// the programs that write them do, and made linear. A material of a format without the notion is
-/// double-sided. Texture names resolve inside the model's folder only.
+/// double-sided. Texture names resolve inside the model's folder only; what is named
+/// elsewhere is looked for beside the model and in `textures` there.
 ///
 /// What is dropped (animations, lines, cameras, maps other than base colour and normal, a texture
 /// that is missing or broken, triangles without area) is said with job.note().
@@ -54,9 +55,11 @@ struct PointCloud {
     std::span<const glm::u8vec4> colours;  ///< sRGB, straight alpha
     std::span<const glm::vec3> normals;    ///< unit
     bool alpha = false;                    ///< write the colours' alpha, too
+    glm::dvec3 origin{0.0};                ///< added to the positions, gives the world's
 };
 
-/// How writePoints() codes .drc; .ply is always exact.
+/// How writePoints() codes .drc; .ply is always exact (with an origin: world coordinates as
+/// doubles; .drc has floats only, so it stays at the origin, with a note).
 struct PointWriteOptions {
     int positionBits = 16;  ///< bits per coordinate of the cloud's largest extent, 1..30; 0 = exact
     int normalBits = 10;    ///< bits per component, 2..30; 0 = exact

@@ -17,6 +17,36 @@ Result<Bytes> ModelFiles::read(std::string_view name) const {
     return readFile(*path, job_.limits);
 }
 
+Result<std::filesystem::path> ModelFiles::find(std::string_view name,
+                                               const std::string& alsoIn) const {
+    auto path = resolveInside(folder_, name, job_.limits);
+    if (path) return path;
+    const auto slash = name.find_last_of("/\\");
+    const auto last = std::string(slash == std::string_view::npos ? name : name.substr(slash + 1));
+    if (last.empty() || last == "." || last == "..") return path;
+    std::vector<std::string> places = {last, "textures/" + last, "Textures/" + last};
+    if (!alsoIn.empty()) {
+        places.insert(places.begin(), alsoIn + "/" + last);
+        if (slash != std::string_view::npos)
+            places.insert(places.begin(), fmt::format("{}/{}", alsoIn, name));
+    }
+    for (const auto& place : places) {
+        auto found = resolveInside(folder_, place, job_.limits);
+        if (!found) continue;
+        // Names relative to the material file are as they should be.
+        const bool own = !alsoIn.empty() && place == fmt::format("{}/{}", alsoIn, name);
+        if (!own && told_.emplace(name).second)
+            job_.note(fmt::format("'{}' is not there; '{}' is taken instead", name, place));
+        return found;
+    }
+    return path;
+}
+
+std::string_view whyNotThere(const Error& error) {
+    if (error.code == ErrorCode::io) return "cannot be read";
+    return "is outside of the model's folder (--allow-outside reads what is there) and not in it";
+}
+
 std::optional<int> ModelFiles::known(std::string_view name, SamplerState s,
                                      std::vector<MeshTexture>& textures) {
     const auto it = first_.find(name);
@@ -36,16 +66,21 @@ std::optional<int> ModelFiles::known(std::string_view name, SamplerState s,
 }
 
 Result<int> ModelFiles::textureFromFile(std::string_view name, SamplerState sampler,
-                                        std::vector<MeshTexture>& textures) {
+                                        std::vector<MeshTexture>& textures,
+                                        const std::string& alsoIn) {
     if (const auto index = known(name, sampler, textures)) return *index;
-    const auto bytes = read(name);
-    if (!bytes) {
-        if (bytes.error().code != ErrorCode::io)
-            return tl::unexpected(bytes.error().at(fmt::format("texture '{}'", name)));
-        job_.note(
-            fmt::format("texture '{}' cannot be read; the plain colour is used instead", name));
+    const auto without = [&](const Error& error) {
+        job_.note(fmt::format("texture '{}' {}; the plain colour is used instead", name,
+                              whyNotThere(error)));
         first_.emplace(std::string(name), -1);
         return -1;
+    };
+    const auto path = find(name, alsoIn);
+    if (!path) return without(path.error());
+    const auto bytes = readFile(*path, job_.limits);
+    if (!bytes) {
+        if (bytes.error().code == ErrorCode::io) return without(bytes.error());
+        return tl::unexpected(bytes.error().at(fmt::format("texture '{}'", name)));
     }
     return textureFromBytes(*bytes, name, sampler, textures);
 }

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 
@@ -21,16 +22,30 @@ struct SamplerState {
 /// Opens what a model's file names, inside the model's folder only.
 class ModelFiles {
   public:
-    ModelFiles(std::filesystem::path folder, Job& job) : folder_(std::move(folder)), job_(job) {}
+    /// `replacesColour`: the caller has a texture that wins over the model's.
+    ModelFiles(std::filesystem::path folder, Job& job, bool replacesColour = false)
+        : folder_(std::move(folder)), job_(job), replacesColour_(replacesColour) {}
 
     /// The bytes of a file that the model names. Backslashes are tried as separators when the name
     /// as it is does not exist. Errors as resolveInside() and readFile().
     [[nodiscard]] Result<Bytes> read(std::string_view name) const;
 
-    /// Index into `textures` of the image file `name`, or -1, with a note, when it is missing or
-    /// cannot be decoded. Errors only when the name leaves the folder or memory runs out.
+    /// Where a texture or material file is whose name may be of another machine
+    /// (`D:\work\t.png`, `/home/x/t.png`, `../t.png`): as named, else its last part in `alsoIn`,
+    /// beside the model, or in a folder `textures` there; the latter with a note, once. Errors as
+    /// resolveInside() for the name itself.
+    [[nodiscard]] Result<std::filesystem::path> find(std::string_view name,
+                                                     const std::string& alsoIn = {}) const;
+
+    /// Base colour textures of materials need not be opened: another one is put on all of them.
+    [[nodiscard]] bool replacesColour() const { return replacesColour_; }
+
+    /// Index into `textures` of the image file `name`, looked for as find() does, or -1, with a
+    /// note, when it is missing, outside of the folder or cannot be decoded. Errors only when
+    /// memory runs out.
     [[nodiscard]] Result<int> textureFromFile(std::string_view name, SamplerState sampler,
-                                              std::vector<MeshTexture>& textures);
+                                              std::vector<MeshTexture>& textures,
+                                              const std::string& alsoIn = {});
     /// The same for an image in memory; `name` is for messages and must be the image's own.
     [[nodiscard]] Result<int> textureFromBytes(ByteSpan bytes, std::string_view name,
                                                SamplerState sampler,
@@ -47,6 +62,8 @@ class ModelFiles {
 
     std::filesystem::path folder_;
     Job& job_;
+    bool replacesColour_ = false;
+    mutable std::set<std::string, std::less<>> told_;  ///< names that were found elsewhere
     std::map<Key, int> textures_;
     std::map<std::string, int, std::less<>> first_;  ///< by name alone
     std::uint64_t pixelBytes_ = 0;
@@ -54,6 +71,9 @@ class ModelFiles {
 
 /// "%20" and the like of a URI made bytes again.
 [[nodiscard]] std::string percentDecoded(std::string_view uri);
+
+/// What a note says of a file that find() did not find, with its error.
+[[nodiscard]] std::string_view whyNotThere(const Error& error);
 
 /// True for `scheme:...` with a scheme of two letters or more.
 [[nodiscard]] bool hasUriScheme(std::string_view name);

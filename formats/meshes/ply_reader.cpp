@@ -254,7 +254,7 @@ class PlyReader {
         };
         if (!has(Role::x) || !has(Role::y) || !has(Role::z))
             return fail(ErrorCode::invalidInput, "the PLY vertices have no x, y and z");
-        STX_CHECK(builder_.charge(element.count, 12 + 12 + 16 + 8, "the PLY vertices"));
+        STX_CHECK(builder_.charge(element.count, 24 + 12 + 16 + 8, "the PLY vertices"));
         const bool hasNormals = has(Role::nx) && has(Role::ny) && has(Role::nz);
         const bool hasColours = has(Role::red) && has(Role::green) && has(Role::blue);
         const bool hasUvs = has(Role::u) && has(Role::v);
@@ -280,7 +280,9 @@ class PlyReader {
             const auto f = [&](Role r) {
                 return static_cast<float>(v[static_cast<std::size_t>(r)]);
             };
-            positions_.emplace_back(f(Role::x), f(Role::y), f(Role::z));
+            positions_.emplace_back(v[static_cast<std::size_t>(Role::x)],
+                                    v[static_cast<std::size_t>(Role::y)],
+                                    v[static_cast<std::size_t>(Role::z)]);
             if (hasNormals) normals_.emplace_back(f(Role::nx), f(Role::ny), f(Role::nz));
             if (hasColours)
                 colours_.emplace_back(f(Role::red), f(Role::green), f(Role::blue), f(Role::alpha));
@@ -383,7 +385,7 @@ class PlyReader {
             files_.job().note("the PLY file names a texture but has no texture coordinates for it");
         for (const auto& name : header_.textureFiles) {
             Material m{.name = name};
-            if (!uvs_.empty() || hasCornerUvs_) {
+            if ((!uvs_.empty() || hasCornerUvs_) && !files_.replacesColour()) {
                 STX_TRY(m.baseColourTexture, files_.textureFromFile(name, {}, builder_.textures()));
             }
             materials.push_back(std::move(m));
@@ -408,7 +410,7 @@ class PlyReader {
         }
         std::map<std::uint32_t, MeshPart> parts;
         const bool shared = !hasCornerUvs_ && !useFaceColours && materials.size() == 1;
-        std::vector<glm::vec3> polygon;
+        std::vector<glm::dvec3> polygon;
         std::vector<glm::uvec3> triangles;
         for (std::size_t f = 0; f < faces_.size(); ++f) {
             const auto& face = faces_[f];
@@ -465,7 +467,8 @@ class PlyReader {
     PlyValues values_;
     ModelFiles& files_;
     MeshBuilder builder_;
-    std::vector<glm::vec3> positions_, normals_;
+    std::vector<glm::dvec3> positions_;
+    std::vector<glm::vec3> normals_;
     std::vector<glm::vec4> colours_;
     std::vector<glm::vec2> uvs_;
     std::vector<Face> faces_;

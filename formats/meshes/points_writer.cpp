@@ -34,22 +34,29 @@ Result<void> check(const PointCloud& points) {
 
 Bytes encodePly(const PointCloud& points) {
     const bool hasNormals = !points.normals.empty(), hasColours = !points.colours.empty();
+    const bool large = points.origin != glm::dvec3(0.0);
+    const char* type = large ? "double" : "float";
     std::string header = fmt::format(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
-        "property float x\nproperty float y\nproperty float z\n",
-        points.positions.size());
+        "property {} x\nproperty {} y\nproperty {} z\n",
+        points.positions.size(), type, type, type);
     if (hasNormals) header += "property float nx\nproperty float ny\nproperty float nz\n";
     if (hasColours) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     if (hasColours && points.alpha) header += "property uchar alpha\n";
     header += "end_header\n";
     const std::size_t colourBytes = !hasColours ? 0 : points.alpha ? 4 : 3;
-    const std::size_t each = 12 + (hasNormals ? 12 : 0) + colourBytes;
+    const std::size_t positionBytes = large ? 24 : 12;
+    const std::size_t each = positionBytes + (hasNormals ? 12 : 0) + colourBytes;
     Bytes bytes(header.size() + each * points.positions.size());
     std::memcpy(bytes.data(), header.data(), header.size());
     auto* at = bytes.data() + header.size();
     for (std::size_t i = 0; i < points.positions.size(); ++i) {
-        std::memcpy(at, &points.positions[i], 12);
-        at += 12;
+        const glm::dvec3 world = glm::dvec3(points.positions[i]) + points.origin;
+        if (large)
+            std::memcpy(at, &world, positionBytes);
+        else
+            std::memcpy(at, &points.positions[i], positionBytes);
+        at += positionBytes;
         if (hasNormals) {
             std::memcpy(at, &points.normals[i], 12);
             at += 12;
@@ -115,6 +122,11 @@ Result<Bytes> encodeDraco(const PointCloud& points, Job& job, const PointWriteOp
                              options.positionBits,
                              largest / (std::exp2(options.positionBits) - 1) / 2));
     }
+    if (points.origin != glm::dvec3(0.0))
+        job.note(fmt::format(
+            "Draco holds floats: the points are written without the origin {} {} {}; .ply has the "
+            "world's coordinates",
+            points.origin.x, points.origin.y, points.origin.z));
     if (options.normalBits > 0 && !points.normals.empty())
         job.note(fmt::format("Draco rounds normals to {} bits", options.normalBits));
     const auto* first = reinterpret_cast<const std::byte*>(buffer.data());

@@ -15,11 +15,11 @@ bool inside(glm::dvec2 p, glm::dvec2 a, glm::dvec2 b, glm::dvec2 c) {
 }
 
 /// The polygon in its own plane, counter-clockwise.
-std::vector<glm::dvec2> flatten(std::span<const glm::vec3> corners) {
+std::vector<glm::dvec2> flatten(std::span<const glm::dvec3> corners) {
     glm::dvec3 normal(0.0);
     for (std::size_t i = 0; i < corners.size(); ++i) {
-        const glm::dvec3 a(corners[i]), b(corners[(i + 1) % corners.size()]);
-        normal += glm::cross(a - glm::dvec3(corners[0]), b - glm::dvec3(corners[0]));
+        const auto a = corners[i], b = corners[(i + 1) % corners.size()];
+        normal += glm::cross(a - corners[0], b - corners[0]);
     }
     const auto size = glm::abs(normal);
     std::vector<glm::dvec2> flat;
@@ -42,7 +42,7 @@ void fan(std::span<const std::uint32_t> corners, std::vector<glm::uvec3>& triang
 
 }  // namespace
 
-void triangulate(std::span<const glm::vec3> corners, std::vector<glm::uvec3>& triangles) {
+void triangulate(std::span<const glm::dvec3> corners, std::vector<glm::uvec3>& triangles) {
     const auto n = corners.size();
     if (n < 3) return;
     std::vector<std::uint32_t> rest(n);

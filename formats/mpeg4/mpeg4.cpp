@@ -45,6 +45,7 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
     struct Part {
         ElementaryStream* stream;
         std::string name;
+        bool asTrack;  ///< an .mp4 with one track, number 1
     };
     std::vector<Part> parts;
     std::size_t next = 0;
@@ -56,19 +57,18 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
                 for (ElementaryStream& stream : od.streams) {
                     const std::string& name = names.at(next++);
                     if (name.empty()) continue;
-                    for (const Sample& sample : stream.samples)
-                        if (sample.duration != stream.samples[0].duration)
-                            return fail(ErrorCode::unsupported,
-                                        "object descriptor {} has pictures of unequal duration, "
-                                        "which a text "
-                                        "cannot say; keep this presentation as .mp4",
-                                        od.id);
-                    parts.push_back({&stream, name});
+                    parts.push_back({&stream, name, needsTrackFile(stream)});
                 }
             }
         }
     }
-    for (Part& part : parts) part.stream->fileName = folderName + "/" + part.name;
+    for (Part& part : parts)
+        part.stream->fileName = folderName + "/" + part.name + (part.asTrack ? "#1" : "");
+    for (const ElementaryStream* stream : {&document.sceneStream, &document.odStream})
+        if (!stream->edits.edits.empty())
+            job.note(
+                "the edit list of the scene or its object descriptors is left out: texts have "
+                "none");
     STX_TRY(const auto text,
             container == Mpeg4Container::bt ? writeBt(document, job) : writeXmt(document, job));
     if (path == "-") {
@@ -83,6 +83,10 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
 
     std::vector<std::string> allNames;
     for (const Part& part : parts) {
+        if (part.asTrack) {
+            allNames.push_back(part.name);
+            continue;
+        }
         for (const std::string& name : sampleFileNames(*part.stream))
             allNames.push_back(name.substr(folderName.size() + 1));
     }
@@ -91,6 +95,12 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
     next = 0;
     for (const Part& part : parts) {
         STX_CHECK(job.checkCancelled());
+        if (part.asTrack) {
+            STX_TRY(auto track, OutputFile::create(folder.temporaryPath() / allNames[next++]));
+            STX_CHECK(writeMp4Stream(*part.stream, track, job));
+            STX_CHECK(track.commit());
+            continue;
+        }
         for (const Sample& sample : part.stream->samples) {
             STX_TRY(const auto bytes, sample.data.load(job.limits));
             STX_CHECK(writeFile(folder.temporaryPath() / allNames[next++], bytes));
@@ -167,7 +177,9 @@ Result<void> writeMpeg4(const Mpeg4Document& document, const std::filesystem::pa
     STX_TRY(auto file, OutputFile::create(path, options.output));
     Mp4WriteOptions mp4;
     mp4.style = options.style;
-    STX_CHECK(writeMp4(document, file, job, mp4));
+    Document named = document;
+    nameTracks(named);
+    STX_CHECK(writeMp4(named, file, job, mp4));
     return file.commit();
 }
 

@@ -30,7 +30,8 @@ struct Mpeg4WriteOptions {
 };
 
 /// Writes a presentation into the container of the path's ending, whole or not at all. Beside
-/// `name.bt` and `name.xmt` is the folder `name_images` with the streams' bytes, untouched.
+/// `name.bt` and `name.xmt` is the folder `name_images` with the streams' bytes, untouched: images
+/// as files, all else (needsTrackFile) as an .mp4 with one track.
 /// Errors: (usage) another ending, or a text for stdout that has images; (io); what the writers
 /// say.
 [[nodiscard]] Result<void> writeMpeg4(const Mpeg4Document& document,
@@ -45,11 +46,20 @@ struct Mpeg4WriteOptions {
 
 namespace mpeg4 {
 
+/// Whether a text has to keep a stream in an .mp4 of its own, named as `file.mp4#1`, which other
+/// programs read, too: it has several pictures, or a sample entry or edits of its own.
+[[nodiscard]] bool needsTrackFile(const ElementaryStream& stream);
+
 /// Opens the files that the streams of a document (from a text) name, found in `folder`. Streams
-/// that do not say what they are get their type from the file. `name.mp4#3` is stream 3 of an .mp4.
+/// that do not say what they are get their type from the file. `name.mp4#3` is track 3 of an .mp4.
 /// Errors: (invalidInput) names that leave the folder; (io) files that are not there.
 [[nodiscard]] Result<void> loadMedia(Document& document, const std::filesystem::path& folder,
                                      Job& job);
+
+/// In a scene that was made from a bundle, says what the tracks of its images are for: each gets a
+/// name, they are alternatives to each other, and only colour is enabled, so that players that know
+/// no scenes show no depth as a video. Other scenes stay as they are.
+void nameTracks(Document& document);
 
 /// Names for the files of all streams, each once: their own name where it is a plain one, else what
 /// they are for (`front_depth.png`, from the DEF name of the DepthImage), else by object

@@ -162,6 +162,10 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
     return bundle;
 }
 
+glm::dvec3 originOf(const Model& model) {
+    return std::visit([](const auto& m) { return m.origin; }, model);
+}
+
 Bounds boundsOf(const Model& model) {
     if (const auto* mesh = std::get_if<Mesh>(&model)) return mesh->bounds();
     if (const auto* atlas = std::get_if<Atlas>(&model)) return boundsOf(*atlas);

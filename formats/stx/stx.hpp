@@ -85,8 +85,8 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 struct ConvertSettings {
     /// `cube` (6), `ring:N`, `sphere:N`, `octahedral:N` (N x N) or `auto:N` (the N best), N from 1.
     std::string views = "sphere:16";
-    /// The views themselves, when there are any: then neither `views` nor the framing below, from
-    /// width to elevationRad, counts.
+    /// The views themselves, in the model's coordinates (see originOf()), when there are any: then
+    /// neither `views` nor the framing below, from width to elevationRad, counts.
     std::vector<Camera> cameras{};
     int width = 512, height = 512;             ///< pixels of each view
     std::optional<bool> orthographic{};        ///< without a value: only the faces of a cube are
@@ -113,6 +113,10 @@ struct ConvertSettings {
 
 /// The box around a model's surface or points; empty when there is none.
 [[nodiscard]] Bounds boundsOf(const Model& model);
+
+/// What a model's coordinates count from: positions and cameras here, and those of novel cameras,
+/// plus this are the world's. 0 but for models whose coordinates are too large for floats.
+[[nodiscard]] glm::dvec3 originOf(const Model& model);
 
 // ---- Pictures ----
 

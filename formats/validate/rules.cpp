@@ -19,6 +19,7 @@ constexpr const char* kV2 = "ISO/IEC 14496-16, 4.5.4 (V2 nodes)";
 constexpr Rule kRules[] = {
     {1001, error, kFile, "the file can be read"},
     {1002, warning, kFile, "the ending of the name is that of the content"},
+    {1003, error, kFile, "each file that an image set names is there"},
 
     {2001, error, kMp4, "moov has an iods box with the initial object descriptor"},
     {2002, error, kMp4, "the scene's track is listed in iods"},

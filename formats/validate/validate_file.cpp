@@ -1,8 +1,34 @@
+#include "formats/imagesets/image_sets.hpp"
+#include "formats/imagesets/summary.hpp"
+#include "formats/meshes/meshes.hpp"
 #include "formats/open.hpp"
 #include "formats/validate/findings.hpp"
 #include "formats/validate/validate_mpeg4.hpp"
 
 namespace stx {
+namespace {
+
+/// Missing files first, all of them; the pixels only when there are none.
+Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
+                                              const ValidateOptions& options, Job& job) {
+    const auto set = summariseImageSet(path, job);
+    if (!set) return unreadable(set.error());
+    Findings findings;
+    for (std::size_t i = 0; i < set->views.size(); ++i)
+        for (const std::string& name : set->views[i].missing)
+            findings.add(1003, viewText(i, set->views[i].name), fmt::format("no file '{}'", name),
+                         "the file");
+    if (!findings.list.empty() || !options.pixels) return findings.list;
+    const auto bundle = readImageSet(path, {}, job);
+    if (bundle) return validate(*bundle);
+    // Without --depth-range and the like the set is not wrong, but cannot be read.
+    if (bundle.error().code == ErrorCode::usage) return tl::unexpected(bundle.error());
+    Error error = bundle.error();
+    if (error.code == ErrorCode::io) error.code = ErrorCode::invalidInput;
+    return unreadable(error);
+}
+
+}  // namespace
 
 Result<std::vector<Finding>> validateFile(const std::filesystem::path& path,
                                           const ValidateOptions& options, Job& job) {
@@ -19,12 +45,22 @@ Result<std::vector<Finding>> validateFile(const std::filesystem::path& path,
         case FileKind::atlas:
             findings = validateAtlasFile(path, options, job);
             break;
-        case FileKind::mesh:
         case FileKind::imageSet:
+            findings = validateImageSet(path, options, job);
+            break;
+        case FileKind::mesh: {
+            const auto mesh = readMesh(path, job);
+            if (!mesh)
+                findings = unreadable(mesh.error());
+            else
+                findings = std::vector<Finding>();
+            break;
+        }
         case FileKind::image:
             return fail(ErrorCode::invalidInput,
-                        "'{}' is {}; bundles (.mp4, .xmt, .bt, .exr) and atlases can be validated",
-                        path.string(), nameOf(kind));
+                        "'{}' is a picture; bundles (.mp4, .xmt, .bt, .exr), atlases, image sets "
+                        "and meshes can be validated",
+                        path.string());
     }
     STX_CHECK(job.checkCancelled());
     return findings;

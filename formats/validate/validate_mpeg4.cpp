@@ -72,6 +72,8 @@ class DocumentValidator {
         if (!document_.mp4) return;
         for (const Mp4Deviation& deviation : document_.mp4->deviations) {
             const int rule = ruleOf(deviation.kind);
+            // PointTextures, PixelTextures and files beside this one need no descriptors.
+            if (rule == 2009 && namedDescriptors().empty()) continue;
             add(rule, deviation.where, deviation.text, findRule(rule)->summary);
         }
     }
@@ -94,19 +96,7 @@ class DocumentValidator {
                             document_.bifsConfig.version),
                 fmt::format("objectTypeIndication {}", document_.bifsConfig.version));
 
-        std::set<int> named;
-        for (const CommandFrame& frame : document_.frames)
-            for (const Command& command : frame.commands) {
-                forEachNode(command, [&](const NodePtr& node) {
-                    for (const Node::SetField& field : node->setFields)
-                        collectUrls(field.value, named);
-                });
-                std::visit(
-                    [&](const auto& c) {
-                        if constexpr (requires { c.value; }) collectUrls(c.value, named);
-                    },
-                    command);
-            }
+        const std::set<int> named = namedDescriptors();
         std::set<int> present;
         for (const OdFrame& frame : document_.odFrames) {
             for (const OdCommand& command : frame.commands) {
@@ -132,6 +122,23 @@ class DocumentValidator {
         for (const int id : present)
             if (!named.contains(id))
                 add(2024, odName(id), "no node that names it", "a url of a texture");
+    }
+    /// Object descriptors that some node of the scene, or a command, names.
+    std::set<int> namedDescriptors() const {
+        std::set<int> named;
+        for (const CommandFrame& frame : document_.frames)
+            for (const Command& command : frame.commands) {
+                forEachNode(command, [&](const NodePtr& node) {
+                    for (const Node::SetField& field : node->setFields)
+                        collectUrls(field.value, named);
+                });
+                std::visit(
+                    [&](const auto& c) {
+                        if constexpr (requires { c.value; }) collectUrls(c.value, named);
+                    },
+                    command);
+            }
+        return named;
     }
     static void collectUrls(const FieldValue& value, std::set<int>& ids) {
         if (const auto* url = std::get_if<Url>(&value); url && url->objectDescriptorId != 0)
@@ -458,7 +465,9 @@ class DocumentValidator {
             normals->channels < 3)
             return;
         ReferenceView view;
-        const auto distances = depthFromImage(*codes, channel, nearPlane, farPlane);
+        const auto info = images_->probe(depthNode ? *depthNode : *colourNode);
+        const int greyBits = info ? info->greyBits : 0;
+        const auto distances = depthFromImage(*codes, channel, greyBits, nearPlane, farPlane);
         if (!distances) return;
         view.depth = *distances;
         const auto vectors = normalsFromImage(*normals, view.depth);
@@ -517,7 +526,7 @@ std::vector<Finding> validate(const Mpeg4Document& document, const ValidateOptio
 Result<std::vector<Finding>> validateMpeg4File(const std::filesystem::path& path,
                                                const ValidateOptions& options, Job& job) {
     PresentationImages images;
-    images.folder = path.has_parent_path() ? path.parent_path() : ".";
+    images.folder = folderOf(path);
     const auto document = readMpeg4(path, job);
     Findings findings;
     if (!document) {

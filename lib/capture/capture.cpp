@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/strays.hpp"
 
 namespace stx {
 namespace {
@@ -22,6 +24,24 @@ Texture straightTexture(const Image<glm::vec4>& premultiplied) {
     Texture texture(std::move(image));
     bleedColour(texture);
     return texture;
+}
+
+/// Says what becomes of glass: a view has one depth a pixel.
+void noteTranslucent(const Mesh& mesh, Job& job) {
+    std::string first;
+    int count = 0;
+    for (const auto& m : mesh.materials) {
+        if (m.alpha != Material::Alpha::blend || !(m.baseColour.a < 1.0f)) continue;
+        if (count++ == 0) first = m.name;
+    }
+    if (count == 0) return;
+    job.note(fmt::format(
+        "material '{}'{} translucent: a pixel has the depth of the surface that shows most there; "
+        "its colour mixes all of them, its alpha says how much they hide",
+        first,
+        count == 1   ? " is"
+        : count == 2 ? " and one more are"
+                     : fmt::format(" and {} more are", count - 1)));
 }
 
 }  // namespace
@@ -66,9 +86,18 @@ Result<ReferenceView> captureView(const Mesh& mesh, const Camera& camera, std::s
     return view;
 }
 
-Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& cameras,
+Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& cameras,
                              const CaptureSettings& settings, Job& job) {
-    STX_CHECK(mesh.check());
+    STX_CHECK(whole.check());
+    // A stray behind the object would take the range of its view's depth codes for itself.
+    const auto strays = findStrays(whole);
+    std::optional<Mesh> rest;
+    if (!strays.pieces.empty()) {
+        rest = whole;
+        dropStrays(*rest, strays);
+    }
+    const Mesh& mesh = rest ? *rest : whole;
+    noteTranslucent(mesh, job);
     std::uint64_t pixels = 0;
     for (const auto& c : cameras) {
         STX_CHECK(c.check());
@@ -103,19 +132,30 @@ Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& camera
         return fail(
             ErrorCode::invalidInput, "{} the model; check the poses and units",
             n == 1 ? "the camera does not see" : fmt::format("none of the {} cameras sees", n));
-    bundle.bounds = mesh.bounds();
+    bundle.origin = mesh.origin;
+    bundle.bounds = strays.bounds;
     return bundle;
 }
 
 std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
+    const auto strays = findStrays(mesh);
+    std::size_t next = 0;
+    const auto isStray = [&](std::uint64_t piece) {
+        if (next == strays.pieces.size() || strays.pieces[next] != piece) return false;
+        ++next;
+        return true;
+    };
     std::vector<glm::vec3> points;
-    points.reserve(mesh.triangles.size() * 3 + mesh.points.size());
-    for (const auto& t : mesh.triangles) {
-        for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[t[k]]);
+    points.reserve(mesh.triangles.size() * 3 + mesh.points.size() * 6);
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        if (isStray(i)) continue;
+        for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[mesh.triangles[i][k]]);
     }
     // Loose points are drawn as discs, which must fit into the frame, too.
     const float radius = pointRadius(mesh);
-    for (const auto p : mesh.points) {
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+        if (isStray(mesh.triangles.size() + i)) continue;
+        const auto p = mesh.points[i];
         for (int axis = 0; axis < 3; ++axis) {
             glm::vec3 offset(0.0f);
             offset[axis] = radius;

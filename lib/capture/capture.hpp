@@ -24,8 +24,8 @@ struct CaptureSettings {
                                                 std::string name, const CaptureSettings& settings,
                                                 Job& job);
 
-/// All views of a bundle, several at a time. Views without points are dropped with a note; errors
-/// when none is left.
+/// All views of a bundle, several at a time, without the mesh's strays (findStrays()). Views
+/// without points are dropped with a note; errors when none is left.
 [[nodiscard]] Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& cameras,
                                            const CaptureSettings& settings, Job& job);
 
@@ -35,7 +35,7 @@ struct CaptureSettings {
 void fitDepthRange(ReferenceView& view);
 
 /// What of a mesh is drawn, as points that cameras frame: the corners of its triangles, and those
-/// of the discs that its loose points become.
+/// of the discs that its loose points become; not its strays (findStrays()).
 [[nodiscard]] std::vector<glm::vec3> drawnPoints(const Mesh& mesh);
 
 }  // namespace stx

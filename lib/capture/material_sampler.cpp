@@ -87,11 +87,14 @@ glm::vec4 sampleTexture(const MeshTexture& texture, glm::vec2 uv) {
 
 MaterialSampler::MaterialSampler(const Mesh& mesh) : mesh_(mesh) {
     for (const auto& m : mesh.materials) {
-        seeThrough_.push_back(m.alpha != Material::Alpha::opaque);
-        plainTexture_.push_back(mesh.colours.empty() && m.baseColour == glm::vec4(1.0f));
-        constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0);
-        constantColour_.emplace_back(srgbFast(m.baseColour.x), srgbFast(m.baseColour.y),
-                                     srgbFast(m.baseColour.z));
+        seeThrough_.push_back(m.alpha == Material::Alpha::mask);
+        translucent_.push_back(m.alpha == Material::Alpha::blend);
+        const bool shines = m.emissive != glm::vec3(0.0f);
+        plainTexture_.push_back(mesh.colours.empty() && m.baseColour == glm::vec4(1.0f) && !shines);
+        constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0 &&
+                            (!shines || m.emissiveTexture < 0));
+        const auto light = glm::vec3(m.baseColour) + m.emissive;
+        constantColour_.emplace_back(srgbFast(light.x), srgbFast(light.y), srgbFast(light.z));
     }
 }
 
@@ -105,10 +108,15 @@ glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b) const {
     if (plainTexture_[material]) return texel;
     glm::vec4 factor = m.baseColour;
     if (!mesh_.colours.empty()) factor *= mix3(mesh_.colours, t, b);
+    glm::vec3 emissive = m.emissive;
+    if (m.emissiveTexture >= 0 && emissive != glm::vec3(0.0f)) {
+        const auto glow = sampleTexture(mesh_.textures[m.emissiveTexture], mix3(mesh_.uvs, t, b));
+        for (int k = 0; k < 3; ++k) emissive[k] *= linearFast(glow[k]);
+    }
     glm::vec4 out;
     for (int k = 0; k < 3; ++k) {
         const float light = (m.baseColourTexture >= 0 ? linearFast(texel[k]) : 1.0f) * factor[k];
-        out[k] = srgbFast(light);
+        out[k] = srgbFast(light + emissive[k]);
     }
     out.w = texel.w * factor.w;
     return out;
@@ -116,9 +124,7 @@ glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b) const {
 
 bool MaterialSampler::opaqueAt(std::uint32_t triangle, glm::vec3 b) const {
     const auto& m = mesh_.materials[mesh_.triangleMaterial[triangle]];
-    if (m.alpha == Material::Alpha::opaque) return true;
-    const float cutoff = m.alpha == Material::Alpha::mask ? m.alphaCutoff : 0.5f;
-    return colour(triangle, b).w >= cutoff;
+    return m.alpha != Material::Alpha::mask || colour(triangle, b).w >= m.alphaCutoff;
 }
 
 glm::vec3 MaterialSampler::normal(std::uint32_t triangle, glm::vec3 b) const {

@@ -16,11 +16,15 @@ class MaterialSampler {
 
     /// Straight sRGB-coded RGBA, 0..1, at barycentric coordinates of a triangle.
     [[nodiscard]] glm::vec4 colour(std::uint32_t triangle, glm::vec3 barycentric) const;
-    /// Whether the surface is there at all (alpha mask, and alpha of blended materials at 1/2).
+    /// Whether the surface is there at all (alpha mask).
     [[nodiscard]] bool opaqueAt(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// This triangle can have see-through points, so opaqueAt() must be asked.
     [[nodiscard]] bool seeThrough(std::uint32_t triangle) const {
         return seeThrough_[mesh_.triangleMaterial[triangle]];
+    }
+    /// This triangle's alpha is its coverage (Material::Alpha::blend).
+    [[nodiscard]] bool translucent(std::uint32_t triangle) const {
+        return translucent_[mesh_.triangleMaterial[triangle]];
     }
     /// The colour of a triangle that has only one, else null.
     [[nodiscard]] const glm::vec3* constantColour(std::uint32_t triangle) const {
@@ -45,6 +49,7 @@ class MaterialSampler {
   private:
     const Mesh& mesh_;
     std::vector<bool> seeThrough_;    ///< per material
+    std::vector<bool> translucent_;   ///< per material
     std::vector<bool> plainTexture_;  ///< per material: the texture alone decides, no conversion
     std::vector<bool> constant_;      ///< per material: one colour everywhere
     std::vector<glm::vec3> constantColour_;

@@ -3,6 +3,7 @@
 #include <unordered_map>
 
 #include "lib/capture/rasterizer.hpp"
+#include "lib/model/strays.hpp"
 
 namespace stx {
 namespace {
@@ -60,8 +61,11 @@ class PointGrid {
 
 float pointRadius(const Mesh& mesh) {
     if (mesh.points.empty()) return 0.0f;
-    Bounds bounds;
-    for (const auto p : mesh.points) bounds.add(mesh.positions[p]);
+    // A single point far off says nothing of how dense the others are.
+    const auto bounds = findStrays(mesh.points.size(), [&](std::uint64_t i) {
+                            const glm::dvec3 p(mesh.positions[mesh.points[i]]);
+                            return Piece{p, p};
+                        }).bounds;
     const double size = bounds.radius() * 2.0;
     if (!(size > 0)) return 0.01f;  // one point, or all in one place: any radius shows it
     // Points lie on surfaces: n of them on a size x size area are size / sqrt(n) apart.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "lib/base/parallel.hpp"
+#include "lib/capture/layers.hpp"
 #include "lib/capture/material_sampler.hpp"
 #include "lib/geometry/depth_code.hpp"
 
@@ -13,6 +14,8 @@ namespace {
 
 constexpr int kTile =
     32;  // pixels; with 4x4 samples a tile's buffers stay in the second-level cache
+/// Less than this of a surface is not there: half a step of 8 bits.
+constexpr float kLeastAlpha = 0.5f / 255.0f;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 /// a x + b y + c over pixel positions.
@@ -44,17 +47,27 @@ class Rasterizer {
 
   private:
     bool setUp(std::uint32_t triangle, SetUp& out) const;
+    /// What is seen at the samples of a tile.
+    struct Tile {
+        std::vector<float> depth;        ///< nearness of the opaque surface
+        std::vector<std::uint32_t> ids;  ///< its slot, or kNone
+        Layers layers;                   ///< translucent surfaces in front of it
+    };
+    /// Shrinks [from, to] to the samples of a line that are inside; false when none is.
+    static bool clipSpan(const SetUp& s, double y, double step, double origin, int& from, int& to);
     void drawSpan(const SetUp& s, double y, int from, int to, double step, double origin,
                   float* depth, std::uint32_t* ids) const;
+    void drawLayerSpan(const SetUp& s, double y, int from, int to, double step, double origin,
+                       std::size_t line, Tile& tile) const;
     void drawTile(const std::vector<std::uint32_t>& list, int tileX, int tileY, int samples,
-                  std::vector<float>& depth, std::vector<std::uint32_t>& ids) const;
-    void shadeTile(int tileX, int tileY, const RasterSettings& settings,
-                   const std::vector<std::uint32_t>& ids, RasterImage& out) const;
+                  Tile& tile) const;
+    void shadeTile(int tileX, int tileY, const RasterSettings& settings, const Tile& tile,
+                   RasterImage& out) const;
     [[nodiscard]] glm::vec4 shadeUniform(const SetUp& s, int px, int py, int samples) const;
     [[nodiscard]] glm::vec3 lit(const Lighting& lighting, const SetUp& s, glm::vec3 albedo,
                                 double x, double y) const;
-    void resolveCentres(int tileX, int tileY, const std::vector<std::uint32_t>& ids,
-                        RasterImage& out) const;
+    static std::uint32_t mainSurface(const Tile& tile, std::size_t sample);
+    void resolveCentres(int tileX, int tileY, const Tile& tile, RasterImage& out) const;
     [[nodiscard]] glm::vec3 barycentric(const SetUp& s, double x, double y) const {
         const double e0 = s.edge[0].at(x, y), e1 = s.edge[1].at(x, y), e2 = s.edge[2].at(x, y);
         const double scale = 1.0 / (e0 + e1 + e2);
@@ -117,15 +130,15 @@ bool Rasterizer::setUp(std::uint32_t triangle, SetUp& out) const {
     return out.x0 <= out.x1 && out.y0 <= out.y1;
 }
 
-void Rasterizer::drawSpan(const SetUp& s, double y, int from, int to, double step, double origin,
-                          float* depth, std::uint32_t* ids) const {
+bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, int& from,
+                          int& to) {
     // Shrink [from, to] by each edge; the exact predicate decides at the ends, and being monotone
     // in x it holds in between.
     for (const auto& e : s.edge) {
         const double rest = e.b * y + e.c;
         const auto inside = [&](int i) { return e.a * (origin + i * step) + rest >= 0; };
         if (e.a == 0) {
-            if (rest < 0) return;
+            if (rest < 0) return false;
             continue;
         }
         const double zero = (-rest / e.a - origin) / step;
@@ -142,8 +155,14 @@ void Rasterizer::drawSpan(const SetUp& s, double y, int from, int to, double ste
             while (i >= from && !inside(i)) --i;
             to = i;
         }
-        if (from > to) return;
+        if (from > to) return false;
     }
+    return true;
+}
+
+void Rasterizer::drawSpan(const SetUp& s, double y, int from, int to, double step, double origin,
+                          float* depth, std::uint32_t* ids) const {
+    if (!clipSpan(s, y, step, origin, from, to)) return;
     const double base = s.nearness.b * y + s.nearness.c;
     const bool perspective = !camera_.orthographic;
     const auto slot = static_cast<std::uint32_t>(&s - setUps_.data());
@@ -159,24 +178,65 @@ void Rasterizer::drawSpan(const SetUp& s, double y, int from, int to, double ste
     }
 }
 
+void Rasterizer::drawLayerSpan(const SetUp& s, double y, int from, int to, double step,
+                               double origin, std::size_t line, Tile& tile) const {
+    if (!clipSpan(s, y, step, origin, from, to)) return;
+    const double base = s.nearness.b * y + s.nearness.c;
+    const bool perspective = !camera_.orthographic;
+    const auto slot = static_cast<std::uint32_t>(&s - setUps_.data());
+    for (int i = from; i <= to; ++i) {
+        const double x = origin + i * step;
+        const auto nearness = static_cast<float>(s.nearness.a * x + base);
+        if (perspective ? nearness <= 0.0f : nearness > 0.0f) continue;  // behind the viewpoint
+        const auto sample = line + static_cast<std::size_t>(i);
+        if (!(nearness > tile.depth[sample])) continue;
+        const auto colour = sampler_.colour(s.triangle, barycentric(s, x, y));
+        if (!(colour.w > kLeastAlpha)) continue;
+        tile.layers.add(sample, {nearness, std::min(colour.w, 1.0f), glm::vec3(colour),
+                                 mesh_.triangleMaterial[s.triangle], slot});
+    }
+}
+
 void Rasterizer::drawTile(const std::vector<std::uint32_t>& list, int tileX, int tileY, int samples,
-                          std::vector<float>& depth, std::vector<std::uint32_t>& ids) const {
+                          Tile& tile) const {
     const int side = kTile * samples;
+    auto& depth = tile.depth;
+    auto& ids = tile.ids;
+    auto& layers = tile.layers;
     depth.assign(static_cast<std::size_t>(side) * side, -std::numeric_limits<float>::infinity());
     ids.assign(depth.size(), kNone);
+    layers.reset(0);
     const double step = 1.0 / samples;
     const double originX = tileX * kTile + 0.5 * step, originY = tileY * kTile + 0.5 * step;
-    for (const auto index : list) {
-        const auto& s = setUps_[index];
+    const auto drawLines = [&](const SetUp& s, const auto& drawLine) {
         const int px0 = std::max(s.x0 - tileX * kTile, 0),
                   px1 = std::min(s.x1 - tileX * kTile, kTile - 1);
         const int py0 = std::max(s.y0 - tileY * kTile, 0),
                   py1 = std::min(s.y1 - tileY * kTile, kTile - 1);
         for (int row = py0 * samples; row < (py1 + 1) * samples; ++row) {
-            const auto at = static_cast<std::size_t>(row) * side;
-            drawSpan(s, originY + row * step, px0 * samples, (px1 + 1) * samples - 1, step, originX,
-                     depth.data() + at, ids.data() + at);
+            drawLine(originY + row * step, px0 * samples, (px1 + 1) * samples - 1,
+                     static_cast<std::size_t>(row) * side);
         }
+    };
+    bool translucent = false;
+    for (const auto index : list) {
+        const auto& s = setUps_[index];
+        if (sampler_.translucent(s.triangle)) {
+            translucent = true;
+            continue;
+        }
+        drawLines(s, [&](double y, int from, int to, std::size_t line) {
+            drawSpan(s, y, from, to, step, originX, depth.data() + line, ids.data() + line);
+        });
+    }
+    if (!translucent) return;
+    layers.reset(depth.size());
+    for (const auto index : list) {
+        const auto& s = setUps_[index];
+        if (!sampler_.translucent(s.triangle)) continue;
+        drawLines(s, [&](double y, int from, int to, std::size_t line) {
+            drawLayerSpan(s, y, from, to, step, originX, line, tile);
+        });
     }
 }
 
@@ -240,8 +300,10 @@ glm::vec4 Rasterizer::shadeUniform(const SetUp& s, int px, int py, int samples) 
     return glm::vec4(sum / static_cast<float>(samples * samples), 1.0f);
 }
 
-void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
-                           const std::vector<std::uint32_t>& ids, RasterImage& out) const {
+void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings, const Tile& tile,
+                           RasterImage& out) const {
+    const auto& ids = tile.ids;
+    const bool plain = !settings.lighting.on() && tile.layers.empty();
     const int samples = settings.supersampling;
     const int side = kTile * samples;
     const double step = 1.0 / samples;
@@ -253,7 +315,7 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
             glm::vec4 sum(0.0f), litSum(0.0f);
             const auto* corner =
                 ids.data() + static_cast<std::size_t>(py * samples) * side + px * samples;
-            if (!settings.lighting.on() && uniform(corner, samples, side)) {
+            if (plain && uniform(corner, samples, side)) {
                 if (*corner == kNone) continue;
                 out.colour.at(tileX * kTile + px, tileY * kTile + py) =
                     shadeUniform(setUps_[*corner], tileX * kTile + px, tileY * kTile + py, samples);
@@ -261,15 +323,22 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
             }
             for (int k = 0; k < samples * samples; ++k) {
                 const int sx = px * samples + k % samples, sy = py * samples + k / samples;
-                const auto id = ids[static_cast<std::size_t>(sy) * side + sx];
-                if (id == kNone) continue;
-                const auto& s = setUps_[id];
+                const auto sample = static_cast<std::size_t>(sy) * side + sx;
                 const double x = tileX * kTile + (sx + 0.5) * step;
                 const double y = tileY * kTile + (sy + 0.5) * step;
-                const glm::vec3 colour(sampler_.colour(s.triangle, barycentric(s, x, y)));
-                sum += glm::vec4(colour, 1.0f);
-                if (settings.lighting.on())
-                    litSum += glm::vec4(lit(settings.lighting, s, colour, x, y), 1.0f);
+                const auto add = [&](const SetUp& s, glm::vec3 colour, float share) {
+                    sum += glm::vec4(colour, 1.0f) * share;
+                    if (settings.lighting.on())
+                        litSum += glm::vec4(lit(settings.lighting, s, colour, x, y), 1.0f) * share;
+                };
+                float through = 1.0f;
+                for (const auto& layer : tile.layers.at(sample)) {
+                    add(setUps_[layer.slot], layer.colour, layer.alpha * through);
+                    through *= 1.0f - layer.alpha;
+                }
+                if (ids[sample] == kNone) continue;
+                const auto& s = setUps_[ids[sample]];
+                add(s, glm::vec3(sampler_.colour(s.triangle, barycentric(s, x, y))), through);
             }
             const int x = tileX * kTile + px, y = tileY * kTile + py;
             out.colour.at(x, y) = sum * share;
@@ -278,13 +347,27 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
     }
 }
 
-void Rasterizer::resolveCentres(int tileX, int tileY, const std::vector<std::uint32_t>& ids,
-                                RasterImage& out) const {
+/// The surface that is seen most at a sample: where more than half of what lies behind is hidden,
+/// else the opaque one, else the nearest. kNone where there is nothing.
+std::uint32_t Rasterizer::mainSurface(const Tile& tile, std::size_t sample) {
+    // Interpolated alphas of one half are a hair off.
+    constexpr float kHalf = 0.5f + 1e-4f;
+    const auto layers = tile.layers.at(sample);
+    float through = 1.0f;
+    for (const auto& layer : layers) {
+        through *= 1.0f - layer.alpha;
+        if (through <= kHalf) return layer.slot;
+    }
+    if (tile.ids[sample] != kNone || layers.empty()) return tile.ids[sample];
+    return layers.front().slot;
+}
+
+void Rasterizer::resolveCentres(int tileX, int tileY, const Tile& tile, RasterImage& out) const {
     const int x1 = std::min(kTile, camera_.width - tileX * kTile);
     const int y1 = std::min(kTile, camera_.height - tileY * kTile);
     for (int py = 0; py < y1; ++py) {
         for (int px = 0; px < x1; ++px) {
-            const auto id = ids[static_cast<std::size_t>(py) * kTile + px];
+            const auto id = mainSurface(tile, static_cast<std::size_t>(py) * kTile + px);
             if (id == kNone) continue;
             const int x = tileX * kTile + px, y = tileY * kTile + py;
             const auto& s = setUps_[id];
@@ -332,8 +415,7 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     std::atomic<bool> stopped = false;
     parallelForBlocks(
         0, static_cast<std::int64_t>(bins.size()), 8, [&](std::int64_t from, std::int64_t to) {
-            std::vector<float> depth;
-            std::vector<std::uint32_t> ids;
+            Tile tile;
             for (auto i = from; i < to; ++i) {
                 if (bins[i].empty()) continue;
                 if (job.cancelled.load(std::memory_order_relaxed)) {
@@ -341,10 +423,10 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
                     return;
                 }
                 const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
-                drawTile(bins[i], tx, ty, settings.supersampling, depth, ids);
-                shadeTile(tx, ty, settings, ids, out);
-                if (settings.supersampling > 1) drawTile(bins[i], tx, ty, 1, depth, ids);
-                resolveCentres(tx, ty, ids, out);
+                drawTile(bins[i], tx, ty, settings.supersampling, tile);
+                shadeTile(tx, ty, settings, tile, out);
+                if (settings.supersampling > 1) drawTile(bins[i], tx, ty, 1, tile);
+                resolveCentres(tx, ty, tile, out);
             }
         });
     if (stopped) STX_CHECK(job.checkCancelled());

@@ -12,6 +12,8 @@ namespace stx {
 struct Bundle {
     std::string title;
     std::vector<ReferenceView> views;
+    /// Added to coordinates here (cameras, bounds), gives the world's; see Mesh::origin.
+    glm::dvec3 origin{0.0};
     /// World bounds of all points, when known (WorldInfo, an EXR attribute).
     std::optional<Bounds> bounds;
 

@@ -2,15 +2,12 @@
 
 #include <cmath>
 
+#include "lib/model/strays.hpp"
+
 namespace stx {
 
 Bounds Mesh::bounds() const {
-    Bounds b;
-    for (const auto& t : triangles) {
-        for (int k = 0; k < 3; ++k) b.add(positions[t[k]]);
-    }
-    for (const auto p : points) b.add(positions[p]);
-    return b;
+    return findStrays(*this).bounds;
 }
 
 Result<void> Mesh::check() const {
@@ -49,10 +46,11 @@ Result<void> Mesh::check() const {
     }
     const auto textureExists = [&](int t) { return t < static_cast<int>(textures.size()); };
     for (const auto& m : materials) {
-        if (!textureExists(m.baseColourTexture) || !textureExists(m.normalTexture))
+        if (!textureExists(m.baseColourTexture) || !textureExists(m.normalTexture) ||
+            !textureExists(m.emissiveTexture))
             return fail(ErrorCode::invalidInput, "material '{}' uses a texture that does not exist",
                         m.name);
-        if (m.baseColourTexture >= 0 && uvs.empty())
+        if ((m.baseColourTexture >= 0 || m.emissiveTexture >= 0) && uvs.empty())
             return fail(ErrorCode::invalidInput,
                         "material '{}' has a texture but the mesh has no uvs", m.name);
     }

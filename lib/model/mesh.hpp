@@ -27,16 +27,22 @@ struct Material {
     std::string name;
     glm::vec4 baseColour{1.0f};  ///< linear factor, multiplies texture and vertex colour
     int baseColourTexture = -1;  ///< index into Mesh::textures, -1 = none; sRGB-coded
+    glm::vec3 emissive{0.0f};    ///< linear, added to the base colour; may exceed 1
+    int emissiveTexture = -1;    ///< multiplies `emissive`, -1 = none; sRGB-coded, at Mesh::uvs
     int normalTexture = -1;      ///< tangent-space normal map, -1 = none; linear
     float normalScale = 1.0f;
     Alpha alpha = Alpha::opaque;
     float alphaCutoff = 0.5f;  ///< for Alpha::mask
     bool doubleSided = true;   ///< false: back faces are not drawn
+    bool hasColour = true;     ///< false: nobody gave a colour, baseColour is white for lack of one
 };
 
 /// Triangles (and loose points) in the world, all node transforms and instances applied.
 /// Per-vertex arrays are empty or as long as `positions`.
 struct Mesh {
+    /// Added to `positions`, gives the world's coordinates: 0 unless these are so large that floats
+    /// would round them (see originFor()). All else here and in lib counts from it.
+    glm::dvec3 origin{0.0};
     std::vector<glm::vec3> positions;  ///< scene units, +Y up
     std::vector<glm::vec3> normals;    ///< unit
     std::vector<glm::vec4> tangents;   ///< xyz unit, w = handedness (only with normal maps)
@@ -51,6 +57,7 @@ struct Mesh {
     std::vector<Material> materials;  ///< at least one when there are triangles
     std::vector<MeshTexture> textures;
 
+    /// Of all that is drawn, but for the few small pieces that lie far off (findStrays()).
     [[nodiscard]] Bounds bounds() const;
     /// Errors on indices out of range, arrays of unlike length, NaN or infinite positions, and on a
     /// mesh with neither triangles nor points.

@@ -164,6 +164,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     atlas.layout = tight ? "tight" : "grid";
     atlas.padding = settings.padding;
     atlas.bounds = bundle.bounds;
+    atlas.origin = bundle.origin;
     atlas.title = bundle.title;
     const std::vector<int> source = keptViews(bundle, tight, layout.rectangles, job);
     for (const int i : source) atlas.views.push_back(withoutImages(bundle.views[i]));
@@ -252,6 +253,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     Bundle bundle;
     bundle.title = atlas.title;
     bundle.bounds = atlas.bounds;
+    bundle.origin = atlas.origin;
     bundle.views.resize(atlas.views.size());
     std::vector<Image<std::uint8_t>> givenOf(atlas.views.size());
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {

@@ -106,8 +106,13 @@ Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const PageSet& set,
 
 Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
                                            const RenderSettings& settings, int device, Job& job) {
-    STX_TRY(auto made, makePlain(backend, set, settings, device, job));
-    if (averages(backend, settings)) made = withFootprint(std::move(made), set, job.limits);
+    // Alpha inside of the object is no outline for surfaces to end at.
+    bool translucent = false;
+    const PageSet drawn = settings.mode == RenderMode::surface ? set.solid(translucent) : set;
+    if (translucent)
+        job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");
+    STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));
+    if (averages(backend, settings)) made = withFootprint(std::move(made), drawn, job.limits);
     return made;
 }
 

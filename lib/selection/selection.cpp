@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/capture/capture.hpp"
 #include "lib/capture/rasterizer.hpp"
 #include "lib/selection/coverage.hpp"
 
@@ -96,6 +97,7 @@ Bundle keepViews(const Bundle& bundle, const std::vector<int>& views) {
     Bundle kept;
     kept.title = bundle.title;
     kept.bounds = bundle.bounds;
+    kept.origin = bundle.origin;
     for (const int v : sorted) kept.views.push_back(bundle.views[v]);
     return kept;
 }
@@ -114,7 +116,7 @@ Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& ca
     ViewLayout layout;
     layout.kind = ViewLayout::Kind::sphere;
     layout.count = candidates.directions;
-    STX_TRY(const auto cameras, layoutCameras(layout, candidates.framing, mesh.positions));
+    STX_TRY(const auto cameras, layoutCameras(layout, candidates.framing, drawnPoints(mesh)));
 
     const auto count = static_cast<std::int64_t>(cameras.size());
     std::vector<CandidateView> views(cameras.size());

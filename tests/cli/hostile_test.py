@@ -29,7 +29,8 @@ RENDER = ["-o", "OUT/a.png", "--size", "24x24", "--backend", "cpu"]
 OTHERS = [["extract", "IN", "-o", "OUT/set"], ["extract", "IN", "-o", "OUT/points.ply"],
           ["extract", "IN", "-o", "OUT/set", "--cameras", "miv", "--depth", "png"],
           ["extract", "IN", "-o", "OUT/points.drc"], ["select", "IN", "-o", "OUT/a.exr", "--count", "1"],
-          ["bake", "IN", "-o", "OUT/a.mp4"], ["pack", "IN", "-o", "OUT/atlas"]]
+          ["bake", "IN", "-o", "OUT/a.mp4"], ["pack", "IN", "-o", "OUT/atlas"],
+          ["convert", "IN", "-o", "OUT/o.mp4", "--octree-image", "4"]]
 
 
 class Case:

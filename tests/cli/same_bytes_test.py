@@ -46,6 +46,7 @@ def main():
             "convert exr": ["convert", args.model, "-o", "OUT/a.exr", "--depth-bits", "32"] + views,
             "convert xmt": ["convert", "IN/in.exr", "-o", "OUT/a.xmt"],
             "convert bt": ["convert", "IN/in.exr", "-o", "OUT/a.bt", "--point-texture"],
+            "convert octree": ["convert", "IN/in.exr", "-o", "OUT/o.mp4", "--octree-image", "6"],
             "bake": ["bake", "IN/in.exr", "-o", "OUT/a.mp4"],
             "bake exr": ["bake", "IN/in.exr", "-o", "OUT/a.exr"],
             "pack": ["pack", "IN/baked.mp4", "-o", "OUT/a"],

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstring>
 
+#include "formats/files/base64.hpp"
 #include "formats/meshes/gltf/gltf_file.hpp"
 
 namespace stx::gltf {
@@ -43,38 +44,6 @@ constexpr std::string_view kKnownExtensions[] = {
 };
 
 }  // namespace
-
-std::optional<Bytes> decodeBase64(std::string_view text) {
-    static const auto kValues = [] {
-        std::array<std::int8_t, 256> table;
-        table.fill(-1);
-        constexpr std::string_view alphabet =
-            "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        for (std::size_t i = 0; i < alphabet.size(); ++i)
-            table[static_cast<unsigned char>(alphabet[i])] = static_cast<std::int8_t>(i);
-        table[static_cast<unsigned char>('-')] = 62;
-        table[static_cast<unsigned char>('_')] = 63;
-        return table;
-    }();
-    for (int padding = 0; padding < 2 && !text.empty() && text.back() == '='; ++padding)
-        text.remove_suffix(1);
-    if (text.size() % 4 == 1) return std::nullopt;
-    Bytes bytes;
-    bytes.reserve(text.size() / 4 * 3 + 2);
-    std::uint32_t bits = 0;
-    int count = 0;
-    for (const char c : text) {
-        const int value = kValues[static_cast<unsigned char>(c)];
-        if (value < 0) return std::nullopt;
-        bits = bits << 6 | static_cast<std::uint32_t>(value);
-        count += 6;
-        if (count >= 8) {
-            count -= 8;
-            bytes.push_back(static_cast<std::byte>(bits >> count & 0xff));
-        }
-    }
-    return bytes;
-}
 
 Result<GltfFile> GltfFile::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& builder) {
     GltfFile model;

@@ -74,7 +74,4 @@ class GltfFile {
     MeshBuilder* builder_ = nullptr;
 };
 
-/// Bytes of base64 text; nothing when it is not base64.
-[[nodiscard]] std::optional<Bytes> decodeBase64(std::string_view text);
-
 }  // namespace stx::gltf

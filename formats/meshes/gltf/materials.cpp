@@ -105,11 +105,6 @@ Result<int> Materials::texture(const Json& info, const std::string& where, UvSou
     auto& textures = builder_.textures();
     int result = -1;
     if (uri && !uri->starts_with("data:")) {
-        if (hasUriScheme(*uri))
-            return fail(
-                ErrorCode::invalidInput,
-                "{}: '{}' is a network or absolute address; only files beside the model are read",
-                imageWhere, uri->substr(0, 120));
         auto name = percentDecoded(*uri);
         if (name != *uri && resolveInside(model_.files().folder(), *uri, model_.job().limits))
             name = *uri;
@@ -147,7 +142,7 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
         m.baseColour = glm::vec4(factor);
         const char* key = glossy ? "diffuseTexture" : "baseColorTexture";
         STX_TRY(const Json* info, getObject(*base, key, baseWhere));
-        if (info) {
+        if (info && !model_.files().replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(*info, baseWhere + "." + key, use.baseColour));
         }
         if (base->contains("metallicRoughnessTexture")) ++dropped["metallic-roughness maps"];

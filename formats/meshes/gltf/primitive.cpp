@@ -158,7 +158,8 @@ Result<void> applyMorph(GltfFile& model, const Json& primitive, const std::strin
                             name, deltas.count, values.size());
             for (std::size_t i = 0; i < values.size(); ++i) {
                 for (int c = 0; c < 3; ++c)
-                    values[i][c] += static_cast<float>(weights[t] * deltas.at(i, c));
+                    values[i][c] = static_cast<std::decay_t<decltype(values[i][c])>>(
+                        values[i][c] + weights[t] * deltas.at(i, c));
             }
             return {};
         };
@@ -198,8 +199,9 @@ Result<Primitive> readPrimitive(GltfFile& model, MeshBuilder& builder, Materials
     }
     const auto count = position->count;
     STX_CHECK(checkCount(position, count, 3, where, "POSITION"));
-    part.positions = vectors<glm::vec3>(*position);
-    for (std::size_t i = 0; i < count; ++i) {
+    part.positions = vectors<glm::dvec3>(*position);
+    // Points that are nowhere are left out later; a triangle needs all of its corners.
+    for (std::size_t i = 0; mode != 0 && i < count; ++i) {
         const auto p = part.positions[i];
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
             return fail(ErrorCode::invalidInput,

@@ -29,7 +29,7 @@ void transform(MeshPart& part, const glm::dmat4& worldFromMesh) {
     const glm::dmat3 forNormals(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
                                 glm::cross(linear[0], linear[1]));
     const double side = determinant < 0 ? -1.0 : 1.0;
-    for (auto& p : part.positions) p = glm::vec3(worldFromMesh * glm::dvec4(p, 1.0));
+    for (auto& p : part.positions) p = glm::dvec3(worldFromMesh * glm::dvec4(p, 1.0));
     for (auto& n : part.normals) {
         const auto turned = forNormals * glm::dvec3(n) * side;
         const double length = glm::length(turned);
@@ -334,7 +334,7 @@ class SceneReader {
             const glm::dmat3 linear(blend);
             const double determinant = glm::determinant(linear);
             handedness += determinant < 0 ? -1 : 1;
-            part.positions[i] = glm::vec3(blend * glm::dvec4(part.positions[i], 1.0));
+            part.positions[i] = glm::dvec3(blend * glm::dvec4(part.positions[i], 1.0));
             if (!part.normals.empty()) {
                 const glm::dmat3 forNormals(glm::cross(linear[1], linear[2]),
                                             glm::cross(linear[2], linear[0]),

@@ -124,6 +124,20 @@ struct BifsEncoder::Impl {
         writeFloat(value.angle);
         return {};
     }
+    Result<void> write(const glm::vec4& value, const Coding&) {
+        for (int i = 0; i < 4; ++i) writeFloat(value[i]);
+        return {};
+    }
+    Result<void> write(const CommandBuffer& value, const Coding&) {
+        return writeString(std::string(value.bytes.begin(), value.bytes.end()));
+    }
+    Result<void> write(const ScriptText&, const Coding&) {
+        return fail(ErrorCode::unsupported,
+                    "the program of a Script cannot be written as BIFS; write a text (.bt, .xmt)");
+    }
+    Result<void> write(const AttributeReference&, const Coding&) {
+        return fail(ErrorCode::unsupported, "a reference to a field cannot be written");
+    }
     Result<void> write(const PixelImage& image, const Coding&) {
         if (image.width < 0 || image.width > 4095 || image.height < 0 || image.height > 4095)
             return error("an image of {}x{} has no code in BIFS; 4095x4095 is the largest",

@@ -98,6 +98,16 @@ Result<T> BifsNodeReader::readItem(const std::optional<QuantisedCoding>& coding)
         rotation.axis = readVec3();
         rotation.angle = readFloat();
         return rotation;
+    } else if constexpr (std::is_same_v<T, glm::vec4>) {
+        const glm::vec3 v = readVec3();
+        return glm::vec4(v, readFloat());
+    } else if constexpr (std::is_same_v<T, CommandBuffer>) {
+        STX_TRY(const std::string bytes, readString());
+        return CommandBuffer{{bytes.begin(), bytes.end()}};
+    } else if constexpr (std::is_same_v<T, ScriptText>) {
+        return error(ErrorCode::unsupported, "the program of a Script, which is not supported");
+    } else if constexpr (std::is_same_v<T, AttributeReference>) {
+        return error(ErrorCode::unsupported, "a reference to a field, which is not supported");
     } else {
         static_assert(std::is_same_v<T, PixelImage>);
         return readImage();
@@ -130,6 +140,10 @@ std::uint64_t BifsNodeReader::fewestBits(FieldType item,
             return 2 * each;  // a quantised normal has two numbers
         case SFRotation:
             return 3 * each;
+        case SFVec4f:
+            return 4 * each;
+        case SFCommandBuffer:
+            return 5;
         case SFImage:
             return 26;
         default:

@@ -126,6 +126,8 @@ Result<std::optional<QuantisedCoding>> QuantisationScope::codingOf(const FieldIn
     if (field.quantisation == Quantisation::linear) {
         coding.kind = QuantisedCoding::Kind::linearInt;
         coding.bits = field.quantisationBits;
+        // Without a bound the numbers are all of SFInt32.
+        coding.minimum[0] = std::max(coding.minimum[0], -2147483648.0);
         return coding;
     }
     if (field.quantisation == Quantisation::coordIndex)

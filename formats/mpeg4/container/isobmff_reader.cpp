@@ -39,7 +39,29 @@ class Reader {
         return std::move(document_);
     }
 
+    Result<ElementaryStream> readStream(std::uint32_t trackId) {
+        STX_CHECK(readTopLevel());
+        STX_CHECK(readMoov());
+        Mp4Track* track = findTrack(trackId);
+        if (track == nullptr)
+            return failAt("moov", ErrorCode::invalidInput,
+                          "the file has no track {}; its tracks are {}", trackId, trackNumbers());
+        if (track->elsewhere)
+            return failAt(track->path, ErrorCode::unsupported,
+                          "the data of the track are in another file, which is not opened");
+        STX_TRY(const std::vector<Sample>* samples, samplesOf(*track));
+        ElementaryStream stream = track->stream;
+        stream.samples = *samples;
+        return stream;
+    }
+
   private:
+    std::string trackNumbers() const {
+        std::vector<std::uint32_t> numbers;
+        for (const Mp4Track& track : tracks_)
+            if (numbers.size() < 20) numbers.push_back(track.facts.trackId);
+        return numbers.empty() ? "none" : fmt::format("{}", fmt::join(numbers, ", "));
+    }
     Mp4Facts& facts() { return *document_.mp4; }
     void addDeviation(Deviation kind, std::string text, std::string where) {
         if (facts().deviations.size() < kMaxDeviations)
@@ -232,7 +254,8 @@ class Reader {
     Result<const std::vector<Sample>*> samplesOf(Mp4Track& track) {
         const auto known = samples_.find(track.facts.trackId);
         if (known != samples_.end()) return &known->second;
-        STX_TRY(std::vector<Sample> samples, readSamples(track, source_, job_.limits));
+        STX_TRY(std::vector<Sample> samples,
+                readSamples(track, source_, facts().movieTimescale, job_.limits));
         track.facts.sampleCount = samples.size();
         for (const Sample& sample : samples) track.facts.bytes += sample.data.size;
         return &(samples_[track.facts.trackId] = std::move(samples));
@@ -277,7 +300,8 @@ class Reader {
     }
 
     void noteEntry(const Mp4Track& track) {
-        const bool visual = track.stream.streamType == StreamType::visual;
+        const bool visual =
+            track.stream.streamType == StreamType::visual && track.stream.sampleEntry.empty();
         if (visual && track.facts.sampleEntry == "mp4s")
             addDeviation(Deviation::imageInSystemsEntry,
                          "an image is in a sample entry 'mp4s'; 'mp4v' is expected", track.path);
@@ -296,6 +320,7 @@ class Reader {
     Result<void> readObjectDescriptors() {
         if (od_ == nullptr) return {};
         STX_TRY(const std::vector<Sample>* samples, samplesOf(*od_));
+        document_.odStream.edits = od_->stream.edits;
         document_.odStream.samples = *samples;
         const DescriptorContext context{od_->mpod, &facts().deviations};
         for (std::size_t i = 0; i < samples->size(); ++i) {
@@ -316,7 +341,7 @@ class Reader {
                     job_.note(fmt::format("OD command {:#04x} is passed over",
                                           std::get<OtherOdCommand>(command).tag));
             }
-            document_.odFrames.push_back({sample.time, std::move(*commands)});
+            document_.odFrames.push_back({sample.time, std::move(*commands), sample.sync && i > 0});
         }
         return {};
     }
@@ -336,6 +361,7 @@ class Reader {
         if (!config) return tl::unexpected(config.error().at(scene_->path));
         document_.bifsConfig = *config;
         STX_TRY(const std::vector<Sample>* samples, samplesOf(*scene_));
+        document_.sceneStream.edits = scene_->stream.edits;
         document_.sceneStream.samples = *samples;
         BifsDecoder decoder(*config, job_.limits);
         for (std::size_t i = 0; i < samples->size(); ++i) {
@@ -349,7 +375,7 @@ class Reader {
                 addDeviation(Deviation::trailingBytes,
                              fmt::format("{} bits follow the last command", decoder.bitsLeft()),
                              place);
-            document_.frames.push_back({sample.time, std::move(*commands)});
+            document_.frames.push_back({sample.time, std::move(*commands), sample.sync && i > 0});
         }
         return {};
     }
@@ -382,6 +408,13 @@ Result<Document> readMp4(const ByteSource& source, Job& job) {
     if (!document && !source.name().empty())
         return tl::unexpected(document.error().at(fmt::format("'{}'", source.name())));
     return document;
+}
+
+Result<ElementaryStream> readMp4Stream(const ByteSource& source, std::uint32_t trackId, Job& job) {
+    auto stream = Reader(source, job).readStream(trackId);
+    if (!stream && !source.name().empty())
+        return tl::unexpected(stream.error().at(fmt::format("'{}'", source.name())));
+    return stream;
 }
 
 std::vector<const ObjectDescriptor*> Document::objectDescriptors(std::uint64_t until) const {

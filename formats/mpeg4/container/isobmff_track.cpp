@@ -1,6 +1,7 @@
 #include "formats/mpeg4/container/isobmff_track.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <unordered_map>
 
 #include "formats/mpeg4/bifs/descriptors.hpp"
@@ -99,6 +100,41 @@ std::optional<std::size_t> entryHeader(std::string_view entry, std::string_view 
     return std::nullopt;
 }
 
+/// The entries that are written anew from their descriptor; others are kept as they are.
+bool isOurEntry(std::string_view entry) {
+    return entry == "mp4s" || entry == "mp4v" || entry == "jpeg" || entry == "png ";
+}
+
+/// Keeps the bytes of the entry, which has one data reference in what we write, and takes the
+/// decoder's config out of it where we know its place.
+Result<void> keepEntry(const Box& entry, const std::vector<Box>& inner, Mp4Track& track) {
+    const ByteSpan body = entry.body.restView();
+    Bytes& bytes = track.stream.sampleEntry;
+    bytes.assign(8 + body.size(), std::byte{0});
+    for (std::size_t i = 0; i < 4; ++i) {
+        bytes[i] = static_cast<std::byte>(bytes.size() >> (24 - 8 * i) & 0xFF);
+        bytes[4 + i] = static_cast<std::byte>(entry.type[i]);
+    }
+    std::copy(body.begin(), body.end(), bytes.begin() + 8);
+    bytes[14] = std::byte{0};
+    bytes[15] = std::byte{1};
+    track.stream.handler = track.facts.handler;
+    if (track.hasEsds) return {};
+    const bool avc = entry.type == "avc1" || entry.type == "avc3";
+    const bool hevc = entry.type == "hvc1" || entry.type == "hev1";
+    if (avc || hevc) {
+        track.stream.objectTypeIndication = avc ? oti::kAvc : oti::kHevc;
+        if (const Box* config = findBox(inner, avc ? "avcC" : "hvcC")) {
+            const ByteSpan record = config->body.restView();
+            track.stream.decoderSpecificInfo.assign(record.begin(), record.end());
+        }
+    }
+    track.stream.streamType = track.facts.handler == "vide"   ? StreamType::visual
+                              : track.facts.handler == "soun" ? StreamType::audio
+                                                              : StreamType::none;
+    return {};
+}
+
 Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) {
     Box entries = stsd;
     fullBox(entries.body);
@@ -108,6 +144,7 @@ Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) 
     if (boxes.empty())
         return damaged(stsd, "{} sample entries are announced, but there is none", count);
     Box entry = boxes.front();
+    const Box whole = entry;
     track.facts.sampleEntry = entry.type;
     if (entry.type == "encv" || entry.type == "enca" || entry.type == "encs")
         return failAt(entry.place(), ErrorCode::unsupported, "the track is encrypted");
@@ -142,12 +179,16 @@ Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) 
         track.stream.objectTypeIndication = entry.type == "jpeg" ? oti::kJpeg : oti::kPng;
         track.stream.streamType = StreamType::visual;
     }
-    if (!header) return {};
-    STX_TRY(const auto inner, childBoxes(entry));
+    if (!header) return keepEntry(whole, {}, track);
+    // The boxes of an entry that we only pass on may be in a form that we do not know.
+    auto children = childBoxes(entry);
+    if (!children && !isOurEntry(entry.type)) return keepEntry(whole, {}, track);
+    STX_TRY(const auto inner, std::move(children));
     if (findBox(inner, "sinf") != nullptr)
         return failAt(entry.place(), ErrorCode::unsupported, "the track is encrypted");
     const Box* esds = findBox(inner, "esds");
-    if (esds == nullptr) return {};
+    if (esds == nullptr)
+        return isOurEntry(entry.type) ? Result<void>{} : keepEntry(whole, inner, track);
     track.hasEsds = true;
     ByteReader body = esds->body;
     fullBox(body);
@@ -159,6 +200,7 @@ Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) 
     stream->height = track.stream.height;
     track.facts.esIdInEsds = stream->esId;
     track.stream = std::move(*stream);
+    if (!isOurEntry(entry.type)) return keepEntry(whole, inner, track);
     return {};
 }
 
@@ -245,6 +287,10 @@ Result<Mp4Track> readTrack(const Box& trak) {
     keep(track.stco, {"stco", "co64"});
     keep(track.ctts, {"ctts"});
     keep(track.stss, {"stss"});
+    if (const Box* edts = findBox(boxes, "edts")) {
+        STX_TRY(const auto inner, childBoxes(*edts));
+        if (const Box* elst = findBox(inner, "elst")) track.elst = *elst;
+    }
     return track;
 }
 
@@ -397,10 +443,49 @@ Result<void> time(const Mp4Track& track, std::vector<Sample>& samples) {
     return {};
 }
 
+/// Puts the edit list into the times of the samples where it only delays them, else into the
+/// stream.
+Result<void> edit(Mp4Track& track, std::uint32_t movieTimescale, const Limits& limits,
+                  std::vector<Sample>& samples) {
+    if (track.elst.type.empty()) return {};
+    const bool wide = ByteReader(track.elst.body).u8() == 1;
+    std::uint64_t count = 0;
+    STX_TRY(ByteReader table, tableOf(track.elst, wide ? 20 : 12, count));
+    if (auto fits = limits.checkAllocation(count, sizeof(Edit), "the edit list"); !fits)
+        return tl::unexpected(fits.error().at(track.elst.place()));
+    EditList list{movieTimescale, {}};
+    for (std::uint64_t i = 0; i < count; ++i) {
+        Edit one;
+        one.duration = wide ? table.u64() : table.u32();
+        one.mediaTime =
+            wide ? static_cast<std::int64_t>(table.u64()) : static_cast<std::int32_t>(table.u32());
+        one.rate = table.u32();
+        list.edits.push_back(one);
+    }
+    const bool delayed = list.edits.size() == 2 && list.edits[0].mediaTime == -1;
+    const std::uint64_t length =
+        samples.empty() ? 0 : samples.back().time + samples.back().duration;
+    const Edit* shown = list.edits.size() == (delayed ? 2u : 1u) ? &list.edits.back() : nullptr;
+    // All of the track, but for a tick of rounding: in seconds, since the numbers may be anything.
+    const bool whole =
+        shown != nullptr && shown->mediaTime == 0 && shown->rate == 0x10000 && movieTimescale > 0 &&
+        (shown->duration == 0 || static_cast<double>(shown->duration + 1) / movieTimescale >=
+                                     static_cast<double>(length) / track.stream.timescale);
+    const std::uint64_t delay = delayed ? list.edits[0].duration : 0;
+    if (whole && delay <= std::numeric_limits<std::uint32_t>::max() &&
+        delay * track.stream.timescale % movieTimescale == 0) {
+        for (Sample& sample : samples)
+            sample.time += delay * track.stream.timescale / movieTimescale;
+    } else if (movieTimescale > 0) {
+        track.stream.edits = std::move(list);
+    }
+    return {};
+}
+
 }  // namespace
 
-Result<std::vector<Sample>> readSamples(const Mp4Track& track, const ByteSource& source,
-                                        const Limits& limits) {
+Result<std::vector<Sample>> readSamples(Mp4Track& track, const ByteSource& source,
+                                        std::uint32_t movieTimescale, const Limits& limits) {
     std::vector<Sample> samples;
     if (track.stsz.type.empty())
         return failAt(track.path, ErrorCode::invalidInput,
@@ -416,6 +501,7 @@ Result<std::vector<Sample>> readSamples(const Mp4Track& track, const ByteSource&
         return tl::unexpected(fits.error().at(track.stsz.place()));
     STX_CHECK(place(track, sizes, source, samples));
     STX_CHECK(time(track, samples));
+    STX_CHECK(edit(track, movieTimescale, limits, samples));
     return samples;
 }
 

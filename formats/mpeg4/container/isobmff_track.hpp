@@ -36,15 +36,17 @@ struct Mp4Track {
     bool elsewhere = false;  ///< the data are in another file, which is not opened
     std::string path;
 
-    Box stts, stsc, stsz, stco, ctts, stss;  ///< type empty: not there
+    Box stts, stsc, stsz, stco, ctts, stss, elst;  ///< type empty: not there
 };
 
 [[nodiscard]] Result<Mp4Track> readTrack(const Box& trak);
 
-/// The samples of a track, each held against the size of the file. Errors (invalidInput) when the
-/// tables disagree, reach outside the file, or need more memory than limits allow.
-[[nodiscard]] Result<std::vector<Sample>> readSamples(const Mp4Track& track,
-                                                      const ByteSource& source,
+/// The samples of a track, each held against the size of the file, at the times that its edit list
+/// gives them; an edit list that is more than a delay goes into track.stream.edits, its durations
+/// in `movieTimescale`. Errors (invalidInput) when the tables disagree, reach outside the file, or
+/// need more memory than limits allow.
+[[nodiscard]] Result<std::vector<Sample>> readSamples(Mp4Track& track, const ByteSource& source,
+                                                      std::uint32_t movieTimescale,
                                                       const Limits& limits);
 
 /// Fills in facts.sampleCount and facts.bytes from the table of sizes alone; leaves them 0 where it

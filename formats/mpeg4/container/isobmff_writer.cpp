@@ -21,26 +21,40 @@ constexpr std::uint64_t kHeadBytes = 1u << 20;
 
 class Writer {
   public:
-    Writer(const Document& document, Job& job, const Mp4WriteOptions& options)
+    Writer(const Document& document, Job& job, Mp4WriteOptions options)
         : document_(document), job_(job), options_(options) {}
 
     Result<void> write(const Sink& sink) {
         STX_CHECK(makeTracks());
+        return writeTracks(sink, &document_.iod);
+    }
+
+    /// One stream without a scene.
+    Result<void> writeStream(const ElementaryStream& stream, const Sink& sink) {
+        ElementaryStream alone = stream;
+        alone.esId = 1;
+        STX_TRY(Track track, makeMediaTrack(alone, 0));
+        tracks_.push_back(std::move(track));
+        return writeTracks(sink, nullptr);
+    }
+
+  private:
+    Result<void> writeTracks(const Sink& sink, const InitialObjectDescriptor* iod) {
         const std::uint64_t payload = placeSamples();
         const std::uint64_t mdatHeader =
             payload + 8 > std::numeric_limits<std::uint32_t>::max() ? 16 : 8;
 
         ByteWriter head;
-        STX_CHECK(writeMovieHead(head, tracks_, document_.iod, false));
+        STX_CHECK(writeMovieHead(head, tracks_, iod, false));
         bool wide = head.size() + mdatHeader + payload > std::numeric_limits<std::uint32_t>::max();
         if (wide) {
             head = ByteWriter();
-            STX_CHECK(writeMovieHead(head, tracks_, document_.iod, true));
+            STX_CHECK(writeMovieHead(head, tracks_, iod, true));
         }
         // The size does not depend on the offsets, so they are known now.
         for (Track& track : tracks_) track.offset += head.size() + mdatHeader;
         head = ByteWriter();
-        STX_CHECK(writeMovieHead(head, tracks_, document_.iod, wide));
+        STX_CHECK(writeMovieHead(head, tracks_, iod, wide));
 
         if (mdatHeader == 16) {
             head.u32(1);
@@ -54,7 +68,6 @@ class Writer {
         return writeSamples(sink);
     }
 
-  private:
     // ---- tracks
 
     Result<void> makeTracks() {
@@ -150,17 +163,20 @@ class Writer {
                     out.decoderSpecificInfo = jpegDecoderSpecificInfo(*image);
             }
         }
-        if (out.objectTypeIndication == 0)
+        const bool ownEntry = !out.sampleEntry.empty();
+        if (out.objectTypeIndication == 0 && !ownEntry)
             return fail(ErrorCode::invalidInput,
                         "{} is neither JPEG nor PNG and has no objectTypeIndication", what);
-        if (out.streamType == StreamType::none) out.streamType = StreamType::visual;
+        if (out.streamType == StreamType::none && !ownEntry) out.streamType = StreamType::visual;
         if (out.width < 0 || out.width > 65535 || out.height < 0 || out.height > 65535)
             return fail(ErrorCode::invalidInput, "{} is {}x{} pixels; 65535x65535 are possible",
                         what, out.width, out.height);
         const bool visual = out.streamType == StreamType::visual;
         if (!visual) out.width = out.height = 0;
         track.handler = visual ? "vide" : out.streamType == StreamType::audio ? "soun" : "gesm";
+        if (ownEntry && out.handler.size() == 4) track.handler = out.handler;
         track.handlerName = visual ? "MPEG-4 image" : "MPEG-4 stream";
+        if (!stream.trackName.empty()) track.handlerName = stream.trackName;
         STX_CHECK(finish(track, what));
         return track;
     }
@@ -170,17 +186,18 @@ class Writer {
         ElementaryStream& stream = track.stream;
         if (stream.timescale == 0) return fail(ErrorCode::invalidInput, "{} has timescale 0", what);
         std::uint64_t largest = 0;
-        std::uint64_t time = 0;
+        if (!stream.samples.empty()) track.start = stream.samples.front().time;
+        std::uint64_t time = track.start;
         for (const Sample& sample : stream.samples) {
             if (sample.data.size > std::numeric_limits<std::uint32_t>::max())
                 return fail(ErrorCode::invalidInput,
                             "{} has a sample of {} bytes; 4 GiB less one byte are possible", what,
                             sample.data.size);
-            if (&sample == &stream.samples.front() ? sample.time != 0 : sample.time < time)
+            if (sample.time < time)
                 return fail(ErrorCode::invalidInput,
-                            "{} has an access unit at time {}, but the first must be at 0 and time "
-                            "may not go back",
-                            what, sample.time);
+                            "{} has an access unit at time {} behind one at {}; time may not go "
+                            "back",
+                            what, sample.time, time);
             if (sample.time - time > std::numeric_limits<std::uint32_t>::max())
                 return fail(ErrorCode::invalidInput, "{} has a gap of {} ticks", what,
                             sample.time - time);
@@ -188,7 +205,8 @@ class Writer {
             largest = std::max(largest, sample.data.size);
             track.bytes += sample.data.size;
         }
-        if (!stream.samples.empty()) track.duration = time + stream.samples.back().duration;
+        if (!stream.samples.empty())
+            track.duration = time - track.start + stream.samples.back().duration;
         if (stream.bufferSizeDB == 0)
             stream.bufferSizeDB =
                 static_cast<std::uint32_t>(std::min<std::uint64_t>(largest, 0xFFFFFF));
@@ -224,7 +242,7 @@ class Writer {
             auto bytes = encoder.encode(document_.frames[i].commands);
             if (!bytes)
                 return tl::unexpected(bytes.error().at(fmt::format("BIFS access unit {}", i + 1)));
-            addFrame(track, std::move(*bytes), document_.frames[i].time);
+            addFrame(track, std::move(*bytes), document_.frames[i]);
         }
         STX_CHECK(finish(track, "the scene"));
         return track;
@@ -255,7 +273,7 @@ class Writer {
             auto bytes = encodeOdFrame(withTrackIds(document_.odFrames[i].commands), referenceOf);
             if (!bytes)
                 return tl::unexpected(bytes.error().at(fmt::format("OD access unit {}", i + 1)));
-            addFrame(track, std::move(*bytes), document_.odFrames[i].time);
+            addFrame(track, std::move(*bytes), document_.odFrames[i]);
         }
         STX_CHECK(finish(track, "the object descriptor stream"));
         return track;
@@ -293,10 +311,12 @@ class Writer {
         return result;
     }
 
-    static void addFrame(Track& track, Bytes bytes, std::uint64_t time) {
+    template <class Frame>
+    static void addFrame(Track& track, Bytes bytes, const Frame& frame) {
         Sample sample;
         sample.data = ByteRange::of(std::move(bytes));
-        sample.time = time;
+        sample.time = frame.time;
+        sample.sync = track.stream.samples.empty() || frame.randomAccess;
         sample.duration = 0;
         track.stream.samples.push_back(std::move(sample));
     }
@@ -338,7 +358,7 @@ class Writer {
 
     const Document& document_;
     Job& job_;
-    const Mp4WriteOptions& options_;
+    Mp4WriteOptions options_;
     std::vector<Track> tracks_;
     std::vector<Track> media_;
     std::unordered_set<std::uint32_t> takenIds_;
@@ -354,6 +374,13 @@ class Writer {
 Result<void> writeMp4(const Document& document, OutputFile& out, Job& job,
                       const Mp4WriteOptions& options) {
     return Writer(document, job, options).write([&](ByteSpan bytes) { return out.write(bytes); });
+}
+
+Result<void> writeMp4Stream(const ElementaryStream& stream, OutputFile& out, Job& job) {
+    const Document none;
+    return Writer(none, job, {}).writeStream(stream, [&](ByteSpan bytes) {
+        return out.write(bytes);
+    });
 }
 
 Result<Bytes> writeMp4(const Document& document, Job& job, const Mp4WriteOptions& options) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include "formats/files/source_date.hpp"
 #include "formats/mpeg4/bifs/descriptors.hpp"
@@ -9,7 +10,9 @@
 namespace stx::mpeg4 {
 namespace {
 
+/// What most files have. Where a delay or an edit is no number of such ticks, they are finer.
 constexpr std::uint32_t kMovieTimescale = 600;
+constexpr std::uint64_t kFinestTimescale = 1'000'000'000;
 
 /// Seconds from 1904 to 1970.
 constexpr std::uint64_t kEpochOffset = 2082844800;
@@ -48,10 +51,67 @@ bool isSystems(const Track& track) {
     return track.stream.streamType != StreamType::visual;
 }
 
-std::uint64_t movieDuration(const Track& track) {
-    const std::uint64_t whole = track.duration / track.stream.timescale * kMovieTimescale;
-    return whole +
-           track.duration % track.stream.timescale * kMovieTimescale / track.stream.timescale;
+/// `ticks` of `from` in ticks of `to`, rounded down.
+std::uint64_t rescaled(std::uint64_t ticks, std::uint32_t from, std::uint32_t to) {
+    return ticks / from * to + ticks % from * to / from;
+}
+
+/// The edit list that a track gets: its own, or one that delays it.
+EditList editsOf(const Track& track, std::uint32_t timescale) {
+    EditList list{timescale, {}};
+    const ElementaryStream& stream = track.stream;
+    if (track.start > 0)
+        list.edits.push_back({rescaled(track.start, stream.timescale, timescale), -1, 0x10000});
+    for (const Edit& edit : stream.edits.edits) {
+        list.edits.push_back(edit);
+        list.edits.back().duration = rescaled(edit.duration, stream.edits.timescale, timescale);
+    }
+    if (!list.edits.empty() && stream.edits.edits.empty())
+        list.edits.push_back({rescaled(track.duration, stream.timescale, timescale), 0, 0x10000});
+    return list;
+}
+
+std::uint64_t movieDuration(const Track& track, std::uint32_t timescale) {
+    std::uint64_t duration = 0;
+    for (const Edit& edit : editsOf(track, timescale).edits) duration += edit.duration;
+    return duration > 0 ? duration : rescaled(track.duration, track.stream.timescale, timescale);
+}
+
+/// A timescale in which every delay and every edit is a whole number, as far as one is fine enough.
+std::uint32_t movieTimescale(std::span<const Track> tracks) {
+    std::uint64_t timescale = kMovieTimescale;
+    const auto include = [&](std::uint64_t ticks, std::uint64_t each) {
+        if (ticks == 0 || each == 0) return;
+        const std::uint64_t finer = std::lcm(timescale, each / std::gcd(ticks, each));
+        if (finer <= kFinestTimescale) timescale = finer;
+    };
+    for (const Track& track : tracks) {
+        include(track.start, track.stream.timescale);
+        for (const Edit& edit : track.stream.edits.edits)
+            include(edit.duration, track.stream.edits.timescale);
+    }
+    return static_cast<std::uint32_t>(timescale);
+}
+
+void writeEdits(ByteWriter& out, const EditList& list) {
+    if (list.edits.empty()) return;
+    const bool wide = std::any_of(list.edits.begin(), list.edits.end(), [](const Edit& e) {
+        return e.duration > std::numeric_limits<std::uint32_t>::max() ||
+               e.mediaTime != static_cast<std::int32_t>(e.mediaTime);
+    });
+    const BoxScope edts(out, "edts");
+    const BoxScope elst(out, "elst", wide ? 1 : 0, 0);
+    out.u32(static_cast<std::uint32_t>(list.edits.size()));
+    for (const Edit& edit : list.edits) {
+        if (wide) {
+            out.u64(edit.duration);
+            out.u64(static_cast<std::uint64_t>(edit.mediaTime));
+        } else {
+            out.u32(static_cast<std::uint32_t>(edit.duration));
+            out.u32(static_cast<std::uint32_t>(edit.mediaTime));
+        }
+        out.u32(edit.rate);
+    }
 }
 
 /// Version 1 boxes carry times of 64 bits; version 0 is used where it suffices.
@@ -79,10 +139,11 @@ void writeMatrix(ByteWriter& out) {
         out.u32(value);
 }
 
-void writeMovieHeader(ByteWriter& out, std::uint64_t duration, std::uint32_t highestId) {
+void writeMovieHeader(ByteWriter& out, std::uint32_t timescale, std::uint64_t duration,
+                      std::uint32_t highestId) {
     const bool wide = needsWide(duration);
     const BoxScope mvhd(out, "mvhd", wide ? 1 : 0, 0);
-    writeTimes(out, wide, kMovieTimescale, false, duration);
+    writeTimes(out, wide, timescale, false, duration);
     out.u32(0x10000);
     out.u16(0x0100);
     out.zeros(10);
@@ -92,6 +153,12 @@ void writeMovieHeader(ByteWriter& out, std::uint64_t duration, std::uint32_t hig
 }
 
 Result<void> writeSampleEntry(ByteWriter& out, const Track& track) {
+    if (!track.stream.sampleEntry.empty()) {
+        const BoxScope stsd(out, "stsd", 0, 0);
+        out.u32(1);
+        out.bytes(track.stream.sampleEntry);
+        return {};
+    }
     STX_TRY(const Bytes descriptor, encodeEsDescriptor(track.stream));
     const BoxScope stsd(out, "stsd", 0, 0);
     out.u32(1);
@@ -195,13 +262,16 @@ void writeTables(ByteWriter& out, const Track& track, bool wide) {
         out.u32(static_cast<std::uint32_t>(track.offset));
 }
 
-Result<void> writeTrack(ByteWriter& out, const Track& track, bool wide) {
+Result<void> writeTrack(ByteWriter& out, const Track& track, std::uint32_t timescale, bool wide) {
     const BoxScope trak(out, "trak");
     {
-        const std::uint64_t duration = movieDuration(track);
-        const BoxScope tkhd(out, "tkhd", needsWide(duration) ? 1 : 0, isSystems(track) ? 1 : 7);
+        const std::uint64_t duration = movieDuration(track, timescale);
+        const std::uint32_t flags = isSystems(track) ? 1 : track.stream.enabled ? 7 : 6;
+        const BoxScope tkhd(out, "tkhd", needsWide(duration) ? 1 : 0, flags);
         writeTimes(out, needsWide(duration), track.id, true, duration);
-        out.zeros(16);
+        out.zeros(10);  // and the layer
+        out.u16(static_cast<std::uint16_t>(track.stream.alternateGroup));
+        out.zeros(4);
         writeMatrix(out);
         out.u32(static_cast<std::uint32_t>(track.stream.width) << 16);
         out.u32(static_cast<std::uint32_t>(track.stream.height) << 16);
@@ -211,6 +281,7 @@ Result<void> writeTrack(ByteWriter& out, const Track& track, bool wide) {
         const BoxScope mpod(out, "mpod");
         for (const std::uint32_t id : track.mpod) out.u32(id);
     }
+    writeEdits(out, editsOf(track, timescale));
     const BoxScope mdia(out, "mdia");
     {
         const BoxScope mdhd(out, "mdhd", needsWide(track.duration) ? 1 : 0, 0);
@@ -227,7 +298,7 @@ Result<void> writeTrack(ByteWriter& out, const Track& track, bool wide) {
         out.u8(0);
     }
     const BoxScope minf(out, "minf");
-    if (!isSystems(track)) {
+    if (track.handler == "vide") {
         const BoxScope vmhd(out, "vmhd", 0, 1);
         out.zeros(8);
     } else if (track.handler == "soun") {
@@ -251,7 +322,8 @@ Result<void> writeTrack(ByteWriter& out, const Track& track, bool wide) {
 }  // namespace
 
 Result<void> writeMovieHead(ByteWriter& out, std::span<const Track> tracks,
-                            const InitialObjectDescriptor& iod, bool wide) {
+                            const InitialObjectDescriptor* iod, bool wide) {
+    const std::uint32_t timescale = movieTimescale(tracks);
     {
         const BoxScope ftyp(out, "ftyp");
         out.text("mp42");
@@ -262,19 +334,19 @@ Result<void> writeMovieHead(ByteWriter& out, std::span<const Track> tracks,
     std::uint64_t duration = 0;
     std::uint32_t highest = 0;
     for (const Track& track : tracks) {
-        duration = std::max(duration, movieDuration(track));
+        duration = std::max(duration, movieDuration(track, timescale));
         highest = std::max(highest, track.id);
     }
-    writeMovieHeader(out, duration, highest);
-    {
+    writeMovieHeader(out, timescale, duration, highest);
+    if (iod != nullptr) {
         const BoxScope iods(out, "iods", 0, 0);
         std::vector<std::uint32_t> initial;
         for (const Track& track : tracks)
             if (track.handler == "sdsm" || track.handler == "odsm") initial.push_back(track.id);
-        STX_TRY(const Bytes descriptor, encodeIod(iod, initial));
+        STX_TRY(const Bytes descriptor, encodeIod(*iod, initial));
         out.bytes(descriptor);
     }
-    for (const Track& track : tracks) STX_CHECK(writeTrack(out, track, wide));
+    for (const Track& track : tracks) STX_CHECK(writeTrack(out, track, timescale, wide));
     return {};
 }
 

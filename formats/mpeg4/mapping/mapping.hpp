@@ -34,23 +34,28 @@ struct SceneReadOptions {
     std::filesystem::path folder;
     ImageDecoder decode = decodeImage;
     /// Without pixels only headers are read: the views have cameras, planes and depthBits, but
-    /// empty images, and a PointTexture gives one view.
+    /// empty images.
     bool pixels = true;
+    /// A scene that shows no view gives a bundle without any, instead of an error.
+    bool mayBeEmpty = false;
 };
 
 /// The object of a presentation as it is at its first moment: a view for each DepthImage (and
 /// DepthImageV2) that is shown. Transforms are folded into the cameras; of a Switch only the chosen
 /// child counts; a node used twice gives two views. A PointTexture gives as many views with the
 /// same camera as a pixel has depths; an OctreeImage gives a view for each of its images, with the
-/// depths of the voxels that it sees first. Views are named by DEF name. Title and bounds come from
-/// WorldInfo. Errors (invalidInput) name the view and what is wrong; Transforms that scale
-/// unevenly, shear or mirror are refused. Notes say what is left out.
+/// depths of the voxels that it sees first. Views are named by DEF name. Title, bounds and
+/// origin come from WorldInfo. Errors (invalidInput) name the view and what is wrong; Transforms
+/// that scale unevenly, shear or mirror are refused. Notes say what is left out.
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
 
 /// What the scene's objects are: "SimpleTexture", "SimpleTextureV2", "PointTexture", "OctreeImage",
 /// or "none"; the richest where there are several.
 [[nodiscard]] const char* nodeKindOf(const Document& document);
+
+/// The first string of the WorldInfo of scenes that are made from bundles.
+inline constexpr const char* kMadeByUs = "made by stx";
 
 struct SceneWriteOptions {
     enum class Texture { png, jpeg };
@@ -62,15 +67,19 @@ struct SceneWriteOptions {
     Nodes nodes = Nodes::automatic;
     /// PointTexture instead of SimpleTexture; the colours are in the scene itself.
     bool pointTexture = false;
+    /// OctreeImage of so many levels instead of depth images, see octree_write.hpp; 0: none.
+    int octreeLevels = 0;
 };
 
-/// A presentation of a bundle: Group { WorldInfo, DepthImage... }, the WorldInfo with title and
-/// bounds (computed where the bundle has none). Field values are rounded to float, planes outwards.
-/// A principal point off the centre is centred by padding with pixels without a point (see
-/// placement.hpp) and noted; reading the scene back here undoes it. What is lossy is noted: float
-/// depth and 8 bits with the largest error, JPEG, linear colour, what V1 cannot hold. Errors:
-/// (unsupported) more images than MPEG-4 has object descriptors for, or images that padding makes
-/// too large; (usage) options out of range; what Bundle::check() says.
+/// A presentation of a bundle: Group { WorldInfo, DepthImage..., Viewpoint, NavigationInfo }, the
+/// WorldInfo with title and bounds (computed where the bundle has none); with octreeLevels Group {
+/// WorldInfo, OctreeImage }, under a Transform where the object is not in the unit cube. Field
+/// values are rounded to float, planes outwards. A principal point off the centre is centred by
+/// padding with pixels without a point (see placement.hpp) and noted; reading the scene back here
+/// undoes it. What is lossy is noted: float depth and 8 bits with the largest error, JPEG, linear
+/// colour, what V1 cannot hold. Errors: (unsupported) more images than MPEG-4 has object
+/// descriptors for, or images that padding makes too large; (usage) options out of range; what
+/// Bundle::check() says.
 [[nodiscard]] Result<Document> sceneFromBundle(const Bundle& bundle,
                                                const SceneWriteOptions& options, Job& job);
 

@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/octree.hpp"
@@ -40,10 +42,21 @@ class BundleReader {
                             document_.frames.size() - 1));
         STX_TRY(const auto scene, composeScene(document_.frames, start));
         STX_TRY(const auto shown, shownScene(scene.root, job_.limits));
-        if (shown.hasShapes)
-            job_.note("the scene has Shapes, which are no views; they are left out");
-        const ViewNotes notes = ViewNotes::parse(shown.info);
+        if (!shown.leftOut.empty())
+            job_.note(fmt::format("the scene has nodes that are no views; they are left out: {}",
+                                  fmt::join(shown.leftOut, ", ")));
+        if (!shown.asGroups.empty())
+            job_.note(fmt::format(
+                "nodes that place or choose their children by themselves are read as Group: {}",
+                fmt::join(shown.asGroups, ", ")));
+        const ViewNotes notes = notesOf(shown);
         STX_TRY(const auto plans, makePlans(shown, notes));
+        if (plans.empty() && options_.mayBeEmpty) {
+            Bundle nothing;
+            nothing.title = shown.title;
+            return nothing;
+        }
+        noteMotion(scene, shown);
         if (plans.empty())
             return fail(ErrorCode::invalidInput,
                         "the scene shows no DepthImage with a texture; there is nothing to see");
@@ -61,13 +74,17 @@ class BundleReader {
         Bundle bundle;
         bundle.title = shown.title;
         bundle.bounds = notes.bounds;
+        bundle.origin = notes.origin;
         for (std::size_t i = 0; i < plans.size(); ++i) {
             if (!read[i])
                 return tl::unexpected(
                     read[i].error().at(fmt::format("view {} '{}'", i, plans[i].name)));
-            for (ReferenceView& view : *read[i]) {
+            for (std::size_t layer = 0; layer < read[i]->size(); ++layer) {
+                ReferenceView& view = (*read[i])[layer];
                 const auto pad = notes.paddings.find(plans[i].defName);
                 if (pad != notes.paddings.end()) removePadding(view, pad->second);
+                const auto pruned = notes.pruned.find({plans[i].defName, static_cast<int>(layer)});
+                if (pruned != notes.pruned.end()) markPruned(view, plans[i], pruned->second);
                 applySimilarity(view, plans[i].worldFromLocal);
                 bundle.views.push_back(std::move(view));
             }
@@ -81,6 +98,84 @@ class BundleReader {
     }
 
   private:
+    /// What all WorldInfo say. Bounds are moved as the WorldInfo is; they hold only when each
+    /// object is moved with one.
+    ViewNotes notesOf(const ShownScene& shown) {
+        ViewNotes all;
+        std::vector<glm::dmat4> places;
+        for (const ShownInfo& info : shown.infos) {
+            ViewNotes notes = ViewNotes::parse(info.text);
+            all.names.merge(notes.names);
+            all.paddings.merge(notes.paddings);
+            all.pruned.merge(notes.pruned);
+            if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
+            if (!notes.bounds) continue;
+            places.push_back(info.worldFromLocal);
+            if (!all.bounds) all.bounds.emplace();
+            for (int corner = 0; corner < 8; ++corner) {
+                const Bounds& b = *notes.bounds;
+                const glm::dvec4 p(corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y,
+                                   corner & 4 ? b.max.z : b.min.z, 1.0);
+                all.bounds->add(glm::dvec3(info.worldFromLocal * p));
+            }
+        }
+        const bool moved =
+            std::any_of(shown.nodes.begin(), shown.nodes.end(), [&](const ShownNode& node) {
+                return std::find(places.begin(), places.end(), node.worldFromLocal) == places.end();
+            });
+        if (all.bounds && moved) {
+            job_.note(
+                "the bounds that WorldInfo states are left out: a Transform moves views away "
+                "from them");
+            all.bounds.reset();
+        }
+        return all;
+    }
+    /// A mask that is damaged costs quality only, so that it is a note.
+    void markPruned(ReferenceView& view, const Plan& plan, const std::string& where) {
+        if (where == kPrunedInAlpha || !options_.pixels) {
+            view.pruned = true;
+            return;
+        }
+        // The list of a PointTexture has no colours for pruned pixels; neighbours' serve.
+        if (plan.texture->info->find("depthNbBits") >= 0) bleedColour(view.texture);
+        if (const auto ok = applyPrunedMask(view, where, job_.limits); !ok)
+            job_.note(fmt::format("view '{}': {}; borders of what was pruned may show", view.name,
+                                  ok.error().text()));
+    }
+
+    /// Says what would change the views in time, besides commands.
+    void noteMotion(const Scene& scene, const ShownScene& shown) {
+        std::unordered_map<int, std::size_t> pictures;
+        for (const ObjectDescriptor* od : document_.objectDescriptors())
+            if (!od->streams.empty()) pictures[od->id] = od->streams[0].samples.size();
+        std::unordered_set<const Node*> inViews = shown.above;
+        std::unordered_set<int> moving;
+        // Views share nodes, so all are walked as one graph.
+        const NodePtr all = makeNode("Group");
+        for (const ShownNode& view : shown.nodes)
+            all->edit<NodeList>("children").push_back(view.node);
+        forEachNode(all, [&](const NodePtr& node) {
+            inViews.insert(node.get());
+            const int url = node->info->find("url");
+            const auto* urls = url < 0 ? nullptr : std::get_if<std::vector<Url>>(&node->value(url));
+            if (urls == nullptr || urls->empty()) return;
+            const auto found = pictures.find(urls->front().objectDescriptorId);
+            if (found != pictures.end() && found->second > 1) moving.insert(found->first);
+        });
+        const auto routes =
+            std::count_if(scene.routes.begin(), scene.routes.end(),
+                          [&](const Route& route) { return inViews.contains(route.to.get()); });
+        if (routes > 0)
+            job_.note(fmt::format("{} ROUTE(s) change the views in time; only their start is read",
+                                  routes));
+        if (!moving.empty())
+            job_.note(
+                fmt::format("{} image(s) of the views have several pictures in time; only "
+                            "the first of each is read",
+                            moving.size()));
+    }
+
     std::string freeName(const NodePtr& node, const ViewNotes& notes) {
         std::string name = node->defName;
         if (const auto own = notes.names.find(name); own != notes.names.end()) name = own->second;
@@ -219,13 +314,13 @@ class BundleReader {
         if (plan.texture->info->find("depthNbBits") >= 0) {
             STX_TRY(const auto view, cameraOf(plan, plan.texture->get<std::int32_t>("width"),
                                               plan.texture->get<std::int32_t>("height")));
-            return std::vector<ReferenceView>{view};
+            return headersFromPointTexture(*plan.texture, view, job_.limits);
         }
         const NodePtr& depth = plan.texture->get<NodePtr>("depth");
         const NodePtr& colour = plan.texture->get<NodePtr>("texture");
         STX_TRY(const auto info, images_->probe(depth && !plan.octree ? *depth : *colour));
         STX_TRY(auto view, cameraOf(plan, info.width, info.height));
-        view.depthBits = info.bits;
+        if (!plan.octree) view.depthBits = info.bits;
         return std::vector<ReferenceView>{view};
     }
 
@@ -258,7 +353,9 @@ class BundleReader {
             if (depth.channels == 2 || depth.channels == 4)
                 job_.note("a depth image has an alpha channel, which is left out");
             depthBits = depth.bits();
-            STX_TRY(view.depth, depthFromImage(depth, 0, view.nearPlane, view.farPlane));
+            const auto stored = images_->probe(*depthNode);
+            STX_TRY(view.depth, depthFromImage(depth, 0, stored ? stored->greyBits : 0,
+                                               view.nearPlane, view.farPlane));
         } else {
             if (!hasAlpha)
                 return fail(
@@ -267,7 +364,7 @@ class BundleReader {
             STX_TRY(view, cameraOf(plan, colour.width, colour.height));
             depthBits = colour.bits();
             STX_TRY(view.depth,
-                    depthFromImage(colour, colour.channels - 1, view.nearPlane, view.farPlane));
+                    depthFromImage(colour, colour.channels - 1, 0, view.nearPlane, view.farPlane));
         }
         if (!plan.octree) view.depthBits = depthBits;
 

@@ -2,6 +2,7 @@
 #include <set>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/mapping/octree_write.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
@@ -29,6 +30,7 @@ struct ViewImages {
     float nearPlane = 0, farPlane = 0;
     float longestSplat = 0;
     Bytes texture, depth, normal, splatU, splatV;
+    std::string pruned;  ///< of a pruned view: what its note says
     double worstDepth = 0;
     bool clamped = false;
     bool coverageLost = false;
@@ -41,36 +43,20 @@ class SceneWriter {
 
     Result<Document> write() {
         STX_CHECK(checkRequest());
-        std::vector<Result<ViewImages>> images(bundle_.views.size());
-        parallelFor(0, static_cast<std::int64_t>(bundle_.views.size()), [&](std::int64_t i) {
-            const auto at = static_cast<std::size_t>(i);
-            if (!job_.cancelled) images[at] = encode(bundle_.views[at]);
-        });
-        STX_CHECK(job_.checkCancelled());
-        NodeList children = {nullptr};  // WorldInfo, known at the end
         ViewNotes notes;
-        notes.bounds = bundle_.bounds ? bundle_.bounds : bundle_.computeBounds();
-        for (std::size_t i = 0; i < bundle_.views.size(); ++i) {
-            if (!images[i]) return tl::unexpected(images[i].error().at(viewName(i)));
-            const std::size_t layers = options_.pointTexture ? layersFrom(i) : 1;
-            for (std::size_t k = 1; k < layers; ++k)
-                if (!images[i + k])
-                    return tl::unexpected(images[i + k].error().at(viewName(i + k)));
-            children.push_back(depthImage(i, layers, *images[i], notes));
-            for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
-            i += layers - 1;
+        notes.origin = bundle_.origin;
+        bounds_ = bundle_.bounds ? *bundle_.bounds : bundle_.computeBounds();
+        notes.bounds = bounds_;
+        NodePtr root;
+        if (options_.octreeLevels > 0) {
+            STX_TRY(root, octreeGroup(notes));
+        } else {
+            STX_TRY(auto children, depthImages(notes));
+            root = groupOf(std::move(children), notes);
         }
-        sayTotals();
-        NodePtr worldInfo = makeNode("WorldInfo");
-        worldInfo->set("title", bundle_.title);
-        std::vector<std::string> info = notes.text();
-        info.insert(info.begin(), "made by stx");
-        worldInfo->set("info", std::move(info));
-        children[0] = worldInfo;
+        addNavigation(*root);
 
         Document document;
-        NodePtr root = makeNode("Group");
-        root->set("children", std::move(children));
         document.sceneStream.esId = 1;
         document.sceneStream.streamType = StreamType::sceneDescription;
         document.sceneStream.objectTypeIndication = oti::kSystemsV1;
@@ -111,6 +97,123 @@ class SceneWriter {
         return view.depthBits == 8 ? 8 : 16;
     }
 
+    Result<NodeList> depthImages(ViewNotes& notes) {
+        std::vector<Result<ViewImages>> images(bundle_.views.size());
+        parallelFor(0, static_cast<std::int64_t>(bundle_.views.size()), [&](std::int64_t i) {
+            const auto at = static_cast<std::size_t>(i);
+            if (!job_.cancelled) images[at] = encode(bundle_.views[at]);
+        });
+        STX_CHECK(job_.checkCancelled());
+        NodeList children;
+        for (std::size_t i = 0; i < bundle_.views.size(); ++i) {
+            if (!images[i]) return tl::unexpected(images[i].error().at(viewName(i)));
+            const std::size_t layers = options_.pointTexture ? layersFrom(i) : 1;
+            for (std::size_t k = 1; k < layers; ++k)
+                if (!images[i + k])
+                    return tl::unexpected(images[i + k].error().at(viewName(i + k)));
+            children.push_back(depthImage(i, layers, *images[i], notes));
+            for (std::size_t k = 0; k < layers; ++k)
+                if (!images[i + k]->pruned.empty())
+                    notes.pruned[{children.back()->defName, static_cast<int>(k)}] =
+                        std::move(images[i + k]->pruned);
+            for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
+            i += layers - 1;
+        }
+        sayTotals();
+        return children;
+    }
+
+    /// Group { WorldInfo, children }.
+    NodePtr groupOf(NodeList children, const ViewNotes& notes, const char* type = "Group") const {
+        NodePtr worldInfo = makeNode("WorldInfo");
+        worldInfo->set("title", bundle_.title);
+        std::vector<std::string> info = notes.text();
+        info.insert(info.begin(), kMadeByUs);
+        worldInfo->set("info", std::move(info));
+        children.insert(children.begin(), worldInfo);
+        NodePtr group = makeNode(type);
+        group->set("children", std::move(children));
+        return group;
+    }
+
+    /// For players: the whole object in sight from the side of the first view, and turned around
+    /// it.
+    void addNavigation(Node& root) const {
+        if (bounds_.empty()) return;
+        NodePtr viewpoint = makeNode("Viewpoint");
+        const double angle = viewpoint->get<float>("fieldOfView");
+        const double away = std::max(bounds_.radius(), 1e-6) / std::sin(angle / 2);
+        // From the rounded orientation: a bundle that was read gives the same bytes again.
+        const glm::vec4 turn(axisAngleFromQuat(bundle_.views[0].camera.orientation));
+        const glm::dvec3 back = quatFromAxisAngle(glm::dvec4(turn)) * glm::dvec3(0, 0, 1);
+        viewpoint->set("position", glm::vec3(bounds_.centre() + back * away));
+        viewpoint->set("orientation", Rotation{glm::vec3(turn), turn.w});
+        viewpoint->set("description", std::string("all"));
+        NodePtr navigation = makeNode("NavigationInfo");
+        navigation->set("type", std::vector<std::string>{"EXAMINE", "ANY"});
+        navigation->set("headlight", false);
+        NodeList children = root.get<NodeList>("children");
+        children.push_back(viewpoint);
+        children.push_back(navigation);
+        root.set("children", std::move(children));
+    }
+
+    /// The WorldInfo is in the frame of the octree's cube, so that its bounds follow it.
+    Result<NodePtr> octreeGroup(ViewNotes& notes) {
+        STX_TRY(auto parts, octreeFromBundle(bundle_, options_.octreeLevels, job_));
+        NodePtr octree = makeNode("OctreeImage");
+        octree->defName = "octree";
+        taken_.insert(octree->defName);
+        octree->set("octreeResolution", parts.resolution);
+        octree->set("octree", std::move(parts.octree));
+        NodeList images;
+        for (std::size_t i = 0; i < parts.pictures.size(); ++i) {
+            auto image = octreePicture(i, parts.pictures[i], notes);
+            if (!image) return tl::unexpected(image.error().at(viewName(i)));
+            images.push_back(std::move(*image));
+        }
+        octree->set("images", std::move(images));
+        job_.note(fmt::format("depth is rounded to {} voxels of {:.4g} scene units on a side",
+                              parts.voxels, parts.side / parts.resolution));
+        for (const ReferenceView& view : bundle_.views)
+            vectorsLost_ = vectorsLost_ || view.hasNormals() || view.hasSplats();
+        if (vectorsLost_) job_.note("an OctreeImage has no normals and splats: they are left out");
+        notes.bounds = parts.used;
+        if (parts.isUnitCube()) return groupOf({octree}, notes);
+        notes.bounds->min = (notes.bounds->min - parts.centre) / parts.side;
+        notes.bounds->max = (notes.bounds->max - parts.centre) / parts.side;
+        NodePtr transform = groupOf({octree}, notes, "Transform");
+        transform->set("translation", glm::vec3(parts.centre));
+        transform->set("scale", glm::vec3(static_cast<float>(parts.side)));
+        NodePtr group = makeNode("Group");
+        group->set("children", NodeList{transform});
+        return group;
+    }
+    Result<NodePtr> octreePicture(std::size_t i, const OctreeParts::Picture& picture,
+                                  ViewNotes& notes) {
+        STX_TRY(const auto padding,
+                centringPadding(picture.camera, std::min(job_.limits.maxImageSide, 65535)));
+        const Rgba8Image colour = padded(picture.colour, padding);
+        Bytes bytes;
+        if (options_.texture == SceneWriteOptions::Texture::jpeg) {
+            STX_TRY(bytes, colourJpeg(colour, options_.jpegQuality));
+        } else {
+            STX_TRY(bytes, colourPng(colour, false));
+        }
+        NodePtr node = makeNode("DepthImage");
+        node->defName = defNameOf(bundle_.views[i], i, notes);
+        const Camera& c = padding.camera;
+        const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
+        node->set("position", glm::vec3(c.position));
+        node->set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
+        node->set("fieldOfView", glm::vec2(c.fieldOfView()));
+        node->set("orthographic", true);
+        NodePtr texture = makeNode("SimpleTexture");
+        texture->set("texture", textureNode(node->defName, "texture", std::move(bytes)));
+        node->set("diTexture", texture);
+        return node;
+    }
+
     Result<void> checkRequest() const {
         if (options_.jpegQuality < 1 || options_.jpegQuality > 100)
             return fail(ErrorCode::usage, "the JPEG quality is {}; 1 to 100 is possible",
@@ -123,11 +226,18 @@ class SceneWriter {
             return fail(ErrorCode::usage, "normals of {} bits are not possible; 8 or 16",
                         options_.normalBits);
         STX_CHECK(bundle_.checkHeaders());
+        if (options_.pointTexture && options_.octreeLevels > 0)
+            return fail(ErrorCode::usage,
+                        "PointTexture and OctreeImage are both asked for; only one is possible");
+        if (options_.octreeLevels < 0 || options_.octreeLevels > kMaxOctreeLevels)
+            return fail(ErrorCode::usage, "an octree of {} levels; 1 to {} are possible",
+                        options_.octreeLevels, kMaxOctreeLevels);
         if (options_.pointTexture) return {};
         std::size_t count = 0;
         for (const ReferenceView& view : bundle_.views) {
-            count += 2;
-            if (isV2(view)) count += (view.hasNormals() ? 1u : 0u) + (view.hasSplats() ? 2u : 0u);
+            count += options_.octreeLevels > 0 ? 1 : 2;
+            if (options_.octreeLevels == 0 && isV2(view))
+                count += (view.hasNormals() ? 1u : 0u) + (view.hasSplats() ? 2u : 0u);
         }
         if (count > kLastOd - kFirstOd + 1)
             return fail(ErrorCode::unsupported,
@@ -165,16 +275,23 @@ class SceneWriter {
                     out.worstDepth =
                         std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
             }
-            out.coverageLost =
-                !alphaFollowsDepth(rgba8FromTexture(view.texture, out.clamped), view.depth);
+            const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
+            out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
+            if (view.pruned) {
+                STX_TRY(out.pruned, prunedMask(colour, view.depth));
+            }
             return out;
         }
         STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
         const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
         const bool alpha = !alphaFollowsDepth(colour, view.depth);
+        if (view.pruned) out.pruned = kPrunedInAlpha;
         const Rgba8Image wide = padded(colour, out.padding);
         if (options_.texture == SceneWriteOptions::Texture::jpeg) {
-            out.coverageLost = alpha;
+            out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
+            if (view.pruned) {
+                STX_TRY(out.pruned, prunedMask(colour, view.depth));
+            }
             STX_TRY(out.texture, colourJpeg(wide, options_.jpegQuality));
         } else {
             STX_TRY(out.texture, colourPng(wide, alpha));
@@ -354,10 +471,11 @@ class SceneWriter {
     const SceneWriteOptions& options_;
     Job& job_;
     UpdateObjectDescriptors update_;
+    Bounds bounds_;
     std::set<std::string> taken_;
     double worst_ = 0;
     int lossyBits_ = 0;
-    bool clamped_ = false, coverageLost_ = false, dropped_ = false;
+    bool clamped_ = false, coverageLost_ = false, dropped_ = false, vectorsLost_ = false;
 };
 
 }  // namespace

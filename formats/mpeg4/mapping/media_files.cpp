@@ -1,3 +1,4 @@
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -47,6 +48,7 @@ bool isPlainFileName(std::string_view name) {
 }
 
 std::string_view endingOf(const ElementaryStream& stream) {
+    if (needsTrackFile(stream)) return ".mp4";
     switch (stream.objectTypeIndication) {
         case oti::kJpeg:
             return ".jpg";
@@ -57,10 +59,15 @@ std::string_view endingOf(const ElementaryStream& stream) {
     }
 }
 
-/// What the object descriptors of a scene are for: `front_depth` for the depth of DepthImage
-/// `front`.
-std::map<int, std::string> rolesOf(const Document& document) {
-    std::map<int, std::string> roles;
+/// What an image is for: the depth of DepthImage `front`.
+struct Role {
+    std::string view, field;
+    [[nodiscard]] std::string name() const { return view + "_" + field; }
+};
+
+/// What the object descriptors of a scene are for.
+std::map<int, Role> rolesOf(const Document& document) {
+    std::map<int, Role> roles;
     int count = 0;
     const auto visit = [&](const NodePtr& node) {
         const int index = node->info->find("diTexture");
@@ -78,7 +85,7 @@ std::map<int, std::string> rolesOf(const Document& document) {
                 for (const Url& one : *urls)
                     if (one.objectDescriptorId != 0)
                         roles.try_emplace(one.objectDescriptorId,
-                                          base + "_" + (*texture)->info->fields[field.index].name);
+                                          Role{base, (*texture)->info->fields[field.index].name});
         }
     };
     for (const CommandFrame& frame : document.frames)
@@ -111,7 +118,7 @@ class MediaLoader {
             return fail(ErrorCode::invalidInput, "'{}' is no name of {} file(s)",
                         excerpt(stream.fileName), stream.samples.size());
         for (std::size_t i = 0; i < names.size(); ++i) {
-            STX_TRY(const auto path, resolveInside(folder_, names[i], job_.limits));
+            STX_TRY(const auto path, find(names[i]));
             STX_TRY(stream.samples[i].data, open(path));
         }
         if (stream.samples.empty()) return {};
@@ -121,6 +128,16 @@ class MediaLoader {
         if (stream.objectTypeIndication == 0) stream.objectTypeIndication = typeOf(bytes);
         if (stream.streamType == StreamType::none) stream.streamType = StreamType::visual;
         return {};
+    }
+    /// Where it is named, else beside the text: other programs write names as seen from where they
+    /// ran, and files get moved together.
+    Result<std::filesystem::path> find(const std::string& name) const {
+        auto path = resolveInside(folder_, name, job_.limits);
+        if (path) return path;
+        const auto slash = name.find_last_of("/\\");
+        if (slash == std::string::npos) return path;
+        auto beside = resolveInside(folder_, name.substr(slash + 1), job_.limits);
+        return beside ? beside : path;
     }
     Result<ByteRange> open(const std::filesystem::path& path) {
         if (!many_) {
@@ -136,21 +153,30 @@ class MediaLoader {
     Result<void> loadTrack(ElementaryStream& stream, const std::string& file,
                            const std::string& track) {
         const auto id = integerFromText(track);
-        if (!id || *id < 1)
+        if (!id || *id < 1 || *id > 0xFFFFFFFF)
             return fail(ErrorCode::invalidInput, "'{}' names no track; expected FILE.mp4#NUMBER",
                         excerpt(stream.fileName));
-        STX_TRY(const auto path, resolveInside(folder_, file, job_.limits));
+        STX_TRY(const auto path, find(file));
         STX_TRY(const auto source, ByteSource::open(path));
-        STX_TRY(const auto other, readMp4(source, job_));
-        const ElementaryStream* found = nullptr;
-        for (const ObjectDescriptor* od : other.objectDescriptors())
-            for (const ElementaryStream& candidate : od->streams)
-                if (candidate.esId == static_cast<std::uint32_t>(*id)) found = &candidate;
-        if (!found) return fail(ErrorCode::invalidInput, "'{}' has no media track {}", file, *id);
-        stream.samples = found->samples;
-        stream.timescale = found->timescale;
-        stream.width = found->width;
-        stream.height = found->height;
+        STX_TRY(auto found, readMp4Stream(source, static_cast<std::uint32_t>(*id), job_));
+        // What the text says of the start of the stream delays the track.
+        const double start = stream.samples.empty()
+                                 ? 0
+                                 : static_cast<double>(stream.samples[0].time) / stream.timescale;
+        const auto delay = static_cast<std::uint64_t>(std::llround(start * found.timescale));
+        for (Sample& sample : found.samples) sample.time += delay;
+        stream.samples = std::move(found.samples);
+        stream.timescale = found.timescale;
+        stream.edits = std::move(found.edits);
+        stream.width = found.width;
+        stream.height = found.height;
+        stream.sampleEntry = std::move(found.sampleEntry);
+        stream.handler = std::move(found.handler);
+        if (stream.objectTypeIndication == 0)
+            stream.objectTypeIndication = found.objectTypeIndication;
+        if (stream.streamType == StreamType::none) stream.streamType = found.streamType;
+        if (stream.decoderSpecificInfo.empty())
+            stream.decoderSpecificInfo = std::move(found.decoderSpecificInfo);
         return {};
     }
 
@@ -162,6 +188,14 @@ class MediaLoader {
 
 }  // namespace
 
+bool needsTrackFile(const ElementaryStream& stream) {
+    if (stream.samples.empty()) return false;
+    if (!stream.sampleEntry.empty() || !stream.edits.edits.empty()) return true;
+    if (stream.samples.size() > 1) return true;
+    const Sample& first = stream.samples.front();
+    return !first.sync || first.compositionOffset != 0;
+}
+
 Result<void> loadMedia(Document& document, const std::filesystem::path& folder, Job& job) {
     std::size_t files = 0;
     STX_CHECK(forEachStream(document, [&](ElementaryStream& stream, int) -> Result<void> {
@@ -171,6 +205,28 @@ Result<void> loadMedia(Document& document, const std::filesystem::path& folder, 
     MediaLoader loader(folder, files > kMostOpen, job);
     return forEachStream(
         document, [&](ElementaryStream& stream, int odId) { return loader.load(stream, odId); });
+}
+
+void nameTracks(Document& document) {
+    bool ours = false;
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands)
+            forEachNode(command, [&](const NodePtr& node) {
+                if (!node->is("WorldInfo")) return;
+                const auto& info = node->get<std::vector<std::string>>("info");
+                ours = ours || (!info.empty() && info.front() == kMadeByUs);
+            });
+    if (!ours) return;
+    const auto roles = rolesOf(document);
+    const auto done = forEachStream(document, [&](ElementaryStream& stream, int odId) {
+        const auto role = roles.find(odId);
+        if (role == roles.end()) return Result<void>();
+        stream.trackName = role->second.view + " " + role->second.field;
+        stream.alternateGroup = 1;
+        stream.enabled = role->second.field == "texture";
+        return Result<void>();
+    });
+    (void)done;  // the body never fails
 }
 
 std::vector<std::string> mediaFileNames(const Document& document) {
@@ -200,7 +256,7 @@ std::vector<std::string> mediaFileNames(const Document& document) {
                               (ending == ".bin" && !own.empty());
             if (!isPlainFileName(name) || !fits) {
                 const auto role = roles.find(odId);
-                name = (role != roles.end() ? role->second : fmt::format("od{}", odId)) +
+                name = (role != roles.end() ? role->second.name() : fmt::format("od{}", odId)) +
                        std::string(ending);
             }
             const auto end = name.rfind('.');
@@ -214,10 +270,6 @@ std::vector<std::string> mediaFileNames(const Document& document) {
             for (int n = 1; !taken.insert(key(name)).second; ++n)
                 name = fmt::format("{}_od{}{}{}", stem, odId, n > 1 ? fmt::format("_{}", n) : "",
                                    tail);
-            if (stream.samples.size() > 1) {
-                const auto at = name.rfind('.');
-                name.insert(at, "_%04d");
-            }
             names.push_back(name);
             return {};
         });

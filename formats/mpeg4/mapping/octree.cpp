@@ -49,16 +49,16 @@ Result<Octree> Octree::parse(std::span<const std::int32_t> octree, std::int32_t 
     return tree;
 }
 
-double Octree::firstHit(glm::dvec3 origin, glm::dvec3 direction) const {
+double Octree::firstHit(glm::dvec3 origin, glm::dvec3 direction, glm::ivec3* voxel) const {
     // Children are tried in the order in which the line passes them: nearest octant first.
     const int nearest =
         (direction.x < 0 ? 1 : 0) | (direction.y < 0 ? 2 : 0) | (direction.z < 0 ? 4 : 0);
     if (levels_ > 0 && nodes_.empty()) return kNoDepth;
-    return hit(0, 0, glm::dvec3(-0.5), 1.0, origin, direction, nearest);
+    return hit(0, 0, glm::dvec3(-0.5), 1.0, origin, direction, nearest, voxel);
 }
 
 double Octree::hit(std::uint32_t node, int level, glm::dvec3 low, double side, glm::dvec3 origin,
-                   glm::dvec3 direction, int nearest) const {
+                   glm::dvec3 direction, int nearest, glm::ivec3* voxel) const {
     double enter = -std::numeric_limits<double>::infinity();
     double leave = std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
@@ -74,7 +74,10 @@ double Octree::hit(std::uint32_t node, int level, glm::dvec3 low, double side, g
         leave = std::min(leave, std::max(t0, t1));
     }
     if (!(enter <= leave)) return kNoDepth;
-    if (level == levels_) return enter;
+    if (level == levels_) {
+        if (voxel) *voxel = glm::ivec3(glm::round((low + 0.5) * static_cast<double>(1 << levels_)));
+        return enter;
+    }
 
     const Node& here = nodes_[node];
     const double half = side / 2;
@@ -86,7 +89,7 @@ double Octree::hit(std::uint32_t node, int level, glm::dvec3 low, double side, g
         const glm::dvec3 corner =
             low + half * glm::dvec3(child & 1, child >> 1 & 1, child >> 2 & 1);
         const double found =
-            hit(here.first + before, level + 1, corner, half, origin, direction, nearest);
+            hit(here.first + before, level + 1, corner, half, origin, direction, nearest, voxel);
         if (found < kNoDepth) return found;
     }
     return kNoDepth;

@@ -29,8 +29,10 @@ class Octree {
     [[nodiscard]] std::int64_t voxelCount() const { return voxels_; }
 
     /// Distance along `direction` (unit) from `origin` to the first voxel that the whole line
-    /// meets, which may be negative; kNoDepth when it meets none.
-    [[nodiscard]] double firstHit(glm::dvec3 origin, glm::dvec3 direction) const;
+    /// meets, which may be negative; kNoDepth when it meets none. `voxel` becomes which one it is,
+    /// counted from the lower corner of the cube.
+    [[nodiscard]] double firstHit(glm::dvec3 origin, glm::dvec3 direction,
+                                  glm::ivec3* voxel = nullptr) const;
 
   private:
     struct Node {
@@ -38,7 +40,7 @@ class Octree {
         std::uint32_t first = 0;  ///< index of the first child that exists
     };
     double hit(std::uint32_t node, int level, glm::dvec3 low, double side, glm::dvec3 origin,
-               glm::dvec3 direction, int nearest) const;
+               glm::dvec3 direction, int nearest, glm::ivec3* voxel) const;
 
     int levels_ = 0;
     std::vector<Node> nodes_;  ///< inner nodes, breadth first

@@ -9,11 +9,15 @@ std::uint8_t byteFromUnit(float v) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(v, 0.0f, 1.0f) * 255.0f));
 }
 
-}  // namespace
+/// The length of the lists of a PointTexture.
+struct Shape {
+    std::size_t points = 0;
+    std::int32_t layers = 1;
+    int depthBits = 8;  ///< 8, 16 or 32: what holds the codes
+};
 
-Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
-                                                         const ReferenceView& view,
-                                                         const Limits& limits) {
+/// Errors: sizes, bits or counts that do not fit each other.
+Result<Shape> shapeOf(const Node& node, const Limits& limits) {
     const auto width = node.get<std::int32_t>("width"), height = node.get<std::int32_t>("height");
     const auto& codes = node.get<std::vector<std::int32_t>>("depth");
     const auto& colours = node.get<std::vector<Color>>("color");
@@ -31,9 +35,9 @@ Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
                     "{} is {}x{} but its depth has {} values; each pixel needs one at least",
                     node.info->name, width, height, codes.size());
 
-    // First how many layers and points there are, then the pixels.
-    std::size_t at = 0, points = 0;
-    std::int32_t layers = 1;
+    Shape shape;
+    shape.depthBits = bits + 1 <= 8 ? 8 : bits + 1 <= 16 ? 16 : 32;
+    std::size_t at = 0;
     for (std::size_t i = 0; i < pixels && !codes.empty(); ++i) {
         if (at >= codes.size())
             return fail(ErrorCode::invalidInput, "{}.depth ends at pixel {} of {}", node.info->name,
@@ -44,15 +48,34 @@ Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
                         "{}.depth says {} depths for pixel {}, but {} values follow",
                         node.info->name, count, i, codes.size() - at);
         at += static_cast<std::size_t>(count);
-        points += static_cast<std::size_t>(count);
-        layers = std::max(layers, count);
+        shape.points += static_cast<std::size_t>(count);
+        shape.layers = std::max(shape.layers, count);
     }
     if (at != codes.size())
         return fail(ErrorCode::invalidInput, "{}.depth has {} values behind the last pixel",
                     node.info->name, codes.size() - at);
-    if (colours.size() != points)
+    if (colours.size() != shape.points)
         return fail(ErrorCode::invalidInput, "{} has {} depths but {} colours; both must match",
-                    node.info->name, points, colours.size());
+                    node.info->name, shape.points, colours.size());
+    if (shape.layers > limits.maxViews)
+        return fail(ErrorCode::invalidInput, "{} has a pixel with {} depths; at most {} are read",
+                    node.info->name, shape.layers, limits.maxViews);
+    return shape;
+}
+
+}  // namespace
+
+Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
+                                                         const ReferenceView& view,
+                                                         const Limits& limits) {
+    const auto width = node.get<std::int32_t>("width"), height = node.get<std::int32_t>("height");
+    const auto& codes = node.get<std::vector<std::int32_t>>("depth");
+    const auto& colours = node.get<std::vector<Color>>("color");
+    const auto bits = node.get<std::int32_t>("depthNbBits");
+    STX_TRY(const Shape shape, shapeOf(node, limits));
+    const std::size_t pixels = static_cast<std::size_t>(width) * height;
+    const std::size_t points = shape.points;
+    const std::int32_t layers = shape.layers;
     const bool v2 = node.info->find("splatU") >= 0;
     const std::vector<glm::vec3> none;
     const NodePtr normalNode = v2 ? node.get<NodePtr>("normal") : nullptr;
@@ -65,9 +88,6 @@ Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
                         "{} has {} depths but {} normals, {} splatU and {} splatV", node.info->name,
                         points, normals.size(), splatU.size(), splatV.size());
     const bool splats = !splatU.empty() && !splatV.empty();
-    if (layers > limits.maxViews)
-        return fail(ErrorCode::invalidInput, "{} has a pixel with {} depths; at most {} are read",
-                    node.info->name, layers, limits.maxViews);
     const std::uint64_t perPixel = 8 + (normals.empty() ? 0 : 12) + (splats ? 24 : 0);
     if (auto ok = limits.checkAllocation(pixels * static_cast<std::uint64_t>(layers), perPixel,
                                          "the points of a PointTexture");
@@ -86,13 +106,12 @@ Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
             layer.splatU = Image<glm::vec3>(width, height);
             layer.splatV = Image<glm::vec3>(width, height);
         }
-        layer.depthBits = bits + 1 <= 8 ? 8 : bits + 1 <= 16 ? 16 : 32;
+        layer.depthBits = shape.depthBits;
         views.push_back(std::move(layer));
     }
     const DepthCode code{view.nearPlane, view.farPlane,
                          static_cast<std::uint32_t>((1ull << (bits + 1)) - 1)};
-    at = 0;
-    std::size_t point = 0;
+    std::size_t at = 0, point = 0;
     for (int y = height - 1; y >= 0 && !codes.empty(); --y) {
         for (int x = 0; x < width; ++x) {
             const std::int32_t count = codes[at++];
@@ -122,6 +141,18 @@ Result<std::vector<ReferenceView>> viewsFromPointTexture(const Node& node,
     }
     for (std::size_t k = 0; k < views.size(); ++k)
         views[k].texture = Texture(std::move(textures[k]));
+    return views;
+}
+
+Result<std::vector<ReferenceView>> headersFromPointTexture(const Node& node,
+                                                           const ReferenceView& view,
+                                                           const Limits& limits) {
+    STX_TRY(const Shape shape, shapeOf(node, limits));
+    std::vector<ReferenceView> views(static_cast<std::size_t>(shape.layers), view);
+    for (std::size_t k = 0; k < views.size(); ++k) {
+        if (k > 0) views[k].name += fmt::format("_{}", k);
+        views[k].depthBits = shape.depthBits;
+    }
     return views;
 }
 

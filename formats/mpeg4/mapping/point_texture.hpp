@@ -19,6 +19,11 @@ namespace stx::mpeg4 {
                                                                        const ReferenceView& view,
                                                                        const Limits& limits);
 
+/// The same layers without their images. The lists are checked as far as their lengths go.
+[[nodiscard]] Result<std::vector<ReferenceView>> headersFromPointTexture(const Node& node,
+                                                                         const ReferenceView& view,
+                                                                         const Limits& limits);
+
 /// Whether a view can be a further layer of one: camera and planes are the same.
 [[nodiscard]] bool isLayerOf(const ReferenceView& view, const ReferenceView& first);
 

@@ -83,14 +83,19 @@ DecodedImage decodedFromPixels(const PixelImage& image) {
     return out;
 }
 
-Result<Image<float>> depthFromImage(const DecodedImage& image, int channel, double nearPlane,
-                                    double farPlane) {
+Result<Image<float>> depthFromImage(const DecodedImage& image, int channel, int greyBits,
+                                    double nearPlane, double farPlane) {
     Image<float> depth(image.width, image.height, kNoDepth);
     STX_CHECK(withSamples(image, "depth", [&](const auto& values, unsigned cmax) {
-        const DepthCode code{nearPlane, farPlane, cmax};
+        const bool few = greyBits == 1 || greyBits == 2 || greyBits == 4;
+        const DepthCode code{nearPlane, farPlane, few ? (1u << greyBits) - 1 : cmax};
+        const unsigned spread = cmax / code.dmax;
         for (std::size_t i = 0; i < depth.count(); ++i) {
-            const unsigned d = values[i * static_cast<std::size_t>(image.channels) + channel];
-            if (d != 0) depth.pixels()[i] = static_cast<float>(code.decode(d));
+            const unsigned d =
+                values[i * static_cast<std::size_t>(image.channels) + channel] / spread;
+            if (d == 0) continue;
+            // One bit only: 1 is both planes; take the far one, as in a PointTexture.
+            depth.pixels()[i] = static_cast<float>(code.dmax == 1 ? farPlane : code.decode(d));
         }
     }));
     return depth;
@@ -207,9 +212,12 @@ Rgba8Image rgba8FromTexture(const Texture& texture, bool& clamped) {
     return out;
 }
 
-bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth) {
-    for (std::size_t i = 0; i < texture.count(); ++i)
-        if (texture.pixels()[i].a != (hasPoint(depth.pixels()[i]) ? 255 : 0)) return false;
+bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth, bool prunedToo) {
+    for (std::size_t i = 0; i < texture.count(); ++i) {
+        const int alpha = texture.pixels()[i].a;
+        const bool point = hasPoint(depth.pixels()[i]);
+        if (alpha != (point ? 255 : 0) && !(prunedToo && !point && alpha == 255)) return false;
+    }
     return true;
 }
 

@@ -13,10 +13,11 @@ namespace stx::mpeg4 {
 /// The picture of a PixelTexture; the file's first row is the lowest.
 [[nodiscard]] DecodedImage decodedFromPixels(const PixelImage& image);
 
-/// Distances of a grey image of depth codes, from channel `channel`. Errors when the image has
+/// Distances of a grey image of depth codes, from channel `channel`. `greyBits`: 1, 2 or 4 when
+/// the codes were spread from so few bits (ImageInfo::greyBits), else 0. Errors when the image has
 /// neither 8 nor 16 bits.
 [[nodiscard]] Result<Image<float>> depthFromImage(const DecodedImage& image, int channel,
-                                                  double nearPlane, double farPlane);
+                                                  int greyBits, double nearPlane, double farPlane);
 /// Whether red, green and blue are equal in every pixel.
 [[nodiscard]] bool isGrey(const DecodedImage& image);
 
@@ -46,8 +47,9 @@ namespace stx::mpeg4 {
 /// than 1.
 [[nodiscard]] Rgba8Image rgba8FromTexture(const Texture& texture, bool& clamped);
 /// Whether alpha is 255 where the depth has a point and 0 elsewhere, so that it need not be
-/// written.
-[[nodiscard]] bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth);
+/// written. `prunedToo`: it may be 255 elsewhere, too.
+[[nodiscard]] bool alphaFollowsDepth(const Rgba8Image& texture, const Image<float>& depth,
+                                     bool prunedToo = false);
 /// An image with `padding` around it, its edge repeated (alpha 0 in what is new).
 [[nodiscard]] Rgba8Image padded(const Rgba8Image& image, const Padding& padding);
 /// PNG of colour, with alpha when asked.

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "formats/files/base64.hpp"
+#include "formats/images/images.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 
 namespace stx::mpeg4 {
@@ -16,6 +18,19 @@ std::vector<std::string_view> words(std::string_view text, std::size_t most) {
         text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     }
     if (!text.empty()) list.push_back(text);
+    return list;
+}
+
+/// The finite numbers behind the first word; none when there are not exactly `count`.
+std::vector<double> numbers(std::string_view text, std::size_t count) {
+    const auto w = words(text, count + 2);
+    if (w.size() != count + 1) return {};
+    std::vector<double> list;
+    for (std::size_t i = 1; i < w.size(); ++i) {
+        const auto value = doubleFromText(w[i]);
+        if (!value || !std::isfinite(*value)) return {};
+        list.push_back(*value);
+    }
     return list;
 }
 
@@ -34,19 +49,14 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
     ViewNotes notes;
     for (const std::string& line : info) {
         if (line.starts_with("bounds ")) {
-            const auto w = words(line, 8);
-            glm::dvec3 corners[2];
-            bool good = w.size() == 7;
-            for (int i = 0; good && i < 6; ++i) {
-                const auto value = doubleFromText(w[static_cast<std::size_t>(i) + 1]);
-                good = value && std::isfinite(*value);
-                if (good) corners[i / 3][i % 3] = *value;
-            }
-            if (!good) continue;
+            const auto n = numbers(line, 6);
+            if (n.empty()) continue;
             Bounds bounds;
-            bounds.add(corners[0]);
-            bounds.add(corners[1]);
+            bounds.add({n[0], n[1], n[2]});
+            bounds.add({n[3], n[4], n[5]});
             notes.bounds = bounds;
+        } else if (line.starts_with("origin ")) {
+            if (const auto n = numbers(line, 3); !n.empty()) notes.origin = {n[0], n[1], n[2]};
         } else if (line.starts_with("name ")) {
             const auto w = words(line, 3);
             if (w.size() == 3) notes.names[std::string(w[1])] = w[2];
@@ -66,6 +76,11 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             pad.cx = *cx;
             pad.cy = *cy;
             notes.paddings[std::string(w[1])] = pad;
+        } else if (line.starts_with("pruned ")) {
+            const auto w = words(line, 4);
+            const auto layer = w.size() == 4 ? integerFromText(w[2]) : std::nullopt;
+            if (layer && *layer >= 0 && *layer <= 1 << 20)
+                notes.pruned[{std::string(w[1]), static_cast<int>(*layer)}] = w[3];
         }
     }
     return notes;
@@ -76,11 +91,15 @@ std::vector<std::string> ViewNotes::text() const {
     if (bounds && !bounds->empty())
         info.push_back(fmt::format("bounds {} {} {} {} {} {}", bounds->min.x, bounds->min.y,
                                    bounds->min.z, bounds->max.x, bounds->max.y, bounds->max.z));
+    if (origin != glm::dvec3(0.0))
+        info.push_back(fmt::format("origin {} {} {}", origin.x, origin.y, origin.z));
     for (const auto& [defName, own] : names)
         info.push_back(fmt::format("name {} {}", defName, own));
     for (const auto& [defName, pad] : paddings)
         info.push_back(fmt::format("padding {} {} {} {} {} {} {}", defName, pad.left, pad.top,
                                    pad.right, pad.bottom, pad.cx, pad.cy));
+    for (const auto& [key, where] : pruned)
+        info.push_back(fmt::format("pruned {} {} {}", key.first, key.second, where));
     return info;
 }
 
@@ -100,6 +119,36 @@ void removePadding(ReferenceView& view, const ViewNotes::Pad& pad) {
     c.height = height;
     c.cx = pad.cx;
     c.cy = pad.cy;
+}
+
+Result<std::string> prunedMask(const Rgba8Image& texture, const Image<float>& depth) {
+    std::vector<std::uint8_t> grey(texture.count());
+    for (std::size_t i = 0; i < grey.size(); ++i)
+        grey[i] = texture.pixels()[i].a == 255 && !hasPoint(depth.pixels()[i]) ? 255 : 0;
+    STX_TRY(const auto png, encodePng(texture.width(), texture.height(), 1, 8, grey.data(), false));
+    return encodeBase64(png);
+}
+
+Result<void> applyPrunedMask(ReferenceView& view, const std::string& mask, const Limits& limits) {
+    const auto png = decodeBase64(mask);
+    if (!png) return fail(ErrorCode::invalidInput, "the mask of its pruned pixels is no base64");
+    STX_TRY(const auto header, probeImage(*png));
+    if (header.format != "png" || header.channels != 1 || header.bits != 8 ||
+        header.width != view.depth.width() || header.height != view.depth.height())
+        return fail(ErrorCode::invalidInput,
+                    "the mask of its pruned pixels is a {} of {}x{}; a grey PNG of {}x{} is "
+                    "expected",
+                    header.format, header.width, header.height, view.depth.width(),
+                    view.depth.height());
+    STX_TRY(const auto image, decodeImage(*png, "the mask of pruned pixels", limits));
+    const auto* grey = std::get_if<std::vector<std::uint8_t>>(&image.values);
+    Rgba8Image* texture = view.texture.rgba8();
+    if (!grey || !texture || grey->size() != texture->count())
+        return fail(ErrorCode::invalidInput, "the mask of its pruned pixels does not fit it");
+    for (std::size_t i = 0; i < grey->size(); ++i)
+        if ((*grey)[i] != 0 && !hasPoint(view.depth.pixels()[i])) texture->pixels()[i].a = 255;
+    view.pruned = true;
+    return {};
 }
 
 }  // namespace stx::mpeg4

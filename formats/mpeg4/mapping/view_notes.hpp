@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/mpeg4/scene/placement.hpp"
+#include "lib/base/job.hpp"
 #include "lib/geometry/bounds.hpp"
 
 // clang-format off
@@ -13,21 +14,29 @@
 /// lost:
 ///
 ///     "bounds minX minY minZ maxX maxY maxZ"
+///     "origin x y z" (added to all coordinates here, gives the world's; see Bundle::origin)
 ///     "name DEFNAME the view's own name"
 ///     "padding DEFNAME left top right bottom cx cy"
+///     "pruned DEFNAME layer where"
 ///
-/// Padding is in pixels, cx and cy are the principal point without it. Other strings are left alone.
+/// Padding is in pixels, cx and cy are the principal point without it. A pruned view is layer 0 of
+/// its DepthImage, or a further one of a PointTexture; where it was pruned is "alpha" (full alpha
+/// without a depth), or, when the scene has no alpha for it, a PNG in base64, white where it was
+/// pruned. Other strings are left alone.
 // clang-format on
 namespace stx::mpeg4 {
 
 struct ViewNotes {
     std::optional<Bounds> bounds;
+    glm::dvec3 origin{0.0};
     std::map<std::string, std::string> names;  ///< by DEF name
     struct Pad {
         int left = 0, top = 0, right = 0, bottom = 0;
         double cx = 0, cy = 0;
     };
     std::map<std::string, Pad> paddings;  ///< by DEF name
+    /// Where views were pruned, by DEF name and layer: kPrunedInAlpha, or the text of a mask.
+    std::map<std::pair<std::string, int>, std::string> pruned;
 
     /// Strings that are not ours, or do not parse, are passed over.
     [[nodiscard]] static ViewNotes parse(const std::vector<std::string>& info);
@@ -37,5 +46,14 @@ struct ViewNotes {
 /// Takes the padding off a view again: images are cropped, the principal point goes back to where
 /// it was. Does nothing when the padding does not fit the view.
 void removePadding(ReferenceView& view, const ViewNotes::Pad& pad);
+
+/// What a note says of a pruned view whose alpha is written.
+inline constexpr const char* kPrunedInAlpha = "alpha";
+/// The pixels of full alpha without a depth, as a note's text: a PNG of grey in base64.
+[[nodiscard]] Result<std::string> prunedMask(const Rgba8Image& texture, const Image<float>& depth);
+/// Marks a view of 8-bit colour as pruned and gives it the alpha that a mask says. Errors: the mask
+/// is no such PNG, or has another size than the view.
+[[nodiscard]] Result<void> applyPrunedMask(ReferenceView& view, const std::string& mask,
+                                           const Limits& limits);
 
 }  // namespace stx::mpeg4

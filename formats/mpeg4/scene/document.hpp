@@ -28,6 +28,8 @@ namespace stx::mpeg4 {
 namespace oti {
 inline constexpr std::uint8_t kSystemsV1 = 0x01;  ///< BIFS with a v1 config, and OD streams
 inline constexpr std::uint8_t kSystemsV2 = 0x02;  ///< BIFS with a v2 config
+inline constexpr std::uint8_t kAvc = 0x21;
+inline constexpr std::uint8_t kHevc = 0x23;
 inline constexpr std::uint8_t kJpeg = 0x6C;
 inline constexpr std::uint8_t kPng = 0x6D;
 }  // namespace oti
@@ -73,6 +75,20 @@ struct Sample {
     bool sync = true;
 };
 
+/// One edit of an edit list (ISO/IEC 14496-12, 8.6.6).
+struct Edit {
+    std::uint64_t duration = 0;    ///< in EditList::timescale
+    std::int64_t mediaTime = 0;    ///< in the stream's timescale; -1: nothing is shown
+    std::uint32_t rate = 0x10000;  ///< 16.16
+    bool operator==(const Edit&) const = default;
+};
+/// Which parts of a track are shown when; no edits: all of it, from its first sample's time.
+struct EditList {
+    std::uint32_t timescale = 600;
+    std::vector<Edit> edits;
+    bool operator==(const EditList&) const = default;
+};
+
 /// An ES_Descriptor and the stream it describes.
 struct ElementaryStream {
     std::uint32_t esId = 0;  ///< ES_ID of the text forms = track_ID in the file; 0: writers choose
@@ -91,6 +107,17 @@ struct ElementaryStream {
 
     std::uint32_t timescale = 1000;  ///< ticks a second, at least 1
     std::vector<Sample> samples;
+    /// What a delay cannot say: a delay alone is in the times of the samples.
+    EditList edits;
+    /// Of a track that is no image and no MPEG-4 Systems stream (AVC, HEVC, audio, ...): its whole
+    /// sample entry and its handler, which writers of .mp4 write as they are.
+    Bytes sampleEntry;
+    std::string handler;  ///< four characters; empty: by streamType
+    /// How an .mp4 presents the track to players that know no scenes (ISO/IEC 14496-12, 8.3.2):
+    /// readers leave these as they are here. No name: one for all images.
+    std::string trackName;
+    bool enabled = true;
+    int alternateGroup = 0;  ///< tracks of one group are alternatives; 0: none
     /// Of a visual track as its sample entry says; 0: the writer looks into the image.
     int width = 0, height = 0;
     /// The name of the file that the stream came from or goes to: MuxInfo.fileName, StreamSource
@@ -129,6 +156,7 @@ using OdCommand = std::variant<UpdateObjectDescriptors, RemoveObjectDescriptors,
 struct OdFrame {
     std::uint64_t time = 0;  ///< in odStream.timescale
     std::vector<OdCommand> commands;
+    bool randomAccess = false;  ///< as CommandFrame has it
 };
 
 struct InitialObjectDescriptor {

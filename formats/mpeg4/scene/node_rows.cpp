@@ -1,301 +1,133 @@
 #include "formats/mpeg4/scene/node_rows.hpp"
 
-// A row per node: its numbers as {node data type, version of the code table, code}, then its fields
-// in the order of the standard, from which all field ids follow. Bounds are left out where the
-// standard says [-I, +I]; defaults where they are [], "" or NULL.
+#include <cassert>
+#include <charconv>
+#include <limits>
 
 namespace stx::mpeg4 {
+namespace {
 
-using enum FieldType;
-using enum Ndt;
+// Each file is one raw string.
+constexpr std::string_view kNodeTexts[] = {
+#include "formats/mpeg4/scene/nodes/version1_a_f.inc"
+    ,
+#include "formats/mpeg4/scene/nodes/version1_g_p.inc"
+    ,
+#include "formats/mpeg4/scene/nodes/version1_q_z.inc"
+    ,
+#include "formats/mpeg4/scene/nodes/version2_body.inc"
+    ,
+#include "formats/mpeg4/scene/nodes/version2_to_4.inc"
+    ,
+#include "formats/mpeg4/scene/nodes/version5.inc"
+    ,
+#include "formats/mpeg4/scene/nodes/version6_to_10.inc"
+};
+
+/// Takes what is before the next `mark` off the front of `text`, and the mark.
+std::string_view takeUntil(std::string_view& text, char mark) {
+    const std::string_view part = text.substr(0, text.find(mark));
+    text.remove_prefix(std::min(text.size(), part.size() + 1));
+    return part;
+}
+
+int integerOf(std::string_view text) {
+    int value = 0;
+    [[maybe_unused]] const auto parsed =
+        std::from_chars(text.data(), text.data() + text.size(), value);
+    assert(parsed.ec == std::errc{} && parsed.ptr == text.data() + text.size());
+    return value;
+}
+
+float boundOf(std::string_view text) {
+    if (text == "+I") return std::numeric_limits<float>::max();
+    if (text == "-I") return -std::numeric_limits<float>::max();
+    float value = 0;
+    [[maybe_unused]] const auto parsed =
+        std::from_chars(text.data(), text.data() + text.size(), value);
+    assert(parsed.ec == std::errc{});
+    return value;
+}
+
+/// `scale dynamic 0 +I`
+void readAttributes(std::string_view text, FieldInfo& field) {
+    while (!text.empty()) {
+        const std::string_view word = takeUntil(text, ' ');
+        if (word.empty()) continue;
+        if (word == "dynamic") {
+            field.isDynamic = true;
+        } else if (word.starts_with("linear")) {
+            field.quantisation = Quantisation::linear;
+            field.quantisationBits = integerOf(word.substr(6));
+        } else if (const auto category = quantisationOfName(word)) {
+            field.quantisation = *category;
+        } else {
+            field.minimum = boundOf(word);
+            field.maximum = boundOf(takeUntil(text, ' '));
+        }
+    }
+}
+
+/// `exposedField SFVec3f scale 1 1 1 ; scale dynamic 0 +I`
+FieldInfo fieldOf(std::string_view line) {
+    FieldInfo field;
+    const auto mark = line.find(" ; ");
+    if (mark != std::string_view::npos) {
+        readAttributes(line.substr(mark + 3), field);
+        line = line.substr(0, mark);
+    }
+    const auto kind = fieldKindOfName(takeUntil(line, ' '));
+    std::string_view type = takeUntil(line, ' ');
+    const auto fieldType = fieldTypeOfName(takeUntil(type, '<'));
+    assert(kind && fieldType);
+    field.kind = *kind;
+    field.type = *fieldType;
+    if (!type.empty()) {
+        const auto nodeType = ndtOfName(takeUntil(type, '>'));
+        assert(nodeType);
+        field.nodeType = *nodeType;
+    }
+    field.name = takeUntil(line, ' ');
+    field.defaultText = line;
+    return field;
+}
+
+/// `Transform SFWorldNode:1.94 SF3DNode:1.47`
+NodeRow nodeOf(std::string_view line) {
+    NodeRow node;
+    node.name = takeUntil(line, ' ');
+    while (!line.empty()) {
+        std::string_view code = takeUntil(line, ' ');
+        const auto type = ndtOfName(takeUntil(code, ':'));
+        assert(type);
+        const int version = integerOf(takeUntil(code, '.'));
+        node.codes.push_back({*type, version, integerOf(code)});
+    }
+    return node;
+}
+
+}  // namespace
+
+std::vector<NodeRow> nodeRowsOf(std::string_view text) {
+    std::vector<NodeRow> rows;
+    while (!text.empty()) {
+        const std::string_view line = takeUntil(text, '\n');
+        if (line.empty() || line[0] == '#') continue;
+        if (line[0] != ' ') {
+            rows.push_back(nodeOf(line));
+        } else {
+            assert(!rows.empty() && line.starts_with("  "));
+            rows.back().fields.push_back(fieldOf(line.substr(2)));
+        }
+    }
+    return rows;
+}
 
 std::vector<NodeRow> makeNodeRows() {
-    using enum Quantisation;
-    return {
-        // clang-format off
-        // ---- Depth image-based rendering (ISO/IEC 14496-16)
-        node("DepthImage", {{SFWorldNode, 5, 3}, {SF3DNode, 5, 3}, {SFDepthImageNode, 5, 1}},
-             {field("diTexture", SFNode, SFDepthTextureNode),
-              field("farPlane", SFFloat).byDefault("100").within(0, kMax),
-              field("fieldOfView", SFVec2f).byDefault("0.785398 0.785398").within(0, kPi),
-              field("nearPlane", SFFloat).byDefault("10").within(0, kMax),
-              field("orientation", SFRotation).byDefault("0 0 1 0"),
-              field("orthographic", SFBool).byDefault("TRUE"),
-              field("position", SFVec3f).byDefault("0 0 10")}),
-        node("SimpleTexture", {{SFWorldNode, 5, 35}, {SFDepthTextureNode, 5, 2}},
-             {field("depth", SFNode, SFTextureNode),
-              field("texture", SFNode, SFTextureNode)}),
-        node("PointTexture", {{SFWorldNode, 5, 22}, {SFDepthTextureNode, 5, 1}},
-             {field("color", MFColor),
-              field("depth", MFInt32).within(0, kMax),
-              field("depthNbBits", SFInt32).byDefault("7").linear(5).within(0, 31),
-              field("height", SFInt32).byDefault("256").within(1, kMax),
-              field("width", SFInt32).byDefault("256").within(1, kMax)}),
-        node("OctreeImage", {{SFWorldNode, 5, 17}, {SF3DNode, 5, 5}},
-             {field("images", MFNode, SFDepthImageNode),
-              field("octree", MFInt32).linear(8).within(0, 255),
-              field("octreeResolution", SFInt32).byDefault("256").within(1, kMax),
-              field("voxelImageIndex", MFInt32).linear(8).within(0, 255)}),
-        node("DepthImageV2", {{SFWorldNode, 7, 3}, {SF3DNode, 7, 1}, {SFDepthImageNode, 7, 1}},
-             {field("diTexture", SFNode, SFDepthTextureNode),
-              field("farPlane", SFFloat).byDefault("100").within(0, kMax),
-              field("fieldOfView", SFVec2f).byDefault("0.75 0.75").within(0, kPi),
-              field("nearPlane", SFFloat).byDefault("10").within(0, kMax),
-              field("orientation", SFRotation).byDefault("0 0 1 0"),
-              field("orthographic", SFBool).byDefault("TRUE"),
-              field("position", SFVec3f).byDefault("0 0 10"),
-              field("splatMinMax", SFVec2f).byDefault("0.115 0.975")}),
-        node("SimpleTextureV2", {{SFWorldNode, 7, 8}, {SFDepthTextureNode, 7, 2}},
-             {field("depth", SFNode, SFTextureNode),
-              field("normal", SFNode, SFTextureNode),
-              field("splatU", SFNode, SFTextureNode),
-              field("splatV", SFNode, SFTextureNode),
-              field("texture", SFNode, SFTextureNode)}),
-        node("PointTextureV2", {{SFWorldNode, 7, 6}, {SFDepthTextureNode, 7, 1}},
-             {field("color", MFColor),
-              field("depth", MFInt32).within(0, kMax),
-              field("depthNbBits", SFInt32).byDefault("7").linear(5).within(0, 31),
-              field("height", SFInt32).byDefault("256").within(1, kMax),
-              field("normal", SFNode, SFNormalNode),
-              field("splatU", MFVec3f).quantised(position3D),
-              field("splatV", MFVec3f).quantised(position3D),
-              field("width", SFInt32).byDefault("256").within(1, kMax)}),
-        node("BitWrapper", {{SFWorldNode, 5, 1}, {SF3DNode, 5, 1}, {SF2DNode, 5, 1}, {SFGeometryNode, 5, 1}},
-             {field("node", SFNode, SFWorldNode),
-              field("type", SFInt32).byDefault("0"),
-              field("url", MFURL),
-              field("buffer", SFString)}),
-        // ---- Structure
-        node("Group", {{SFWorldNode, 1, 46}, {SF3DNode, 1, 17}, {SF2DNode, 1, 10}, {SFTopNode, 1, 1}},
-             {eventIn("addChildren", MFNode, SF3DNode),
-              eventIn("removeChildren", MFNode, SF3DNode),
-              exposed("children", MFNode, SF3DNode)}),
-        node("OrderedGroup", {{SFWorldNode, 1, 65}, {SF3DNode, 1, 26}, {SF2DNode, 1, 16}, {SFTopNode, 1, 4}},
-             {eventIn("addChildren", MFNode, SF3DNode),
-              eventIn("removeChildren", MFNode, SF3DNode),
-              exposed("children", MFNode, SF3DNode),
-              exposed("order", MFFloat).quantised(drawOrder).within(0, kMax)}),
-        node("Layer3D", {{SFWorldNode, 1, 55}, {SF3DNode, 1, 21}, {SF2DNode, 1, 14}, {SFTopNode, 1, 3}},
-             {eventIn("addChildren", MFNode, SF3DNode),
-              eventIn("removeChildren", MFNode, SF3DNode),
-              exposed("children", MFNode, SF3DNode),
-              exposed("size", SFVec2f).byDefault("-1 -1").quantised(size2D).dynamic(),
-              exposed("background", SFNode, SFBackground3DNode),
-              exposed("fog", SFNode, SFFogNode),
-              exposed("navigationInfo", SFNode, SFNavigationInfoNode),
-              exposed("viewpoint", SFNode, SFViewpointNode)}),
-        node("Transform", {{SFWorldNode, 1, 94}, {SF3DNode, 1, 47}},
-             {eventIn("addChildren", MFNode, SF3DNode),
-              eventIn("removeChildren", MFNode, SF3DNode),
-              exposed("center", SFVec3f).byDefault("0 0 0").quantised(position3D).dynamic(),
-              exposed("children", MFNode, SF3DNode),
-              exposed("rotation", SFRotation).byDefault("0 0 1 0").quantised(rotation).dynamic(),
-              exposed("scale", SFVec3f).byDefault("1 1 1").quantised(scale).within(0, kMax).dynamic(),
-              exposed("scaleOrientation", SFRotation).byDefault("0 0 1 0").quantised(rotation).dynamic(),
-              exposed("translation", SFVec3f).byDefault("0 0 0").quantised(position3D).dynamic()}),
-        node("Switch", {{SFWorldNode, 1, 87}, {SF3DNode, 1, 43}, {SF2DNode, 1, 25}},
-             {exposed("choice", MFNode, SF3DNode),
-              exposed("whichChoice", SFInt32).byDefault("-1").linear(10).within(-1, 1022)}),
-        node("WorldInfo", {{SFWorldNode, 1, 100}, {SF3DNode, 1, 52}, {SF2DNode, 1, 31}},
-             {field("info", MFString),
-              field("title", SFString)}),
-        node("QuantizationParameter", {{SFWorldNode, 1, 77}, {SF3DNode, 1, 35}, {SF2DNode, 1, 20}},
-             {field("isLocal", SFBool).byDefault("FALSE"),
-              field("position3DQuant", SFBool).byDefault("FALSE"),
-              field("position3DMin", SFVec3f).byDefault("-I -I -I"),
-              field("position3DMax", SFVec3f).byDefault("+I +I +I"),
-              field("position3DNbBits", SFInt32).byDefault("16").linear(5).within(0, 31),
-              field("position2DQuant", SFBool).byDefault("FALSE"),
-              field("position2DMin", SFVec2f).byDefault("-I -I"),
-              field("position2DMax", SFVec2f).byDefault("+I +I"),
-              field("position2DNbBits", SFInt32).byDefault("16").linear(5).within(0, 31),
-              field("drawOrderQuant", SFBool).byDefault("FALSE"),
-              field("drawOrderMin", SFFloat).byDefault("-I"),
-              field("drawOrderMax", SFFloat).byDefault("+I"),
-              field("drawOrderNbBits", SFInt32).byDefault("8").linear(5).within(0, 31),
-              field("colorQuant", SFBool).byDefault("TRUE"),
-              field("colorMin", SFFloat).byDefault("0").within(0, 1),
-              field("colorMax", SFFloat).byDefault("1").within(0, 1),
-              field("colorNbBits", SFInt32).byDefault("8").linear(5).within(0, 31),
-              field("textureCoordinateQuant", SFBool).byDefault("TRUE"),
-              field("textureCoordinateMin", SFFloat).byDefault("0").within(0, 1),
-              field("textureCoordinateMax", SFFloat).byDefault("1").within(0, 1),
-              field("textureCoordinateNbBits", SFInt32).byDefault("16").linear(5).within(0, 31),
-              field("angleQuant", SFBool).byDefault("TRUE"),
-              field("angleMin", SFFloat).byDefault("0").within(0, kTwoPi),
-              field("angleMax", SFFloat).byDefault("6.2831855").within(0, kTwoPi),
-              field("angleNbBits", SFInt32).byDefault("16").linear(5).within(0, 31),
-              field("scaleQuant", SFBool).byDefault("FALSE"),
-              field("scaleMin", SFFloat).byDefault("0"),
-              field("scaleMax", SFFloat).byDefault("+I"),
-              field("scaleNbBits", SFInt32).byDefault("8").linear(5).within(0, 31),
-              field("keyQuant", SFBool).byDefault("TRUE"),
-              field("keyMin", SFFloat).byDefault("0"),
-              field("keyMax", SFFloat).byDefault("1"),
-              field("keyNbBits", SFInt32).byDefault("8").linear(5).within(0, 31),
-              field("normalQuant", SFBool).byDefault("TRUE"),
-              field("normalNbBits", SFInt32).byDefault("8").linear(5).within(0, 31),
-              field("sizeQuant", SFBool).byDefault("FALSE"),
-              field("sizeMin", SFFloat).byDefault("0"),
-              field("sizeMax", SFFloat).byDefault("+I"),
-              field("sizeNbBits", SFInt32).byDefault("8").linear(5).within(0, 31),
-              field("useEfficientCoding", SFBool).byDefault("FALSE")}),
-        // ---- Viewer and light
-        node("Viewpoint", {{SFWorldNode, 1, 97}, {SF3DNode, 1, 50}, {SFViewpointNode, 1, 1}},
-             {eventIn("set_bind", SFBool),
-              exposed("fieldOfView", SFFloat).byDefault("0.785398").quantised(angle).within(0, kPi).dynamic(),
-              exposed("jump", SFBool).byDefault("TRUE"),
-              exposed("orientation", SFRotation).byDefault("0 0 1 0").quantised(rotation).dynamic(),
-              exposed("position", SFVec3f).byDefault("0 0 10").quantised(position3D).dynamic(),
-              field("description", SFString),
-              eventOut("bindTime", SFTime),
-              eventOut("isBound", SFBool)}),
-        node("NavigationInfo", {{SFWorldNode, 1, 62}, {SF3DNode, 1, 24}, {SFNavigationInfoNode, 1, 1}},
-             {eventIn("set_bind", SFBool),
-              exposed("avatarSize", MFFloat).byDefault("[0.25, 1.6, 0.75]").quantised(size3D).within(0, kMax),
-              exposed("headlight", SFBool).byDefault("TRUE"),
-              exposed("speed", SFFloat).byDefault("1").within(0, kMax),
-              exposed("type", MFString).byDefault("[\"WALK\", \"ANY\"]"),
-              exposed("visibilityLimit", SFFloat).byDefault("0").quantised(size3D).within(0, kMax).dynamic(),
-              eventOut("isBound", SFBool)}),
-        node("Background", {{SFWorldNode, 1, 11}, {SF3DNode, 1, 3}, {SFBackground3DNode, 1, 1}},
-             {eventIn("set_bind", SFBool),
-              exposed("groundAngle", MFFloat).quantised(angle).within(0, kHalfPi).dynamic(),
-              exposed("groundColor", MFColor).quantised(color).within(0, 1).dynamic(),
-              exposed("backUrl", MFURL),
-              exposed("bottomUrl", MFURL),
-              exposed("frontUrl", MFURL),
-              exposed("leftUrl", MFURL),
-              exposed("rightUrl", MFURL),
-              exposed("topUrl", MFURL),
-              exposed("skyAngle", MFFloat).quantised(angle).within(0, kPi).dynamic(),
-              exposed("skyColor", MFColor).byDefault("[0 0 0]").quantised(color).within(0, 1).dynamic(),
-              eventOut("isBound", SFBool)}),
-        node("DirectionalLight", {{SFWorldNode, 1, 31}, {SF3DNode, 1, 12}},
-             {exposed("ambientIntensity", SFFloat).byDefault("0").quantised(color).within(0, 1).dynamic(),
-              exposed("color", SFColor).byDefault("1 1 1").quantised(color).within(0, 1).dynamic(),
-              exposed("direction", SFVec3f).byDefault("0 0 -1").quantised(normal).dynamic(),
-              exposed("intensity", SFFloat).byDefault("1").quantised(color).within(0, 1).dynamic(),
-              exposed("on", SFBool).byDefault("TRUE")}),
-        node("PointLight", {{SFWorldNode, 1, 70}, {SF3DNode, 1, 30}},
-             {exposed("ambientIntensity", SFFloat).byDefault("0").quantised(color).within(0, 1).dynamic(),
-              exposed("attenuation", SFVec3f).byDefault("1 0 0").quantised(size3D).within(0, kMax).dynamic(),
-              exposed("color", SFColor).byDefault("1 1 1").quantised(color).within(0, 1).dynamic(),
-              exposed("intensity", SFFloat).byDefault("1").quantised(color).within(0, 1).dynamic(),
-              exposed("location", SFVec3f).byDefault("0 0 0").quantised(position3D).dynamic(),
-              exposed("on", SFBool).byDefault("TRUE"),
-              exposed("radius", SFFloat).byDefault("100").quantised(size3D).within(0, kMax).dynamic()}),
-        // ---- Shapes
-        node("Shape", {{SFWorldNode, 1, 81}, {SF3DNode, 1, 38}, {SF2DNode, 1, 23}},
-             {exposed("appearance", SFNode, SFAppearanceNode),
-              exposed("geometry", SFNode, SFGeometryNode)}),
-        node("Appearance", {{SFWorldNode, 1, 3}, {SFAppearanceNode, 1, 1}},
-             {exposed("material", SFNode, SFMaterialNode),
-              exposed("texture", SFNode, SFTextureNode),
-              exposed("textureTransform", SFNode, SFTextureTransformNode)}),
-        node("Material", {{SFWorldNode, 1, 59}, {SFMaterialNode, 1, 1}},
-             {exposed("ambientIntensity", SFFloat).byDefault("0.2").quantised(color).within(0, 1).dynamic(),
-              exposed("diffuseColor", SFColor).byDefault("0.8 0.8 0.8").quantised(color).within(0, 1).dynamic(),
-              exposed("emissiveColor", SFColor).byDefault("0 0 0").quantised(color).within(0, 1).dynamic(),
-              exposed("shininess", SFFloat).byDefault("0.2").quantised(color).within(0, 1).dynamic(),
-              exposed("specularColor", SFColor).byDefault("0 0 0").quantised(color).within(0, 1).dynamic(),
-              exposed("transparency", SFFloat).byDefault("0").quantised(color).within(0, 1).dynamic()}),
-        node("Box", {{SFWorldNode, 1, 15}, {SFGeometryNode, 1, 2}},
-             {field("size", SFVec3f).byDefault("2 2 2").quantised(size3D).within(0, kMax)}),
-        node("IndexedFaceSet", {{SFWorldNode, 1, 48}, {SFGeometryNode, 1, 9}},
-             {eventIn("set_colorIndex", MFInt32),
-              eventIn("set_coordIndex", MFInt32),
-              eventIn("set_normalIndex", MFInt32),
-              eventIn("set_texCoordIndex", MFInt32),
-              exposed("color", SFNode, SFColorNode),
-              exposed("coord", SFNode, SFCoordinateNode),
-              exposed("normal", SFNode, SFNormalNode),
-              exposed("texCoord", SFNode, SFTextureCoordinateNode),
-              field("ccw", SFBool).byDefault("TRUE"),
-              field("colorIndex", MFInt32).quantised(coordIndex).within(-1, kMax),
-              field("colorPerVertex", SFBool).byDefault("TRUE"),
-              field("convex", SFBool).byDefault("TRUE"),
-              field("coordIndex", MFInt32).quantised(coordIndex).within(-1, kMax),
-              field("creaseAngle", SFFloat).byDefault("0").quantised(angle).within(0, kTwoPi),
-              field("normalIndex", MFInt32).quantised(coordIndex).within(-1, kMax),
-              field("normalPerVertex", SFBool).byDefault("TRUE"),
-              field("solid", SFBool).byDefault("TRUE"),
-              field("texCoordIndex", MFInt32).quantised(coordIndex).within(-1, kMax)}),
-        node("PointSet", {{SFWorldNode, 1, 71}, {SFGeometryNode, 1, 13}},
-             {exposed("color", SFNode, SFColorNode),
-              exposed("coord", SFNode, SFCoordinateNode)}),
-        node("Coordinate", {{SFWorldNode, 1, 24}, {SFCoordinateNode, 1, 1}},
-             {exposed("point", MFVec3f).quantised(position3D).dynamic()}),
-        node("Color", {{SFWorldNode, 1, 18}, {SFColorNode, 1, 1}},
-             {exposed("color", MFColor).quantised(color).within(0, 1).dynamic()}),
-        node("Normal", {{SFWorldNode, 1, 63}, {SFNormalNode, 1, 1}},
-             {exposed("vector", MFVec3f).quantised(normal).dynamic()}),
-        node("TextureCoordinate", {{SFWorldNode, 1, 90}, {SFTextureCoordinateNode, 1, 1}},
-             {exposed("point", MFVec2f).quantised(textureCoordinate).dynamic()}),
-        // ---- Textures
-        node("ImageTexture", {{SFWorldNode, 1, 47}, {SFTextureNode, 1, 3}},
-             {exposed("url", MFURL),
-              field("repeatS", SFBool).byDefault("TRUE"),
-              field("repeatT", SFBool).byDefault("TRUE")}),
-        node("PixelTexture", {{SFWorldNode, 1, 67}, {SFTextureNode, 1, 5}},
-             {exposed("image", SFImage).byDefault("0 0 0"),
-              field("repeatS", SFBool).byDefault("TRUE"),
-              field("repeatT", SFBool).byDefault("TRUE")}),
-        node("MovieTexture", {{SFWorldNode, 1, 61}, {SFStreamingNode, 1, 5}, {SFTextureNode, 1, 4}},
-             {exposed("loop", SFBool).byDefault("FALSE"),
-              exposed("speed", SFFloat).byDefault("1").dynamic(),
-              exposed("startTime", SFTime).byDefault("0"),
-              exposed("stopTime", SFTime).byDefault("0"),
-              exposed("url", MFURL),
-              field("repeatS", SFBool).byDefault("TRUE"),
-              field("repeatT", SFBool).byDefault("TRUE"),
-              eventOut("duration_changed", SFTime),
-              eventOut("isActive", SFBool)}),
-        node("CompositeTexture2D", {{SFWorldNode, 1, 20}, {SFTextureNode, 1, 1}},
-             {eventIn("addChildren", MFNode, SF2DNode),
-              eventIn("removeChildren", MFNode, SF2DNode),
-              exposed("children", MFNode, SF2DNode),
-              exposed("pixelWidth", SFInt32).byDefault("-1").linear(16).within(0, kMax),
-              exposed("pixelHeight", SFInt32).byDefault("-1").linear(16).within(0, kMax),
-              exposed("background", SFNode, SFBackground2DNode),
-              exposed("viewport", SFNode, SFViewportNode),
-              field("repeatSandT", SFInt32).byDefault("3").linear(2).within(0, 3)}),
-        node("MatteTexture", {{SFWorldNode, 4, 2}, {SF3DNode, 4, 2}, {SF2DNode, 4, 2}, {SFTextureNode, 4, 1}},
-             {field("surfaceA", SFNode, SFTextureNode),
-              field("surfaceB", SFNode, SFTextureNode),
-              field("alphaSurface", SFNode, SFTextureNode),
-              exposed("operation", SFString),
-              field("overwrite", SFBool).byDefault("FALSE"),
-              exposed("fraction", SFFloat).byDefault("0"),
-              exposed("parameter", MFFloat).byDefault("[0]")}),
-        node("TextureTransform", {{SFWorldNode, 1, 91}, {SFTextureTransformNode, 1, 1}},
-             {exposed("center", SFVec2f).byDefault("0 0").quantised(position2D).dynamic(),
-              exposed("rotation", SFFloat).byDefault("0").quantised(angle).within(0, kTwoPi).dynamic(),
-              exposed("scale", SFVec2f).byDefault("1 1").quantised(scale).dynamic(),
-              exposed("translation", SFVec2f).byDefault("0 0").quantised(position2D).dynamic()}),
-        // ---- Time
-        node("TimeSensor", {{SFWorldNode, 1, 92}, {SF3DNode, 1, 45}, {SF2DNode, 1, 27}},
-             {exposed("cycleInterval", SFTime).byDefault("1"),
-              exposed("enabled", SFBool).byDefault("TRUE"),
-              exposed("loop", SFBool).byDefault("FALSE"),
-              exposed("startTime", SFTime).byDefault("0"),
-              exposed("stopTime", SFTime).byDefault("0"),
-              eventOut("cycleTime", SFTime),
-              eventOut("fraction_changed", SFFloat),
-              eventOut("isActive", SFBool),
-              eventOut("time", SFTime)}),
-        node("PositionInterpolator", {{SFWorldNode, 1, 73}, {SF3DNode, 1, 31}},
-             {eventIn("set_fraction", SFFloat),
-              exposed("key", MFFloat).quantised(key).within(0, 1),
-              exposed("keyValue", MFVec3f).quantised(position3D),
-              eventOut("value_changed", SFVec3f)}),
-        node("OrientationInterpolator", {{SFWorldNode, 1, 66}, {SF3DNode, 1, 27}},
-             {eventIn("set_fraction", SFFloat),
-              exposed("key", MFFloat).quantised(key).within(0, 1),
-              exposed("keyValue", MFRotation).quantised(rotation),
-              eventOut("value_changed", SFRotation)}),
-        // clang-format on
-    };
+    std::vector<NodeRow> rows;
+    for (const std::string_view text : kNodeTexts)
+        for (NodeRow& row : nodeRowsOf(text)) rows.push_back(std::move(row));
+    return rows;
 }
 
 }  // namespace stx::mpeg4

@@ -1,87 +1,38 @@
 #pragma once
 
-#include <limits>
-#include <numbers>
-#include <string_view>
+#include <string>
 #include <vector>
 
 #include "formats/mpeg4/scene/node_table.hpp"
 
-/// The notation of the rows in node_rows.cpp; node_table.cpp makes NodeInfo of them.
+// clang-format off
+/// The rows of the node table as the files of the folder nodes write them; node_table.cpp makes
+/// NodeInfo of them. A node is a line with its name and its codes, then an indented line for each
+/// field, in the order of the standard, from which all field ids follow:
+///
+///     Transform SFWorldNode:1.94 SF3DNode:1.47                 node data type:version.code
+///       eventIn MFNode<SF3DNode> addChildren                   kind, type<what nodes it takes>, name
+///       exposedField SFVec3f scale 1 1 1 ; scale dynamic 0 +I
+///
+/// Codes are the numbers in the bits of a stream: in version 2 they begin at 2.
+/// After the name comes the default (left out for [], "" and NULL; a list has no brackets). After a
+/// semicolon: the quantisation (a name of Quantisation; linear10 is linear in 10 bits), `dynamic`
+/// when BIFS-Anim can animate the field, and two bounds (left out for -I +I; I is infinite).
+/// Lines that begin with # are remarks.
+// clang-format on
 namespace stx::mpeg4 {
 
-inline constexpr float kMax = std::numeric_limits<float>::max();  ///< the standard's +I
-inline constexpr float kPi = std::numbers::pi_v<float>;
-inline constexpr float kTwoPi = 2 * kPi;
-inline constexpr float kHalfPi = kPi / 2;
-
-/// One field in the notation of the rows.
-struct FieldRow {
-    FieldInfo info;
-
-    FieldRow byDefault(std::string_view text) const {
-        FieldRow row = *this;
-        row.info.defaultText = text;
-        return row;
-    }
-    FieldRow quantised(Quantisation category) const {
-        FieldRow row = *this;
-        row.info.quantisation = category;
-        return row;
-    }
-    /// Category 13: always this many bits where a QuantizationParameter is active.
-    FieldRow linear(int bits) const {
-        FieldRow row = quantised(Quantisation::linear);
-        row.info.quantisationBits = bits;
-        return row;
-    }
-    FieldRow within(float minimum, float maximum) const {
-        FieldRow row = *this;
-        row.info.minimum = minimum;
-        row.info.maximum = maximum;
-        return row;
-    }
-    /// Can be animated.
-    FieldRow dynamic() const {
-        FieldRow row = *this;
-        row.info.isDynamic = true;
-        return row;
-    }
-};
-
-inline FieldRow makeFieldRow(FieldKind kind, std::string_view name, FieldType type, Ndt nodeType) {
-    FieldRow row;
-    row.info.kind = kind;
-    row.info.name = name;
-    row.info.type = type;
-    row.info.nodeType = nodeType;
-    return row;
-}
-inline FieldRow field(std::string_view name, FieldType type, Ndt nodeType = Ndt::none) {
-    return makeFieldRow(FieldKind::field, name, type, nodeType);
-}
-inline FieldRow exposed(std::string_view name, FieldType type, Ndt nodeType = Ndt::none) {
-    return makeFieldRow(FieldKind::exposedField, name, type, nodeType);
-}
-inline FieldRow eventIn(std::string_view name, FieldType type, Ndt nodeType = Ndt::none) {
-    return makeFieldRow(FieldKind::eventIn, name, type, nodeType);
-}
-inline FieldRow eventOut(std::string_view name, FieldType type, Ndt nodeType = Ndt::none) {
-    return makeFieldRow(FieldKind::eventOut, name, type, nodeType);
-}
-
 /// One node: name, numbers as {node data type, version, code}, fields in the order of their ids.
+/// The ids themselves are not filled in.
 struct NodeRow {
-    std::string_view name;
+    std::string name;
     std::vector<NodeCode> codes;
-    std::vector<FieldRow> fields;
+    std::vector<FieldInfo> fields;
 };
-inline NodeRow node(std::string_view name, std::vector<NodeCode> codes,
-                    std::vector<FieldRow> fields) {
-    return {name, std::move(codes), std::move(fields)};
-}
 
-/// The rows, made at each call.
+/// The rows of a text in that notation. A line that is not of it is a mistake of ours (assertion).
+[[nodiscard]] std::vector<NodeRow> nodeRowsOf(std::string_view text);
+/// All rows, made at each call.
 [[nodiscard]] std::vector<NodeRow> makeNodeRows();
 
 }  // namespace stx::mpeg4

@@ -12,60 +12,89 @@
 namespace stx::mpeg4 {
 namespace {
 
-constexpr std::array<std::string_view, 22> kTypeNames = {
-    "SFBool",  "SFInt32",    "SFFloat", "SFTime",  "SFString",   "SFURL",   "SFVec2f", "SFVec3f",
-    "SFColor", "SFRotation", "SFImage", "SFNode",  "MFInt32",    "MFFloat", "MFTime",  "MFString",
-    "MFURL",   "MFVec2f",    "MFVec3f", "MFColor", "MFRotation", "MFNode"};
+constexpr std::array<std::string_view, 29> kTypeNames = {
+    "SFBool",     "SFInt32",  "SFFloat",         "SFTime",     "SFString", "SFURL",
+    "SFVec2f",    "SFVec3f",  "SFColor",         "SFRotation", "SFImage",  "SFNode",
+    "SFVec4f",    "SFScript", "SFCommandBuffer", "SFAttrRef",  "MFInt32",  "MFFloat",
+    "MFTime",     "MFString", "MFURL",           "MFVec2f",    "MFVec3f",  "MFColor",
+    "MFRotation", "MFNode",   "MFVec4f",         "MFScript",   "MFAttrRef"};
+constexpr std::array<std::string_view, 4> kKindNames = {"field", "exposedField", "eventIn",
+                                                        "eventOut"};
+constexpr std::array<std::string_view, 16> kQuantisationNames = {
+    "none",   "position3D", "position2D", "drawOrder", "color",    "textureCoordinate",
+    "angle",  "scale",      "key",        "normal",    "rotation", "size3D",
+    "size2D", "linear",     "coordIndex", "reserved"};
 
-constexpr std::array<std::string_view, 23> kNdtNames = {"none",
-                                                        "SFWorldNode",
-                                                        "SF3DNode",
-                                                        "SF2DNode",
-                                                        "SFTopNode",
-                                                        "SFTextureNode",
-                                                        "SFDepthImageNode",
-                                                        "SFDepthTextureNode",
-                                                        "SFNormalNode",
-                                                        "SFAppearanceNode",
-                                                        "SFGeometryNode",
-                                                        "SFMaterialNode",
-                                                        "SFTextureTransformNode",
-                                                        "SFViewpointNode",
-                                                        "SFNavigationInfoNode",
-                                                        "SFBackground3DNode",
-                                                        "SFStreamingNode",
-                                                        "SFColorNode",
-                                                        "SFCoordinateNode",
-                                                        "SFTextureCoordinateNode",
-                                                        "SFFogNode",
-                                                        "SFBackground2DNode",
-                                                        "SFViewportNode"};
+/// A node data type and the bits of its codes in versions 1 to 10, as the standard's tables have
+/// them.
+struct NdtRow {
+    std::string_view name;
+    std::array<std::uint8_t, kNdtVersions> codeBits;
+};
+constexpr NdtRow kNdtRows[] = {
+    {"none", {}},
+    {"SFWorldNode", {7, 4, 2, 3, 6, 4, 4, 2, 3, 3}},
+    {"SF3DNode", {6, 3, 2, 3, 5, 3, 3, 1, 3, 3}},
+    {"SF2DNode", {5, 2, 2, 3, 4, 3, 2, 1, 0, 3}},
+    {"SFTopNode", {3, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFTextureNode", {3, 1, 0, 1, 1, 2, 1, 0, 0, 1}},
+    {"SFDepthImageNode", {0, 1, 0, 0, 1, 0, 1, 0, 0, 0}},
+    {"SFDepthTextureNode", {0, 1, 0, 0, 2, 0, 2, 0, 0, 0}},
+    {"SFNormalNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFAppearanceNode", {1, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFGeometryNode", {5, 2, 0, 0, 4, 2, 0, 0, 3, 0}},
+    {"SFMaterialNode", {2, 2, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFTextureTransformNode", {1, 1, 0, 0, 0, 1, 0, 0, 0, 0}},
+    {"SFViewpointNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFNavigationInfoNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFBackground3DNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFStreamingNode", {3, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFColorNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFCoordinateNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFTextureCoordinateNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFogNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFBackground2DNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFViewportNode", {0, 1, 0, 0, 0, 1, 0, 0, 0, 0}},
+    {"SFAudioNode", {3, 1, 0, 0, 0, 0, 2, 0, 0, 0}},
+    {"SFCoordinate2DNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFExpressionNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFaceDefMeshNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFaceDefTablesNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFaceDefTransformNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFAPNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFDPNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFITNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFFontStyleNode", {1, 1, 0, 0, 0, 1, 0, 0, 0, 0}},
+    {"SFLinePropertiesNode", {1, 1, 0, 0, 0, 1, 0, 0, 0, 0}},
+    {"SFVisemeNode", {1, 1, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFBAPNode", {0, 2, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFBDPNode", {0, 2, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFBodyDefTableNode", {0, 2, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFBodySegmentConnectionHintNode", {0, 2, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFPerceptualParameterNode", {0, 2, 0, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFTemporalNode", {0, 1, 2, 0, 0, 0, 0, 0, 0, 0}},
+    {"SFBlendListNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFFrameListNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFLightMapNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFSurfaceMapNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFViewMapNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFParticleInitializerNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFInfluenceNode", {0, 1, 0, 0, 2, 0, 0, 0, 0, 0}},
+    {"SFSBBoneNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFSBMuscleNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFSBSegmentNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFSBSiteNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFBaseMeshNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFSubdivSurfaceSectorNode", {0, 1, 0, 0, 1, 0, 0, 0, 0, 0}},
+    {"SFMusicScoreNode", {0, 1, 0, 0, 0, 0, 0, 1, 0, 0}},
+};
 
-// Bits of the codes in versions 1 to 10 of each table. They follow from the highest code of the
-// standard's tables, of which ours hold only a part.
-constexpr std::array<std::array<std::uint8_t, kNdtVersions>, 21> kCodeBits = {{
-    {},                              // none
-    {7, 4, 2, 3, 6, 4, 4, 2, 3, 3},  // SFWorldNode
-    {6, 3, 2, 3, 5, 3, 3, 1, 3, 3},  // SF3DNode
-    {5, 2, 2, 3, 4, 3, 2, 1, 0, 3},  // SF2DNode
-    {3, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFTopNode
-    {3, 1, 0, 1, 1, 2, 1, 0, 0, 1},  // SFTextureNode
-    {0, 1, 0, 0, 1, 0, 1, 0, 0, 0},  // SFDepthImageNode
-    {0, 1, 0, 0, 2, 0, 2, 0, 0, 0},  // SFDepthTextureNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFNormalNode
-    {1, 1, 0, 0, 1, 0, 0, 0, 0, 0},  // SFAppearanceNode
-    {5, 2, 0, 0, 4, 2, 0, 0, 3, 0},  // SFGeometryNode
-    {2, 2, 0, 0, 0, 0, 0, 0, 0, 0},  // SFMaterialNode
-    {1, 1, 0, 0, 0, 1, 0, 0, 0, 0},  // SFTextureTransformNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFViewpointNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFNavigationInfoNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFBackground3DNode
-    {3, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFStreamingNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFColorNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFCoordinateNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFTextureCoordinateNode
-    {1, 1, 0, 0, 0, 0, 0, 0, 0, 0},  // SFFogNode
-}};
+template <class Value, class Names>
+std::optional<Value> valueOfName(const Names& names, std::string_view name) {
+    for (std::size_t i = 0; i < std::size(names); ++i)
+        if (names[i] == name) return static_cast<Value>(i);
+    return {};
+}
 
 int idBits(std::size_t count) {
     return count < 2 ? 0 : static_cast<int>(std::bit_width(count - 1));
@@ -76,8 +105,7 @@ NodeInfo makeNodeInfo(const NodeRow& row) {
     node.name = row.name;
     node.codes = row.codes;
     int dynamicFields = 0;
-    for (const FieldRow& fieldRow : row.fields) {
-        FieldInfo info = fieldRow.info;
+    for (FieldInfo info : row.fields) {
         info.index = static_cast<int>(node.fields.size());
         const bool exposedField = info.kind == FieldKind::exposedField;
         if (exposedField || info.kind == FieldKind::field) {
@@ -132,12 +160,24 @@ std::string_view name(FieldType type) {
     return kTypeNames[static_cast<std::size_t>(type)];
 }
 std::string_view name(Ndt type) {
-    return kNdtNames[static_cast<std::size_t>(type)];
+    return kNdtRows[static_cast<std::size_t>(type)].name;
+}
+std::optional<FieldType> fieldTypeOfName(std::string_view name) {
+    return valueOfName<FieldType>(kTypeNames, name);
+}
+std::optional<Ndt> ndtOfName(std::string_view name) {
+    for (std::size_t i = 1; i < std::size(kNdtRows); ++i)
+        if (kNdtRows[i].name == name) return static_cast<Ndt>(i);
+    return {};
+}
+std::optional<FieldKind> fieldKindOfName(std::string_view name) {
+    return valueOfName<FieldKind>(kKindNames, name);
+}
+std::optional<Quantisation> quantisationOfName(std::string_view name) {
+    return valueOfName<Quantisation>(kQuantisationNames, name);
 }
 std::string_view name(FieldKind kind) {
-    constexpr std::array<std::string_view, 4> kNames = {"field", "exposedField", "eventIn",
-                                                        "eventOut"};
-    return kNames[static_cast<std::size_t>(kind)];
+    return kKindNames[static_cast<std::size_t>(kind)];
 }
 
 bool isMultiple(FieldType type) {
@@ -167,6 +207,12 @@ FieldType itemType(FieldType type) {
             return SFRotation;
         case MFNode:
             return SFNode;
+        case MFVec4f:
+            return SFVec4f;
+        case MFScript:
+            return SFScript;
+        case MFAttrRef:
+            return SFAttrRef;
         default:
             return type;
     }
@@ -195,6 +241,12 @@ FieldType listType(FieldType type) {
             return MFRotation;
         case SFNode:
             return MFNode;
+        case SFVec4f:
+            return MFVec4f;
+        case SFScript:
+            return MFScript;
+        case SFAttrRef:
+            return MFAttrRef;
         default:
             return type;
     }
@@ -202,8 +254,8 @@ FieldType listType(FieldType type) {
 
 std::optional<int> codeBits(Ndt type, int version) {
     const auto row = static_cast<std::size_t>(type);
-    if (row == 0 || row >= kCodeBits.size() || version < 1 || version > kNdtVersions) return {};
-    return kCodeBits[row][static_cast<std::size_t>(version - 1)];
+    if (row == 0 || row >= std::size(kNdtRows) || version < 1 || version > kNdtVersions) return {};
+    return kNdtRows[row].codeBits[static_cast<std::size_t>(version - 1)];
 }
 
 int NodeInfo::find(std::string_view fieldName) const {

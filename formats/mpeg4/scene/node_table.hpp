@@ -9,8 +9,8 @@
 #include <vector>
 
 /// The one table of MPEG-4 nodes from which the BIFS reader and writer, the BT and XMT-A forms and
-/// the validator work. The rows are in node_rows.cpp; adding a node is adding a row there. All
-/// identifiers of fields and the widths of codes are derived from the rows.
+/// the validator work. The rows are in the folder nodes; adding a node is adding its lines there.
+/// All identifiers of fields and the widths of their codes are derived from the rows.
 /// Source: ISO/IEC 14496-11, annex H (node coding tables), and ISO/IEC 14496-16, 4.5.4.
 namespace stx::mpeg4 {
 
@@ -28,6 +28,10 @@ enum class FieldType : std::uint8_t {
     SFRotation,
     SFImage,
     SFNode,
+    SFVec4f,
+    SFScript,
+    SFCommandBuffer,
+    SFAttrRef,
     MFInt32,
     MFFloat,
     MFTime,
@@ -38,10 +42,14 @@ enum class FieldType : std::uint8_t {
     MFColor,
     MFRotation,
     MFNode,
+    MFVec4f,
+    MFScript,
+    MFAttrRef,
 };
 
 /// "SFVec3f", and back.
 [[nodiscard]] std::string_view name(FieldType type);
+[[nodiscard]] std::optional<FieldType> fieldTypeOfName(std::string_view name);
 [[nodiscard]] bool isMultiple(FieldType type);     ///< MFxxx
 [[nodiscard]] FieldType itemType(FieldType type);  ///< SFxxx of MFxxx; SFxxx is its own
 [[nodiscard]] FieldType listType(FieldType type);  ///< MFxxx of SFxxx that have one
@@ -50,6 +58,7 @@ enum class FieldKind : std::uint8_t { field, exposedField, eventIn, eventOut };
 
 /// "exposedField"
 [[nodiscard]] std::string_view name(FieldKind kind);
+[[nodiscard]] std::optional<FieldKind> fieldKindOfName(std::string_view name);
 
 /// Node data types: what kind of node a field takes. A node is coded by its number within one.
 enum class Ndt : std::uint8_t {
@@ -76,14 +85,48 @@ enum class Ndt : std::uint8_t {
     SFFogNode,
     SFBackground2DNode,
     SFViewportNode,
+    SFAudioNode,
+    SFCoordinate2DNode,
+    SFExpressionNode,
+    SFFaceDefMeshNode,
+    SFFaceDefTablesNode,
+    SFFaceDefTransformNode,
+    SFFAPNode,
+    SFFDPNode,
+    SFFITNode,
+    SFFontStyleNode,
+    SFLinePropertiesNode,
+    SFVisemeNode,
+    SFBAPNode,
+    SFBDPNode,
+    SFBodyDefTableNode,
+    SFBodySegmentConnectionHintNode,
+    SFPerceptualParameterNode,
+    SFTemporalNode,
+    SFBlendListNode,
+    SFFrameListNode,
+    SFLightMapNode,
+    SFSurfaceMapNode,
+    SFViewMapNode,
+    SFParticleInitializerNode,
+    SFInfluenceNode,
+    SFSBBoneNode,
+    SFSBMuscleNode,
+    SFSBSegmentNode,
+    SFSBSiteNode,
+    SFBaseMeshNode,
+    SFSubdivSurfaceSectorNode,
+    SFMusicScoreNode,
 };
 [[nodiscard]] std::string_view name(Ndt type);
+/// By exact name; nothing when there is none.
+[[nodiscard]] std::optional<Ndt> ndtOfName(std::string_view name);
 
 /// Versions of the node code tables, 1..kNdtVersions; code 0 in one leads to the next.
 inline constexpr int kNdtVersions = 10;
 
-/// Bits of a node code in `version` (1..10) of a node data type. Empty when the table of that type
-/// is not known (SFBackground2DNode, SFViewportNode): only NULL and USE can be coded there.
+/// Bits of a node code in `version` (1..10) of a node data type; empty for Ndt::none. Version 2
+/// always has a bit, since its code 1 is an instance of a PROTO.
 [[nodiscard]] std::optional<int> codeBits(Ndt type, int version);
 
 /// Quantisation categories with their numbers in the standard.
@@ -103,7 +146,10 @@ enum class Quantisation : std::uint8_t {
     size2D,
     linear,
     coordIndex,
+    reserved,  ///< of SFVec4f: never quantised
 };
+/// By its name here.
+[[nodiscard]] std::optional<Quantisation> quantisationOfName(std::string_view name);
 
 /// One field of a node type.
 struct FieldInfo {

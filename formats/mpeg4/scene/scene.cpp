@@ -14,14 +14,14 @@ std::vector<std::string> tokens(std::string_view text) {
     std::size_t i = 0;
     while (i < text.size()) {
         const char c = text[i];
-        if (c == ' ' || c == ',' || c == '[' || c == ']') {
+        if (c == ' ') {
             ++i;
         } else if (c == '"') {
             const std::size_t end = text.find('"', i + 1);
             out.emplace_back(text.substr(i + 1, end - i - 1));
             i = end + 1;
         } else {
-            const std::size_t end = std::min(text.find_first_of(" ,]", i), text.size());
+            const std::size_t end = std::min(text.find(' ', i), text.size());
             out.emplace_back(text.substr(i, end - i));
             i = end;
         }
@@ -29,59 +29,65 @@ std::vector<std::string> tokens(std::string_view text) {
     return out;
 }
 
-template <class T>
-T number(std::string_view text) {
-    if constexpr (std::is_same_v<T, float>) {
-        if (text == "+I") return std::numeric_limits<float>::max();
-        if (text == "-I") return -std::numeric_limits<float>::max();
+/// Takes one value after the other from the words of a default.
+class DefaultReader {
+  public:
+    explicit DefaultReader(std::string_view text) : words_(tokens(text)) {}
+
+    [[nodiscard]] bool atEnd() const { return next_ == words_.size(); }
+
+    template <class T>
+    void read(T& value) {
+        const std::string& word = words_.at(next_++);
+        if (word == "+I") {
+            value = std::numeric_limits<T>::max();
+        } else if (word == "-I") {
+            value = std::numeric_limits<T>::lowest();
+        } else {
+            [[maybe_unused]] const auto parsed =
+                std::from_chars(word.data(), word.data() + word.size(), value);
+            assert(parsed.ec == std::errc{});
+        }
     }
-    T value{};
-    [[maybe_unused]] const auto parsed =
-        std::from_chars(text.data(), text.data() + text.size(), value);
-    assert(parsed.ec == std::errc{});
-    return value;
-}
+    void read(bool& value) { value = words_.at(next_++) == "TRUE"; }
+    void read(std::string& value) { value = words_.at(next_++); }
+    void read(glm::vec2& v) { readAll(v.x, v.y); }
+    void read(glm::vec3& v) { readAll(v.x, v.y, v.z); }
+    void read(glm::vec4& v) { readAll(v.x, v.y, v.z, v.w); }
+    void read(Color& v) { readAll(v.r, v.g, v.b); }
+    void read(Rotation& v) { readAll(v.axis.x, v.axis.y, v.axis.z, v.angle); }
+    void read(PixelImage& v) { readAll(v.width, v.height, v.components); }
+    // These have no default but the empty one.
+    void read(NodePtr&) { ++next_; }
+    void read(Url&) { ++next_; }
+    void read(ScriptText&) { ++next_; }
+    void read(CommandBuffer&) { ++next_; }
+    void read(AttributeReference&) { ++next_; }
+
+  private:
+    template <class... T>
+    void readAll(T&... values) {
+        (read(values), ...);
+    }
+
+    std::vector<std::string> words_;
+    std::size_t next_ = 0;
+};
 
 FieldValue parseDefault(const FieldInfo& info) {
-    using enum FieldType;
-    const std::vector<std::string> t = tokens(info.defaultText);
-    if (t.empty() || t[0] == "NULL") return emptyValue(info.type);
-    const auto f = [&](std::size_t i) { return number<float>(t.at(i)); };
-    switch (info.type) {
-        case SFBool:
-            return t[0] == "TRUE";
-        case SFInt32:
-            return number<std::int32_t>(t[0]);
-        case SFFloat:
-            return f(0);
-        case SFTime:
-            return number<double>(t[0]);
-        case SFString:
-            return t[0];
-        case SFVec2f:
-            return glm::vec2(f(0), f(1));
-        case SFVec3f:
-            return glm::vec3(f(0), f(1), f(2));
-        case SFColor:
-            return Color{f(0), f(1), f(2)};
-        case SFRotation:
-            return Rotation{{f(0), f(1), f(2)}, f(3)};
-        case MFFloat: {
-            std::vector<float> values;
-            for (const std::string& token : t) values.push_back(number<float>(token));
-            return values;
-        }
-        case MFString:
-            return t;
-        case MFColor: {
-            std::vector<Color> values;
-            for (std::size_t i = 0; i + 2 < t.size(); i += 3)
-                values.push_back({f(i), f(i + 1), f(i + 2)});
-            return values;
-        }
-        default:
-            return emptyValue(info.type);
-    }
+    FieldValue value = emptyValue(info.type);
+    DefaultReader reader(info.defaultText);
+    if (reader.atEnd()) return value;
+    std::visit(
+        [&](auto& v) {
+            if constexpr (kIsList<std::decay_t<decltype(v)>>) {
+                while (!reader.atEnd()) reader.read(v.emplace_back());
+            } else {
+                reader.read(v);
+            }
+        },
+        value);
+    return value;
 }
 
 template <std::size_t... I>

@@ -64,13 +64,32 @@ struct PixelImage {
     bool operator==(const PixelImage&) const = default;
 };
 
+/// SFScript: a program of a Script node in source text, or where it is ("javascript: ...").
+struct ScriptText {
+    std::string text;
+    bool operator==(const ScriptText&) const = default;
+};
+
+/// SFCommandBuffer: BIFS commands as they are coded, with the ids of the stream they came in.
+struct CommandBuffer {
+    std::vector<std::uint8_t> bytes;
+    bool operator==(const CommandBuffer&) const = default;
+};
+
+/// SFAttrRef: a field of a node. Readers refuse values; only the empty list of Storage occurs.
+struct AttributeReference {
+    bool operator==(const AttributeReference&) const = default;
+};
+
 /// The value of a field; alternatives in the order of FieldType. double is SFTime.
 using FieldValue =
     std::variant<bool, std::int32_t, float, double, std::string, Url, glm::vec2, glm::vec3, Color,
-                 Rotation, PixelImage, NodePtr, std::vector<std::int32_t>, std::vector<float>,
+                 Rotation, PixelImage, NodePtr, glm::vec4, ScriptText, CommandBuffer,
+                 AttributeReference, std::vector<std::int32_t>, std::vector<float>,
                  std::vector<double>, std::vector<std::string>, std::vector<Url>,
                  std::vector<glm::vec2>, std::vector<glm::vec3>, std::vector<Color>,
-                 std::vector<Rotation>, NodeList>;
+                 std::vector<Rotation>, NodeList, std::vector<glm::vec4>, std::vector<ScriptText>,
+                 std::vector<AttributeReference>>;
 
 /// Whether T is the C++ type of an MF value.
 template <class T>
@@ -229,6 +248,8 @@ using Command =
 struct CommandFrame {
     std::uint64_t time = 0;  ///< in units of the stream's timescale
     std::vector<Command> commands;
+    /// Whether a reader may begin here. The first of a stream always is such a place.
+    bool randomAccess = false;
 };
 
 /// A scene at one moment.

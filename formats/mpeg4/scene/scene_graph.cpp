@@ -80,7 +80,8 @@ template <class T>
 bool sameBits(const T& a, const T& b) {
     if constexpr (std::is_same_v<T, float> || std::is_same_v<T, double> ||
                   std::is_same_v<T, glm::vec2> || std::is_same_v<T, glm::vec3> ||
-                  std::is_same_v<T, Color> || std::is_same_v<T, Rotation>) {
+                  std::is_same_v<T, glm::vec4> || std::is_same_v<T, Color> ||
+                  std::is_same_v<T, Rotation>) {
         return std::memcmp(&a, &b, sizeof(T)) == 0;
     } else {
         return a == b;

@@ -9,6 +9,14 @@ class Walker {
 
     Result<void> visit(const NodePtr& node, const glm::dmat4& world, int parent, int depth) {
         if (!node) return {};
+        path_.push_back(node.get());
+        auto done = visitNode(node, world, parent, depth);
+        path_.pop_back();
+        return done;
+    }
+
+  private:
+    Result<void> visitNode(const NodePtr& node, const glm::dmat4& world, int parent, int depth) {
         // A few nodes that USE each other in turn can be shown in any number of places.
         if (++visits_ > kMaxVisits)
             return fail(ErrorCode::invalidInput,
@@ -22,19 +30,21 @@ class Walker {
                 return fail(ErrorCode::invalidInput, "the scene shows more than {} views",
                             limits_.maxViews);
             scene_.nodes.push_back({node, world, parent});
+            scene_.above.insert(path_.begin(), path_.end());
         } else if (type == "WorldInfo") {
             const auto& title = node->get<std::string>("title");
             if (scene_.title.empty()) scene_.title = title;
-            const auto& info = node->get<std::vector<std::string>>("info");
-            scene_.info.insert(scene_.info.end(), info.begin(), info.end());
-        } else if (type == "Shape") {
-            scene_.hasShapes = true;
+            scene_.infos.push_back({node->get<std::vector<std::string>>("info"), world});
         } else if (type == "Switch") {
             const auto& choice = node->get<NodeList>("choice");
             const auto chosen = node->get<std::int32_t>("whichChoice");
             if (chosen >= 0 && static_cast<std::size_t>(chosen) < choice.size())
                 return visit(choice[static_cast<std::size_t>(chosen)], world, ++groups_, depth + 1);
-        } else if (const int index = node->info->find("children"); index >= 0) {
+        } else if (type == "LOD") {
+            const auto& levels = node->get<NodeList>("level");
+            if (!levels.empty()) return visitAsGroup(*node, {levels[0]}, world, depth);
+        } else if (const auto* children = childrenOf(*node)) {
+            if (!isPlainGroup(type)) return visitAsGroup(*node, *children, world, depth);
             glm::dmat4 here = world;
             if (type == "Transform") {
                 here = world * transformMatrix(node->get<glm::vec3>("center"),
@@ -43,18 +53,53 @@ class Walker {
                                                axisAngle(node->get<Rotation>("scaleOrientation")),
                                                node->get<glm::vec3>("translation"));
             }
-            const int group = ++groups_;
-            const auto* children = std::get_if<NodeList>(&node->value(index));
-            if (!children) return {};
-            for (const NodePtr& child : *children) STX_CHECK(visit(child, here, group, depth + 1));
+            return visitAll(*children, here, depth);
+        } else if (!isSetting(type)) {
+            scene_.leftOut.insert(type);
+            if (type == "Shape")
+                if (const NodePtr& geometry = node->get<NodePtr>("geometry"))
+                    scene_.leftOut.insert(geometry->info->name);
         }
         return {};
     }
 
-  private:
+    /// Settings, clocks and what they drive show nothing by themselves.
+    static bool isSetting(std::string_view type) {
+        for (const std::string_view setting : {"QuantizationParameter", "Viewpoint", "Viewport",
+                                               "NavigationInfo", "TimeSensor", "Valuator"})
+            if (type == setting) return true;
+        return type.find("Interpolator") != std::string_view::npos;
+    }
+    /// Groups whose children are where they would be without it, but for Transform.
+    static bool isPlainGroup(std::string_view type) {
+        for (const std::string_view group :
+             {"Group", "OrderedGroup", "Transform", "Layer2D", "Layer3D", "Anchor", "Collision"})
+            if (type == group) return true;
+        return false;
+    }
+    static const NodeList* childrenOf(const Node& node) {
+        const int index = node.info->find("children");
+        return index < 0 ? nullptr : std::get_if<NodeList>(&node.value(index));
+    }
+
+    Result<void> visitAll(const NodeList& children, const glm::dmat4& world, int depth) {
+        const int group = ++groups_;
+        for (const NodePtr& child : children) STX_CHECK(visit(child, world, group, depth + 1));
+        return {};
+    }
+
+    Result<void> visitAsGroup(const Node& node, const NodeList& children, const glm::dmat4& world,
+                              int depth) {
+        const std::size_t before = scene_.nodes.size();
+        STX_CHECK(visitAll(children, world, depth));
+        if (scene_.nodes.size() > before) scene_.asGroups.insert(node.info->name);
+        return {};
+    }
+
     static constexpr std::int64_t kMaxVisits = 1 << 21;
     const Limits& limits_;
     ShownScene& scene_;
+    std::vector<const Node*> path_;  ///< from the root to the node that is visited
     std::int64_t visits_ = 0;
     int groups_ = 0;
 };

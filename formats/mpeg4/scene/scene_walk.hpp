@@ -1,6 +1,8 @@
 #pragma once
 
+#include <set>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "formats/mpeg4/scene/placement.hpp"
@@ -15,13 +17,23 @@ struct ShownNode {
     int parent = 0;                  ///< the same for nodes under the very same grouping node's use
 };
 
+/// The strings of a WorldInfo, and where they are said.
+struct ShownInfo {
+    std::vector<std::string> text;
+    glm::dmat4 worldFromLocal{1.0};  ///< of all Transforms above it
+};
+
 /// What a scene shows, from top to bottom: all children of grouping nodes, only the chosen one of a
-/// Switch; a node that is used twice appears twice. Errors when that is more than `limits` allow.
+/// Switch and the finest of a LOD; a node that is used twice appears twice. Errors when that is
+/// more than `limits` allow.
 struct ShownScene {
     std::vector<ShownNode> nodes;
-    std::string title;              ///< of the first WorldInfo with one
-    std::vector<std::string> info;  ///< of all WorldInfo
-    bool hasShapes = false;         ///< there is a Shape, which is not a view
+    std::string title;                      ///< of the first WorldInfo with one
+    std::vector<ShownInfo> infos;           ///< of each WorldInfo
+    std::unordered_set<const Node*> above;  ///< the nodes that one of `nodes` is in
+    std::set<std::string> leftOut;  ///< types of nodes that are no views, groups or settings
+    /// Types of grouping nodes that turn, move or choose their children; read as plain groups.
+    std::set<std::string> asGroups;
 };
 [[nodiscard]] Result<ShownScene> shownScene(const NodePtr& root, const Limits& limits);
 

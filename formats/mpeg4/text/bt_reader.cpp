@@ -99,7 +99,7 @@ Result<void> BtReader::readRouteEnd(NodePtr& node, int& field, FieldUse use) {
 }
 
 Result<void> BtReader::readBlock() {
-    STX_TRY([[maybe_unused]] const bool rap, takeIf("RAP"));
+    STX_TRY(const bool rap, takeIf("RAP"));
     STX_CHECK(takeWord("AT"));
     const std::string where = lexer_.where();
     STX_TRY(const auto text, takeName("a time"));
@@ -115,6 +115,16 @@ Result<void> BtReader::readBlock() {
     if (in) {
         STX_TRY([[maybe_unused]] const auto stream, takeName("a stream's ES_ID"));
     }
+    const std::size_t before = commandsAt(document_.frames, time);
+    rap_ = rap;
+    STX_CHECK(readBlockCommands(time));
+    rap_ = false;
+    if (rap && commandsAt(document_.frames, time) > before)
+        markRandomAccess(document_.frames, time);
+    return {};
+}
+
+Result<void> BtReader::readBlockCommands(std::uint64_t time) {
     const std::string blockWhere = lexer_.where();
     STX_CHECK(take(Kind::openBrace, "'{'"));
     while (lexer_.peek().kind != Kind::closeBrace) {
@@ -143,7 +153,7 @@ Result<void> BtReader::readOdUpdate(std::uint64_t time) {
         list.push_back(std::move(descriptor));
     }
     STX_TRY([[maybe_unused]] const auto bracket, lexer_.take());
-    odUpdates_.push_back({time, std::move(list), {}});
+    odUpdates_.push_back({time, std::move(list), {}, rap_});
     return {};
 }
 
@@ -160,7 +170,7 @@ Result<void> BtReader::readOdRemove(std::uint64_t time) {
         STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
     }
     STX_TRY([[maybe_unused]] const auto bracket, lexer_.take());
-    odUpdates_.push_back({time, {}, std::move(remove)});
+    odUpdates_.push_back({time, {}, std::move(remove), rap_});
     return {};
 }
 
@@ -228,6 +238,7 @@ Result<void> BtReader::readDescriptors() {
     for (const OdUpdate& update : odUpdates_) {
         if (!update.remove.ids.empty()) {
             addCommand(document_.odFrames, update.time, update.remove);
+            if (update.randomAccess) markRandomAccess(document_.odFrames, update.time);
             continue;
         }
         UpdateObjectDescriptors command;
@@ -236,6 +247,7 @@ Result<void> BtReader::readDescriptors() {
             command.descriptors.push_back(std::move(od));
         }
         addCommand(document_.odFrames, update.time, std::move(command));
+        if (update.randomAccess) markRandomAccess(document_.odFrames, update.time);
     }
     return {};
 }

@@ -66,6 +66,7 @@ class BtReader {
 
     /// [RAP] AT time [IN stream] { commands }
     Result<void> readBlock();
+    Result<void> readBlockCommands(std::uint64_t time);
 
     // ---- Commands
     Result<void> readCommand(std::uint64_t time);
@@ -117,6 +118,7 @@ class BtReader {
         std::uint64_t time;
         std::vector<TextDescriptor> descriptors;
         RemoveObjectDescriptors remove;
+        bool randomAccess;
     };
 
     BtLexer lexer_;
@@ -129,6 +131,7 @@ class BtReader {
     std::uint64_t lastTime_ = 0;
     bool haveScene_ = false;
     bool inCommand_ = false;
+    bool rap_ = false;  ///< the block that is read is a place where a reader may begin
 };
 
 }  // namespace stx::mpeg4

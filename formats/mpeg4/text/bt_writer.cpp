@@ -42,7 +42,8 @@ class BtWriter {
                 STX_CHECK(writeOdFrame(document_.odFrames[od]));
             if (first == frame.commands.size()) continue;
             line("");
-            line("AT {} {{", frame.time);
+            const bool rap = frame.randomAccess && &frame != &document_.frames.front();
+            line("{}AT {} {{", rap ? "RAP " : "", frame.time);
             ++depth_;
             for (std::size_t i = first; i < frame.commands.size(); ++i)
                 STX_CHECK(writeCommand(frame.commands[i]));
@@ -302,7 +303,8 @@ class BtWriter {
     }
     Result<void> writeOdFrame(const OdFrame& frame) {
         line("");
-        line("AT {} {{", frame.time);
+        const bool rap = frame.randomAccess && &frame != &document_.odFrames.front();
+        line("{}AT {} {{", rap ? "RAP " : "", frame.time);
         ++depth_;
         for (const OdCommand& command : frame.commands) {
             if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {

@@ -76,7 +76,27 @@ Result<void> finishDocument(Document& document, NodeNames& names) {
     return {};
 }
 
+/// What a text has no form for.
+static Result<void> checkTextValues(const Document& document) {
+    Result<void> fits;
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands)
+            forEachNode(command, [&](const NodePtr& node) {
+                for (const Node::SetField& field : node->setFields) {
+                    const auto* buffer = std::get_if<CommandBuffer>(&field.value);
+                    if (buffer != nullptr && !buffer->bytes.empty())
+                        fits = fail(ErrorCode::unsupported,
+                                    "{}.{} holds commands, which the texts here do not have; keep "
+                                    "this presentation as .mp4",
+                                    node->info->name,
+                                    node->info->fields[static_cast<std::size_t>(field.index)].name);
+                }
+            });
+    return fits;
+}
+
 Result<TextNames> TextNames::make(const Document& document, const Limits& limits) {
+    STX_CHECK(checkTextValues(document));
     TextNames result;
     for (const CommandFrame& frame : document.frames) {
         for (const Command& command : frame.commands) {

@@ -25,6 +25,19 @@ enum class FieldUse { in, out };
 [[nodiscard]] Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view owner,
                                           std::string_view fieldName, const std::string& where);
 
+/// The commands at a time, and a mark on them as a place where a reader may begin.
+template <class Frame>
+[[nodiscard]] std::size_t commandsAt(const std::vector<Frame>& frames, std::uint64_t time) {
+    for (const Frame& frame : frames)
+        if (frame.time == time) return frame.commands.size();
+    return 0;
+}
+template <class Frame>
+void markRandomAccess(std::vector<Frame>& frames, std::uint64_t time) {
+    for (Frame& frame : frames)
+        if (frame.time == time) frame.randomAccess = true;
+}
+
 /// What every text ends with: names resolved, streams and ids filled in as writers need them.
 [[nodiscard]] Result<void> finishDocument(Document& document, NodeNames& names);
 
@@ -32,7 +45,7 @@ enum class FieldUse { in, out };
 /// no two nodes have the same.
 class TextNames {
   public:
-    /// Errors when nodes nest too deeply or contain themselves.
+    /// Errors when nodes nest too deeply or contain themselves, or hold what texts cannot.
     [[nodiscard]] static Result<TextNames> make(const Document& document, const Limits& limits);
 
     /// Null: the node has no name.

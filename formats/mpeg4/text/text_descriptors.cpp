@@ -360,7 +360,8 @@ std::optional<Bytes> bytesFromPercentText(std::string_view text) {
 
 MuxTimes muxTimes(const ElementaryStream& stream) {
     MuxTimes times;
-    if (stream.samples.empty()) return times;
+    // A track of an .mp4 has its own times.
+    if (stream.samples.empty() || stream.fileName.find('#') != std::string::npos) return times;
     const double tick = 1000.0 / stream.timescale;
     times.startMs = static_cast<double>(stream.samples[0].time) * tick;
     times.durationMs = static_cast<double>(stream.samples[0].duration) * tick *

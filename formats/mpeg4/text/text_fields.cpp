@@ -70,6 +70,28 @@ class ItemReader {
     }
     Result<void> read(glm::vec2& v) { return readAll(v.x, v.y); }
     Result<void> read(glm::vec3& v) { return readAll(v.x, v.y, v.z); }
+    Result<void> read(glm::vec4& v) { return readAll(v.x, v.y, v.z, v.w); }
+    Result<void> read(ScriptText& v) { return read(v.text); }
+    Result<void> read(CommandBuffer& v) {
+        const std::string where = lexer_.where();
+        const bool braces = lexer_.peek().kind == Kind::openBrace;
+        STX_TRY(const auto first, lexer_.take());
+        const bool empty =
+            braces ? lexer_.peek().kind == Kind::closeBrace
+                   : first.kind == Kind::end || (first.kind == Kind::string && first.value.empty());
+        if (!empty)
+            return failAt(where, ErrorCode::unsupported,
+                          "commands inside of a node are not supported in texts; leave them out");
+        if (braces) {
+            STX_TRY([[maybe_unused]] const auto brace, lexer_.take());
+        }
+        v.bytes.clear();
+        return {};
+    }
+    Result<void> read(AttributeReference&) {
+        return failAt(lexer_.where(), ErrorCode::unsupported,
+                      "a reference to a field of a node is not supported; leave it out");
+    }
     Result<void> read(Color& v) {
         // The reference encoder's own spelling: $RRGGBB.
         const BtToken& token = lexer_.peek();
@@ -183,6 +205,17 @@ void append(std::string& out, const PixelImage& image, TextStyle) {
         out += kDigits[image.pixels[i] & 15];
     }
 }
+void append(std::string& out, const glm::vec4& v, TextStyle s) {
+    appendAll(out, s, v.x, v.y, v.z, v.w);
+}
+void append(std::string& out, const ScriptText& v, TextStyle) {
+    out += quotedText(v.text);
+}
+// Writers refuse all but empty ones before they come here.
+void append(std::string& out, const CommandBuffer&, TextStyle style) {
+    out += style == TextStyle::bt ? "{ }" : "";
+}
+void append(std::string&, const AttributeReference&, TextStyle) {}
 void append(std::string&, const NodePtr&, TextStyle) {}
 
 }  // namespace

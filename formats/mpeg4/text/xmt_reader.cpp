@@ -199,7 +199,18 @@ class XmtReader {
                     return failAt(where(node), ErrorCode::invalidInput,
                                   "begin is '{}', expected a time of 0 or more seconds",
                                   excerpt(node.attribute("begin").value()));
+                const auto sceneTime = static_cast<std::uint64_t>(
+                    std::llround((seconds + *begin) * document_.sceneStream.timescale));
+                const auto odTime = static_cast<std::uint64_t>(
+                    std::llround((seconds + *begin) * document_.odStream.timescale));
+                const std::size_t sceneBefore = commandsAt(document_.frames, sceneTime);
+                const std::size_t odBefore = commandsAt(document_.odFrames, odTime);
                 STX_CHECK(readCommands(node, seconds + *begin, depth + 1));
+                if (!equalNoCase(node.attribute("isRAP").as_string(), "yes")) continue;
+                if (commandsAt(document_.frames, sceneTime) > sceneBefore)
+                    markRandomAccess(document_.frames, sceneTime);
+                if (commandsAt(document_.odFrames, odTime) > odBefore)
+                    markRandomAccess(document_.odFrames, odTime);
             } else if (type == "ObjectDescriptorUpdate") {
                 STX_CHECK(readOdUpdate(node, ticks(document_.odStream.timescale)));
             } else if (type == "ObjectDescriptorRemove") {

@@ -53,10 +53,11 @@ class XmtWriter {
                 return time < limit || (including && time == limit);
             };
             while (isDue(seconds, false)) STX_CHECK(writeOdFrame(document_.odFrames[od++]));
-            beginTime(seconds);
+            const bool rap = frame.randomAccess && &frame != &document_.frames.front();
+            beginTime(seconds, rap);
             for (const Command& command : frame.commands)
                 std::visit([&](const auto& c) { write(c); }, command);
-            endTime(seconds);
+            endTime(seconds, rap);
             while (isDue(seconds, true)) STX_CHECK(writeOdFrame(document_.odFrames[od++]));
         }
         while (od < document_.odFrames.size()) STX_CHECK(writeOdFrame(document_.odFrames[od++]));
@@ -141,11 +142,13 @@ class XmtWriter {
         begin(tag, attributes);
         out_ += "/>\n";
     }
-    void beginTime(double seconds) {
-        if (seconds != 0) open("par", {{"begin", textFromDouble(seconds)}});
+    void beginTime(double seconds, bool rap) {
+        Attributes attributes = {{"begin", textFromDouble(seconds)}};
+        if (rap) attributes.push_back({"isRAP", "yes"});
+        if (seconds != 0 || rap) open("par", attributes);
     }
-    void endTime(double seconds) {
-        if (seconds != 0) close("par");
+    void endTime(double seconds, bool rap) {
+        if (seconds != 0 || rap) close("par");
     }
 
     // ---- Nodes
@@ -428,7 +431,8 @@ class XmtWriter {
     }
     Result<void> writeOdFrame(const OdFrame& frame) {
         const double seconds = static_cast<double>(frame.time) / document_.odStream.timescale;
-        beginTime(seconds);
+        const bool rap = frame.randomAccess && &frame != &document_.odFrames.front();
+        beginTime(seconds, rap);
         for (const OdCommand& command : frame.commands) {
             if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
                 open("ObjectDescriptorUpdate");
@@ -447,7 +451,7 @@ class XmtWriter {
                             "text forms here do not have; keep this presentation as .mp4");
             }
         }
-        endTime(seconds);
+        endTime(seconds, rap);
         return {};
     }
 

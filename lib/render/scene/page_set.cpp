@@ -111,7 +111,7 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
     auto data = std::make_shared<Data>();
     if (!atlas.paddingHolds(kPadding)) {
         STX_TRY(auto bundle, unpack(atlas, job));
-        data->unpacked = std::make_unique<const Bundle>(std::move(bundle));
+        data->unpacked = std::make_shared<const Bundle>(std::move(bundle));
         addBundle(*data->unpacked, *data);
         return PageSet(std::move(data));
     }

@@ -100,6 +100,11 @@ class PageSet {
     [[nodiscard]] bool linear() const { return data_->pages[0].texture->isLinear(); }
     [[nodiscard]] bool pruned() const { return data_->pruned; }
     [[nodiscard]] std::int64_t pointCount() const;
+    /// The same with translucent surfaces made opaque, for renderers to whom alpha says how much of
+    /// a pixel the object covers at its outline: pixels with points all around them, and those
+    /// beside such, get full alpha. `changed` tells whether there were any.
+    [[nodiscard]] PageSet solid(bool& changed) const;
+
     /// World bounds of all points: those that the file gives, else computed from the pixels.
     [[nodiscard]] Bounds bounds() const;
 
@@ -176,7 +181,8 @@ class PageSet {
         std::optional<Bounds> bounds;
         int padding = 0;  ///< texels around each rectangle that may be read
         bool pruned = false;
-        std::unique_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles
+        std::shared_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles
+        std::vector<std::shared_ptr<const Texture>> solid;  ///< of solid()
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
     static void addBundle(const Bundle& bundle, Data& data);

@@ -30,8 +30,8 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
     const std::vector<glm::vec2> outline = {{0, 0}, {6, 0}, {6, 4}, {5, 1}, {4, 4},
                                             {3, 1}, {2, 4}, {1, 1}, {0, 4}};
     for (const bool reversed : {false, true}) {
-        std::vector<glm::vec3> corners;
-        for (const auto& p : outline) corners.emplace_back(p.x, p.y * 0.5f, p.y + p.x);
+        std::vector<glm::dvec3> corners;
+        for (const auto& p : outline) corners.emplace_back(p.x, p.y * 0.5, p.y + p.x);
         if (reversed) std::reverse(corners.begin(), corners.end());
         std::vector<glm::uvec3> triangles;
         triangulate(corners, triangles);
@@ -39,8 +39,7 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
         double sum = 0;
         glm::dvec3 whole(0.0);
         for (const auto& t : triangles) {
-            const auto area = glm::cross(glm::dvec3(corners[t.y] - corners[t.x]),
-                                         glm::dvec3(corners[t.z] - corners[t.x]));
+            const auto area = glm::cross(corners[t.y] - corners[t.x], corners[t.z] - corners[t.x]);
             sum += glm::length(area);
             whole += area;
         }
@@ -49,7 +48,7 @@ TEST(Triangulate, ConcavePolygonsKeepTheirArea) {
 }
 
 TEST(Triangulate, NonsenseStillEnds) {
-    std::vector<glm::vec3> corners(50, glm::vec3(1));
+    std::vector<glm::dvec3> corners(50, glm::dvec3(1));
     std::vector<glm::uvec3> triangles;
     triangulate(corners, triangles);
     EXPECT_EQ(triangles.size(), 48u);
@@ -136,6 +135,30 @@ TEST(Ply, FaceColoursAndStrips) {
         const auto& p = strips.mesh.positions;
         EXPECT_GT(glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]).z, 0.0f);
     }
+}
+
+TEST(Clouds, PointsThatAreNowhereAreSkippedAndCounted) {
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+        "float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+    const auto cloud = readGoodText(
+        header + "0 0 0 255 0 0\nnan nan nan 0 0 0\n1 0 0 0 0 255\n0 inf 0 9 9 9\n", "a.ply");
+    ASSERT_EQ(cloud.mesh.points.size(), 2u);
+    EXPECT_EQ(cloud.mesh.positions[1], glm::vec3(1, 0, 0));
+    EXPECT_EQ(cloud.mesh.colours[1], glm::vec4(0, 0, 1, 1));
+    EXPECT_TRUE(cloud.hasNote("2 of 4 points are at no finite place and are skipped"));
+    std::string none = header;
+    for (int i = 0; i < 4; ++i) none += "nan 0 0 0 0 0\n";
+    EXPECT_NE(readBadText(none, "a.ply").text().find("none of the model's 4 points"),
+              std::string::npos);
+
+    GltfText gltf;
+    const auto nan = std::numeric_limits<float>::quiet_NaN();
+    const int position =
+        gltf.accessor(std::vector<float>{0, 0, 0, nan, 0, 0, 1, 1, 0}, 5126, "VEC3", 3);
+    gltf.root["meshes"][0]["primitives"].push_back(
+        {{"attributes", {{"POSITION", position}}}, {"mode", 0}});
+    EXPECT_EQ(readGoodText(gltf.text(), "a.gltf").mesh.points.size(), 2u);
 }
 
 class WritePoints : public testing::Test {

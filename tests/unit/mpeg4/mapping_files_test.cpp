@@ -100,7 +100,12 @@ TEST(Mpeg4Files, StreamsOfSeveralPicturesSurviveTheTexts) {
     ASSERT_TRUE(straight) << straight.error().text();
     for (const char* name : {"a.bt", "a.xmt"}) {
         mustWrite(writeMpeg4(*scene, folder / name, job));
-        EXPECT_TRUE(fs::exists(folder / "a_images" / "view1_texture_0002.png"));
+        // Named as other programs name a track, too.
+        const Bytes text = bytesOfFile(folder / name);
+        EXPECT_NE(std::string_view(reinterpret_cast<const char*>(text.data()), text.size())
+                      .find("a_images/view1_texture.mp4#1\""),
+                  std::string_view::npos);
+        EXPECT_TRUE(fs::exists(folder / "a_images" / "view1_texture.mp4"));
         const auto back = readMpeg4(folder / name, job);
         ASSERT_TRUE(back) << back.error().text();
         const auto& again = back->findObjectDescriptor(ods[0].id)->streams.at(0);
@@ -111,9 +116,107 @@ TEST(Mpeg4Files, StreamsOfSeveralPicturesSurviveTheTexts) {
         ASSERT_TRUE(bytes) << bytes.error().text();
         EXPECT_EQ(*bytes, *straight);
     }
+    // Times that a rate cannot say go into a track of their own.
     stream.samples[1].duration = 3001;
-    EXPECT_EQ(writeMpeg4(*scene, folder / "b.bt", job).error().code, ErrorCode::unsupported);
-    EXPECT_FALSE(fs::exists(folder / "b.bt"));
+    stream.samples[2].time = 6001;
+    mustWrite(writeMpeg4(*scene, folder / "b.bt", job));
+    EXPECT_TRUE(fs::exists(folder / "b_images" / "view1_texture.mp4"));
+    const auto back = readMpeg4(folder / "b.bt", job);
+    ASSERT_TRUE(back) << back.error().text();
+    EXPECT_EQ(back->findObjectDescriptor(ods[0].id)->streams.at(0).samples.at(2).time, 6001u);
+}
+
+/// Another program's dump names the file as it was seen from where the program ran.
+TEST(Mpeg4Files, TracksAreFoundBesideTheTextWhereTheirPathIsNone) {
+    const TemporaryFolder folder("dump");
+    Job job;
+    mustWrite(writeMpeg4(sceneOf(twoViews()), folder / "a.mp4", job));
+    const auto direct = readMpeg4Bundle(folder / "a.mp4", job);
+    ASSERT_TRUE(direct) << direct.error().text();
+    auto document = readMpeg4(folder / "a.mp4", job);
+    ASSERT_TRUE(document);
+    std::size_t files = 0;
+    for (OdFrame& frame : document->odFrames)
+        for (ObjectDescriptor& od :
+             std::get<UpdateObjectDescriptors>(frame.commands.at(0)).descriptors)
+            for (ElementaryStream& stream : od.streams) {
+                const char* where = files++ % 2 == 0 ? "elsewhere/run/" : "C:\\run\\";
+                stream.fileName = fmt::format("{}a.mp4#{}", where, stream.esId);
+            }
+    ASSERT_GE(files, 4u);
+    const auto text = writeBt(*document, job);
+    ASSERT_TRUE(text) << text.error().text();
+    ASSERT_TRUE(writeFile(folder / "dump.bt", std::as_bytes(std::span(*text))));
+    const auto dumped = readMpeg4Bundle(folder / "dump.bt", job);
+    ASSERT_TRUE(dumped) << dumped.error().text();
+    ASSERT_EQ(dumped->views.size(), direct->views.size());
+    for (std::size_t i = 0; i < dumped->views.size(); ++i) {
+        EXPECT_EQ(dumped->views[i].depth, direct->views[i].depth);
+        EXPECT_EQ(dumped->views[i].texture, direct->views[i].texture);
+    }
+}
+
+/// Dumps of the reference files, each beside its .mp4.
+TEST(Mpeg4Files, DumpsOfAnotherProgramAreReadBesideTheirFile) {
+    REQUIRE_SHARED(reference, "reference");
+    for (const char* name : {"01_depthimage_simpletexture", "08_use_names", "14_movietexture"}) {
+        SCOPED_TRACE(name);
+        const TemporaryFolder folder("reference_dump");
+        const std::string bt = std::string(name) + ".bt", mp4 = std::string(name) + ".mp4";
+        fs::copy_file(reference / "dumps/v26.02.0" / bt, folder / bt);
+        fs::copy_file(reference / "mp4" / mp4, folder / mp4);
+        Job job;
+        const auto direct = readMpeg4Bundle(folder / mp4, job);
+        const auto dumped = readMpeg4Bundle(folder / bt, job);
+        ASSERT_TRUE(direct) << direct.error().text();
+        ASSERT_TRUE(dumped) << dumped.error().text();
+        ASSERT_EQ(dumped->views.size(), direct->views.size());
+        for (std::size_t i = 0; i < dumped->views.size(); ++i)
+            EXPECT_EQ(dumped->views[i].depth, direct->views[i].depth);
+    }
+}
+
+/// Players that know no scenes take every image track for a video.
+TEST(Mpeg4Files, OnlyColourTracksAreEnabledInScenesOfOurs) {
+    const TemporaryFolder folder("enabled");
+    Job job;
+    const Document scene = sceneOf(twoViews());
+    mustWrite(writeMpeg4(scene, folder / "a.mp4", job));
+    const Bytes bytes = bytesOfFile(folder / "a.mp4");
+    const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    int enabled = 0, disabled = 0;
+    for (std::size_t at = file.find("tkhd"); at != std::string_view::npos;
+         at = file.find("tkhd", at + 1)) {
+        const std::string_view name = file.substr(file.find("hdlr", at) + 28);
+        const bool image = name.starts_with("view");
+        const int flags = file[at + 7], group = file[at + 4 + 4 + 20 + 8 + 3];
+        if (!image) {
+            EXPECT_EQ(flags, 1) << "scene and descriptors";
+            continue;
+        }
+        EXPECT_EQ(group, 1) << name.substr(0, 20);
+        const bool colour = name.substr(0, name.find('\0')).ends_with(" texture");
+        EXPECT_EQ(flags, colour ? 7 : 6) << name.substr(0, 20);
+        ++(colour ? enabled : disabled);
+    }
+    EXPECT_EQ(enabled, 2);
+    EXPECT_EQ(disabled, 5);
+    // Through a text the same; a scene of others stays as it is.
+    mustWrite(writeMpeg4(scene, folder / "a.bt", job));
+    const auto text = readMpeg4(folder / "a.bt", job);
+    ASSERT_TRUE(text);
+    mustWrite(writeMpeg4(*text, folder / "b.mp4", job));
+    EXPECT_EQ(bytesOfFile(folder / "b.mp4"), bytes);
+    Document foreign = scene;
+    for (CommandFrame& frame : foreign.frames)
+        for (Command& command : frame.commands)
+            forEachNode(command, [](const NodePtr& node) {
+                if (node->is("WorldInfo")) node->set("info", std::vector<std::string>());
+            });
+    mustWrite(writeMpeg4(foreign, folder / "c.mp4", job));
+    const auto plain = writeMp4(foreign, job);
+    ASSERT_TRUE(plain);
+    EXPECT_EQ(bytesOfFile(folder / "c.mp4"), *plain);
 }
 
 TEST(Mpeg4Files, NothingIsReplacedWithNoClobber) {

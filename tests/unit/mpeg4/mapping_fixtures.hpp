@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/mpeg4/mpeg4.hpp"
+#include "formats/mpeg4/text/bt.hpp"
 
 namespace stx::mpeg4 {
 
@@ -104,6 +105,33 @@ inline Bytes bytesOfFile(const std::filesystem::path& path) {
     auto bytes = readFile(path, Limits());
     if (!bytes) ADD_FAILURE() << bytes.error().text();
     return bytes ? std::move(*bytes) : Bytes();
+}
+
+/// What is read from BT nodes under one Group.
+inline Result<Bundle> bundleFromText(const std::string& nodes) {
+    Job job;
+    auto document = readBt("Group { children [ " + nodes + " ] }", "test.bt", job);
+    if (!document) return propagate(document);
+    return bundleFromScene(*document, {}, job);
+}
+inline Bundle mustRead(const std::string& nodes) {
+    auto bundle = bundleFromText(nodes);
+    if (!bundle) ADD_FAILURE() << bundle.error().text() << "\n" << nodes;
+    return bundle ? std::move(*bundle) : Bundle();
+}
+inline std::string errorOf(const std::string& nodes) {
+    auto bundle = bundleFromText(nodes);
+    return bundle ? "no error" : bundle.error().text();
+}
+
+/// 2x2 pixels: lower left 0, lower right 64, upper left 128, upper right 255.
+inline constexpr const char* kPixels =
+    "SimpleTexture { texture PixelTexture { image 2 2 3 0xFF0000 0x00FF00 0x0000FF 0xFFFFFF } "
+    "depth PixelTexture { image 2 2 1 0 64 128 255 } }";
+
+inline std::string depthImage(const std::string& fields = "") {
+    return "DepthImage { nearPlane 1 farPlane 9 orthographic FALSE fieldOfView 0.5 0.5 " + fields +
+           " diTexture " + kPixels + " }";
 }
 
 }  // namespace stx::mpeg4

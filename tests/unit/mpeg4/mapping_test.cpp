@@ -12,32 +12,6 @@
 namespace stx::mpeg4 {
 namespace {
 
-Result<Bundle> bundleFromText(const std::string& nodes) {
-    Job job;
-    auto document = readBt("Group { children [ " + nodes + " ] }", "test.bt", job);
-    if (!document) return propagate(document);
-    return bundleFromScene(*document, {}, job);
-}
-Bundle mustRead(const std::string& nodes) {
-    auto bundle = bundleFromText(nodes);
-    if (!bundle) ADD_FAILURE() << bundle.error().text() << "\n" << nodes;
-    return bundle ? std::move(*bundle) : Bundle();
-}
-std::string errorOf(const std::string& nodes) {
-    auto bundle = bundleFromText(nodes);
-    return bundle ? "no error" : bundle.error().text();
-}
-
-/// 2x2 pixels: lower left 0, lower right 64, upper left 128, upper right 255.
-constexpr const char* kPixels =
-    "SimpleTexture { texture PixelTexture { image 2 2 3 0xFF0000 0x00FF00 0x0000FF 0xFFFFFF } "
-    "depth PixelTexture { image 2 2 1 0 64 128 255 } }";
-
-std::string depthImage(const std::string& fields = "") {
-    return "DepthImage { nearPlane 1 farPlane 9 orthographic FALSE fieldOfView 0.5 0.5 " + fields +
-           " diTexture " + kPixels + " }";
-}
-
 TEST(Mapping, ABundleComesBackWithItsDepthCodes) {
     for (const int bits : {8, 16}) {
         Bundle bundle;

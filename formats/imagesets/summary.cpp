@@ -1,0 +1,68 @@
+#include "formats/imagesets/summary.hpp"
+
+#include <set>
+
+#include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/pictures.hpp"
+
+namespace stx {
+
+using namespace imagesets;
+
+Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job& job) {
+    ImageSetSummary summary;
+    ImageSetOptions options;
+    STX_TRY(options.from, recogniseImageSet(path));
+    summary.kind = options.from;
+    // Depth is not read: its range has no effect here.
+    if (summary.kind == "msr") {
+        options.depthMin = 1;
+        options.depthMax = 2;
+    }
+    auto described = describeSet(path, options, job);
+    if (!described && described.error().code == ErrorCode::usage) {
+        job.note(fmt::format("cameras are not known: {}", described.error().text()));
+        summary.camerasKnown = false;
+        options.depthMin = options.focal = options.baseline = 1;
+        options.depthMax = 2;
+        for (double& value : options.intrinsics) value = 1;
+        described = describeSet(path, options, job);
+    }
+    if (!described) return propagate(described);
+    summary.title = std::move(described->title);
+    summary.frames = described->frames;
+    std::set<std::filesystem::path> counted;
+    for (const SetView& view : described->views) {
+        ImageSetSummary::View out;
+        out.name = view.name;
+        out.camera = view.camera;
+        out.panorama = view.panorama.has_value();
+        out.colour = view.texture.name;
+        out.depth = view.depth.name;
+        for (const PictureSource* source : {&view.texture, &view.depth}) {
+            std::error_code ec;
+            if (source->missing) {
+                out.missing.push_back(source->name);
+            } else if (!source->path.empty() && counted.insert(source->path).second) {
+                if (const auto size = std::filesystem::file_size(source->path, ec); !ec)
+                    summary.bytes += size;
+            }
+        }
+        // Blender's files have an angle only.
+        if (out.camera.width == 0 && !view.texture.missing && !view.texture.path.empty()) {
+            if (const auto size = imageSizeOf(view.texture, job)) {
+                out.camera.width = size->x;
+                out.camera.height = size->y;
+                out.camera.fx = size->x * 0.5 / std::tan(view.angleX * 0.5);
+                out.camera.fy =
+                    view.angleY > 0 ? size->y * 0.5 / std::tan(view.angleY * 0.5) : out.camera.fx;
+                out.camera.cx = size->x * 0.5;
+                out.camera.cy = size->y * 0.5;
+            }
+        }
+        summary.views.push_back(std::move(out));
+    }
+    return summary;
+}
+
+}  // namespace stx

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/geometry/camera.hpp"
+
+namespace stx {
+
+/// What an image set says of itself, before a pixel is read.
+struct ImageSetSummary {
+    struct View {
+        std::string name;
+        Camera camera;          ///< in our axes; width and height are 0 when only its missing
+                                ///< picture would tell them
+        bool panorama = false;  ///< equirectangular: the camera has position and orientation only
+        std::string colour;     ///< names as the set has them; empty where one file holds all
+        std::string depth;
+        std::vector<std::string> missing;  ///< those of the two that are not there
+    };
+    std::string kind;  ///< one of imageSetKinds()
+    std::string title;
+    int frames = 1;  ///< of sets that have time
+    std::vector<View> views;
+    std::uint64_t bytes = 0;  ///< of all files that the views name
+    /// The kind needs options of `convert` for its cameras (--focal, --intrinsics): cameras here
+    /// have names, but no meaning.
+    bool camerasKnown = true;
+};
+
+/// Reads cameras and looks for the files that a set names. Errors: (io) there is no such file or
+/// folder; (invalidInput) it is no image set, or its cameras cannot be read.
+[[nodiscard]] Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path,
+                                                        Job& job);
+
+}  // namespace stx

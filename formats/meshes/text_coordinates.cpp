@@ -1,0 +1,104 @@
+#include "formats/meshes/text_coordinates.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <vector>
+
+#include "formats/meshes/text_encoding.hpp"
+#include "lib/geometry/origin.hpp"
+#include "lib/model/strays.hpp"
+
+namespace stx {
+namespace {
+
+/// A line of the keyword: its place in the world, and what stands behind the coordinates.
+struct CoordinateLine {
+    glm::dvec3 position{0.0};
+    std::string_view rest;
+};
+
+bool isBlank(char c) {
+    return c == ' ' || c == '\t';
+}
+
+bool takeNumber(std::string_view& text, double& value) {
+    while (!text.empty() && isBlank(text.front())) text.remove_prefix(1);
+    if (text.starts_with('+')) text.remove_prefix(1);
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || !std::isfinite(value)) return false;
+    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    return text.empty() || isBlank(text.front());
+}
+
+/// `values` is what follows the keyword. OBJ: x y z, x y z w, or x y z r g b.
+std::optional<CoordinateLine> parse(std::string_view values) {
+    CoordinateLine line;
+    values = trimmed(values);
+    for (int k = 0; k < 3; ++k) {
+        if (!takeNumber(values, line.position[k])) return std::nullopt;
+    }
+    line.rest = trimmed(values);
+    double w = 1;
+    if (auto last = line.rest; !last.empty() && takeNumber(last, w) && trimmed(last).empty()) {
+        if (!(std::abs(w) > 0)) return std::nullopt;
+        line.position /= w;
+        line.rest = {};
+    }
+    return line;
+}
+
+/// Calls visit(line, values): the line with its end, and what follows the keyword if it has it.
+/// Stops when visit gives false.
+template <class Visit>
+bool eachLine(std::string_view text, std::string_view keyword, const Visit& visit) {
+    while (!text.empty()) {
+        const auto end = text.find('\n');
+        const auto line = text.substr(0, end == std::string_view::npos ? end : end + 1);
+        text.remove_prefix(line.size());
+        auto content = line;
+        while (!content.empty() && isBlank(content.front())) content.remove_prefix(1);
+        const bool has = content.size() > keyword.size() && content.starts_with(keyword) &&
+                         isBlank(content[keyword.size()]);
+        if (has) content.remove_prefix(keyword.size());
+        if (!visit(line, has ? std::optional(content) : std::nullopt)) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+std::optional<ShiftedText> shiftLargeCoordinates(ByteSpan bytes, std::string_view keyword) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    std::vector<glm::dvec3> positions;
+    const bool understood = eachLine(text, keyword, [&](auto, const auto& values) {
+        if (!values) return true;
+        const auto line = parse(*values);
+        if (line) positions.push_back(line->position);
+        return line.has_value();
+    });
+    if (!understood) return std::nullopt;
+    const auto strays = findStrays(positions.size(), [&](std::uint64_t i) {
+        return Piece{positions[i], positions[i]};
+    });
+    ShiftedText out;
+    out.origin = originFor(strays.bounds);
+    if (out.origin == glm::dvec3(0.0)) return std::nullopt;
+    out.text.reserve(text.size() + positions.size() * 8);
+    const auto append = [&](std::string_view piece) {
+        const auto* first = reinterpret_cast<const std::byte*>(piece.data());
+        out.text.insert(out.text.end(), first, first + piece.size());
+    };
+    eachLine(text, keyword, [&](std::string_view line, const auto& values) {
+        if (!values) {
+            append(line);
+            return true;
+        }
+        const auto parsed = *parse(*values);
+        const glm::vec3 p(parsed.position - out.origin);
+        append(fmt::format("{} {} {} {} {}\n", keyword, p.x, p.y, p.z, parsed.rest));
+        return true;
+    });
+    return out;
+}
+
+}  // namespace stx

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+namespace stx {
+
+/// The translucent surfaces at each sample of a tile, from the nearest on.
+class Layers {
+  public:
+    struct Layer {
+        float nearness = 0;  ///< as of opaque surfaces
+        float alpha = 0;     ///< 0..1
+        glm::vec3 colour{0.0f};
+        std::uint32_t material = 0;
+        std::uint32_t slot = 0;  ///< of the triangle
+    };
+
+    /// Forgets all; `samples` = 0 as long as a tile has no translucent surface.
+    void reset(std::size_t samples) {
+        counts_.assign(samples, 0);
+        layers_.resize(samples * kMost);
+    }
+    [[nodiscard]] bool empty() const { return counts_.empty(); }
+    [[nodiscard]] std::span<const Layer> at(std::size_t sample) const {
+        if (counts_.empty()) return {};
+        return {layers_.data() + sample * kMost, counts_[sample]};
+    }
+
+    void add(std::size_t sample, const Layer& layer) {
+        Layer* const first = layers_.data() + sample * kMost;
+        std::uint8_t& count = counts_[sample];
+        int at = 0;
+        for (; at < count && first[at].nearness >= layer.nearness; ++at) {
+            if (isSame(first[at], layer) || first[at].alpha >= kOpaque) return;
+        }
+        if (at < count && isSame(first[at], layer)) return;
+        if (at == kMost) return;
+        if (layer.alpha >= kOpaque) {
+            count = static_cast<std::uint8_t>(at + 1);
+        } else {
+            const int last = std::min<int>(count, kMost - 1);
+            std::move_backward(first + at, first + last, first + last + 1);
+            count = static_cast<std::uint8_t>(last + 1);
+        }
+        first[at] = layer;
+    }
+
+  private:
+    /// What lies behind so many surfaces hardly shows; a file may stack millions.
+    static constexpr int kMost = 8;
+    static constexpr float kOpaque = 0.998f;
+
+    /// A sample on the edge of two triangles is inside of both, but sees one surface.
+    static bool isSame(const Layer& a, const Layer& b) {
+        return a.material == b.material &&
+               std::abs(a.nearness - b.nearness) <= 1e-6f * std::abs(a.nearness);
+    }
+
+    std::vector<Layer> layers_;
+    std::vector<std::uint8_t> counts_;
+};
+
+}  // namespace stx

@@ -1,0 +1,87 @@
+#include <algorithm>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/scene/page_set.hpp"
+
+namespace stx {
+namespace {
+
+/// Pixels around a point that must be points, too, for it to be inside of the object; outlines,
+/// also those of hair and leaves, are narrower.
+constexpr int kInside = 2;
+/// How far full alpha reaches from there towards the outline.
+constexpr int kReach = 3;
+
+/// 1 for the translucent pixels that lie inside of the object.
+Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>& depth) {
+    const int w = depth.width(), h = depth.height();
+    Image<std::uint8_t> inside(w, h, std::uint8_t{0});
+    parallelFor(0, h, [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < w; ++x) {
+            const float alpha = texture.at(x, y).w;
+            if (!(alpha > 0.0f && alpha < 1.0f) || x < kInside || y < kInside || x + kInside >= w ||
+                y + kInside >= h)
+                continue;
+            bool all = true;
+            for (int dy = -kInside; all && dy <= kInside; ++dy) {
+                for (int dx = -kInside; all && dx <= kInside; ++dx)
+                    all = hasPoint(depth.at(x + dx, y + dy));
+            }
+            inside.at(x, y) = all ? 1 : 0;
+        }
+    });
+    return inside;
+}
+
+/// 1 for all pixels within kReach of those of 1, along both axes.
+Image<std::uint8_t> widened(const Image<std::uint8_t>& from) {
+    const int w = from.width(), h = from.height();
+    Image<std::uint8_t> across(w, h, std::uint8_t{0}), out(w, h, std::uint8_t{0});
+    const auto spread = [&](const Image<std::uint8_t>& in, Image<std::uint8_t>& to, int stepX,
+                            int stepY) {
+        parallelFor(0, h, [&](std::int64_t row) {
+            const int y = static_cast<int>(row);
+            for (int x = 0; x < w; ++x) {
+                std::uint8_t any = 0;
+                for (int k = -kReach; k <= kReach; ++k) {
+                    const int px = x + k * stepX, py = y + k * stepY;
+                    if (px >= 0 && py >= 0 && px < w && py < h) any |= in.at(px, py);
+                }
+                to.at(x, y) = any;
+            }
+        });
+    };
+    spread(from, across, 1, 0);
+    spread(across, out, 0, 1);
+    return out;
+}
+
+}  // namespace
+
+PageSet PageSet::solid(bool& changed) const {
+    changed = false;
+    std::shared_ptr<Data> data;
+    for (std::size_t i = 0; i < data_->pages.size(); ++i) {
+        const Page& page = data_->pages[i];
+        const auto inside = translucentInside(*page.texture, *page.depth);
+        if (std::none_of(inside.pixels().begin(), inside.pixels().end(),
+                         [](std::uint8_t v) { return v != 0; }))
+            continue;
+        if (!data) data = std::make_shared<Data>(*data_);
+        const auto near = widened(inside);
+        auto texture = std::make_shared<Texture>(*page.texture);
+        for (std::size_t p = 0; p < near.count(); ++p) {
+            if (near.data()[p] == 0 || !hasPoint(page.depth->data()[p])) continue;
+            if (auto* image = texture->rgba8()) image->data()[p].w = 255;
+            if (auto* image = texture->rgbaFloat()) image->data()[p].w = 1.0f;
+        }
+        data->pages[i].texture = texture.get();
+        data->solid.push_back(std::move(texture));
+    }
+    if (!data) return *this;
+    changed = true;
+    return PageSet(std::move(data));
+}
+
+}  // namespace stx

@@ -1,0 +1,88 @@
+#include "lib/model/strays.hpp"
+
+#include <gtest/gtest.h>
+
+#include "lib/capture/capture.hpp"
+#include "lib/geometry/view_layout.hpp"
+
+namespace stx {
+namespace {
+
+/// `count` points on a unit sphere, evenly spread.
+Mesh sphereCloud(int count) {
+    Mesh mesh;
+    ViewLayout layout;
+    layout.count = count;
+    for (const auto& d : layoutDirections(layout)) {
+        mesh.points.push_back(static_cast<std::uint32_t>(mesh.positions.size()));
+        mesh.positions.emplace_back(d);
+    }
+    mesh.materials.emplace_back();
+    return mesh;
+}
+
+void addPoint(Mesh& mesh, glm::vec3 at) {
+    mesh.points.push_back(static_cast<std::uint32_t>(mesh.positions.size()));
+    mesh.positions.push_back(at);
+}
+
+TEST(Strays, OnePointFarOffHidesNothing) {
+    const Mesh clean = sphereCloud(20000);
+    Mesh mesh = clean;
+    addPoint(mesh, {3e5f, 2e5f, 0});
+    EXPECT_LT(mesh.bounds().radius(), 2.0);
+    EXPECT_NEAR(pointRadius(mesh), pointRadius(clean), 1e-3);
+    ViewLayout layout;
+    layout.count = 8;
+    ViewFraming framing;
+    framing.width = framing.height = 48;
+    const auto cameras = layoutCameras(layout, framing, drawnPoints(mesh));
+    const auto cleanCameras = layoutCameras(layout, framing, drawnPoints(clean));
+    ASSERT_TRUE(cameras && cleanCameras);
+    Job job;
+    const auto bundle = captureBundle(mesh, *cameras, {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    ASSERT_EQ(bundle->views.size(), 8u);
+    const auto expected = captureBundle(clean, *cleanCameras, {}, job);
+    ASSERT_TRUE(expected);
+    EXPECT_NEAR(static_cast<double>(bundle->pointCount()),
+                static_cast<double>(expected->pointCount()), 0.02 * expected->pointCount());
+    for (const auto& view : bundle->views)
+        EXPECT_LT(view.farPlane - view.nearPlane, 2.0) << "the codes of the depth are the object's";
+}
+
+TEST(Strays, ShapesHaveNone) {
+    // A cube of 8 corners, a small thing on a wide floor, two clouds apart.
+    Mesh cube;
+    for (int k = 0; k < 8; ++k) addPoint(cube, {k & 1, k >> 1 & 1, (k >> 2 & 1) * 1000});
+    EXPECT_TRUE(findStrays(cube).pieces.empty());
+    Mesh floor = sphereCloud(20000);
+    const auto base = static_cast<std::uint32_t>(floor.positions.size());
+    floor.positions.insert(floor.positions.end(),
+                           {{-500, -1, -500}, {500, -1, -500}, {500, -1, 500}, {-500, -1, 500}});
+    floor.triangles = {{base, base + 1, base + 2}, {base, base + 2, base + 3}};
+    floor.triangleMaterial = {0, 0};
+    EXPECT_EQ(floor.bounds().max.x, 500);
+    Mesh two = sphereCloud(20000);
+    for (int i = 0; i < 200; ++i) addPoint(two, {1000 + i * 0.01f, 0, 0});
+    EXPECT_TRUE(findStrays(two).pieces.empty()) << "one in a hundred is a part of the object";
+    EXPECT_EQ(two.bounds().max.x, 1000 + 199 * 0.01f);
+}
+
+TEST(Strays, AreSaidWithTheirPlace) {
+    Mesh mesh = sphereCloud(5000);
+    addPoint(mesh, {0, 1000, 0});
+    addPoint(mesh, {0, 5000, 0});
+    const auto strays = findStrays(mesh);
+    ASSERT_EQ(strays.pieces, (std::vector<std::uint64_t>{5000, 5001}));
+    Job job;
+    noteStrays(strays, 5002, "points", {0, 0, 7}, job);
+    EXPECT_EQ(job.takeNotes(),
+              std::vector<std::string>{"2 of 5002 points lie far outside of the rest (the farthest "
+                                       "at 0 5000 7): bounds and reference views leave them out"});
+    dropStrays(mesh, strays);
+    EXPECT_EQ(mesh.points.size(), 5000u);
+}
+
+}  // namespace
+}  // namespace stx

@@ -1,0 +1,134 @@
+#include <gtest/gtest.h>
+
+#include "lib/capture/capture.hpp"
+#include "lib/capture/rasterizer.hpp"
+
+namespace stx {
+namespace {
+
+/// Squares of 8 x 8 that face +Z, each with a material of its own; materials[0] is the first's.
+Mesh squares(std::initializer_list<std::pair<float, glm::vec4>> heightAndColour) {
+    Mesh mesh;
+    for (const auto& [z, colour] : heightAndColour) {
+        const auto base = static_cast<std::uint32_t>(mesh.positions.size());
+        const auto material = static_cast<std::uint32_t>(mesh.materials.size());
+        mesh.positions.insert(mesh.positions.end(),
+                              {{-4, -4, z}, {4, -4, z}, {4, 4, z}, {-4, 4, z}});
+        mesh.triangles.insert(mesh.triangles.end(),
+                              {{base, base + 1, base + 2}, {base, base + 2, base + 3}});
+        mesh.triangleMaterial.insert(mesh.triangleMaterial.end(), {material, material});
+        Material m;
+        m.name = fmt::format("m{}", material);
+        m.baseColour = colour;
+        m.alpha = colour.a < 1 ? Material::Alpha::blend : Material::Alpha::opaque;
+        mesh.materials.push_back(m);
+    }
+    return mesh;
+}
+
+constexpr glm::vec4 kRed{1, 0, 0, 1}, kBlue{0, 0, 1, 1};
+glm::vec4 withAlpha(glm::vec4 colour, float alpha) {
+    return {glm::vec3(colour), alpha};
+}
+
+/// From z = 5, one unit a pixel: the squares fill the frame.
+Camera above() {
+    return Camera::fromFieldOfView({0, 0, 5}, {1, 0, 0, 0}, {8, 8}, true, 8, 8);
+}
+
+void expectAll(const RasterImage& image, glm::vec4 colour, float depth) {
+    for (int y = 0; y < 8; ++y) {
+        for (int x = 0; x < 8; ++x) {
+            for (int k = 0; k < 4; ++k)
+                EXPECT_NEAR(image.colour.at(x, y)[k], colour[k], 1e-4f)
+                    << x << ' ' << y << ' ' << k;
+            EXPECT_FLOAT_EQ(image.depth.at(x, y), depth) << x << ' ' << y;
+        }
+    }
+}
+
+TEST(Translucent, AloneKeepsItsShareOfCoverageAndItsDepth) {
+    Job job;
+    for (const float alpha : {0.05f, 0.3f, 0.5f, 0.7f, 0.95f}) {
+        for (const int samples : {1, 2, 4}) {
+            RasterSettings settings;
+            settings.supersampling = samples;
+            const auto image =
+                rasterise(squares({{0, withAlpha(kRed, alpha)}}), above(), settings, job);
+            ASSERT_TRUE(image);
+            expectAll(*image, kRed * alpha, 5);
+        }
+    }
+}
+
+TEST(Translucent, InFrontOfOpaqueMixesAndTheDepthIsWhatShowsMost) {
+    Job job;
+    for (const float alpha : {0.3f, 0.5f, 0.7f}) {
+        const auto mesh = squares({{0, kBlue}, {1, withAlpha(kRed, alpha)}});
+        const auto image = rasterise(mesh, above(), {}, job);
+        ASSERT_TRUE(image);
+        expectAll(*image, kRed * alpha + kBlue * (1 - alpha), alpha < 0.5f ? 5 : 4);
+    }
+    // Behind opaque it does not show.
+    const auto hidden =
+        rasterise(squares({{0, withAlpha(kRed, 0.5f)}, {1, kBlue}}), above(), {}, job);
+    expectAll(*hidden, kBlue, 4);
+}
+
+TEST(Translucent, LayersAddUpInAnyOrder) {
+    Job job;
+    const auto a = withAlpha(kRed, 0.3f), b = withAlpha(kBlue, 0.4f);
+    const auto expected = kBlue * 0.4f + kRed * 0.3f * 0.6f;
+    for (const auto& mesh : {squares({{0, a}, {2, b}}), squares({{2, b}, {0, a}})}) {
+        const auto image = rasterise(mesh, above(), {}, job);
+        ASSERT_TRUE(image);
+        expectAll(*image, expected, 5);
+    }
+    // More than anybody looks through.
+    Mesh many;
+    for (int i = 0; i < 50; ++i) {
+        auto one = squares({{i * 0.01f, a}});
+        const auto base = static_cast<std::uint32_t>(many.positions.size());
+        many.positions.insert(many.positions.end(), one.positions.begin(), one.positions.end());
+        for (const auto& t : one.triangles) many.triangles.push_back(t + base);
+        many.triangleMaterial.resize(many.triangles.size(), 0);
+        many.materials = one.materials;
+    }
+    const auto image = rasterise(many, above(), {}, job);
+    ASSERT_TRUE(image);
+    EXPECT_GT(image->colour.at(3, 3).w, 0.94f);
+}
+
+TEST(Translucent, OneHalfDoesNotSpeckleBesideVertexColours) {
+    Job job;
+    auto mesh = squares({{0, kBlue}, {1, withAlpha(kRed, 0.5f)}});
+    // Another part has colours, so that all vertices get white ones.
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(1));
+    const auto camera = Camera::fromFieldOfView({0.1, 0.2, 5}, *lookAt({0.1, 0.2, 5}, {0, 0, 1}),
+                                                {4, 4}, true, 64, 64);
+    const auto image = rasterise(mesh, camera, {}, job);
+    ASSERT_TRUE(image);
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+            EXPECT_NEAR(image->colour.at(x, y).w, 1.0f, 1e-4f);
+            EXPECT_NEAR(image->colour.at(x, y).r, 0.5f, 1e-3f) << x << ' ' << y;
+            EXPECT_LT(image->depth.at(x, y), 4.5f) << "the front surface at " << x << ' ' << y;
+        }
+    }
+}
+
+TEST(Translucent, ReferenceViewsKeepAlphaAndTheNoteSaysSo) {
+    Job job;
+    const auto bundle = captureBundle(squares({{0, withAlpha(kRed, 0.3f)}}), {above()}, {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    const auto* colour = bundle->views[0].texture.rgba8();
+    ASSERT_TRUE(colour);
+    EXPECT_EQ(bundle->views[0].pointCount(), 64);
+    EXPECT_EQ(colour->at(3, 3), glm::u8vec4(255, 0, 0, 77));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_TRUE(notes[0].starts_with("material 'm0' is translucent")) << notes[0];
+}
+
+}  // namespace
+}  // namespace stx

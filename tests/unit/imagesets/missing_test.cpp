@@ -1,0 +1,86 @@
+// A recording of a thousand images from which one is missing is still a recording.
+
+#include "formats/imagesets/export.hpp"
+#include "tests/unit/imagesets/set_writer.hpp"
+
+using namespace stx;
+using namespace sets;
+
+namespace {
+
+glm::dmat3 visionRotation(const Camera& c) {
+    const glm::dmat3 r = glm::mat3_cast(c.orientation);
+    return {r[0], -r[1], -r[2]};
+}
+
+/// Reads a set of three views one of which lacks a file, with a note; strictly it is an error.
+void expectTwoOfThree(const std::filesystem::path& set, const std::string& gone) {
+    ImageSetOptions options;
+    options.depthBits = 32;
+    Job job;
+    const auto read = readImageSet(set, options, job);
+    ASSERT_TRUE(read) << read.error().text();
+    EXPECT_EQ(read->views.size(), 2u);
+    std::string notes;
+    for (const auto& note : job.takeNotes()) notes += note + "\n";
+    EXPECT_NE(notes.find("1 of 3 views is left out, as files are missing; the first: "),
+              std::string::npos)
+        << notes;
+    EXPECT_NE(notes.find(gone), std::string::npos) << notes;
+    options.strict = true;
+    const auto strict = readImageSet(set, options, job);
+    ASSERT_FALSE(strict);
+    EXPECT_EQ(strict.error().code, ErrorCode::io);
+    EXPECT_NE(strict.error().text().find(gone), std::string::npos) << strict.error().text();
+}
+
+TEST(MissingFiles, OfTransformsLeaveTheirViewOut) {
+    Bundle bundle;
+    bundle.views = roomViews(3);
+    for (std::size_t i = 0; i < 3; ++i) bundle.views[i].name = fmt::format("v{}", i);
+    TemporaryFolder folder;
+    Job job;
+    const auto set = folder / "set";
+    ASSERT_TRUE(exportImages(bundle, set, {}, job));
+    std::filesystem::remove(set / "images/v1.png");
+    expectTwoOfThree(set, "v1.png");
+    std::filesystem::remove(set / "images/v0.png");
+    std::filesystem::remove(set / "depth/v2.exr");
+    expectError(readSet(set), {"frames[0]", "v0.png"});
+}
+
+TEST(MissingFiles, OfRecordingsLeaveTheirViewOut) {
+    const auto views = roomViews(3);
+    TemporaryFolder tum, scenes;
+    std::string rgb, depth, poses;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto& v = views[i];
+        const glm::dmat3 r = visionRotation(v.camera);
+        const glm::dquat q = glm::quat_cast(r);
+        const auto& p = v.camera.position;
+        writeColour(tum / fmt::format("{}.png", i), v);
+        const auto codes = [&](double scale) {
+            return [&v, scale](int x, int y) { return std::lround(v.depth.at(x, y) * scale); };
+        };
+        writeCodes(tum / fmt::format("d{}.png", i), 96, 64, 16, codes(5000));
+        rgb += fmt::format("{}.0 {}.png\n", i, i);
+        depth += fmt::format("{}.0 d{}.png\n", i, i);
+        poses += fmt::format("{}.0 {} {} {} {} {} {} {}\n", i, p.x, p.y, p.z, q.x, q.y, q.z, q.w);
+        const auto stem = fmt::format("frame-00000{}", i);
+        writeColour(scenes / (stem + ".color.png"), v);
+        writeCodes(scenes / (stem + ".depth.png"), 96, 64, 16, codes(1000));
+        std::string pose;
+        for (int row = 0; row < 3; ++row)
+            pose += fmt::format("{} {} {} {}\n", r[0][row], r[1][row], r[2][row], p[row]);
+        writeText(scenes / (stem + ".pose.txt"), pose + "0 0 0 1\n");
+    }
+    writeText(tum / "rgb.txt", rgb);
+    writeText(tum / "depth.txt", depth);
+    writeText(tum / "groundtruth.txt", poses);
+    std::filesystem::remove(tum / "0.png");
+    expectTwoOfThree(tum.path(), "0.png");
+    std::filesystem::remove(scenes / "frame-000002.depth.png");
+    expectTwoOfThree(scenes.path(), "frame-000002.depth.png");
+}
+
+}  // namespace

@@ -1,0 +1,101 @@
+#include <fstream>
+
+#include "formats/images/images.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/meshes/models.hpp"
+
+namespace stx {
+namespace {
+
+/// A model that was made on another machine: its textures are named as they were there.
+class MovedModel : public testing::Test {
+  protected:
+    MovedModel() {
+        std::filesystem::create_directories(folder_ / "home/model/textures");
+        std::filesystem::create_directories(folder_ / "home/other");
+        for (const char* name :
+             {"home/model/beside.png", "home/model/textures/below.png", "home/other/outside.png"})
+            writePicture(name, {200, 100, 50, 255});
+    }
+
+    void writePicture(const std::string& name, glm::u8vec4 colour) {
+        const Rgba8Image image(2, 2, colour);
+        const auto png = encodePng(2, 2, 4, 8, image.data(), true);
+        ASSERT_TRUE(png);
+        ASSERT_TRUE(writeFile(folder_ / name, *png));
+    }
+
+    [[nodiscard]] std::filesystem::path obj(const std::string& texture) const {
+        std::ofstream(folder_ / "home/model/a.mtl")
+            << "newmtl paint\nKd 1 1 1\nmap_Kd " << texture << "\n";
+        const auto file = folder_ / "home/model/a.obj";
+        std::ofstream(file) << "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+                               "usemtl paint\nf 1/1 2/2 3/3\n";
+        return file;
+    }
+    [[nodiscard]] std::filesystem::path gltf(const std::string& texture) const {
+        GltfText text;
+        text.addQuad();
+        text.root["images"] = {{{"uri", texture}}};
+        text.root["textures"] = {{{"source", 0}}};
+        text.root["materials"] = {
+            {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+        text.primitive()["material"] = 0;
+        const auto file = folder_ / "home/model/a.gltf";
+        std::ofstream(file) << text.text();
+        return file;
+    }
+    /// Red of the first material's texture, or -1 when it has none.
+    static int red(const Mesh& mesh) {
+        for (const auto& m : mesh.materials) {
+            if (m.baseColourTexture >= 0)
+                return mesh.textures[static_cast<std::size_t>(m.baseColourTexture)]
+                    .pixels.at(0, 0)
+                    .r;
+        }
+        return -1;
+    }
+
+    TemporaryFolder folder_;
+};
+
+TEST_F(MovedModel, TexturesAreFoundBesideItAndInTextures) {
+    for (const char* name :
+         {"D:\\work\\beside.png", "/home/x/beside.png", "../maps/beside.png", "gone/beside.png",
+          "D:\\work\\below.png", "/home/x/below.png", "../textures/below.png", "below.png"}) {
+        SCOPED_TRACE(name);
+        for (const auto& file : {obj(name), gltf(name)}) {
+            const auto model = readGood(file);
+            EXPECT_EQ(red(model.mesh), 200) << file;
+            EXPECT_TRUE(model.hasNote(fmt::format("'{}' is not there", name))) << file;
+        }
+    }
+}
+
+TEST_F(MovedModel, WhatIsElsewhereGivesThePlainColourAndANote) {
+    for (const char* name : {"D:\\work\\gone.png", "../other/outside.png", "/none/gone.png"}) {
+        SCOPED_TRACE(name);
+        for (const auto& file : {obj(name), gltf(name)}) {
+            const auto model = readGood(file);
+            EXPECT_EQ(red(model.mesh), -1) << file;
+            EXPECT_TRUE(model.hasNote("--allow-outside")) << file;
+        }
+    }
+    Job job;
+    job.limits.allowOutside = true;
+    const auto mesh = readMesh(obj("../other/outside.png"), job);
+    ASSERT_TRUE(mesh) << mesh.error().text();
+    EXPECT_EQ(red(*mesh), 200);
+}
+
+TEST_F(MovedModel, TheCallersTextureWins) {
+    writePicture("mine.png", {7, 8, 9, 255});
+    for (const auto& file : {obj("beside.png"), gltf("beside.png"), obj("D:\\work\\gone.png")}) {
+        const auto model = readGood(file, {folder_ / "mine.png"});
+        EXPECT_EQ(red(model.mesh), 7) << file;
+        EXPECT_TRUE(model.notes.empty()) << model.notes[0];
+    }
+}
+
+}  // namespace
+}  // namespace stx

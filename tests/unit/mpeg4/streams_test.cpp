@@ -1,0 +1,208 @@
+// Streams that are no images, and when streams begin: what a file says is what every form keeps.
+
+#include <gtest/gtest.h>
+
+#include "formats/mpeg4/container/byte_io.hpp"
+#include "tests/unit/mpeg4/core_fixtures.hpp"
+#include "tests/unit/mpeg4/mapping_fixtures.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<ElementaryStream> streamsOf(const Document& document) {
+    std::vector<ElementaryStream> streams;
+    for (const ObjectDescriptor* od : document.objectDescriptors())
+        for (const ElementaryStream& stream : od->streams) streams.push_back(stream);
+    return streams;
+}
+
+Bytes bytesOf(const Sample& sample) {
+    auto bytes = sample.data.load(Limits());
+    EXPECT_TRUE(bytes);
+    return bytes ? *bytes : Bytes();
+}
+
+void expectSameStreams(const Document& a, const Document& b) {
+    const auto before = streamsOf(a), after = streamsOf(b);
+    ASSERT_EQ(before.size(), after.size());
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        SCOPED_TRACE(fmt::format("stream {}", i));
+        EXPECT_EQ(before[i].objectTypeIndication, after[i].objectTypeIndication);
+        EXPECT_EQ(before[i].streamType, after[i].streamType);
+        EXPECT_EQ(hex(before[i].decoderSpecificInfo), hex(after[i].decoderSpecificInfo));
+        EXPECT_EQ(hex(before[i].sampleEntry), hex(after[i].sampleEntry));
+        EXPECT_EQ(before[i].handler, after[i].handler);
+        EXPECT_EQ(before[i].timescale, after[i].timescale);
+        EXPECT_EQ(before[i].edits.edits.size(), after[i].edits.edits.size());
+        ASSERT_EQ(before[i].samples.size(), after[i].samples.size());
+        for (std::size_t k = 0; k < before[i].samples.size(); ++k) {
+            const Sample& x = before[i].samples[k];
+            const Sample& y = after[i].samples[k];
+            EXPECT_EQ(bytesOf(x), bytesOf(y));
+            EXPECT_EQ(x.time, y.time);
+            EXPECT_EQ(x.duration, y.duration);
+            EXPECT_EQ(x.compositionOffset, y.compositionOffset);
+            EXPECT_EQ(x.sync, y.sync);
+        }
+    }
+    for (std::size_t i = 0; i < std::min(a.frames.size(), b.frames.size()); ++i) {
+        EXPECT_EQ(a.frames[i].time, b.frames[i].time);
+        EXPECT_EQ(a.frames[i].randomAccess, b.frames[i].randomAccess);
+    }
+    EXPECT_EQ(a.frames.size(), b.frames.size());
+}
+
+/// Writes a document in each form, reads it and compares the streams.
+void expectKeptEverywhere(const Document& document) {
+    const TemporaryFolder folder("streams");
+    Job job;
+    for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
+        SCOPED_TRACE(name);
+        const auto written = writeMpeg4(document, folder / name, job);
+        ASSERT_TRUE(written) << written.error().text();
+        const auto back = readMpeg4(folder / name, job);
+        ASSERT_TRUE(back) << back.error().text();
+        expectSameStreams(document, *back);
+        // And what the form became goes into the same .mp4.
+        const auto again = writeMpeg4(*back, folder / "b.mp4", job);
+        ASSERT_TRUE(again) << again.error().text();
+        EXPECT_EQ(bytesOfFile(folder / "b.mp4"), bytesOfFile(folder / "a.mp4"));
+    }
+}
+
+class MotionFile : public testing::TestWithParam<const char*> {};
+
+TEST_P(MotionFile, IsTheSameInEveryForm) {
+    REQUIRE_SHARED(path, std::string("reference/motion/") + GetParam());
+    Job job;
+    const auto document = readMpeg4(path, job);
+    ASSERT_TRUE(document) << document.error().text();
+    ASSERT_EQ(streamsOf(*document).size(), 2u);
+    EXPECT_GT(streamsOf(*document)[0].samples.size(), 1u);
+    expectKeptEverywhere(*document);
+}
+INSTANTIATE_TEST_SUITE_P(All, MotionFile,
+                         testing::Values("avc.mp4", "hevc.mp4", "m4v.mp4", "imgseq.mp4"));
+
+/// A scene with one view and its images, and what the object descriptors hold.
+Document smallScene() {
+    Bundle bundle;
+    bundle.views = {makeView(8, 6, 8, 1)};
+    return sceneOf(bundle);
+}
+std::vector<ObjectDescriptor>& descriptorsOf(Document& document) {
+    return std::get<UpdateObjectDescriptors>(document.odFrames.at(0).commands.at(0)).descriptors;
+}
+/// The document as its own .mp4 reads.
+Document throughMp4(const Document& document) {
+    Job job;
+    const auto bytes = writeMp4(document, job);
+    if (!bytes) {
+        ADD_FAILURE() << bytes.error().text();
+        return {};
+    }
+    auto back = readMp4(ByteSource::fromBytes(*bytes), job);
+    if (!back) ADD_FAILURE() << back.error().text();
+    return back ? std::move(*back) : Document();
+}
+
+TEST(Streams, AnEntryThatNobodyKnowsPassesThrough) {
+    Document document = smallScene();
+    ElementaryStream stream;
+    ByteWriter entry;
+    entry.u32(28);
+    entry.text("wxyz");
+    entry.zeros(6);
+    entry.u16(1);
+    entry.text("some config.");
+    stream.sampleEntry = entry.take();
+    stream.handler = "meta";
+    stream.timescale = 90000;
+    for (int i = 0; i < 3; ++i) {
+        Sample sample;
+        sample.data = ByteRange::of(Bytes(5 + static_cast<std::size_t>(i), std::byte(i)));
+        sample.time = 3000ull * static_cast<unsigned>(i * i);
+        sample.duration = i < 2 ? 3000u * static_cast<unsigned>(2 * i + 1) : 7u;
+        sample.compositionOffset = i == 1 ? 500 : 0;
+        sample.sync = i != 1;
+        stream.samples.push_back(sample);
+    }
+    descriptorsOf(document).push_back({77, "", {stream}});
+    const Document read = throughMp4(document);
+    const auto streams = streamsOf(read);
+    ASSERT_EQ(streams.size(), 3u);
+    EXPECT_EQ(hex(streams[2].sampleEntry), hex(stream.sampleEntry));
+    EXPECT_EQ(streams[2].handler, "meta");
+    EXPECT_FALSE(streams[2].samples[1].sync);
+    expectKeptEverywhere(read);
+}
+
+TEST(Streams, AStartIsADelayInTheFileAndAStartTimeInTexts) {
+    for (const std::uint64_t start : {500u, 333u}) {
+        Document document = smallScene();
+        descriptorsOf(document)[0].streams[0].samples[0].time = start;
+        const Document read = throughMp4(document);
+        EXPECT_EQ(streamsOf(read).at(0).samples.at(0).time, start);
+        EXPECT_TRUE(streamsOf(read).at(0).edits.edits.empty());
+        EXPECT_EQ(streamsOf(read).at(1).samples.at(0).time, 0u);
+        expectKeptEverywhere(read);
+        // An .mp4 has it as an empty edit.
+        Job job;
+        const auto bytes = writeMp4(document, job);
+        ASSERT_TRUE(bytes);
+        EXPECT_NE(hex(*bytes).find("65 6c 73 74"), std::string::npos) << "elst";
+    }
+}
+
+TEST(Streams, ASceneThatBeginsLateKeepsItsTime) {
+    Document document = smallScene();
+    document.frames[0].time = 500;
+    document.odFrames[0].time = 250;
+    const Document read = throughMp4(document);
+    EXPECT_EQ(read.frames.at(0).time, 500u);
+    EXPECT_EQ(read.odFrames.at(0).time, 250u);
+    expectKeptEverywhere(read);
+    EXPECT_EQ(bundleOf(read).views.size(), 1u);
+}
+
+TEST(Streams, EditsThatAreNoDelayAreKept) {
+    Document document = smallScene();
+    ElementaryStream& stream = descriptorsOf(document)[0].streams[0];
+    stream.edits = {1000, {{250, -1, 0x10000}, {333, 100, 0x10000}, {400, 0, 0x8000}}};
+    const Document read = throughMp4(document);
+    const EditList edits = streamsOf(read).at(0).edits;
+    ASSERT_EQ(edits.edits.size(), 3u);
+    EXPECT_EQ(static_cast<double>(edits.edits[1].duration) / edits.timescale, 0.333);
+    EXPECT_EQ(edits.edits[0].mediaTime, -1);
+    EXPECT_EQ(edits.edits[1].mediaTime, 100);
+    EXPECT_EQ(edits.edits[2].rate, 0x8000u);
+    expectKeptEverywhere(read);
+}
+
+TEST(Streams, OnlyPlacesToBeginAreSyncSamples) {
+    Document document = smallScene();
+    const NodePtr root = std::get<ReplaceScene>(document.frames[0].commands[0]).root;
+    for (int i = 1; i < 4; ++i) {
+        document.frames.push_back(
+            {500ull * static_cast<unsigned>(i), {InsertNode{root, {}, makeNode("Viewpoint")}}});
+        document.odFrames.push_back(
+            {500ull * static_cast<unsigned>(i), {RemoveObjectDescriptors{{20 + i}}}});
+    }
+    document.frames[2].randomAccess = true;
+    document.odFrames[3].randomAccess = true;
+    const Document read = throughMp4(document);
+    ASSERT_EQ(read.sceneStream.samples.size(), 4u);
+    ASSERT_EQ(read.odStream.samples.size(), 4u);
+    for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_EQ(read.sceneStream.samples[i].sync, i == 0 || i == 2);
+        EXPECT_EQ(read.odStream.samples[i].sync, i == 0 || i == 3);
+        EXPECT_EQ(read.frames[i].randomAccess, i == 2);
+        EXPECT_EQ(read.odFrames[i].randomAccess, i == 3);
+    }
+    expectKeptEverywhere(read);
+}
+
+}  // namespace
+}  // namespace stx::mpeg4

@@ -1,0 +1,84 @@
+// Files that are no bundles of ours: one kind of answer for them, too.
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "formats/imagesets/export.hpp"
+#include "formats/save.hpp"
+#include "formats/validate/validate.hpp"
+#include "tests/small_bundle.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/validate/numbers.hpp"
+
+namespace stx {
+namespace {
+
+Numbers rulesOf(const std::filesystem::path& path) {
+    Job job;
+    const auto findings = validateFile(path, {}, job);
+    if (!findings) ADD_FAILURE() << findings.error().text();
+    return findings ? numbersOf(*findings) : Numbers{-1};
+}
+
+TEST(ValidateScenes, WithoutDescriptorsNeedNoObjectDescriptorTrack) {
+    const TemporaryFolder folder;
+    Job job;
+    SaveOptions points;
+    points.pointTexture = true;
+    ASSERT_TRUE(saveBundle(smallBundle(2, 16, false, false), folder / "a.mp4", points, job));
+    EXPECT_EQ(rulesOf(folder / "a.mp4"), Numbers{});
+}
+
+TEST(ValidateImageSets, MissingFilesAreFindingsAndAllOfThem) {
+    const TemporaryFolder folder;
+    Job job;
+    for (const auto kind : {ExportOptions::Kind::transforms, ExportOptions::Kind::miv}) {
+        const bool miv = kind == ExportOptions::Kind::miv;
+        const auto set = folder / (miv ? "miv" : "transforms");
+        ExportOptions options;
+        options.kind = kind;
+        ASSERT_TRUE(exportImages(smallBundle(3, 16, false, false), set, options, job));
+        EXPECT_EQ(rulesOf(set), Numbers{});
+        for (const char* name : {"view_0", "view_2"})
+            ASSERT_TRUE(
+                std::filesystem::remove(set / (miv ? name + std::string("_depth.exr")
+                                                   : "depth/" + std::string(name) + ".exr")));
+        const auto findings = validateFile(set, {}, job);
+        ASSERT_TRUE(findings) << findings.error().text();
+        ASSERT_EQ(findings->size(), 2u);
+        EXPECT_EQ(numbersOf(*findings), Numbers{1003});
+        EXPECT_NE(findings->at(1).text().find("view 2 'view 2'"), std::string::npos)
+            << findings->at(1).text();
+    }
+}
+
+TEST(ValidateImageSets, WhatCannotBeReadBreaksRule1001) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(exportImages(smallBundle(1, 16, false, false), folder / "set", {}, job));
+    std::filesystem::resize_file(folder / "set/depth/view_0.exr", 200);
+    EXPECT_EQ(rulesOf(folder / "set"), Numbers{1001});
+    std::ofstream(folder / "set/transforms.json") << "{";
+    EXPECT_EQ(rulesOf(folder / "set"), Numbers{1001});
+}
+
+TEST(ValidateMeshes, AreReadOrBreakRule1001) {
+    const TemporaryFolder folder;
+    std::ofstream(folder / "a.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    EXPECT_EQ(rulesOf(folder / "a.obj"), Numbers{});
+    std::ofstream(folder / "a.ply") << "ply\nformat ascii 1.0\nelement vertex 3\n";
+    EXPECT_EQ(rulesOf(folder / "a.ply"), Numbers{1001});
+}
+
+TEST(ValidateExr, EmptyAndCutFilesBreakRule1001) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(saveBundle(smallBundle(1, 16, false, false), folder / "a.exr", {}, job));
+    for (const int size : {0, 3, 8, 100}) {
+        std::filesystem::resize_file(folder / "a.exr", size);
+        EXPECT_EQ(rulesOf(folder / "a.exr"), Numbers{1001}) << size;
+    }
+}
+
+}  // namespace
+}  // namespace stx
