@@ -441,9 +441,9 @@ class SceneWriter {
                 viewName(i), p.left, p.top, p.right, p.bottom, p.shift));
         const int bits = bitsOf(view);
         // Depth that is on the codes already is off by what floats are, which is not worth a word.
-        constexpr double kOnCodes = 0.01;  // of a step
+        const double rounding = std::max(0.01 * view.depthCode().step(), 1e-6 * view.farPlane);
         if (view.depthBits == 32 || bits < view.depthBits ||
-            images.worstDepth > kOnCodes * view.depthCode().step()) {
+            (bits == 8 && images.worstDepth > rounding)) {
             worst_ = std::max(worst_, images.worstDepth);
             lossyBits_ = lossyBits_ == 0 ? bits : std::min(lossyBits_, bits);
         }
