@@ -287,6 +287,19 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
     return out;
 }
 
+namespace {
+
+/// What a view sees, in the units that options take.
+std::string lensText(const Json& view) {
+    const double x = view["fieldOfView"][0].get<double>(), y = view["fieldOfView"][1].get<double>();
+    if (view["orthographic"].get<bool>())
+        return fmt::format("orthographic, window {:.6g} x {:.6g}", x, y);
+    return fmt::format("perspective, field of view {:.4g} x {:.4g} degrees", glm::degrees(x),
+                       glm::degrees(y));
+}
+
+}  // namespace
+
 std::string describeAsText(const Json& info) {
     const auto text = [](const Json& v) {
         return v.is_string() ? printable(v.get_ref<const std::string&>()) : v.dump();
@@ -329,12 +342,10 @@ std::string describeAsText(const Json& info) {
                 continue;
             }
             out += fmt::format(
-                "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, fieldOfView {:.6g} {:.6g}, "
-                "at {:.6g} {:.6g} {:.6g}{}{}\n",
+                "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, at {:.10g} {:.10g} "
+                "{:.10g}{}{}\n",
                 i++, text(v["name"]), text(v["width"]), text(v["height"]), text(v["depthBits"]),
-                v["nearPlane"].get<double>(), v["farPlane"].get<double>(),
-                v["orthographic"].get<bool>() ? "orthographic" : "perspective",
-                v["fieldOfView"][0].get<double>(), v["fieldOfView"][1].get<double>(),
+                v["nearPlane"].get<double>(), v["farPlane"].get<double>(), lensText(v),
                 v["position"][0].get<double>(), v["position"][1].get<double>(),
                 v["position"][2].get<double>(),
                 v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "",

@@ -34,16 +34,33 @@ double secondsSince(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::string stemOf(const std::string& input) {
-    const fs::path path(input);
-    return (path.has_filename() ? path : path.parent_path()).stem().string();
+/// The pattern with what its placeholders stand for. Each is put in once: a name may hold braces.
+std::string outputOf(const std::string& pattern, const std::string& input) {
+    fs::path path(input);
+    if (!path.has_filename()) path = path.parent_path();
+    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    std::error_code ec;
+    fs::path whole = fs::absolute(folder, ec).lexically_normal();
+    if (!whole.has_filename()) whole = whole.parent_path();
+    const std::pair<std::string_view, std::string> values[] = {
+        {"{stem}", path.stem().string()},
+        {"{dir}", folder.string()},
+        {"{parent}", whole.filename().string()}};
+    std::string out;
+    for (std::size_t at = 0; at < pattern.size();) {
+        const auto* found = std::find_if(std::begin(values), std::end(values), [&](const auto& v) {
+            return pattern.compare(at, v.first.size(), v.first) == 0;
+        });
+        out += found == std::end(values) ? std::string(1, pattern[at]) : found->second;
+        at += found == std::end(values) ? 1 : found->first.size();
+    }
+    return out;
 }
 
-std::string withStem(std::string text, const std::string& stem) {
-    const std::string what = "{stem}";
-    for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + stem.size()))
-        text.replace(at, what.size(), stem);
-    return text;
+bool namesEach(const std::string& pattern) {
+    return pattern.find("{stem}") != std::string::npos ||
+           pattern.find("{dir}") != std::string::npos ||
+           pattern.find("{parent}") != std::string::npos;
 }
 
 bool sendAll(int fd, const void* from, std::size_t size) {
@@ -91,7 +108,7 @@ Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
     }
     program.sayNotes();
     if (done) return *done;
-    return failedEntry(item, static_cast<int>(done.error().code), done.error().text());
+    return failedEntry(item, static_cast<int>(done.error().code), textOf(done.error()));
 }
 
 /// A worker's life: numbers of items come in, their reports go out.
@@ -102,6 +119,7 @@ Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
     // Less patient than the process that waits for this one.
     watchStopSignals(program.job.cancelled, 400);
     program.job.onProgress = nullptr;
+    program.progress.leaveToParent(!program.common.quiet && ::isatty(STDERR_FILENO) != 0);
     const ThreadLimit limit(threads);
     std::uint32_t index = 0;
     while (receiveAll(in, &index, sizeof(index)) && index < items.size()) {
@@ -198,8 +216,8 @@ void BatchRun::finish(std::size_t item, Json entry) {
     if (status == "error") {
         ++failed_;
         // Not hushed by --quiet: nothing else tells which input it was.
-        fmt::print(stderr, "error: '{}': {}\n", printable(items_[item].input),
-                   printable(entry.value("message", "")));
+        program_.complain(
+            fmt::format("error: '{}': {}", items_[item].input, entry.value("message", "")));
     }
     entries_[item] = std::move(entry);
     program_.job.progress(static_cast<std::int64_t>(done_),
@@ -338,8 +356,7 @@ Result<void> BatchRun::writeLines() const {
         if (entry.is_object())
             lines += entry.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     }
-    return writeFile(program_.common.report, std::as_bytes(std::span(lines)),
-                     program_.outputOptions());
+    return program_.writeReportText(lines);
 }
 
 }  // namespace
@@ -363,7 +380,9 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
             if (line.find('\0') != std::string_view::npos)
                 return fail(ErrorCode::invalidInput,
                             "'{}' holds zero bytes; a list is text, one name in each line", list);
-            if (!line.empty()) names.emplace_back(line);
+            const auto first = line.find_first_not_of(" \t");
+            const bool comment = first != std::string_view::npos && line[first] == '#';
+            if (!line.empty() && !comment) names.emplace_back(line);
             at = end + 1;
         }
         if (names.size() == before)
@@ -375,7 +394,7 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
 
 Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
                                          const std::string& pattern) {
-    if (inputs.size() > 1 && pattern.find("{stem}") == std::string::npos)
+    if (inputs.size() > 1 && !namesEach(pattern))
         return fail(ErrorCode::usage,
                     "{} inputs need an output name for each; write {{stem}} in -o, as in "
                     "'out/{{stem}}.mp4'",
@@ -383,13 +402,14 @@ Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
     std::vector<BatchItem> items;
     std::map<std::string, std::string> inputOf;
     for (const auto& input : inputs) {
-        BatchItem item{input, withStem(pattern, stemOf(input))};
+        BatchItem item{input, outputOf(pattern, input)};
         const auto key = fs::path(item.output).lexically_normal().string();
         if (const auto [known, fresh] = inputOf.emplace(key, input); !fresh)
-            return fail(ErrorCode::usage,
-                        "'{}' and '{}' would both be written to '{}'; rename one, or convert them "
-                        "into different folders",
-                        known->second, input, item.output);
+            return fail(
+                ErrorCode::usage,
+                "'{}' and '{}' would both be written to '{}'; put {{dir}} or {{parent}} into "
+                "-o, or rename one",
+                known->second, input, item.output);
         items.push_back(std::move(item));
     }
     return items;

@@ -20,13 +20,15 @@ struct BatchOptions {
 };
 
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
-/// the current folder; empty lines are passed over. Errors: io; (invalidInput) a list without a
-/// name; (usage) no input at all.
+/// the current folder; empty lines and those that begin with # are passed over. Errors: io;
+/// (invalidInput) a list without a name; (usage) no input at all.
 [[nodiscard]] Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
                                                             const Limits& limits);
 
-/// Names each input's output: `{stem}` in `pattern` stands for the input's file name without its
-/// ending. Errors (usage): several inputs and no {stem}, two inputs with the same output.
+/// Names each input's output: in `pattern`, `{stem}` stands for the input's file name without its
+/// ending, `{dir}` for the folder it is in as given ("." for a bare name), `{parent}` for that
+/// folder's own name. Errors (usage): several inputs and none of these, two inputs with the same
+/// output.
 [[nodiscard]] Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
                                                        const std::string& pattern);
 

@@ -4,6 +4,7 @@
 
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/geometry/view_layout.hpp"
 
 namespace stx::tools {
 namespace {
@@ -11,6 +12,20 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 
 }  // namespace
+
+Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
+    if (!size) return camera;
+    const double scale = std::min(static_cast<double>(size->x) / camera.width,
+                                  static_cast<double>(size->y) / camera.height);
+    Camera c = camera;
+    c.width = size->x;
+    c.height = size->y;
+    c.fx *= scale;
+    c.fy *= scale;
+    c.cx = c.width * 0.5 + (camera.cx - camera.width * 0.5) * scale;
+    c.cy = c.height * 0.5 + (camera.cy - camera.height * 0.5) * scale;
+    return c;
+}
 
 void addCameraOptions(Command command, CameraOptions& o) {
     const char* group = "Camera";
@@ -25,8 +40,11 @@ void addCameraOptions(Command command, CameraOptions& o) {
     command.option("--target", o.target, "What it looks at (default: the middle of the object)")
         .takes("X,Y,Z")
         .group(group);
-    command.option("--up", o.up, "What is up in the picture (default 0,1,0)")
-        .takes("X,Y,Z")
+    command
+        .option("--up", o.up,
+                "What is up in the picture, and the axis of an orbit: Z, X,Y,Z or with a minus "
+                "--up=-Y (default Y; of an orbit: what the reference views have)")
+        .takes("AXIS")
         .group(group);
     command
         .option("--fov", o.fovDeg,
@@ -53,25 +71,51 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .range(-90.0, 90.0)
         .group(group);
     command
-        .option("--cameras", o.cameraFile,
-                "Every camera of a file (transforms.json, MIV JSON, cameras.json)")
+        .option("--radius", o.orbitRadius,
+                "Of the orbit, in scene units (default: the object fills the picture)")
+        .takes("R")
+        .positive()
+        .group(group);
+    command
+        .option("--start", o.startDeg,
+                "Where the orbit begins, in degrees from the front, counter-clockwise from above "
+                "(default 0)")
+        .takes("DEG")
+        .range(-360.0, 360.0)
+        .group(group);
+    command
+        .option("--arc", o.arcDeg,
+                "How far the orbit goes, in degrees; less than 360: the last camera is at its end "
+                "(default 360)")
+        .takes("DEG")
+        .range(-360.0, 360.0)
+        .group(group);
+    command
+        .option(
+            "--cameras", o.cameraFile,
+            "Every camera of a file (transforms.json, camera_path.json, MIV JSON, cameras.json) or "
+            "of a COLMAP model")
         .takes("FILE")
         .group(group);
     command
-        .option("--size", o.size, "Size of the picture (default: that of the camera, else 512x512)")
+        .option("--size", o.size,
+                "Size of the picture (default: that of the camera, else 512x512). Where its shape "
+                "is not the camera's, more is seen on the longer side: nothing is squeezed or cut")
         .takes("WxH")
         .group(group);
 }
 
 Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraContext& context,
                                         Program& program) {
-    const bool pose = !o.eye.empty() || !o.target.empty() || !o.up.empty();
+    // An orbit may have a target and an axis.
+    const bool pose = !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty()));
     const int ways = (pose ? 1 : 0) + (o.view >= 0 ? 1 : 0) + (o.orbit > 0 ? 1 : 0) +
                      (o.cameraFile.empty() ? 0 : 1);
     if (ways > 1)
         return fail(
             ErrorCode::usage,
-            "--eye/--target/--up, --view, --orbit and --cameras exclude each other; give one");
+            "--eye/--target/--up, --view, --orbit and --cameras exclude each other; give one (an "
+            "orbit may have --target and --up)");
     std::optional<glm::ivec2> size;
     if (!o.size.empty()) {
         STX_TRY(size, parseSize(o.size, program.job.limits));
@@ -90,16 +134,14 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
             return fail(ErrorCode::usage,
                         "--view is {}, but the input has {} reference views, from 0", o.view,
                         context.views.size());
-        Camera c = context.views[o.view];
-        if (size) c = c.resized(size->x, size->y);
-        return std::vector<Camera>{c};
+        return std::vector<Camera>{inPicture(context.views[o.view], size)};
     }
     if (!o.cameraFile.empty()) {
-        STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job));
+        STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job, size));
         std::vector<Camera> out;
         for (auto& c : cameras) {
             c.camera.position -= context.origin;
-            out.push_back(size ? c.camera.resized(size->x, size->y) : c.camera);
+            out.push_back(inPicture(c.camera, size));
         }
         return out;
     }
@@ -113,9 +155,17 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     lens.orthoHeight = o.orthoHeight.value_or(0);
     glm::dvec3 target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
     if (!o.up.empty()) {
-        STX_TRY(lens.up, parseVec3(o.up, "--up"));
-        if (!(glm::length(lens.up) > 0))
-            return fail(ErrorCode::usage, "--up is 0,0,0; it must point somewhere");
+        STX_TRY(lens.up, parseDirection(o.up, "--up"));
+    } else if (!pose) {
+        lens.up = upOfCameras(context.views);
+        if (lens.up != glm::dvec3(0, 1, 0))
+            program.job.note(fmt::format(
+                "the reference views stand upright along {}{}, and so does the orbit; --up changes "
+                "that",
+                lens.up.x + lens.up.y + lens.up.z < 0 ? "-" : "+",
+                lens.up.x != 0   ? "X"
+                : lens.up.y != 0 ? "Y"
+                                 : "Z"));
     }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));
@@ -123,7 +173,10 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     }
     const double radius = context.bounds.radius();
     if (!pose)
-        return orbitCameras(target, radius, std::max(o.orbit, 1), o.elevationDeg * kDegree, lens);
+        return orbitCameras(target, radius,
+                            {std::max(o.orbit, 1), o.elevationDeg * kDegree, o.startDeg * kDegree,
+                             o.arcDeg * kDegree, o.orbitRadius},
+                            lens);
     glm::dvec3 eye;
     if (o.eye.empty()) {
         STX_TRY(const auto front, orbitCameras(target, radius, 1, 0.0, lens));
@@ -136,13 +189,24 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
     return std::vector<Camera>{camera};
 }
 
-Result<int> checkCameraOptions(const CameraOptions& options, Program& program) {
+Result<int> checkCameraOptions(const CameraOptions& options, const Command& command,
+                               Program& program) {
     CameraOptions o = options;
+    const bool own = o.view >= 0 || !o.cameraFile.empty();
+    if (own)
+        STX_CHECK(command.refuse({"--fov", "--ortho"},
+                                 fmt::format("does not go with {}, whose cameras have their own",
+                                             o.view >= 0 ? "--view" : "--cameras")));
+    if (own || !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty())))
+        STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
+    if (o.orbit == 0) STX_CHECK(command.refuse({"--radius", "--start", "--arc"}, "is of --orbit"));
     o.view = -1;  // needs the input
     CameraContext unitCube;
     unitCube.bounds.add(glm::dvec3(-1));
     unitCube.bounds.add(glm::dvec3(1));
-    STX_TRY(const auto cameras, makeCameras(o, unitCube, program));
+    Program quiet;  // the same notes come again, when the cameras are made
+    quiet.job.limits = program.job.limits;
+    STX_TRY(const auto cameras, makeCameras(o, unitCube, quiet));
     return static_cast<int>(cameras.size());
 }
 

@@ -19,16 +19,22 @@ struct CameraOptions {
     std::optional<double> orthoHeight;  ///< orthographic novel camera: window height in scene units
     int view = -1;
     int orbit = 0;
-    double elevationDeg = 15.0;
+    double elevationDeg = 15.0, startDeg = 0.0, arcDeg = 360.0;
+    double orbitRadius = 0;  ///< 0 = the object fills the picture
     std::string cameraFile;
     std::string size;
 };
+
+/// The camera's view in a picture of another size, when one is given. Its pixels keep their shape
+/// and nothing of the view is cut: a picture of another shape shows more on its longer side.
+[[nodiscard]] Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size);
 
 void addCameraOptions(Command command, CameraOptions& options);
 
 /// The number of cameras asked for. Errors (usage, io) that need no input to be seen: so they come
 /// before an hour of loading.
-[[nodiscard]] Result<int> checkCameraOptions(const CameraOptions& options, Program& program);
+[[nodiscard]] Result<int> checkCameraOptions(const CameraOptions& options, const Command& command,
+                                             Program& program);
 
 /// What the cameras are made for: the object and its reference views.
 struct CameraContext {

@@ -33,11 +33,11 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
-    program.say(fmt::format("{} ({}) → {} ({}), {} views with normals and splats, {:.2g} s",
-                            std::filesystem::path(o.input).filename().string(),
-                            humanBytes(bytesOf(o.input)),
-                            std::filesystem::path(o.output).filename().string(),
-                            humanBytes(bytesOf(o.output)), bundle.views.size(), seconds));
+    program.say(fmt::format(
+        "{} ({}) → {} ({}), {} with normals and splats, {}",
+        std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)),
+        std::filesystem::path(o.output).filename().string(), humanBytes(bytesOf(o.output)),
+        counted(bundle.views.size(), "view"), humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "bake-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},

@@ -12,9 +12,9 @@ namespace {
 
 struct CompareOptions {
     std::string a, b;
-    std::string mask, errorPicture, background = "0,0,0";
+    std::string mask, errorPicture, background = "black";
     double gain = 8.0;
-    std::optional<double> minPsnr;
+    std::optional<double> minPsnr, minSsim;
     int firstFrame = 0;
     int frames = 0;
 };
@@ -39,8 +39,7 @@ Result<Comparison> comparePair(const std::string& a, const std::string& b, const
     STX_TRY(const auto second, openPicture(b, program.job));
     CompareSettings settings;
     settings.mask = mask;
-    STX_TRY(const auto background, parseVec3(o.background, "--background"));
-    settings.background = glm::vec3(background);
+    STX_TRY(settings.background, parseColour(o.background, "--background"));
     auto result = compare(first, second, settings, program.job);
     if (!result) return tl::unexpected(result.error().at(fmt::format("'{}' and '{}'", a, b)));
     if (!o.errorPicture.empty()) {
@@ -59,8 +58,13 @@ std::string decibels(std::optional<double> v) {
     return v ? fmt::format("{:.2f} dB", *v) : std::string("identical");
 }
 
-Result<int> compareImages(const CompareOptions& o, Program& program) {
+Result<int> compareImages(const CompareOptions& o, const Command& command, Program& program) {
     const bool sequences = frameName(o.a, 0) && frameName(o.b, 0);
+    if (!sequences)
+        STX_CHECK(command.refuse({"--first-frame", "--frames"},
+                                 "is of sequences, named as in a_%04d.png"));
+    if (o.errorPicture.empty())
+        STX_CHECK(command.refuse({"--gain"}, "is of the error picture; give --error-picture, too"));
     if (sequences && !o.errorPicture.empty() && !frameName(o.errorPicture, 0))
         return fail(ErrorCode::usage,
                     "--error-picture is '{}', one file for all frames; a numbered name is "
@@ -103,13 +107,14 @@ Result<int> compareImages(const CompareOptions& o, Program& program) {
         STX_TRY(total, comparePair(o.a, o.b, o, maskImage, program));
     }
 
+    nlohmann::ordered_json out = {{"$schema", "compare.schema.json"}};
+    out.update(toJson(total));
+    if (worstFrame >= 0) {
+        out["worst"]["frame"] = worstFrame;
+        out["frames"] = perFrame;
+    }
+    STX_CHECK(program.writeReport(out));
     if (program.common.format == "json") {
-        nlohmann::ordered_json out = {{"$schema", "compare.schema.json"}};
-        out.update(toJson(total));
-        if (worstFrame >= 0) {
-            out["worst"]["frame"] = worstFrame;
-            out["frames"] = perFrame;
-        }
         program.printJson(out);
     } else if (total.identical()) {
         program.print("identical\n");
@@ -122,7 +127,9 @@ Result<int> compareImages(const CompareOptions& o, Program& program) {
             total.worst.difference, total.differentPixels, total.pixels));
     }
     if (total.identical()) return 0;
-    if (o.minPsnr && total.psnrRgb && *total.psnrRgb >= *o.minPsnr) return 0;
+    const bool near = !o.minPsnr || (total.psnrRgb && *total.psnrRgb >= *o.minPsnr);
+    const bool alike = !o.minSsim || total.ssimY >= *o.minSsim;
+    if ((o.minPsnr || o.minSsim) && near && alike) return 0;
     return static_cast<int>(ErrorCode::difference);
 }
 
@@ -141,15 +148,20 @@ void addCompare(CommandLine& line, Program& program) {
     c.option("--error-picture", o->errorPicture, "Write where they differ as a PNG")
         .takes("FILE.png");
     c.option("--gain", o->gain, "Of the error picture (default 8)").range(0.001, 1e6);
-    c.option("--background", o->background,
-             "Colour behind transparent pixels, 0..1 (default 0,0,0)")
-        .takes("R,G,B");
+    c.option(
+         "--background", o->background,
+         "Colour behind transparent pixels: values of 0 to 1, #rrggbb or a name (default black)")
+        .takes("COLOUR");
     c.option("--min-psnr", o->minPsnr, "Exit code 0 when the PSNR of RGB is at least this")
         .takes("DB");
+    c.option("--min-ssim", o->minSsim,
+             "Exit code 0 when the SSIM of Y is at least this (with --min-psnr: when both are)")
+        .range(-1.0, 1.0)
+        .takes("SSIM");
     c.option("--first-frame", o->firstFrame, "First frame of sequences (default 0)").notNegative();
     c.option("--frames", o->frames, "Number of frames (default: all that exist)").notNegative();
     c.sharedOptions(program.common, kFormat | kOutput);
-    c.runs([o](Program& p) { return compareImages(*o, p); });
+    c.runs([o, c](Program& p) { return compareImages(*o, c, p); });
 }
 
 }  // namespace stx::tools

@@ -33,20 +33,39 @@ std::vector<std::string> commandNames(const std::vector<CommandRow>& table) {
     return names;
 }
 
+/// How values begin that cannot be listed; a file may be meant instead.
+struct Beginnings {
+    const char* option;
+    const char* words;
+};
+constexpr Beginnings kBeginnings[] = {
+    {"--views", "cube ring: sphere: octahedral: auto:"},
+    {"--light", "dir: point:"},
+};
+
+/// Those of an option; empty when there are none.
+std::string beginningsOf(const OptionRow& option) {
+    for (const auto& known : kBeginnings)
+        for (const auto& name : option.names)
+            if (name == known.option) return known.words;
+    return {};
+}
+
 // ---- bash ----
 
 std::string bashCompletion(const std::vector<CommandRow>& table) {
     std::string choices, options;
     for (const CommandRow& command : table) {
         for (const OptionRow& option : command.options) {
-            if (option.choices.empty()) continue;
+            const std::string list =
+                option.choices.empty() ? beginningsOf(option) : words(option.choices);
+            if (list.empty()) continue;
             std::vector<std::string> patterns;
             for (const auto& name : option.names)
                 patterns.push_back(option.positional ? ""
                                                      : fmt::format("'{} {}'", command.name, name));
             if (option.positional) continue;
-            choices += fmt::format("        {}) list='{}' ;;\n", fmt::join(patterns, "|"),
-                                   words(option.choices));
+            choices += fmt::format("        {}) list='{}' ;;\n", fmt::join(patterns, "|"), list);
         }
         options += fmt::format("        {}) list='{}' ;;\n", command.name, words(dashed(command)));
     }
@@ -65,6 +84,16 @@ _stx() {{
         COMPREPLY=($(compgen -W '{} --help --version' -- "$cur"))
         return
     fi
+    # A list of names, @FILE, arrives as one word or as two.
+    if [[ $cur == '@' ]]; then cur=''; prev='@'; fi
+    if [[ $prev == '@' || $cur == @* ]]; then
+        local mark=''
+        [[ $cur == @* ]] && mark='@'
+        mapfile -t COMPREPLY < <(compgen -f -P "$mark" -- "${{cur#@}}")
+        return 0
+    fi
+    # After sphere: comes a number.
+    [[ $cur == ':' || $prev == ':' ]] && return 0
     case "${{COMP_WORDS[1]}} $prev" in
 {}    esac
     if [[ -z $list && $cur == -* ]]; then
@@ -73,6 +102,8 @@ _stx() {{
     fi
     # Without a list: file names, by `-o default`.
     [[ -n $list ]] && COMPREPLY=($(compgen -W "$list" -- "$cur"))
+    # No space after sphere: either.
+    [[ ${{#COMPREPLY[@]}} == 1 && ${{COMPREPLY[0]}} == *: ]] && compopt -o nospace 2> /dev/null
     return 0
 }}
 complete -o bashdefault -o default -F _stx stx
@@ -95,8 +126,13 @@ std::string zshCompletion(const std::vector<CommandRow>& table) {
         commands += fmt::format("        '{}:{}'\n", command.name, zshText(command.summary));
         std::string specs;
         for (const OptionRow& option : command.options) {
+            const std::string beginnings = beginningsOf(option);
             const std::string values =
-                option.choices.empty() ? "_files" : fmt::format("({})", words(option.choices));
+                !option.choices.empty() ? fmt::format("({})", words(option.choices))
+                : !beginnings.empty()
+                    ? fmt::format("{{_files; compadd -S \"\" -- {}}}", zshText(beginnings))
+                : option.positional && option.many ? "{compset -P @; _files}"
+                                                   : "_files";
             if (option.positional) {
                 specs += fmt::format(" \\\n                '{}:{}:{}'", option.many ? "*" : "",
                                      zshText(option.names[0]), values);
@@ -152,6 +188,8 @@ std::string fishCompletion(const std::vector<CommandRow>& table) {
             if (!option.choices.empty())
                 out += fmt::format("{} -a '{}'", option.positional ? " -f" : " -x",
                                    words(option.choices));
+            else if (!beginningsOf(option).empty())
+                out += fmt::format(" -r -a '{}'", beginningsOf(option));
             else if (!option.value.empty() && !option.positional)
                 out += " -r";
             else if (option.positional)

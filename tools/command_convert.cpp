@@ -27,6 +27,8 @@ struct ConvertOptions {
     int bifsVersion = 0;
     OpenOptions open;
     std::string frames;  ///< A-B
+    /// Options that were given.
+    std::vector<std::string> givenOfMeshes, givenOfSets;
     BatchOptions batch;
 };
 
@@ -48,12 +50,39 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     return save;
 }
 
+/// Heading of the help that options of image sets are under.
+constexpr const char* kSetHeading = "Image sets";
+
+/// Options that were given but do not matter to this input: lists of many inputs may hold others.
+void noteUnused(const std::filesystem::path& input, bool mesh, const ConvertOptions& o,
+                Program& program) {
+    const auto kind = recognise(input);
+    // An .exr is a bundle or a picture with Z.
+    const bool set =
+        !o.open.set.from.empty() || !kind || *kind == FileKind::imageSet || *kind == FileKind::exr;
+    const auto note = [&](const std::vector<std::string>& options, const char* ofWhat,
+                          const char* isWhat) {
+        if (options.empty()) return;
+        program.job.note(fmt::format("{} {} of {} and not used: '{}' is {}",
+                                     fmt::join(options, ", "), options.size() == 1 ? "is" : "are",
+                                     ofWhat, input.filename().string(), isWhat));
+    };
+    if (!mesh) {
+        auto options = o.givenOfMeshes;
+        // Of an image set it is the pattern of names.
+        if (set) std::erase(options, "--texture");
+        note(options, "meshes", kind ? nameOf(*kind) : "none");
+    }
+    if (!set) note(o.givenOfSets, "image sets", nameOf(*kind));
+}
+
 Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptions& o,
                           Program& program) {
     OpenOptions open = o.open;
     open.set.texturePattern = open.texture;
     open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
     STX_TRY(auto opened, openRenderable(input, open, program.job));
+    noteUnused(input, std::holds_alternative<Mesh>(opened), o, program);
     if (auto* mesh = std::get_if<Mesh>(&opened)) {
         auto bundle = captureMesh(*mesh, *o.mesh, program);
         if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", input.string())));
@@ -62,12 +91,15 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
     }
     auto& bundle = std::get<Bundle>(opened);
     if (const auto bits = o.mesh->depthBits) {
+        bool changed = false;
         for (auto& view : bundle.views) {
             if (view.depthBits == *bits) continue;
             view.depthBits = *bits;
             fitDepthRange(view);
+            changed = true;
         }
-        noteDepthLoss(bundle, program.job);
+        // Readers of image sets have said it for what they made.
+        if (changed) noteDepthLoss(bundle, program.job);
     }
     return std::move(bundle);
 }
@@ -82,7 +114,9 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     const bool countPoints = !program.common.report.empty();
     STX_TRY(auto bundle, convertDocument(input, target, saveOptions(o, program),
                                          o.mesh->depthBits.has_value(), countPoints, program.job));
-    if (!bundle) {
+    if (bundle) {
+        noteUnused(input, false, o, program);
+    } else {
         STX_TRY(bundle, makeBundle(input, o, program));
         STX_CHECK(program.job.checkCancelled());
         STX_CHECK(saveBundle(*bundle, target, saveOptions(o, program), program.job));
@@ -90,14 +124,14 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     const std::size_t views = bundle->views.size();
     std::string sizes;
     if (views > 0)
-        sizes = fmt::format(", {} views {}x{}", views, bundle->views[0].camera.width,
+        sizes = fmt::format(", {} {}x{}", counted(views, "view"), bundle->views[0].camera.width,
                             bundle->views[0].camera.height);
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
-    program.say(fmt::format("{} ({}) → {} ({}){}, {:.2g} s", input.filename().string(),
+    program.say(fmt::format("{} ({}) → {} ({}){}, {}", input.filename().string(),
                             humanBytes(bytesOf(input)), target.filename().string(),
-                            humanBytes(bytesOf(target)), sizes, seconds));
+                            humanBytes(bytesOf(target)), sizes, humanSeconds(seconds)));
     return nlohmann::ordered_json{
         {"input", input.string()},  {"output", target.string()},
         {"status", "ok"},           {"exitCode", 0},
@@ -149,13 +183,36 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
     return 0;
 }
 
-Result<int> convert(const ConvertOptions& o, Program& program) {
+/// The report of one conversion that failed.
+Error withReport(const Error& error, const BatchItem& item, Program& program) {
+    const nlohmann::ordered_json entry = {{"input", item.input},
+                                          {"output", item.output},
+                                          {"status", "error"},
+                                          {"exitCode", static_cast<int>(error.code)},
+                                          {"message", textOf(error)}};
+    // The first error is the one to tell.
+    (void)program.writeReport({{"$schema", "convert-report.schema.json"},
+                               {"conversions", nlohmann::ordered_json::array({entry})}});
+    return error;
+}
+
+Result<int> convert(const ConvertOptions& options, const Command& command, Program& program) {
+    ConvertOptions o = options;
+    o.givenOfMeshes = command.givenUnder(MeshViewOptions::kHeading);
+    o.givenOfSets = command.givenUnder(kSetHeading);
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
+    const auto container = containerOf(o.output);
+    if (container && *container == FileKind::exr) {
+        if (o.colour == "jpeg")
+            STX_CHECK(command.refuse(
+                {"--colour"}, "jpeg is of MPEG-4 containers; .exr keeps colours as they are"));
+        STX_CHECK(command.refuse({"--point-texture"}, "is of MPEG-4 containers, not of .exr"));
+    }
     if (!o.frames.empty()) return convertFrames(o, program);
     STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
     STX_TRY(const auto items, planBatch(inputs, o.output));
-    STX_CHECK(checkMeshViewOptions(*o.mesh, program));
+    STX_CHECK(checkMeshViewOptions(*o.mesh, command, program));
     STX_CHECK(containerOf(items[0].output));
     const BatchWork work = [&](const BatchItem& item, Program& p) {
         preloadCodecs(item.input);
@@ -172,7 +229,9 @@ Result<int> convert(const ConvertOptions& o, Program& program) {
                  {"status", "skipped"},
                  {"exitCode", 0}};
     } else {
-        STX_TRY(entry, work(items[0], program));
+        auto done = work(items[0], program);
+        if (!done) return tl::unexpected(withReport(done.error(), items[0], program));
+        entry = std::move(*done);
     }
     STX_CHECK(program.writeReport({{"$schema", "convert-report.schema.json"},
                                    {"conversions", nlohmann::ordered_json::array({entry})}}));
@@ -191,15 +250,18 @@ void addConvert(CommandLine& line, Program& program) {
         "  stx convert capture/transforms.json -o capture.exr\n"
         "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
     auto o = std::make_shared<ConvertOptions>();
-    c.option("IN", o->inputs, "Files or folders to convert; @FILE: those named in its lines")
+    c.option("IN", o->inputs,
+             "Files or folders to convert; @FILE: those named in its lines, # begins a comment")
         .required();
-    c.option("-o,--output", o->output, "What to write; {stem} stands for an input's name")
+    c.option("-o,--output", o->output,
+             "What to write; {stem} stands for an input's name, {dir} for its folder, {parent} for "
+             "that folder's name")
         .required()
         .takes("OUT");
     addMeshViewOptions(c, o->mesh);
     c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
-        .group("Views of a mesh");
+        .group(MeshViewOptions::kHeading);
     const char* coding = "Coding";
     c.option("--colour", o->colour, "png (exact) or jpeg, in MPEG-4 containers (default png)")
         .oneOf({"png", "jpeg"})
@@ -225,7 +287,7 @@ void addConvert(CommandLine& line, Program& program) {
         .group(many);
     c.flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
         .group(many);
-    const char* sets = "Image sets";
+    const char* sets = kSetHeading;
     std::vector<std::string> kinds;
     for (const ImageSetKind& kind : imageSetKinds()) kinds.emplace_back(kind.name);
     c.option("--from", o->open.set.from, "Kind of image set, when the files do not show it")
@@ -283,6 +345,11 @@ void addConvert(CommandLine& line, Program& program) {
           {"keep", MixedPixels::keep}},
          "Flying points at depth edges: auto (dropped from sensors' depth), drop, keep")
         .group(sets);
+    c.choice<bool>(
+         "--view-size", set.raiseDepth, {{"picture", true}, {"depth", false}},
+         "Of views whose depth is smaller than their picture: picture (the depth is raised "
+         "along the picture's edges) or depth (default picture)")
+        .group(sets);
     c.flag("--refine-poses", set.refinePoses,
            "Move the cameras so that overlapping views agree in depth and colour")
         .group(sets);
@@ -308,7 +375,7 @@ void addConvert(CommandLine& line, Program& program) {
         .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"})
         .group(sets);
     c.sharedOptions(program.common, kOutput | kOutside);
-    c.runs([o](Program& p) { return convert(*o, p); });
+    c.runs([o, c](Program& p) { return convert(*o, c, p); });
 }
 
 }  // namespace stx::tools

@@ -53,44 +53,58 @@ Points pointsOf(const Bundle& bundle) {
     return out;
 }
 
-Result<int> extract(const ExtractOptions& o, Program& program) {
+Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
-    const auto ending = std::filesystem::path(o.output).extension();
-    if (!ending.empty() && ending != ".ply" && ending != ".drc")
-        return fail(ErrorCode::usage, "-o '{}' ends in '{}'; a folder, .ply or .drc is expected",
-                    o.output, ending.string());
+    ExtractOptions o = options;
+    STX_TRY(o.output, folderTarget(options.output, {".ply", ".drc"}, "a folder, .ply or .drc"));
+    const auto dotted = std::filesystem::path(o.output).extension();
+    std::error_code ec;
+    const bool points = (dotted == ".ply" || dotted == ".drc") && o.output == options.output &&
+                        !std::filesystem::is_directory(o.output, ec);
+    const auto ending = points ? dotted : std::filesystem::path();
+    if (!ending.empty())
+        STX_CHECK(
+            command.refuse({"--cameras", "--depth"},
+                           fmt::format("is of a folder; -o {} is a file of points", o.output)));
+    if (o.cameras == "colmap")
+        STX_CHECK(command.refuse({"--depth"},
+                                 "does not go with --cameras colmap, whose depth is floats"));
+    if (ending != ".drc")
+        STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
     STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
     std::string what;
-    if (ending == ".ply" || ending == ".drc") {
+    if (points) {
         STX_CHECK(program.job.limits.checkAllocation(
             static_cast<std::uint64_t>(bundle.pointCount()), 28, "the points"));
-        const auto points = pointsOf(bundle);
+        const auto found = pointsOf(bundle);
         PointCloud cloud;
-        cloud.positions = points.positions;
-        cloud.colours = points.colours;
-        cloud.normals = points.normals;
+        cloud.positions = found.positions;
+        cloud.colours = found.colours;
+        cloud.normals = found.normals;
         cloud.origin = bundle.origin;
-        PointWriteOptions options = o.points;
-        options.file.noClobber = program.common.noClobber;
-        STX_CHECK(writePoints(o.output, cloud, program.job, options));
-        what = fmt::format("{} points", points.positions.size());
+        PointWriteOptions write = o.points;
+        write.file.noClobber = program.common.noClobber;
+        STX_CHECK(writePoints(o.output, cloud, program.job, write));
+        what = counted(found.positions.size(), "point");
     } else {
-        ExportOptions options;
-        options.kind =
-            o.cameras == "miv" ? ExportOptions::Kind::miv : ExportOptions::Kind::transforms;
-        options.noClobber = program.common.noClobber;
-        options.floatDepth = o.depth == "exr";
-        STX_CHECK(exportImages(bundle, o.output, options, program.job));
-        what = fmt::format("{} views", bundle.views.size());
+        ExportOptions write;
+        write.kind = o.cameras == "miv"      ? ExportOptions::Kind::miv
+                     : o.cameras == "colmap" ? ExportOptions::Kind::colmap
+                                             : ExportOptions::Kind::transforms;
+        write.noClobber = program.common.noClobber;
+        write.floatDepth = o.depth == "exr";
+        STX_CHECK(exportImages(bundle, o.output, write, program.job));
+        what = counted(bundle.views.size(), "view");
     }
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
-    program.say(fmt::format(
-        "{} ({}) → {} ({}), {}, {:.2g} s", std::filesystem::path(o.input).filename().string(),
-        humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)), what, seconds));
+    program.say(fmt::format("{} ({}) → {} ({}), {}, {}",
+                            std::filesystem::path(o.input).filename().string(),
+                            humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
+                            what, humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "extract-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
@@ -112,16 +126,18 @@ void addExtract(CommandLine& line, Program& program) {
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle or atlas").required();
     c.option("-o,--output", o->output, "Folder, points.ply or points.drc").required().takes("OUT");
-    c.option("--cameras", o->cameras,
-             "Camera file in the folder: transforms (nerfstudio) or miv (default transforms)")
-        .oneOf({"transforms", "miv"});
+    c.option(
+         "--cameras", o->cameras,
+         "Camera file in the folder: transforms (nerfstudio), miv, or colmap (a dense workspace) "
+         "(default transforms)")
+        .oneOf({"transforms", "miv", "colmap"});
     c.option("--depth", o->depth,
              "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
         .oneOf({"exr", "png"});
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.sharedOptions(program.common, kOutput | kOutside);
-    c.runs([o](Program& p) { return extract(*o, p); });
+    c.runs([o, c](Program& p) { return extract(*o, c, p); });
 }
 
 }  // namespace stx::tools

@@ -80,11 +80,30 @@ const CLI::App& chosen(const CLI::App& app) {
     return *where;
 }
 
+/// Refuses numbers that are `bad`, as they were written. What is no number is CLI11's to refuse.
+CLI::Validator numberThat(const std::function<bool(double)>& bad, const std::string& expected,
+                          const std::string& description) {
+    return CLI::Validator(
+        [=](std::string& text) {
+            double value = 0;
+            if (!CLI::detail::lexical_cast(text, value) || !bad(value)) return std::string();
+            return fmt::format("it is {}; {}", text, expected);
+        },
+        description);
+}
+
 Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
     const CLI::App& where = chosen(app);
     std::string message = error.what();
     std::replace(message.begin(), message.end(), '\n', ' ');
     while (!message.empty() && (message.back() == ' ' || message.back() == '.')) message.pop_back();
+
+    constexpr std::string_view kNoNumber = "Could not convert: ";
+    if (const auto equals = message.find(" = ");
+        message.starts_with(kNoNumber) && equals != message.npos)
+        message = fmt::format("{} is '{}'; a number is expected",
+                              message.substr(kNoNumber.size(), equals - kNoNumber.size()),
+                              message.substr(equals + 3));
 
     std::vector<std::string> known;
     std::string unknown;
@@ -139,19 +158,21 @@ Option& Option::oneOf(std::initializer_list<int> numbers) {
     return *this;
 }
 Option& Option::range(int least, int most) {
-    option_->check(CLI::Range(least, most));
-    return *this;
+    return range(static_cast<double>(least), static_cast<double>(most));
 }
 Option& Option::range(double least, double most) {
-    option_->check(CLI::Range(least, most));
+    option_->check(numberThat([=](double v) { return v < least || v > most; },
+                              fmt::format("{:.10g} to {:.10g} is possible", least, most),
+                              fmt::format("in [{:.10g} - {:.10g}]", least, most)));
     return *this;
 }
 Option& Option::notNegative() {
-    option_->check(CLI::NonNegativeNumber);
+    option_->check(
+        numberThat([](double v) { return v < 0; }, "it must be 0 or more", "NONNEGATIVE"));
     return *this;
 }
 Option& Option::positive() {
-    option_->check(CLI::PositiveNumber);
+    option_->check(numberThat([](double v) { return v <= 0; }, "it must be above 0", "POSITIVE"));
     return *this;
 }
 
@@ -224,6 +245,27 @@ void Command::runs(Body body) {
     *body_ = std::move(body);
 }
 
+std::vector<std::string> Command::given(const std::vector<std::string>& names) const {
+    std::vector<std::string> found;
+    for (const auto& name : names)
+        if (app_->count(name) > 0) found.push_back(name);
+    return found;
+}
+
+std::vector<std::string> Command::givenUnder(const std::string& heading) const {
+    std::vector<std::string> found;
+    for (const auto* option : std::as_const(*app_).get_options())
+        if (option->get_group() == heading && option->count() > 0)
+            found.push_back(option->get_name());
+    return found;
+}
+
+Result<void> Command::refuse(const std::vector<std::string>& names, const std::string& why) const {
+    if (const auto found = given(names); !found.empty())
+        return fail(ErrorCode::usage, "{} {}", found.front(), why);
+    return {};
+}
+
 CommandLine::CommandLine()
     : app_(std::make_unique<CLI::App>(
           "The MPEG-4 AFX SimpleTexture toolkit: depth image-based representation of 3D objects.",
@@ -251,14 +293,14 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         app_->parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
         const CLI::App& where = chosen(*app_);
-        return Request{where.help(&where == app_.get() ? "" : "stx"), {}};
+        return Request{where.help(&where == app_.get() ? "" : "stx"), {}, {}};
     } catch (const CLI::CallForVersion&) {
-        return Request{"stx " STX_VERSION "\n", {}};
+        return Request{"stx " STX_VERSION "\n", {}, {}};
     } catch (const CLI::ParseError& e) {
         return tl::unexpected(usageError(*app_, e, argc, argv));
     }
     for (const auto& entry : entries_)
-        if (entry.app->parsed()) return Request{{}, *entry.body};
+        if (entry.app->parsed()) return Request{{}, *entry.body, entry.app->get_name()};
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");
 }
 

@@ -96,6 +96,17 @@ class Command {
     /// What it does once its options are parsed; gives the exit code.
     void runs(Body body);
 
+    // ---- Once the options are parsed. ----
+
+    /// Those of `names` ("--size") that were given, in that order.
+    [[nodiscard]] std::vector<std::string> given(const std::vector<std::string>& names) const;
+    /// The options under a heading of the help that were given.
+    [[nodiscard]] std::vector<std::string> givenUnder(const std::string& heading) const;
+    /// Error (usage) when one of `names` was given though it cannot matter. `why` goes on after the
+    /// name: "is of lighting; give --light, too".
+    [[nodiscard]] Result<void> refuse(const std::vector<std::string>& names,
+                                      const std::string& why) const;
+
   private:
     CLI::App* app_;
     Body* body_;
@@ -136,6 +147,7 @@ class CommandLine {
     struct Request {
         std::string text;
         Command::Body body;
+        std::string command;  ///< its name
     };
     /// Errors (usage) in one line that says where to read on, with the nearest known word for an
     /// unknown one.

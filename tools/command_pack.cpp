@@ -56,7 +56,9 @@ Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std
     return smaller;
 }
 
-Result<int> packBundle(const PackOptions& o, Program& program) {
+Result<int> packBundle(const PackOptions& options, Program& program) {
+    PackOptions o = options;
+    STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
     const auto start = std::chrono::steady_clock::now();
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
@@ -90,11 +92,12 @@ Result<int> packBundle(const PackOptions& o, Program& program) {
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
-    program.say(fmt::format(
-        "{} ({}) → {} ({}), {} views in {} textures {}x{}, {:.1f} % used{}, {:.2g} s",
-        std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)), o.output,
-        humanBytes(bytesOf(o.output)), atlas->views.size(), atlas->textureCount(), atlas->width(),
-        atlas->height(), atlas->used() * 100, pruned, seconds));
+    program.say(fmt::format("{} ({}) → {} ({}), {} in {} {}x{}, {:.1f} % used{}, {}",
+                            std::filesystem::path(o.input).filename().string(),
+                            humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
+                            counted(atlas->views.size(), "view"),
+                            counted(atlas->textureCount(), "texture"), atlas->width(),
+                            atlas->height(), atlas->used() * 100, pruned, humanSeconds(seconds)));
     STX_CHECK(program.writeReport(
         {{"$schema", "pack-report.schema.json"},
          {"input", o.input},

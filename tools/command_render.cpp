@@ -24,11 +24,36 @@ struct RenderOptions {
     std::string ambient = "0.2", specular = "0";
     double shininess = 32;
     std::string fileFormat;
-    double framesPerSecond = 25;
+    std::string framesPerSecond = "25";
     bool skipExisting = false, listDevices = false;
     int device = -1;
     OpenOptions open;
 };
+
+/// "25", "29.97" or "30000/1001", as a fraction.
+Result<std::pair<int, int>> parseRate(const std::string& text) {
+    const auto wrong = [&] {
+        return fail(ErrorCode::usage,
+                    "--fps is '{}'; 0.001 to 1000, or a fraction as in 30000/1001, is expected",
+                    text);
+    };
+    const auto slash = text.find('/');
+    const auto top = parseNumbers(text.substr(0, slash), 1, "--fps");
+    if (!top) return wrong();
+    double numerator = (*top)[0], denominator = 1;
+    if (slash != std::string::npos) {
+        const auto bottom = parseNumbers(text.substr(slash + 1), 1, "--fps");
+        if (!bottom) return wrong();
+        denominator = (*bottom)[0];
+        const auto whole = [](double v) { return v >= 1 && v <= 1e9 && v == std::floor(v); };
+        if (!whole(numerator) || !whole(denominator)) return wrong();
+    } else if (numerator != std::floor(numerator)) {
+        numerator = std::round(numerator * 1000);
+        denominator = 1000;
+    }
+    if (!(numerator / denominator >= 0.001 && numerator / denominator <= 1000)) return wrong();
+    return std::pair(static_cast<int>(numerator), static_cast<int>(denominator));
+}
 
 /// "0.2" or "r,g,b".
 Result<glm::vec3> parseGreyOrRgb(const std::string& text, const char* option) {
@@ -68,15 +93,47 @@ Result<Light> parseLight(const std::string& text, glm::dvec3 origin) {
     return light;
 }
 
-/// R,G,B in 0..1, or in 0..255 when one is above 1; nothing for `none`.
+/// A colour; nothing for `none`.
 Result<std::optional<glm::vec3>> parseBackground(const std::string& text) {
     if (text == "none") return std::optional<glm::vec3>();
-    STX_TRY(auto v, parseVec3(text, "--background"));
-    if (v.x > 1 || v.y > 1 || v.z > 1) v /= 255.0;
-    if (glm::any(glm::lessThan(v, glm::dvec3(0))) || glm::any(glm::greaterThan(v, glm::dvec3(1))))
-        return fail(ErrorCode::usage,
-                    "--background is '{}'; each value must be 0 to 1 (or 0 to 255)", text);
-    return std::optional<glm::vec3>(glm::vec3(v));
+    STX_TRY(const auto colour, parseColour(text, "--background"));
+    return std::optional<glm::vec3>(colour);
+}
+
+/// Errors (usage) for options that cannot matter, whatever the input is.
+Result<void> checkOptions(const RenderOptions& o, const Command& command) {
+    if (o.lights.empty())
+        STX_CHECK(command.refuse({"--ambient", "--specular", "--shininess"},
+                                 "is of lighting; give --light, too"));
+    if (o.output != "-")
+        STX_CHECK(command.refuse({"--fps"}, "is of a stream on stdout, -o - --file-format y4m"));
+    if (o.backend == Backend::cpu)
+        STX_CHECK(command.refuse({"--device"}, "is of GPUs; it does not go with --backend cpu"));
+    if (o.settings.splat != SplatRule::paper)
+        STX_CHECK(command.refuse({"--splat-coefficient"}, "is of --splat paper"));
+    return {};
+}
+
+/// Notes options that do not matter to this model and mode: scripts pass them to all.
+void noteUnused(const Model& model, const RenderOptions& o, const Command& command,
+                Program& program) {
+    const auto note = [&](const std::vector<std::string>& options, const char* why) {
+        if (!options.empty())
+            program.job.note(fmt::format("{} {} not used: {}", fmt::join(options, ", "),
+                                         options.size() == 1 ? "is" : "are", why));
+    };
+    if (std::holds_alternative<Mesh>(model)) {
+        note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
+                            "--splat-coefficient", "--fill"}),
+             "a mesh is rasterised itself, on the processor");
+        return;
+    }
+    note(command.given({"--texture"}), "only meshes take a texture");
+    if (o.settings.mode == RenderMode::splat)
+        note(command.given({"--quality"}), "it is of --mode surface");
+    else
+        note(command.given({"--splat", "--splat-coefficient", "--pipeline"}),
+             "they are of --mode splat");
 }
 
 Result<RenderSettings> settingsOf(const RenderOptions& o) {
@@ -125,14 +182,15 @@ Result<void> checkFrames(const RenderOptions& o, int count, const Program& progr
     return {};
 }
 
-Result<int> render(const RenderOptions& o, Program& program) {
+Result<int> render(const RenderOptions& o, const Command& command, Program& program) {
     if (o.listDevices) return printDevices(program);
     if (o.input.empty() || o.output.empty())
         return fail(ErrorCode::usage, "an input and -o OUTPUT are needed. See 'stx render --help'");
+    STX_CHECK(checkOptions(o, command));
     STX_TRY(auto settings, settingsOf(o));
     STX_TRY(const auto background, parseBackground(o.background));
     STX_CHECK(checkTarget(o.output, program));
-    STX_TRY(const int wanted, checkCameraOptions(o.camera, program));
+    STX_TRY(const int wanted, checkCameraOptions(o.camera, command, program));
     if (wanted > 1 && !frameName(o.output, 0) && o.output != "-")
         return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
                     wanted);
@@ -141,12 +199,13 @@ Result<int> render(const RenderOptions& o, Program& program) {
     writing.pattern = o.output;
     writing.background = background;
     writing.stream = o.fileFormat;
-    writing.framesPerSecond = o.framesPerSecond;
+    STX_TRY(writing.rate, parseRate(o.framesPerSecond));
     writing.noClobber = program.common.noClobber;
     STX_CHECK(FrameWriter::check(writing));
 
     preloadCodecs(o.input);
     STX_TRY(auto model, stx::open(o.input, o.open, program.job));
+    noteUnused(model, o, command, program);
     CameraContext context;
     std::int64_t points = 0;
     const auto addViews = [&](const auto& seen) {
@@ -202,12 +261,11 @@ Result<int> render(const RenderOptions& o, Program& program) {
     }
     STX_CHECK(writer.finish());
     program.sayNotes();
-    program.say(fmt::format("{} → {}, {} picture{} {}x{}, {}{}{}",
-                            std::filesystem::path(o.input).filename().string(), o.output,
-                            cameras.size(), cameras.size() == 1 ? "" : "s", cameras[0].width,
-                            cameras[0].height, renderer->backend(),
-                            drawn > 0 ? fmt::format(", {:.1f} ms each", total / drawn) : "",
-                            drawn < count ? fmt::format(", {} skipped", count - drawn) : ""));
+    program.say(fmt::format(
+        "{} → {}, {} {}x{}, {}{}{}", std::filesystem::path(o.input).filename().string(), o.output,
+        counted(cameras.size(), "picture"), cameras[0].width, cameras[0].height,
+        renderer->backend(), drawn > 0 ? fmt::format(", {:.1f} ms each", total / drawn) : "",
+        drawn < count ? fmt::format(", {} skipped", count - drawn) : ""));
     STX_CHECK(
         program.writeReport({{"$schema", "render-report.schema.json"},
                              {"backend", renderer->backend()},
@@ -230,7 +288,7 @@ void addRender(CommandLine& line, Program& program) {
     auto o = std::make_shared<RenderOptions>();
     c.option("IN", o->input, "Bundle, atlas or mesh");
     c.option("-o,--output", o->output,
-             ".png, .jpg or .exr; name_%04d.png for several; - for a y4m stream")
+             ".png, .jpg, .exr, .tif or .webp; name_%04d.png for several; - for a y4m stream")
         .takes("IMAGE");
     addCameraOptions(c, o->camera);
     const char* drawing = "Drawing";
@@ -274,8 +332,9 @@ void addRender(CommandLine& line, Program& program) {
                    "What no view saw in full scenes: background or none (default background)")
         .group(drawing);
     c.option("--background", o->background,
-             "Colour behind the object, 0..1 each; none keeps alpha (default none)")
-        .takes("R,G,B|none")
+             "Colour behind the object: values of 0 to 1, #rrggbb or a name such as white; none "
+             "keeps alpha (default none)")
+        .takes("COLOUR|none")
         .group(drawing);
     const char* lighting = "Lighting (Phong; off without --light)";
     c.option("--light", o->lights,
@@ -294,8 +353,9 @@ void addRender(CommandLine& line, Program& program) {
         .oneOf({"y4m"})
         .group(output);
     c.option("--format", o->fileFormat, "The same as --file-format").oneOf({"y4m"}).group(output);
-    c.option("--fps", o->framesPerSecond, "Frame rate written into the stream (default 25)")
-        .range(0.001, 1000.0)
+    c.option("--fps", o->framesPerSecond,
+             "Frame rate written into the stream, as in 30 or 30000/1001 (default 25)")
+        .takes("RATE")
         .group(output);
     c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
         .group(output);
@@ -303,7 +363,7 @@ void addRender(CommandLine& line, Program& program) {
         .takes("IMAGE")
         .group(output);
     c.sharedOptions(program.common, kOutput | kOutside);
-    c.runs([o](Program& p) { return render(*o, p); });
+    c.runs([o, c](Program& p) { return render(*o, c, p); });
 }
 
 }  // namespace stx::tools

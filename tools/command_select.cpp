@@ -1,4 +1,5 @@
 #include <chrono>
+#include <numeric>
 
 #include <nlohmann/json.hpp>
 
@@ -19,29 +20,53 @@ struct SelectOptions {
 };
 
 /// A mesh has no views to choose from: the best ones around it are captured.
-Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, Program& program) {
+Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, const Command& command,
+                             Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    STX_CHECK(command.refuse({"--share", "--density"},
+                             fmt::format("is of bundles, but '{}' is a mesh", o.input)));
     if (o.settings.count == 0)
         return fail(ErrorCode::usage, "'{}' is a mesh; say how many views of it with --count N",
                     o.input);
     MeshViewOptions views;
     views.views = fmt::format("auto:{}", o.settings.count);
     views.plot = o.plot;
-    auto bundle = captureMesh(mesh, views, program);
+    Selection chosen;
+    auto bundle = captureMesh(mesh, views, program, &chosen);
     if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", o.input)));
     bundle->title = std::filesystem::path(o.input).stem().string();
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveBundle(*bundle, o.output, save, program.job));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format("{} → {}, {}, {}", std::filesystem::path(o.input).filename().string(),
+                            o.output, counted(bundle->views.size(), "view"),
+                            humanSeconds(seconds)));
+    std::vector<int> order(bundle->views.size());
+    std::iota(order.begin(), order.end(), 0);
+    STX_CHECK(program.writeReport({{"$schema", "select-report.schema.json"},
+                                   {"input", o.input},
+                                   {"output", o.output},
+                                   {"views", order},
+                                   {"of", bundle->views.size()},
+                                   {"quality", chosen.quality},
+                                   {"certificate", chosen.certificate},
+                                   {"coverage", chosen.coverage},
+                                   {"coverageOfAll", chosen.coverageOfAll},
+                                   {"seconds", seconds}}));
     return 0;
 }
 
-Result<int> select(const SelectOptions& o, Program& program) {
+Result<int> select(const SelectOptions& o, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
     STX_TRY(auto opened, openRenderable(o.input, {}, program.job));
-    if (const auto* mesh = std::get_if<Mesh>(&opened)) return selectAroundMesh(*mesh, o, program);
+    if (const auto* mesh = std::get_if<Mesh>(&opened))
+        return selectAroundMesh(*mesh, o, command, program);
     const auto& bundle = std::get<Bundle>(opened);
     SelectSettings settings = o.settings;
     settings.share = o.sharePercent.value_or(settings.count > 0 ? 100.0 : 95.0) / 100.0;
@@ -61,10 +86,10 @@ Result<int> select(const SelectOptions& o, Program& program) {
     program.say(fmt::format(
         "{} → {}, {} of {} views, {:.1f} % of the quality of all, at least {:.1f} % of the best "
         "possible "
-        "choice; they see {:.1f} % of the surface, all see {:.1f} %; {:.2g} s",
+        "choice; they see {:.1f} % of the surface, all see {:.1f} %; {}",
         std::filesystem::path(o.input).filename().string(), o.output, selection.views.size(),
         bundle.views.size(), quality * 100, selection.certificate * 100, selection.coverage * 100,
-        selection.coverageOfAll * 100, seconds));
+        selection.coverageOfAll * 100, humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "select-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
@@ -99,7 +124,7 @@ void addSelect(CommandLine& line, Program& program) {
         .notNegative();
     c.option("--plot", o->plot, "Draw quality against the number of views").takes("FILE.svg");
     c.sharedOptions(program.common, kOutput | kOutside);
-    c.runs([o](Program& p) { return select(*o, p); });
+    c.runs([o, c](Program& p) { return select(*o, c, p); });
 }
 
 }  // namespace stx::tools

@@ -1,6 +1,5 @@
 #include "tools/frame_writer.hpp"
 
-#include <cmath>
 #include <filesystem>
 
 #include "formats/images/frames.hpp"
@@ -100,8 +99,8 @@ Result<void> FrameWriter::writeOne(const Item& item) {
     if (!stream_) {
         STX_TRY(streamFile_, OutputFile::create("-"));
         Y4mOptions video;
-        video.rateNumerator = static_cast<int>(std::lround(settings_.framesPerSecond * 1000));
-        video.rateDenominator = 1000;
+        video.rateNumerator = settings_.rate.first;
+        video.rateDenominator = settings_.rate.second;
         video.background = settings_.background.value_or(glm::vec3(0.0f));
         STX_TRY(stream_, Y4mWriter::create(*streamFile_, item.frame.colour.width(),
                                            item.frame.colour.height(), video));

@@ -23,8 +23,8 @@ class FrameWriter {
     struct Settings {
         std::string pattern;  ///< file, name_%04d.png, or - for a stream
         std::optional<glm::vec3> background;
-        std::string stream;  ///< "y4m" for stdout
-        double framesPerSecond = 25;
+        std::string stream;               ///< "y4m" for stdout
+        std::pair<int, int> rate{25, 1};  ///< frames per second, a fraction
         bool noClobber = false;
     };
     /// Errors (usage) when the ending or the stream makes no sense.

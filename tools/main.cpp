@@ -25,6 +25,7 @@ int mainProgram(int argc, char** argv) {
         program.print(request->text);
         return 0;
     }
+    program.command = request->command;
     watchStopSignals(program.job.cancelled);
     const int code = program.run([&] { return request->body(program); });
     return stopSignal() != 0 ? 128 + stopSignal() : code;

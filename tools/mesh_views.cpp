@@ -7,6 +7,7 @@
 #include "formats/imagesets/camera_file.hpp"
 #include "lib/quality/capture_quality.hpp"
 #include "lib/selection/selection.hpp"
+#include "tools/camera_options.hpp"
 
 namespace stx::tools {
 namespace {
@@ -49,7 +50,7 @@ Result<std::optional<AutoViews>> parseAuto(const std::string& text) {
 
 Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& program) {
     ViewFraming framing;
-    STX_TRY(const auto size, parseSize(o.size, program.job.limits));
+    STX_TRY(const auto size, parseSize(o.size.empty() ? "512x512" : o.size, program.job.limits));
     framing.width = size.x;
     framing.height = size.y;
     // The six faces of a cube are orthographic in the standard's own example.
@@ -58,12 +59,13 @@ Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& prog
         return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 170 degrees",
                     o.fovDeg);
     framing.fovRad = o.fovDeg * std::numbers::pi / 180.0;
+    STX_TRY(framing.up, parseDirection(o.up, "--up"));
     return framing;
 }
 
 Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wanted,
                                         const MeshViewOptions& o, const CaptureSettings& capture,
-                                        Program& program) {
+                                        Program& program, Selection* selection) {
     MeshCandidates candidates;
     STX_TRY(candidates.framing, framingOf(o, false, program));
     SelectSettings select;
@@ -72,14 +74,20 @@ Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wante
     STX_TRY(auto chosen, selectMeshViews(mesh, candidates, select, program.job));
     auto cameras = std::move(chosen.cameras);
     if (wanted.count == 0) {
-        const auto most = static_cast<int>(cameras.size());
-        STX_TRY(const int count,
+        const auto most = cameras.size();
+        STX_TRY(const auto fewest,
                 fewestCameras(mesh, cameras, capture, wanted.decibels, program.job));
-        cameras.resize(count);
-        if (count == most)
+        cameras.resize(fewest.count);
+        const std::string reached = fmt::format(
+            "{} {:.1f} dB",
+            fewest.count == 1 ? "1 view reaches" : fmt::format("{} views reach", fewest.count),
+            fewest.psnr);
+        if (fewest.psnr < wanted.decibels)
             program.job.note(
-                fmt::format("{} views are the most that are tried; {:g} dB may not be reached",
-                            most, wanted.decibels));
+                fmt::format("{:g} dB is not reached by {}, the most that are tried; {}",
+                            wanted.decibels, counted(most, "view"), reached));
+        else
+            program.say(reached + " in pictures from six sides");
     }
     const auto& s = chosen.selection;
     const auto n = cameras.size();
@@ -93,6 +101,7 @@ Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wante
         const std::string svg = selectionPlotSvg(s, "quality against the number of views");
         STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
     }
+    if (selection) *selection = s;
     return cameras;
 }
 
@@ -101,11 +110,15 @@ Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions
     std::error_code ec;
     auto layout = parseViewLayout(o.views);
     if (!layout) {
-        if (!std::filesystem::is_regular_file(o.views, ec)) return propagate(layout);
-        STX_TRY(const auto named, readCameraFile(o.views, program.job));
+        if (!std::filesystem::exists(o.views, ec)) return propagate(layout);
+        std::optional<glm::ivec2> size;
+        if (!o.size.empty()) {
+            STX_TRY(size, parseSize(o.size, program.job.limits));
+        }
+        STX_TRY(const auto named, readCameraFile(o.views, program.job, size));
         std::vector<Camera> cameras;
         for (const auto& n : named) {
-            cameras.push_back(n.camera);
+            cameras.push_back(inPicture(n.camera, size));
             cameras.back().position -= mesh.origin;
         }
         return cameras;
@@ -118,14 +131,16 @@ Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions
 }  // namespace
 
 void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>& o) {
-    const char* group = "Views of a mesh";
+    const char* group = MeshViewOptions::kHeading;
     command
         .option("--views", o->views,
                 "cube, ring:N, sphere:N, octahedral:N, auto:N (the N best), auto:DBdB (the "
                 "fewest that reach "
                 "this PSNR) or a camera file (default sphere:16)")
         .group(group);
-    command.option("--size", o->size, "Size of each view (default 512x512)")
+    command
+        .option("--size", o->size,
+                "Size of each view (default 512x512; of a camera file: what it says)")
         .takes("WxH")
         .group(group);
     command
@@ -138,6 +153,12 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
                 "Of a ring above the horizon, in degrees (default 15)")
         .range(-90.0, 90.0)
         .takes("DEG")
+        .group(group);
+    command
+        .option("--up", o->up,
+                "The model's up axis, on which rings, spheres and octahedra stand: Z, X,Y,Z or "
+                "with a minus --up=-Y (default Y)")
+        .takes("AXIS")
         .group(group);
     command
         .option("--fov", o->fovDeg,
@@ -162,19 +183,27 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
         .group("Coding");
 }
 
-Result<void> checkMeshViewOptions(const MeshViewOptions& o, Program& program) {
+Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& command,
+                                  Program& program) {
     STX_TRY(const auto automatic, parseAuto(o.views));
-    std::error_code ec;
-    if (!automatic) {
-        if (auto layout = parseViewLayout(o.views);
-            !layout && !std::filesystem::exists(o.views, ec))
-            return tl::unexpected(layout.error());
-    }
     STX_CHECK(framingOf(o, false, program));
-    return {};
+    if (!automatic) STX_CHECK(command.refuse({"--plot"}, "is of --views auto:N"));
+    const auto layout = parseViewLayout(o.views);
+    if (automatic || (layout && layout->kind != ViewLayout::Kind::ring))
+        STX_CHECK(command.refuse({"--elevation"}, "is of --views ring:N"));
+    if (automatic || layout) return {};
+    std::error_code ec;
+    if (std::filesystem::exists(o.views, ec))
+        return command.refuse({"--elevation", "--projection", "--fov", "--up"},
+                              "does not go with a camera file, whose cameras have their own");
+    // A word without a dot or a slash is meant as a layout.
+    if (o.views.find_first_of("./") == std::string::npos) return tl::unexpected(layout.error());
+    return fail(ErrorCode::io, "cannot read the camera file '{}' of --views: there is no such file",
+                o.views);
 }
 
-Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& program) {
+Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& program,
+                           Selection* selection) {
     STX_CHECK(mesh.check());
     CaptureSettings capture;
     capture.supersampling = o.supersampling;
@@ -183,7 +212,7 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     STX_TRY(const auto automatic, parseAuto(o.views));
     std::vector<Camera> cameras;
     if (automatic) {
-        STX_TRY(cameras, autoCameras(mesh, *automatic, o, capture, program));
+        STX_TRY(cameras, autoCameras(mesh, *automatic, o, capture, program, selection));
     } else {
         STX_TRY(cameras, layoutOrFile(mesh, o, program));
     }

@@ -5,6 +5,7 @@
 
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/selection/selection.hpp"
 #include "tools/command_line.hpp"
 #include "tools/program.hpp"
 
@@ -13,24 +14,29 @@ namespace stx::tools {
 /// How a mesh becomes reference views, as the command line says it.
 struct MeshViewOptions {
     std::string views = "sphere:16";
-    std::string size = "512x512";
+    std::string size;        ///< empty: 512x512, or what a camera file says
     std::string projection;  ///< empty: perspective, except the faces of a cube
     std::optional<double> elevationDeg;
     double fovDeg = 35.0;
     std::optional<int> depthBits;  ///< nothing: 16, or what an image set has
     int supersampling = 4;
     std::string normals = "none";
+    std::string up = "Y";
     std::string plot;  ///< SVG of quality against the number of views, of --views auto
+    /// Heading of the help that they are under.
+    static constexpr const char* kHeading = "Views of a mesh";
 };
 
 void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>& options);
 
 /// Errors (usage) that are found before a mesh is read.
-[[nodiscard]] Result<void> checkMeshViewOptions(const MeshViewOptions& options, Program& program);
+[[nodiscard]] Result<void> checkMeshViewOptions(const MeshViewOptions& options,
+                                                const Command& command, Program& program);
 
-/// Captures a mesh by a layout, a camera file, or the best views (auto:N, auto:DBdB).
+/// Captures a mesh by a layout, a camera file, or the best views (auto:N, auto:DBdB), of which
+/// `selection` gets how good the choice is.
 [[nodiscard]] Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& options,
-                                         Program& program);
+                                         Program& program, Selection* selection = nullptr);
 
 /// Says what 8-bit depth costs, in scene units.
 void noteDepthLoss(const Bundle& bundle, Job& job);

@@ -10,13 +10,14 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
+#include "tools/stop_signals.hpp"
 
 namespace stx::tools {
 
 namespace {
 
 /// Bytes of a name that are no UTF-8 become U+FFFD.
-std::string textOf(const nlohmann::ordered_json& json) {
+std::string jsonText(const nlohmann::ordered_json& json) {
     return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -27,29 +28,93 @@ void Program::print(std::string_view text) {
 }
 
 void Program::printJson(const nlohmann::ordered_json& json) {
-    write(textOf(json));
+    write(jsonText(json));
 }
 
 void Program::write(std::string_view text) {
+    progress.erase();
     if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0)
         return;
     outputFailed_ = true;
     outputUnwanted_ = errno == EPIPE;
 }
 
-void Program::say(std::string_view line) const {
-    if (!common.quiet) fmt::print(stderr, "{}\n", printable(line));
+void Program::say(std::string_view line) {
+    if (!common.quiet) complain(line);
 }
+
+void Program::complain(std::string_view line) {
+    progress.erase();
+    fmt::print(stderr, "{}\n", printable(line));
+}
+
+namespace {
+
+/// More notes alike than this are told as a number.
+constexpr std::size_t kNotesAlike = 3;
+
+/// What a note says without its names in quotes and its numbers.
+std::string withoutParticulars(std::string_view note) {
+    std::string text;
+    for (std::size_t i = 0; i < note.size(); ++i) {
+        const char c = note[i];
+        if (const auto end = note.find('\'', i + 1);
+            c == '\'' && end != std::string_view::npos && (i == 0 || note[i - 1] == ' ')) {
+            i = end;
+            text += '\'';
+        } else if (c >= '0' && c <= '9') {
+            while (i + 1 < note.size() && (std::isalnum(static_cast<unsigned char>(note[i + 1])) ||
+                                           note[i + 1] == '.' || note[i + 1] == '-'))
+                ++i;
+            text += '#';
+        } else {
+            text += c;
+        }
+    }
+    return text;
+}
+
+}  // namespace
 
 void Program::sayNotes() {
     const std::string about = subject.empty() ? "" : fmt::format("'{}': ", subject);
-    for (const auto& note : job.takeNotes()) say("note: " + about + note);
+    const auto notes = job.takeNotes();
+    std::vector<std::string> kinds;
+    for (const auto& note : notes) kinds.push_back(withoutParticulars(note));
+    for (std::size_t i = 0; i < notes.size(); ++i) {
+        const auto alike =
+            static_cast<std::size_t>(std::count(kinds.begin(), kinds.end(), kinds[i]));
+        const bool first = std::find(kinds.begin(), kinds.end(), kinds[i]) == kinds.begin() + i;
+        if (alike <= kNotesAlike || common.verbose > 0)
+            say("note: " + about + notes[i]);
+        else if (first)
+            say(fmt::format("note: {}{} (and {} more like it; -v lists them)", about, notes[i],
+                            alike - 1));
+    }
 }
 
-Result<void> Program::writeReport(const nlohmann::ordered_json& report) const {
+Result<void> Program::writeReport(const nlohmann::ordered_json& report) {
+    return writeReportText(jsonText(report));
+}
+
+Result<void> Program::writeReportText(std::string_view text) {
+    reportWritten_ = true;
     if (common.report.empty()) return {};
-    const std::string text = textOf(report);
     return writeFile(common.report, std::as_bytes(std::span(text)), outputOptions());
+}
+
+void Program::reportError(const Error& error) {
+    const int signal = stopSignal();
+    const nlohmann::ordered_json report = {
+        {"$schema", "error-report.schema.json"},
+        {"command", command},
+        {"status", "error"},
+        {"exitCode", signal != 0 ? 128 + signal : static_cast<int>(error.code)},
+        {"message", textOf(error)}};
+    // In one line: of many inputs the report is lines of JSON.
+    const auto written = writeReportText(
+        report.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+    if (!written) complain("stx: " + textOf(written.error()));
 }
 
 namespace {
@@ -73,41 +138,33 @@ Result<void> checkFolderOf(const std::filesystem::path& target) {
 int Program::run(const std::function<Result<int>()>& body) {
     job.limits.maxMemoryBytes = common.maxMemoryMiB << 20;
     job.limits.allowOutside = common.allowOutside;
-    const bool terminal = !common.quiet && isatty(STDERR_FILENO) != 0;
-    auto lastShown = std::chrono::steady_clock::now();
-    std::mutex mutex;
-    bool shown = false;
-    if (terminal) {
-        job.onProgress = [&](std::int64_t done, std::int64_t total, std::string_view what) {
-            const std::lock_guard lock(mutex);
-            const auto now = std::chrono::steady_clock::now();
-            if (now - lastShown < std::chrono::milliseconds(200)) return;
-            lastShown = now;
-            shown = true;
-            fmt::print(stderr, "\r\033[K{} {}/{}", what, done, total);
+    if (!common.quiet && isatty(STDERR_FILENO) != 0)
+        job.onProgress = [this](std::int64_t done, std::int64_t total, std::string_view what) {
+            progress.show(done, total, what);
         };
-    }
     const ThreadLimit threads(common.threads);
     Result<int> code = 0;
     try {
         // A report that cannot be written is an error before the work, not after it.
         const auto report =
             common.report.empty() ? Result<void>() : checkTarget(common.report, *this);
+        reportWritten_ = !report;  // there is no place for it
         code = report ? body() : tl::unexpected(report.error());
     } catch (const std::bad_alloc&) {
         code = fail(ErrorCode::failed, "out of memory; use smaller images or fewer --threads");
     } catch (const std::exception& e) {
         code = fail(ErrorCode::failed, "{}", e.what());
     }
-    if (shown) fmt::print(stderr, "\r\033[K");
     job.onProgress = nullptr;
     sayNotes();
     if (!code) {
-        fmt::print(stderr, "stx: {}\n", printable(code.error().text()));
+        complain("stx: " + textOf(code.error()));
+        if (!reportWritten_) reportError(code.error());
         return static_cast<int>(code.error().code);
     }
+    progress.erase();
     if (outputFailed_) {
-        if (!outputUnwanted_) fmt::print(stderr, "stx: cannot write to stdout\n");
+        if (!outputUnwanted_) complain("stx: cannot write to stdout");
         return static_cast<int>(ErrorCode::io);
     }
     return *code;
@@ -138,6 +195,75 @@ Result<std::vector<double>> parseNumbers(std::string_view text, std::size_t coun
 Result<glm::dvec3> parseVec3(std::string_view text, std::string_view option) {
     STX_TRY(const auto v, parseNumbers(text, 3, option));
     return glm::dvec3(v[0], v[1], v[2]);
+}
+
+namespace {
+
+struct NamedColour {
+    std::string_view name;
+    unsigned rgb;
+};
+/// The basic colours of CSS, and its orange; grey in both spellings.
+constexpr NamedColour kColours[] = {
+    {"black", 0x000000},   {"silver", 0xc0c0c0},  {"gray", 0x808080},  {"grey", 0x808080},
+    {"white", 0xffffff},   {"maroon", 0x800000},  {"red", 0xff0000},   {"purple", 0x800080},
+    {"fuchsia", 0xff00ff}, {"magenta", 0xff00ff}, {"green", 0x008000}, {"lime", 0x00ff00},
+    {"olive", 0x808000},   {"yellow", 0xffff00},  {"navy", 0x000080},  {"blue", 0x0000ff},
+    {"teal", 0x008080},    {"aqua", 0x00ffff},    {"cyan", 0x00ffff},  {"orange", 0xffa500}};
+
+glm::vec3 colourOf(unsigned rgb) {
+    return glm::vec3(rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255) / 255.0f;
+}
+
+}  // namespace
+
+Result<glm::dvec3> parseDirection(std::string_view text, std::string_view option) {
+    std::string_view name = text;
+    const bool minus = name.starts_with('-');
+    if (minus || name.starts_with('+')) name.remove_prefix(1);
+    if (name.size() == 1) {
+        const auto axis = std::string_view("xyzXYZ").find(name[0]);
+        if (axis != std::string_view::npos) {
+            glm::dvec3 v(0);
+            v[static_cast<int>(axis % 3)] = minus ? -1 : 1;
+            return v;
+        }
+    }
+    const auto v = parseVec3(text, option);
+    if (!v)
+        return fail(ErrorCode::usage, "{} is '{}'; an axis (Z, -Y) or X,Y,Z is expected", option,
+                    text);
+    if (!(glm::length(*v) > 0))
+        return fail(ErrorCode::usage, "{} is {}; it must point somewhere", option, text);
+    return *v;
+}
+
+Result<glm::vec3> parseColour(std::string_view text, std::string_view option) {
+    for (const auto& known : kColours)
+        if (known.name == text) return colourOf(known.rgb);
+    if (text.starts_with('#') && (text.size() == 4 || text.size() == 7)) {
+        unsigned rgb = 0;
+        const auto parsed = std::from_chars(text.data() + 1, text.data() + text.size(), rgb, 16);
+        if (parsed.ec == std::errc() && parsed.ptr == text.data() + text.size()) {
+            if (text.size() == 4)
+                rgb = (rgb >> 8 & 15) * 0x110000 + (rgb >> 4 & 15) * 0x1100 + (rgb & 15) * 0x11;
+            return colourOf(rgb);
+        }
+    }
+    const auto v = parseNumbers(text, 3, option);
+    if (!v)
+        return fail(ErrorCode::usage,
+                    "{} is '{}'; R,G,B with values of 0 to 1, #rrggbb or a name such as white is "
+                    "expected",
+                    option, text);
+    const glm::dvec3 colour((*v)[0], (*v)[1], (*v)[2]);
+    if (glm::any(glm::lessThan(colour, glm::dvec3(0))) ||
+        glm::any(glm::greaterThan(colour, glm::dvec3(1))))
+        return fail(ErrorCode::usage,
+                    "{} is '{}'; each value is 0 to 1 (for values of 0 to 255 write #rrggbb in "
+                    "hexadecimal, as in #ff8000)",
+                    option, text);
+    return glm::vec3(colour);
 }
 
 Result<glm::ivec2> parseSize(std::string_view text, const Limits& limits) {
@@ -171,11 +297,40 @@ std::optional<std::string> frameName(const std::string& pattern, int frame) {
            pattern.substr(at + 1);
 }
 
+std::string textOf(const Error& error) {
+    std::string where = error.where;
+    // `'a': 'a': line 3`, at its beginning, where callers add.
+    for (std::size_t end; (end = where.find("': ")) != std::string::npos;) {
+        const auto first = where.substr(0, end + 3);
+        if (!first.starts_with('\'') || where.compare(first.size(), first.size(), first) != 0)
+            break;
+        where.erase(0, first.size());
+    }
+    // `'a'` or `'a': 'a'` before a message that names it.
+    const auto quoted = where.substr(
+        0, where.find("': ") == std::string::npos ? where.size() : where.find("': ") + 1);
+    if (quoted.size() > 2 && quoted.starts_with('\'') && quoted.ends_with('\'') &&
+        error.message.find(quoted) != std::string::npos) {
+        where.erase(0, quoted.size());
+        if (where.starts_with(": ")) where.erase(0, 2);
+    }
+    return where.empty() ? error.message : where + ": " + error.message;
+}
+
 std::string humanBytes(std::uint64_t bytes) {
     if (bytes < 1000) return fmt::format("{} B", bytes);
     if (bytes < 1000000) return fmt::format("{:.3g} kB", bytes / 1e3);
     if (bytes < 1000000000) return fmt::format("{:.3g} MB", bytes / 1e6);
     return fmt::format("{:.3g} GB", bytes / 1e9);
+}
+
+std::string humanSeconds(double seconds) {
+    if (seconds < 0.9995) return fmt::format("{:.2f} s", seconds);
+    if (seconds < 9.95) return fmt::format("{:.1f} s", seconds);
+    const auto whole = std::llround(seconds);
+    if (whole < 120) return fmt::format("{} s", whole);
+    if (whole < 7200) return fmt::format("{} min {} s", whole / 60, whole % 60);
+    return fmt::format("{} h {} min", whole / 3600, whole % 3600 / 60);
 }
 
 std::string nearestWord(std::string_view word, const std::vector<std::string>& words) {
@@ -211,6 +366,29 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
         if (it->is_regular_file(ec)) sum += it->file_size(ec);
     }
     return sum;
+}
+
+Result<std::string> folderTarget(const std::string& target, const std::vector<std::string>& files,
+                                 std::string_view expected) {
+    // What people give to other programs; a folder's name may have any other dot in it.
+    static const std::vector<std::string> kFiles = {
+        ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr",  ".hdr", ".svg", ".mp4",
+        ".bt",  ".xmt", ".json", ".txt", ".obj",  ".glb",  ".gltf", ".stl", ".ply", ".drc",
+        ".off", ".dae", ".fbx",  ".zip", ".tar",  ".gz",   ".yuv",  ".y4m", ".pfm", ".bin"};
+    std::string path = target;
+    while (path.size() > 1 && path.back() == '/') path.pop_back();
+    std::error_code ec;
+    if (path != target || std::filesystem::is_directory(path, ec)) return path;
+    const auto ending = std::filesystem::path(path).extension().string();
+    const auto among = [&](const std::vector<std::string>& list) {
+        return std::find(list.begin(), list.end(), ending) != list.end();
+    };
+    if (among(kFiles) && !among(files))
+        return fail(ErrorCode::usage,
+                    "-o '{}' ends in '{}', like a file; {} is expected (a slash at its end makes "
+                    "any name a folder's)",
+                    target, ending, expected);
+    return path;
 }
 
 Result<void> checkTarget(const std::filesystem::path& target, const Program& program) {

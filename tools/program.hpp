@@ -11,7 +11,9 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "formats/files/files.hpp"
+#include "lib/base/counted.hpp"
 #include "lib/base/job.hpp"
+#include "tools/progress_line.hpp"
 
 namespace stx::tools {
 
@@ -32,8 +34,11 @@ class Program {
   public:
     CommonOptions common;
     Job job;
+    /// The name of the command that runs.
+    std::string command;
     /// What notes are about, when there are many inputs; empty = they need no name.
     std::string subject;
+    ProgressLine progress;
 
     /// Lines of text for stdout, through printableLines(); names in them need printable() before.
     /// Errors of writing (a closed pipe, a full disk) become the exit code.
@@ -41,19 +46,27 @@ class Program {
     /// The same for JSON: valid UTF-8, whatever the bytes of names in it are.
     void printJson(const nlohmann::ordered_json& json);
     /// One line for a person on stderr, unless --quiet; through printable().
-    void say(std::string_view line) const;
-    /// The notes of the job as lines on stderr, unless --quiet.
+    void say(std::string_view line);
+    /// The same, also under --quiet: for errors.
+    void complain(std::string_view line);
+    /// The notes of the job as lines on stderr, unless --quiet. Of many that differ in names and
+    /// numbers only the first is said, with their count; -v says all.
     void sayNotes();
     /// Writes the --report file, when one was asked for.
-    [[nodiscard]] Result<void> writeReport(const nlohmann::ordered_json& report) const;
+    [[nodiscard]] Result<void> writeReport(const nlohmann::ordered_json& report);
+    /// The same for a text: a line of JSON for each input.
+    [[nodiscard]] Result<void> writeReportText(std::string_view text);
     [[nodiscard]] OutputFile::Options outputOptions() const { return {common.noClobber}; }
 
     /// Runs a command's body with limits, threads and progress set up; prints its error and returns
-    /// the exit code.
+    /// the exit code. A body that fails before it has written its report gets one that says so
+    /// (error-report.schema.json).
     [[nodiscard]] int run(const std::function<Result<int>()>& body);
 
   private:
     void write(std::string_view text);
+    void reportError(const Error& error);
+    bool reportWritten_ = false;
     bool outputFailed_ = false;
     bool outputUnwanted_ = false;  ///< its reader has closed the pipe, as head does: not an error
 };
@@ -67,15 +80,32 @@ class Program {
                                                        std::string_view option);
 [[nodiscard]] Result<glm::dvec3> parseVec3(std::string_view text, std::string_view option);
 
+/// A colour, sRGB-coded 0..1: "R,G,B" in 0..1, "#rrggbb", "#rgb", or one of CSS's basic names.
+[[nodiscard]] Result<glm::vec3> parseColour(std::string_view text, std::string_view option);
+
+/// A direction: "X,Y,Z", or an axis: "Z", "-Y". Errors (usage) also when it has no length.
+[[nodiscard]] Result<glm::dvec3> parseDirection(std::string_view text, std::string_view option);
+
 /// The file of one frame of a sequence named `name_%04d.png`; nothing when the name has no number.
 [[nodiscard]] std::optional<std::string> frameName(const std::string& pattern, int frame);
 
+/// Error::text() with each file named once: what knows a file's name says it, and so does its
+/// caller.
+[[nodiscard]] std::string textOf(const Error& error);
 /// "1.2 MB", for messages.
 [[nodiscard]] std::string humanBytes(std::uint64_t bytes);
+/// "0.25 s", "12 s", "3 min 20 s", "2 h 5 min".
+[[nodiscard]] std::string humanSeconds(double seconds);
 /// The nearest of `words` to `word`, or empty when none is near.
 [[nodiscard]] std::string nearestWord(std::string_view word, const std::vector<std::string>& words);
 /// Size of a file, or of all files in a folder.
 [[nodiscard]] std::uint64_t bytesOf(const std::filesystem::path& path);
+/// A target that may be a folder, without slashes at its end. Error (usage) when it ends like a
+/// file, neither exists as a folder nor has a slash, and is none of `files` (".ply"); `expected` is
+/// for the message.
+[[nodiscard]] Result<std::string> folderTarget(const std::string& target,
+                                               const std::vector<std::string>& files,
+                                               std::string_view expected);
 /// Errors early when the target's folder is missing or not writable, or, under --no-clobber, when
 /// the target exists: before an hour of work, not after it.
 [[nodiscard]] Result<void> checkTarget(const std::filesystem::path& target, const Program& program);

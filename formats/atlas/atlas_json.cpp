@@ -9,6 +9,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// 2: quaternions are x y z w, as in all JSON here; 1 had w x y z.
+constexpr int kVersion = 2;
+
 Json arrayOf(glm::dvec2 v) {
     return Json::array({v.x, v.y});
 }
@@ -28,7 +31,7 @@ Json jsonOf(const ReferenceView& v) {
     j["position"] = arrayOf(c.position);
     j["orientation"] = arrayOf(axisAngleFromQuat(c.orientation));
     j["quaternion"] =
-        Json::array({c.orientation.w, c.orientation.x, c.orientation.y, c.orientation.z});
+        Json::array({c.orientation.x, c.orientation.y, c.orientation.z, c.orientation.w});
     j["fieldOfView"] = arrayOf(c.fieldOfView());
     j["orthographic"] = c.orthographic;
     j["fx"] = c.fx;
@@ -163,7 +166,8 @@ class Reader {
 
 constexpr double kAnyInt = 2147483647.0;
 
-Result<void> readView(const Reader& r, const Limits& limits, bool prunedByCount, ReferenceView& v) {
+Result<void> readView(const Reader& r, const Limits& limits, int version, bool prunedByCount,
+                      ReferenceView& v) {
     Camera& c = v.camera;
     std::array<double, 3> position{};
     std::array<double, 4> q{};
@@ -189,7 +193,9 @@ Result<void> readView(const Reader& r, const Limits& limits, bool prunedByCount,
     v.pruned = prunedByCount;
     STX_CHECK(r.flag("pruned", v.pruned, false));
     c.position = {position[0], position[1], position[2]};
-    c.orientation = glm::dquat(q[0], q[1], q[2], q[3]);
+    // The constructor takes w x y z.
+    c.orientation =
+        version == 1 ? glm::dquat(q[0], q[1], q[2], q[3]) : glm::dquat(q[3], q[0], q[1], q[2]);
     return {};
 }
 
@@ -295,7 +301,7 @@ std::string atlasJson(const AtlasHeader& header) {
     const Atlas& atlas = header.atlas;
     Json top;
     top["$schema"] = kAtlasSchema;
-    top["version"] = 1;
+    top["version"] = kVersion;
     top["title"] = atlas.title;
     top["layout"] = atlas.layout;
     top["padding"] = atlas.padding;
@@ -331,9 +337,10 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     Atlas& atlas = header.atlas;
     int version = 0;
     STX_CHECK(top.number("version", version, 1, kAnyInt));
-    if (version > 1)
+    if (version > kVersion)
         return failAt(where, ErrorCode::unsupported,
-                      "it was written by a newer stx (version {}; this one knows 1)", version);
+                      "it was written by a newer stx (version {}; this one knows 1 to {})", version,
+                      kVersion);
     STX_CHECK(top.text("title", atlas.title, false));
     STX_CHECK(top.text("layout", atlas.layout));
     if (atlas.layout != "grid" && atlas.layout != "tight")
@@ -363,7 +370,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     }));
     STX_CHECK(checkTextures(top, header));
     STX_CHECK(top.list("views", static_cast<std::size_t>(limits.maxViews), [&](const Reader& r) {
-        return readView(r, limits, atlas.keptPixels < atlas.sourcePixels,
+        return readView(r, limits, version, atlas.keptPixels < atlas.sourcePixels,
                         atlas.views.emplace_back());
     }));
     const auto most = static_cast<std::size_t>(header.pageWidth) * header.pageHeight * header.pages;

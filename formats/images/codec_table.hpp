@@ -8,7 +8,7 @@
 /// build.
 namespace stx::codecs {
 
-inline constexpr std::uint32_t kTableVersion = 2;
+inline constexpr std::uint32_t kTableVersion = 3;
 /// The one symbol of the module: `const Table* stxCodecs();`
 inline constexpr const char* kTableSymbol = "stxCodecs";
 
@@ -40,10 +40,21 @@ struct DecodeRequest {
     void* (*allocate)(void* context, const Header& header, Failure& failure) = nullptr;
 };
 
+/// A picture of 8 bits a channel to be written, sRGB, straight alpha, nothing lost.
+struct EncodeRequest {
+    const char* path = nullptr;    ///< of a file, whose name need not show the format
+    const char* format = nullptr;  ///< "tiff" or "webp"
+    int width = 0, height = 0;
+    int channels = 0;  ///< 3 or 4
+    const std::uint8_t* values = nullptr;
+    const char* date = nullptr;  ///< TIFF's DateTime: "1970:01:02 03:04:05"
+};
+
 struct Table {
     std::uint32_t version = kTableVersion;
     /// True, or false with a failure.
     bool (*decode)(const DecodeRequest& request, Failure& failure) = nullptr;
+    bool (*encode)(const EncodeRequest& request, Failure& failure) = nullptr;
 };
 
 }  // namespace stx::codecs

@@ -7,6 +7,8 @@
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
 #include "formats/exr/exr_file.hpp"
+#include "formats/files/source_date.hpp"
+#include "formats/images/codec_module.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/texture.hpp"
@@ -34,6 +36,46 @@ Image<glm::vec4> linearImage(const Image<glm::vec4>& image, bool linear,
         }
     });
     return out;
+}
+
+std::vector<std::uint8_t> withoutAlpha(const Rgba8Image& rgba) {
+    std::vector<std::uint8_t> rgb;
+    rgb.reserve(rgba.count() * 3);
+    for (const auto& p : rgba.pixels()) rgb.insert(rgb.end(), {p.r, p.g, p.b});
+    return rgb;
+}
+
+/// By the module of image codecs, into the file's temporary name.
+Result<void> writeByModule(const Frame& frame, FrameFormat format, const OutputFile& file,
+                           const FrameOptions& options) {
+    STX_TRY(const auto* codecs, loadCodecs());
+    const auto rgba = rgba8From(frame, options.background);
+    std::vector<std::uint8_t> rgb;
+    codecs::EncodeRequest request;
+    const std::string path = file.temporaryPath().string();
+    request.path = path.c_str();
+    request.format = format == FrameFormat::tiff ? "tiff" : "webp";
+    request.width = rgba.width();
+    request.height = rgba.height();
+    request.channels = 4;
+    request.values = &rgba.data()->x;
+    // TIFF is never written without a time.
+    const std::string date = exrDate(sourceDate().value_or(0));
+    request.date = date.c_str();
+    if (options.background) {
+        rgb = withoutAlpha(rgba);
+        request.channels = 3;
+        request.values = rgb.data();
+    }
+    constexpr int kWebpSide = 16383;
+    if (format == FrameFormat::webp && std::max(rgba.width(), rgba.height()) > kWebpSide)
+        return fail(ErrorCode::usage,
+                    "a WebP picture of {}x{} is asked for; {} a side are possible", rgba.width(),
+                    rgba.height(), kWebpSide);
+    codecs::Failure failure;
+    if (!codecs->encode(request, failure))
+        return fail(static_cast<ErrorCode>(failure.code), "{}", failure.message);
+    return {};
 }
 
 Result<void> checkFrame(const Frame& frame) {
@@ -91,23 +133,25 @@ Result<FrameFormat> frameFormat(const std::filesystem::path& path) {
     if (ending == ".png") return FrameFormat::png;
     if (ending == ".jpg" || ending == ".jpeg") return FrameFormat::jpeg;
     if (ending == ".exr") return FrameFormat::exr;
+    if (ending == ".tif" || ending == ".tiff") return FrameFormat::tiff;
+    if (ending == ".webp") return FrameFormat::webp;
     return fail(ErrorCode::usage,
-                "cannot write a picture as '{}'; its name must end in .png, .jpg or .exr",
+                "cannot write a picture as '{}'; its name must end in .png, .jpg, .exr, .tif or "
+                ".webp",
                 path.string());
 }
 
 Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format, const FrameOptions& options) {
     STX_CHECK(checkFrame(frame));
-    if (format == FrameFormat::exr)
-        return fail(ErrorCode::failed, "an OpenEXR picture is written to a file, not to memory");
+    if (format != FrameFormat::png && format != FrameFormat::jpeg)
+        return fail(ErrorCode::failed,
+                    "an OpenEXR, TIFF or WebP picture is written to a file, not to memory");
     auto background = options.background;
     if (format == FrameFormat::jpeg && !background) background = glm::vec3(0.0f);
     const auto rgba = rgba8From(frame, background);
     if (!background)
         return encodePng(rgba.width(), rgba.height(), 4, 8, rgba.data(), true, options.pngLevel);
-    std::vector<std::uint8_t> rgb;
-    rgb.reserve(rgba.count() * 3);
-    for (const auto& p : rgba.pixels()) rgb.insert(rgb.end(), {p.r, p.g, p.b});
+    const auto rgb = withoutAlpha(rgba);
     if (format == FrameFormat::jpeg)
         return encodeJpeg(rgba.width(), rgba.height(), 3, rgb.data(), options.jpegQuality);
     return encodePng(rgba.width(), rgba.height(), 3, 8, rgb.data(), true, options.pngLevel);
@@ -120,6 +164,9 @@ Result<void> writeFrame(const Frame& frame, const std::filesystem::path& path,
     STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
     if (format == FrameFormat::exr) {
         if (auto ok = writeExrFrame(frame, file, options); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    } else if (format == FrameFormat::tiff || format == FrameFormat::webp) {
+        if (auto ok = writeByModule(frame, format, file, options); !ok)
             return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
     } else {
         STX_TRY(const auto bytes, encodeFrame(frame, format, options));

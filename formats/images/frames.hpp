@@ -16,10 +16,12 @@ enum class FrameFormat {
     png,   ///< 8-bit sRGB, straight alpha, tagged
     jpeg,  ///< 8-bit sRGB without alpha; lossy
     exr,   ///< linear, premultiplied; depth, normals and albedo with it
+    tiff,  ///< as PNG
+    webp,  ///< as PNG, lossless; at most 16383 pixels a side
 };
 
-/// The format by a name's ending: .png, .jpg, .jpeg, .exr in any case; "-" is PNG. Error (usage)
-/// else.
+/// The format by a name's ending: .png, .jpg, .jpeg, .exr, .tif, .tiff, .webp in any case; "-" is
+/// PNG. Error (usage) else.
 [[nodiscard]] Result<FrameFormat> frameFormat(const std::filesystem::path& path);
 
 struct FrameOptions {
@@ -34,12 +36,13 @@ struct FrameOptions {
 };
 
 /// Writes one picture whole or not at all, by the name's ending. Linear frames are coded as sRGB
-/// for PNG and JPEG, sRGB-coded ones are made linear for EXR. EXR channels: R G B A (half,
+/// for all but EXR, sRGB-coded ones are made linear for EXR. EXR channels: R G B A (half,
 /// premultiplied), Z (float32, +inf where nothing was drawn), N.X N.Y N.Z (half) when there are
-/// normals, albedo.R G B A (half) when there is albedo. Safe to call from several threads.
+/// normals, albedo.R G B A (half) when there is albedo. TIFF and WebP need the module of image
+/// codecs: error (unsupported) without it. Safe to call from several threads.
 [[nodiscard]] Result<void> writeFrame(const Frame& frame, const std::filesystem::path& path,
                                       const FrameOptions& options = {});
-/// PNG or JPEG as bytes. Error (failed) for EXR, which is written to files only.
+/// PNG or JPEG as bytes. Error (failed) for the others, which are written to files only.
 [[nodiscard]] Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format,
                                         const FrameOptions& options = {});
 

@@ -2,18 +2,72 @@
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
+#include "lib/base/counted.hpp"
 
 namespace stx {
+namespace {
 
-Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job) {
+/// What can be drawn of the views of a file.
+Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>& views,
+                                           const std::string& where, Job& job,
+                                           std::optional<glm::ivec2> size) {
+    using namespace imagesets;
+    if (views.empty()) return failAt(where, ErrorCode::invalidInput, "there is no camera in it");
+    std::vector<NamedCamera> out;
+    bool sizeMissing = false;
+    int lenses = 0;
+    for (const SetView& view : views) {
+        if (!view.lens.ideal()) ++lenses;
+        if (view.panorama)
+            return failAt(where, ErrorCode::invalidInput,
+                          "camera '{}' is equirectangular; only perspective and orthographic "
+                          "cameras can be used here",
+                          view.name);
+        Camera camera = view.camera;
+        if (camera.width == 0) {
+            // Blender's files have an angle only, the size is that of the images.
+            const glm::ivec2 used = size.value_or(glm::ivec2(512));
+            camera.width = used.x;
+            camera.height = used.y;
+            camera.cx = used.x * 0.5;
+            camera.cy = used.y * 0.5;
+            camera.fx = camera.cx / std::tan(view.angleX * 0.5);
+            camera.fy = view.angleY > 0 ? camera.cy / std::tan(view.angleY * 0.5) : camera.fx;
+            sizeMissing = true;
+        }
+        if (auto ok = camera.check(); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("camera '{}'", view.name)).at(where));
+        out.push_back({view.name, camera});
+    }
+    if (sizeMissing && !size)
+        job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));
+    if (lenses > 0)
+        job.note(fmt::format("{}: pictures are drawn without the lens distortion of {}", where,
+                             counted(lenses, "camera")));
+    return out;
+}
+
+}  // namespace
+
+Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job,
+                                                std::optional<glm::ivec2> size) {
     using namespace imagesets;
     const std::string where = inQuotes(path.string());
+    std::error_code ec;
+    const auto ending = path.extension();
+    if (std::filesystem::is_directory(path, ec) || ending == ".bin" || ending == ".txt") {
+        STX_TRY(const auto views, colmapViews(path, job));
+        return camerasOf(views, where, job, size);
+    }
     STX_TRY(const Json file, readJson(path, job.limits));
     Result<std::vector<SetView>> views =
         fail(ErrorCode::invalidInput,
-             "there is neither a list 'frames' (transforms.json) nor a list "
-             "'cameras' (MIV, cameras.json) in it");
+             "there is no list 'frames' (transforms.json), 'cameras' (MIV, cameras.json) or "
+             "'camera_path' (nerfstudio) in it");
     switch (jsonKindOf(file)) {
+        case JsonKind::cameraPath:
+            views = cameraPathViews(file, job);
+            break;
         case JsonKind::transforms:
             views = transformsViews(file, job);
             break;
@@ -27,28 +81,7 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
             break;
     }
     if (!views) return tl::unexpected(views.error().at(where));
-    if (views->empty()) return failAt(where, ErrorCode::invalidInput, "there is no camera in it");
-    std::vector<NamedCamera> out;
-    for (const SetView& view : *views) {
-        if (view.panorama)
-            return failAt(where, ErrorCode::invalidInput,
-                          "camera '{}' is equirectangular; only perspective and orthographic "
-                          "cameras can be used here",
-                          view.name);
-        Camera camera = view.camera;
-        if (camera.width == 0) {
-            // Blender's files have an angle only, the size is that of the images.
-            camera.width = camera.height = 512;
-            camera.fx = 256 / std::tan(view.angleX * 0.5);
-            camera.fy = view.angleY > 0 ? 256 / std::tan(view.angleY * 0.5) : camera.fx;
-            camera.cx = camera.cy = 256;
-            job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));
-        }
-        if (auto ok = camera.check(); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("camera '{}'", view.name)).at(where));
-        out.push_back({view.name, camera});
-    }
-    return out;
+    return camerasOf(*views, where, job, size);
 }
 
 }  // namespace stx

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,13 @@ struct NamedCamera {
 };
 
 /// The cameras of a file, in its order, without any image: transforms.json (NeRF, nerfstudio,
-/// Blender), MIV/RVS JSON, or our own cameras.json; distinguished by their keys. Each camera has
-/// its own intrinsics and size. Errors: io, invalidInput with file and key.
+/// Blender), camera_path.json (nerfstudio), MIV/RVS JSON, or our own cameras.json; distinguished by
+/// their keys; or a COLMAP model (its folder or one of its files, cameras in the order of names).
+/// Lenses are left out, with a note. Each camera has
+/// its own intrinsics and size; `size` is for those whose file does not tell it (without it
+/// 512x512, with a note). Errors: io, invalidInput with file and key.
 [[nodiscard]] Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path,
-                                                              Job& job);
+                                                              Job& job,
+                                                              std::optional<glm::ivec2> size = {});
 
 }  // namespace stx

@@ -1,5 +1,6 @@
 #include "formats/imagesets/colmap.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <optional>
@@ -22,18 +23,19 @@ constexpr Model kModels[] = {{"SIMPLE_PINHOLE", 3},
                              {"SIMPLE_RADIAL", 4},
                              {"RADIAL", 5},
                              {"OPENCV", 8},
-                             {"OPENCV_FISHEYE", 0},
+                             {"OPENCV_FISHEYE", 8},
                              {"FULL_OPENCV", 0},
                              {"FOV", 0},
-                             {"SIMPLE_RADIAL_FISHEYE", 0},
-                             {"RADIAL_FISHEYE", 0},
+                             {"SIMPLE_RADIAL_FISHEYE", 4},
+                             {"RADIAL_FISHEYE", 5},
                              {"THIN_PRISM_FISHEYE", 0}};
 
 tl::unexpected<Error> unknownModel(const std::string& model, const std::string& where) {
     return failAt(
         where, ErrorCode::invalidInput,
-        "the camera model is {}; SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL and OPENCV "
-        "are known (COLMAP's image_undistorter makes PINHOLE of the others)",
+        "the camera model is {}; SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and "
+        "those three with _FISHEYE are known (COLMAP's image_undistorter makes PINHOLE of the "
+        "others)",
         model);
 }
 
@@ -42,17 +44,22 @@ Result<ColmapCamera> cameraOf(const std::string& model, double width, double hei
     ColmapCamera c;
     STX_TRY(c.width, imageSide(width, "WIDTH", 65535, where));
     STX_TRY(c.height, imageSide(height, "HEIGHT", 65535, where));
-    const bool oneFocal = model.starts_with("SIMPLE") || model == "RADIAL";
+    const bool oneFocal = model.starts_with("SIMPLE") || model.starts_with("RADIAL");
     std::size_t at = 0;
     c.fx = p[at++];
     c.fy = oneFocal ? c.fx : p[at++];
     c.cx = p[at++];
     c.cy = p[at++];
-    if (model == "SIMPLE_RADIAL" || model == "RADIAL" || model == "OPENCV") c.lens.k1 = p[at++];
-    if (model == "RADIAL" || model == "OPENCV") c.lens.k2 = p[at++];
+    c.lens.fisheye = model.ends_with("_FISHEYE");
+    if (!model.ends_with("PINHOLE")) c.lens.k1 = p[at++];
+    if (model.starts_with("RADIAL") || model.starts_with("OPENCV")) c.lens.k2 = p[at++];
     if (model == "OPENCV") {
         c.lens.p1 = p[at++];
         c.lens.p2 = p[at++];
+    }
+    if (model == "OPENCV_FISHEYE") {
+        c.lens.k3 = p[at++];
+        c.lens.k4 = p[at++];
     }
     for (const double v : p)
         if (!std::isfinite(v))
@@ -228,88 +235,134 @@ Result<std::vector<ColmapImage>> parseColmapImages(ByteSpan bytes, bool binary,
     return binary ? imagesFromBinary(bytes, limits) : imagesFromText(textOf(bytes), limits);
 }
 
-Result<SetDescription> describeColmap(const path& given, const ImageSetOptions&, Job& job) {
-    const std::string where = inQuotes(given.string());
-    path base = given, model;
+namespace {
+
+/// A model as its files have it, and where its images are.
+struct Model3d {
+    path base;   ///< has images/ and stereo/
+    path model;  ///< has the files
     bool binary = false;
-    const auto hasModel = [&](const path& folder) {
+    bool ours = false;  ///< written by stx: depth maps have no mixed pixels
+    ColmapCameras cameras;
+    std::vector<ColmapImage> images;
+
+    [[nodiscard]] path file(const char* stem) const {
+        return model / fmt::format("{}{}", stem, binary ? ".bin" : ".txt");
+    }
+};
+
+Result<Model3d> readModel(const path& given, const Limits& limits) {
+    Model3d m;
+    m.base = given;
+    std::error_code ec;
+    // One of its files stands for the model.
+    if (std::filesystem::is_regular_file(given, ec))
+        m.base = given.has_parent_path() ? given.parent_path() : path(".");
+    const path folder = m.base;
+    const auto hasModel = [&](const path& in) {
         for (const bool b : {true, false}) {
             const char* ending = b ? ".bin" : ".txt";
-            std::error_code ec;
-            if (std::filesystem::is_regular_file(folder / fmt::format("cameras{}", ending), ec) &&
-                std::filesystem::is_regular_file(folder / fmt::format("images{}", ending), ec)) {
-                model = folder;
-                binary = b;
+            if (std::filesystem::is_regular_file(in / fmt::format("cameras{}", ending), ec) &&
+                std::filesystem::is_regular_file(in / fmt::format("images{}", ending), ec)) {
+                m.model = in;
+                m.binary = b;
                 return true;
             }
         }
         return false;
     };
-    if (!hasModel(given / "sparse") && !hasModel(given / "sparse/0") && hasModel(given)) {
+    if (!hasModel(folder / "sparse") && !hasModel(folder / "sparse/0") && hasModel(folder)) {
         // The model's own folder is given: the images are beside it.
-        std::error_code ec;
         for (const char* up : {"..", "../.."})
-            if (!std::filesystem::is_directory(base / "images", ec)) base = given / up;
-        base = base.lexically_normal();
+            if (!std::filesystem::is_directory(m.base / "images", ec)) m.base = folder / up;
+        m.base = m.base.lexically_normal();
     }
-    if (model.empty())
-        return failAt(where, ErrorCode::invalidInput,
+    if (m.model.empty())
+        return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
                       "there is no COLMAP model: sparse/cameras.bin and images.bin, or .txt, are "
                       "looked for");
-    const auto nameOf = [&](const char* stem) {
-        return model / fmt::format("{}{}", stem, binary ? ".bin" : ".txt");
-    };
-    STX_TRY(const auto cameraBytes, readFile(nameOf("cameras"), job.limits));
-    STX_TRY(const auto cameras, within(inQuotes(nameOf("cameras").string()),
-                                       parseColmapCameras(cameraBytes, binary, job.limits)));
-    STX_TRY(const auto imageBytes, readFile(nameOf("images"), job.limits));
-    STX_TRY(const auto images, within(inQuotes(nameOf("images").string()),
-                                      parseColmapImages(imageBytes, binary, job.limits)));
+    STX_TRY(const auto cameraBytes, readFile(m.file("cameras"), limits));
+    STX_TRY(m.cameras, within(inQuotes(m.file("cameras").string()),
+                              parseColmapCameras(cameraBytes, m.binary, limits)));
+    m.ours = textOf(cameraBytes).starts_with(kWrittenByUs);
+    STX_TRY(const auto imageBytes, readFile(m.file("images"), limits));
+    STX_TRY(m.images, within(inQuotes(m.file("images").string()),
+                             parseColmapImages(imageBytes, m.binary, limits)));
+    return m;
+}
+
+/// The camera of an image, in our axes.
+Result<SetView> viewOf(const Model3d& m, const ColmapImage& image, const std::string& place) {
+    const auto found = m.cameras.find(image.camera);
+    if (found == m.cameras.end())
+        return failAt(place, ErrorCode::invalidInput, "there is no camera {} in the model",
+                      image.camera);
+    const ColmapCamera& c = found->second;
+    SetView view;
+    view.name = path(image.name).replace_extension().generic_string();
+    STX_TRY(const glm::dmat3 rotation, rotationFromQuaternion(image.rotation, place));
+    VisionCamera v;
+    v.worldFromCamera = glm::transpose(rotation);
+    v.centre = -(v.worldFromCamera * image.translation);
+    v.fx = c.fx;
+    v.fy = c.fy;
+    v.cx = c.cx;
+    v.cy = c.cy;
+    v.width = c.width;
+    v.height = c.height;
+    view.camera = cameraFromVision(v);
+    view.lens = c.lens;
+    return view;
+}
+
+std::string placeOf(const Model3d& m, const ColmapImage& image) {
+    return fmt::format("{}: image '{}'", inQuotes(m.file("images").string()), image.name);
+}
+
+}  // namespace
+
+Result<std::vector<SetView>> colmapViews(const path& given, Job& job) {
+    STX_TRY(const Model3d m, readModel(given, job.limits));
+    std::vector<SetView> views;
+    for (const ColmapImage& image : m.images) {
+        STX_TRY(auto view, viewOf(m, image, placeOf(m, image)));
+        views.push_back(std::move(view));
+    }
+    // The file's order is that of the numbers that COLMAP gave; people expect that of the names.
+    std::stable_sort(views.begin(), views.end(),
+                     [](const SetView& a, const SetView& b) { return a.name < b.name; });
+    return views;
+}
+
+Result<SetDescription> describeColmap(const path& given, const ImageSetOptions&, Job& job) {
+    const std::string where = inQuotes(given.string());
+    STX_TRY(const Model3d m, readModel(given, job.limits));
     SetDescription set;
     int without = 0;
-    for (const ColmapImage& image : images) {
-        const std::string place =
-            fmt::format("{}: image '{}'", inQuotes(nameOf("images").string()), image.name);
-        const auto found = cameras.find(image.camera);
-        if (found == cameras.end())
-            return failAt(place, ErrorCode::invalidInput, "there is no camera {} in the model",
-                          image.camera);
-        const ColmapCamera& c = found->second;
+    for (const ColmapImage& image : m.images) {
+        const std::string place = placeOf(m, image);
+        STX_TRY(auto view, viewOf(m, image, place));
         const std::string depth =
-            firstThere(base, {fmt::format("stereo/depth_maps/{}.geometric.bin", image.name),
-                              fmt::format("stereo/depth_maps/{}.photometric.bin", image.name)});
+            firstThere(m.base, {fmt::format("stereo/depth_maps/{}.geometric.bin", image.name),
+                                fmt::format("stereo/depth_maps/{}.photometric.bin", image.name)});
         if (depth.empty()) {
             ++without;
             continue;
         }
-        SetView view;
-        view.name = path(image.name).replace_extension().generic_string();
-        STX_TRY(const glm::dmat3 rotation, rotationFromQuaternion(image.rotation, place));
-        VisionCamera v;
-        v.worldFromCamera = glm::transpose(rotation);
-        v.centre = -(v.worldFromCamera * image.translation);
-        v.fx = c.fx;
-        v.fy = c.fy;
-        v.cx = c.cx;
-        v.cy = c.cy;
-        v.width = c.width;
-        v.height = c.height;
-        view.camera = cameraFromVision(v);
-        view.lens = c.lens;
-        STX_TRY(view.texture, sourceInside(base, "images/" + image.name, place, job.limits));
-        STX_TRY(view.depth, sourceInside(base, depth, place, job.limits));
+        STX_TRY(view.texture, sourceInside(m.base, "images/" + image.name, place, job.limits));
+        STX_TRY(view.depth, sourceInside(m.base, depth, place, job.limits));
         view.depth.colmap = true;
-        view.sensor = true;
+        view.sensor = !m.ours;
         set.views.push_back(std::move(view));
     }
     if (without > 0 && !set.views.empty())
         job.note(fmt::format("{} of {} images have no depth map and are left out", without,
-                             images.size()));
+                             m.images.size()));
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput,
                       "none of the {} images has a depth map; stereo/depth_maps/NAME.geometric.bin "
                       "is looked for (made by COLMAP's patch_match_stereo)",
-                      images.size());
+                      m.images.size());
     return set;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/files/files.hpp"
@@ -24,10 +25,13 @@ struct ColmapImage {
     glm::dvec3 translation{0.0};
 };
 
+/// How the cameras.txt of our own exports begins.
+inline constexpr std::string_view kWrittenByUs = "# written by stx";
+
 using ColmapCameras = std::map<std::uint32_t, ColmapCamera>;
 
 /// Errors name the line, or the camera or image and the byte. Lens models that cannot be undone
-/// (OPENCV_FISHEYE, FOV...) are errors.
+/// (FULL_OPENCV, FOV...) are errors.
 [[nodiscard]] Result<ColmapCameras> parseColmapCameras(ByteSpan bytes, bool binary,
                                                        const Limits& limits);
 [[nodiscard]] Result<std::vector<ColmapImage>> parseColmapImages(ByteSpan bytes, bool binary,

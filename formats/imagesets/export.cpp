@@ -9,6 +9,7 @@
 
 #include "formats/exr/exr_file.hpp"
 #include "formats/images/images.hpp"
+#include "formats/imagesets/export_colmap.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "lib/base/parallel.hpp"
 
@@ -211,6 +212,9 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     for (const ReferenceView& view : bundle.views)
         if (view.hasNormals() || view.hasSplats())
             job.note("normals and splats have no place in an image set and are left out");
+
+    if (options.kind == ExportOptions::Kind::colmap)
+        return imagesets::exportColmap(bundle, folder, names, options, job);
 
     Json json;
     double unit = 0.001;

@@ -12,6 +12,8 @@ struct ExportOptions {
     enum class Kind {
         transforms,  ///< transforms.json with images/ and depth/
         miv,         ///< NAME.json of MIV with NAME_color and NAME_depth16 files
+        colmap,      ///< COLMAP's dense workspace: images/, sparse/, stereo/depth_maps/ (floats);
+                     ///< perspective cameras only, planes are fitted again when it is read
     };
     Kind kind = Kind::transforms;
     /// Depth as OpenEXR floats, which come back exactly; else as 16-bit PNG: millimetres (or what

@@ -62,6 +62,9 @@ struct ImageSetOptions {
     bool refinePoses = false;
     Dequantise dequantise = Dequantise::automatic;
     AlignEdges alignEdges = AlignEdges::automatic;
+    /// Depth that is smaller than its picture is raised to the picture's size along the picture's
+    /// edges; else the picture is reduced to the depth's.
+    bool raiseDepth = true;
     YuvColour yuv;
     int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
 };

@@ -14,6 +14,7 @@ JsonKind jsonKindOf(const Json& file) {
         return it != file.end() && it->is_array() ? &*it : nullptr;
     };
     if (list("frames")) return JsonKind::transforms;
+    if (list("camera_path")) return JsonKind::cameraPath;
     const Json* cameras = list("cameras");
     if (!cameras) return JsonKind::none;
     for (const Json& camera : *cameras)

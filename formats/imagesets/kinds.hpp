@@ -30,7 +30,7 @@ using std::filesystem::path;
 [[nodiscard]] Result<SetDescription> describeSet(const path&, const ImageSetOptions&, Job&);
 
 /// What a JSON file with cameras is.
-enum class JsonKind { transforms, miv, cameras, none };
+enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 [[nodiscard]] JsonKind jsonKindOf(const Json& file);
 /// Reads and parses a JSON file; errors name it.
 [[nodiscard]] Result<Json> readJson(const path& file, const Limits& limits);
@@ -39,6 +39,10 @@ enum class JsonKind { transforms, miv, cameras, none };
 [[nodiscard]] Result<std::vector<SetView>> transformsViews(const Json& file, Job& job);
 [[nodiscard]] Result<std::vector<SetView>> mivViews(const Json& file, Job& job);
 [[nodiscard]] Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job);
+/// Cameras without images: camera_path.json, as nerfstudio's viewer writes it.
+[[nodiscard]] Result<std::vector<SetView>> cameraPathViews(const Json& file, Job& job);
+/// Those of a COLMAP model (its folder, the workspace, or one of its files), by their names.
+[[nodiscard]] Result<std::vector<SetView>> colmapViews(const path& given, Job& job);
 
 /// What our own export writes beside a camera (stx:name, stx:quaternion, stx:position, stx:window,
 /// nearPlane, farPlane, depthBits), so that a bundle comes back to the bit. Values that contradict

@@ -1,6 +1,7 @@
 #include "formats/imagesets/lens.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace stx::imagesets {
 
@@ -8,6 +9,12 @@ glm::dvec2 Lens::realFromIdeal(const Camera& c, glm::dvec2 pixel) const {
     const double x = (pixel.x - c.cx) / c.fx;
     const double y = (pixel.y - c.cy) / c.fy;
     const double r2 = x * x + y * y;
+    if (fisheye) {
+        const double r = std::sqrt(r2), t = std::atan(r), t2 = t * t;
+        const double scale =
+            r > 1e-12 ? t * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)))) / r : 1.0;
+        return {c.fx * x * scale + skew * y * scale + c.cx, c.fy * y * scale + c.cy};
+    }
     const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
     const double xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
     const double yd = y * radial + 2.0 * p2 * x * y + p1 * (r2 + 2.0 * y * y);

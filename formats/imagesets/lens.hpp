@@ -13,10 +13,14 @@ namespace stx::imagesets {
 struct Lens {
     double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0;
     double skew = 0;  ///< pixels
+    /// OPENCV_FISHEYE instead: t = atan r, x' = x / r * t (1 + k1 t2 + k2 t4 + k3 t6 + k4 t8);
+    /// p1 and p2 are not used.
+    bool fisheye = false;
+    double k4 = 0;
 
     [[nodiscard]] bool ideal() const { return !distorts() && skew == 0; }
     [[nodiscard]] bool distorts() const {
-        return k1 != 0 || k2 != 0 || k3 != 0 || p1 != 0 || p2 != 0;
+        return fisheye || k1 != 0 || k2 != 0 || k3 != 0 || p1 != 0 || p2 != 0;
     }
     /// Where the pixel position of the ideal pinhole is in the real picture.
     [[nodiscard]] glm::dvec2 realFromIdeal(const Camera& camera, glm::dvec2 pixel) const;

@@ -5,6 +5,7 @@
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/mixed_pixels.hpp"
 #include "formats/imagesets/pictures.hpp"
+#include "formats/imagesets/raise_depth.hpp"
 #include "formats/imagesets/resample.hpp"
 #include "formats/imagesets/set_view.hpp"
 #include "lib/capture/capture.hpp"
@@ -195,19 +196,28 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     const int tw = stored.texture.width(), th = stored.texture.height();
     const int dw = stored.depth.width(), dh = stored.depth.height();
     STX_TRY(Camera camera, cameraOfSize(set, tw, th));
+    const bool raise = options.raiseDepth && dw < tw && dh < th;
     if (tw != dw || th != dh) {
         if (!sameShape(tw, th, dw, dh))
             return fail(ErrorCode::invalidInput,
                         "'{}' is {}x{} but its depth '{}' is {}x{}; both must match, or have the "
                         "same shape",
                         set.texture.name, tw, th, set.depth.name, dw, dh);
-        job.note(fmt::format("images of {}x{} are resampled to the size of their depth, {}x{}", tw,
-                             th, dw, dh));
-        stored.texture = resizeTexture(stored.texture, dw, dh);
-        camera = camera.resized(dw, dh);
+        if (raise) {
+            job.note(fmt::format(
+                "depth of {}x{} is raised to the size of its picture, {}x{}, along the picture's "
+                "edges",
+                dw, dh, tw, th));
+        } else {
+            job.note(fmt::format("images of {}x{} are resampled to the size of their depth, {}x{}",
+                                 tw, th, dw, dh));
+            stored.texture = resizeTexture(stored.texture, dw, dh);
+            camera = camera.resized(dw, dh);
+        }
     }
-    STX_CHECK(within(fmt::format("'{}'", set.depth.name),
-                     toDistances(set, options, camera, stored, job)));
+    STX_CHECK(
+        within(fmt::format("'{}'", set.depth.name),
+               toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored, job)));
     if (countPoints(stored.depth) == 0)
         return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                       "not one of its {}x{} pixels has a valid depth; at least one is needed", dw,
@@ -228,12 +238,14 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                 "not");
     }
 
+    if (raise) stored.depth = raiseDepth(stored.depth, stored.texture);
     align(set, options, stored, job);
 
     std::vector<ReferenceView> views;
     if (set.panorama) {
         static constexpr const char* kFaces[6] = {"front", "left", "back", "right", "up", "down"};
-        const auto faces = cubeFaces(camera, *set.panorama, dw, dh);
+        const auto faces =
+            cubeFaces(camera, *set.panorama, stored.depth.width(), stored.depth.height());
         for (std::size_t i = 0; i < faces.size(); ++i) {
             auto [texture, depth] =
                 faceOfPanorama(stored.texture, stored.depth, faces[i], camera, *set.panorama);

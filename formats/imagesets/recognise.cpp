@@ -44,6 +44,7 @@ Result<std::string> kindOfJson(const path& file) {
             return std::string("miv");
         case JsonKind::cameras:
             return std::string("cameras");
+        case JsonKind::cameraPath:
         case JsonKind::none:
             break;
     }

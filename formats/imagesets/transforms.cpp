@@ -40,10 +40,11 @@ Result<void> setIntrinsics(const Json& file, const Json& frame, const std::strin
     if (panorama)
         view.panorama = Panorama();
     else if (!orthographic && model != "OPENCV" && model != "PINHOLE" &&
-             model != "SIMPLE_PINHOLE" && model != "SIMPLE_RADIAL" && model != "RADIAL")
+             model != "SIMPLE_PINHOLE" && model != "SIMPLE_RADIAL" && model != "RADIAL" &&
+             model != "OPENCV_FISHEYE")
         return failAt(where, ErrorCode::invalidInput,
-                      "the camera_model is '{}'; OPENCV, PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
-                      "RADIAL, ORTHOGRAPHIC and EQUIRECTANGULAR are known",
+                      "the camera_model is '{}'; OPENCV, OPENCV_FISHEYE, PINHOLE, SIMPLE_PINHOLE, "
+                      "SIMPLE_RADIAL, RADIAL, ORTHOGRAPHIC and EQUIRECTANGULAR are known",
                       model);
     Camera& c = view.camera;
     c.orthographic = orthographic;
@@ -73,7 +74,10 @@ Result<void> setIntrinsics(const Json& file, const Json& frame, const std::strin
         *to = value.value_or(0);
     }
     STX_TRY(const auto k4, get("k4"));
-    if (k4.value_or(0) != 0)
+    view.lens.fisheye = model == "OPENCV_FISHEYE";
+    if (view.lens.fisheye)
+        view.lens.k4 = k4.value_or(0);
+    else if (k4.value_or(0) != 0)
         return failAt(where, ErrorCode::invalidInput,
                       "'k4' is {:g}; only k1 k2 k3 p1 p2 can be undone", *k4);
     for (const auto& [angle, key] :

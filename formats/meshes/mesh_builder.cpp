@@ -287,7 +287,9 @@ Result<Mesh> MeshBuilder::finish() {
         roundPositions();
     }
     if (flatTriangles_ > 0)
-        job_.note(fmt::format("{} triangles have no area and are left out", flatTriangles_));
+        job_.note(flatTriangles_ == 1
+                      ? "1 triangle has no area and is left out"
+                      : fmt::format("{} triangles have no area and are left out", flatTriangles_));
     if (brokenPoints_ > 0 && brokenPoints_ < points_)
         job_.note(fmt::format("{} of {} points are at no finite place and are skipped",
                               brokenPoints_, points_));

@@ -51,17 +51,33 @@ Result<Camera> cameraAt(glm::dvec3 eye, glm::dvec3 target, const CameraSettings&
 
 Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius, int count,
                                          double elevationRad, const CameraSettings& s) {
+    OrbitSettings orbit;
+    orbit.count = count;
+    orbit.elevationRad = elevationRad;
+    return orbitCameras(centre, radius, orbit, s);
+}
+
+Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius,
+                                         const OrbitSettings& orbit, const CameraSettings& s) {
     STX_CHECK(check(s));
+    const int count = orbit.count;
+    if (!(orbit.distance >= 0 && std::isfinite(orbit.distance)))
+        return fail(ErrorCode::usage, "the orbit's radius is {:g}; it must be 0 or more",
+                    orbit.distance);
     if (count < 1 || count > kMostCameras)
         return fail(ErrorCode::usage, "an orbit of {} cameras is asked for; 1 to {} are possible",
                     count, kMostCameras);
-    const double distance = framingDistance(std::max(radius, 1e-9), s);
-    ViewLayout ring;
-    ring.kind = ViewLayout::Kind::ring;
-    ring.count = count;
-    ring.elevationRad = elevationRad;
+    const double distance =
+        orbit.distance > 0 ? orbit.distance : framingDistance(std::max(radius, 1e-9), s);
+    const glm::dquat toUp = rotationToUp(s.up);
+    const bool whole = std::abs(orbit.arcRad) >= 2 * std::numbers::pi - 1e-9;
+    const double steps = whole ? count : std::max(count - 1, 1);
+    const double e = orbit.elevationRad;
     std::vector<Camera> cameras;
-    for (const auto& direction : layoutDirections(ring)) {
+    for (int i = 0; i < count; ++i) {
+        const double a = orbit.startRad + orbit.arcRad * i / steps;
+        const glm::dvec3 direction =
+            toUp * glm::dvec3(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e));
         STX_TRY(const auto camera, cameraAt(centre + direction * distance, centre, s));
         cameras.push_back(camera);
     }

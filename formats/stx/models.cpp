@@ -41,6 +41,9 @@ Result<ViewFraming> framingOf(const ConvertSettings& s, bool cube, const Limits&
     framing.height = s.height;
     framing.orthographic = s.orthographic.value_or(cube);
     framing.fovRad = s.fovRad;
+    if (!(glm::length(s.up) > 0))
+        return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
+    framing.up = s.up;
     return framing;
 }
 

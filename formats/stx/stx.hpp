@@ -98,6 +98,7 @@ struct ConvertSettings {
     /// 8, 16 or 32 (float distances, only .exr holds them). Without a value meshes get 16 and
     /// bundles keep theirs.
     std::optional<int> depthBits{};
+    glm::dvec3 up{0, 1, 0};  ///< the mesh's up axis: what views stand on; need not be unit
 };
 
 /// Captures a mesh from all sides; takes the views out of an atlas; gives a bundle the depth bits
@@ -132,9 +133,23 @@ struct CameraSettings {
 [[nodiscard]] Result<Camera> cameraAt(glm::dvec3 eye, glm::dvec3 target,
                                       const CameraSettings& settings);
 
-/// `count` cameras (from 1) on a circle around +Y, from which a sphere just fills the narrower side
-/// of the frame: the first on +Z, counter-clockwise from above, `elevationRad` above the horizon.
-/// Errors (usage): settings out of range.
+/// Cameras on a circle around an object, whose axis is CameraSettings::up.
+struct OrbitSettings {
+    int count = 1;                        ///< from 1
+    double elevationRad = 0;              ///< above the horizon
+    double startRad = 0;                  ///< of the first, from the front (+Z when +Y is up)
+    double arcRad = glm::radians(360.0);  ///< counter-clockwise from above; less than a whole
+                                          ///< circle: the last camera is at its end
+    double distance = 0;  ///< from the centre, scene units; 0: the sphere just fills
+                          ///< the narrower side of the frame
+};
+
+/// The cameras of an orbit around a sphere. Errors (usage): settings out of range.
+[[nodiscard]] Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius,
+                                                       const OrbitSettings& orbit,
+                                                       const CameraSettings& settings);
+
+/// The same for `count` cameras on a whole circle, the first in front.
 [[nodiscard]] Result<std::vector<Camera>> orbitCameras(glm::dvec3 centre, double radius, int count,
                                                        double elevationRad,
                                                        const CameraSettings& settings);

@@ -1,5 +1,6 @@
 #include "lib/capture/capture.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -121,9 +122,16 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
         }
         bundle.views.push_back(std::move(*views[i]));
     }
-    if (bundle.views.empty())
+    const auto tooSmall = [](const Camera& c) { return std::max(c.width, c.height) < 16; };
+    if (bundle.views.empty() && std::all_of(cameras.begin(), cameras.end(), tooSmall))
         return fail(ErrorCode::invalidInput,
-                    "none of the {} cameras sees the model; check their poses and units", n);
+                    "no pixel of the views meets the model: {}x{} pixels are too few; take 16x16 "
+                    "or more",
+                    cameras[0].width, cameras[0].height);
+    if (bundle.views.empty())
+        return fail(
+            ErrorCode::invalidInput, "{} the model; check the poses and units",
+            n == 1 ? "the camera does not see" : fmt::format("none of the {} cameras sees", n));
     bundle.origin = mesh.origin;
     bundle.bounds = strays.bounds;
     return bundle;

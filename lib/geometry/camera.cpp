@@ -88,9 +88,10 @@ Result<glm::dquat> lookAt(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
     const glm::dvec3 toEye = eye - target;
     const double distance = glm::length(toEye);
     if (!(distance > 0) || !std::isfinite(distance))
-        return fail(ErrorCode::usage,
-                    "the camera's eye and target are the same point ({:g},{:g},{:g}); move one",
-                    eye.x, eye.y, eye.z);
+        return fail(
+            ErrorCode::usage,
+            "the camera's eye and target are the same point ({:.10g},{:.10g},{:.10g}); move one",
+            eye.x, eye.y, eye.z);
     const glm::dvec3 z = toEye / distance;
     glm::dvec3 x = glm::cross(up, z);
     if (!(glm::length(x) > 1e-9 * glm::length(up))) {

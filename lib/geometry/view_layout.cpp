@@ -31,13 +31,15 @@ Result<ViewLayout> parseViewLayout(std::string_view text) {
     const auto digits =
         colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
     const auto parsed = std::from_chars(digits.data(), digits.data() + digits.size(), layout.count);
-    if (digits.empty() || parsed.ec != std::errc() || parsed.ptr != digits.data() + digits.size())
+    const bool large = parsed.ec == std::errc::result_out_of_range;
+    if (digits.empty() || (parsed.ec != std::errc() && !large) ||
+        parsed.ptr != digits.data() + digits.size())
         return fail(ErrorCode::usage, "'{}' needs a number of views, as in {}:16", text, word);
     const int most = layout.kind == ViewLayout::Kind::octahedral ? 64 : 4096;
     const int least = layout.kind == ViewLayout::Kind::octahedral ? 2 : 1;
-    if (layout.count < least || layout.count > most)
-        return fail(ErrorCode::usage, "'{}' asks for {} views; {} to {} are possible", text,
-                    layout.count, least, most);
+    if (large || layout.count < least || layout.count > most)
+        return fail(ErrorCode::usage, "'{}' asks for {} views; {} to {} are possible", text, digits,
+                    least, most);
     return layout;
 }
 
@@ -51,6 +53,34 @@ glm::dvec3 octahedralDirection(int i, int j, int n) {
         z = fz;
     }
     return glm::normalize(glm::dvec3(x, y, z));
+}
+
+glm::dquat rotationToUp(glm::dvec3 up) {
+    const glm::dvec3 from(0, 1, 0), to = glm::normalize(up);
+    const double cosine = glm::dot(from, to);
+    if (cosine > 1 - 1e-15) return {1, 0, 0, 0};
+    if (cosine < -1 + 1e-9) return {0, 1, 0, 0};  // half a turn about X
+    const glm::dvec3 axis = glm::cross(from, to);
+    return glm::normalize(glm::dquat(1 + cosine, axis.x, axis.y, axis.z));
+}
+
+glm::dvec3 upOfCameras(const std::vector<Camera>& cameras) {
+    constexpr double kTilt = 0.2;     // sine of what a hand tilts a camera by
+    constexpr double kUpright = 0.3;  // of the mean: else they look down or are upside down
+    glm::dvec3 tilt(0), up(0);
+    for (const auto& c : cameras) {
+        const glm::dvec3 right = c.orientation * glm::dvec3(1, 0, 0);
+        tilt += right * right;
+        up += c.orientation * glm::dvec3(0, 1, 0);
+    }
+    const auto n = static_cast<double>(std::max<std::size_t>(cameras.size(), 1));
+    for (const int axis : {1, 2, 0}) {
+        if (std::sqrt(tilt[axis] / n) > kTilt || std::abs(up[axis] / n) < kUpright) continue;
+        glm::dvec3 found(0);
+        found[axis] = up[axis] < 0 ? -1 : 1;
+        return found;
+    }
+    return {0, 1, 0};
 }
 
 std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout) {
@@ -99,7 +129,7 @@ Result<Camera> frameCamera(glm::dvec3 direction, const ViewFraming& framing,
     const double radius = std::max(sphere.radius, 1e-6 * (1.0 + glm::length(sphere.centre)));
     const double distance = radius / std::sin(framing.fovRad * 0.5);
     const glm::dvec3 eye = sphere.centre + direction * distance;
-    STX_TRY(const auto orientation, lookAt(eye, sphere.centre));
+    STX_TRY(const auto orientation, lookAt(eye, sphere.centre, framing.up));
     const glm::dmat3 cameraFromWorld = glm::transpose(glm::mat3_cast(orientation));
 
     // Half extents of the object in the image plane (at dist 1, or in scene units).
@@ -135,7 +165,14 @@ Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout, const ViewFr
                                           const std::vector<glm::vec3>& points) {
     if (points.empty()) return fail(ErrorCode::invalidInput, "the object has no points to look at");
     const auto sphere = boundingSphere(points);
-    const auto directions = layoutDirections(layout);
+    if (!(glm::length(framing.up) > 0))
+        return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
+    auto directions = layoutDirections(layout);
+    // The faces of a cube are those of the axes, whichever is up.
+    if (framing.up != glm::dvec3(0, 1, 0) && layout.kind != ViewLayout::Kind::cube) {
+        const glm::dquat toUp = rotationToUp(framing.up);
+        for (auto& d : directions) d = toUp * d;
+    }
     const bool tight = layout.kind != ViewLayout::Kind::octahedral;
     std::vector<Camera> cameras(directions.size());
     std::vector<Result<Camera>> results(directions.size(), Camera());

@@ -31,12 +31,22 @@ struct ViewFraming {
     double fovRad =
         0.6;  ///< perspective: angle that the object's bounding sphere fills; sets the distance
     int marginPixels = 2;  ///< kept free around the object
+    /// The object's up axis: what layouts stand on, and up in the pictures. Need not be unit.
+    glm::dvec3 up{0, 1, 0};
 };
 
 /// Parses `cube`, `ring:N`, `sphere:N`, `octahedral:N`. Errors (usage) name the possible forms.
 [[nodiscard]] Result<ViewLayout> parseViewLayout(std::string_view text);
 
-/// Unit vectors from the object towards the cameras, in order.
+/// The shortest rotation that takes +Y to `up` (which need not be unit). So the front, +Z, of an
+/// object that stands on +Z is -Y, as in programs whose models do.
+[[nodiscard]] glm::dquat rotationToUp(glm::dvec3 up);
+
+/// The coordinate axis along which cameras stand upright: none is tilted sideways against it by
+/// more than some degrees. +Y when it is one of these, or when none is.
+[[nodiscard]] glm::dvec3 upOfCameras(const std::vector<Camera>& cameras);
+
+/// Unit vectors from the object towards the cameras, in order, of an object whose up is +Y.
 [[nodiscard]] std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout);
 
 /// Direction of cell (i, j) of an N x N octahedral map, 0 <= i, j < n: the corners and edges of the
@@ -45,7 +55,7 @@ struct ViewFraming {
 [[nodiscard]] glm::dvec3 octahedralDirection(int i, int j, int n);
 
 /// Cameras of a layout around points (the object's vertices, or the corners of its box). Each looks
-/// at the centre of the bounds; +Y is up. The frame is drawn in until the object fills it, with
+/// at the centre of the bounds. The frame is drawn in until the object fills it, with
 /// square pixels, except in octahedral layouts, where all views have the same window (impostor
 /// shaders rely on it). Errors when there are no points.
 [[nodiscard]] Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout,

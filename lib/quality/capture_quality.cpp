@@ -1,5 +1,8 @@
 #include "lib/quality/capture_quality.hpp"
 
+#include <algorithm>
+#include <map>
+
 #include "lib/geometry/view_layout.hpp"
 #include "lib/quality/view_quality.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
@@ -7,25 +10,54 @@
 
 namespace stx {
 
-Result<int> fewestCameras(const Mesh& mesh, const std::vector<Camera>& cameras,
-                          const CaptureSettings& settings, double wantedPsnr, Job& job) {
-    constexpr int kNovelViews = 6, kSide = 256;
-    Job quiet;  // each attempt would give the same notes again
-    quiet.limits = job.limits;
+namespace {
+
+/// Cameras from all sides, as somebody would look at the object.
+Result<std::vector<Camera>> novelCameras(const Mesh& mesh, int side) {
     ViewFraming framing;
-    framing.width = framing.height = kSide;
+    framing.width = framing.height = side;
     ViewLayout layout;
-    layout.count = kNovelViews;
-    STX_TRY(auto novel, layoutCameras(layout, framing, drawnPoints(mesh)));
+    layout.count = 6;
+    const auto points = drawnPoints(mesh);
+    const auto sphere = boundingSphere(points);
+    std::vector<Camera> cameras;
+    for (const auto& direction : layoutDirections(layout)) {
+        STX_TRY(const auto camera, frameCamera(direction, framing, points, sphere, false));
+        cameras.push_back(camera);
+    }
+    return cameras;
+}
+
+}  // namespace
+
+Result<FewestCameras> fewestCameras(const Mesh& mesh, const std::vector<Camera>& cameras,
+                                    const CaptureSettings& settings, double wantedPsnr, Job& job) {
+    if (cameras.empty()) return fail(ErrorCode::usage, "there is no camera to choose");
+    constexpr int kLargestSide = 512;
+    constexpr double kAsGood = 0.1;  // dB that are not worth more views
+    Job quiet;                       // each attempt would give the same notes again
+    quiet.limits = job.limits;
+    STX_TRY(
+        auto novel,
+        novelCameras(mesh, std::min(kLargestSide, std::max(cameras[0].width, cameras[0].height))));
     STX_TRY(const auto quality,
             ViewQuality::against(*makeMeshRenderer(mesh, {}, quiet), std::move(novel), job));
-    return leastViews(static_cast<int>(cameras.size()), wantedPsnr, [&](int n) -> Result<double> {
+    std::map<int, double> reached;
+    const auto measure = [&](int n) -> Result<double> {
         STX_TRY(const auto bundle,
                 captureBundle(mesh, {cameras.begin(), cameras.begin() + n}, settings, quiet));
         STX_TRY(const auto renderer, makeRenderer(Backend::cpu, bundle, {}, -1, quiet));
         STX_TRY(const auto psnr, quality.measure(*renderer, job));
+        reached[n] = psnr.all;
         return psnr.all;
-    });
+    };
+    STX_TRY(const int count, leastViews(static_cast<int>(cameras.size()), wantedPsnr, measure));
+    if (reached[count] >= wantedPsnr) return FewestCameras{count, reached[count]};
+    double best = 0;
+    for (const auto& [n, psnr] : reached) best = std::max(best, psnr);
+    for (const auto& [n, psnr] : reached)
+        if (psnr >= best - kAsGood) return FewestCameras{n, psnr};
+    return FewestCameras{count, reached[count]};
 }
 
 }  // namespace stx

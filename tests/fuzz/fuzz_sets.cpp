@@ -51,6 +51,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             if (kind == imagesets::JsonKind::miv) checkViews(imagesets::mivViews(*json, job));
             if (kind == imagesets::JsonKind::cameras)
                 checkViews(imagesets::camerasJsonViews(*json, job));
+            if (kind == imagesets::JsonKind::cameraPath)
+                checkViews(imagesets::cameraPathViews(*json, job));
             break;
         }
         case 3:

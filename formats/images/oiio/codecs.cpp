@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
+#include <webp/encode.h>
 
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -15,7 +17,8 @@
 #include "formats/images/codec_table.hpp"
 #include "lib/base/result.hpp"
 
-/// The only file that knows OpenImageIO. Its exceptions and geterror() end here, in `adapt`.
+/// The only file that knows OpenImageIO and libwebp. Its exceptions and geterror() end here, in
+/// `adapt`.
 namespace stx::codecs {
 
 namespace {
@@ -208,6 +211,42 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     input->close();
 }
 
+[[noreturn]] void cannotWrite(const std::string& reason) {
+    throw Failed{ErrorCode::io, reason.empty() ? "the picture cannot be written" : reason};
+}
+
+/// OpenImageIO's own writer loses something at every quality.
+void encodeWebp(const EncodeRequest& request) {
+    std::uint8_t* bytes = nullptr;
+    const int stride = request.width * request.channels;
+    const std::size_t size =
+        request.channels == 4
+            ? WebPEncodeLosslessRGBA(request.values, request.width, request.height, stride, &bytes)
+            : WebPEncodeLosslessRGB(request.values, request.width, request.height, stride, &bytes);
+    const std::unique_ptr<std::uint8_t, void (*)(void*)> owner(bytes, &WebPFree);
+    if (size == 0) throw Failed{ErrorCode::failed, "the picture cannot be coded as WebP"};
+    std::FILE* file = std::fopen(request.path, "wb");
+    if (!file) cannotWrite("the file cannot be opened");
+    const bool written = std::fwrite(bytes, 1, size, file) == size;
+    if (std::fclose(file) != 0 || !written) cannotWrite("the file cannot be written");
+}
+
+void encodeOrThrow(const EncodeRequest& request) {
+    if (std::string_view(request.format) == "webp") return encodeWebp(request);
+    setUpOnce();
+    const auto output = OIIO::ImageOutput::create(request.format);
+    if (!output) throw Failed{ErrorCode::unsupported, OIIO::geterror()};
+    OIIO::ImageSpec spec(request.width, request.height, request.channels, OIIO::TypeDesc::UINT8);
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    // The values are straight, and the file says so.
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    spec.attribute("compression", "zip");
+    spec.attribute("DateTime", request.date);
+    if (!output->open(request.path, spec)) cannotWrite(output->geterror());
+    if (!output->write_image(OIIO::TypeDesc::UINT8, request.values) || !output->close())
+        cannotWrite(output->geterror());
+}
+
 }  // namespace
 
 }  // namespace stx::codecs
@@ -218,6 +257,9 @@ extern "C" __attribute__((visibility("default"))) const stx::codecs::Table* stxC
         kTableVersion,
         [](const DecodeRequest& request, Failure& failure) {
             return adapt(failure, [&] { decodeOrThrow(request, failure); });
+        },
+        [](const EncodeRequest& request, Failure& failure) {
+            return adapt(failure, [&] { encodeOrThrow(request); });
         },
     };
     return &table;

@@ -441,7 +441,10 @@ class SceneWriter {
                 "top, right, bottom), the rest of {:.3g} pixels is moved",
                 viewName(i), p.left, p.top, p.right, p.bottom, p.shift));
         const int bits = bitsOf(view);
-        if (view.depthBits == 32 || bits == 8 || bits < view.depthBits) {
+        // Depth that is on the codes already is off by what floats are, which is not worth a word.
+        const double rounding = std::max(0.01 * view.depthCode().step(), 1e-6 * view.farPlane);
+        if (view.depthBits == 32 || bits < view.depthBits ||
+            (bits == 8 && images.worstDepth > rounding)) {
             worst_ = std::max(worst_, images.worstDepth);
             lossyBits_ = lossyBits_ == 0 ? bits : std::min(lossyBits_, bits);
         }

@@ -62,6 +62,12 @@ int main(int argc, char** argv) {
 
     // Several pictures, drawn by one renderer that keeps the model.
     const auto sphere = stx::boundsOf(opened);
+    stx::OrbitSettings half;
+    half.count = 3;
+    half.arcRad = 3.1;
+    half.distance = 4;
+    if (valueOf(stx::orbitCameras(sphere.centre(), sphere.radius(), half, lens)).size() != 3)
+        return 1;
     const auto orbit = valueOf(stx::orbitCameras(sphere.centre(), sphere.radius(), 2, 0.3, lens));
     const auto renderer = valueOf(stx::rendererOf(opened, {}, job, stx::Backend::cpu));
     for (const auto& c : orbit)

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/geometry/depth_code.hpp"
+#include "lib/geometry/view_layout.hpp"
 
 namespace stx {
 namespace {
@@ -64,6 +65,39 @@ TEST(DepthCode, FollowsTheStandard) {
     const DepthCode fine{0.7, 3.3, 65535};
     for (std::uint32_t d = 1; d <= 65535; ++d)
         EXPECT_EQ(fine.encode(static_cast<float>(fine.decode(d))), d);
+}
+
+/// Four cameras around an axis, level or tilted.
+std::vector<Camera> around(glm::dvec3 up, double roll) {
+    std::vector<Camera> cameras;
+    ViewLayout ring;
+    ring.kind = ViewLayout::Kind::ring;
+    ring.count = 4;
+    ring.elevationRad = 0.9;
+    for (const auto& d : layoutDirections(ring)) {
+        Camera c;
+        c.orientation = *lookAt(rotationToUp(up) * d, glm::dvec3(0), up) *
+                        glm::angleAxis(roll, glm::dvec3(0, 0, 1));
+        cameras.push_back(c);
+    }
+    return cameras;
+}
+
+TEST(UpOfCameras, IsTheAxisTheyStandOn) {
+    for (const glm::dvec3 up :
+         {glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(0, -1, 0), glm::dvec3(-1, 0, 0)}) {
+        EXPECT_EQ(upOfCameras(around(up, 0.0)), up);
+        EXPECT_EQ(upOfCameras(around(up, 0.1)), up);
+    }
+    EXPECT_EQ(upOfCameras({}), glm::dvec3(0, 1, 0));
+    EXPECT_EQ(upOfCameras(around({1, 1, 1}, 0.0)), glm::dvec3(0, 1, 0));
+}
+
+TEST(RotationToUp, TakesTheFrontWithIt) {
+    EXPECT_LT(glm::length(rotationToUp({0, 0, 3}) * glm::dvec3(0, 0, 1) - glm::dvec3(0, -1, 0)),
+              1e-12);
+    EXPECT_LT(glm::length(rotationToUp({0, -1, 0}) * glm::dvec3(0, 1, 0) - glm::dvec3(0, -1, 0)),
+              1e-12);
 }
 
 }  // namespace

@@ -43,6 +43,8 @@ TEST(FrameFormat, GoesByTheEnding) {
     EXPECT_EQ(*frameFormat("a.b/c.jpeg"), FrameFormat::jpeg);
     EXPECT_EQ(*frameFormat("c.exr"), FrameFormat::exr);
     EXPECT_EQ(*frameFormat("-"), FrameFormat::png);
+    EXPECT_EQ(*frameFormat("c.TIF"), FrameFormat::tiff);
+    EXPECT_EQ(*frameFormat("c.webp"), FrameFormat::webp);
     EXPECT_EQ(frameFormat("a.gif").error().code, ErrorCode::usage);
     EXPECT_EQ(frameFormat("png").error().code, ErrorCode::usage);
 }

@@ -94,8 +94,8 @@ TEST(Colmap, CutShortAndUnknownModelsAreErrors) {
     std::filesystem::resize_file(folder / "sparse/images.bin", 50);
     expectError(readSet(folder.path()), {"images.bin", "cut short"});
     writeText(folder / "sparse/cameras.bin",
-              little(1, 8) + little(1, 4) + little(5, 4) + little(4, 8) + little(4, 8));
-    expectError(readSet(folder.path()), {"cameras.bin", "OPENCV_FISHEYE", "PINHOLE"});
+              little(1, 8) + little(1, 4) + little(6, 4) + little(4, 8) + little(4, 8));
+    expectError(readSet(folder.path()), {"cameras.bin", "FULL_OPENCV", "PINHOLE"});
 }
 
 TEST(Msr, CheckValues) {
@@ -293,8 +293,8 @@ TEST(Transforms, BadOnesAreOneSentenceEach) {
     expectError(readSet(folder.path()), {"d.png", "90x64", "96x64"});
     std::filesystem::remove(folder / "d.png");
     expectError(readSet(folder.path()), {"transforms.json", "frames[0]", "d.png"});
-    writeText(file, transformsJson(views[0].camera, "\"camera_model\":\"OPENCV_FISHEYE\","));
-    expectError(readSet(folder.path()), {"frames[0]", "OPENCV_FISHEYE"});
+    writeText(file, transformsJson(views[0].camera, "\"camera_model\":\"FISHEYE624\","));
+    expectError(readSet(folder.path()), {"frames[0]", "FISHEYE624"});
     Camera broken = views[0].camera;
     broken.orientation = {0, 0, 0, 0};
     broken.orientation.w = 1;

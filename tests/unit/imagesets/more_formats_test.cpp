@@ -183,9 +183,20 @@ TEST(CamerasJson, DepthImageCodesComeBackAndUnlikeSizesAreResampled) {
     };
     json(",\"nearPlane\":0.1,\"farPlane\":40");
     EXPECT_EQ(recogniseImageSet(folder.path()).value_or(""), "cameras");
-    const auto read = readSet(folder.path());
+    ImageSetOptions reduced;
+    reduced.raiseDepth = false;
+    const auto read = readSet(folder.path(), reduced);
     ASSERT_TRUE(read) << read.error().text();
     expectSame(views[0], read->views[0], [&](double) { return code.step(); });
+    // By default the depth is raised to the picture: nearly all of it as if it had been measured.
+    const auto raised = readSet(folder.path());
+    ASSERT_TRUE(raised) << raised.error().text();
+    ASSERT_EQ(raised->views[0].depth.width(), 192);
+    EXPECT_EQ(raised->views[0].camera.fx, 2 * c.fx);
+    int good = 0;
+    for (std::size_t i = 0; i < large.depth.count(); ++i)
+        good += std::abs(raised->views[0].depth.data()[i] / large.depth.data()[i] - 1) < 0.02f;
+    EXPECT_GT(good, 0.97 * large.depth.count());
     json("");
     expectError(readSet(folder.path()), {"d.png", "depthUnit"});
     json(",\"nearPlane\":40,\"farPlane\":0.1");

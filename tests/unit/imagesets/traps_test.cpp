@@ -101,6 +101,41 @@ glm::dvec2 distorted(glm::dvec2 pixel, glm::dvec2 f, glm::dvec2 c, double k1, do
             f.y * (n.y * radial + p1 * (r2 + 2 * n.y * n.y) + 2 * p2 * n.x * n.y) + c.y};
 }
 
+TEST(ColmapTraps, AFisheyeIsUndoneToAThousandthOfAPixel) {
+    const double k[4] = {-0.04, 0.01, -0.003, 0.0005};
+    for (const auto* line : {"OPENCV_FISHEYE 96 64 60 60 50 30 -0.04 0.01 -0.003 0.0005",
+                             "SIMPLE_RADIAL_FISHEYE 96 64 60 50 30 -0.04"}) {
+        const int terms = std::string_view(line).starts_with("SIMPLE") ? 1 : 4;
+        TemporaryFolder folder;
+        writeText(folder / "sparse/cameras.txt", fmt::format("1 {}\n", line));
+        writeText(folder / "sparse/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");
+        writePositions(folder / "images/a.exr", 96, 64);
+        std::string depth = "96&64&1&";
+        for (int i = 0; i < 96 * 64; ++i) depth += floatBytes(2.0f);
+        writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
+        Job job;
+        ImageSetOptions options;
+        options.mixedPixels = MixedPixels::keep;
+        const auto read = readImageSet(folder.path(), options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        const ReferenceView& v = read->views[0];
+        int checked = 0;
+        for (int y = 0; y < 64; ++y)
+            for (int x = 0; x < 96; ++x) {
+                const glm::dvec2 n((x + 0.5 - 50) / 60, (y + 0.5 - 30) / 60);
+                const double r = glm::length(n), t = std::atan(r);
+                double bent = t;
+                for (int i = 0; i < terms; ++i) bent += k[i] * std::pow(t, 2 * i + 3);
+                const glm::dvec2 at = n / r * bent * 60.0 + glm::dvec2(50, 30);
+                if (at.x < 2 || at.y < 2 || at.x > 94 || at.y > 62) continue;
+                ASSERT_NEAR(v.texture.at(x, y).x, at.x, 1e-3) << line << " at " << x << "," << y;
+                ASSERT_NEAR(v.texture.at(x, y).y, at.y, 1e-3) << line << " at " << x << "," << y;
+                ++checked;
+            }
+        EXPECT_GT(checked, 5000);
+    }
+}
+
 TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
     struct Model {
         std::string line;

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "formats/imagesets/export.hpp"
+
+namespace stx::imagesets {
+
+/// Writes a bundle as COLMAP's dense workspace: images/ (8-bit PNG), sparse/ (text), and
+/// stereo/depth_maps/ (floats). `names` are those of the views, fit for files. Errors: io;
+/// invalidInput for orthographic cameras, which COLMAP does not have.
+[[nodiscard]] Result<void> exportColmap(const Bundle& bundle, const std::filesystem::path& folder,
+                                        const std::vector<std::string>& names,
+                                        const ExportOptions& options, Job& job);
+
+}  // namespace stx::imagesets
