@@ -25,6 +25,7 @@ struct RenderOptions {
     double shininess = 32;
     std::string fileFormat;
     std::string framesPerSecond = "25";
+    int compression = 1;
     bool skipExisting = false, listDevices = false;
     int device = -1;
     OpenOptions open;
@@ -107,6 +108,9 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
                                  "is of lighting; give --light, too"));
     if (o.output != "-")
         STX_CHECK(command.refuse({"--fps"}, "is of a stream on stdout, -o - --file-format y4m"));
+    if (const auto format = frameFormat(o.output);
+        o.output == "-" || !format || *format != FrameFormat::png)
+        STX_CHECK(command.refuse({"--compression"}, "is of .png pictures"));
     if (o.backend == Backend::cpu)
         STX_CHECK(command.refuse({"--device"}, "is of GPUs; it does not go with --backend cpu"));
     if (o.settings.splat != SplatRule::paper)
@@ -200,6 +204,7 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     writing.background = background;
     writing.stream = o.fileFormat;
     STX_TRY(writing.rate, parseRate(o.framesPerSecond));
+    writing.compression = o.compression;
     writing.noClobber = program.common.noClobber;
     STX_CHECK(FrameWriter::check(writing));
 
@@ -353,6 +358,10 @@ void addRender(CommandLine& line, Program& program) {
         .oneOf({"y4m"})
         .group(output);
     c.option("--format", o->fileFormat, "The same as --file-format").oneOf({"y4m"}).group(output);
+    c.option("--compression", o->compression,
+             "Of .png, 0 to 9: 1 takes least time, 9 makes files a tenth smaller (default 1)")
+        .range(0, 9)
+        .group(output);
     c.option("--fps", o->framesPerSecond,
              "Frame rate written into the stream, as in 30 or 30000/1001 (default 25)")
         .takes("RATE")

@@ -9,7 +9,7 @@
 namespace stx::tools {
 namespace {
 
-constexpr std::size_t kQueue = 4;  // frames waiting; enough to hide encoding, small in memory
+constexpr std::size_t kQueue = 2;  // frames waiting; enough to hide encoding, small in memory
 
 }  // namespace
 
@@ -48,6 +48,13 @@ std::string FrameWriter::nameOf(int frame) const {
 }
 
 Result<void> FrameWriter::write(int index, Frame frame, const Camera& camera) {
+    // Only OpenEXR has room for more than colours.
+    const auto format = frameFormat(settings_.pattern);
+    if (settings_.pattern == "-" || !format || *format != FrameFormat::exr) {
+        frame.albedo = {};
+        frame.depth = {};
+        frame.normal = {};
+    }
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return queue_.size() < kQueue || error_; });
     if (error_) return tl::unexpected(*error_);
@@ -93,6 +100,7 @@ Result<void> FrameWriter::writeOne(const Item& item) {
         FrameOptions file;
         file.background = settings_.background;
         file.noClobber = settings_.noClobber;
+        file.pngLevel = settings_.compression;
         file.camera = item.camera;
         return writeFrame(item.frame, nameOf(item.index), file);
     }

@@ -25,6 +25,7 @@ class FrameWriter {
         std::optional<glm::vec3> background;
         std::string stream;               ///< "y4m" for stdout
         std::pair<int, int> rate{25, 1};  ///< frames per second, a fraction
+        int compression = 1;              ///< of PNG, 0 (fast, large) to 9
         bool noClobber = false;
     };
     /// Errors (usage) when the ending or the stream makes no sense.

@@ -29,7 +29,7 @@ struct FrameOptions {
     /// their alpha, and JPEG has black behind.
     std::optional<glm::vec3> background;
     int jpegQuality = 92;  ///< 1..100
-    int pngLevel = 6;      ///< 0..9
+    int pngLevel = 1;      ///< 0 (fast, large) to 9
     bool noClobber = false;
     /// EXR: gets into the standard attributes worldToCamera, worldToNDC, screenWindow...
     std::optional<Camera> camera;

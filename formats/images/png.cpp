@@ -188,6 +188,11 @@ Result<Bytes> encodePng(int width, int height, int channels, int bits, const voi
         return fail(ErrorCode::failed,
                     "cannot encode a PNG of {} channels of {} bits; 1 to 4 of 8 or 16 is possible",
                     channels, bits);
+    level = std::clamp(level, 0, 9);
+    // Larger ones in a stream, which takes no memory beside the result.
+    constexpr std::uint64_t kWholeBytes = 256u << 20;
+    if (std::uint64_t{1} * width * height * channels * bits / 8 <= kWholeBytes)
+        return encodeWholePng(width, height, channels, bits, values, srgb, level);
     const Context context(spng_ctx_new(SPNG_CTX_ENCODER));
     Bytes out;
     int error = context ? 0 : SPNG_EMEM;
@@ -213,7 +218,7 @@ Result<Bytes> encodePng(int width, int height, int channels, int bits, const voi
         step(spng_set_gama_int, std::uint32_t{45455});
         step(spng_set_chrm_int, &primaries);
     }
-    step(spng_set_option, SPNG_IMG_COMPRESSION_LEVEL, std::clamp(level, 0, 9));
+    step(spng_set_option, SPNG_IMG_COMPRESSION_LEVEL, level);
     // The library's own choice, Z_FILTERED, is larger by up to a third for flat pictures.
     step(spng_set_option, SPNG_IMG_COMPRESSION_STRATEGY, kDefaultStrategy);
     step(spng_encode_image, values,

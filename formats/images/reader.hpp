@@ -33,6 +33,10 @@ class ImageReader {
 [[nodiscard]] Result<std::unique_ptr<ImageReader>> openPng(ByteSpan bytes);
 [[nodiscard]] Result<std::unique_ptr<ImageReader>> openJpeg(ByteSpan bytes, const Limits& limits);
 
+/// encodePng() of an image that is taken into memory whole, twice: by libdeflate.
+[[nodiscard]] Result<Bytes> encodeWholePng(int width, int height, int channels, int bits,
+                                           const void* values, bool srgb, int level);
+
 /// Checks a header before memory is taken for its pixels. Error (invalidInput) when a size is below
 /// 1 or beyond the limits, or when there are more pixels than `fileBytes` bytes of such a file can
 /// hold, whatever is in them.
