@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -241,7 +242,7 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     FrameWriter writer(writing, program.job);
     auto views = nlohmann::ordered_json::array();
     double total = 0;
-    int drawn = 0;
+    int drawn = 0, empty = 0;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         const auto name = writer.nameOf(static_cast<int>(i));
         std::error_code ec;
@@ -260,11 +261,18 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
         total += milliseconds;
         ++drawn;
         views.push_back({{"output", name}, {"milliseconds", milliseconds}});
+        const auto colours = frame->colour.pixels();
+        if (std::all_of(colours.begin(), colours.end(), [](glm::vec4 c) { return !(c.a > 0); }))
+            ++empty;
         STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), cameras[i]));
         program.job.progress(static_cast<std::int64_t>(i) + 1,
                              static_cast<std::int64_t>(cameras.size()), "rendering");
     }
     STX_CHECK(writer.finish());
+    if (empty > 0)
+        program.job.note(fmt::format(
+            "{} {} nothing: the object is behind or beside the camera; 'stx info' tells its bounds",
+            counted(static_cast<std::size_t>(empty), "picture"), empty == 1 ? "shows" : "show"));
     program.sayNotes();
     program.say(fmt::format(
         "{} → {}, {} {}x{}, {}{}{}", std::filesystem::path(o.input).filename().string(), o.output,
