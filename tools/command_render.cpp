@@ -349,7 +349,7 @@ void addRender(CommandLine& line, Program& program) {
              "keeps alpha (default none)")
         .takes("COLOUR|none")
         .group(drawing);
-    const char* lighting = "Lighting (Phong; off without --light)";
+    const char* lighting = "Lighting (Phong, in linear light; off without --light)";
     c.option("--light", o->lights,
              "dir:X,Y,Z[,r,g,b] shines along X,Y,Z; point:X,Y,Z[,r,g,b] is at X,Y,Z; @camera "
              "appended: in camera space. Repeat for more")
