@@ -1,5 +1,6 @@
 #include "lib/render/splat/gl/gl_renderer.hpp"
 
+#include "lib/packing/packing.hpp"
 #include "lib/render/splat/gl/gl_points.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 
@@ -73,6 +74,24 @@ TEST(GlRenderer, ShowsTheRoom) {
         EXPECT_GT(good, points * 9 / 10) << orthographic;
         EXPECT_GT(points, static_cast<int>(frame->depth.count()) / 2);
     }
+}
+
+TEST(GlRenderer, DrawsAtlasesFromTheirTextures) {
+    REQUIRE_GPU();
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 3);
+    PackSettings packing;
+    packing.layout = PackSettings::Layout::tight;
+    Job job;
+    const auto atlas = pack(bundle, packing, job);
+    ASSERT_TRUE(atlas) << atlas.error().text();
+    const Camera camera = test::small(analyticCamera(AnalyticScene::object, 0.5, 3), 128);
+    const auto fromViews = test::drawOn(Backend::gl, bundle, splatSettings(), camera);
+    const auto fromAtlas = test::drawOn(Backend::gl, *atlas, splatSettings(), camera);
+    ASSERT_TRUE(fromViews && fromAtlas);
+    EXPECT_GT(psnr(fromAtlas->colour, fromViews->colour), 50.0);
+    EXPECT_GT(
+        std::count_if(fromAtlas->depth.pixels().begin(), fromAtlas->depth.pixels().end(), hasPoint),
+        500);
 }
 
 TEST(GlRenderer, LightsWithFixedFunctions) {
