@@ -5,6 +5,7 @@
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/metrics/compare.hpp"
+#include "lib/metrics/steadiness.hpp"
 #include "tools/commands.hpp"
 
 namespace stx::tools {
@@ -34,7 +35,8 @@ nlohmann::ordered_json toJson(const Comparison& c) {
 }
 
 Result<Comparison> comparePair(const std::string& a, const std::string& b, const CompareOptions& o,
-                               const Image<std::uint8_t>* mask, Program& program) {
+                               const Image<std::uint8_t>* mask, Steadiness* steadiness,
+                               Program& program) {
     STX_TRY(const auto first, openPicture(a, program.job));
     STX_TRY(const auto second, openPicture(b, program.job));
     CompareSettings settings;
@@ -42,8 +44,10 @@ Result<Comparison> comparePair(const std::string& a, const std::string& b, const
     STX_TRY(settings.background, parseColour(o.background, "--background"));
     auto result = compare(first, second, settings, program.job);
     if (!result) return tl::unexpected(result.error().at(fmt::format("'{}' and '{}'", a, b)));
+    const bool linear = first.isLinear() && second.isLinear();
+    if (steadiness && linear) steadiness->add(first.linear, second.linear, settings);
+    if (steadiness && !linear) steadiness->add(first.coded, second.coded, settings);
     if (!o.errorPicture.empty()) {
-        const bool linear = first.isLinear() && second.isLinear();
         STX_TRY(const auto picture,
                 linear ? errorPicture(first.linear, second.linear, settings, o.gain)
                        : errorPicture(first.coded, second.coded, settings, o.gain));
@@ -84,6 +88,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
     Comparison total;
     auto perFrame = nlohmann::ordered_json::array();
     int worstFrame = -1;
+    Steadiness steadiness;
     if (sequences) {
         SequenceComparison sequence(255.0);
         for (int frame = o.firstFrame; o.frames == 0 || frame < o.firstFrame + o.frames; ++frame) {
@@ -95,7 +100,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
                 break;
             CompareOptions one = o;
             one.errorPicture = frameName(o.errorPicture, frame).value_or("");
-            STX_TRY(const auto c, comparePair(a, b, one, maskImage, program));
+            STX_TRY(const auto c, comparePair(a, b, one, maskImage, &steadiness, program));
             sequence.add(c);
             auto entry = toJson(c);
             entry["frame"] = frame;
@@ -104,7 +109,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
         total = sequence.total();
         worstFrame = o.firstFrame + sequence.worstFrame();
     } else {
-        STX_TRY(total, comparePair(o.a, o.b, o, maskImage, program));
+        STX_TRY(total, comparePair(o.a, o.b, o, maskImage, nullptr, program));
     }
 
     nlohmann::ordered_json out = {{"$schema", "compare.schema.json"}};
@@ -113,6 +118,12 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
         out["worst"]["frame"] = worstFrame;
         out["frames"] = perFrame;
     }
+    if (steadiness.steps() > 0)
+        out["unsteadiness"] = {
+            {"mean", steadiness.mean()},
+            {"worst", steadiness.worst()},
+            {"worstFrame", o.firstFrame + steadiness.worstFrame()},
+        };
     STX_CHECK(program.writeReport(out));
     if (program.common.format == "json") {
         program.printJson(out);
@@ -125,6 +136,11 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
             decibels(total.psnrRgb), decibels(total.psnrY), total.ssimY, total.worst.x,
             total.worst.y, worstFrame >= 0 ? fmt::format(" of frame {}", worstFrame) : "",
             total.worst.difference, total.differentPixels, total.pixels));
+        if (steadiness.steps() > 0)
+            program.print(fmt::format(
+                "changes from frame to frame: {:.3f} beyond those of B, {:.3f} at worst (frame "
+                "{})\n",
+                steadiness.mean(), steadiness.worst(), o.firstFrame + steadiness.worstFrame()));
     }
     if (total.identical()) return 0;
     const bool near = !o.minPsnr || (total.psnrRgb && *total.psnrRgb >= *o.minPsnr);

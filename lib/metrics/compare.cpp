@@ -4,27 +4,15 @@
 #include <vector>
 
 #include "lib/base/parallel.hpp"
+#include "lib/metrics/seen_pixel.hpp"
 #include "lib/metrics/ssim.hpp"
 
 namespace stx {
 namespace {
 
+using metrics::seenPixel;
+
 constexpr int kRowsPerTask = 16;
-
-glm::vec3 over(glm::vec4 straight, glm::vec3 background) {
-    return straight.a >= 1.0f ? glm::vec3(straight)
-                              : glm::vec3(straight) * straight.a + background * (1.0f - straight.a);
-}
-
-// A pixel as it is seen, laid over the background. 8-bit values are kept as 0..255, so that
-// differences of opaque pixels are whole numbers.
-glm::vec3 seenPixel(glm::u8vec4 c, glm::vec3 background) {
-    if (c.a == 255) return {c.r, c.g, c.b};
-    return over(glm::vec4(c.r, c.g, c.b, c.a / 255.0f), background * 255.0f);
-}
-glm::vec3 seenPixel(glm::vec4 c, glm::vec3 background) {
-    return over(c, background);
-}
 
 double luma(glm::vec3 c) {
     return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;

@@ -20,7 +20,7 @@ constexpr double kLinked = 4;
 /// Voxels put between two neighbouring pixels at most.
 constexpr int kMostBetween = 64;
 
-struct Sample {
+struct OctreeSample {
     std::uint64_t code = 0;  ///< place of the voxel, its bits x y z in turn, x lowest
     glm::u8vec3 colour{0};
 };
@@ -177,9 +177,9 @@ Result<Grid> gridOf(const Bundle& bundle, int resolution) {
 }
 
 /// Samples of one voxel become one, of their mean colour.
-void unite(std::vector<Sample>& samples) {
+void unite(std::vector<OctreeSample>& samples) {
     std::sort(samples.begin(), samples.end(),
-              [](const Sample& a, const Sample& b) { return a.code < b.code; });
+              [](const OctreeSample& a, const OctreeSample& b) { return a.code < b.code; });
     std::size_t out = 0;
     for (std::size_t i = 0; i < samples.size();) {
         glm::vec<3, std::uint64_t> sum(0);
@@ -193,12 +193,12 @@ void unite(std::vector<Sample>& samples) {
     samples.resize(out);
 }
 
-std::vector<std::int32_t> treeOf(const std::vector<Sample>& voxels, int levels) {
+std::vector<std::int32_t> treeOf(const std::vector<OctreeSample>& voxels, int levels) {
     std::vector<std::int32_t> bytes;
     for (int level = 0; level < levels; ++level) {
         const int shift = 3 * (levels - level);
         std::uint64_t last = ~std::uint64_t{0};
-        for (const Sample& voxel : voxels) {
+        for (const OctreeSample& voxel : voxels) {
             if (voxel.code >> shift != last) bytes.push_back(0);
             last = voxel.code >> shift;
             bytes.back() |= 1 << (voxel.code >> (shift - 3) & 7);
@@ -241,8 +241,8 @@ Result<Camera> cameraAlong(const Camera& view, glm::ivec3 first, glm::ivec3 last
     return c;
 }
 
-Rgba8Image pictureOf(const Camera& camera, const Octree& octree, const std::vector<Sample>& voxels,
-                     const Job& job) {
+Rgba8Image pictureOf(const Camera& camera, const Octree& octree,
+                     const std::vector<OctreeSample>& voxels, const Job& job) {
     Rgba8Image picture(camera.width, camera.height, glm::u8vec4(0));
     for (int y = 0; y < camera.height && !job.cancelled; ++y) {
         for (int x = 0; x < camera.width; ++x) {
@@ -251,9 +251,11 @@ Rgba8Image pictureOf(const Camera& camera, const Octree& octree, const std::vect
                 camera.position + camera.orientation * camera.unproject(x + 0.5, y + 0.5, 0.0);
             if (!(octree.firstHit(origin, camera.forward(), &voxel) < kNoDepth)) continue;
             const std::uint64_t code = codeOf(voxel);
-            const auto found = std::lower_bound(
-                voxels.begin(), voxels.end(), code,
-                [](const Sample& sample, std::uint64_t wanted) { return sample.code < wanted; });
+            const auto found =
+                std::lower_bound(voxels.begin(), voxels.end(), code,
+                                 [](const OctreeSample& sample, std::uint64_t wanted) {
+                                     return sample.code < wanted;
+                                 });
             if (found != voxels.end() && found->code == code)
                 picture.at(x, y) = glm::u8vec4(found->colour, 255);
         }
@@ -275,11 +277,12 @@ Result<OctreeParts> octreeFromBundle(const Bundle& bundle, int levels, Job& job)
     std::uint64_t count = 0;
     for (const ReferenceView& view : bundle.views)
         forEachPoint(view, grid.voxel, [&](glm::dvec3, std::size_t) { ++count; });
-    if (auto ok = job.limits.checkAllocation(
-            count, sizeof(Sample), fmt::format("an octree of {} levels (take fewer)", levels));
+    if (auto ok =
+            job.limits.checkAllocation(count, sizeof(OctreeSample),
+                                       fmt::format("an octree of {} levels (take fewer)", levels));
         !ok)
         return propagate(ok);
-    std::vector<Sample> samples;
+    std::vector<OctreeSample> samples;
     samples.reserve(count);
     std::vector<Rgba8Image> colours;
     glm::ivec3 first(resolution), last(-1);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lib/render/surface/constants.hpp"
+#include "lib/render/surface/cpu/shade_groups.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lib/render/surface/cpu/shade.cpp"
@@ -15,41 +16,7 @@ HWY_BEFORE_NAMESPACE();
 namespace stx::surface::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Pieces are shaded in groups of this many, whatever the vector length.
-constexpr int kGroup = 16;
-constexpr int kTaps = 4;
 constexpr int kMoments = 15;
-
-struct alignas(64) Lanes {
-    float v[kGroup];
-    float& operator[](int i) { return v[i]; }
-    const float& operator[](int i) const { return v[i]; }
-};
-
-/// One source under a group of pieces.
-struct View {
-    Lanes u, v;            ///< position in the source, pixels
-    Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
-    Lanes weight;
-    bool active = false;
-    bool plain = true;      ///< all taps of all lanes lie on one surface, fully covered
-    TapPlace taps[kGroup];  ///< of sources that are not whole
-
-    /// Where the taps of a lane are, from pixel (baseU, baseV) on.
-    [[nodiscard]] TapPlace tapsOf(const Source& source, int lane, int baseU, int baseV) const {
-        return source.whole ? source.tapPlaceOf(baseU, baseV) : taps[lane];
-    }
-};
-
-struct Group {
-    const float* x;
-    const float* y;
-    const float* q;
-    const float* qx;
-    const float* qy;
-    const std::uint32_t* sources;
-    int count;
-};
 
 /// The distance to the nearest edge at the position of each lane. Lanes without texels lose their
 /// weight.
