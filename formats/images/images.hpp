@@ -65,8 +65,8 @@ struct DecodedImage {
 [[nodiscard]] Image<glm::vec4> rgbaFloatFrom(const DecodedImage& image);
 
 /// PNG bytes of 1..4 channels with 8 or 16 bits (values in host order), tagged sRGB when `srgb`.
-/// The same input gives the same bytes. `level` is 0 (fast, large) to 9; from 2 on the filter of each
-/// row is chosen, which helps depth most.
+/// The same input gives the same bytes. `level` is 0 (fast, large) to 9; from 2 on the filter of
+/// each row is chosen, which helps depth most.
 [[nodiscard]] Result<Bytes> encodePng(int width, int height, int channels, int bits,
                                       const void* values, bool srgb, int level = 6);
 /// JPEG bytes of 1 or 3 channels of 8 bits; quality 1..100, no chroma subsampling at 90 and above.
