@@ -15,12 +15,6 @@ using namespace sets;
 
 namespace {
 
-/// Computer vision's camera axes from ours: y down, z forward.
-glm::dmat3 visionRotation(const Camera& c) {
-    const glm::dmat3 r = glm::mat3_cast(c.orientation);
-    return {r[0], -r[1], -r[2]};
-}
-
 std::string colmapDepth(const ReferenceView& v) {
     std::string out = fmt::format("{}&{}&1&", v.depth.width(), v.depth.height());
     for (const float d : v.depth.pixels()) out += floatBytes(hasPoint(d) ? d : 0.0f);

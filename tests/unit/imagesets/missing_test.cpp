@@ -8,11 +8,6 @@ using namespace sets;
 
 namespace {
 
-glm::dmat3 visionRotation(const Camera& c) {
-    const glm::dmat3 r = glm::mat3_cast(c.orientation);
-    return {r[0], -r[1], -r[2]};
-}
-
 /// Reads a set of three views one of which lacks a file, with a note; strictly it is an error.
 void expectTwoOfThree(const std::filesystem::path& set, const std::string& gone) {
     ImageSetOptions options;

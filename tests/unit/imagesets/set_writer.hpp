@@ -186,4 +186,10 @@ inline std::string mivJson(int w, int h, const std::string& range, int colourBit
         range, w, h, colourBits);
 }
 
+/// Computer vision's camera axes from ours: y down, z forward.
+inline glm::dmat3 visionRotation(const stx::Camera& c) {
+    const glm::dmat3 r = glm::mat3_cast(c.orientation);
+    return {r[0], -r[1], -r[2]};
+}
+
 }  // namespace sets
