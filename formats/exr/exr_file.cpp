@@ -321,6 +321,7 @@ Imf::Header headerFrom(const ExrPart& part) {
                        static_cast<float>(part.screenWindowWidth), Imf::INCREASING_Y,
                        Imf::ZIP_COMPRESSION);
     header.setType(Imf::SCANLINEIMAGE);
+    header.zipCompressionLevel() = part.zipLevel;
     if (!part.name.empty()) header.setName(part.name);
     if (!part.view.empty()) header.setView(part.view);
     Imf::addChromaticities(header, Imf::Chromaticities());
