@@ -255,7 +255,7 @@ Result<Model3d> readModel(const path& given, const Limits& limits) {
     Model3d m;
     m.base = given;
     std::error_code ec;
-    // One of its files stands for the model.
+    // One of its files is given in place of the folder.
     if (std::filesystem::is_regular_file(given, ec))
         m.base = given.has_parent_path() ? given.parent_path() : path(".");
     const path folder = m.base;

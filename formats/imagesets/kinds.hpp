@@ -61,7 +61,7 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 /// error, but PictureSource::missing.
 [[nodiscard]] Result<PictureSource> sourceInside(const path& folder, const std::string& name,
                                                  const std::string& where, const Limits& limits);
-/// The same for the two files of a view. One that does not exist is no error: it is in
+/// The same for the two files of a view. One that does not exist is not an error: it is in
 /// view.missing.
 [[nodiscard]] Result<void> findPictures(const path& folder, const std::string& texture,
                                         const std::string& depth, const std::string& where,

@@ -216,8 +216,10 @@ class ScriptWriter {
         STX_CHECK(statementsUntil([&] { return isMark("}"); }));
         return take("}");
     }
+    /// Statements up to where `end` is true, which is left to the caller; with no mark at their
+    /// end.
     template <class End>
-    Result<void> statementsUntil(const End& end) {
+    Result<void> openStatements(const End& end) {
         while (!end()) {
             if (token_.kind == Kind::end) return noCode("instead of '}'");
             if (isMark(";")) {
@@ -227,6 +229,11 @@ class ScriptWriter {
             out_.flag(true);
             STX_CHECK(statement());
         }
+        return {};
+    }
+    template <class End>
+    Result<void> statementsUntil(const End& end) {
+        STX_CHECK(openStatements(end));
         out_.flag(false);
         return {};
     }
@@ -328,15 +335,7 @@ class ScriptWriter {
         // A block alone is the body itself.
         if (!isMark("{")) return statementsUntil(atEnd);
         STX_CHECK(next());
-        while (!isMark("}")) {
-            if (token_.kind == Kind::end) return noCode("instead of '}'");
-            if (isMark(";")) {
-                STX_CHECK(next());
-                continue;
-            }
-            out_.flag(true);
-            STX_CHECK(statement());
-        }
+        STX_CHECK(openStatements([&] { return isMark("}"); }));
         STX_CHECK(take("}"));
         return statementsUntil(atEnd);
     }

@@ -17,8 +17,9 @@ Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>
     const int w = depth.width(), h = depth.height();
     Image<std::uint8_t> inside(w, h, std::uint8_t{0});
     const auto isTranslucent = [&](int x, int y) {
-        const float alpha = texture.at(x, y).w;
-        return alpha > 0.0f && alpha < 1.0f && hasPoint(depth.at(x, y));
+        const std::size_t texel = static_cast<std::size_t>(y) * w + x;
+        const float alpha = PageSet::alphaOf(texture, texel);
+        return alpha > 0.0f && alpha < 1.0f && hasPoint(depth.data()[texel]);
     };
     parallelFor(kInside, h - kInside, [&](std::int64_t row) {
         const int y = static_cast<int>(row);

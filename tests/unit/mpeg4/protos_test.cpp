@@ -7,38 +7,11 @@
 #include "formats/mpeg4/text/xmt.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
+#include "tests/unit/mpeg4/round_trips.hpp"
 
 namespace stx::mpeg4 {
 namespace {
 
-Document mustReadBt(const std::string& text) {
-    Job job;
-    auto document = readBt(text, "test.bt", job);
-    if (!document) ADD_FAILURE() << document.error().text() << "\n" << text;
-    return document ? std::move(*document) : Document();
-}
-std::string btOf(const Document& document) {
-    Job job;
-    auto text = writeBt(document, job);
-    if (!text) ADD_FAILURE() << text.error().text();
-    return text.value_or("");
-}
-std::string errorOf(const std::string& bt) {
-    Job job;
-    const auto document = readBt(bt, "test.bt", job);
-    return document ? "no error" : document.error().text();
-}
-Document throughMp4(const Document& document, BifsStyle style = {}) {
-    Job job;
-    const auto bytes = writeMp4(document, job, {style});
-    if (!bytes) {
-        ADD_FAILURE() << bytes.error().text();
-        return {};
-    }
-    auto back = readMp4(ByteSource::fromBytes(*bytes), job);
-    if (!back) ADD_FAILURE() << back.error().text();
-    return back ? std::move(*back) : Document();
-}
 Document throughXmt(const Document& document) {
     Job job;
     const auto text = writeXmt(document, job);
@@ -215,13 +188,13 @@ TEST(Script, FieldsAndProgramAreKeptInEveryForm) {
 }
 
 TEST(Script, ErrorsNameWhatIsWrong) {
-    EXPECT_NE(errorOf("Group { children Script { field SFInt32 url 3 } }").find("name is taken"),
+    EXPECT_NE(btErrorOf("Group { children Script { field SFInt32 url 3 } }").find("name is taken"),
               std::string::npos);
-    EXPECT_NE(errorOf("Group { children Script { exposedField SFInt32 a 3 } }").find("the kind"),
+    EXPECT_NE(btErrorOf("Group { children Script { exposedField SFInt32 a 3 } }").find("the kind"),
               std::string::npos);
-    EXPECT_NE(errorOf("Group { children Script { field SFFoo a 3 } }").find("'SFFoo'"),
+    EXPECT_NE(btErrorOf("Group { children Script { field SFFoo a 3 } }").find("'SFFoo'"),
               std::string::npos);
-    EXPECT_NE(errorOf("Group { children Script { eventIn SFInt32 a 3 } }").find("'3'"),
+    EXPECT_NE(btErrorOf("Group { children Script { eventIn SFInt32 a 3 } }").find("'3'"),
               std::string::npos);
 }
 
@@ -303,22 +276,23 @@ TEST(Proto, InstancesShowTheirDepthImages) {
 }
 
 TEST(Proto, ErrorsNameWhatIsWrong) {
-    EXPECT_NE(errorOf("PROTO A [ ] { Group { } } PROTO B [ ] { A { x 1 } } Group { }")
+    EXPECT_NE(btErrorOf("PROTO A [ ] { Group { } } PROTO B [ ] { A { x 1 } } Group { }")
                   .find("A has no field 'x'"),
               std::string::npos);
     EXPECT_NE(
-        errorOf("Group { children Transform { translation IS a } }").find("outside of a PROTO"),
+        btErrorOf("Group { children Transform { translation IS a } }").find("outside of a PROTO"),
         std::string::npos);
-    EXPECT_NE(errorOf("PROTO A [ field SFInt32 a 1 ] { Transform { translation IS a } } Group { }")
-                  .find("SFVec3f and IS a, which is SFInt32"),
+    EXPECT_NE(
+        btErrorOf("PROTO A [ field SFInt32 a 1 ] { Transform { translation IS a } } Group { }")
+            .find("SFVec3f and IS a, which is SFInt32"),
+        std::string::npos);
+    EXPECT_NE(btErrorOf("PROTO Group [ ] { } Group { }").find("no name for a PROTO"),
               std::string::npos);
-    EXPECT_NE(errorOf("PROTO Group [ ] { } Group { }").find("no name for a PROTO"),
-              std::string::npos);
-    EXPECT_NE(errorOf("PROTO A [ ] { A { } } Group { }").find("no node type 'A'"),
+    EXPECT_NE(btErrorOf("PROTO A [ ] { A { } } Group { }").find("no node type 'A'"),
               std::string::npos);
     std::string many;
     for (int i = 0; i < 1100; ++i) many += fmt::format("PROTO P{} [ ] {{ Group {{ }} }} ", i);
-    EXPECT_NE(errorOf(many + "Group { }").find("more than 1000 PROTOs"), std::string::npos);
+    EXPECT_NE(btErrorOf(many + "Group { }").find("more than 1000 PROTOs"), std::string::npos);
     // Each shows the one before twice: 2^40 nodes.
     std::string doubled = "PROTO P0 [ ] { Group { } } ";
     for (int i = 1; i < 40; ++i)

@@ -5,6 +5,7 @@
 #include "formats/mpeg4/container/byte_io.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
+#include "tests/unit/mpeg4/round_trips.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -94,18 +95,6 @@ Document smallScene() {
 }
 std::vector<ObjectDescriptor>& descriptorsOf(Document& document) {
     return std::get<UpdateObjectDescriptors>(document.odFrames.at(0).commands.at(0)).descriptors;
-}
-/// The document as its own .mp4 reads.
-Document throughMp4(const Document& document) {
-    Job job;
-    const auto bytes = writeMp4(document, job);
-    if (!bytes) {
-        ADD_FAILURE() << bytes.error().text();
-        return {};
-    }
-    auto back = readMp4(ByteSource::fromBytes(*bytes), job);
-    if (!back) ADD_FAILURE() << back.error().text();
-    return back ? std::move(*back) : Document();
 }
 
 TEST(Streams, AnEntryThatNobodyKnowsPassesThrough) {

@@ -10,6 +10,7 @@
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
 #include "tests/shared_data.hpp"
+#include "tests/unit/mpeg4/round_trips.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -23,15 +24,6 @@ std::string textOfFile(const fs::path& path) {
     return out.str();
 }
 
-Document mustReadBt(const std::string& text) {
-    Job job;
-    auto document = readBt(text, "test.bt", job);
-    if (!document) {
-        ADD_FAILURE() << document.error().text() << "\n" << text;
-        return {};
-    }
-    return std::move(*document);
-}
 Document mustReadXmt(const std::string& text) {
     Job job;
     auto document = readXmt(text, "test.xmt", job);
@@ -41,22 +33,11 @@ Document mustReadXmt(const std::string& text) {
     }
     return std::move(*document);
 }
-std::string btOf(const Document& document) {
-    Job job;
-    auto text = writeBt(document, job);
-    if (!text) ADD_FAILURE() << text.error().text();
-    return text.value_or("");
-}
 std::string xmtOf(const Document& document) {
     Job job;
     auto text = writeXmt(document, job);
     if (!text) ADD_FAILURE() << text.error().text();
     return text.value_or("");
-}
-std::string errorOf(const std::string& bt) {
-    Job job;
-    const auto document = readBt(bt, "test.bt", job);
-    return document ? "no error" : document.error().text();
 }
 std::string xmtErrorOf(const std::string& xmt) {
     Job job;
@@ -209,60 +190,62 @@ Group { children [   # another { [ "
 }
 
 TEST(Bt, ErrorsSayWhereWhatAndWhatWasExpected) {
-    EXPECT_EQ(errorOf("Group {\n children [\n  Depth { }\n ]\n}"),
+    EXPECT_EQ(btErrorOf("Group {\n children [\n  Depth { }\n ]\n}"),
               "'test.bt':3:3: there is no node type 'Depth' in the table");
-    EXPECT_EQ(errorOf("Group { children [ DepthImage { position 0 0 x } ] }"),
+    EXPECT_EQ(btErrorOf("Group { children [ DepthImage { position 0 0 x } ] }"),
               "'test.bt':1:46: found 'x', expected a number for DepthImage.position");
-    EXPECT_EQ(errorOf("Group { children [ DepthImage { colour 1 } ] }"),
+    EXPECT_EQ(btErrorOf("Group { children [ DepthImage { colour 1 } ] }"),
               "'test.bt':1:33: DepthImage has no field 'colour'");
     EXPECT_EQ(
-        errorOf("Group { children [ SimpleTexture { } ] }"),
+        btErrorOf("Group { children [ SimpleTexture { } ] }"),
         "'test.bt':1:20: SimpleTexture may not stand in Group.children, which takes SF3DNode");
-    EXPECT_EQ(errorOf("Group { children [ DEF A Group { } DEF A Group { } ] }"),
+    EXPECT_EQ(btErrorOf("Group { children [ DEF A Group { } DEF A Group { } ] }"),
               "'test.bt':1:36: DEF 'A' names a second node; the first stands at 'test.bt':1:20");
-    EXPECT_EQ(errorOf("Group { children [ USE A ] }"),
+    EXPECT_EQ(btErrorOf("Group { children [ USE A ] }"),
               "'test.bt':1:20: no node has the DEF name 'A'");
-    EXPECT_EQ(errorOf("Group { children [ \"abc"),
+    EXPECT_EQ(btErrorOf("Group { children [ \"abc"),
               "'test.bt':1:20: a string begins here and has no closing \"");
-    EXPECT_NE(errorOf("Group { children [").find("the end of the file"), std::string::npos);
-    EXPECT_NE(errorOf("").find("empty"), std::string::npos);
-    EXPECT_NE(errorOf("DEF DI DepthImage { }").find("SFTopNode"), std::string::npos);
+    EXPECT_NE(btErrorOf("Group { children [").find("the end of the file"), std::string::npos);
+    EXPECT_NE(btErrorOf("").find("empty"), std::string::npos);
+    EXPECT_NE(btErrorOf("DEF DI DepthImage { }").find("SFTopNode"), std::string::npos);
     EXPECT_NE(
-        errorOf("Group { children [ DEF D DepthImage { } ] } AT 1 { REPLACE D.position BY 1 2 3 }")
+        btErrorOf(
+            "Group { children [ DEF D DepthImage { } ] } AT 1 { REPLACE D.position BY 1 2 3 }")
             .find("replace the whole node"),
         std::string::npos);
-    EXPECT_NE(errorOf("Group { children [ Shape { geometry PROTO } ] }").find("PROTO"),
+    EXPECT_NE(btErrorOf("Group { children [ Shape { geometry PROTO } ] }").find("PROTO"),
               std::string::npos);
 }
 
 TEST(Bt, RefusesNodesThatHoldThemselvesOrNestTooDeeply) {
-    EXPECT_NE(errorOf("DEF A Group { children [ USE A ] }").find("would hold itself"),
+    EXPECT_NE(btErrorOf("DEF A Group { children [ USE A ] }").find("would hold itself"),
               std::string::npos);
-    EXPECT_NE(errorOf("Group { children [ DEF A Group { children [ USE B ] } DEF B Group { "
-                      "children [ USE A ] } ] }")
+    EXPECT_NE(btErrorOf("Group { children [ DEF A Group { children [ USE B ] } DEF B Group { "
+                        "children [ USE A ] } ] }")
                   .find("holds itself"),
               std::string::npos);
     std::string deep;
     for (int i = 0; i < 100000; ++i) deep += "Group{children ";
-    EXPECT_NE(errorOf(deep).find("nest deeper"), std::string::npos);
+    EXPECT_NE(btErrorOf(deep).find("nest deeper"), std::string::npos);
     // Flat in the text, deep in the graph: each group uses the one before.
     std::string chain = "Group { children [ DEF A0 Group { } ";
     for (int i = 1; i < 2000; ++i)
         chain += fmt::format("DEF A{} Group {{ children USE A{} }} ", i, i - 1);
-    EXPECT_NE(errorOf(chain + "] }").find("nest deeper"), std::string::npos);
+    EXPECT_NE(btErrorOf(chain + "] }").find("nest deeper"), std::string::npos);
     std::string forward = "Group { children [ ";
     for (int i = 0; i < 2000; ++i)
         forward += fmt::format("DEF A{} Group {{ children USE A{} }} ", i, i + 1);
-    EXPECT_NE(errorOf(forward + "DEF A2000 Group { } ] }").find("nest deeper"), std::string::npos);
+    EXPECT_NE(btErrorOf(forward + "DEF A2000 Group { } ] }").find("nest deeper"),
+              std::string::npos);
 }
 
 TEST(Bt, DoesNotBelieveTheSizeOfAnImage) {
-    EXPECT_NE(errorOf("Group { children Shape { appearance Appearance { texture PixelTexture { "
-                      "image 4095 4095 4 0 } } } }")
+    EXPECT_NE(btErrorOf("Group { children Shape { appearance Appearance { texture PixelTexture { "
+                        "image 4095 4095 4 0 } } } }")
                   .find("bytes of text follow"),
               std::string::npos);
-    EXPECT_NE(errorOf("Group { children Shape { appearance Appearance { texture PixelTexture { "
-                      "image 1 1 1 256 } } } }")
+    EXPECT_NE(btErrorOf("Group { children Shape { appearance Appearance { texture PixelTexture { "
+                        "image 1 1 1 256 } } } }")
                   .find("an integer of 1 bytes"),
               std::string::npos);
 }
@@ -424,7 +407,7 @@ TEST_P(ReferenceBt, ReadsAndComesBackThroughBothForms) {
     const std::string text = textOfFile(path);
     if (std::string(GetParam()) == "13_transform_root") {
         // A Transform is no top node: another implementation refuses this scene, too.
-        EXPECT_NE(errorOf(text).find("SFTopNode"), std::string::npos);
+        EXPECT_NE(btErrorOf(text).find("SFTopNode"), std::string::npos);
         return;
     }
     const Document d = mustReadBt(text);

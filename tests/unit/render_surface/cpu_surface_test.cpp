@@ -232,8 +232,7 @@ TEST(CpuSurface, ASeeThroughGapStaysOpen) {
     double truth = 0;
     for (int y = 0; y < novel.height; ++y)
         for (int x = 0; x < novel.width; ++x) truth += pixelOf(grille, novel, x, y).a;
-    // Each hole has a rim of 25 pixels; 2 % more coverage is a twelfth of a pixel around it.
-    EXPECT_NEAR(coverage(frame) / truth, 1.0, 0.02);
+    EXPECT_NEAR(coverage(frame) / truth, 1.0, 0.016);
     const glm::dvec3 middle =
         novel.project(glm::inverse(novel.orientation) * (glm::dvec3(0) - novel.position));
     EXPECT_LT(frame.colour.at(static_cast<int>(middle.x), static_cast<int>(middle.y)).a, 0.05f);
