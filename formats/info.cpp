@@ -4,6 +4,7 @@
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
+#include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/open.hpp"
 #include "lib/base/printable.hpp"
@@ -94,6 +95,14 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     return {};
 }
 
+/// Of what moves: frames, duration in seconds, and the rate where it is steady.
+void addTime(Json& out, const Timeline& timeline) {
+    if (!timeline.moves()) return;
+    out["frames"] = timeline.count();
+    out["duration"] = timeline.duration;
+    if (const double rate = timeline.rate(); rate > 0) out["rate"] = rate;
+}
+
 const char* streamKind(const mpeg4::ElementaryStream& stream) {
     switch (stream.objectTypeIndication) {
         case mpeg4::oti::kJpeg:
@@ -123,12 +132,16 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     out["views"] = std::move(views);
     addOrigin(out, bundle.origin);
     if (bundle.bounds) out["bounds"] = boundsJson(*bundle.bounds, bundle.origin);
+    STX_TRY(const auto images, mpeg4::StreamImages::make(document, options.folder, job.limits));
+    STX_TRY(const auto timeline, mpeg4::timelineOf(document, images));
+    addTime(out, timeline);
     auto streams = Json::array();
     const auto add = [&](const mpeg4::ElementaryStream& stream, const std::string& name,
                          const char* kind) {
         std::uint64_t bytes = 0;
         for (const auto& sample : stream.samples) bytes += sample.data.size;
         streams.push_back({{"name", name}, {"kind", kind}, {"bytes", bytes}});
+        if (stream.samples.size() > 1) streams.back()["pictures"] = stream.samples.size();
     };
     if (!document.sceneStream.samples.empty()) add(document.sceneStream, "scene", "bifs");
     if (!document.odStream.samples.empty()) add(document.odStream, "object descriptors", "od");
@@ -199,6 +212,7 @@ Result<void> describeSet(const fs::path& path, Json& out, Job& job) {
     out["imageSet"] = set.kind;
     if (!set.title.empty()) out["title"] = set.title;
     out["frames"] = set.frames;
+    addTime(out, set.timeline);
     auto views = Json::array();
     int missing = 0;
     for (const auto& view : set.views) {
@@ -311,6 +325,11 @@ std::string describeAsText(const Json& info) {
         if (info.contains(key) && !(key == std::string_view("frames") && info[key] == 1))
             out += fmt::format("{}: {}\n", key, text(info[key]));
     }
+    if (info.contains("duration"))
+        out += fmt::format("duration: {:.6g} s{}\n", info["duration"].get<double>(),
+                           info.contains("rate")
+                               ? fmt::format(", {:.6g} frames a second", info["rate"].get<double>())
+                               : "");
     if (info.contains("origin")) out += fmt::format("origin: {}\n", text(info["origin"]));
     if (info.contains("bounds"))
         out += fmt::format("bounds: {} to {}\n", text(info["bounds"]["min"]),

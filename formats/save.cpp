@@ -28,6 +28,10 @@ Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const Save
         return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
                     target.string());
     if (container == FileKind::exr) return writeExrBundle(bundle, target, job, {options.noClobber});
+    return writeMpeg4Bundle(bundle, target, job, mpeg4Scene(options), mpeg4Write(options));
+}
+
+mpeg4::SceneWriteOptions mpeg4Scene(const SaveOptions& options) {
     mpeg4::SceneWriteOptions scene;
     if (options.jpegQuality > 0) {
         scene.texture = mpeg4::SceneWriteOptions::Texture::jpeg;
@@ -35,10 +39,14 @@ Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const Save
     }
     scene.pointTexture = options.pointTexture;
     scene.octreeLevels = options.octreeLevels;
+    return scene;
+}
+
+Mpeg4WriteOptions mpeg4Write(const SaveOptions& options) {
     Mpeg4WriteOptions write;
     write.output.noClobber = options.noClobber;
     write.bifsVersion = options.bifsVersion;
-    return writeMpeg4Bundle(bundle, target, job, scene, write);
+    return write;
 }
 
 Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::path& target,
@@ -50,10 +58,7 @@ Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::p
         options.jpegQuality != 0 || options.pointTexture || options.octreeLevels > 0)
         return std::nullopt;
     STX_TRY(const auto document, readMpeg4(input, job));
-    Mpeg4WriteOptions write;
-    write.output.noClobber = options.noClobber;
-    write.bifsVersion = options.bifsVersion;
-    STX_CHECK(writeMpeg4(document, target, job, write));
+    STX_CHECK(writeMpeg4(document, target, job, mpeg4Write(options)));
     // A presentation need not be a bundle to be converted, so what is wrong with its views is
     // neither an error nor a note here.
     Job quiet;

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "formats/mpeg4/mpeg4.hpp"
 #include "formats/open.hpp"
 #include "formats/stx/options.hpp"
 
@@ -16,6 +17,10 @@ namespace stx {
 /// Bundle::check() says; files; (unsupported) what the container cannot hold.
 [[nodiscard]] Result<void> saveBundle(const Bundle& bundle, const std::filesystem::path& target,
                                       const SaveOptions& options, Job& job);
+
+/// What of the options is about the scene, and about its file.
+[[nodiscard]] mpeg4::SceneWriteOptions mpeg4Scene(const SaveOptions& options);
+[[nodiscard]] Mpeg4WriteOptions mpeg4Write(const SaveOptions& options);
 
 /// Converts one MPEG-4 file into another container without decoding an image: every stream's bytes
 /// pass untouched. Returns what the presentation shows, as a bundle without images (empty when it

@@ -105,8 +105,8 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .group(group);
 }
 
-Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraContext& context,
-                                        Program& program) {
+Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const CameraContext& context,
+                                             Program& program) {
     // An orbit may have a target and an axis.
     const bool pose = !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty()));
     const int ways = (pose ? 1 : 0) + (o.view >= 0 ? 1 : 0) + (o.orbit > 0 ? 1 : 0) +
@@ -134,14 +134,14 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
             return fail(ErrorCode::usage,
                         "--view is {}, but the input has {} reference views, from 0", o.view,
                         context.views.size());
-        return std::vector<Camera>{inPicture(context.views[o.view], size)};
+        return std::vector<NovelCamera>{{inPicture(context.views[o.view], size)}};
     }
     if (!o.cameraFile.empty()) {
         STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job, size));
-        std::vector<Camera> out;
+        std::vector<NovelCamera> out;
         for (auto& c : cameras) {
             c.camera.position -= context.origin;
-            out.push_back(inPicture(c.camera, size));
+            out.push_back({inPicture(c.camera, size), c.time});
         }
         return out;
     }
@@ -172,11 +172,16 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
         target -= context.origin;
     }
     const double radius = context.bounds.radius();
-    if (!pose)
-        return orbitCameras(target, radius,
-                            {std::max(o.orbit, 1), o.elevationDeg * kDegree, o.startDeg * kDegree,
-                             o.arcDeg * kDegree, o.orbitRadius},
-                            lens);
+    if (!pose) {
+        STX_TRY(const auto circle,
+                orbitCameras(target, radius,
+                             {std::max(o.orbit, 1), o.elevationDeg * kDegree, o.startDeg * kDegree,
+                              o.arcDeg * kDegree, o.orbitRadius},
+                             lens));
+        std::vector<NovelCamera> out;
+        for (const Camera& camera : circle) out.push_back({camera});
+        return out;
+    }
     glm::dvec3 eye;
     if (o.eye.empty()) {
         STX_TRY(const auto front, orbitCameras(target, radius, 1, 0.0, lens));
@@ -186,7 +191,7 @@ Result<std::vector<Camera>> makeCameras(const CameraOptions& o, const CameraCont
         eye -= context.origin;
     }
     STX_TRY(const auto camera, cameraAt(eye, target, lens));
-    return std::vector<Camera>{camera};
+    return std::vector<NovelCamera>{{camera}};
 }
 
 Result<int> checkCameraOptions(const CameraOptions& options, const Command& command,

@@ -43,11 +43,17 @@ struct CameraContext {
     std::vector<Camera> views;  ///< of the reference views; empty for a mesh
 };
 
+/// A camera of a picture, and when it is taken, in seconds, where its file says so.
+struct NovelCamera {
+    Camera camera;
+    std::optional<double> time = {};
+};
+
 /// The cameras asked for, in order, counted from the context's origin. Without any camera option:
 /// one from the front, slightly above. Errors (usage) on contradicting options and on views that do
 /// not exist.
-[[nodiscard]] Result<std::vector<Camera>> makeCameras(const CameraOptions& options,
-                                                      const CameraContext& context,
-                                                      Program& program);
+[[nodiscard]] Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& options,
+                                                           const CameraContext& context,
+                                                           Program& program);
 
 }  // namespace stx::tools

@@ -8,6 +8,7 @@
 #include "formats/imagesets/patterns.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
+#include "formats/sequences.hpp"
 #include "lib/capture/capture.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
@@ -26,7 +27,9 @@ struct ConvertOptions {
     int octreeLevels = 0;
     int bifsVersion = 0;
     OpenOptions open;
-    std::string frames;  ///< A-B
+    std::string frames;       ///< A-B
+    bool frameGiven = false;  ///< one frame is asked for
+    bool still = false, moving = false;
     /// Options that were given.
     std::vector<std::string> givenOfMeshes, givenOfSets;
     BatchOptions batch;
@@ -104,6 +107,49 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
     return std::move(bundle);
 }
 
+/// What was converted, for the summary and the report.
+struct Converted {
+    Bundle bundle;  ///< the first frame, without images where nobody needs them
+    Timeline timeline;
+};
+
+/// Frames in time, where the input has them and the target takes them; nothing otherwise.
+Result<std::optional<Converted>> convertSequence(const std::filesystem::path& input,
+                                                 const std::filesystem::path& target,
+                                                 const ConvertOptions& o, Program& program) {
+    if (!holdsSequences(target) || o.frameGiven || o.open.set.refinePoses) return std::nullopt;
+    // A mesh, an atlas and one .exr stand still.
+    if (o.open.set.from.empty()) {
+        const auto kind = recognise(input);
+        if (kind && *kind != FileKind::imageSet && *kind != FileKind::mpeg4) return std::nullopt;
+        if (!kind && !frameName(input.string(), 0)) return std::nullopt;
+    }
+    OpenOptions open = o.open;
+    open.set.texturePattern = open.texture;
+    open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
+    STX_TRY(auto frames, openSequence(input, open, program.job));
+    const bool numbered = frameName(target.filename().string(), 0).has_value();
+    if (!frames->timeline().moves() && !numbered) {
+        // What stands still is read once more, by the way that meshes and atlases take, too: no
+        // pixel has been read of an MPEG-4 file, and of a set the way is the same.
+        (void)program.job.takeNotes();
+        return std::nullopt;
+    }
+    if (const auto bits = o.mesh->depthBits)
+        frames = changed(std::move(frames), [bits = *bits](Bundle& bundle, Job&) -> Result<void> {
+            for (ReferenceView& view : bundle.views) view.depthBits = bits;
+            return {};
+        });
+    noteUnused(input, false, o, program);
+    Converted done;
+    done.timeline = frames->timeline();
+    Job quiet;
+    quiet.limits = program.job.limits;
+    STX_TRY(done.bundle, frames->frame(0, quiet));
+    STX_CHECK(saveSequence(*frames, target, saveOptions(o, program), program.job));
+    return done;
+}
+
 Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                                           const std::filesystem::path& target,
                                           const ConvertOptions& o, Program& program) {
@@ -114,8 +160,13 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     const bool countPoints = !program.common.report.empty();
     STX_TRY(auto bundle, convertDocument(input, target, saveOptions(o, program),
                                          o.mesh->depthBits.has_value(), countPoints, program.job));
+    Timeline timeline;
     if (bundle) {
         noteUnused(input, false, o, program);
+    } else if (auto moving = convertSequence(input, target, o, program); !moving || *moving) {
+        if (!moving) return propagate(moving);
+        bundle = std::move((*moving)->bundle);
+        timeline = std::move((*moving)->timeline);
     } else {
         STX_TRY(bundle, makeBundle(input, o, program));
         STX_CHECK(program.job.checkCancelled());
@@ -126,17 +177,25 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     if (views > 0)
         sizes = fmt::format(", {} {}x{}", counted(views, "view"), bundle->views[0].camera.width,
                             bundle->views[0].camera.height);
+    if (timeline.moves())
+        sizes += fmt::format(", {} over {:.4g} s", counted(timeline.count(), "frame"),
+                             timeline.duration);
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}){}, {}", input.filename().string(),
                             humanBytes(bytesOf(input)), target.filename().string(),
                             humanBytes(bytesOf(target)), sizes, humanSeconds(seconds)));
-    return nlohmann::ordered_json{
+    nlohmann::ordered_json entry{
         {"input", input.string()},  {"output", target.string()},
         {"status", "ok"},           {"exitCode", 0},
         {"views", views},           {"points", countPoints ? bundle->pointCount() : 0},
         {"bytes", bytesOf(target)}, {"seconds", seconds}};
+    if (timeline.moves()) {
+        entry["frames"] = timeline.count();
+        entry["duration"] = timeline.duration;
+    }
+    return entry;
 }
 
 /// One bundle for each frame `A-B` of one set; {frame} in the output's name is the frame.
@@ -200,6 +259,10 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     ConvertOptions o = options;
     o.givenOfMeshes = command.givenUnder(MeshViewOptions::kHeading);
     o.givenOfSets = command.givenUnder(kSetHeading);
+    if (o.still && o.moving)
+        return fail(ErrorCode::usage, "--still and --moving exclude each other; give one");
+    if (o.still || o.moving) o.open.set.moving = o.moving;
+    o.frameGiven = !command.given({"--frame", "--frames"}).empty();
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
     const auto container = containerOf(o.output);
@@ -293,13 +356,22 @@ void addConvert(CommandLine& line, Program& program) {
     c.option("--from", o->open.set.from, "Kind of image set, when the files do not show it")
         .oneOf(kinds)
         .group(sets);
-    c.option("--frame", o->open.set.frame, "Frame of a set that has time, from 0 (default 0)")
+    c.option("--frame", o->open.set.frame,
+             "Only this frame of a set that has time, from 0 (default: all, where OUT takes them)")
         .notNegative()
         .group(sets);
     c.option("--frames", o->frames, "One bundle for each of them; OUT has {frame} in it")
         .takes("A-B")
         .group(sets);
-    c.option("--every", o->open.set.every, "Take each N-th view of a recording (default 1)")
+    c.flag("--still", o->still, "All pictures are of one moment, whatever times they have")
+        .group(sets);
+    c.flag(
+         "--moving", o->moving,
+         "Pictures with times are of a scene that moves: of recordings (TUM), which are taken for "
+         "one moment seen from many sides")
+        .group(sets);
+    c.option("--every", o->open.set.every,
+             "Take each N-th view of a recording, or each N-th frame (default 1)")
         .range(1, 1000000)
         .takes("N")
         .group(sets);

@@ -6,11 +6,13 @@
 
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
+#include "formats/sequences.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/render/renderer.hpp"
 #include "tools/camera_options.hpp"
 #include "tools/commands.hpp"
 #include "tools/frame_writer.hpp"
+#include "tools/picture_times.hpp"
 
 namespace stx::tools {
 namespace {
@@ -18,6 +20,7 @@ namespace {
 struct RenderOptions {
     std::string input, output;
     CameraOptions camera;
+    TimeOptions time;
     Backend backend = Backend::automatic;
     RenderSettings settings;  ///< without the lighting
     std::string background = "none";
@@ -25,7 +28,7 @@ struct RenderOptions {
     std::string ambient = "0.2", specular = "0";
     double shininess = 32;
     std::string fileFormat;
-    std::string framesPerSecond = "25";
+    std::string framesPerSecond;  ///< empty: that of the input, else 25
     int compression = 1;
     bool skipExisting = false, listDevices = false;
     int device = -1;
@@ -107,6 +110,8 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
     if (o.lights.empty())
         STX_CHECK(command.refuse({"--ambient", "--specular", "--shininess"},
                                  "is of lighting; give --light, too"));
+    if (o.time.time)
+        STX_CHECK(command.refuse({"--times"}, "and --time exclude each other; give one"));
     if (o.output != "-")
         STX_CHECK(command.refuse({"--fps"}, "is of a stream on stdout, -o - --file-format y4m"));
     if (const auto format = frameFormat(o.output);
@@ -187,6 +192,87 @@ Result<void> checkFrames(const RenderOptions& o, int count, const Program& progr
     return {};
 }
 
+/// What is drawn.
+struct DrawnScene {
+    Model model;  ///< of what stands still
+    std::unique_ptr<Renderer> still;
+    std::unique_ptr<MovingPictures> moving;
+    CameraContext context;
+    std::int64_t points = 0;
+};
+
+/// Opens the input: as a sequence when times are asked for.
+Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
+                             const Command& command, Program& program) {
+    DrawnScene scene;
+    if (o.time.any()) {
+        STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+        scene.moving = std::make_unique<MovingPictures>(std::move(frames), settings, o.backend,
+                                                        o.device, program.job);
+        STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
+        STX_CHECK(scene.moving->at(times.front(), {}));
+        scene.context.views = scene.moving->views();
+        scene.context.bounds = scene.moving->bounds();
+        scene.context.origin = scene.moving->origin();
+        noteUnused(Bundle(), o, command, program);
+        return scene;
+    }
+    STX_TRY(scene.model, stx::open(o.input, o.open, program.job));
+    noteUnused(scene.model, o, command, program);
+    const auto addViews = [&](const auto& seen) {
+        for (const auto& v : seen.views) scene.context.views.push_back(v.camera);
+        scene.points = seen.pointCount();
+    };
+    if (const auto* mesh = std::get_if<Mesh>(&scene.model)) STX_CHECK(mesh->check());
+    if (const auto* bundle = std::get_if<Bundle>(&scene.model)) addViews(*bundle);
+    if (const auto* atlas = std::get_if<Atlas>(&scene.model)) addViews(*atlas);
+    scene.context.bounds = boundsOf(scene.model);
+    scene.context.origin = originOf(scene.model);
+    return scene;
+}
+
+/// A picture for each camera, for each time, or for each pair of them.
+Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnScene& scene,
+                                            Program& program) {
+    STX_TRY(auto cameras, makeCameras(o.camera, scene.context, program));
+    if (!scene.moving) return cameras;
+    const bool timed =
+        std::ranges::all_of(cameras, [](const auto& c) { return c.time.has_value(); });
+    // `--times cameras`: a file of cameras may say when.
+    if (o.time.times == "cameras") {
+        if (timed) return cameras;
+        return fail(ErrorCode::usage, "--times cameras: the cameras have no times of their own");
+    }
+    STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
+    if (cameras.size() > 1 && times.size() > 1 && cameras.size() != times.size())
+        return fail(ErrorCode::usage,
+                    "{} cameras and {} times; one camera, one time, or as many of both are "
+                    "expected",
+                    cameras.size(), times.size());
+    std::vector<NovelCamera> pictures;
+    for (std::size_t i = 0; i < std::max(cameras.size(), times.size()); ++i) {
+        pictures.push_back(cameras[cameras.size() == 1 ? 0 : i]);
+        pictures.back().time = times[times.size() == 1 ? 0 : i];
+    }
+    return pictures;
+}
+
+/// The camera of a reference view, which may move, in a picture as large as `picture`.
+Camera ofView(const std::vector<Camera>& views, const RenderOptions& o, const Camera& picture) {
+    return inPicture(views[static_cast<std::size_t>(o.camera.view)],
+                     glm::ivec2(picture.width, picture.height));
+}
+
+/// A rate as the nearest fraction that films have.
+std::pair<int, int> rateOf(double rate) {
+    for (const int denominator : {1, 1001, 1000}) {
+        const double numerator = rate * denominator;
+        if (std::abs(numerator - std::round(numerator)) < 1e-4 * numerator)
+            return {static_cast<int>(std::round(numerator)), denominator};
+    }
+    return {static_cast<int>(std::round(rate * 1000)), 1000};
+}
+
 Result<int> render(const RenderOptions& o, const Command& command, Program& program) {
     if (o.listDevices) return printDevices(program);
     if (o.input.empty() || o.output.empty())
@@ -204,46 +290,45 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     writing.pattern = o.output;
     writing.background = background;
     writing.stream = o.fileFormat;
-    STX_TRY(writing.rate, parseRate(o.framesPerSecond));
+    STX_TRY(writing.rate, parseRate(o.framesPerSecond.empty() ? "25" : o.framesPerSecond));
     writing.compression = o.compression;
     writing.noClobber = program.common.noClobber;
     STX_CHECK(FrameWriter::check(writing));
 
     preloadCodecs(o.input);
-    STX_TRY(auto model, stx::open(o.input, o.open, program.job));
-    noteUnused(model, o, command, program);
-    CameraContext context;
-    std::int64_t points = 0;
-    const auto addViews = [&](const auto& seen) {
-        for (const auto& v : seen.views) context.views.push_back(v.camera);
-        points = seen.pointCount();
-    };
-    if (const auto* mesh = std::get_if<Mesh>(&model)) STX_CHECK(mesh->check());
-    if (const auto* bundle = std::get_if<Bundle>(&model)) addViews(*bundle);
-    if (const auto* atlas = std::get_if<Atlas>(&model)) addViews(*atlas);
-    context.bounds = boundsOf(model);
-    context.origin = originOf(model);
+    STX_TRY(auto scene, openScene(o, settings, command, program));
+    CameraContext& context = scene.context;
     for (std::size_t i = 0; i < o.lights.size(); ++i) {
         STX_TRY(settings.lighting.lights[i], parseLight(o.lights[i], context.origin));
     }
-    STX_TRY(const auto cameras, makeCameras(o.camera, context, program));
-    const auto count = static_cast<int>(cameras.size());
+    STX_TRY(const auto pictures, picturesOf(o, scene, program));
+    const auto count = static_cast<int>(pictures.size());
+    if (count > 1 && !frameName(o.output, 0) && o.output != "-")
+        return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
+                    count);
     STX_CHECK(checkFrames(o, count, program));
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-        if (auto ok = cameras[i].check(); !ok)
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+        const Camera& camera = pictures[i].camera;
+        if (auto ok = camera.check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera {}", i)));
         STX_CHECK(program.job.limits.checkAllocation(
-            static_cast<std::uint64_t>(cameras[i].width) * cameras[i].height, 64, "the picture"));
+            static_cast<std::uint64_t>(camera.width) * camera.height, 64, "the picture"));
     }
-    STX_TRY(const auto renderer,
-            rendererOf(std::move(model), settings, program.job, o.backend, o.device));
+    if (scene.moving && o.framesPerSecond.empty())
+        if (const double rate = scene.moving->timeline().rate(); rate > 0 && o.time.times == "all")
+            writing.rate = rateOf(rate);
+    if (!scene.moving) {
+        STX_TRY(scene.still,
+                rendererOf(std::move(scene.model), settings, program.job, o.backend, o.device));
+    }
     program.sayNotes();
 
     FrameWriter writer(writing, program.job);
     auto views = nlohmann::ordered_json::array();
     double total = 0;
     int drawn = 0, empty = 0;
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
+    Renderer* renderer = scene.still.get();
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
         const auto name = writer.nameOf(static_cast<int>(i));
         std::error_code ec;
         if (o.skipExisting && o.output != "-" && std::filesystem::exists(name, ec)) {
@@ -251,9 +336,19 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
             continue;
         }
         STX_CHECK(program.job.checkCancelled());
+        const bool more = !o.skipExisting && i + 1 < pictures.size();
+        Camera camera = pictures[i].camera;
+        if (scene.moving) {
+            auto now = scene.moving->at(*pictures[i].time,
+                                        more ? pictures[i + 1].time : std::optional<double>());
+            if (!now) return tl::unexpected(now.error().at(fmt::format("picture {}", i)));
+            renderer = *now;
+            if (o.camera.view >= 0) camera = ofView(scene.moving->views(), o, camera);
+        } else if (more) {
+            renderer->expect(pictures[i + 1].camera);
+        }
         const auto start = std::chrono::steady_clock::now();
-        if (!o.skipExisting && i + 1 < cameras.size()) renderer->expect(cameras[i + 1]);
-        auto frame = renderer->render(cameras[i]);
+        auto frame = renderer->render(camera);
         if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
         const double milliseconds =
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -261,12 +356,13 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
         total += milliseconds;
         ++drawn;
         views.push_back({{"output", name}, {"milliseconds", milliseconds}});
+        if (scene.moving) views.back()["time"] = *pictures[i].time;
         const auto colours = frame->colour.pixels();
         if (std::all_of(colours.begin(), colours.end(), [](glm::vec4 c) { return !(c.a > 0); }))
             ++empty;
-        STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), cameras[i]));
+        STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), camera));
         program.job.progress(static_cast<std::int64_t>(i) + 1,
-                             static_cast<std::int64_t>(cameras.size()), "rendering");
+                             static_cast<std::int64_t>(pictures.size()), "rendering");
     }
     STX_CHECK(writer.finish());
     if (empty > 0)
@@ -274,17 +370,18 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
             "{} {} nothing: the object is behind or beside the camera; 'stx info' tells its bounds",
             counted(static_cast<std::size_t>(empty), "picture"), empty == 1 ? "shows" : "show"));
     program.sayNotes();
-    program.say(fmt::format(
-        "{} → {}, {} {}x{}, {}{}{}", std::filesystem::path(o.input).filename().string(), o.output,
-        counted(cameras.size(), "picture"), cameras[0].width, cameras[0].height,
-        renderer->backend(), drawn > 0 ? fmt::format(", {:.1f} ms each", total / drawn) : "",
-        drawn < count ? fmt::format(", {} skipped", count - drawn) : ""));
+    program.say(fmt::format("{} → {}, {} {}x{}, {}{}{}",
+                            std::filesystem::path(o.input).filename().string(), o.output,
+                            counted(pictures.size(), "picture"), pictures[0].camera.width,
+                            pictures[0].camera.height, renderer ? renderer->backend() : "",
+                            drawn > 0 ? fmt::format(", {:.1f} ms each", total / drawn) : "",
+                            drawn < count ? fmt::format(", {} skipped", count - drawn) : ""));
     STX_CHECK(
         program.writeReport({{"$schema", "render-report.schema.json"},
-                             {"backend", renderer->backend()},
-                             {"device", renderer->device()},
+                             {"backend", renderer ? renderer->backend() : ""},
+                             {"device", renderer ? renderer->device() : ""},
                              {"mode", settings.mode == RenderMode::splat ? "splat" : "surface"},
-                             {"points", points},
+                             {"points", scene.moving ? scene.moving->points() : scene.points},
                              {"views", views}}));
     return 0;
 }
@@ -304,6 +401,16 @@ void addRender(CommandLine& line, Program& program) {
              ".png, .jpg, .exr, .tif or .webp; name_%04d.png for several; - for a y4m stream")
         .takes("IMAGE");
     addCameraOptions(c, o->camera);
+    c.option("--time", o->time.time,
+             "The moment of an input that moves, in seconds from its start (default 0)")
+        .takes("T")
+        .group("Time");
+    c.option(
+         "--times", o->time.times,
+         "A picture for each frame from A to B seconds, or each STEP seconds between; all: each "
+         "frame; cameras: the times of the --cameras file. With several cameras: as many")
+        .takes("A:B[:STEP]|all|cameras")
+        .group("Time");
     const char* drawing = "Drawing";
     c.choice<Backend>("--backend", o->backend,
                       {{"auto", Backend::automatic},
@@ -370,8 +477,10 @@ void addRender(CommandLine& line, Program& program) {
              "Of .png, 0 to 9: 1 takes least time, 9 makes files a tenth smaller (default 1)")
         .range(0, 9)
         .group(output);
-    c.option("--fps", o->framesPerSecond,
-             "Frame rate written into the stream, as in 30 or 30000/1001 (default 25)")
+    c.option(
+         "--fps", o->framesPerSecond,
+         "Frame rate written into the stream, as in 30 or 30000/1001 (default: of --times all the "
+         "input's, else 25)")
         .takes("RATE")
         .group(output);
     c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")

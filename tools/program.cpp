@@ -285,18 +285,6 @@ Result<glm::ivec2> parseSize(std::string_view text, const Limits& limits) {
     return glm::ivec2(static_cast<int>(width), static_cast<int>(height));
 }
 
-std::optional<std::string> frameName(const std::string& pattern, int frame) {
-    const auto percent = pattern.find('%');
-    if (percent == std::string::npos) return std::nullopt;
-    std::size_t at = percent + 1;
-    int width = 0;
-    while (at < pattern.size() && pattern[at] >= '0' && pattern[at] <= '9' && at - percent < 4)
-        width = width * 10 + (pattern[at++] - '0');
-    if (at >= pattern.size() || pattern[at] != 'd') return std::nullopt;
-    return pattern.substr(0, percent) + fmt::format("{:0{}}", frame, width) +
-           pattern.substr(at + 1);
-}
-
 std::string textOf(const Error& error) {
     std::string where = error.where;
     // `'a': 'a': line 3`, at its beginning, where callers add.

@@ -11,6 +11,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "formats/files/files.hpp"
+#include "formats/files/numbered.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/base/job.hpp"
 #include "tools/progress_line.hpp"
@@ -85,9 +86,6 @@ class Program {
 
 /// A direction: "X,Y,Z", or an axis: "Z", "-Y". Errors (usage) also when it has no length.
 [[nodiscard]] Result<glm::dvec3> parseDirection(std::string_view text, std::string_view option);
-
-/// The file of one frame of a sequence named `name_%04d.png`; nothing when the name has no number.
-[[nodiscard]] std::optional<std::string> frameName(const std::string& pattern, int frame);
 
 /// Error::text() with each file named once: what knows a file's name says it, and so does its
 /// caller.

@@ -15,7 +15,8 @@
 //              pruned views only)
 //   part 0:    stx:version (int) · stx:kind ("bundle") · stx:colour ("sRGB8" or "linear") ·
 //              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d) · stx:origin (v3d; where it
-//              is not 0: added to positions and bounds, gives the world's)
+//              is not 0: added to positions and bounds, gives the world's) · stx:time (double,
+//              seconds; of a frame of a sequence)
 namespace stx {
 
 namespace {
@@ -93,6 +94,7 @@ Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
     first["stx:colour"] = std::string(bundle.views[0].texture.isLinear() ? "linear" : "sRGB8");
     if (!bundle.title.empty()) first["stx:title"] = bundle.title;
     if (bundle.origin != glm::dvec3(0.0)) first["stx:origin"] = bundle.origin;
+    if (bundle.time) first["stx:time"] = *bundle.time;
     const Bounds bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
     if (!bounds.empty()) {
         first["stx:boundsMin"] = bounds.min;

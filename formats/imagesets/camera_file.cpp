@@ -37,7 +37,7 @@ Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>
         }
         if (auto ok = camera.check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("camera '{}'", view.name)).at(where));
-        out.push_back({view.name, camera});
+        out.push_back({view.name, camera, view.time});
     }
     if (sizeMissing && !size)
         job.note(fmt::format("{} does not tell the images' size; 512x512 is used", where));

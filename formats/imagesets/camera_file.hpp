@@ -13,6 +13,7 @@ namespace stx {
 struct NamedCamera {
     std::string name;
     Camera camera;
+    std::optional<double> time = {};  ///< seconds, where the file says it
 };
 
 /// The cameras of a file, in its order, without any image: transforms.json (NeRF, nerfstudio,

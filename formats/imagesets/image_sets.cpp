@@ -5,6 +5,7 @@
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/motion.hpp"
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
@@ -134,30 +135,16 @@ void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
         origin.x, origin.y, origin.z));
 }
 
-}  // namespace
-
-Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
-                            Job& job) {
-    STX_CHECK(checkOptions(options));
-    STX_TRY(SetDescription set, describeSet(path, options, job));
-    const std::string where = inQuotes(path.string());
+/// The views of a described frame.
+Result<Bundle> readViews(SetDescription set, const std::string& where,
+                         const ImageSetOptions& options, Job& job) {
     useOrigin(set);
-    if (options.every > 1) {
-        std::vector<SetView> some;
-        for (std::size_t i = 0; i < set.views.size(); i += static_cast<std::size_t>(options.every))
-            some.push_back(std::move(set.views[i]));
-        set.views = std::move(some);
-    }
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
     STX_CHECK(dropMissing(set, options.strict, job));
     for (const SetView& view : set.views)
         for (const PictureSource* source : {&view.texture, &view.depth})
             if (source->missing) return tl::unexpected(*source->missing);
-    if (options.frame >= set.frames)
-        return failAt(where, ErrorCode::invalidInput,
-                      "frame {} is asked for, but the set has {} (from 0)", options.frame,
-                      set.frames);
     STX_CHECK(checkViewCount(set.views.size(), job.limits, where));
     std::uint64_t pixels = 0;
     for (const SetView& view : set.views)
@@ -203,11 +190,115 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     return bundle;
 }
 
+/// Each N-th view of a set, or each N-th moment of one that moves.
+void takeEvery(SetDescription& set, Motion& motion, int every) {
+    if (every <= 1) return;
+    const auto thin = [every](auto& all) {
+        std::remove_reference_t<decltype(all)> some;
+        for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(every))
+            some.push_back(std::move(all[i]));
+        all = std::move(some);
+    };
+    if (motion.moves())
+        thin(motion.times);
+    else
+        thin(set.views);
+}
+
+/// A set whose moments are in its description, or one that is described again for each frame.
+class SetSequence : public Sequence {
+  public:
+    SetSequence(std::filesystem::path path, ImageSetOptions options, SetDescription set,
+                Motion motion)
+        : path_(std::move(path)),
+          options_(std::move(options)),
+          set_(std::move(set)),
+          motion_(std::move(motion)) {
+        if (motion_.moves()) {
+            timeline_ = motion_.timeline();
+        } else if (set_.frames > 1) {
+            const int count = (set_.frames + options_.every - 1) / options_.every;
+            timeline_ = steadyTimeline(count, set_.rate / options_.every);
+        }
+        // One origin for all frames, from what is known before a pixel is read.
+        if (set_.origin) return;
+        Bounds places;
+        for (const SetView& view : set_.views) places.add(view.camera.position);
+        if (!places.empty())
+            if (const auto origin = originFor(places); origin != glm::dvec3(0.0))
+                set_.origin = origin;
+    }
+
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        SetDescription now;
+        if (motion_.moves()) {
+            now = motion_.moment(set_, index);
+        } else {
+            ImageSetOptions options = options_;
+            options.frame = static_cast<int>(index) * options_.every;
+            STX_TRY(now, describeSet(path_, options, job));
+            if (set_.origin) now.origin = set_.origin;
+        }
+        STX_TRY(auto bundle, readViews(std::move(now), inQuotes(path_.string()), options_, job));
+        bundle.time = timeline_.times[index];
+        return bundle;
+    }
+
+  private:
+    std::filesystem::path path_;
+    ImageSetOptions options_;
+    SetDescription set_;
+    Motion motion_;
+};
+
+}  // namespace
+
+Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
+                            Job& job) {
+    STX_CHECK(checkOptions(options));
+    STX_TRY(SetDescription set, describeSet(path, options, job));
+    const std::string where = inQuotes(path.string());
+    STX_TRY(Motion motion, within(where, motionOf(set, options)));
+    takeEvery(set, motion, options.every);
+    const auto frames = motion.moves() ? static_cast<int>(motion.times.size()) : set.frames;
+    if (options.frame >= frames)
+        return failAt(where, ErrorCode::invalidInput,
+                      "frame {} is asked for, but the set has {} (from 0)", options.frame, frames);
+    if (!motion.moves()) return readViews(std::move(set), where, options, job);
+    if (options.frame == 0)
+        job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
+                             motion.times.size(), motion.times.back()));
+    STX_TRY(auto bundle, readViews(motion.moment(set, static_cast<std::size_t>(options.frame)),
+                                   where, options, job));
+    bundle.time = motion.times[static_cast<std::size_t>(options.frame)];
+    return bundle;
+}
+
+Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,
+                                               const ImageSetOptions& options, Job& job) {
+    STX_CHECK(checkOptions(options));
+    if (options.refinePoses)
+        return fail(ErrorCode::usage,
+                    "--refine-poses moves the cameras of one moment; give --frame N or --still");
+    STX_TRY(SetDescription set, describeSet(path, options, job));
+    const std::string where = inQuotes(path.string());
+    STX_TRY(Motion motion, within(where, motionOf(set, options)));
+    takeEvery(set, motion, options.every);
+    if (set.views.empty())
+        return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+    if (set.frames == 1 && !motion.moves()) {
+        STX_TRY(auto still, readViews(std::move(set), where, options, job));
+        return sequenceOf(std::move(still));
+    }
+    return std::make_unique<SetSequence>(path, options, std::move(set), std::move(motion));
+}
+
 Result<int> imageSetFrameCount(const std::filesystem::path& path, const ImageSetOptions& options,
                                Job& job) {
     STX_CHECK(checkOptions(options));
     STX_TRY(const SetDescription set, describeSet(path, options, job));
-    return set.frames;
+    STX_TRY(const Motion motion, within(inQuotes(path.string()), motionOf(set, options)));
+    return motion.moves() ? static_cast<int>(motion.times.size()) : set.frames;
 }
 
 }  // namespace stx

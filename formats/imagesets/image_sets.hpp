@@ -1,12 +1,15 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/sequence.hpp"
 
 /// Photographs with depth and cameras, as other programs leave them. Axes, pixel centres and the
 /// meaning of depth of every kind: formats/imagesets/README.md.
@@ -41,7 +44,10 @@ struct YuvColour {
 struct ImageSetOptions {
     std::string from;  ///< one of imageSetKinds(); empty = recognise
     int frame = 0;     ///< of sets that have time, from 0
-    int every = 1;     ///< takes each N-th view, for recordings of thousands
+    /// Pictures with times are of a scene that moves; else all are views of one moment. Without a
+    /// value: as the kind of set usually is (recordings of a moving camera are of one moment).
+    std::optional<bool> moving;
+    int every = 1;  ///< takes each N-th view, for recordings of thousands
     /// A view whose files are missing is an error, not a note (transforms, TUM, 7-Scenes).
     bool strict = false;
     /// Depth range that the set itself does not have (MSR), scene units; 0, 0 = not given.
@@ -80,13 +86,21 @@ struct ImageSetKind {
 /// io when there is nothing, invalidInput when it is not an image set, with what was looked for.
 [[nodiscard]] Result<std::string> recogniseImageSet(const std::filesystem::path& path);
 
-/// Reads one frame of a set. Cameras are exact; lens distortion and skew are undone and rotations
+/// Reads one frame of a set; of a set that moves frame 0, with a note, when none is asked for.
+/// Cameras are exact; lens distortion and skew are undone and rotations
 /// repaired, with a note of their size in pixels. Pixels of unknown depth do not belong to the
 /// object; nearPlane and farPlane of each view are fitted. Several views at a time, in the memory
 /// of one per thread beside the bundle. Errors: io, usage (an option that this kind needs or does
 /// not have), invalidInput with file and line or key.
 [[nodiscard]] Result<Bundle> readImageSet(const std::filesystem::path& path,
                                           const ImageSetOptions& options, Job& job);
+
+/// All frames of a set, one of a set without time. Which pictures belong to one camera the set says
+/// (`camera` of transforms.json); else those of one pose do, and where no pose comes twice, one
+/// camera moves. Errors as readImageSet(); (usage) refinePoses, which is of one moment.
+[[nodiscard]] Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,
+                                                             const ImageSetOptions& options,
+                                                             Job& job);
 
 /// Frames of a set that has time, 1 for others.
 [[nodiscard]] Result<int> imageSetFrameCount(const std::filesystem::path& path,

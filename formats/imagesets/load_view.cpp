@@ -189,6 +189,33 @@ Distances scaledIntegers(double unit, float alsoNone) {
     };
 }
 
+Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone) {
+    return [=](Image<float>& values, const Camera&, int bits, Job& job) -> Result<void> {
+        if (bits == 32) return {};
+        const double largest = (1 << bits) - 1;
+        const bool endless = std::isinf(farthest);
+        bool atInfinity = false;
+        for (float& v : values.pixels()) {
+            if (v == 0 && zeroIsNone) {
+                v = kNoDepth;
+                continue;
+            }
+            double s = v / largest;
+            if (endless && s == 0) {
+                // The nearest distance that has this code.
+                s = 0.5 / largest;
+                atInfinity = true;
+            }
+            v = static_cast<float>(
+                endless ? nearest / s : nearest * farthest / (nearest + s * (farthest - nearest)));
+        }
+        if (atInfinity)
+            job.note(fmt::format("points at infinity are put to {:g} scene units",
+                                 2 * largest * nearest));
+        return {};
+    };
+}
+
 Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSetOptions& options,
                                                Job& job) {
     STX_CHECK(job.checkCancelled());

@@ -16,6 +16,7 @@ namespace {
 constexpr double kRadian = glm::pi<double>() / 180.0;
 /// A far distance of this or more means infinity.
 constexpr double kInfinity = 1000;
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 struct MivDepth {
     double nearest = 0, farthest = 0;
@@ -38,34 +39,6 @@ Result<MivDepth> depthOf(const Json& camera, const std::string& where) {
         d.invalidZero = it->get<bool>();
     }
     return d;
-}
-
-/// Normalised disparity: s = code / (2^bits - 1).
-auto distancesOf(MivDepth depth) {
-    return [depth](Image<float>& values, const Camera&, int bits, Job& job) -> Result<void> {
-        if (bits == 32) return {};
-        const double largest = (1 << bits) - 1;
-        const bool endless = depth.farthest >= kInfinity;
-        const double n = depth.nearest, f = depth.farthest;
-        bool atInfinity = false;
-        for (float& v : values.pixels()) {
-            if (v == 0 && depth.invalidZero) {
-                v = kNoDepth;
-                continue;
-            }
-            double s = v / largest;
-            if (endless && s == 0) {
-                // The nearest distance that has this code.
-                s = 0.5 / largest;
-                atInfinity = true;
-            }
-            v = static_cast<float>(endless ? n / s : n * f / (n + s * (f - n)));
-        }
-        if (atInfinity)
-            job.note(
-                fmt::format("points at infinity are put to {:g} scene units", 2 * largest * n));
-        return {};
-    };
 }
 
 Result<void> setProjection(const Json& c, const std::string& where, SetView& view) {
@@ -358,7 +331,9 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         STX_TRY(view.depth,
                 within(place, sourceOf(depth, forDepth, isNumbered(options.depthPattern), frames,
                                        job.limits)));
-        view.distances = distancesOf(range);
+        view.distances = normalisedDisparity(
+            range.nearest, range.farthest >= kInfinity ? kEndless : range.farthest,
+            range.invalidZero);
         if (set.views.empty() &&
             (isNumbered(options.texturePattern) || isNumbered(options.depthPattern))) {
             Search nextTexture = forTexture, nextDepth = forDepth;
@@ -378,6 +353,10 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
                       "no camera has both a texture and a depth image beside the file (such as "
                       "NAME_color.png and NAME_depth16.png, or NAME_texture_WxH_FORMAT.yuv)");
     set.frames = std::max(frames, 1);
+    STX_TRY(const auto rate, within(where, findNumber(json, "Fps", "")));
+    if (rate && !(*rate > 0))
+        return failAt(where, ErrorCode::invalidInput, "'Fps' is {:g}; it must be above 0", *rate);
+    set.rate = rate.value_or(set.rate);
     return set;
 }
 

@@ -16,6 +16,8 @@
 namespace stx::imagesets {
 namespace {
 
+constexpr double kMsrRate = 15;  ///< frames a second of Breakdancers and Ballet
+
 constexpr std::size_t kNumbersPerCamera = 24;  // index, 3x3, 2, 3x4
 
 std::vector<std::string> usualNames(const char* what, const std::string& name, int frame) {
@@ -198,6 +200,7 @@ Result<SetDescription> describeMsr(const path& given, const ImageSetOptions& opt
                    firstThere(folder, names(options.depthPattern, "depth", frames)) != depth)
                 ++frames;
             set.frames = frames;
+            set.rate = kMsrRate;
         }
     }
     if (set.views.empty())

@@ -58,6 +58,10 @@ struct SetView {
 
     Distances distances;  ///< null: the stored values are distances already
 
+    /// When it was taken, in seconds, and by which camera (empty: the set does not say).
+    std::optional<double> time;
+    std::string taker;
+
     bool sensor = false;    ///< mixed pixels at depth edges are to be expected
     bool measured = false;  ///< stereo's disparities, whose edges lie beside the picture's
     /// Planes and code of an export of ours; used when they hold all points.
@@ -73,7 +77,9 @@ struct SetDescription {
     std::optional<glm::dvec3>
         origin;  ///< of an export of ours; cameras are in the world all the same
     std::vector<SetView> views;
+    /// Of sets whose views are those of ImageSetOptions::frame; of others, motionOf() finds them.
     int frames = 1;
+    double rate = 25;  ///< frames a second, where the set has frames without times
 };
 
 /// Reads the images of one view and does what is common to all kinds: sizes, lens, mixed pixels,
@@ -88,5 +94,10 @@ void dropImpossible(Image<float>& distances);
 
 /// Distances of integers in steps of `unit`; 0 and `alsoNone` are none.
 [[nodiscard]] Distances scaledIntegers(double unit, float alsoNone = 0);
+
+/// Distances of normalised disparity: s = code / (2^bits - 1), 1 at `nearest` and 0 at `farthest`
+/// (scene units; infinity: 1 / distance from 0). 0 is none where `zeroIsNone`. Floats are distances
+/// already.
+[[nodiscard]] Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone);
 
 }  // namespace stx::imagesets

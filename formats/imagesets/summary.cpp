@@ -3,6 +3,7 @@
 #include <set>
 
 #include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/motion.hpp"
 #include "formats/imagesets/pictures.hpp"
 
 namespace stx {
@@ -30,7 +31,12 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
     }
     if (!described) return propagate(described);
     summary.title = std::move(described->title);
-    summary.frames = described->frames;
+    STX_TRY(const Motion motion, motionOf(*described, options));
+    summary.frames = motion.moves() ? static_cast<int>(motion.times.size()) : described->frames;
+    if (motion.moves())
+        summary.timeline = motion.timeline();
+    else if (described->frames > 1)
+        summary.timeline = steadyTimeline(described->frames, described->rate);
     std::set<std::filesystem::path> counted;
     for (const SetView& view : described->views) {
         ImageSetSummary::View out;

@@ -6,6 +6,7 @@
 
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
+#include "lib/model/sequence.hpp"
 
 namespace stx {
 
@@ -22,7 +23,8 @@ struct ImageSetSummary {
     };
     std::string kind;  ///< one of imageSetKinds()
     std::string title;
-    int frames = 1;  ///< of sets that have time
+    int frames = 1;     ///< of sets that have time
+    Timeline timeline;  ///< theirs
     std::vector<View> views;
     std::uint64_t bytes = 0;  ///< of all files that the views name
     /// The kind needs options of `convert` for its cameras (--focal, --intrinsics): cameras here

@@ -151,6 +151,23 @@ Result<void> setPose(const Json& frame, const std::string& where, SetView& view,
     return {};
 }
 
+/// When, and by which camera: `time` in seconds, else `frame` by the file's `fps`; `camera`.
+Result<void> setTime(const Json& file, const Json& frame, const std::string& where, SetView& view) {
+    STX_TRY(view.time, findNumber(frame, "time", where));
+    STX_TRY(const auto rate, findNumber(file, "fps", where));
+    STX_TRY(const auto number, findNumber(frame, "frame", where));
+    if (rate && !(*rate > 0))
+        return failAt(where, ErrorCode::invalidInput, "'fps' is {:g}; it must be above 0", *rate);
+    if (!view.time && number && rate) view.time = *number / *rate;
+    if (const auto it = frame.find("camera"); it != frame.end()) {
+        if (it->is_string())
+            view.taker = it->get<std::string>();
+        else if (it->is_number_integer())
+            view.taker = fmt::format("camera{}", it->get<std::int64_t>());
+    }
+    return {};
+}
+
 std::string nameOfFrame(const std::string& filePath) {
     return path(filePath).replace_extension().generic_string();
 }
@@ -164,6 +181,26 @@ auto distancesOf(double unit) {
                         "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
         return scaledIntegers(unit)(values, camera, bits, job);
     };
+}
+
+/// `depth_coding` of a file whose integers are not distances: normalised disparity between `near`
+/// and `far`, with `none` (0) for what is unknown.
+Result<std::optional<Distances>> codedDistances(const Json& file, const std::string& where) {
+    const auto it = file.find("depth_coding");
+    if (it == file.end()) return std::nullopt;
+    const std::string place = where + ": 'depth_coding'";
+    if (!it->is_object() || it->value("normalised_disparity", Json()) != Json(true))
+        return failAt(place, ErrorCode::invalidInput,
+                      "{{\"normalised_disparity\": true, \"near\": N, \"far\": F}} is expected; "
+                      "leave it out where depth is a distance (integer_depth_scale)");
+    STX_TRY(const auto nearest, findNumber(*it, "near", place));
+    STX_TRY(const auto farthest, findNumber(*it, "far", place));
+    STX_TRY(const auto none, findNumber(*it, "none", place));
+    if (!nearest || !farthest || !(*nearest > 0 && *farthest > *nearest))
+        return failAt(place, ErrorCode::invalidInput, "'near' and 'far' must be 0 < near < far");
+    if (none.value_or(0) != 0)
+        return failAt(place, ErrorCode::unsupported, "'none' is {:g}; only 0 is read", *none);
+    return normalisedDisparity(*nearest, *farthest, none.has_value());
 }
 
 }  // namespace
@@ -183,6 +220,7 @@ Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
         STX_CHECK(setIntrinsics(file, frame, where, view));
         STX_CHECK(setPose(frame, where, view, job));
         STX_CHECK(readOwnKeys(frame, where, view));
+        STX_CHECK(setTime(file, frame, where, view));
         if (!view.exactName.empty()) view.name = view.exactName;
         if (view.camera.width > 0)
             if (auto ok = view.camera.check(); !ok) return tl::unexpected(ok.error().at(where));
@@ -213,6 +251,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     if (!(unit > 0))
         return failAt(where, ErrorCode::invalidInput,
                       "the depth's scale is {:g}; it must be above 0", unit);
+    STX_TRY(const auto coded, codedDistances(json, where));
     for (std::size_t i = 0; i < set.views.size(); ++i) {
         SetView& view = set.views[i];
         const Json& frame = json["frames"][i];
@@ -229,7 +268,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
                           "'depth_file_path' is missing; each frame needs its depth");
         STX_CHECK(findPictures(folder, textureFile, withImageEnding(folder, *depth), place,
                                job.limits, view));
-        view.distances = distancesOf(unit);
+        view.distances = coded ? *coded : distancesOf(unit);
     }
     return set;
 }

@@ -16,6 +16,8 @@ struct Bundle {
     glm::dvec3 origin{0.0};
     /// World bounds of all points, when known (WorldInfo, an EXR attribute).
     std::optional<Bounds> bounds;
+    /// Of a moment of a sequence: seconds from the sequence's start (Sequence).
+    std::optional<double> time;
 
     /// "SimpleTextureV2" when a view carries normals or splats, else "SimpleTexture".
     [[nodiscard]] const char* nodeKind() const;

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <string_view>
+#include <vector>
 
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/scene/document.hpp"
@@ -69,6 +70,9 @@ struct SceneWriteOptions {
     bool pointTexture = false;
     /// OctreeImage of so many levels instead of depth images, see octree_write.hpp; 0: none.
     int octreeLevels = 0;
+    /// Range of each view's splats in scene units, of a sequence whose frames share it; empty or 0:
+    /// the largest that the view has.
+    std::vector<float> splatRanges;
 };
 
 /// A presentation of a bundle: Group { WorldInfo, DepthImage..., Viewpoint, NavigationInfo }, the

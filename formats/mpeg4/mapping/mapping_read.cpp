@@ -8,6 +8,7 @@
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/octree.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
+#include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mapping/stream_images.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
@@ -16,6 +17,9 @@
 
 namespace stx::mpeg4 {
 namespace {
+
+/// Appended to what is said of things that move.
+constexpr const char* kOthers = " (stx render --time and --times show the rest)";
 
 /// A view before its pixels are there.
 struct Plan {
@@ -32,15 +36,8 @@ class BundleReader {
     BundleReader(const Document& document, const SceneReadOptions& options, Job& job)
         : document_(document), options_(options), job_(job) {}
 
-    Result<Bundle> read() {
-        if (document_.frames.empty())
-            return fail(ErrorCode::invalidInput, "the presentation has no scene");
-        const std::uint64_t start = document_.frames.front().time;
-        if (document_.frames.size() > 1)
-            job_.note(
-                fmt::format("the scene changes {} time(s) after its start; only its start is read",
-                            document_.frames.size() - 1));
-        STX_TRY(const auto scene, composeScene(document_.frames, start));
+    /// The object as a scene has it. With `still`, says what moves: the moment is all that is read.
+    Result<Bundle> read(const Scene& scene, const StreamImages& images, bool still) {
         STX_TRY(const auto shown, shownScene(scene.root, job_.limits));
         if (!shown.leftOut.empty())
             job_.note(fmt::format("the scene has nodes that are no views; they are left out: {}",
@@ -56,13 +53,12 @@ class BundleReader {
             nothing.title = shown.title;
             return nothing;
         }
-        noteMotion(scene, shown);
+        if (still) noteMotion(scene, shown);
         if (plans.empty())
             return fail(ErrorCode::invalidInput,
                         "the scene shows no DepthImage with a texture; there is nothing to see");
 
         std::vector<Result<std::vector<ReferenceView>>> read(plans.size());
-        STX_TRY(const auto images, StreamImages::make(document_, options_.folder, job_.limits));
         images_ = &images;
         if (options_.pixels) STX_CHECK(checkMemory(plans));
         parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
@@ -167,13 +163,18 @@ class BundleReader {
             std::count_if(scene.routes.begin(), scene.routes.end(),
                           [&](const Route& route) { return inViews.contains(route.to.get()); });
         if (routes > 0)
-            job_.note(fmt::format("{} ROUTE(s) change the views in time; only their start is read",
-                                  routes));
+            job_.note(
+                fmt::format("{} ROUTE(s) change the views in time; only their start is read{}",
+                            routes, kOthers));
         if (!moving.empty())
             job_.note(
                 fmt::format("{} image(s) of the views have several pictures in time; only "
-                            "the first of each is read",
-                            moving.size()));
+                            "the first of each is read{}",
+                            moving.size(), kOthers));
+        if (document_.frames.size() > 1)
+            job_.note(fmt::format(
+                "the scene changes {} time(s) after its start; only its start is read{}",
+                document_.frames.size() - 1, kOthers));
     }
 
     std::string freeName(const NodePtr& node, const ViewNotes& notes) {
@@ -462,7 +463,17 @@ class BundleReader {
 
 Result<Bundle> bundleFromScene(const Document& document, const SceneReadOptions& options,
                                Job& job) {
-    return BundleReader(document, options, job).read();
+    if (document.frames.empty())
+        return fail(ErrorCode::invalidInput, "the presentation has no scene");
+    STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
+    STX_TRY(const auto images, StreamImages::make(document, options.folder, job.limits));
+    return BundleReader(document, options, job).read(scene, images, true);
+}
+
+Result<Bundle> bundleOfMoment(const Document& document, const Scene& scene,
+                              const StreamImages& images, const SceneReadOptions& options,
+                              Job& job) {
+    return BundleReader(document, options, job).read(scene, images, false);
 }
 
 const char* nodeKindOf(const Document& document) {

@@ -5,36 +5,13 @@
 #include "formats/mpeg4/mapping/octree_write.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
+#include "formats/mpeg4/mapping/view_images.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/mpeg4/text/text_fields.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::mpeg4 {
 namespace {
-
-/// The nearest float that is not above (below) a value: planes must keep what lies between them.
-float floatBelow(double v) {
-    const float f = static_cast<float>(v);
-    return static_cast<double>(f) > v ? std::nextafter(f, -std::numeric_limits<float>::infinity())
-                                      : f;
-}
-float floatAbove(double v) {
-    const float f = static_cast<float>(v);
-    return static_cast<double>(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity())
-                                      : f;
-}
-
-/// The encoded images of one view.
-struct ViewImages {
-    Padding padding;
-    float nearPlane = 0, farPlane = 0;
-    float longestSplat = 0;
-    Bytes texture, depth, normal, splatU, splatV;
-    std::string pruned;  ///< of a pruned view: what its note says
-    double worstDepth = 0;
-    bool clamped = false;
-    bool coverageLost = false;
-};
 
 class SceneWriter {
   public:
@@ -88,20 +65,20 @@ class SceneWriter {
         return fmt::format("view {} '{}'", i, bundle_.views[i].name);
     }
     [[nodiscard]] bool isV2(const ReferenceView& view) const {
-        if (options_.nodes == SceneWriteOptions::Nodes::automatic)
-            return view.hasNormals() || view.hasSplats();
-        return options_.nodes == SceneWriteOptions::Nodes::v2;
+        return isWrittenAsV2(view, options_);
     }
     [[nodiscard]] int bitsOf(const ReferenceView& view) const {
-        if (options_.depthBits != 0) return options_.depthBits;
-        return view.depthBits == 8 ? 8 : 16;
+        return writtenDepthBits(view, options_);
     }
 
     Result<NodeList> depthImages(ViewNotes& notes) {
         std::vector<Result<ViewImages>> images(bundle_.views.size());
         parallelFor(0, static_cast<std::int64_t>(bundle_.views.size()), [&](std::int64_t i) {
             const auto at = static_cast<std::size_t>(i);
-            if (!job_.cancelled) images[at] = encode(bundle_.views[at]);
+            if (!job_.cancelled)
+                images[at] =
+                    encodeView(bundle_.views[at], options_, job_.limits,
+                               at < options_.splatRanges.size() ? options_.splatRanges[at] : 0);
         });
         STX_CHECK(job_.checkCancelled());
         NodeList children;
@@ -256,61 +233,6 @@ class SceneWriter {
                isLayerOf(bundle_.views[first + n], bundle_.views[first]))
             ++n;
         return n;
-    }
-
-    Result<ViewImages> encode(const ReferenceView& view) const {
-        ViewImages out;
-        STX_TRY(out.padding,
-                centringPadding(view.camera, std::min(job_.limits.maxImageSide, 65535)));
-        out.nearPlane = floatBelow(view.nearPlane);
-        out.farPlane = floatAbove(view.farPlane);
-        if (!std::isfinite(out.farPlane) || !(out.nearPlane < out.farPlane))
-            return fail(ErrorCode::unsupported,
-                        "nearPlane {:g} and farPlane {:g} do not fit 32-bit floats", view.nearPlane,
-                        view.farPlane);
-        const DepthCode code{out.nearPlane, out.farPlane, bitsOf(view) == 8 ? 255u : 65535u};
-        if (options_.pointTexture) {
-            for (const float d : view.depth.pixels()) {
-                if (!(d >= 0)) return depthError(d);
-                if (hasPoint(d))
-                    out.worstDepth =
-                        std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
-            }
-            const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
-            out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
-            if (view.pruned) {
-                STX_TRY(out.pruned, prunedMask(colour, view.depth));
-            }
-            return out;
-        }
-        STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
-        const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
-        const bool alpha = !alphaFollowsDepth(colour, view.depth);
-        if (view.pruned) out.pruned = kPrunedInAlpha;
-        const Rgba8Image wide = padded(colour, out.padding);
-        if (options_.texture == SceneWriteOptions::Texture::jpeg) {
-            out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
-            if (view.pruned) {
-                STX_TRY(out.pruned, prunedMask(colour, view.depth));
-            }
-            STX_TRY(out.texture, colourJpeg(wide, options_.jpegQuality));
-        } else {
-            STX_TRY(out.texture, colourPng(wide, alpha));
-        }
-        if (!isV2(view)) return out;
-        if (view.hasNormals()) {
-            STX_TRY(out.normal, normalPng(view.normal, options_.normalBits, out.padding));
-        }
-        if (view.hasSplats()) {
-            out.longestSplat =
-                std::max(largestComponent(view.splatU), largestComponent(view.splatV));
-            if (!(out.longestSplat > 0)) out.longestSplat = 1;
-            STX_TRY(out.splatU,
-                    splatPng(view.splatU, out.longestSplat, options_.normalBits, out.padding));
-            STX_TRY(out.splatV,
-                    splatPng(view.splatV, out.longestSplat, options_.normalBits, out.padding));
-        }
-        return out;
     }
 
     /// A name that every text form can hold, and that no other view has.

@@ -1,5 +1,7 @@
 #include "formats/mpeg4/mapping/stream_images.hpp"
 
+#include <algorithm>
+
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 
@@ -18,15 +20,43 @@ Result<StreamImages> StreamImages::make(const Document& document,
     StreamImages images;
     images.folder_ = folder;
     images.limits_ = limits;
-    for (const ObjectDescriptor* od : document.objectDescriptors()) images.byId_[od->id] = od;
-    if (!document.frames.empty() && !document.odFrames.empty()) {
-        const double start =
-            static_cast<double>(document.frames[0].time) / document.sceneStream.timescale;
-        const auto ticks = static_cast<std::uint64_t>(start * document.odStream.timescale);
-        for (const ObjectDescriptor* od : document.objectDescriptors(ticks))
-            images.byId_[od->id] = od;
-    }
+    images.document_ = &document;
+    double start = 0;
+    if (!document.frames.empty())
+        start = static_cast<double>(document.frames[0].time) / document.sceneStream.timescale;
+    images.byId_.clear();
+    images.setTime(start);
+    // Found before threads ask for them.
+    for (const OdFrame& frame : document.odFrames)
+        for (const OdCommand& command : frame.commands)
+            if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command))
+                for (const ObjectDescriptor& od : update->descriptors)
+                    for (const ElementaryStream& stream : od.streams)
+                        if (stream.samples.size() > 1) (void)images.presentation(stream);
     return images;
+}
+
+void StreamImages::setTime(double now) {
+    now_ = now;
+    const Document& document = *document_;
+    if (!byId_.empty() && document.odFrames.size() <= 1) return;
+    for (const ObjectDescriptor* od : document.objectDescriptors()) byId_[od->id] = od;
+    if (document.odFrames.empty()) return;
+    const auto ticks =
+        static_cast<std::uint64_t>(std::max(0.0, now) * document.odStream.timescale + 0.5);
+    for (const ObjectDescriptor* od : document.objectDescriptors(ticks)) byId_[od->id] = od;
+}
+
+const Presentation& StreamImages::presentation(const ElementaryStream& stream) const {
+    const auto found = presentations_.find(&stream);
+    if (found != presentations_.end()) return found->second;
+    return presentations_.emplace(&stream, presentationOf(stream)).first->second;
+}
+
+std::size_t StreamImages::sampleAt(const Node& texture, const ElementaryStream& stream) const {
+    const auto found = presentations_.find(&stream);
+    if (stream.samples.size() < 2 || found == presentations_.end()) return 0;
+    return found->second.sampleAt(mediaTimeOf(texture, found->second.duration, now_));
 }
 
 const ElementaryStream* StreamImages::stream(const Node& texture) const {
@@ -80,7 +110,7 @@ Result<Bytes> StreamImages::load(const Node& texture, const Limits& limits) cons
                 {}};
             continue;
         }
-        const Sample& sample = od.streams[0].samples[0];
+        const Sample& sample = od.streams[0].samples[sampleAt(texture, od.streams[0])];
         if (sample.data.size == 0) {
             last = {ErrorCode::invalidInput,
                     fmt::format("the image '{}' of object descriptor {} was not loaded",
@@ -101,18 +131,24 @@ Result<DecodedImage> StreamImages::decode(const Node& texture, const ImageDecode
             return fail(ErrorCode::invalidInput, "the PixelTexture is empty");
         return decodedFromPixels(image);
     }
-    if (const ElementaryStream* from = stream(texture); from && from->objectTypeIndication != 0 &&
-                                                        from->objectTypeIndication != oti::kJpeg &&
-                                                        from->objectTypeIndication != oti::kPng)
+    const ElementaryStream* from = stream(texture);
+    if (from && from->objectTypeIndication != 0 && from->objectTypeIndication != oti::kJpeg &&
+        from->objectTypeIndication != oti::kPng)
         return fail(ErrorCode::unsupported,
                     "the image is a stream of objectTypeIndication 0x{:02X}; JPEG (0x6C) and PNG "
                     "(0x6D) are read",
                     from->objectTypeIndication);
+    const PictureCache::Key key{from,
+                                from && !from->samples.empty() ? sampleAt(texture, *from) : 0};
+    if (cache_ && from)
+        if (auto kept = cache_->find(key)) return *kept;
     STX_TRY(const auto bytes, load(texture, limits));
     const auto* urls = urlsOf(texture);
     const Url& url = urls->front();
-    return decoder(
+    auto image = decoder(
         bytes, url.text.empty() ? fmt::format("od:{}", url.objectDescriptorId) : url.text, limits);
+    if (cache_ && from && image) cache_->keep(key, *image);
+    return image;
 }
 
 Result<ImageInfo> StreamImages::probe(const Node& texture) const {
@@ -122,7 +158,7 @@ Result<ImageInfo> StreamImages::probe(const Node& texture) const {
     }
     // Headers are at the front, but for a JPEG with much metadata.
     if (const ElementaryStream* from = stream(texture); from && !from->samples.empty()) {
-        ByteRange head = from->samples[0].data;
+        ByteRange head = from->samples[sampleAt(texture, *from)].data;
         head.size = std::min<std::uint64_t>(head.size, 1 << 16);
         STX_TRY(const auto bytes, head.load(limits_));
         if (auto info = probeImage(bytes)) return info;

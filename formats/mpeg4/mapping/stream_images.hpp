@@ -1,14 +1,18 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <unordered_map>
 
 #include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/mapping/picture_cache.hpp"
 
 namespace stx::mpeg4 {
 
-/// The images that texture nodes name: streams by object descriptor, files by name, PixelTextures.
+/// The images that texture nodes name: streams by object descriptor, files by name, PixelTextures;
+/// of a stream with several pictures the one of a moment.
 class StreamImages {
   public:
     /// Object descriptors as they are at the scene's start; ones that come later serve where
@@ -17,9 +21,14 @@ class StreamImages {
                                                    const std::filesystem::path& folder,
                                                    const Limits& limits);
 
-    /// The bytes of an ImageTexture's or MovieTexture's first usable URL (of a movie, its first
-    /// picture). Errors: no URL, an unknown descriptor, a stream without samples, a URL that is not
-    /// a file in the folder.
+    /// The moment of the scene, in seconds: 0 at first.
+    void setTime(double now);
+    /// Pictures of streams that were decoded are kept, in so many bytes: for sequences.
+    void keepPictures(std::uint64_t bytes) { cache_ = std::make_shared<PictureCache>(bytes); }
+
+    /// The bytes of an ImageTexture's or MovieTexture's first usable URL (of a movie, the picture
+    /// of the moment). Errors: no URL, an unknown descriptor, a stream without samples, a URL that
+    /// is not a file in the folder.
     [[nodiscard]] Result<Bytes> load(const Node& texture, const Limits& limits) const;
     /// The decoded picture, PixelTexture included. Errors: those of load() and of the decoder, an
     /// empty PixelTexture, a node of another type, a stream that is neither JPEG nor PNG.
@@ -30,8 +39,17 @@ class StreamImages {
 
     /// The stream behind the first URL that has one; null for files and PixelTexture.
     [[nodiscard]] const ElementaryStream* stream(const Node& texture) const;
+    /// When its samples are shown; found once for each stream.
+    [[nodiscard]] const Presentation& presentation(const ElementaryStream& stream) const;
 
   private:
+    /// The sample that a texture shows at the moment. The stream must have one.
+    [[nodiscard]] std::size_t sampleAt(const Node& texture, const ElementaryStream& stream) const;
+
+    const Document* document_ = nullptr;
+    double now_ = 0;
+    mutable std::unordered_map<const ElementaryStream*, Presentation> presentations_;
+    std::shared_ptr<PictureCache> cache_;
     std::unordered_map<int, const ObjectDescriptor*> byId_;
     std::filesystem::path folder_;
     Limits limits_;

@@ -336,6 +336,25 @@ struct SameOptions {
 [[nodiscard]] Result<Scene> composeScene(const std::vector<CommandFrame>& frames,
                                          std::uint64_t until = ~std::uint64_t{0});
 
+/// The scene at one moment after another. Going on in time costs the commands between; going back
+/// starts anew.
+class SceneInTime {
+  public:
+    /// `frames` must outlive this.
+    explicit SceneInTime(const std::vector<CommandFrame>& frames);
+    SceneInTime(SceneInTime&&) noexcept;
+    SceneInTime& operator=(SceneInTime&&) noexcept;
+    ~SceneInTime();
+
+    /// The scene after all commands with time <= `until`. It may be changed, as interpolators do,
+    /// and lives until the next call. Errors as composeScene(), whose result this is.
+    [[nodiscard]] Result<Scene*> at(std::uint64_t until);
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
 /// The ids that nodes and routes are coded with.
 struct NodeIds {
     std::unordered_map<const Node*, std::uint32_t> nodes;  ///< 1-based

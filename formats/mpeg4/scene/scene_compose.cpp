@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <numeric>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -15,18 +16,17 @@ constexpr std::uint64_t kMaxVisits = 20'000'000;
 
 class Composer {
   public:
-    Result<Scene> run(const std::vector<CommandFrame>& frames, std::uint64_t until) {
-        std::vector<Command> commands;
-        for (const CommandFrame& frame : frames)
-            if (frame.time <= until)
-                commands.insert(commands.end(), frame.commands.begin(), frame.commands.end());
+    /// Applies commands to what earlier calls left.
+    Result<void> run(std::vector<Command> commands) {
         copyAll(commands);
-        for (std::size_t i = 0; i < commands.size(); ++i) {
-            auto done = std::visit([&](auto& command) { return apply(command); }, commands[i]);
-            if (!done) return tl::unexpected(done.error().at(fmt::format("command {}", i + 1)));
+        for (Command& command : commands) {
+            ++count_;
+            auto done = std::visit([&](auto& c) { return apply(c); }, command);
+            if (!done) return tl::unexpected(done.error().at(fmt::format("command {}", count_)));
         }
-        return std::move(scene_);
+        return {};
     }
+    Scene& scene() { return scene_; }
 
   private:
     // ---- copies
@@ -45,13 +45,15 @@ class Composer {
     }
 
     void copyAll(std::vector<Command>& commands) {
+        std::vector<Node*> fresh;
         for (const Command& command : commands)
             forEachNode(command, [&](const NodePtr& node) {
-                if (!copies_.contains(node.get())) {
-                    copies_.emplace(node.get(), std::make_shared<Node>(*node));
-                }
+                auto& copy = copies_[node.get()];
+                if (copy) return;
+                copy = std::make_shared<Node>(*node);
+                fresh.push_back(copy.get());
             });
-        for (auto& [original, copy] : copies_)
+        for (Node* copy : fresh)
             for (Node::SetField& field : copy->setFields) relink(field.value);
         for (Command& command : commands)
             std::visit(
@@ -289,12 +291,51 @@ class Composer {
     Scene scene_;
     std::unordered_map<const Node*, NodePtr> copies_;
     std::uint64_t visits_ = 0;
+    std::size_t count_ = 0;  ///< of commands
 };
 
 }  // namespace
 
 Result<Scene> composeScene(const std::vector<CommandFrame>& frames, std::uint64_t until) {
-    return Composer().run(frames, until);
+    SceneInTime moments(frames);
+    STX_TRY(Scene * scene, moments.at(until));
+    return std::move(*scene);
+}
+
+struct SceneInTime::Impl {
+    const std::vector<CommandFrame>& frames;
+    std::vector<std::size_t> order;  ///< of frames, by time
+    std::size_t next = 0;            ///< in order
+    std::unique_ptr<Composer> composer;
+};
+
+SceneInTime::SceneInTime(const std::vector<CommandFrame>& frames)
+    : impl_(std::make_unique<Impl>(Impl{frames, {}, 0, nullptr})) {
+    impl_->order.resize(frames.size());
+    std::iota(impl_->order.begin(), impl_->order.end(), std::size_t{0});
+    std::ranges::stable_sort(impl_->order, {}, [&](std::size_t i) { return frames[i].time; });
+}
+SceneInTime::SceneInTime(SceneInTime&&) noexcept = default;
+SceneInTime& SceneInTime::operator=(SceneInTime&&) noexcept = default;
+SceneInTime::~SceneInTime() = default;
+
+Result<Scene*> SceneInTime::at(std::uint64_t until) {
+    Impl& i = *impl_;
+    const bool back = i.next > 0 && i.frames[i.order[i.next - 1]].time > until;
+    if (!i.composer || back) {
+        i.composer = std::make_unique<Composer>();
+        i.next = 0;
+    }
+    std::vector<Command> commands;
+    for (; i.next < i.order.size() && i.frames[i.order[i.next]].time <= until; ++i.next) {
+        const auto& more = i.frames[i.order[i.next]].commands;
+        commands.insert(commands.end(), more.begin(), more.end());
+    }
+    if (auto done = i.composer->run(std::move(commands)); !done) {
+        i.composer.reset();
+        return tl::unexpected(done.error());
+    }
+    return &i.composer->scene();
 }
 
 }  // namespace stx::mpeg4

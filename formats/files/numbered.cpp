@@ -1,0 +1,70 @@
+#include "formats/files/numbered.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+#include "formats/files/files.hpp"
+
+namespace stx {
+namespace {
+
+/// `%04d` in a pattern.
+struct Placeholder {
+    std::size_t begin = 0, end = 0;
+    int width = 0;
+};
+
+std::optional<Placeholder> placeholderOf(const std::string& pattern) {
+    const auto percent = pattern.find('%');
+    if (percent == std::string::npos) return std::nullopt;
+    std::size_t at = percent + 1;
+    int width = 0;
+    while (at < pattern.size() && pattern[at] >= '0' && pattern[at] <= '9' && at - percent < 4)
+        width = width * 10 + (pattern[at++] - '0');
+    if (at >= pattern.size() || pattern[at] != 'd') return std::nullopt;
+    return Placeholder{percent, at + 1, width};
+}
+
+}  // namespace
+
+std::optional<std::string> frameName(const std::string& pattern, int frame) {
+    const auto place = placeholderOf(pattern);
+    if (!place) return std::nullopt;
+    return pattern.substr(0, place->begin) + fmt::format("{:0{}}", frame, place->width) +
+           pattern.substr(place->end);
+}
+
+Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
+    const std::filesystem::path path(pattern);
+    const std::string name = path.filename().string();
+    const auto place = placeholderOf(name);
+    std::vector<NumberedFile> files;
+    std::error_code error;
+    for (std::filesystem::directory_iterator it(folderOf(path), error), end; place && it != end;
+         it.increment(error)) {
+        if (error) break;
+        const std::string found = it->path().filename().string();
+        const std::string_view before = std::string_view(name).substr(0, place->begin);
+        const std::string_view after = std::string_view(name).substr(place->end);
+        if (found.size() <= before.size() + after.size() || !found.starts_with(before) ||
+            !found.ends_with(after))
+            continue;
+        const std::string_view digits = std::string_view(found).substr(
+            before.size(), found.size() - before.size() - after.size());
+        NumberedFile file{0, it->path()};
+        const auto [last, wrong] =
+            std::from_chars(digits.data(), digits.data() + digits.size(), file.number);
+        // As the pattern writes it: `%04d` does not name a_5.exr.
+        if (wrong != std::errc() || last != digits.data() + digits.size() ||
+            fmt::format("{:0{}}", file.number, place->width) != digits)
+            continue;
+        files.push_back(std::move(file));
+    }
+    if (files.empty())
+        return fail(ErrorCode::io, "cannot read '{}': there is no file of that name and a number",
+                    pattern);
+    std::ranges::sort(files, {}, &NumberedFile::number);
+    return files;
+}
+
+}  // namespace stx

@@ -1,0 +1,128 @@
+#include "formats/imagesets/motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "formats/imagesets/messages.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+using Pose = std::tuple<double, double, double, double, double, double, double>;
+
+Pose poseOf(const Camera& c) {
+    return {c.position.x,    c.position.y,    c.position.z,   c.orientation.x,
+            c.orientation.y, c.orientation.z, c.orientation.w};
+}
+
+/// Which camera took each view, by name.
+std::vector<std::string> takersOf(const SetDescription& set) {
+    std::vector<std::string> takers;
+    if (std::ranges::any_of(set.views, [](const SetView& v) { return !v.taker.empty(); })) {
+        for (const SetView& view : set.views)
+            takers.push_back(view.taker.empty() ? "camera" : view.taker);
+        return takers;
+    }
+    std::map<Pose, std::size_t> poses;  // in order of appearance
+    for (const SetView& view : set.views) poses.emplace(poseOf(view.camera), poses.size());
+    if (poses.size() == 1 || poses.size() < set.views.size()) {
+        for (const SetView& view : set.views)
+            takers.push_back(poses.size() == 1
+                                 ? "camera"
+                                 : fmt::format("camera{}", poses.at(poseOf(view.camera))));
+        return takers;
+    }
+    // No pose comes twice: cameras move, as many as there are pictures of one time.
+    std::map<double, std::size_t> ofTime;
+    for (const SetView& view : set.views) {
+        const std::size_t rank = ofTime[*view.time]++;
+        takers.push_back(rank == 0 ? "camera" : fmt::format("camera{}", rank));
+    }
+    return takers;
+}
+
+}  // namespace
+
+Timeline Motion::timeline() const {
+    Timeline line;
+    line.times = times;
+    // The last picture is shown as long as pictures are on average.
+    const auto steps = static_cast<double>(times.size() - 1);
+    line.duration = times.back() + (times.back() - times.front()) / steps;
+    return line;
+}
+
+SetDescription Motion::moment(const SetDescription& set, std::size_t frame) const {
+    SetDescription now;
+    now.title = set.title;
+    now.origin = set.origin;
+    for (const Track& track : tracks) {
+        const auto next = std::upper_bound(
+            track.views.begin(), track.views.end(), times[frame],
+            [&](double time, std::size_t view) { return time < *set.views[view].time - start; });
+        const std::size_t index = next == track.views.begin() ? *next : *std::prev(next);
+        SetView view = set.views[index];
+        view.name = track.name;
+        now.views.push_back(std::move(view));
+    }
+    return now;
+}
+
+Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& options) {
+    Motion motion;
+    const auto timed = static_cast<std::size_t>(
+        std::ranges::count_if(set.views, [](const SetView& v) { return v.time.has_value(); }));
+    if (timed == 0) {
+        if (options.moving == true && set.frames == 1)
+            return fail(ErrorCode::invalidInput,
+                        "no picture has a time, so that none moves (--moving)");
+        return motion;
+    }
+    // A recording from a moving camera: its pictures are views of a scene that stands still.
+    const bool recording = std::ranges::any_of(set.views, &SetView::sensor);
+    if (!options.moving.value_or(!recording)) return motion;
+    if (timed < set.views.size())
+        return fail(ErrorCode::invalidInput,
+                    "{} of {} pictures have a 'time'; either all have one or none", timed,
+                    set.views.size());
+    std::vector<double> times;
+    for (const SetView& view : set.views) {
+        if (!std::isfinite(*view.time))
+            return fail(ErrorCode::invalidInput, "the time of '{}' is {}; seconds are expected",
+                        view.name, *view.time);
+        times.push_back(*view.time);
+    }
+    std::ranges::sort(times);
+    times.erase(std::unique(times.begin(), times.end()), times.end());
+    if (times.size() < 2) return motion;
+    motion.start = times.front();
+    for (double& time : times) time -= motion.start;
+    motion.times = std::move(times);
+
+    const auto takers = takersOf(set);
+    for (std::size_t i = 0; i < set.views.size(); ++i) {
+        auto track = std::ranges::find(motion.tracks, takers[i], &Motion::Track::name);
+        if (track == motion.tracks.end())
+            track = motion.tracks.insert(track, Motion::Track{takers[i], {}});
+        track->views.push_back(i);
+    }
+    for (Motion::Track& track : motion.tracks) {
+        std::ranges::stable_sort(track.views, [&](std::size_t a, std::size_t b) {
+            return *set.views[a].time < *set.views[b].time;
+        });
+        for (std::size_t i = 1; i < track.views.size(); ++i) {
+            const SetView& view = set.views[track.views[i]];
+            const SetView& before = set.views[track.views[i - 1]];
+            if (*view.time == *before.time)
+                return fail(ErrorCode::invalidInput,
+                            "'{}' and '{}' are both of camera '{}' at {:g} s; give each picture "
+                            "its own time, or take all as views of one moment (--still)",
+                            before.name, view.name, track.name, *view.time);
+        }
+    }
+    return motion;
+}
+
+}  // namespace stx::imagesets

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "formats/mpeg4/scene/document.hpp"
+
+namespace stx::mpeg4 {
+
+/// When the samples of a stream are shown, counted from the stream's start: decoding time plus
+/// composition offset, through the edit list (ISO/IEC 14496-12, 8.6).
+struct Presentation {
+    struct Shown {
+        double time = 0;  ///< seconds, ascending
+        std::size_t sample = 0;
+    };
+    std::vector<Shown> shown;
+    double duration = 0;  ///< seconds: of one cycle at speed 1
+
+    /// The sample that is shown at a time of the stream; the first one before that. There must be
+    /// one.
+    [[nodiscard]] std::size_t sampleAt(double time) const;
+};
+/// Samples that the edit list leaves out are never shown; an edit list that leaves out all is
+/// passed over.
+[[nodiscard]] Presentation presentationOf(const ElementaryStream& stream);
+
+/// The time of its stream that a texture shows at `now` seconds of the scene. A MovieTexture runs
+/// by startTime, stopTime, speed and loop, shows its first picture before it begins (its last when
+/// it runs backwards), and holds the last one when it has ended (ISO/IEC 14772-1, 6.28). Other
+/// textures run with the scene.
+[[nodiscard]] double mediaTimeOf(const Node& texture, double duration, double now);
+
+/// The moments of the scene at which a texture of a stream changes, within its first cycle;
+/// seconds, ascending. `end` becomes the end of that cycle when it is later.
+[[nodiscard]] std::vector<double> changesOf(const Node& texture, const Presentation& stream,
+                                            double& end);
+
+}  // namespace stx::mpeg4

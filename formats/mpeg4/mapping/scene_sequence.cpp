@@ -1,0 +1,128 @@
+#include "formats/mpeg4/mapping/scene_sequence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_set>
+
+#include "formats/mpeg4/scene/interpolators.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// Moments nearer than this are one: ticks of two clocks.
+constexpr double kSameMoment = 1e-6;
+/// Moments a second where only interpolators move.
+constexpr double kSmoothRate = 25;
+/// More moments than that are not listed: a day at 25 a second is 2,160,000.
+constexpr std::size_t kMostMoments = 4'000'000;
+/// Decoded pictures that are kept, at most.
+constexpr std::uint64_t kCacheBytes = 256u << 20;
+
+/// Nodes that hold images of DepthImages and OctreeImages, wherever commands bring them.
+std::vector<NodePtr> texturesOf(const Document& document) {
+    std::vector<NodePtr> textures;
+    std::unordered_set<const Node*> seen;
+    for (const CommandFrame& frame : document.frames)
+        for (const Command& command : frame.commands)
+            forEachNode(command, [&](const NodePtr& node) {
+                if (node->info->find("diTexture") < 0) return;
+                const NodePtr& texture = node->get<NodePtr>("diTexture");
+                if (!texture) return;
+                for (const Node::SetField& field : texture->setFields)
+                    if (const auto* image = std::get_if<NodePtr>(&field.value);
+                        image && *image && seen.insert(image->get()).second)
+                        textures.push_back(*image);
+            });
+    return textures;
+}
+
+class SceneSequence : public Sequence {
+  public:
+    SceneSequence(Document document, SceneReadOptions options)
+        : document_(std::move(document)),
+          options_(std::move(options)),
+          moments_(document_.frames) {}
+
+    Result<void> prepare(Job& job) {
+        STX_TRY(images_, StreamImages::make(document_, options_.folder, job.limits));
+        images_.keepPictures(std::min<std::uint64_t>(kCacheBytes, job.limits.maxMemoryBytes / 4));
+        STX_TRY(timeline_, timelineOf(document_, images_));
+        return {};
+    }
+
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        const double now = timeline_.times[index];
+        STX_TRY(Scene * scene, moments_.at(static_cast<std::uint64_t>(
+                                   std::floor(now * document_.sceneStream.timescale + 0.5))));
+        applyInterpolators(*scene, now);
+        images_.setTime(now);
+        STX_TRY(auto bundle, bundleOfMoment(document_, *scene, images_, options_, job));
+        bundle.time = now;
+        return bundle;
+    }
+
+  private:
+    Document document_;
+    SceneReadOptions options_;
+    SceneInTime moments_;
+    StreamImages images_;
+};
+
+}  // namespace
+
+// Whether an interpolator or a command reaches what views are made of or are placed by is not
+// asked: a moment at which nothing changes costs a frame and harms nothing.
+Result<Timeline> timelineOf(const Document& document, const StreamImages& images) {
+    Timeline line;
+    std::vector<double>& times = line.times;
+    double end = 0;
+    std::uint64_t most = document.frames.size();
+    for (const NodePtr& texture : texturesOf(document)) {
+        const ElementaryStream* stream = images.stream(*texture);
+        if (!stream || stream->samples.size() < 2) continue;
+        const auto changes = changesOf(*texture, images.presentation(*stream), end);
+        most += changes.size();
+        if (most > kMostMoments)
+            return fail(ErrorCode::unsupported, "the presentation has more than {} moments",
+                        kMostMoments);
+        times.insert(times.end(), changes.begin(), changes.end());
+    }
+    for (const CommandFrame& frame : document.frames)
+        times.push_back(static_cast<double>(frame.time) / document.sceneStream.timescale);
+    const double start =
+        static_cast<double>(document.frames.front().time) / document.sceneStream.timescale;
+    const bool pictures = end > 0;
+    STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
+    for (const ClockSpan& span : clockSpans(scene)) {
+        if (!pictures) {
+            const double steps = (span.end - span.begin) * kSmoothRate;
+            if (steps > static_cast<double>(kMostMoments))
+                return fail(ErrorCode::unsupported, "a TimeSensor runs for {:g} s",
+                            span.end - span.begin);
+            for (int i = 0; i < steps; ++i) times.push_back(span.begin + i / kSmoothRate);
+        }
+        end = std::max(end, pictures ? end : span.end);
+    }
+    std::erase_if(times, [&](double t) { return !std::isfinite(t) || t < start; });
+    std::ranges::sort(times);
+    times.erase(std::unique(times.begin(), times.end(),
+                            [](double a, double b) { return b - a <= kSameMoment; }),
+                times.end());
+    if (times.empty() || times.front() > start + kSameMoment) times.insert(times.begin(), start);
+    if (times.size() > 1) {
+        const double step = times[times.size() - 1] - times[times.size() - 2];
+        line.duration = end > times.back() ? end : times.back() + step;
+    }
+    return line;
+}
+
+Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,
+                                                    const SceneReadOptions& options, Job& job) {
+    if (document.frames.empty())
+        return fail(ErrorCode::invalidInput, "the presentation has no scene");
+    auto sequence = std::make_unique<SceneSequence>(std::move(document), options);
+    STX_CHECK(sequence->prepare(job));
+    return sequence;
+}
+
+}  // namespace stx::mpeg4

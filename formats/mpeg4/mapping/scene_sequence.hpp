@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/mapping/stream_images.hpp"
+#include "lib/model/sequence.hpp"
+
+namespace stx::mpeg4 {
+
+/// A presentation in time: MovieTextures (and other textures of streams with several pictures) at
+/// their composition times, commands at theirs, interpolators that TimeSensors drive. Its timeline
+/// has every moment at which a picture or a command changes something, within the first cycle of
+/// what repeats; where only interpolators move, 25 moments a second. Pictures are decoded when a
+/// frame is asked for. Errors as bundleFromScene().
+[[nodiscard]] Result<std::unique_ptr<Sequence>> sequenceFromScene(Document document,
+                                                                  const SceneReadOptions& options,
+                                                                  Job& job);
+
+/// When such a sequence changes: at least one moment. Errors: (unsupported) more than four million.
+[[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images);
+
+/// The object of a presentation in a scene as it is at the moment of `images`; see
+/// bundleFromScene().
+[[nodiscard]] Result<Bundle> bundleOfMoment(const Document& document, const Scene& scene,
+                                            const StreamImages& images,
+                                            const SceneReadOptions& options, Job& job);
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,359 @@
+#include "formats/mpeg4/mapping/sequence_write.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <unordered_map>
+
+#include "formats/mpeg4/mapping/view_images.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// What must not change from frame to frame.
+struct ViewRange {
+    double nearPlane = std::numeric_limits<double>::infinity(), farPlane = 0;
+    int depthBits = 8;
+    float longestSplat = 0;
+    bool normals = false, splats = false;
+};
+
+/// The images of a SimpleTexture, in the order in which they are coded.
+constexpr std::array kRoles = {"texture", "depth", "normal", "splatU", "splatV"};
+const Bytes& imageOf(const ViewImages& images, std::size_t role) {
+    const std::array all = {&images.texture, &images.depth, &images.normal, &images.splatU,
+                            &images.splatV};
+    return *all[role];
+}
+
+/// A view on its way into the document.
+struct ViewTrack {
+    NodePtr node;  ///< the DepthImage that is shown now
+    Camera camera;
+    std::array<ElementaryStream*, kRoles.size()> streams{};
+    std::array<Bytes, kRoles.size()> last;
+    std::array<bool, kRoles.size()> changed{};
+};
+
+class SequenceWriter {
+  public:
+    SequenceWriter(Sequence& frames, const SceneWriteOptions& options, PictureSpool& spool,
+                   Job& job)
+        : frames_(frames), options_(options), spool_(spool), job_(job) {}
+
+    Result<Document> write() {
+        if (options_.pointTexture || options_.octreeLevels > 0)
+            return fail(ErrorCode::unsupported,
+                        "{} cannot move: its points are in the scene itself; write SimpleTexture",
+                        options_.pointTexture ? "a PointTexture" : "an OctreeImage");
+        STX_CHECK(frames_.timeline().check());
+        STX_CHECK(findRanges());
+        STX_CHECK(begin());
+        const std::size_t count = frames_.timeline().count();
+        for (std::size_t i = 1; i < count; ++i) {
+            job_.progress(static_cast<std::int64_t>(count + i),
+                          static_cast<std::int64_t>(2 * count), "writing frames");
+            STX_CHECK(job_.checkCancelled());
+            STX_TRY(const auto bundle, frame(i));
+            if (auto done = add(bundle, i); !done)
+                return tl::unexpected(done.error().at(placeOf(i)));
+        }
+        STX_CHECK(finish());
+        return std::move(document_);
+    }
+
+  private:
+    [[nodiscard]] std::string placeOf(std::size_t i) const {
+        return fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i]);
+    }
+    [[nodiscard]] std::uint64_t ticks(double seconds) const {
+        return static_cast<std::uint64_t>(std::llround(seconds * scale_));
+    }
+
+    /// A frame with the ranges of the sequence. Its notes are said once, of the first frame.
+    Result<Bundle> frame(std::size_t i) {
+        Job quiet;
+        quiet.limits = job_.limits;
+        quiet.cancelled = job_.cancelled.load();
+        auto bundle = frames_.frame(i, i == 0 && ranges_.empty() ? job_ : quiet);
+        if (!bundle) return tl::unexpected(bundle.error().at(placeOf(i)));
+        for (std::size_t k = 0; k < ranges_.size(); ++k) {
+            ReferenceView& view = bundle->views[k];
+            view.nearPlane = ranges_[k].nearPlane;
+            view.farPlane = ranges_[k].farPlane;
+            view.depthBits = ranges_[k].depthBits;
+        }
+        return bundle;
+    }
+
+    Result<void> findRanges() {
+        const std::size_t count = frames_.timeline().count();
+        std::vector<ViewRange> ranges;
+        Bundle first;
+        for (std::size_t i = 0; i < count; ++i) {
+            job_.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(2 * count),
+                          "writing frames");
+            STX_CHECK(job_.checkCancelled());
+            STX_TRY(auto bundle, frame(i));
+            if (i == 0) {
+                ranges.resize(bundle.views.size());
+                first = headersOf(bundle);
+            }
+            if (auto same = checkSameViews(first, bundle); !same)
+                return tl::unexpected(same.error().at(placeOf(i)));
+            const Bounds here = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
+            if (!here.empty()) {
+                bounds_.add(here.min);
+                bounds_.add(here.max);
+            }
+            for (std::size_t k = 0; k < ranges.size(); ++k)
+                if (auto done = widen(ranges[k], bundle.views[k], i == 0); !done)
+                    return tl::unexpected(done.error().at(
+                        fmt::format("{}: view '{}'", placeOf(i), bundle.views[k].name)));
+        }
+        ranges_ = std::move(ranges);
+        return {};
+    }
+    static Bundle headersOf(const Bundle& bundle) {
+        Bundle headers;
+        for (const ReferenceView& view : bundle.views) {
+            ReferenceView header;
+            header.name = view.name;
+            header.camera = view.camera;
+            headers.views.push_back(std::move(header));
+        }
+        return headers;
+    }
+    Result<void> widen(ViewRange& range, const ReferenceView& view, bool first) const {
+        if (first) {
+            range.normals = view.hasNormals();
+            range.splats = view.hasSplats();
+        }
+        if (range.normals != view.hasNormals() || range.splats != view.hasSplats())
+            return fail(ErrorCode::unsupported,
+                        "normals or splats are there in some frames only; bake all or none");
+        if (view.pruned && options_.texture == SceneWriteOptions::Texture::jpeg)
+            return fail(ErrorCode::unsupported,
+                        "a pruned view that moves keeps its mark in the alpha of its colour, "
+                        "which JPEG does not have; use PNG");
+        range.nearPlane = std::min(range.nearPlane, view.nearPlane);
+        range.farPlane = std::max(range.farPlane, view.farPlane);
+        range.depthBits = std::max(range.depthBits, view.depthBits);
+        if (view.hasSplats())
+            range.longestSplat = std::max(range.longestSplat, longestSplatOf(view));
+        return {};
+    }
+
+    /// The document of the first frame, whose streams the others go into.
+    Result<void> begin() {
+        STX_TRY(auto bundle, frame(0));
+        bundle.bounds = bounds_;
+        SceneWriteOptions options = options_;
+        for (const ViewRange& range : ranges_)
+            options.splatRanges.push_back(range.splats ? range.longestSplat : 0);
+        STX_TRY(document_, sceneFromBundle(bundle, options, job_));
+        scale_ = frames_.timeline().timescale();
+        document_.sceneStream.timescale = scale_;
+        std::map<int, ElementaryStream*> streams;
+        for (OdFrame& odFrame : document_.odFrames)
+            for (OdCommand& command : odFrame.commands)
+                if (auto* update = std::get_if<UpdateObjectDescriptors>(&command))
+                    for (ObjectDescriptor& od : update->descriptors)
+                        streams[od.id] = &od.streams.front();
+        const auto& root = std::get<ReplaceScene>(document_.frames[0].commands[0]).root;
+        for (const NodePtr& node : root->get<NodeList>("children")) {
+            if (node->info->find("diTexture") < 0) continue;
+            ViewTrack track;
+            track.node = node;
+            track.camera = bundle.views[tracks_.size()].camera;
+            const NodePtr& texture = node->get<NodePtr>("diTexture");
+            for (std::size_t r = 0; r < kRoles.size(); ++r) {
+                const int field = texture->info->find(kRoles[r]);
+                const NodePtr image =
+                    field < 0 ? nullptr : std::get<NodePtr>(texture->value(field));
+                if (!image) continue;
+                const auto& urls = image->get<std::vector<Url>>("url");
+                ElementaryStream* stream = streams.at(urls.front().objectDescriptorId);
+                STX_TRY(track.last[r], stream->samples[0].data.load(job_.limits));
+                STX_TRY(stream->samples[0].data, spool_.add(track.last[r]));
+                stream->timescale = scale_;
+                stream->samples[0].time = ticks(frames_.timeline().times[0]);
+                track.streams[r] = stream;
+            }
+            tracks_.push_back(std::move(track));
+        }
+        first_ = headersOf(bundle);
+        return {};
+    }
+
+    Result<void> add(const Bundle& bundle, std::size_t index) {
+        STX_CHECK(checkSameViews(first_, bundle));
+        std::vector<Result<ViewImages>> images(bundle.views.size());
+        parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
+            const auto k = static_cast<std::size_t>(i);
+            images[k] = encodeView(bundle.views[k], options_, job_.limits, ranges_[k].longestSplat);
+        });
+        const std::uint64_t now = ticks(frames_.timeline().times[index]);
+        for (std::size_t k = 0; k < images.size(); ++k) {
+            auto done = images[k] ? addView(tracks_[k], *images[k], bundle.views[k], now)
+                                  : Result<void>(tl::unexpected(images[k].error()));
+            if (!done)
+                return tl::unexpected(
+                    done.error().at(fmt::format("view '{}'", bundle.views[k].name)));
+        }
+        return {};
+    }
+
+    Result<void> addView(ViewTrack& track, const ViewImages& images, const ReferenceView& view,
+                         std::uint64_t now) {
+        bool any = false;
+        for (std::size_t r = 0; r < kRoles.size(); ++r) {
+            if (!track.streams[r]) continue;
+            const bool differs = imageOf(images, r) != track.last[r];
+            track.changed[r] = track.changed[r] || differs;
+            any = any || differs;
+        }
+        for (std::size_t r = 0; any && r < kRoles.size(); ++r) {
+            ElementaryStream* stream = track.streams[r];
+            if (!stream) continue;
+            Sample sample;
+            sample.time = now;
+            sample.data = stream->samples.back().data;
+            if (imageOf(images, r) != track.last[r]) {
+                track.last[r] = imageOf(images, r);
+                STX_TRY(sample.data, spool_.add(track.last[r]));
+            }
+            stream->samples.push_back(std::move(sample));
+        }
+        if (view.camera == track.camera) return {};
+        return moveCamera(track, images, view, now);
+    }
+
+    /// A new node in the old one's place, with its id, so that later commands find it.
+    Result<void> moveCamera(ViewTrack& track, const ViewImages& images, const ReferenceView& view,
+                            std::uint64_t now) {
+        const Camera& was = track.camera;
+        if (!view.camera.orthographic && (view.camera.cx != was.cx || view.camera.cy != was.cy))
+            return fail(ErrorCode::unsupported,
+                        "the principal point moves from {:.6g} {:.6g} to {:.6g} {:.6g}; in MPEG-4 "
+                        "it is fixed by the pictures' size; write .exr",
+                        was.cx, was.cy, view.camera.cx, view.camera.cy);
+        track.camera = view.camera;
+        NodePtr node = std::make_shared<Node>(*track.node);
+        const Camera& c = images.padding.camera;
+        const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
+        node->set("position", glm::vec3(c.position));
+        node->set("orientation", Rotation{glm::vec3(turn), static_cast<float>(turn.w)});
+        node->set("fieldOfView", glm::vec2(c.fieldOfView()));
+        if (sameNode(node, track.node)) return {};
+        if (document_.frames.back().time != now || document_.frames.size() == 1) {
+            CommandFrame frame;
+            frame.time = now;
+            document_.frames.push_back(std::move(frame));
+        }
+        document_.frames.back().commands.emplace_back(ReplaceNode{track.node, node});
+        track.node = node;
+        return {};
+    }
+
+    /// Durations, and MovieTextures where a stream has become one.
+    Result<void> finish() {
+        STX_TRY(const ByteSource source, spool_.source());
+        for (const ViewTrack& track : tracks_)
+            for (ElementaryStream* stream : track.streams)
+                if (stream)
+                    for (Sample& sample : stream->samples) sample.data.source = source;
+        const std::uint64_t end = ticks(frames_.timeline().duration);
+        // DEF ids that commands need; the nodes that replace each other share one.
+        std::uint32_t id = 0;
+        std::unordered_map<std::string, std::uint32_t> ids;
+        for (CommandFrame& frame : document_.frames)
+            for (Command& command : frame.commands)
+                if (auto* replace = std::get_if<ReplaceNode>(&command)) {
+                    auto& own = ids[replace->target->defName];
+                    if (own == 0) own = ++id;
+                    replace->target->defId = replace->replacement->defId = own;
+                }
+        for (ViewTrack& track : tracks_) {
+            const NodePtr texture = track.node->get<NodePtr>("diTexture");
+            for (std::size_t r = 0; r < kRoles.size(); ++r) {
+                ElementaryStream* stream = track.streams[r];
+                if (!stream) continue;
+                if (!track.changed[r]) {
+                    stream->samples.resize(1);
+                    continue;
+                }
+                auto& samples = stream->samples;
+                for (std::size_t i = 0; i < samples.size(); ++i) {
+                    const std::uint64_t next = i + 1 < samples.size() ? samples[i + 1].time : end;
+                    samples[i].duration = static_cast<std::uint32_t>(
+                        next > samples[i].time ? next - samples[i].time : scale_);
+                }
+                const NodePtr still =
+                    std::get<NodePtr>(texture->value(std::string_view(kRoles[r])));
+                NodePtr movie = makeNode("MovieTexture");
+                for (const char* field : {"url", "repeatS", "repeatT"})
+                    movie->set(field, still->value(field));
+                texture->set(std::string_view(kRoles[r]), movie);
+            }
+        }
+        return {};
+    }
+
+    Sequence& frames_;
+    const SceneWriteOptions& options_;
+    PictureSpool& spool_;
+    Job& job_;
+    std::vector<ViewRange> ranges_;
+    Bounds bounds_;
+    Document document_;
+    Bundle first_;  ///< names and cameras
+    std::vector<ViewTrack> tracks_;
+    std::uint32_t scale_ = 1000;
+};
+
+}  // namespace
+
+Result<PictureSpool> PictureSpool::create(const std::filesystem::path& folder) {
+    auto made = createTemporaryFile(folder);
+    if (!made)
+        return fail(ErrorCode::io, "cannot make a file in '{}': {}", folder.string(),
+                    std::generic_category().message(made.error()));
+    PictureSpool spool;
+    spool.file_ = std::make_unique<File>();
+    spool.file_->file = std::move(*made);
+    return spool;
+}
+
+PictureSpool::File::~File() {
+    std::error_code ignored;
+    std::filesystem::remove(file.path, ignored);
+}
+
+Result<ByteRange> PictureSpool::add(const Bytes& bytes) {
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+        const auto n = ::write(file_->file.fd.get(), bytes.data() + done, bytes.size() - done);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0)
+            return fail(ErrorCode::io, "cannot write '{}': {}", file_->file.path.string(),
+                        std::generic_category().message(n < 0 ? errno : ENOSPC));
+        done += static_cast<std::size_t>(n);
+    }
+    const ByteRange range({}, file_->size, bytes.size());
+    file_->size += bytes.size();
+    return range;
+}
+
+Result<ByteSource> PictureSpool::source() const {
+    return ByteSource::open(file_->file.path);
+}
+
+Result<Document> sceneFromSequence(Sequence& frames, const SceneWriteOptions& options,
+                                   PictureSpool& spool, Job& job) {
+    return SequenceWriter(frames, options, spool, job).write();
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,96 @@
+#include "formats/mpeg4/mapping/view_images.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "formats/mpeg4/mapping/texture_images.hpp"
+#include "formats/mpeg4/mapping/view_notes.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// The nearest float that is not above (below) a value: planes must keep what lies between them.
+float floatBelow(double v) {
+    const float f = static_cast<float>(v);
+    return static_cast<double>(f) > v ? std::nextafter(f, -std::numeric_limits<float>::infinity())
+                                      : f;
+}
+float floatAbove(double v) {
+    const float f = static_cast<float>(v);
+    return static_cast<double>(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity())
+                                      : f;
+}
+
+}  // namespace
+
+bool isWrittenAsV2(const ReferenceView& view, const SceneWriteOptions& options) {
+    if (options.nodes == SceneWriteOptions::Nodes::automatic)
+        return view.hasNormals() || view.hasSplats();
+    return options.nodes == SceneWriteOptions::Nodes::v2;
+}
+
+int writtenDepthBits(const ReferenceView& view, const SceneWriteOptions& options) {
+    if (options.depthBits != 0) return options.depthBits;
+    return view.depthBits == 8 ? 8 : 16;
+}
+
+float longestSplatOf(const ReferenceView& view) {
+    const float longest = std::max(largestComponent(view.splatU), largestComponent(view.splatV));
+    return longest > 0 ? longest : 1.0f;
+}
+
+Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions& options,
+                              const Limits& limits, float longestSplat) {
+    ViewImages out;
+    STX_TRY(out.padding, centringPadding(view.camera, std::min(limits.maxImageSide, 65535)));
+    out.nearPlane = floatBelow(view.nearPlane);
+    out.farPlane = floatAbove(view.farPlane);
+    if (!std::isfinite(out.farPlane) || !(out.nearPlane < out.farPlane))
+        return fail(ErrorCode::unsupported,
+                    "nearPlane {:g} and farPlane {:g} do not fit 32-bit floats", view.nearPlane,
+                    view.farPlane);
+    const DepthCode code{out.nearPlane, out.farPlane,
+                         writtenDepthBits(view, options) == 8 ? 255u : 65535u};
+    if (options.pointTexture) {
+        for (const float d : view.depth.pixels()) {
+            if (!(d >= 0)) return depthError(d);
+            if (hasPoint(d))
+                out.worstDepth =
+                    std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
+        }
+        const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
+        out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
+        if (view.pruned) {
+            STX_TRY(out.pruned, prunedMask(colour, view.depth));
+        }
+        return out;
+    }
+    STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
+    const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
+    const bool alpha = !alphaFollowsDepth(colour, view.depth);
+    if (view.pruned) out.pruned = kPrunedInAlpha;
+    const Rgba8Image wide = padded(colour, out.padding);
+    if (options.texture == SceneWriteOptions::Texture::jpeg) {
+        out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
+        if (view.pruned) {
+            STX_TRY(out.pruned, prunedMask(colour, view.depth));
+        }
+        STX_TRY(out.texture, colourJpeg(wide, options.jpegQuality));
+    } else {
+        STX_TRY(out.texture, colourPng(wide, alpha));
+    }
+    if (!isWrittenAsV2(view, options)) return out;
+    if (view.hasNormals()) {
+        STX_TRY(out.normal, normalPng(view.normal, options.normalBits, out.padding));
+    }
+    if (view.hasSplats()) {
+        out.longestSplat = longestSplat > 0 ? longestSplat : longestSplatOf(view);
+        STX_TRY(out.splatU,
+                splatPng(view.splatU, out.longestSplat, options.normalBits, out.padding));
+        STX_TRY(out.splatV,
+                splatPng(view.splatV, out.longestSplat, options.normalBits, out.padding));
+    }
+    return out;
+}
+
+}  // namespace stx::mpeg4

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "formats/stx/options.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/sequence.hpp"
+
+namespace stx {
+
+/// Opens whatever holds views in time: an MPEG-4 presentation with MovieTextures, commands or
+/// interpolators; an image set with time; OpenEXR bundles by a numbered name (`name_%04d.exr`),
+/// with the times that they hold, else 25 a second. Whatever stands still gives one frame. Errors
+/// as openBundle().
+[[nodiscard]] Result<std::unique_ptr<Sequence>> openSequence(const std::filesystem::path& path,
+                                                             const OpenOptions& options, Job& job);
+
+/// Whether a target can hold more than one frame: MPEG-4, or a numbered name of .exr.
+[[nodiscard]] bool holdsSequences(const std::filesystem::path& target);
+
+/// Writes a sequence, each file whole or not at all: MPEG-4 (see sequence_write.hpp) or one .exr
+/// for each frame, numbered from 0. A sequence of one frame is saved as its bundle. Errors as
+/// saveBundle(); (usage) a target that holds one frame only.
+[[nodiscard]] Result<void> saveSequence(Sequence& frames, const std::filesystem::path& target,
+                                        const SaveOptions& options, Job& job);
+
+}  // namespace stx

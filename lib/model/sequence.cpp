@@ -1,0 +1,163 @@
+#include "lib/model/sequence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stx {
+namespace {
+
+class Still : public Sequence {
+  public:
+    explicit Still(Bundle bundle) : bundle_(std::move(bundle)) {}
+    Result<Bundle> frame(std::size_t, Job&) override { return bundle_; }
+
+  private:
+    Bundle bundle_;
+};
+
+class Changed : public Sequence {
+  public:
+    Changed(std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change)
+        : frames_(std::move(frames)), change_(std::move(change)) {
+        timeline_ = frames_->timeline();
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frames_->frame(index, job));
+        STX_CHECK(change_(bundle, job));
+        return bundle;
+    }
+
+  private:
+    std::unique_ptr<Sequence> frames_;
+    std::function<Result<void>(Bundle&, Job&)> change_;
+};
+
+class Chosen : public Sequence {
+  public:
+    Chosen(std::unique_ptr<Sequence> frames, std::vector<std::size_t> numbers)
+        : frames_(std::move(frames)), numbers_(std::move(numbers)) {
+        const Timeline& all = frames_->timeline();
+        const double start = all.times[numbers_.front()];
+        timeline_.times.clear();
+        for (const std::size_t number : numbers_)
+            timeline_.times.push_back(all.times[number] - start);
+        timeline_.duration = timeline_.times.back() + all.durationOf(numbers_.back());
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frames_->frame(numbers_[index], job));
+        bundle.time = timeline_.times[index];
+        return bundle;
+    }
+
+  private:
+    std::unique_ptr<Sequence> frames_;
+    std::vector<std::size_t> numbers_;
+};
+
+/// Ticks a second that MP4 files usually have, with those of the rates that films have.
+constexpr std::uint32_t kTimescales[] = {1000,  24000, 25000, 30000,  15000, 12000,
+                                         50000, 60000, 90000, 120000, 600000};
+constexpr std::uint32_t kMicroseconds = 1'000'000;
+constexpr double kSameTime = 1e-7;  ///< seconds
+
+}  // namespace
+
+std::size_t Timeline::frameAt(double time) const {
+    // Times that went through a file's ticks are off by less than that.
+    const auto next = std::upper_bound(times.begin(), times.end(), time + kSameTime);
+    return next == times.begin() ? 0 : static_cast<std::size_t>(next - times.begin()) - 1;
+}
+
+double Timeline::durationOf(std::size_t frame) const {
+    return (frame + 1 < times.size() ? times[frame + 1] : std::max(duration, times.back())) -
+           times[frame];
+}
+
+double Timeline::rate() const {
+    if (!moves()) return 0;
+    const double step = (times.back() - times.front()) / static_cast<double>(times.size() - 1);
+    for (std::size_t i = 0; i < times.size(); ++i)
+        if (std::abs(times[i] - times.front() - step * static_cast<double>(i)) > 1e-6) return 0;
+    return 1 / step;
+}
+
+std::uint32_t Timeline::timescale() const {
+    for (const std::uint32_t ticks : kTimescales) {
+        const auto whole = [&](double time) {
+            return std::abs(time * ticks - std::round(time * ticks)) <= kSameTime * ticks;
+        };
+        if (whole(duration) && std::ranges::all_of(times, whole)) return ticks;
+    }
+    return kMicroseconds;
+}
+
+Result<void> Timeline::check() const {
+    if (times.empty()) return fail(ErrorCode::invalidInput, "a sequence has no frame");
+    double last = -1;
+    for (const double time : times) {
+        if (!std::isfinite(time) || time < 0)
+            return fail(ErrorCode::invalidInput, "a frame is at {} s; times are 0 or more", time);
+        if (!(time > last))
+            return fail(ErrorCode::invalidInput, "frames are at {} s and then at {} s", last, time);
+        last = time;
+    }
+    if (!std::isfinite(duration) || (duration < last && moves()))
+        return fail(ErrorCode::invalidInput, "the sequence ends at {} s, before its last frame, {}",
+                    duration, last);
+    return {};
+}
+
+Timeline steadyTimeline(int count, double rate) {
+    Timeline line;
+    line.times.clear();
+    for (int i = 0; i < count; ++i) line.times.push_back(i / rate);
+    line.duration = count > 1 ? count / rate : 0;
+    return line;
+}
+
+std::unique_ptr<Sequence> sequenceOf(Bundle still) {
+    return std::make_unique<Still>(std::move(still));
+}
+
+std::unique_ptr<Sequence> changed(std::unique_ptr<Sequence> frames,
+                                  std::function<Result<void>(Bundle&, Job&)> change) {
+    return std::make_unique<Changed>(std::move(frames), std::move(change));
+}
+
+Result<std::unique_ptr<Sequence>> someFrames(std::unique_ptr<Sequence> frames,
+                                             std::vector<std::size_t> numbers) {
+    if (numbers.empty()) return fail(ErrorCode::usage, "no frame is asked for");
+    const std::size_t count = frames->timeline().count();
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+        if (numbers[i] >= count)
+            return fail(ErrorCode::usage, "frame {} is asked for, but there are {} (from 0)",
+                        numbers[i], count);
+        if (i > 0 && numbers[i] <= numbers[i - 1])
+            return fail(ErrorCode::usage, "frame {} is asked for after frame {}", numbers[i],
+                        numbers[i - 1]);
+    }
+    return std::make_unique<Chosen>(std::move(frames), std::move(numbers));
+}
+
+Result<void> checkSameViews(const Bundle& first, const Bundle& frame) {
+    const double time = frame.time.value_or(0);
+    if (frame.views.size() != first.views.size())
+        return fail(ErrorCode::invalidInput, "there are {} views at {:g} s, but {} at the start",
+                    frame.views.size(), time, first.views.size());
+    for (std::size_t i = 0; i < first.views.size(); ++i) {
+        const ReferenceView& was = first.views[i];
+        const ReferenceView& is = frame.views[i];
+        if (is.name != was.name)
+            return fail(ErrorCode::invalidInput, "view {} is '{}' at {:g} s, but '{}' at the start",
+                        i, is.name, time, was.name);
+        if (is.camera.width != was.camera.width || is.camera.height != was.camera.height)
+            return fail(ErrorCode::invalidInput,
+                        "view '{}' is {}x{} at {:g} s, but {}x{} at the start; the size of a "
+                        "moving picture cannot change",
+                        is.name, is.camera.width, is.camera.height, time, was.camera.width,
+                        was.camera.height);
+    }
+    return {};
+}
+
+}  // namespace stx

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+
+namespace stx {
+
+/// When the pictures of a sequence are shown.
+struct Timeline {
+    /// Seconds from the start of the sequence, ascending, each once; the first is 0 or more. At
+    /// least one. Frame i is shown from times[i] until times[i + 1].
+    std::vector<double> times{0.0};
+    /// When the last frame ends, in seconds; at least the last time. 0 of what stands still.
+    double duration = 0;
+
+    [[nodiscard]] std::size_t count() const { return times.size(); }
+    [[nodiscard]] bool moves() const { return times.size() > 1; }
+    /// The frame that is shown at a time: the last that has begun, or the first before that.
+    [[nodiscard]] std::size_t frameAt(double time) const;
+    /// How long a frame is shown, in seconds.
+    [[nodiscard]] double durationOf(std::size_t frame) const;
+    /// Frames a second when all frames last equally long (to a millionth); else 0.
+    [[nodiscard]] double rate() const;
+    /// Ticks a second in which all times are whole numbers, to a tenth of a microsecond: the
+    /// least of the usual ones of MP4 files, or 1,000,000 where the times are irregular.
+    [[nodiscard]] std::uint32_t timescale() const;
+    /// Errors (invalidInput) when the promises above do not hold.
+    [[nodiscard]] Result<void> check() const;
+};
+
+/// `count` frames, from 1, at a rate above 0.
+[[nodiscard]] Timeline steadyTimeline(int count, double rate);
+
+/// A bundle in time, whose frames are made when they are asked for: a film of ten thousand frames
+/// takes the memory of one. All frames have the same views: in number, order and name; a view
+/// without a picture of a moment has its last one then (before its first: the first). What stands
+/// still is the case of one frame.
+class Sequence {
+  public:
+    virtual ~Sequence() = default;
+
+    [[nodiscard]] const Timeline& timeline() const { return timeline_; }
+    /// The bundle as frame `index` (below timeline().count()) has it, with Bundle::time set.
+    /// Frames may be asked for in any order; ascending is fastest. One call at a time. It passes
+    /// Bundle::check().
+    [[nodiscard]] virtual Result<Bundle> frame(std::size_t index, Job& job) = 0;
+
+  protected:
+    Timeline timeline_;
+};
+
+/// A bundle that stands still.
+[[nodiscard]] std::unique_ptr<Sequence> sequenceOf(Bundle still);
+
+/// The same frames, each changed by `change`.
+[[nodiscard]] std::unique_ptr<Sequence> changed(
+    std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle& frame, Job& job)> change);
+
+/// Some of the frames, in ascending order of their numbers, their times counted from the first.
+/// Errors (usage): no frame, or numbers that are not in the sequence or do not ascend.
+[[nodiscard]] Result<std::unique_ptr<Sequence>> someFrames(std::unique_ptr<Sequence> frames,
+                                                           std::vector<std::size_t> numbers);
+
+/// Errors (invalidInput), which name the view and the time, when a frame does not have the views of
+/// the first: their number, names and sizes.
+[[nodiscard]] Result<void> checkSameViews(const Bundle& first, const Bundle& frame);
+
+}  // namespace stx

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/stx/stx.hpp"
+#include "lib/model/sequence.hpp"
+
+namespace stx::tools {
+
+/// When the pictures of `stx render` are taken, as the command line says it.
+struct TimeOptions {
+    std::optional<double> time;  ///< seconds
+    std::string times;           ///< "A:B[:STEP]" in seconds, "all", or "cameras"
+
+    [[nodiscard]] bool any() const { return time.has_value() || !times.empty(); }
+};
+
+/// The times that are asked for, ascending; at least one. `all` (and `cameras`, whose
+/// times are elsewhere): every frame; A:B without STEP:
+/// every frame from A to B; with it: A, A + STEP, … up to B. Errors (usage): a text of another
+/// form, negative times, a step of 0 or less, more than a million pictures, no frame between.
+[[nodiscard]] Result<std::vector<double>> timesOf(const TimeOptions& options,
+                                                  const Timeline& timeline);
+
+/// Renderers of the frames of a sequence, one after another; the next frame is read while one is
+/// drawn.
+class MovingPictures {
+  public:
+    /// `job` must outlive this.
+    MovingPictures(std::unique_ptr<Sequence> frames, RenderSettings settings, Backend backend,
+                   int device, Job& job);
+    ~MovingPictures();
+
+    [[nodiscard]] const Timeline& timeline() const { return frames_->timeline(); }
+    /// The cameras of the reference views of the frame whose renderer is here.
+    [[nodiscard]] const std::vector<Camera>& views() const { return views_; }
+    [[nodiscard]] std::int64_t points() const { return points_; }
+    [[nodiscard]] const Bounds& bounds() const { return bounds_; }
+    [[nodiscard]] glm::dvec3 origin() const { return origin_; }
+
+    /// The renderer of the frame of a time, which lives until the next call. `next`: the time that
+    /// is asked for after it. Errors: those of the frame and of rendererOf().
+    [[nodiscard]] Result<Renderer*> at(double time, std::optional<double> next);
+
+  private:
+    [[nodiscard]] Result<Bundle> bundleOf(std::size_t frame);
+
+    std::unique_ptr<Sequence> frames_;
+    RenderSettings settings_;
+    Backend backend_;
+    int device_;
+    Job& job_;
+    Job ahead_;  ///< of the frame that is read beside the drawing
+    std::future<Result<Bundle>> coming_;
+    std::optional<std::size_t> comingFrame_, frame_;
+    std::unique_ptr<Renderer> renderer_;
+    std::vector<Camera> views_;
+    std::int64_t points_ = 0;
+    Bounds bounds_;
+    glm::dvec3 origin_{0.0};
+};
+
+}  // namespace stx::tools
