@@ -158,8 +158,13 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     STX_CHECK(containerOf(target));
     // Only the report has the points, for which the images must be decoded.
     const bool countPoints = !program.common.report.empty();
-    STX_TRY(auto bundle, convertDocument(input, target, saveOptions(o, program),
-                                         o.mesh->depthBits.has_value(), countPoints, program.job));
+    std::optional<Bundle> bundle;
+    std::error_code ec;
+    // `name_%04d.exr` is no file.
+    if (std::filesystem::exists(input, ec) || !frameName(input.string(), 0)) {
+        STX_TRY(bundle, convertDocument(input, target, saveOptions(o, program),
+                                        o.mesh->depthBits.has_value(), countPoints, program.job));
+    }
     Timeline timeline;
     if (bundle) {
         noteUnused(input, false, o, program);

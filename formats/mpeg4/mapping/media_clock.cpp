@@ -79,10 +79,12 @@ double mediaTimeOf(const Node& texture, double duration, double now) {
     if (run.stop > run.start) passed = std::min(passed, run.stop - run.start);
     if (passed < 0) return backwards ? duration : 0;
     const double cycle = duration / speed;
-    if (run.loop)
-        passed = std::fmod(passed + kSameTime, cycle);
-    else
+    if (run.loop) {
+        passed = std::fmod(passed, cycle);
+        if (cycle - passed < kSameTime) passed = 0;
+    } else {
         passed = std::min(passed, cycle);
+    }
     return backwards ? duration - passed * speed : passed * speed;
 }
 

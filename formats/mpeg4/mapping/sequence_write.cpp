@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <unordered_map>
 
 #include "formats/mpeg4/mapping/view_images.hpp"
 #include "lib/base/parallel.hpp"
@@ -231,7 +230,7 @@ class SequenceWriter {
         return moveCamera(track, images, view, now);
     }
 
-    /// A new node in the old one's place, with its id, so that later commands find it.
+    /// A new node in the old one's place. It has its name, and so its id: see assignNodeIds().
     Result<void> moveCamera(ViewTrack& track, const ViewImages& images, const ReferenceView& view,
                             std::uint64_t now) {
         const Camera& was = track.camera;
@@ -266,16 +265,6 @@ class SequenceWriter {
                 if (stream)
                     for (Sample& sample : stream->samples) sample.data.source = source;
         const std::uint64_t end = ticks(frames_.timeline().duration);
-        // DEF ids that commands need; the nodes that replace each other share one.
-        std::uint32_t id = 0;
-        std::unordered_map<std::string, std::uint32_t> ids;
-        for (CommandFrame& frame : document_.frames)
-            for (Command& command : frame.commands)
-                if (auto* replace = std::get_if<ReplaceNode>(&command)) {
-                    auto& own = ids[replace->target->defName];
-                    if (own == 0) own = ++id;
-                    replace->target->defId = replace->replacement->defId = own;
-                }
         for (ViewTrack& track : tracks_) {
             const NodePtr texture = track.node->get<NodePtr>("diTexture");
             for (std::size_t r = 0; r < kRoles.size(); ++r) {

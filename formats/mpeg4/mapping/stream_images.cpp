@@ -13,6 +13,25 @@ const std::vector<Url>* urlsOf(const Node& texture) {
     return index < 0 ? nullptr : std::get_if<std::vector<Url>>(&texture.value(index));
 }
 
+/// In words, of streams that no image codec reads.
+const char* videoName(int objectTypeIndication) {
+    switch (objectTypeIndication) {
+        case 0x20:
+            return " (MPEG-4 Visual)";
+        case oti::kAvc:
+            return " (H.264)";
+        case oti::kHevc:
+            return " (HEVC)";
+        default:
+            return "";
+    }
+}
+
+bool isVideo(const ElementaryStream& stream) {
+    return stream.objectTypeIndication != 0 && stream.objectTypeIndication != oti::kJpeg &&
+           stream.objectTypeIndication != oti::kPng;
+}
+
 }  // namespace
 
 Result<StreamImages> StreamImages::make(const Document& document,
@@ -132,12 +151,12 @@ Result<DecodedImage> StreamImages::decode(const Node& texture, const ImageDecode
         return decodedFromPixels(image);
     }
     const ElementaryStream* from = stream(texture);
-    if (from && from->objectTypeIndication != 0 && from->objectTypeIndication != oti::kJpeg &&
-        from->objectTypeIndication != oti::kPng)
+    if (from && isVideo(*from))
         return fail(ErrorCode::unsupported,
-                    "the image is a stream of objectTypeIndication 0x{:02X}; JPEG (0x6C) and PNG "
-                    "(0x6D) are read",
-                    from->objectTypeIndication);
+                    "the image is a stream of objectTypeIndication 0x{:02X}{}; JPEG (0x6C) and PNG "
+                    "(0x6D) are read. Take the pictures out first (ffmpeg -i FILE "
+                    "picture_%04d.png); conversions between .mp4, .bt and .xmt keep the stream",
+                    from->objectTypeIndication, videoName(from->objectTypeIndication));
     const PictureCache::Key key{from,
                                 from && !from->samples.empty() ? sampleAt(texture, *from) : 0};
     if (cache_ && from)
@@ -156,6 +175,9 @@ Result<ImageInfo> StreamImages::probe(const Node& texture) const {
         const auto& image = texture.get<PixelImage>("image");
         return ImageInfo{"pixels", image.width, image.height, image.components, 8};
     }
+    // What video is coded in, only its decoder knows; its track tells its size.
+    if (const ElementaryStream* from = stream(texture); from && isVideo(*from) && from->width > 0)
+        return ImageInfo{"video", from->width, from->height, 1, 8};
     // Headers are at the front, but for a JPEG with much metadata.
     if (const ElementaryStream* from = stream(texture); from && !from->samples.empty()) {
         ByteRange head = from->samples[sampleAt(texture, *from)].data;

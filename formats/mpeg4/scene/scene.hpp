@@ -366,7 +366,8 @@ struct NodeIds {
 };
 /// An id for every node that needs one (a defId, a DEF name, more than one use, an end of a route,
 /// the target of a command): its defId where it has one, else one that no other node has, in order
-/// of appearance. The same for routes with a name.
+/// of appearance. The same for routes with a name. A node that replaces one of its own name takes
+/// its id.
 /// PROTOs keep their id where no other has it. The highest ids count the bodies of PROTOs, too.
 [[nodiscard]] NodeIds assignNodeIds(const std::vector<CommandFrame>& frames);
 /// The ids of the nodes in the body of a PROTO, which are apart from all others.

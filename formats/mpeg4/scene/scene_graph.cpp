@@ -366,6 +366,9 @@ NodeIds nodeIdsOf(const std::vector<CommandFrame>& frames) {
     std::vector<const Node*> inOrder;
     std::unordered_map<const Node*, int> uses;
     std::unordered_set<const Node*> named;  // by a route or as a target
+    // A node that replaces another under its name takes its id, too, so that later commands find
+    // it.
+    std::unordered_map<const Node*, const Node*> successors;
     std::vector<const Route*> routes;
     const std::function<void(const NodePtr&)> visit = [&](const NodePtr& node) {
         inOrder.push_back(node.get());
@@ -386,7 +389,13 @@ NodeIds nodeIdsOf(const std::vector<CommandFrame>& frames) {
                     }
                     if constexpr (requires { c.route; }) routes.push_back(&c.route);
                     if constexpr (requires { c.replacement; })
-                        if (c.replacement) ++uses[c.replacement.get()];
+                        if (c.replacement) {
+                            ++uses[c.replacement.get()];
+                            if (c.target && c.target != c.replacement &&
+                                !c.target->defName.empty() &&
+                                c.target->defName == c.replacement->defName)
+                                successors[c.replacement.get()] = c.target.get();
+                        }
                     if constexpr (requires { c.node; })
                         if (c.node) ++uses[c.node.get()];
                     if constexpr (requires { c.value; })
@@ -417,6 +426,14 @@ NodeIds nodeIdsOf(const std::vector<CommandFrame>& frames) {
     for (const Node* node : inOrder) {
         if (node->defId != 0 || (node->defName.empty() && uses[node] < 2 && !named.contains(node)))
             continue;
+        // Targets are walked before what replaces them.
+        const auto before = successors.find(node);
+        const auto known =
+            before == successors.end() ? ids.nodes.end() : ids.nodes.find(before->second);
+        if (known != ids.nodes.end()) {
+            ids.nodes.emplace(node, known->second);
+            continue;
+        }
         while (taken.contains(next)) ++next;
         ids.nodes.emplace(node, next++);
     }

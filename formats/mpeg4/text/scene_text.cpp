@@ -154,10 +154,25 @@ TextNames TextNames::ofBody(const Proto& proto) {
 void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
     const NodeIds ids = assignNodeIds(frames);
     std::unordered_map<std::string, int> taken;
-    for (const CommandFrame& frame : frames)
-        for (const Command& command : frame.commands)
+    for (const CommandFrame& frame : frames) {
+        for (const Command& command : frame.commands) {
+            // A node in another's place with its id has its name, too: what comes later means it.
+            const auto* replace = std::get_if<ReplaceNode>(&command);
+            const auto isSuccessor = [&](const NodePtr& node) {
+                if (!replace || node != replace->replacement) return false;
+                const auto was = ids.nodes.find(replace->target.get());
+                const auto is = ids.nodes.find(node.get());
+                return was != ids.nodes.end() && is != ids.nodes.end() &&
+                       was->second == is->second &&
+                       textNameOf(*node) == textNameOf(*replace->target) &&
+                       names_.contains(replace->target.get());
+            };
             forEachNode(command, [&](const NodePtr& node) {
                 if (names_.contains(node.get())) return;
+                if (isSuccessor(node)) {
+                    names_[node.get()] = std::string(names_.at(replace->target.get()));
+                    return;
+                }
                 std::string text = textNameOf(*node);
                 if (text.empty()) {
                     const auto id = ids.nodes.find(node.get());
@@ -176,6 +191,8 @@ void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
                 taken[text] = 1;
                 names_[node.get()] = text;
             });
+        }
+    }
 }
 
 const std::string* TextNames::find(const Node& node) const {

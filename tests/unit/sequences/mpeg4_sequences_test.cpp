@@ -1,0 +1,273 @@
+// Bundles in time as MPEG-4 presentations: MovieTextures, commands, clocks, interpolators.
+
+#include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/mapping/scene_sequence.hpp"
+#include "formats/mpeg4/mapping/sequence_write.hpp"
+#include "formats/mpeg4/scene/interpolators.hpp"
+#include "formats/sequences.hpp"
+#include "tests/shared_data.hpp"
+#include "tests/unit/sequences/moving_views.hpp"
+
+using namespace stx;
+using namespace stx::mpeg4;
+
+namespace {
+
+/// The number of its own that a stream's sample holds, and a second.
+ElementaryStream streamOf(std::vector<std::uint64_t> times, std::uint32_t duration = 40) {
+    ElementaryStream stream;
+    for (const std::uint64_t time : times) {
+        Sample sample;
+        sample.time = time;
+        sample.duration = duration;
+        stream.samples.push_back(sample);
+    }
+    return stream;
+}
+
+NodePtr movie(bool loop, float speed = 1, double start = 0, double stop = 0) {
+    NodePtr node = makeNode("MovieTexture");
+    node->set("loop", loop);
+    node->set("speed", speed);
+    node->set("startTime", start);
+    node->set("stopTime", stop);
+    return node;
+}
+
+std::size_t samplesOf(const Document& document, int descriptor) {
+    return document.findObjectDescriptor(descriptor)->streams[0].samples.size();
+}
+
+}  // namespace
+
+class SequenceContainers : public testing::TestWithParam<const char*> {};
+
+TEST_P(SequenceContainers, HoldEveryFrame) {
+    TemporaryFolder folder("sequences");
+    Job job;
+    MovingViews frames(5);
+    const auto target = folder / GetParam();
+    auto saved = saveSequence(frames, target, {}, job);
+    ASSERT_TRUE(saved) << saved.error().text();
+    auto read = openSequence(target, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const Timeline& line = (*read)->timeline();
+    ASSERT_EQ(line.count(), 5u);
+    EXPECT_NEAR(line.duration, 0.2, 1e-9);
+    EXPECT_NEAR(line.rate(), 25, 1e-6);
+    // In any order.
+    for (const std::size_t i : {0u, 4u, 1u, 3u, 2u}) {
+        EXPECT_NEAR(line.times[i], 0.04 * static_cast<double>(i), 1e-9);
+        const auto is = (*read)->frame(i, job);
+        ASSERT_TRUE(is) << is.error().text();
+        EXPECT_NEAR(is->time.value_or(-1), line.times[i], 1e-12);
+        const auto expected = frames.frame(i, job);
+        expectSameFrame(*is, *expected);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SequenceContainers,
+                         testing::Values("a.mp4", "a.bt", "a.xmt", "a_%03d.exr"),
+                         [](const auto& kind) {
+                             return std::string("number") + std::to_string(kind.index);
+                         });
+
+TEST(Mpeg4Sequences, OnlyWhatChangesMoves) {
+    TemporaryFolder folder("sequences");
+    Job job;
+    MovingViews frames(5);
+    auto spool = PictureSpool::create(folder.path());
+    ASSERT_TRUE(spool);
+    const auto document = sceneFromSequence(frames, {}, *spool, job);
+    ASSERT_TRUE(document) << document.error().text();
+    EXPECT_EQ(samplesOf(*document, 2), 5u);  // colour of the first view
+    EXPECT_EQ(samplesOf(*document, 3), 5u);  // its depth
+    EXPECT_EQ(samplesOf(*document, 4), 1u) << "the second view stands still";
+    EXPECT_EQ(samplesOf(*document, 5), 1u);
+    // The first scene and four replacements of the second view.
+    ASSERT_EQ(document->frames.size(), 5u);
+    for (std::size_t i = 1; i < 5; ++i) EXPECT_EQ(document->frames[i].commands.size(), 1u);
+}
+
+TEST(Mpeg4Sequences, ReplacedNodesKeepTheirId) {
+    TemporaryFolder folder("sequences");
+    Job job;
+    MovingViews frames(3);
+    const auto target = folder / "a.mp4";
+    ASSERT_TRUE(saveSequence(frames, target, {}, job));
+    const auto document = readMpeg4(target, job);
+    ASSERT_TRUE(document);
+    std::set<std::uint32_t> ids;
+    for (const CommandFrame& frame : document->frames)
+        for (const Command& command : frame.commands)
+            if (const auto* replace = std::get_if<ReplaceNode>(&command)) {
+                ids.insert(replace->target->defId);
+                ids.insert(replace->replacement->defId);
+            }
+    EXPECT_EQ(ids.size(), 1u);
+}
+
+TEST(Mpeg4Sequences, ThroughATextIsTheSameFile) {
+    for (const char* text : {"a.bt", "a.xmt"}) {
+        TemporaryFolder folder("sequences");
+        Job job;
+        MovingViews frames(4);
+        ASSERT_TRUE(saveSequence(frames, folder / "a.mp4", {}, job));
+        auto document = readMpeg4(folder / "a.mp4", job);
+        ASSERT_TRUE(document);
+        ASSERT_TRUE(writeMpeg4(*document, folder / text, job));
+        document = readMpeg4(folder / text, job);
+        ASSERT_TRUE(document) << document.error().text();
+        ASSERT_TRUE(writeMpeg4(*document, folder / "b.mp4", job));
+        EXPECT_EQ(*readFile(folder / "a.mp4", job.limits), *readFile(folder / "b.mp4", job.limits))
+            << text;
+    }
+}
+
+TEST(Mpeg4Sequences, NothingStaysBesideTheTarget) {
+    TemporaryFolder folder("sequences");
+    Job job;
+    MovingViews frames(4);
+    ASSERT_TRUE(saveSequence(frames, folder / "a.mp4", {}, job));
+    const auto count = std::distance(std::filesystem::directory_iterator(folder.path()), {});
+    EXPECT_EQ(count, 1);
+}
+
+TEST(Mpeg4Sequences, WhatCannotMoveIsSaid) {
+    class Grows : public MovingViews {
+      public:
+        using MovingViews::MovingViews;
+        Result<Bundle> frame(std::size_t index, Job& job) override {
+            auto bundle = MovingViews::frame(index, job);
+            if (index == 2) bundle->views[1] = makeView(32, 16, 16, 2);
+            return bundle;
+        }
+    };
+    TemporaryFolder folder("sequences");
+    Job job;
+    Grows frames(4);
+    const auto saved = saveSequence(frames, folder / "a.mp4", {}, job);
+    ASSERT_FALSE(saved);
+    EXPECT_EQ(saved.error().code, ErrorCode::invalidInput);
+    EXPECT_NE(saved.error().text().find("frame 2 (0.08 s)"), std::string::npos);
+    EXPECT_NE(saved.error().text().find("32x16"), std::string::npos) << saved.error().text();
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.mp4"));
+
+    MovingViews fine(4);
+    SaveOptions points;
+    points.pointTexture = true;
+    const auto asPoints = saveSequence(fine, folder / "a.mp4", points, job);
+    ASSERT_FALSE(asPoints);
+    EXPECT_EQ(asPoints.error().code, ErrorCode::unsupported);
+    const auto one = saveSequence(fine, folder / "a.exr", {}, job);
+    ASSERT_FALSE(one);
+    EXPECT_EQ(one.error().code, ErrorCode::usage);
+}
+
+TEST(MediaClock, FollowsCompositionTimesAndEdits) {
+    // Decoding order is not the order of showing.
+    ElementaryStream stream = streamOf({0, 40, 80});
+    stream.samples[0].compositionOffset = 40;
+    stream.samples[1].compositionOffset = 80;
+    stream.samples[2].compositionOffset = 0;
+    Presentation shown = presentationOf(stream);
+    ASSERT_EQ(shown.shown.size(), 3u);
+    EXPECT_EQ(shown.sampleAt(0.04), 0u);
+    EXPECT_EQ(shown.sampleAt(0.08), 2u);
+    EXPECT_EQ(shown.sampleAt(0.12), 1u);
+    EXPECT_NEAR(shown.duration, 0.16, 1e-9);
+    // The edit list of the fixtures takes the delay away again.
+    stream.edits = {1000, {{120, 40, 0x10000}}};
+    shown = presentationOf(stream);
+    EXPECT_EQ(shown.sampleAt(0), 0u);
+    EXPECT_EQ(shown.sampleAt(0.04), 2u);
+    EXPECT_EQ(shown.sampleAt(0.08), 1u);
+    EXPECT_NEAR(shown.duration, 0.12, 1e-9);
+    // An empty edit first: the first picture stands there already.
+    stream.edits = {1000, {{500, -1, 0x10000}, {120, 40, 0x10000}}};
+    shown = presentationOf(stream);
+    EXPECT_EQ(shown.sampleAt(0.1), 0u);
+    EXPECT_EQ(shown.sampleAt(0.54), 2u);
+}
+
+TEST(MediaClock, RunsAsMovieTexturesDo) {
+    // 14772-1, 6.28.
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(false), 2, 0.5), 0.5);
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(false), 2, 7), 2) << "holds its last picture";
+    EXPECT_NEAR(mediaTimeOf(*movie(true), 2, 7), 1, 1e-5);
+    EXPECT_NEAR(mediaTimeOf(*movie(true, 2), 2, 1.25), 0.5, 1e-5);
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(false, 1, 3), 2, 1), 0) << "has not begun";
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(false, 1, 3), 2, 4), 1);
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(true, 1, 1, 2.5), 4, 9), 1.5) << "stopped";
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(true, 1, 3, 2), 4, 4), 1) << "stopTime before the start";
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(false, -1), 2, 0.5), 1.5);
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(false, -1, 3), 2, 0), 2) << "backwards: the last picture";
+    EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(true, 0), 2, 0.5), 0);
+}
+
+TEST(Interpolators, MoveWhatRoutesReach) {
+    Scene scene;
+    NodePtr clock = makeNode("TimeSensor");
+    clock->set("cycleInterval", 2.0);
+    clock->set("startTime", 1.0);
+    NodePtr positions = makeNode("PositionInterpolator");
+    positions->set("key", std::vector<float>{0, 0.5f, 1});
+    positions->set("keyValue", std::vector<glm::vec3>{{0, 0, 0}, {4, 0, 0}, {4, 8, 0}});
+    NodePtr turns = makeNode("OrientationInterpolator");
+    turns->set("key", std::vector<float>{0, 1});
+    // The shorter way from 350 to 10 degrees is over 0.
+    turns->set("keyValue", std::vector<Rotation>{{{0, 1, 0}, glm::radians(350.0f)},
+                                                 {{0, 1, 0}, glm::radians(10.0f)}});
+    NodePtr place = makeNode("Transform");
+    scene.root = place;
+    const auto route = [&](const NodePtr& from, const char* out, const NodePtr& to,
+                           const char* in) {
+        scene.routes.push_back({0, "", from, from->info->find(out), to, to->info->find(in)});
+    };
+    route(clock, "fraction_changed", positions, "set_fraction");
+    route(clock, "fraction_changed", turns, "set_fraction");
+    route(positions, "value_changed", place, "translation");
+    route(turns, "value_changed", place, "rotation");
+    // A circle of routes ends.
+    route(place, "translation", place, "translation");
+
+    applyInterpolators(scene, 0.5);
+    EXPECT_EQ(place->get<glm::vec3>("translation"), glm::vec3(0)) << "the clock has not begun";
+    applyInterpolators(scene, 1.5);
+    EXPECT_NEAR(place->get<glm::vec3>("translation").x, 2, 1e-5);
+    applyInterpolators(scene, 2.5);
+    EXPECT_NEAR(place->get<glm::vec3>("translation").y, 4, 1e-5);
+    applyInterpolators(scene, 2.0);
+    EXPECT_NEAR(
+        std::abs(std::remainder(place->get<Rotation>("rotation").angle, glm::radians(360.0f))), 0,
+        1e-4);
+    applyInterpolators(scene, 9);
+    EXPECT_NEAR(place->get<glm::vec3>("translation").y, 8, 1e-5) << "its end stays";
+
+    clock->set("loop", true);
+    applyInterpolators(scene, 1 + 2 * 3 + 0.5);
+    EXPECT_NEAR(place->get<glm::vec3>("translation").x, 2, 1e-5);
+}
+
+TEST(Mpeg4Sequences, AReferenceFileMovesAsItsTextSays) {
+    REQUIRE_SHARED(file, "reference/motion/imgseq.mp4");
+    Job job;
+    auto read = openSequence(file, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const Timeline& line = (*read)->timeline();
+    EXPECT_EQ(line.count(), 10u);
+    EXPECT_NEAR(line.rate(), 25, 1e-6);
+    EXPECT_NEAR(line.duration, 0.4, 1e-9);
+    // anim.bt: a PositionInterpolator moves 0 .. 1 along x in 0.4 s; at 0.2 s the Transform is
+    // turned by 0.25 about y and the DepthImage moves to y 0.25.
+    for (std::size_t i = 0; i < line.count(); ++i) {
+        const auto frame = (*read)->frame(i, job);
+        ASSERT_TRUE(frame) << frame.error().text();
+        ASSERT_EQ(frame->views.size(), 1u);
+        const Camera& c = frame->views[0].camera;
+        const double moved = line.times[i] / 0.4;
+        const bool later = line.times[i] >= 0.2 - 1e-9;
+        EXPECT_NEAR(c.position.y, later ? 0.25 : 0.0, 1e-6) << i;
+        EXPECT_NEAR(c.position.x, moved + (later ? 3 * std::sin(0.25) : 0.0), 1e-5) << i;
+    }
+}
