@@ -5,6 +5,7 @@
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
+#include "formats/sequences.hpp"
 #include "lib/surface/normals.hpp"
 #include "tools/commands.hpp"
 
@@ -22,14 +23,25 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
-    STX_TRY(auto bundle, openBundle(o.input, {}, program.job));
+    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
     BakeSettings settings = o.settings;
     settings.method =
         o.method == "paper" ? BakeSettings::Method::paper : BakeSettings::Method::robust;
-    STX_CHECK(bake(bundle, settings, program.job));
+    const Timeline timeline = frames->timeline();
+    // What the report tells is that of the first frame.
+    std::size_t views = 0;
+    std::int64_t points = 0;
+    frames = changed(std::move(frames), [&](Bundle& bundle, Job& job) -> Result<void> {
+        STX_CHECK(bake(bundle, settings, job));
+        if (views == 0) {
+            views = bundle.views.size();
+            points = bundle.pointCount();
+        }
+        return {};
+    });
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    STX_CHECK(saveBundle(bundle, o.output, save, program.job));
+    STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
@@ -37,13 +49,15 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
         "{} ({}) → {} ({}), {} with normals and splats, {}",
         std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)),
         std::filesystem::path(o.output).filename().string(), humanBytes(bytesOf(o.output)),
-        counted(bundle.views.size(), "view"), humanSeconds(seconds)));
+        counted(views, "view") +
+            (timeline.moves() ? " of " + counted(timeline.count(), "frame") : std::string()),
+        humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "bake-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
                                    {"method", o.method},
-                                   {"views", bundle.views.size()},
-                                   {"points", bundle.pointCount()},
+                                   {"views", views},
+                                   {"points", points},
                                    {"seconds", seconds}}));
     return 0;
 }

@@ -257,6 +257,8 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
     if (const auto* origin = first.attribute<glm::dvec3>("stx:origin");
         origin && std::isfinite(origin->x + origin->y + origin->z))
         header.origin = *origin;
+    if (const auto* time = first.attribute<double>("stx:time"); time && std::isfinite(*time))
+        header.time = *time;
     header.linear = isLinearExr(reader);
     for (const int i : exrViewParts(reader)) {
         const ExrPart& part = reader.parts()[i];
@@ -305,6 +307,7 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     bundle.title = header.title;
     bundle.bounds = header.bounds;
     bundle.origin = header.origin;
+    bundle.time = header.time;
     for (auto& view : header.views) bundle.views.push_back(std::move(view.view));
 
     const auto count = static_cast<std::int64_t>(parts.size());

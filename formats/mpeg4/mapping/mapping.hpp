@@ -39,6 +39,8 @@ struct SceneReadOptions {
     bool pixels = true;
     /// A scene that shows no view gives a bundle without any, instead of an error.
     bool mayBeEmpty = false;
+    /// A note of what moves, and is read as it is at its start.
+    bool noteMotion = true;
 };
 
 /// The object of a presentation as it is at its first moment: a view for each DepthImage (and

@@ -53,7 +53,7 @@ class BundleReader {
             nothing.title = shown.title;
             return nothing;
         }
-        if (still) noteMotion(scene, shown);
+        if (still && options_.noteMotion) noteMotion(scene, shown);
         if (plans.empty())
             return fail(ErrorCode::invalidInput,
                         "the scene shows no DepthImage with a texture; there is nothing to see");
