@@ -1,5 +1,6 @@
 #include "tools/command_line.hpp"
 
+#include <algorithm>
 #include <sstream>
 
 #include <CLI/CLI.hpp>
@@ -302,6 +303,29 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
     for (const auto& entry : entries_)
         if (entry.app->parsed()) return Request{{}, *entry.body, entry.app->get_name()};
     return fail(ErrorCode::usage, "no command was given. See 'stx --help'.");
+}
+
+CommandLine::FailedRequest CommandLine::failedRequest(int argc, char** argv) const {
+    FailedRequest request;
+    const std::vector<std::string_view> words(argv + std::min(argc, 1), argv + argc);
+    const auto entry = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
+        return !words.empty() && e.app->get_name() == words[0];
+    });
+    if (entry == entries_.end()) return request;
+    request.command = entry->app->get_name();
+    const bool writes = entry->app->get_option_no_throw("--report") != nullptr;
+    constexpr std::string_view kReport = "--report";
+    for (std::size_t i = 1; i < words.size() && words[i] != "--"; ++i) {
+        const std::string_view word = words[i];
+        if (word == "--no-clobber") request.noClobber = true;
+        if (!writes || !word.starts_with(kReport)) continue;
+        const std::string_view rest = word.substr(kReport.size());
+        if (rest.starts_with('='))
+            request.report = rest.substr(1);
+        else if (rest.empty() && i + 1 < words.size() && !words[i + 1].starts_with('-'))
+            request.report = words[++i];
+    }
+    return request;
 }
 
 std::vector<CommandRow> CommandLine::table() const {

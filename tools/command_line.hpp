@@ -153,6 +153,15 @@ class CommandLine {
     /// unknown one.
     [[nodiscard]] Result<Request> parse(int argc, char** argv) const;
 
+    /// What the arguments say of the report of a command line that parse() refused. They are read
+    /// word by word, since the parse may have stopped before them.
+    struct FailedRequest {
+        std::string command;  ///< empty: none that there is
+        std::string report;   ///< of --report; empty: none, or the command has no report
+        bool noClobber = false;
+    };
+    [[nodiscard]] FailedRequest failedRequest(int argc, char** argv) const;
+
     [[nodiscard]] std::vector<CommandRow> table() const;
     /// What the exit codes mean: the last lines of the help.
     [[nodiscard]] std::string exitCodes() const;

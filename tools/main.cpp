@@ -2,7 +2,6 @@
 
 #include <cstdio>
 
-#include "lib/base/printable.hpp"
 #include "tools/commands.hpp"
 #include "tools/stop_signals.hpp"
 
@@ -18,8 +17,15 @@ int mainProgram(int argc, char** argv) {
         add(line, program);
     const auto request = line.parse(argc, argv);
     if (!request) {
-        fmt::print(stderr, "stx: {}\n", printable(request.error().message));
-        return static_cast<int>(request.error().code);
+        // What was parsed before the mistake does not count, but for the report of it.
+        const auto failed = line.failedRequest(argc, argv);
+        program.command = failed.command;
+        program.common = {};
+        program.common.noClobber = failed.noClobber;
+        // The mistake is told even where its report has no place.
+        if (!failed.report.empty() && checkTarget(failed.report, program))
+            program.common.report = failed.report;
+        return program.run([&]() -> Result<int> { return tl::unexpected(request.error()); });
     }
     if (!request->body) {
         program.print(request->text);
