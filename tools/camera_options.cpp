@@ -98,6 +98,12 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .takes("FILE")
         .group(group);
     command
+        .option("--dataparser", o.dataparser,
+                "dataparser_transforms.json of the training that a camera_path.json belongs to "
+                "(default: one beside it): its cameras then are in the world of the images")
+        .takes("FILE")
+        .group(group);
+    command
         .option("--size", o.size,
                 "Size of the picture (default: that of the camera, else 512x512). Where its shape "
                 "is not the camera's, more is seen on the longer side: nothing is squeezed or cut")
@@ -137,7 +143,7 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
         return std::vector<NovelCamera>{{inPicture(context.views[o.view], size)}};
     }
     if (!o.cameraFile.empty()) {
-        STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job, size));
+        STX_TRY(auto cameras, readCameraFile(o.cameraFile, program.job, size, o.dataparser));
         std::vector<NovelCamera> out;
         for (auto& c : cameras) {
             c.camera.position -= context.origin;
@@ -205,6 +211,8 @@ Result<int> checkCameraOptions(const CameraOptions& options, const Command& comm
     if (own || !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty())))
         STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
     if (o.orbit == 0) STX_CHECK(command.refuse({"--radius", "--start", "--arc"}, "is of --orbit"));
+    if (o.cameraFile.empty())
+        STX_CHECK(command.refuse({"--dataparser"}, "is of --cameras camera_path.json"));
     o.view = -1;  // needs the input
     CameraContext unitCube;
     unitCube.bounds.add(glm::dvec3(-1));

@@ -22,6 +22,7 @@ struct CameraOptions {
     double elevationDeg = 15.0, startDeg = 0.0, arcDeg = 360.0;
     double orbitRadius = 0;  ///< 0 = the object fills the picture
     std::string cameraFile;
+    std::string dataparser;  ///< of a camera_path.json; empty: one beside it
     std::string size;
 };
 

@@ -47,10 +47,44 @@ Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>
     return out;
 }
 
+/// The cameras of a camera_path.json, in the world of the images where that is known.
+Result<std::vector<imagesets::SetView>> cameraPathInWorld(const imagesets::Json& file,
+                                                          const std::filesystem::path& path,
+                                                          std::filesystem::path dataparser,
+                                                          Job& job) {
+    using namespace imagesets;
+    STX_TRY(auto views, cameraPathViews(file, job));
+    const auto folder = path.parent_path();
+    std::error_code ec;
+    if (dataparser.empty() &&
+        std::filesystem::is_regular_file(folder / "dataparser_transforms.json", ec))
+        dataparser = folder / "dataparser_transforms.json";
+    if (dataparser.empty()) {
+        job.note(
+            "a camera_path.json is in the world of nerfstudio's viewer: that of the images only "
+            "when they were loaded without orienting, centring and scaling them; with the "
+            "dataparser_transforms.json of the training beside it this is undone");
+        return views;
+    }
+    STX_TRY(const Json said, readJson(dataparser, job.limits));
+    std::optional<Json> transforms;
+    for (const auto& beside : {folder, dataparser.parent_path()}) {
+        if (transforms || !std::filesystem::is_regular_file(beside / "transforms.json", ec))
+            continue;
+        STX_TRY(transforms, readJson(beside / "transforms.json", job.limits));
+    }
+    if (auto ok = undoDataparser(said, transforms ? &*transforms : nullptr, views, job); !ok)
+        return tl::unexpected(ok.error().at(inQuotes(dataparser.string())));
+    job.note(fmt::format("the cameras are taken out of nerfstudio's normalised world as {} says",
+                         inQuotes(dataparser.string())));
+    return views;
+}
+
 }  // namespace
 
 Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path, Job& job,
-                                                std::optional<glm::ivec2> size) {
+                                                std::optional<glm::ivec2> size,
+                                                const std::filesystem::path& dataparser) {
     using namespace imagesets;
     const std::string where = inQuotes(path.string());
     std::error_code ec;
@@ -66,7 +100,7 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
              "'camera_path' (nerfstudio) in it");
     switch (jsonKindOf(file)) {
         case JsonKind::cameraPath:
-            views = cameraPathViews(file, job);
+            views = cameraPathInWorld(file, path, dataparser, job);
             break;
         case JsonKind::transforms:
             views = transformsViews(file, job);

@@ -21,9 +21,11 @@ struct NamedCamera {
 /// their keys; or a COLMAP model (its folder or one of its files, cameras in the order of names).
 /// Lenses are left out, with a note. Each camera has
 /// its own intrinsics and size; `size` is for those whose file does not tell it (without it
-/// 512x512, with a note). Errors: io, invalidInput with file and key.
-[[nodiscard]] Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& path,
-                                                              Job& job,
-                                                              std::optional<glm::ivec2> size = {});
+/// 512x512, with a note). The poses of a camera_path.json are taken out of nerfstudio's normalised
+/// world by `dataparser`, or where it is empty by a dataparser_transforms.json beside the file; a
+/// note says so, or that there is none. Errors: io, invalidInput with file and key.
+[[nodiscard]] Result<std::vector<NamedCamera>> readCameraFile(
+    const std::filesystem::path& path, Job& job, std::optional<glm::ivec2> size = {},
+    const std::filesystem::path& dataparser = {});
 
 }  // namespace stx

@@ -8,6 +8,62 @@
 #include "formats/imagesets/poses.hpp"
 
 namespace stx::imagesets {
+namespace {
+
+/// p -> scale * (rotation * p + shift)
+struct Similarity {
+    glm::dmat3 rotation{1.0};
+    glm::dvec3 shift{0.0};
+    double scale = 1;
+
+    void undo(Camera& c) const {
+        c.position = glm::transpose(rotation) * (c.position / scale - shift);
+        c.orientation = glm::normalize(glm::quat_cast(glm::transpose(rotation)) * c.orientation);
+    }
+    void apply(Camera& c) const {
+        c.position = scale * (rotation * c.position + shift);
+        c.orientation = glm::normalize(glm::quat_cast(rotation) * c.orientation);
+    }
+};
+
+/// Of a matrix and a factor, which is 1 where there is none.
+Result<Similarity> similarityOf(const Json& file, const char* matrixKey, const char* scaleKey,
+                                const std::string& where, Job& job) {
+    Similarity out;
+    STX_TRY(const glm::dmat4 matrix, needMatrix(file, matrixKey, where));
+    out.shift = glm::dvec3(matrix[3]);
+    // It turns poses, not pixels: corrections are told as if the focal length were 1000 pixels.
+    STX_TRY(out.rotation, repairRotation(glm::dmat3(matrix), 1000.0,
+                                         fmt::format("{}: '{}'", where, matrixKey), job));
+    STX_TRY(const auto scale, findNumber(file, scaleKey, where));
+    out.scale = scale.value_or(1.0);
+    if (!(out.scale > 0))
+        return failAt(where, ErrorCode::invalidInput, "'{}' is {:g}; it must be above 0", scaleKey,
+                      out.scale);
+    return out;
+}
+
+}  // namespace
+
+Result<void> undoDataparser(const Json& dataparser, const Json* transforms,
+                            std::vector<SetView>& views, Job& job) {
+    if (!dataparser.is_object())
+        return fail(ErrorCode::invalidInput, "'transform' and 'scale' are expected in it");
+    STX_TRY(const Similarity normalised, similarityOf(dataparser, "transform", "scale", "", job));
+    Similarity applied;
+    if (transforms != nullptr && transforms->is_object() &&
+        transforms->contains("applied_transform")) {
+        STX_TRY(applied, similarityOf(*transforms, "applied_transform", "applied_scale",
+                                      "transforms.json", job));
+    }
+    for (SetView& view : views) {
+        normalised.undo(view.camera);
+        applied.apply(view.camera);
+        if (auto ok = view.camera.check(); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("camera '{}'", view.name)));
+    }
+    return {};
+}
 
 Result<std::vector<SetView>> cameraPathViews(const Json& file, Job& job) {
     STX_TRY(const auto type, findText(file, "camera_type", ""));
@@ -48,9 +104,6 @@ Result<std::vector<SetView>> cameraPathViews(const Json& file, Job& job) {
         if (auto ok = c.check(); !ok) return tl::unexpected(ok.error().at(where));
         views.push_back(std::move(view));
     }
-    job.note(
-        "a camera_path.json is in the world of nerfstudio's viewer: that of the images only when "
-        "they were loaded without orienting, centring and scaling them");
     return views;
 }
 

@@ -95,6 +95,30 @@ Result<std::vector<double>> needNumbers(const Json& object, const char* key, std
     return std::move(*value);
 }
 
+Result<glm::dmat4> needMatrix(const Json& object, const char* key, const std::string& where) {
+    const auto it = object.find(key);
+    if (it == object.end()) return missing(key, where);
+    glm::dmat4 m(1.0);
+    const bool fine = [&] {
+        if (!it->is_array() || it->size() < 3 || it->size() > 4) return false;
+        for (std::size_t r = 0; r < it->size(); ++r) {
+            const Json& row = (*it)[r];
+            if (!row.is_array() || row.size() != 4) return false;
+            for (std::size_t k = 0; k < 4; ++k) {
+                if (!row[k].is_number() || !std::isfinite(row[k].get<double>())) return false;
+                m[static_cast<int>(k)][static_cast<int>(r)] = row[k].get<double>();
+            }
+        }
+        return true;
+    }();
+    if (!fine)
+        return failAt(where, ErrorCode::invalidInput, "'{}' must be 4 rows of 4 finite numbers",
+                      key);
+    if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1)
+        return failAt(where, ErrorCode::invalidInput, "the last row of '{}' must be 0 0 0 1", key);
+    return m;
+}
+
 Result<std::optional<std::string>> findText(const Json& object, const char* key,
                                             const std::string& where) {
     const Json* value = find(object, key);

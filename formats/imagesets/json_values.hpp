@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include <glm/glm.hpp>
 #include <nlohmann/json.hpp>
 
 #include "formats/files/files.hpp"
@@ -35,6 +36,10 @@ using Json = nlohmann::json;
                                                           const std::string& where);
 [[nodiscard]] Result<std::string> needText(const Json& object, const char* key,
                                            const std::string& where);
+
+/// A matrix of 3 or 4 rows of 4 finite numbers; the last row is 0 0 0 1, given or not.
+[[nodiscard]] Result<glm::dmat4> needMatrix(const Json& object, const char* key,
+                                            const std::string& where);
 
 /// `what` of a whole number within 1..largest.
 [[nodiscard]] Result<int> imageSide(double value, const char* key, int largest,

@@ -41,6 +41,12 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 [[nodiscard]] Result<std::vector<SetView>> camerasJsonViews(const Json& file, Job& job);
 /// Cameras without images: camera_path.json, as nerfstudio's viewer writes it.
 [[nodiscard]] Result<std::vector<SetView>> cameraPathViews(const Json& file, Job& job);
+/// Takes poses out of the world that nerfstudio trains and shows in, with what its
+/// dataparser_transforms.json says: normalised = scale * transform * world. The world is that of
+/// the images before nerfstudio prepared them (COLMAP's), or that of their transforms.json, where
+/// one is given that names the difference (applied_transform, applied_scale).
+[[nodiscard]] Result<void> undoDataparser(const Json& dataparser, const Json* transforms,
+                                          std::vector<SetView>& views, Job& job);
 /// Those of a COLMAP model (its folder, the workspace, or one of its files), by their names.
 [[nodiscard]] Result<std::vector<SetView>> colmapViews(const path& given, Job& job);
 

@@ -43,6 +43,26 @@ double Lens::largestShift(const Camera& c) const {
     return largest;
 }
 
+double Lens::cutShare(const Camera& c) const {
+    constexpr int kCells = 256;
+    double kept = 0;
+    const auto real = [&](double i, double j) {
+        return realFromIdeal(c, {c.width * i / kCells, c.height * j / kCells});
+    };
+    for (int j = 0; j < kCells; ++j) {
+        for (int i = 0; i < kCells; ++i) {
+            const glm::dvec2 middle = real(i + 0.5, j + 0.5);
+            if (!(middle.x >= 0 && middle.y >= 0 && middle.x <= c.width && middle.y <= c.height))
+                continue;
+            // Half the cross product of the diagonals is the area of a quadrangle.
+            const glm::dvec2 a = real(i + 1, j + 1) - real(i, j);
+            const glm::dvec2 b = real(i, j + 1) - real(i + 1, j);
+            kept += 0.5 * (a.x * b.y - a.y * b.x);
+        }
+    }
+    return std::clamp(1.0 - kept / (static_cast<double>(c.width) * c.height), 0.0, 1.0);
+}
+
 bool Lens::invertible(const Camera& c) const {
     bool fine = true;
     overGrid(c, [&](glm::dvec2 p) {

@@ -26,6 +26,9 @@ struct Lens {
     [[nodiscard]] glm::dvec2 realFromIdeal(const Camera& camera, glm::dvec2 pixel) const;
     /// The largest shift over the picture, in pixels.
     [[nodiscard]] double largestShift(const Camera& camera) const;
+    /// The share 0..1 of the real picture's area that the ideal pinhole's picture of the same size
+    /// does not reach, so that it is cut away. Right to about 0.002; the lens must be invertible().
+    [[nodiscard]] double cutShare(const Camera& camera) const;
     /// The mapping does not fold inside the picture: it can be undone.
     [[nodiscard]] bool invertible(const Camera& camera) const;
 };

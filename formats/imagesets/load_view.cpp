@@ -15,6 +15,9 @@
 namespace stx::imagesets {
 namespace {
 
+/// A smaller share of a picture that undoing its lens cuts away is not told.
+constexpr double kCutWorthTelling = 0.005;
+
 /// The two images have the same shape but for the rounding of one pixel.
 bool sameShape(int w1, int h1, int w2, int h2) {
     const double difference = std::abs(static_cast<double>(w1) * h2 - static_cast<double>(w2) * h1);
@@ -295,8 +298,14 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
         const char* what = !set.lens.distorts() ? "skew"
                            : set.lens.skew != 0 ? "lens distortion and skew"
                                                 : "lens distortion";
-        job.note(fmt::format("view '{}': {} of up to {:.2f} pixels undone by resampling", set.name,
-                             what, shift));
+        const double cut = set.lens.cutShare(camera);
+        job.note(fmt::format("view '{}': {} of up to {:.2f} pixels undone by resampling{}",
+                             set.name, what, shift,
+                             cut < kCutWorthTelling
+                                 ? ""
+                                 : fmt::format("; {:.0f} % of the picture lie outside a pinhole's "
+                                               "of the same focal length and size and are cut away",
+                                               100.0 * cut)));
         auto [texture, depth] = undistort(stored.texture, stored.depth, camera, set.lens);
         stored.texture = std::move(texture);
         stored.depth = std::move(depth);

@@ -115,28 +115,7 @@ Result<void> setIntrinsics(const Json& file, const Json& frame, const std::strin
 }
 
 Result<void> setPose(const Json& frame, const std::string& where, SetView& view, Job& job) {
-    const auto it = frame.find("transform_matrix");
-    if (it == frame.end())
-        return failAt(where, ErrorCode::invalidInput, "'transform_matrix' is missing");
-    glm::dmat4 m(1.0);
-    const bool fine = [&] {
-        if (!it->is_array() || it->size() < 3 || it->size() > 4) return false;
-        for (std::size_t r = 0; r < it->size(); ++r) {
-            const Json& row = (*it)[r];
-            if (!row.is_array() || row.size() != 4) return false;
-            for (std::size_t k = 0; k < 4; ++k) {
-                if (!row[k].is_number() || !std::isfinite(row[k].get<double>())) return false;
-                m[static_cast<int>(k)][static_cast<int>(r)] = row[k].get<double>();
-            }
-        }
-        return true;
-    }();
-    if (!fine)
-        return failAt(where, ErrorCode::invalidInput,
-                      "'transform_matrix' must be 4 rows of 4 finite numbers");
-    if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1)
-        return failAt(where, ErrorCode::invalidInput,
-                      "the last row of 'transform_matrix' must be 0 0 0 1");
+    STX_TRY(const glm::dmat4 m, needMatrix(frame, "transform_matrix", where));
     glm::dmat3 rotation(m);
     // Some exporters leave the scale of a parent in it; depth is not scaled by that.
     const double scale = std::cbrt(glm::determinant(rotation));

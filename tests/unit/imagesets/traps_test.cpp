@@ -136,6 +136,46 @@ TEST(ColmapTraps, AFisheyeIsUndoneToAThousandthOfAPixel) {
     }
 }
 
+TEST(ColmapTraps, TheNoteSaysHowMuchOfAFisheyePictureIsCutAway) {
+    for (const double f : {40.0, 60.0, 400.0}) {
+        TemporaryFolder folder;
+        writeText(folder / "sparse/cameras.txt",
+                  fmt::format("1 SIMPLE_RADIAL_FISHEYE 96 64 {} 50 30 0\n", f));
+        writeText(folder / "sparse/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");
+        writePositions(folder / "images/a.exr", 96, 64);
+        std::string depth = "96&64&1&";
+        for (int i = 0; i < 96 * 64; ++i) depth += floatBytes(2.0f);
+        writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
+        Job job;
+        ImageSetOptions options;
+        options.mixedPixels = MixedPixels::keep;
+        const auto read = readImageSet(folder.path(), options, job);
+        ASSERT_TRUE(read) << read.error().text();
+        // The other way round: points of the fisheye's picture that the pinhole's does not have.
+        int cut = 0, all = 0;
+        for (double y = 0.125; y < 64; y += 0.25)
+            for (double x = 0.125; x < 96; x += 0.25) {
+                const glm::dvec2 bent(x - 50, y - 30);
+                const double t = glm::length(bent) / f;
+                const glm::dvec2 at = bent / t * std::tan(t) + glm::dvec2(50, 30);
+                ++all;
+                if (at.x < 0 || at.y < 0 || at.x > 96 || at.y > 64) ++cut;
+            }
+        const double percent = 100.0 * cut / all;
+        const auto notes = job.takeNotes();
+        const auto note = std::find_if(notes.begin(), notes.end(), [](const std::string& text) {
+            return text.find("undone by resampling") != std::string::npos;
+        });
+        ASSERT_NE(note, notes.end());
+        const auto at = note->find("; ");
+        ASSERT_EQ(at == std::string::npos, percent < 0.5) << *note << " " << percent;
+        if (at != std::string::npos) {
+            EXPECT_NEAR(std::stod(note->substr(at + 2)), percent, 0.8) << *note;
+            EXPECT_NE(note->find("% of the picture lie outside"), std::string::npos) << *note;
+        }
+    }
+}
+
 TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
     struct Model {
         std::string line;
