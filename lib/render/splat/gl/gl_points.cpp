@@ -1,6 +1,7 @@
 #include "lib/render/splat/gl/gl_points.hpp"
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
 namespace stx::gl {
@@ -25,16 +26,17 @@ Image<glm::vec3> normalsOf(const ReferenceView& view) {
 
 }  // namespace
 
-PointArrays makePointArrays(const PageSet& set, bool withNormals) {
+PointArrays makePointArrays(const PageSet& set, bool lit) {
     PointArrays out;
     const Bounds bounds = set.bounds();
     if (!bounds.empty()) out.centre = bounds.centre();
     out.linear = set.linear();
+    out.decoded = lit && !out.linear;
     for (std::size_t i = 0; i < set.views().size(); ++i) {
         const PageView& view = set.views()[i];
         const Camera& camera = view.camera;
         Image<glm::vec3> made;
-        if (withNormals && !view.hasNormals) made = normalsOf(set.copyOfView(i));
+        if (lit && !view.hasNormals) made = normalsOf(set.copyOfView(i));
         for (const PageRectangle& r : set.rectanglesOf(i)) {
             const Page& page = set.pages()[static_cast<std::size_t>(r.page)];
             for (int y = r.y0; y < r.y1; ++y) {
@@ -50,10 +52,12 @@ PointArrays makePointArrays(const PageSet& set, bool withNormals) {
                     out.positions.emplace_back(p);
                     if (const auto* floats = page.texture->rgbaFloat())
                         out.coloursF.emplace_back(glm::vec3(floats->data()[texel]), 1.0f);
+                    else if (const glm::u8vec4 code = page.texture->rgba8()->data()[texel]; lit)
+                        out.coloursF.emplace_back(linearFromSrgb8(code.r), linearFromSrgb8(code.g),
+                                                  linearFromSrgb8(code.b), 1.0f);
                     else
-                        out.colours.emplace_back(glm::u8vec3(page.texture->rgba8()->data()[texel]),
-                                                 255);
-                    if (withNormals)
+                        out.colours.emplace_back(glm::u8vec3(code), 255);
+                    if (lit)
                         out.normals.push_back(view.hasNormals ? page.normal->data()[texel]
                                                               : made.at(x, y));
                     const glm::dvec2 spacing = camera.sampleSpacing(dist);

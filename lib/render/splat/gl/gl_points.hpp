@@ -14,15 +14,19 @@ struct PointArrays {
     glm::dvec3 centre{0};              ///< positions are relative to it, so that floats suffice
     double radius = 0;                 ///< of a ball around it that holds all points
     std::vector<glm::vec3> positions;  ///< world axes, scene units
-    std::vector<glm::u8vec4> colours;  ///< 8-bit bundles
-    std::vector<glm::vec4> coloursF;   ///< linear bundles
-    std::vector<glm::vec3> normals;    ///< world; only when asked for
+    std::vector<glm::u8vec4> colours;  ///< 8-bit bundles without lights
+    std::vector<glm::vec4> coloursF;   ///< all others: linear light
+    std::vector<glm::vec3> normals;    ///< world; only for lights
     std::vector<float> spacings;       ///< scene units between neighbouring samples
-    bool linear = false;
+    bool linear = false;               ///< the bundle's colours are, and so are those of the frame
+    bool decoded = false;  ///< coloursF are 8-bit sRGB codes decoded; frames are coded again
+
+    [[nodiscard]] bool inFloats() const { return linear || decoded; }
 };
 
-/// All points at least half covered.
-[[nodiscard]] PointArrays makePointArrays(const PageSet& set, bool withNormals);
+/// All points at least half covered. `lit`: with normals, and colours as linear light, in which
+/// alone lights add up.
+[[nodiscard]] PointArrays makePointArrays(const PageSet& set, bool lit);
 
 /// Points of one size, as a run of PointGroups::indices.
 struct PointGroup {

@@ -4,6 +4,8 @@
 
 #include <glm/gtc/type_ptr.hpp>
 
+#include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/device/gl_object.hpp"
 #include "lib/render/splat/gl/gl_points.hpp"
@@ -51,6 +53,7 @@ class GlRenderer final : public Renderer {
     void setCamera(const Camera& camera) const;
     void setLights(const Camera& camera) const;
     void drawGroups(bool lit) const;
+    void readColours(Image<glm::vec4>& to) const;
 
     std::shared_ptr<EglContext> context_;
     RenderSettings settings_;
@@ -69,8 +72,8 @@ Result<void> GlRenderer::makeTargets(glm::ivec2 size) {
                     size.x, size.y, context_->device().name, limit, limit);
     targets_ = std::make_unique<Targets>();
     targets_->colour = GlTexture::create(GL_TEXTURE_2D);
-    glTextureStorage2D(targets_->colour.get(), 1, points_.linear ? GL_RGBA32F : GL_RGBA8, size.x,
-                       size.y);
+    glTextureStorage2D(targets_->colour.get(), 1, points_.inFloats() ? GL_RGBA32F : GL_RGBA8,
+                       size.x, size.y);
     targets_->depth = GlTexture::create(GL_TEXTURE_2D);
     glTextureStorage2D(targets_->depth.get(), 1, GL_DEPTH_COMPONENT32F, size.x, size.y);
     targets_->framebuffer = GlFramebuffer::create();
@@ -166,7 +169,7 @@ void GlRenderer::drawGroups(bool lit) const {
     glEnableClientState(GL_VERTEX_ARRAY);
     glVertexPointer(3, GL_FLOAT, 0, points_.positions.data());
     glEnableClientState(GL_COLOR_ARRAY);
-    if (points_.linear)
+    if (points_.inFloats())
         glColorPointer(4, GL_FLOAT, 0, points_.coloursF.data());
     else
         glColorPointer(4, GL_UNSIGNED_BYTE, 0, points_.colours.data());
@@ -186,6 +189,17 @@ void GlRenderer::drawGroups(bool lit) const {
     glDisableClientState(GL_COLOR_ARRAY);
     glDisableClientState(GL_VERTEX_ARRAY);
     glFinish();
+}
+
+void GlRenderer::readColours(Image<glm::vec4>& to) const {
+    glReadPixels(0, 0, to.width(), to.height(), GL_RGBA, GL_FLOAT, to.data());
+    if (!points_.decoded) return;
+    parallelFor(0, to.height(), [&](std::int64_t row) {
+        for (int x = 0; x < to.width(); ++x) {
+            glm::vec4& c = to.at(x, static_cast<int>(row));
+            for (int i = 0; i < 3; ++i) c[i] = srgbByTable(c[i]);
+        }
+    });
 }
 
 Result<Frame> GlRenderer::render(const Camera& camera) {
@@ -216,7 +230,7 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
     if (groups_.groups.empty()) return frame;
 
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
-    glReadPixels(0, 0, camera.width, camera.height, GL_RGBA, GL_FLOAT, frame.colour.data());
+    readColours(frame.colour);
     glReadPixels(0, 0, camera.width, camera.height, GL_DEPTH_COMPONENT, GL_FLOAT,
                  frame.depth.data());
     const glm::dvec2 range = depthRange(groups_);
@@ -231,7 +245,7 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
     if (lit) {
         drawGroups(false);
         frame.albedo = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0));
-        glReadPixels(0, 0, camera.width, camera.height, GL_RGBA, GL_FLOAT, frame.albedo.data());
+        readColours(frame.albedo);
     }
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     STX_CHECK(context_->check("reading the frame back"));
@@ -248,7 +262,7 @@ Result<std::unique_ptr<Renderer>> makeGlRenderer(const PageSet& set, const Rende
                     settings.lighting.lights.size(), kMaxLights);
     std::uint64_t points = 0;
     for (const Page& page : set.pages()) points += page.depth->count();
-    STX_CHECK(job.limits.checkAllocation(points, 48, "the vertex arrays of the gl backend"));
+    STX_CHECK(job.limits.checkAllocation(points, 64, "the vertex arrays of the gl backend"));
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::compatibility));
     STX_CHECK(context->requireModern("the gl backend", "--backend gpu or cpu"));
     return std::make_unique<GlRenderer>(std::move(context), set, settings, job.limits);
