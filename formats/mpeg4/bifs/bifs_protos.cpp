@@ -108,6 +108,9 @@ Result<void> BifsNodeReader::readScripts(Node& script, int index, int depth) {
                                return check("Script.url");
                            }));
     }
+    // The fields that a Script has of its own came with a program, though its url be coded once
+    // more.
+    if (scripts.empty() && ownFieldCount(script) > 0) scripts.emplace_back();
     script.set(index, std::move(scripts));
     return {};
 }
