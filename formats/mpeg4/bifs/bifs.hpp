@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "formats/mpeg4/scene/document.hpp"
@@ -15,6 +16,16 @@ namespace stx::mpeg4 {
                                                   std::uint8_t objectTypeIndication);
 [[nodiscard]] Bytes encodeBifsConfig(const BifsConfig& config);
 
+/// What the commands of a buffer can name: the nodes of the scene, or of the body of a PROTO, that
+/// the buffer is in, by their ids, and the PROTOs that it may have instances of.
+struct BufferScene {
+    std::unordered_map<std::uint32_t, NodePtr> nodes;
+    std::vector<ProtoPtr> protos;
+};
+
+/// The coding of commands in a stream.
+[[nodiscard]] CommandCoding codingOf(const BifsConfig& config, bool useNames);
+
 /// Reads the access units of one stream in their order: later ones name the nodes of earlier ones.
 class BifsDecoder {
   public:
@@ -26,6 +37,10 @@ class BifsDecoder {
     /// syntax or the table does not have; (unsupported) on predictive MF coding and on extended
     /// commands.
     [[nodiscard]] Result<std::vector<Command>> decode(ByteSpan accessUnit);
+    /// The commands of a buffer, whose nodes are those of `scene` and new ones. Errors as decode().
+    [[nodiscard]] static Result<std::vector<Command>> decodeBuffer(const CommandBuffer& buffer,
+                                                                   const BufferScene& scene,
+                                                                   const Limits& limits);
     /// Bits that the last access unit left after its last command (at most 7 in tidy files).
     [[nodiscard]] std::uint64_t bitsLeft() const;
 
@@ -57,6 +72,11 @@ class BifsEncoder {
     /// Errors (invalidInput) when a value has no code: an od id above 1023, an image above 4095
     /// pixels, a node where it may not be, a field without the id that a command needs.
     [[nodiscard]] Result<Bytes> encode(const std::vector<Command>& commands);
+    /// The same for a buffer. `brought`: the nodes with ids that come with its commands; all others
+    /// are in the scene by the time that it takes effect.
+    [[nodiscard]] Result<CommandBuffer> encodeBuffer(const std::vector<Command>& commands,
+                                                     const std::unordered_set<const Node*>& brought,
+                                                     bool useNames);
 
   private:
     struct Impl;

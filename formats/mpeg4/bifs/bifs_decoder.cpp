@@ -34,6 +34,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
         useNames = in.flag();
         scene.useNames = useNames;
         defined.clear();
+        around = nullptr;
         protoScopes.assign(1, {});
         protoCount = 0;
         STX_CHECK(readProtos(1));
@@ -194,6 +195,26 @@ BifsDecoder::BifsDecoder(BifsDecoder&&) noexcept = default;
 
 Result<std::vector<Command>> BifsDecoder::decode(ByteSpan accessUnit) {
     return impl_->decode(accessUnit);
+}
+Result<std::vector<Command>> BifsDecoder::decodeBuffer(const CommandBuffer& buffer,
+                                                       const BufferScene& scene,
+                                                       const Limits& limits) {
+    const CommandCoding coding = buffer.coding.value_or(CommandCoding());
+    BifsConfig config;
+    config.version = 2;
+    config.nodeIdBits = coding.nodeIdBits;
+    config.routeIdBits = coding.routeIdBits;
+    config.protoIdBits = coding.protoIdBits;
+    config.usePredictiveMFField = coding.usePredictiveMFField;
+    Impl impl(config, limits);
+    impl.useNames = coding.useNames;
+    impl.around = &scene;
+    impl.protoScopes.front() = scene.protos;
+    return impl.decode(std::as_bytes(std::span(buffer.bytes)));
+}
+CommandCoding codingOf(const BifsConfig& config, bool useNames) {
+    return {config.nodeIdBits, config.routeIdBits, config.version == 2 ? config.protoIdBits : 0,
+            useNames, config.usePredictiveMFField};
 }
 std::uint64_t BifsDecoder::bitsLeft() const {
     return impl_->bitsLeft;

@@ -128,4 +128,22 @@ Result<Bytes> BifsEncoder::encode(const std::vector<Command>& commands) {
     return impl_->encode(commands);
 }
 
+Result<CommandBuffer> BifsEncoder::encodeBuffer(const std::vector<Command>& commands,
+                                                const std::unordered_set<const Node*>& brought,
+                                                bool useNames) {
+    CommandBuffer buffer;
+    buffer.coding = codingOf(impl_->config, useNames);
+    if (commands.empty()) return buffer;
+    impl_->written.clear();
+    impl_->brought = &brought;
+    impl_->useNames = useNames;
+    impl_->quantisation = {};
+    auto bytes = impl_->encode(commands);
+    impl_->brought = nullptr;
+    if (!bytes) return propagate(bytes);
+    const auto* first = reinterpret_cast<const std::uint8_t*>(bytes->data());
+    buffer.bytes.assign(first, first + bytes->size());
+    return buffer;
+}
+
 }  // namespace stx::mpeg4

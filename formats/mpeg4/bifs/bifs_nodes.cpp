@@ -103,7 +103,7 @@ Result<T> BifsNodeReader::readItem(const std::optional<QuantisedCoding>& coding)
         return glm::vec4(v, readFloat());
     } else if constexpr (std::is_same_v<T, CommandBuffer>) {
         STX_TRY(const std::string bytes, readString());
-        return CommandBuffer{{bytes.begin(), bytes.end()}};
+        return CommandBuffer{{bytes.begin(), bytes.end()}, mpeg4::codingOf(config, useNames)};
     } else if constexpr (std::is_same_v<T, ScriptText>) {
         return error(ErrorCode::unsupported, "the program of a Script, which is not supported");
     } else if constexpr (std::is_same_v<T, AttributeReference>) {
@@ -278,20 +278,30 @@ Result<NodePtr> BifsNodeReader::readUse(Ndt expected, int depth, int& height) {
     STX_CHECK(check("a USE"));
     const auto allOnes = static_cast<std::uint32_t>((std::uint64_t{1} << config.nodeIdBits) - 1);
     if (coded == allOnes) return NodePtr{};
-    const auto known = defined.find(coded + 1);
-    if (known == defined.end())
+    NodePtr node = nodeOfId(coded + 1, height);
+    if (!node)
         return error(ErrorCode::invalidInput, "USE of node id {}, which is not defined", coded + 1);
-    if (known->second.height == 0)
+    if (height == 0)
         return error(ErrorCode::invalidInput, "node id {} is used inside itself", coded + 1);
-    const Node& node = *known->second.node;
-    if (!mayStandIn(&node, expected))
+    if (!mayStandIn(node.get(), expected))
         return error(ErrorCode::invalidInput, "USE of node id {}, a {}, where {} is expected",
-                     coded + 1, node.info->name, name(expected));
-    height = known->second.height;
+                     coded + 1, node->info->name, name(expected));
     if (depth + height > limits.maxNesting)
         return error(ErrorCode::invalidInput, "nodes are nested more than {} deep",
                      limits.maxNesting);
-    return known->second.node;
+    return node;
+}
+
+NodePtr BifsNodeReader::nodeOfId(std::uint32_t id, int& height) const {
+    if (const auto known = defined.find(id); known != defined.end()) {
+        height = known->second.height;
+        return known->second.node;
+    }
+    if (around == nullptr) return nullptr;
+    const auto known = around->nodes.find(id);
+    // What is around is named only, and nests nowhere.
+    height = 1;
+    return known == around->nodes.end() ? nullptr : known->second;
 }
 
 Result<NodePtr> BifsNodeReader::readNodeCode(Ndt expected) {

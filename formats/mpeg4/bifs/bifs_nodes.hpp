@@ -24,6 +24,8 @@ struct BifsNodeReader {
     BifsConfig config;
     Limits limits;
     std::unordered_map<std::uint32_t, Defined> defined;
+    /// What else can be named: the nodes around a buffer of commands.
+    const BufferScene* around = nullptr;
     bool useNames = false;
     QuantisationScope quantisation;
     std::uint64_t command = 0;  ///< counts commands over all access units
@@ -106,6 +108,8 @@ struct BifsNodeReader {
     /// A node where `expected` is expected; null for NULL. `height` is how far it reaches down.
     Result<NodePtr> readNode(Ndt expected, int depth, int& height);
 
+    /// Null: no node has this id.
+    [[nodiscard]] NodePtr nodeOfId(std::uint32_t id, int& height) const;
     Result<NodePtr> readUse(Ndt expected, int depth, int& height);
 
     /// A node of the type that its code says.

@@ -27,11 +27,12 @@ bool isFieldName(std::string_view name) {
 Result<NodePtr> BifsNodeReader::readTarget() {
     const std::uint32_t id = in.read(config.nodeIdBits) + 1;
     STX_CHECK(check("a command"));
-    const auto known = defined.find(id);
-    if (known == defined.end())
+    int height = 0;
+    NodePtr node = nodeOfId(id, height);
+    if (!node)
         return error(ErrorCode::invalidInput, "a command names node id {}, which is not defined",
                      id);
-    return known->second.node;
+    return node;
 }
 
 Result<int> BifsNodeReader::readFieldId(const NodeInfo& node, int bits,

@@ -105,6 +105,14 @@ Result<void> BifsNodeWriter::write(const glm::vec4& value, const Coding&) {
     return {};
 }
 Result<void> BifsNodeWriter::write(const CommandBuffer& value, const Coding&) {
+    const CommandCoding own = codingOf(config, useNames);
+    if (!value.bytes.empty() && value.coding && *value.coding != own)
+        return fail(ErrorCode::unsupported,
+                    "a buffer holds commands with ids of {}, {} and {} bits for nodes, ROUTEs and "
+                    "PROTOs, but the scene is written with {}, {} and {}; write a text (.bt, .xmt) "
+                    "first, and this from it",
+                    value.coding->nodeIdBits, value.coding->routeIdBits, value.coding->protoIdBits,
+                    own.nodeIdBits, own.routeIdBits, own.protoIdBits);
     return writeString(std::string(value.bytes.begin(), value.bytes.end()));
 }
 Result<void> BifsNodeWriter::write(const ScriptText&, const Coding&) {
@@ -158,13 +166,10 @@ Result<void> BifsNodeWriter::writeNode(const NodePtr& node, Ndt expected, int de
     if (node->info->codeIn(expected) == nullptr)
         return error("{} may not stand where {} is expected", node->info->name, name(expected));
     const std::uint32_t id = idOf(*node);
-    if (id != 0) {
-        const auto known = written.find(id);
-        if (known != written.end() && known->second == node.get()) {
-            out.flag(true);
-            out.write(id - 1, config.nodeIdBits);
-            return {};
-        }
+    if (isThere(*node, id)) {
+        out.flag(true);
+        out.write(id - 1, config.nodeIdBits);
+        return {};
     }
     out.flag(false);
     STX_CHECK(writeNodeCode(*node, expected));
@@ -412,8 +417,7 @@ Result<void> BifsNodeWriter::writeInterfaceQuantisation(const Proto& declared) {
 Result<void> BifsNodeWriter::writeTarget(const NodePtr& target) {
     if (!target) return error("a command or route names no node");
     const std::uint32_t id = idOf(*target);
-    const auto known = written.find(id);
-    if (id == 0 || known == written.end() || known->second != target.get())
+    if (!isThere(*target, id))
         return error("a command or route names {} '{}', which is not in the scene by then",
                      target->info->name, target->defName);
     out.write(id - 1, config.nodeIdBits);

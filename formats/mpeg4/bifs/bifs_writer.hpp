@@ -22,8 +22,10 @@ struct BifsNodeWriter {
     NodeIds ids;
     std::unordered_map<std::uint32_t, const Node*> written;  ///< the node that has each id by now
     std::unordered_set<std::uint32_t> definedNow;  ///< ids defined by the command that is written
-    const Proto* proto = nullptr;                  ///< whose body is being written
-    ProtoLinks links;                              ///< of that PROTO
+    /// Of a buffer of commands: nodes that come with it; all others are there by then.
+    const std::unordered_set<const Node*>* brought = nullptr;
+    const Proto* proto = nullptr;  ///< whose body is being written
+    ProtoLinks links;              ///< of that PROTO
     bool useNames = false;
     QuantisationScope quantisation;
     BitWriter out;
@@ -37,6 +39,14 @@ struct BifsNodeWriter {
     [[nodiscard]] std::uint32_t idOf(const Node& node) const {
         const auto found = ids.nodes.find(&node);
         return found == ids.nodes.end() ? 0 : found->second;
+    }
+
+    /// Whether a node of this id is there already, so that it can be named.
+    [[nodiscard]] bool isThere(const Node& node, std::uint32_t id) const {
+        if (id == 0) return false;
+        const auto known = written.find(id);
+        if (known != written.end() && known->second == &node) return true;
+        return brought != nullptr && !brought->contains(&node);
     }
 
     // ---- single values

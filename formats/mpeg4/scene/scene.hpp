@@ -72,10 +72,22 @@ struct ScriptText {
     bool operator==(const ScriptText&) const = default;
 };
 
-/// SFCommandBuffer: BIFS commands as they are coded, with the ids of the stream they came in.
+/// How wide the ids in coded commands are, and what is coded with them.
+struct CommandCoding {
+    int nodeIdBits = 0;
+    int routeIdBits = 0;
+    int protoIdBits = 0;
+    bool useNames = false;
+    bool usePredictiveMFField = false;
+    bool operator==(const CommandCoding&) const = default;
+};
+
+/// SFCommandBuffer: BIFS commands as they are coded, with the ids of the stream they came in. They
+/// name nodes by ids, not pointers: most change the very nodes that they are in.
 struct CommandBuffer {
     std::vector<std::uint8_t> bytes;
-    bool operator==(const CommandBuffer&) const = default;
+    std::optional<CommandCoding> coding = {};  ///< nothing: as the stream that it is written to
+    bool operator==(const CommandBuffer& other) const { return bytes == other.bytes; }
 };
 
 /// SFAttrRef: a field of a node. Readers refuse values; only the empty list of Storage occurs.

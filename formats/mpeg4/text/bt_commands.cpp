@@ -6,6 +6,10 @@ using Kind = BtToken::Kind;
 
 Result<void> BtReader::readCommand(std::uint64_t time) {
     inCommand_ = true;
+    if (bufferDepth_ > 0 && (isWord("UPDATE") || isWord("REMOVE")))
+        return unexpected(
+            "REPLACE, INSERT, APPEND, DELETE or '}' (a buffer has commands of the "
+            "scene only)");
     STX_TRY(const bool update, takeIf("UPDATE"));
     if (update) return readOdUpdate(time);
     STX_TRY(const bool remove, takeIf("REMOVE"));
@@ -79,7 +83,58 @@ Result<FieldValue> BtReader::readCommandValue(const Target& target, bool item) {
         STX_CHECK(readNodeList(holder, index, 1, height, false));
         return holder->value(index);
     }
+    if (type == FieldType::SFCommandBuffer && lexer_.peek().kind == Kind::openBrace) {
+        FieldValue stands = buffers_.addValue(proto_);
+        STX_CHECK(passBuffer(buffers_.last()));
+        return stands;
+    }
     return readFieldValue(lexer_, type, false);
+}
+
+Result<void> BtReader::passBuffer(std::size_t number) {
+    const std::string where = lexer_.where();
+    if (bufferDepth_ >= kMaxBufferNesting)
+        return failAt(where, ErrorCode::unsupported,
+                      "buffers of commands hold each other more than {} deep", kMaxBufferNesting);
+    STX_CHECK(take(Kind::openBrace, "'{'"));
+    STX_CHECK(names_.countNode());
+    passed_.push_back({lexer_, number});
+    for (int open = 1; open > 0;) {
+        if (lexer_.peek().kind == Kind::openBrace) ++open;
+        if (lexer_.peek().kind == Kind::closeBrace) --open;
+        if (lexer_.peek().kind == Kind::end)
+            return unexpected(fmt::format("'}}' for the buffer that begins at {}", where));
+        STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
+    }
+    return {};
+}
+
+Result<void> BtReader::readBuffers() {
+    for (PassedBuffer& buffer : std::exchange(passed_, {})) {
+        BtLexer outerLexer = std::exchange(lexer_, std::move(buffer.lexer));
+        NodeNames outerNames = std::move(names_);
+        names_ = NodeNames::inside(outerNames);
+        auto outerFrames = std::exchange(document_.frames, {});
+        const bool outerInCommand = inCommand_;
+        ++bufferDepth_;
+        STX_CHECK(readBufferCommands());
+        --bufferDepth_;
+        inCommand_ = outerInCommand;
+        std::vector<Command> commands;
+        for (CommandFrame& frame : document_.frames) commands = std::move(frame.commands);
+        buffers_.put(buffer.number, std::move(commands), names_);
+        document_.frames = std::move(outerFrames);
+        outerNames.goOn(names_);
+        names_ = std::move(outerNames);
+        lexer_ = std::move(outerLexer);
+    }
+    return {};
+}
+
+Result<void> BtReader::readBufferCommands() {
+    while (lexer_.peek().kind != Kind::closeBrace) STX_CHECK(readCommand(0));
+    STX_CHECK(readBuffers());
+    return names_.resolve();
 }
 
 Result<void> BtReader::readReplace(std::uint64_t time) {
@@ -87,10 +142,13 @@ Result<void> BtReader::readReplace(std::uint64_t time) {
     if (isScene) {
         STX_CHECK(takeWord("BY"));
         ReplaceScene scene;
-        // A scene that takes the place of another has PROTOs of its own.
-        if (!document_.frames.empty()) protoScopes_.front().clear();
-        while (isWord("PROTO") || isWord("EXTERNPROTO")) STX_CHECK(readProto(1));
-        scene.protos = protoScopes_.front();
+        if (bufferDepth_ == 0) {
+            STX_CHECK(readBuffers());
+            // A scene that takes the place of another has PROTOs of its own.
+            if (!document_.frames.empty()) protoScopes_.front().clear();
+            while (isWord("PROTO") || isWord("EXTERNPROTO")) STX_CHECK(readProto(1));
+            scene.protos = protoScopes_.front();
+        }
         const std::string where = lexer_.where();
         int height = 0;
         STX_TRY(scene.root, readNode(1, height, nullptr, -1, -1));

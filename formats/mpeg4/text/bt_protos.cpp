@@ -57,6 +57,11 @@ Result<int> BtReader::readOwnField(Node& script) {
 Result<void> BtReader::readLink(const NodePtr& node, int field) {
     STX_CHECK(takeWord("IS"));
     const std::string where = lexer_.where();
+    if (bufferDepth_ > 0)
+        return failAt(
+            where, ErrorCode::unsupported,
+            "IS stands in a buffer of commands, which has no such links in BIFS; give the "
+            "field a value");
     STX_TRY(const auto linked, takeName("the name of a field of the PROTO"));
     if (proto_ == nullptr)
         return failAt(where, ErrorCode::invalidInput, "IS stands outside of a PROTO");
@@ -87,6 +92,8 @@ Result<void> BtReader::readValueInto(const NodePtr& node, int index, int depth, 
         return {};
     }
     if (field.type == FieldType::MFNode) return readNodeList(node, index, depth + 1, height, true);
+    if (field.type == FieldType::SFCommandBuffer && lexer_.peek().kind == Kind::openBrace)
+        return passBuffer(buffers_.add(node, index, proto_));
     auto value = readFieldValue(lexer_, field.type, false);
     if (!value) {
         value.error().message += fmt::format(" for {}.{}", type, field.name);
@@ -119,8 +126,10 @@ Result<void> BtReader::readProto(int depth) {
         NodeNames outer = std::exchange(names_, names_.ofBody());
         Proto* const outerProto = std::exchange(proto_, proto.get());
         const bool outerInCommand = std::exchange(inCommand_, false);
+        auto outerPassed = std::exchange(passed_, {});
         STX_CHECK(readProtoBody(*proto, depth));
         inCommand_ = outerInCommand;
+        passed_ = std::move(outerPassed);
         proto_ = outerProto;
         outer.countOn(names_);
         names_ = std::move(outer);
@@ -195,6 +204,7 @@ Result<void> BtReader::readProtoBody(Proto& proto, int depth) {
         proto.body.push_back(std::move(node));
     }
     STX_TRY([[maybe_unused]] const auto brace, lexer_.take());
+    STX_CHECK(readBuffers());
     STX_CHECK(names_.resolve());
     proto.protos = std::move(protoScopes_.back());
     protoScopes_.pop_back();

@@ -13,8 +13,10 @@ Result<Document> BtReader::read() {
     if (document_.frames.empty())
         return failAt(lexer_.where(), ErrorCode::invalidInput,
                       "the file ends without a scene, expected a node such as Group {{ ... }}");
+    STX_CHECK(readBuffers());
     STX_CHECK(readDescriptors());
     if (auto ok = finishDocument(document_, names_); !ok) return propagate(ok);
+    STX_CHECK(buffers_.encode(document_));
     return std::move(document_);
 }
 
@@ -283,8 +285,10 @@ Result<NodePtr> BtReader::readNodeBody(const std::string& defName, const std::st
     STX_TRY(const auto type, takeName("a node such as DepthImage"));
     NodePtr node = makeNamedNode(type);
     if (!node)
-        return failAt(typeWhere, ErrorCode::invalidInput, "there is no node type '{}' in the table",
-                      excerpt(type));
+        return failAt(
+            typeWhere, ErrorCode::invalidInput,
+            "found '{}', expected a node such as DepthImage, or a PROTO declared before it",
+            excerpt(type));
     STX_CHECK(names_.countNode());
     if (!defName.empty()) STX_CHECK(names_.define(defName, node, where, inCommand_));
     STX_CHECK(take(Kind::openBrace, fmt::format("'{{' behind {}", type)));

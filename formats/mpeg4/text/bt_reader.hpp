@@ -10,6 +10,7 @@
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/bt_lexer.hpp"
 #include "formats/mpeg4/text/scene_text.hpp"
+#include "formats/mpeg4/text/text_buffers.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 
@@ -130,6 +131,12 @@ class BtReader {
     /// The value of a field of any type; with an owner as readNode.
     Result<void> readValueInto(const NodePtr& node, int index, int depth, int& height);
 
+    /// `{ REPLACE ... }`, passed over until the nodes that it may name are known.
+    Result<void> passBuffer(std::size_t number);
+    /// Reads the commands of the buffers passed over so far.
+    Result<void> readBuffers();
+    Result<void> readBufferCommands();
+
     Result<void> readNodeList(const NodePtr& owner, int index, int depth, int& height, bool waits);
 
     struct OdUpdate {
@@ -152,6 +159,13 @@ class BtReader {
     Proto* proto_ = nullptr;                        ///< whose body is read
     std::set<std::pair<const Node*, int>> linked_;  ///< fields with an IS
     std::size_t protoCount_ = 0;
+    struct PassedBuffer {
+        BtLexer lexer;  ///< at its first command
+        std::size_t number;
+    };
+    std::vector<PassedBuffer> passed_;
+    TextBuffers buffers_;
+    int bufferDepth_ = 0;  ///< in how many buffers the commands that are read are
     bool inCommand_ = false;
     bool rap_ = false;  ///< the block that is read is a place where a reader may begin
 };

@@ -25,6 +25,7 @@ class BtWriter {
                 if (const auto* scene = std::get_if<ReplaceScene>(&frame.commands[0]);
                     scene && scene->root) {
                     line("");
+                    names_.beginScene();
                     writeProtos(scene->protos);
                     indent();
                     writeNode(scene->root);
@@ -54,6 +55,7 @@ class BtWriter {
         }
         for (; od < document_.odFrames.size(); ++od)
             STX_CHECK(writeOdFrame(document_.odFrames[od]));
+        if (!fits_) return propagate(fits_);
         return std::move(out_);
     }
 
@@ -176,9 +178,37 @@ class BtWriter {
                 indent();
             }
             out_ += ']';
+        } else if (const auto* buffer = std::get_if<CommandBuffer>(&value)) {
+            writeBuffer(*buffer);
         } else {
             appendFieldValue(out_, value, TextStyle::bt);
         }
+    }
+
+    void writeBuffer(const CommandBuffer& buffer) {
+        const auto commands = commandsToWrite(names_, buffer, bufferDepth_, fits_);
+        if (commands.empty()) {
+            out_ += "{ }";
+            return;
+        }
+        out_ += "{\n";
+        ++depth_;
+        ++bufferDepth_;
+        TextNames outerNames = std::move(names_);
+        names_ = TextNames::inside(outerNames);
+        const Proto* const outerProto = std::exchange(proto_, nullptr);
+        ProtoLinks outerLinks = std::exchange(links_, {});
+        for (const Command& command : commands) {
+            std::visit([&](const auto& c) { write(c); }, command);
+            out_ += '\n';
+        }
+        proto_ = outerProto;
+        links_ = std::move(outerLinks);
+        names_ = std::move(outerNames);
+        --bufferDepth_;
+        --depth_;
+        indent();
+        out_ += '}';
     }
 
     // ---- Commands
@@ -209,6 +239,7 @@ class BtWriter {
     }
     void write(const ReplaceScene& c) {
         beginCommand("REPLACE SCENE BY ");
+        names_.beginScene();
         if (!c.protos.empty()) {
             out_ += '\n';
             writeProtos(c.protos);
@@ -404,8 +435,10 @@ class BtWriter {
     TextNames names_;
     const Proto* proto_ = nullptr;  ///< whose body is written
     ProtoLinks links_;
+    Result<void> fits_;  ///< the first buffer of commands that has no text
     std::string out_;
     int depth_ = 0;
+    int bufferDepth_ = 0;  ///< in how many buffers what is written is
 };
 
 }  // namespace

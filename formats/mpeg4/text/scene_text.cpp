@@ -87,28 +87,35 @@ Result<void> finishDocument(Document& document, NodeNames& names) {
     return {};
 }
 
-/// What a text has no form for.
-static Result<void> checkTextValues(const Document& document) {
-    Result<void> fits;
-    for (const CommandFrame& frame : document.frames)
-        for (const Command& command : frame.commands)
+/// What the buffers of commands can name in each scene; nothing when there are none.
+static std::vector<BufferScene> scenesOf(const std::vector<CommandFrame>& frames) {
+    std::vector<BufferScene> scenes;
+    bool anyBuffer = false;
+    for (const CommandFrame& frame : frames) {
+        for (const Command& command : frame.commands) {
+            if (const auto* scene = std::get_if<ReplaceScene>(&command)) {
+                scenes.emplace_back();
+                scenes.back().protos = scene->protos;
+            }
+            if (const auto* replace = std::get_if<ReplaceField>(&command))
+                anyBuffer = anyBuffer || std::holds_alternative<CommandBuffer>(replace->value);
             forEachNode(command, [&](const NodePtr& node) {
-                for (const Node::SetField& field : node->setFields) {
-                    const auto* buffer = std::get_if<CommandBuffer>(&field.value);
-                    if (buffer != nullptr && !buffer->bytes.empty())
-                        fits = fail(ErrorCode::unsupported,
-                                    "{}.{} holds commands, which the texts here do not have; keep "
-                                    "this presentation as .mp4",
-                                    node->info->name,
-                                    node->info->fields[static_cast<std::size_t>(field.index)].name);
-                }
+                if (node->defId != 0 && !scenes.empty())
+                    // As names: a node that replaces another takes over its id.
+                    scenes.back().nodes.insert_or_assign(node->defId, node);
+                for (const Node::SetField& field : node->setFields)
+                    anyBuffer = anyBuffer || std::holds_alternative<CommandBuffer>(field.value);
             });
-    return fits;
+        }
+    }
+    if (!anyBuffer) scenes.clear();
+    return scenes;
 }
 
 Result<TextNames> TextNames::make(const Document& document, const Limits& limits) {
-    STX_CHECK(checkTextValues(document));
     TextNames result;
+    result.limits_ = limits;
+    result.scenes_ = scenesOf(document.frames);
     for (const CommandFrame& frame : document.frames) {
         for (const Command& command : frame.commands) {
             Result<void> fits;
@@ -148,12 +155,13 @@ TextNames TextNames::ofBody(const Proto& proto) {
     holder->set("children", proto.body);
     TextNames result;
     result.nameAll({{0, {ReplaceScene{false, holder, proto.routes}}}});
+    result.scenes_ = scenesOf({{0, {ReplaceScene{false, holder, proto.routes, proto.protos}}}});
+    result.beginScene();
     return result;
 }
 
 void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
     const NodeIds ids = assignNodeIds(frames);
-    std::unordered_map<std::string, int> taken;
     for (const CommandFrame& frame : frames) {
         for (const Command& command : frame.commands) {
             // A node in another's place with its id has its name, too: what comes later means it.
@@ -179,29 +187,86 @@ void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
                     if (id == ids.nodes.end()) return;
                     text = fmt::format("N{}", id->second - 1);
                 }
-                // A name that would not read back as itself: other characters give way to '_'.
-                if (!isPlainName(text)) {
-                    for (char& c : text)
-                        if (!isPlainName(std::string("a") + c)) c = '_';
-                    if (!isPlainName(text)) text = fmt::format("_{}", text);
-                }
-                const std::string base = text;
-                // Two nodes of one name are different nodes only when commands replaced one.
-                while (taken.contains(text)) text = fmt::format("{}_{}", base, ++taken[base]);
-                taken[text] = 1;
-                names_[node.get()] = text;
+                names_[node.get()] = uniqueName(std::move(text));
             });
         }
     }
 }
 
+std::string TextNames::uniqueName(std::string text) const {
+    // A name that would not read back as itself: other characters give way to '_'.
+    if (!isPlainName(text)) {
+        for (char& c : text)
+            if (!isPlainName(std::string("a") + c)) c = '_';
+        if (!isPlainName(text)) text = fmt::format("_{}", text);
+    }
+    const std::string base = text;
+    // Two nodes of one name are different nodes only when commands replaced one.
+    while (taken_.contains(text)) text = fmt::format("{}_{}", base, ++taken_[base]);
+    taken_[text] = 1;
+    return text;
+}
+
+TextNames TextNames::inside(const TextNames& outer) {
+    TextNames names;
+    names.limits_ = outer.limits_;
+    names.outer_ = &outer;
+    return names;
+}
+
+Result<std::vector<Command>> TextNames::commandsOf(const CommandBuffer& buffer) const {
+    if (outer_ != nullptr) return outer_->commandsOf(buffer);
+    static const BufferScene kNone;
+    const bool inScene = scene_ > 0 && scene_ <= scenes_.size();
+    auto commands =
+        BifsDecoder::decodeBuffer(buffer, inScene ? scenes_[scene_ - 1] : kNone, limits_);
+    if (commands) {
+        for (const Command& command : *commands)
+            if (const auto* scene = std::get_if<ReplaceScene>(&command);
+                scene != nullptr && !scene->protos.empty())
+                return fail(ErrorCode::unsupported,
+                            "a buffer of commands declares PROTOs, which the texts here do not "
+                            "have; keep this presentation as .mp4");
+        return commands;
+    }
+    return fail(ErrorCode::unsupported,
+                "the commands in a buffer name or bring what is not known here ({}); keep this "
+                "presentation as .mp4",
+                commands.error().text());
+}
+
+void TextNames::beginScene() {
+    ++scene_;
+}
+
 const std::string* TextNames::find(const Node& node) const {
+    if (outer_ != nullptr)
+        if (const std::string* name = outer_->find(node)) return name;
     const auto found = names_.find(&node);
-    return found == names_.end() ? nullptr : &found->second;
+    if (found != names_.end()) return &found->second;
+    if (outer_ == nullptr) return nullptr;
+    std::string text = textNameOf(node);
+    if (text.empty()) return nullptr;
+    return &(names_[&node] = uniqueName(std::move(text)));
 }
 
 bool TextNames::firstTime(const Node& node) {
+    if (outer_ != nullptr && outer_->find(node) != nullptr) return false;
     return written_.insert(&node).second;
+}
+
+std::vector<Command> commandsToWrite(const TextNames& names, const CommandBuffer& buffer, int depth,
+                                     Result<void>& fits) {
+    if (buffer.bytes.empty()) return {};
+    Result<std::vector<Command>> commands =
+        fail(ErrorCode::unsupported,
+             "buffers of commands hold each other more than {} deep; keep this presentation as "
+             ".mp4",
+             kMaxBufferNesting);
+    if (depth < kMaxBufferNesting) commands = names.commandsOf(buffer);
+    if (commands) return std::move(*commands);
+    if (fits) fits = propagate(commands);
+    return {};
 }
 
 }  // namespace stx::mpeg4

@@ -4,7 +4,9 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "formats/mpeg4/bifs/bifs.hpp"
 #include "formats/mpeg4/scene/document.hpp"
+#include "formats/mpeg4/text/text_buffers.hpp"
 #include "formats/mpeg4/text/text_fields.hpp"
 
 /// Steps that the readers of BT and XMT-A share.
@@ -54,6 +56,14 @@ class TextNames {
     /// The names in the body of a PROTO, which are apart from those of the scene.
     [[nodiscard]] static TextNames ofBody(const Proto& proto);
 
+    /// The names in a buffer of commands: nodes of `outer` have theirs and are there already; nodes
+    /// that the commands bring get one when they are first asked for.
+    [[nodiscard]] static TextNames inside(const TextNames& outer);
+    /// The commands of a buffer in the scene that is being written.
+    [[nodiscard]] Result<std::vector<Command>> commandsOf(const CommandBuffer& buffer) const;
+    /// To be called before a scene is written (ReplaceScene), once for each.
+    void beginScene();
+
     /// Null: the node has no name.
     [[nodiscard]] const std::string* find(const Node& node) const;
     /// Whether a node is met for the first time, and is written as DEF; later ones are USE.
@@ -61,9 +71,22 @@ class TextNames {
 
   private:
     void nameAll(const std::vector<CommandFrame>& frames);
+    [[nodiscard]] std::string uniqueName(std::string text) const;
 
-    std::unordered_map<const Node*, std::string> names_;
+    Limits limits_;
+    const TextNames* outer_ = nullptr;
+    mutable std::unordered_map<const Node*, std::string> names_;
+    mutable std::unordered_map<std::string, int> taken_;
+    /// For buffers: what each scene has, in order; none when there is no buffer.
+    std::vector<BufferScene> scenes_;
+    std::size_t scene_ = 0;  ///< scenes begun
     std::unordered_set<const Node*> written_;
 };
+
+/// The commands of a buffer that stands in `depth` others. Where they have no text they are left
+/// out and `fits` says why, unless it does already for another.
+[[nodiscard]] std::vector<Command> commandsToWrite(const TextNames& names,
+                                                   const CommandBuffer& buffer, int depth,
+                                                   Result<void>& fits);
 
 }  // namespace stx::mpeg4

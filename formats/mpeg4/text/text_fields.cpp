@@ -73,19 +73,12 @@ class ItemReader {
     Result<void> read(glm::vec4& v) { return readAll(v.x, v.y, v.z, v.w); }
     Result<void> read(ScriptText& v) { return read(v.text); }
     Result<void> read(CommandBuffer& v) {
-        const std::string where = lexer_.where();
-        const bool braces = lexer_.peek().kind == Kind::openBrace;
-        STX_TRY(const auto first, lexer_.take());
-        const bool empty =
-            braces ? lexer_.peek().kind == Kind::closeBrace
-                   : first.kind == Kind::end || (first.kind == Kind::string && first.value.empty());
-        if (!empty)
-            return failAt(where, ErrorCode::unsupported,
-                          "commands inside of a node are not supported in texts; leave them out");
-        if (braces) {
-            STX_TRY([[maybe_unused]] const auto brace, lexer_.take());
-        }
-        v.bytes.clear();
+        // The readers take buffers with commands in them themselves.
+        const bool empty = lexer_.peek().kind == Kind::end ||
+                           (lexer_.peek().kind == Kind::string && lexer_.peek().value.empty());
+        if (!empty) return unexpected("commands: { ... } in BT, an element in XMT-A");
+        STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
+        v = {};
         return {};
     }
     Result<void> read(AttributeReference&) {
@@ -211,7 +204,7 @@ void append(std::string& out, const glm::vec4& v, TextStyle s) {
 void append(std::string& out, const ScriptText& v, TextStyle) {
     out += quotedText(v.text);
 }
-// Writers refuse all but empty ones before they come here.
+// Writers write those with commands themselves.
 void append(std::string& out, const CommandBuffer&, TextStyle style) {
     out += style == TextStyle::bt ? "{ }" : "";
 }
@@ -327,23 +320,36 @@ Result<void> NodeNames::define(const std::string& name, const NodePtr& node,
 
 void NodeNames::closed(const NodePtr& node, int height) {
     heights_[node.get()] = height;
+    named_.push_back(node);
+}
+
+const NodeNames::Entry* NodeNames::find(const std::string& name) const {
+    const auto found = byName_.find(name);
+    if (found != byName_.end()) return &found->second;
+    return outer_ == nullptr ? nullptr : outer_->find(name);
+}
+
+std::optional<int> NodeNames::heightOfNamed(const Node& node) const {
+    const auto found = heights_.find(&node);
+    if (found != heights_.end()) return found->second;
+    return outer_ == nullptr ? std::nullopt : outer_->heightOfNamed(node);
 }
 
 Result<NodePtr> NodeNames::use(const std::string& name, int depth, const std::string& where,
                                int& height) const {
     height = 0;
-    const auto found = byName_.find(name);
-    if (found == byName_.end()) return NodePtr();
-    const auto known = heights_.find(found->second.node.get());
-    if (known == heights_.end())
+    const Entry* found = find(name);
+    if (found == nullptr) return NodePtr();
+    const auto known = heightOfNamed(*found->node);
+    if (!known)
         return failAt(where, ErrorCode::invalidInput,
                       "USE '{}' stands inside the node of that name, which would hold itself",
                       excerpt(name));
-    height = known->second;
+    height = *known;
     if (depth + height > limits_->maxNesting)
         return failAt(where, ErrorCode::invalidInput, "nodes nest deeper than {} here",
                       limits_->maxNesting);
-    return found->second.node;
+    return found->node;
 }
 
 void NodeNames::useLater(std::string name, NodePtr owner, int field, int item, std::string where) {
@@ -351,11 +357,11 @@ void NodeNames::useLater(std::string name, NodePtr owner, int field, int item, s
 }
 
 Result<NodePtr> NodeNames::target(const std::string& name, const std::string& where) const {
-    const auto found = byName_.find(name);
-    if (found == byName_.end())
+    const Entry* found = find(name);
+    if (found == nullptr)
         return failAt(where, ErrorCode::invalidInput, "no node has the DEF name '{}'",
                       excerpt(name));
-    return found->second.node;
+    return found->node;
 }
 
 Result<void> NodeNames::countNode() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -37,6 +38,21 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 class NodeNames {
   public:
     explicit NodeNames(const Limits& limits) : limits_(&limits) {}
+
+    /// Names inside of a buffer of commands, which may use all of `outer`, too, as it is then. What
+    /// is named in the buffer stays in it.
+    [[nodiscard]] static NodeNames inside(const NodeNames& outer) {
+        NodeNames names = outer.ofBody();
+        names.outer_ = &outer;
+        return names;
+    }
+    /// Goes on where the names of a buffer ended.
+    void goOn(const NodeNames& buffer) {
+        count_ = buffer.count_;
+        anyNames_ = anyNames_ || buffer.anyNames_;
+    }
+    /// The nodes that were named, in the order in which they ended.
+    [[nodiscard]] const std::vector<NodePtr>& named() const { return named_; }
 
     /// Names of a PROTO's body, which are apart, but count as part of the same text.
     [[nodiscard]] NodeNames ofBody() const {
@@ -89,8 +105,14 @@ class NodeNames {
     Result<int> heightOf(const NodePtr& node, int depth,
                          std::unordered_map<const Node*, int>& known) const;
 
+    /// What has a name, here or around; null: nothing has.
+    [[nodiscard]] const Entry* find(const std::string& name) const;
+    [[nodiscard]] std::optional<int> heightOfNamed(const Node& node) const;
+
     const Limits* limits_;
+    const NodeNames* outer_ = nullptr;
     std::unordered_map<std::string, Entry> byName_;
+    std::vector<NodePtr> named_;
     std::unordered_map<const Node*, int> heights_;  ///< of DEF'd nodes; absent while open
     std::vector<Pending> pending_;
     std::uint64_t count_ = 0;

@@ -84,6 +84,10 @@ Result<void> XmtReader::readFieldValues(xml_node element, const NodePtr& instanc
 Result<void> XmtReader::readLinks(xml_node element, const NodePtr& node) {
     if (proto_ == nullptr)
         return failAt(where(element), ErrorCode::invalidInput, "<IS> stands outside of a PROTO");
+    if (bufferDepth_ > 0)
+        return failAt(where(element), ErrorCode::unsupported,
+                      "<IS> stands in a buffer of commands, which has no such links in BIFS; give "
+                      "the field a value");
     for (const xml_node child : elements(element)) {
         if (localName(child) != "connect") return unexpectedElement(child, "connect in IS");
         const std::string_view own = child.attribute("nodeField").value();
@@ -130,12 +134,14 @@ Result<void> XmtReader::readProto(xml_node element, int depth) {
     NodeNames outer = std::exchange(names_, names_.ofBody());
     Proto* const outerProto = std::exchange(proto_, proto.get());
     const bool outerInCommand = std::exchange(inCommand_, false);
+    auto outerPassed = std::exchange(passed_, {});
     protoScopes_.emplace_back();
     STX_CHECK(names_.countNode());
     STX_CHECK(readProtoContent(element, *proto, depth));
     proto->protos = std::move(protoScopes_.back());
     protoScopes_.pop_back();
     inCommand_ = outerInCommand;
+    passed_ = std::move(outerPassed);
     proto_ = outerProto;
     outer.countOn(names_);
     names_ = std::move(outer);
@@ -185,7 +191,40 @@ Result<void> XmtReader::readProtoContent(xml_node element, Proto& proto, int dep
             if (node) proto.body.push_back(std::move(node));
         }
     }
+    STX_CHECK(readBuffers());
     return names_.resolve();
+}
+
+Result<void> XmtReader::passBuffer(xml_node element, std::size_t number) {
+    if (localName(element) != "buffer") return unexpectedElement(element, "buffer");
+    if (bufferDepth_ >= kMaxBufferNesting)
+        return failAt(where(element), ErrorCode::unsupported,
+                      "buffers of commands hold each other more than {} deep", kMaxBufferNesting);
+    STX_CHECK(names_.countNode());
+    passed_.push_back({element, number});
+    return {};
+}
+
+Result<void> XmtReader::readBuffers() {
+    for (const PassedBuffer& buffer : std::exchange(passed_, {})) {
+        NodeNames outerNames = std::move(names_);
+        names_ = NodeNames::inside(outerNames);
+        auto outerFrames = std::exchange(document_.frames, {});
+        const bool outerInCommand = inCommand_;
+        ++bufferDepth_;
+        STX_CHECK(readCommands(buffer.element, 0.0, 1));
+        STX_CHECK(readBuffers());
+        STX_CHECK(names_.resolve());
+        --bufferDepth_;
+        inCommand_ = outerInCommand;
+        std::vector<Command> commands;
+        for (CommandFrame& frame : document_.frames) commands = std::move(frame.commands);
+        buffers_.put(buffer.number, std::move(commands), names_);
+        document_.frames = std::move(outerFrames);
+        outerNames.goOn(names_);
+        names_ = std::move(outerNames);
+    }
+    return {};
 }
 
 }  // namespace stx::mpeg4

@@ -12,6 +12,34 @@ Result<std::optional<Position>> XmtReader::positionOf(xml_node node, std::string
     return std::optional(Position{static_cast<int>(*number)});
 }
 
+Result<FieldValue> XmtReader::commandValue(xml_node node, const Node& target, int field,
+                                           bool item) {
+    const FieldInfo& info = target.info->fields[field];
+    const FieldType type = item ? itemType(info.type) : info.type;
+    if (type == FieldType::SFNode || type == FieldType::MFNode) {
+        NodeList list;
+        for (const xml_node child : elements(node)) {
+            int height = 0;
+            STX_TRY(auto made, readNode(child, 1, height, nullptr, -1, -1));
+            STX_CHECK(checkNodePlace(made.get(), info.nodeType, target.info->name, info.name,
+                                     where(child)));
+            list.push_back(std::move(made));
+        }
+        if (type == FieldType::MFNode) return FieldValue(std::move(list));
+        if (list.size() > 1)
+            return failAt(where(node), ErrorCode::invalidInput, "{} takes one node, found {}",
+                          info.name, list.size());
+        return FieldValue(list.empty() ? NodePtr() : std::move(list[0]));
+    }
+    const auto inner = elements(node);
+    if (type == FieldType::SFCommandBuffer && !inner.empty()) {
+        FieldValue stands = buffers_.addValue(proto_);
+        STX_CHECK(passBuffer(inner[0], buffers_.last()));
+        return stands;
+    }
+    return attributeValue(node, "value", node.attribute("value").value(), type);
+}
+
 Result<void> XmtReader::collectIds(xml_node root) {
     struct IdCollector : pugi::xml_tree_walker {
         std::vector<xml_node> found;

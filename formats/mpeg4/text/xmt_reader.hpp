@@ -7,6 +7,7 @@
 #include <set>
 
 #include "formats/mpeg4/text/scene_text.hpp"
+#include "formats/mpeg4/text/text_buffers.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
@@ -59,7 +60,9 @@ class XmtReader {
         if (document_.frames.empty())
             return failAt(where(root), ErrorCode::invalidInput,
                           "the file has no scene, expected <Body><Replace><Scene>");
+        STX_CHECK(readBuffers());
         STX_CHECK(finishDocument(document_, names_));
+        STX_CHECK(buffers_.encode(document_));
         return std::move(document_);
     }
 
@@ -154,6 +157,8 @@ class XmtReader {
         STX_CHECK(checkDepth(parent, depth));
         for (const xml_node node : elements(parent)) {
             const std::string_view type = localName(node);
+            if (bufferDepth_ > 0 && type != "Replace" && type != "Insert" && type != "Delete")
+                return unexpectedElement(node, "Replace, Insert or Delete in a buffer");
             const auto ticks = [&](std::uint32_t timescale) {
                 return static_cast<std::uint64_t>(std::llround(seconds * timescale));
             };
@@ -316,30 +321,15 @@ class XmtReader {
 
     Result<std::optional<Position>> positionOf(xml_node node, std::string_view text) const;
 
-    Result<FieldValue> commandValue(xml_node node, const Node& target, int field, bool item) {
-        const FieldInfo& info = target.info->fields[field];
-        const FieldType type = item ? itemType(info.type) : info.type;
-        if (type == FieldType::SFNode || type == FieldType::MFNode) {
-            NodeList list;
-            for (const xml_node child : elements(node)) {
-                int height = 0;
-                STX_TRY(auto made, readNode(child, 1, height, nullptr, -1, -1));
-                STX_CHECK(checkNodePlace(made.get(), info.nodeType, target.info->name, info.name,
-                                         where(child)));
-                list.push_back(std::move(made));
-            }
-            if (type == FieldType::MFNode) return FieldValue(std::move(list));
-            if (list.size() > 1)
-                return failAt(where(node), ErrorCode::invalidInput, "{} takes one node, found {}",
-                              info.name, list.size());
-            return FieldValue(list.empty() ? NodePtr() : std::move(list[0]));
-        }
-        return attributeValue(node, "value", node.attribute("value").value(), type);
-    }
+    /// The value of a command for a field; one item of it when `item`.
+    Result<FieldValue> commandValue(xml_node node, const Node& target, int field, bool item);
 
     Result<void> readScene(xml_node node, std::uint64_t time) {
         ReplaceScene scene;
-        protoScopes_.front().clear();
+        if (bufferDepth_ == 0) {
+            STX_CHECK(readBuffers());
+            protoScopes_.front().clear();
+        }
         for (const xml_node child : elements(node)) {
             if (localName(child) == "ROUTE") {
                 STX_TRY(auto route, readRoute(child));
@@ -347,6 +337,9 @@ class XmtReader {
                 continue;
             }
             if (localName(child) == "ProtoDeclare") {
+                if (bufferDepth_ > 0)
+                    return unexpectedElement(child,
+                                             "a node (PROTOs are declared outside of buffers)");
                 STX_CHECK(readProto(child, 1));
                 scene.protos = protoScopes_.front();
                 continue;
@@ -427,11 +420,12 @@ class XmtReader {
             isInstance ? makeNamedInstance(element.attribute("name").value()) : makeNode(type);
         if (!node && isInstance)
             return failAt(where(element), ErrorCode::invalidInput,
-                          "there is no PROTO '{}' before it",
+                          "the instance is of PROTO '{}', which no ProtoDeclare before it declares",
                           excerpt(element.attribute("name").value()));
         if (!node)
             return failAt(where(element), ErrorCode::invalidInput,
-                          "there is no node type '{}' in the table", excerpt(type));
+                          "found <{}>, expected a node such as DepthImage, or ProtoInstance",
+                          excerpt(type));
         if (const auto use = element.attribute("USE"); !use.empty()) {
             STX_TRY(auto used, names_.use(use.value(), depth, where(element), height));
             if (!used && owner) {
@@ -508,6 +502,8 @@ class XmtReader {
     Result<void> readNodeField(xml_node wrapper, const NodePtr& node, int index, int depth,
                                int& below) {
         const FieldInfo& field = node->info->fields[index];
+        if (field.type == FieldType::SFCommandBuffer)
+            return passBuffer(wrapper, buffers_.add(node, index, proto_));
         if (itemType(field.type) != FieldType::SFNode || linked_.contains({node.get(), index}))
             return failAt(where(wrapper), ErrorCode::invalidInput,
                           "{}.{} holds no nodes: write it as an attribute of <{}>",
@@ -541,6 +537,12 @@ class XmtReader {
         return {};
     }
 
+    // ---- Buffers of commands (xmt_protos.cpp)
+    /// <buffer>, to be read when the nodes that its commands may name are known.
+    Result<void> passBuffer(xml_node element, std::size_t number);
+    /// Reads the commands of the buffers passed over so far.
+    Result<void> readBuffers();
+
     // ---- PROTOs, and the fields of Scripts that are declared like theirs (xmt_protos.cpp)
     /// Null: there is no such PROTO.
     [[nodiscard]] NodePtr makeNamedInstance(std::string_view type) const;
@@ -568,6 +570,13 @@ class XmtReader {
     Proto* proto_ = nullptr;                        ///< whose body is read
     std::set<std::pair<const Node*, int>> linked_;  ///< fields with an IS
     std::size_t protoCount_ = 0;
+    struct PassedBuffer {
+        xml_node element;
+        std::size_t number;
+    };
+    std::vector<PassedBuffer> passed_;
+    TextBuffers buffers_;
+    int bufferDepth_ = 0;  ///< in how many buffers the commands that are read are
     bool inCommand_ = false;
 };
 

@@ -65,6 +65,7 @@ class XmtWriter {
         while (od < document_.odFrames.size()) STX_CHECK(writeOdFrame(document_.odFrames[od++]));
         close("Body");
         close("XMT-A");
+        if (!fits_) return propagate(fits_);
         if (replaced_)
             job_.note("characters that XML cannot hold were replaced in strings of the scene");
         return std::move(out_);
@@ -186,7 +187,8 @@ class XmtWriter {
         for (const Node::SetField& field : node->setFields) {
             if (node->proto || field.index >= ownFrom || links.contains(field.index)) continue;
             if (std::holds_alternative<NodePtr>(field.value) ||
-                std::holds_alternative<NodeList>(field.value))
+                std::holds_alternative<NodeList>(field.value) ||
+                std::holds_alternative<CommandBuffer>(field.value))
                 hasNodes = true;
             else
                 attributes.push_back(
@@ -219,6 +221,8 @@ class XmtWriter {
                 open(fieldName);
                 for (const NodePtr& item : *list) writeNode(item);
                 close(fieldName);
+            } else if (const auto* buffer = std::get_if<CommandBuffer>(&field.value)) {
+                writeBuffer(*buffer);
             }
         }
         if (!links.empty()) {
@@ -274,6 +278,27 @@ class XmtWriter {
         close("ProtoDeclare");
     }
 
+    void writeBuffer(const CommandBuffer& buffer) {
+        const auto commands = commandsToWrite(names_, buffer, bufferDepth_, fits_);
+        if (commands.empty()) {
+            empty("buffer");
+            return;
+        }
+        open("buffer");
+        ++bufferDepth_;
+        TextNames outerNames = std::move(names_);
+        names_ = TextNames::inside(outerNames);
+        const Proto* const outerProto = std::exchange(proto_, nullptr);
+        ProtoLinks outerLinks = std::exchange(links_, {});
+        for (const Command& command : commands)
+            std::visit([&](const auto& c) { write(c); }, command);
+        proto_ = outerProto;
+        links_ = std::move(outerLinks);
+        names_ = std::move(outerNames);
+        --bufferDepth_;
+        close("buffer");
+    }
+
     // ---- Commands
     [[nodiscard]] std::string nameOf(const NodePtr& node) const {
         const std::string* found = node ? names_.find(*node) : nullptr;
@@ -304,12 +329,17 @@ class XmtWriter {
             open(tag, attributes);
             for (const NodePtr& item : *list) writeNode(item);
             close(tag);
+        } else if (const auto* buffer = std::get_if<CommandBuffer>(&value)) {
+            open(tag, attributes);
+            writeBuffer(*buffer);
+            close(tag);
         } else {
             attributes.push_back({"value", valueText(value)});
             empty(tag, attributes);
         }
     }
     void write(const ReplaceScene& c) {
+        names_.beginScene();
         open("Replace");
         open("Scene");
         for (const ProtoPtr& proto : c.protos) writeProto(*proto);
@@ -530,6 +560,8 @@ class XmtWriter {
     std::string out_;
     int depth_ = 0;
     bool replaced_ = false;
+    Result<void> fits_;    ///< the first buffer of commands that has no text
+    int bufferDepth_ = 0;  ///< in how many buffers what is written is
 };
 
 }  // namespace

@@ -122,34 +122,6 @@ TEST(AllNodes, EveryNodeWithAllItsFieldsComesBackFromTexts) {
     EXPECT_EQ(problemOf(document.frames, fromXmt->frames), "");
 }
 
-TEST(AllNodes, CommandsInsideOfANodeAreKeptInBifsAndRefusedInTexts) {
-    const NodePtr root = makeNode("Group");
-    const NodePtr conditional = makeNode("Conditional");
-    conditional->set("buffer", CommandBuffer{{0xC0, 0x05, 0xA0}});
-    root->set("children", NodeList{conditional});
-    Document document;
-    document.frames = {{0, {ReplaceScene{false, root, {}}}}};
-    const BifsConfig config = fitBifsConfig({}, assignNodeIds(document.frames));
-    BifsEncoder encoder(config, {}, {});
-    const auto bytes = encoder.encode(document.frames[0].commands);
-    ASSERT_TRUE(bytes) << bytes.error().text();
-    BifsDecoder decoder(config, Limits());
-    const auto decoded = decoder.decode(*bytes);
-    ASSERT_TRUE(decoded) << decoded.error().text();
-    EXPECT_TRUE(sameNode(std::get<ReplaceScene>(decoded->at(0)).root, root));
-    Job job;
-    const auto text = writeBt(document, job);
-    ASSERT_FALSE(text);
-    EXPECT_EQ(text.error().code, ErrorCode::unsupported);
-    for (const char* bt : {"Group { children [ Conditional { buffer { DELETE A } } ] }",
-                           "Group { children [ Conditional { buffer \"x\" } ] }"}) {
-        const auto read = readBt(bt, "test.bt", job);
-        ASSERT_FALSE(read) << bt;
-        EXPECT_EQ(read.error().code, ErrorCode::unsupported) << read.error().text();
-    }
-    EXPECT_TRUE(readBt("Group { children [ Conditional { buffer { } } ] }", "test.bt", job));
-}
-
 TEST(AllNodes, IndicesAreQuantisedByTheirCoordinates) {
     const NodePtr root = makeNode("Group");
     const NodePtr quantisation = makeNode("QuantizationParameter");

@@ -12,18 +12,6 @@
 namespace stx::mpeg4 {
 namespace {
 
-Document throughXmt(const Document& document) {
-    Job job;
-    const auto text = writeXmt(document, job);
-    if (!text) {
-        ADD_FAILURE() << text.error().text();
-        return {};
-    }
-    auto back = readXmt(*text, "test.xmt", job);
-    if (!back) ADD_FAILURE() << back.error().text() << "\n" << *text;
-    return back ? std::move(*back) : Document();
-}
-
 void expectKeptEverywhere(const Document& document) {
     for (const BifsStyle style : {BifsStyle::maskAndVector(), BifsStyle::shortest()}) {
         const Document mp4 = throughMp4(document, style);

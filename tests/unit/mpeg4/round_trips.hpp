@@ -6,6 +6,7 @@
 
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/text/bt.hpp"
+#include "formats/mpeg4/text/xmt.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 
 /// Documents written and read again; what fails is a failure of the test.
@@ -23,6 +24,19 @@ inline std::string btOf(const Document& document) {
     auto text = writeBt(document, job);
     if (!text) ADD_FAILURE() << text.error().text();
     return text.value_or("");
+}
+
+/// The document as its own .xmt reads.
+inline Document throughXmt(const Document& document) {
+    Job job;
+    const auto text = writeXmt(document, job);
+    if (!text) {
+        ADD_FAILURE() << text.error().text();
+        return {};
+    }
+    auto back = readXmt(*text, "test.xmt", job);
+    if (!back) ADD_FAILURE() << back.error().text() << "\n" << *text;
+    return back ? std::move(*back) : Document();
 }
 
 /// What reading a text says.

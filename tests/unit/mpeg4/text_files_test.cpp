@@ -191,7 +191,8 @@ Group { children [   # another { [ "
 
 TEST(Bt, ErrorsSayWhereWhatAndWhatWasExpected) {
     EXPECT_EQ(btErrorOf("Group {\n children [\n  Depth { }\n ]\n}"),
-              "'test.bt':3:3: there is no node type 'Depth' in the table");
+              "'test.bt':3:3: found 'Depth', expected a node such as DepthImage, or a PROTO "
+              "declared before it");
     EXPECT_EQ(btErrorOf("Group { children [ DepthImage { position 0 0 x } ] }"),
               "'test.bt':1:46: found 'x', expected a number for DepthImage.position");
     EXPECT_EQ(btErrorOf("Group { children [ DepthImage { colour 1 } ] }"),
