@@ -388,7 +388,9 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
         if (names.size() == before)
             return fail(ErrorCode::invalidInput, "the list '{}' names no input", list);
     }
-    if (names.empty()) return fail(ErrorCode::usage, "there is no input");
+    if (names.empty())
+        return fail(ErrorCode::usage,
+                    "no input was given, or the list of inputs is empty; name at least one file");
     return names;
 }
 

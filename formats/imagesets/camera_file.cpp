@@ -12,7 +12,8 @@ Result<std::vector<NamedCamera>> camerasOf(const std::vector<imagesets::SetView>
                                            const std::string& where, Job& job,
                                            std::optional<glm::ivec2> size) {
     using namespace imagesets;
-    if (views.empty()) return failAt(where, ErrorCode::invalidInput, "there is no camera in it");
+    if (views.empty())
+        return failAt(where, ErrorCode::invalidInput, "it has no camera; at least one is expected");
     std::vector<NamedCamera> out;
     bool sizeMissing = false;
     int lenses = 0;
@@ -96,8 +97,8 @@ Result<std::vector<NamedCamera>> readCameraFile(const std::filesystem::path& pat
     STX_TRY(const Json file, readJson(path, job.limits));
     Result<std::vector<SetView>> views =
         fail(ErrorCode::invalidInput,
-             "there is no list 'frames' (transforms.json), 'cameras' (MIV, cameras.json) or "
-             "'camera_path' (nerfstudio) in it");
+             "a list 'frames' (transforms.json), 'cameras' (MIV, cameras.json) or 'camera_path' "
+             "(nerfstudio) is expected in it; none was found");
     switch (jsonKindOf(file)) {
         case JsonKind::cameraPath:
             views = cameraPathInWorld(file, path, dataparser, job);

@@ -155,7 +155,9 @@ Result<SetDescription> describeCamerasJson(const path& given, const ImageSetOpti
     const std::string where = inQuotes(file.string());
     STX_TRY(const Json json, readJson(file, job.limits));
     if (jsonKindOf(json) != JsonKind::cameras)
-        return failAt(where, ErrorCode::invalidInput, "there is no list 'cameras' in it");
+        return failAt(where, ErrorCode::invalidInput,
+                      "a list 'cameras' with 'texture' and 'depth' is expected in it, as extract "
+                      "writes it; name another kind with --from");
     SetDescription set;
     STX_TRY(set.views, within(where, camerasJsonViews(json, job)));
     STX_TRY(const auto title, within(where, findText(json, "title", "")));

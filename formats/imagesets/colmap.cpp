@@ -279,8 +279,8 @@ Result<Model3d> readModel(const path& given, const Limits& limits) {
     }
     if (m.model.empty())
         return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
-                      "there is no COLMAP model: sparse/cameras.bin and images.bin, or .txt, are "
-                      "looked for");
+                      "no COLMAP model was found in it; sparse/cameras.bin and images.bin, or "
+                      ".txt, are expected (colmap writes them with its mapper or model_converter)");
     STX_TRY(const auto cameraBytes, readFile(m.file("cameras"), limits));
     STX_TRY(m.cameras, within(inQuotes(m.file("cameras").string()),
                               parseColmapCameras(cameraBytes, m.binary, limits)));
@@ -295,7 +295,8 @@ Result<Model3d> readModel(const path& given, const Limits& limits) {
 Result<SetView> viewOf(const Model3d& m, const ColmapImage& image, const std::string& place) {
     const auto found = m.cameras.find(image.camera);
     if (found == m.cameras.end())
-        return failAt(place, ErrorCode::invalidInput, "there is no camera {} in the model",
+        return failAt(place, ErrorCode::invalidInput,
+                      "it was taken by camera {}, which the model's cameras do not have",
                       image.camera);
     const ColmapCamera& c = found->second;
     SetView view;

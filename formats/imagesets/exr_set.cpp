@@ -173,7 +173,10 @@ Result<SetDescription> describeExr(const path& given, const ImageSetOptions&, Jo
                         : given.has_parent_path() ? given.parent_path()
                                                   : path(".");
     const std::string where = inQuotes(given.string());
-    if (files.empty()) return failAt(where, ErrorCode::io, "there is no .exr file in it");
+    if (files.empty())
+        return failAt(
+            where, ErrorCode::io,
+            "no .exr file was found in it; each view is one, with colour and a channel Z");
     STX_CHECK(checkViewCount(files.size(), job.limits, where));
 
     struct Found {
@@ -192,7 +195,8 @@ Result<SetDescription> describeExr(const path& given, const ImageSetOptions&, Jo
     }
     if (all.empty())
         return failAt(where, ErrorCode::invalidInput,
-                      "there is no view with both colour (R G B or Y) and a channel Z in it");
+                      "no view in it has both colour (R G B or Y) and a channel Z; render with a "
+                      "depth or Z pass");
     STX_CHECK(checkViewCount(all.size(), job.limits, where));
     const std::string json = firstThere(
         folder, {files.front().stem().string() + ".json", "cameras.json", "transforms.json"});

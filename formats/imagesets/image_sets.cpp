@@ -140,7 +140,8 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
                          const ImageSetOptions& options, Job& job) {
     useOrigin(set);
     if (set.views.empty())
-        return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+        return failAt(where, ErrorCode::invalidInput,
+                      "it has no view; at least one with a picture and a depth image is expected");
     STX_CHECK(dropMissing(set, options.strict, job));
     for (const SetView& view : set.views)
         for (const PictureSource* source : {&view.texture, &view.depth})

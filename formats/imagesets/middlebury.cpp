@@ -125,7 +125,8 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
     }
     if (set.views.empty())
         return failAt(where, ErrorCode::io,
-                      "there is no disparity image (disp1.png, disp5.png...)");
+                      "no disparity image was found in it; disp1.png and disp5.png, or such, are "
+                      "expected");
     return set;
 }
 

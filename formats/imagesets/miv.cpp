@@ -264,14 +264,16 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         }
         if (file.empty())
             return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
-                          "there is no JSON file with MIV cameras in it");
+                          "no .json file in it has a list 'cameras' with MIV's keys (Projection, "
+                          "Position); give the file, or name another kind with --from");
     }
     const path folder = file.has_parent_path() ? file.parent_path() : path(".");
     const std::string where = inQuotes(file.string());
     STX_TRY(const Json json, readJson(file, job.limits));
     if (jsonKindOf(json) != JsonKind::miv)
         return failAt(where, ErrorCode::invalidInput,
-                      "there is no list 'cameras' with MIV's keys (Projection, Position)");
+                      "a list 'cameras' with MIV's keys (Projection, Position) is expected in it; "
+                      "name another kind with --from");
     STX_TRY(auto all, within(where, mivViews(json, job)));
 
     std::set<std::string> sources;
@@ -281,7 +283,8 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         for (const std::string& name : sources)
             if (std::none_of(all.begin(), all.end(), [&](const auto& v) { return v.name == name; }))
                 return failAt(where, ErrorCode::invalidInput,
-                              "sourceCameraNames names '{}', but there is no such camera", name);
+                              "sourceCameraNames names '{}', which no camera in the list has",
+                              name);
     }
     SetDescription set;
     STX_TRY(const auto title, within(where, findText(json, "Content_name", "")));

@@ -104,7 +104,9 @@ Result<std::vector<MsrCamera>> parseMsrCalibration(std::string_view text, const 
         STX_CHECK(checkViewCount(numbers.size() / kNumbersPerCamera, limits, "the calibration"));
     }
     if (numbers.empty())
-        return fail(ErrorCode::invalidInput, "there is no camera in the calibration");
+        return fail(ErrorCode::invalidInput,
+                    "the calibration has no camera; lines of numbers are expected (index, 3x3 "
+                    "intrinsics, 2 of distortion, 3x4 rotation and translation)");
     const std::size_t over = numbers.size() % kNumbersPerCamera;
     if (over != 0)
         return failAt(fmt::format("line {}", numbers.back().line), ErrorCode::invalidInput,
@@ -152,7 +154,8 @@ Result<SetDescription> describeMsr(const path& given, const ImageSetOptions& opt
             if (name.starts_with("calibParams") && file.empty()) file = given / name;
         if (file.empty())
             return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
-                          "there is no calibParams-*.txt in it");
+                          "no calibParams-*.txt was found in it; give the folder of Breakdancers "
+                          "or Ballet, or the file");
     }
     const path folder = file.has_parent_path() ? file.parent_path() : path(".");
     const std::string where = inQuotes(file.string());
@@ -182,7 +185,8 @@ Result<SetDescription> describeMsr(const path& given, const ImageSetOptions& opt
             continue;
         }
         if (texture.empty() || depth.empty())
-            return failAt(place1, ErrorCode::io, "there is no '{}' (nor another usual name)",
+            return failAt(place1, ErrorCode::io,
+                          "'{}' is missing, and so is every other usual name of it",
                           texture.empty() ? textures.front() : depths.front());
         STX_TRY(view.texture, sourceInside(folder, texture, place1, job.limits));
         STX_TRY(view.depth, sourceInside(folder, depth, place1, job.limits));

@@ -38,8 +38,10 @@ Result<SetDescription> describePanorama(const path& given, const ImageSetOptions
         to = name;
     }
     if (texture.empty() || depth.empty())
-        return failAt(where, ErrorCode::io, "there is no {} in it",
-                      texture.empty() ? "picture" : "depth image (a name with 'depth' in it)");
+        return failAt(where, ErrorCode::io,
+                      "no {} was found in it; a panorama is a picture and a depth image with "
+                      "'depth' in its name",
+                      texture.empty() ? "picture" : "depth image");
     SetView view;
     view.name = "panorama";
     view.panorama = Panorama();

@@ -147,8 +147,10 @@ Result<std::vector<Frame>> framesByNumber(const path& folder, const std::string&
     const auto depths = numbered(folder, "depth");
     const std::string where = inQuotes(folder.string());
     if (colours.empty() || depths.empty())
-        return failAt(where, ErrorCode::io, "there is no {}/N.png or no depth/N.png in it",
-                      colourFolder);
+        return failAt(where, ErrorCode::io,
+                      "no {}/N.png was found in it; pictures and depth images are expected as "
+                      "{}/N.png and depth/N.png, or rgb.txt and depth.txt with their times",
+                      colours.empty() ? colourFolder : "depth", colourFolder);
     std::vector<Frame> frames;
     for (const auto& [number, name] : colours) {
         const auto depth = std::find_if(depths.begin(), depths.end(),
@@ -269,7 +271,8 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
             if (name.ends_with(".gt.freiburg")) trajectory = name;
     if (trajectory.empty())
         return failAt(where, ErrorCode::io,
-                      "there is no trajectory (groundtruth.txt, pose.txt, *.gt.freiburg) in it");
+                      "no trajectory was found in it; groundtruth.txt, pose.txt, trajectory.txt or "
+                      "*.gt.freiburg is expected");
     const bool timed =
         !firstThere(folder, {"rgb.txt", "associations.txt", "associate.txt", "associated.txt"})
              .empty();

@@ -16,7 +16,9 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
     for (const std::string& name : filesIn(given))
         if (name.ends_with(".pose.txt")) stems.push_back(name.substr(0, name.size() - 9));
     if (stems.empty())
-        return failAt(where, ErrorCode::io, "there is no frame-NNNNNN.pose.txt in it");
+        return failAt(
+            where, ErrorCode::io,
+            "no frame-NNNNNN.pose.txt was found in it; give the folder of one sequence (seq-01)");
     STX_CHECK(
         checkViewCount(stems.size() / static_cast<std::size_t>(options.every), job.limits, where));
     SetDescription set;

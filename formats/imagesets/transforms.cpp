@@ -216,7 +216,8 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     STX_TRY(const Json json, readJson(file, job.limits));
     if (jsonKindOf(json) != JsonKind::transforms)
         return failAt(where, ErrorCode::invalidInput,
-                      "there is no list 'frames'; a transforms.json is expected");
+                      "a list 'frames' is expected in it, as in a transforms.json; name another "
+                      "kind with --from");
     SetDescription set;
     STX_TRY(set.views, within(where, transformsViews(json, job)));
     STX_TRY(const auto title, within(where, findText(json, "stx:title", "")));

@@ -303,8 +303,9 @@ Result<Mesh> MeshBuilder::finish() {
             return fail(ErrorCode::invalidInput,
                         "the model has {} triangles, but none with an area, and no points",
                         flatTriangles_);
-        return fail(ErrorCode::invalidInput,
-                    "the model has neither triangles nor points; there is nothing to see");
+        return fail(
+            ErrorCode::invalidInput,
+            "the model has neither triangles nor points; export its faces or its vertices with it");
     }
     STX_CHECK(mesh_.check());
     return std::move(mesh_);

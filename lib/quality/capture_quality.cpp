@@ -32,7 +32,9 @@ Result<std::vector<Camera>> novelCameras(const Mesh& mesh, int side) {
 
 Result<FewestCameras> fewestCameras(const Mesh& mesh, const std::vector<Camera>& cameras,
                                     const CaptureSettings& settings, double wantedPsnr, Job& job) {
-    if (cameras.empty()) return fail(ErrorCode::usage, "there is no camera to choose");
+    if (cameras.empty())
+        return fail(ErrorCode::usage,
+                    "no camera was given; at least one is expected to choose from");
     constexpr int kLargestSide = 512;
     constexpr double kAsGood = 0.1;  // dB that are not worth more views
     Job quiet;                       // each attempt would give the same notes again

@@ -139,10 +139,10 @@ Result<void> readSampleEntry(const Box& stsd, const Box& dref, Mp4Track& track) 
     Box entries = stsd;
     fullBox(entries.body);
     const std::uint32_t count = entries.body.u32();
-    if (entries.body.failed() || count == 0) return damaged(stsd, "there is no sample entry");
+    if (entries.body.failed() || count == 0)
+        return damaged(stsd, "it has no sample entry; one is expected");
     STX_TRY(const auto boxes, childBoxes(entries));
-    if (boxes.empty())
-        return damaged(stsd, "{} sample entries are announced, but there is none", count);
+    if (boxes.empty()) return damaged(stsd, "it announces {} sample entries and has none", count);
     Box entry = boxes.front();
     const Box whole = entry;
     track.facts.sampleEntry = entry.type;

@@ -56,7 +56,8 @@ class BundleReader {
         if (still && options_.noteMotion) noteMotion(scene, shown);
         if (plans.empty())
             return fail(ErrorCode::invalidInput,
-                        "the scene shows no DepthImage with a texture; there is nothing to see");
+                        "the scene shows no DepthImage or OctreeImage with a texture; at least one "
+                        "is expected");
 
         std::vector<Result<std::vector<ReferenceView>>> read(plans.size());
         images_ = &images;
@@ -359,9 +360,9 @@ class BundleReader {
                                                view.nearPlane, view.farPlane));
         } else {
             if (!hasAlpha)
-                return fail(
-                    ErrorCode::invalidInput,
-                    "there is no depth: the depth image is NULL and the texture has no alpha");
+                return fail(ErrorCode::invalidInput,
+                            "the depth image is NULL and the texture has no alpha; one of them "
+                            "must hold the depth");
             STX_TRY(view, cameraOf(plan, colour.width, colour.height));
             depthBits = colour.bits();
             STX_TRY(view.depth,

@@ -116,9 +116,11 @@ Result<Bytes> StreamImages::load(const Node& texture, const Limits& limits) cons
         }
         const auto found = byId_.find(url.objectDescriptorId);
         if (found == byId_.end()) {
-            last = {ErrorCode::invalidInput,
-                    fmt::format("there is no object descriptor {}", url.objectDescriptorId),
-                    {}};
+            last = {
+                ErrorCode::invalidInput,
+                fmt::format("object descriptor {} is named, which the presentation does not have",
+                            url.objectDescriptorId),
+                {}};
             continue;
         }
         const ObjectDescriptor& od = *found->second;

@@ -328,7 +328,7 @@ TEST(Mapping, BadCamerasAreNamed) {
         std::string::npos);
     EXPECT_NE(
         errorOf("DepthImage { diTexture SimpleTexture { texture ImageTexture { url [od:9] } } }")
-            .find("no object descriptor 9"),
+            .find("object descriptor 9 is named"),
         std::string::npos);
 }
 
