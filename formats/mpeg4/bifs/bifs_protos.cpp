@@ -109,9 +109,8 @@ Result<void> BifsNodeReader::readScripts(Node& script, int index, int depth) {
                                return check("Script.url");
                            }));
     }
-    // The fields that a Script has of its own came with a program, though its url be coded once
-    // more.
-    if (scripts.empty() && ownFieldCount(script) > 0) scripts.emplace_back();
+    // A url that is coded once more, empty, must not take away the program that brought fields.
+    if (scripts.empty() && ownFieldCount(script) > 0) return {};
     script.set(index, std::move(scripts));
     return {};
 }

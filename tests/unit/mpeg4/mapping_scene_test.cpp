@@ -89,7 +89,9 @@ TEST(SceneHeaders, ASceneThatShowsNothingMayBeDescribed) {
     const Bundle nothing = headersOf("WorldInfo { title \"empty\" }");
     EXPECT_TRUE(nothing.views.empty());
     EXPECT_EQ(nothing.title, "empty");
-    EXPECT_NE(errorOf("WorldInfo { title \"empty\" }").find("nothing to see"), std::string::npos);
+    EXPECT_NE(
+        errorOf("WorldInfo { title \"empty\" }").find("with a texture; at least one is expected"),
+        std::string::npos);
 }
 
 /// A player that opens our file sees the whole object, from the side of the first view.

@@ -293,7 +293,8 @@ TEST(Mapping, SwitchShowsOnlyItsChoiceAndUsesCountEach) {
     const Bundle one = mustRead("Switch { whichChoice 1 choice [ " + two + " ] }");
     ASSERT_EQ(one.views.size(), 1u);
     EXPECT_EQ(one.views[0].name, "B");
-    EXPECT_NE(errorOf("Switch { choice [ " + two + " ] }").find("nothing to see"),
+    EXPECT_NE(errorOf("Switch { choice [ " + two + " ] }")
+                  .find("with a texture; at least one is expected"),
               std::string::npos);
     const Bundle used = mustRead(two + " Transform { translation 5 0 0 children USE A }");
     ASSERT_EQ(used.views.size(), 3u);

@@ -276,7 +276,7 @@ TEST(Proto, ErrorsNameWhatIsWrong) {
         std::string::npos);
     EXPECT_NE(btErrorOf("PROTO Group [ ] { } Group { }").find("no name for a PROTO"),
               std::string::npos);
-    EXPECT_NE(btErrorOf("PROTO A [ ] { A { } } Group { }").find("no node type 'A'"),
+    EXPECT_NE(btErrorOf("PROTO A [ ] { A { } } Group { }").find("found 'A', expected a node"),
               std::string::npos);
     std::string many;
     for (int i = 0; i < 1100; ++i) many += fmt::format("PROTO P{} [ ] {{ Group {{ }} }} ", i);
