@@ -1,20 +1,17 @@
-// How fast the processor's renderers are, as ratios to a plain z-buffered splat of one pixel that
-// is timed in the same run, frame by frame in turn with them, so that a busy machine slows both.
-// Lee & Park's full-frame case: 1024x768 views in which every pixel is a point.
+// How fast the processor's renderers are, as ratios to the yardstick, which is timed in the same
+// run, frame by frame in turn with them, so that a busy machine slows both. Lee & Park's full-frame
+// case: 1024x768 views in which every pixel is a point.
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <ctime>
-#include <vector>
 
 #include <benchmark/benchmark.h>
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/renderer.hpp"
+#include "tests/bench/yardstick.hpp"
 
 namespace {
 
@@ -30,74 +27,6 @@ const Bundle& roomBundle() {
 Camera novelCamera() {
     return analyticCamera(AnalyticScene::room, 1.5, kReferences);
 }
-
-// What anybody would write first: every point transformed and put into a z-buffer, in floats, the
-// points of each reference shared out among threads by rows with a buffer for each thread.
-class PlainSplat {
-  public:
-    explicit PlainSplat(const Bundle& bundle) : bundle_(bundle) {}
-
-    void render(const Camera& novel) {
-        const int threads = threadCount();
-        const std::size_t pixels = static_cast<std::size_t>(novel.width) * novel.height;
-        buffers_.resize(threads);
-        parallelFor(0, threads, [&](std::int64_t t) {
-            auto& buffer = buffers_[t];
-            buffer.assign(pixels, ~std::uint64_t{0});
-            for (const auto& v : bundle_.views) {
-                const int from = static_cast<int>(v.camera.height * t / threads);
-                const int to = static_cast<int>(v.camera.height * (t + 1) / threads);
-                splat(v, novel, from, to, buffer);
-            }
-        });
-        picture_.resize(pixels);
-        parallelForBlocks(0, static_cast<std::int64_t>(pixels), 1 << 14,
-                          [&](std::int64_t from, std::int64_t to) {
-                              for (auto i = from; i < to; ++i) {
-                                  std::uint64_t nearest = buffers_[0][i];
-                                  for (int t = 1; t < threads; ++t)
-                                      nearest = std::min(nearest, buffers_[t][i]);
-                                  picture_[i] = static_cast<std::uint32_t>(nearest);
-                              }
-                          });
-        benchmark::DoNotOptimize(picture_.data());
-    }
-
-  private:
-    static void splat(const ReferenceView& v, const Camera& novel, int from, int to,
-                      std::vector<std::uint64_t>& buffer) {
-        const glm::mat4 m(novel.cameraFromWorld() * v.camera.worldFromCamera());
-        const auto fx = static_cast<float>(novel.fx), fy = static_cast<float>(novel.fy);
-        const auto cx = static_cast<float>(novel.cx), cy = static_cast<float>(novel.cy);
-        const auto* colours = v.texture.rgba8()->data();
-        for (int y = from; y < to; ++y) {
-            for (int x = 0; x < v.camera.width; ++x) {
-                const float z = v.depth.at(x, y);
-                if (!hasPoint(z)) continue;
-                const float px = (x + 0.5f - static_cast<float>(v.camera.cx)) /
-                                 static_cast<float>(v.camera.fx) * z;
-                const float py = -(y + 0.5f - static_cast<float>(v.camera.cy)) /
-                                 static_cast<float>(v.camera.fy) * z;
-                const float qx = m[0][0] * px + m[1][0] * py - m[2][0] * z + m[3][0];
-                const float qy = m[0][1] * px + m[1][1] * py - m[2][1] * z + m[3][1];
-                const float depth = -(m[0][2] * px + m[1][2] * py - m[2][2] * z + m[3][2]);
-                if (!(depth > 0)) continue;
-                const int i = static_cast<int>(std::floor(cx + fx * qx / depth));
-                const int j = static_cast<int>(std::floor(cy - fy * qy / depth));
-                if (i < 0 || j < 0 || i >= novel.width || j >= novel.height) continue;
-                std::uint32_t bits, colour;
-                std::memcpy(&bits, &depth, 4);
-                std::memcpy(&colour, &colours[static_cast<std::size_t>(y) * v.camera.width + x], 4);
-                auto& at = buffer[static_cast<std::size_t>(j) * novel.width + i];
-                at = std::min(at, (std::uint64_t{bits} << 32) | colour);
-            }
-        }
-    }
-
-    const Bundle& bundle_;
-    std::vector<std::vector<std::uint64_t>> buffers_;
-    std::vector<std::uint32_t> picture_;
-};
 
 struct Cost {
     double wall = 0;  // milliseconds
@@ -124,7 +53,7 @@ void renderFrames(benchmark::State& state, const RenderSettings& settings) {
         state.SkipWithError(renderer.error().text().c_str());
         return;
     }
-    PlainSplat plain(bundle);
+    bench::Yardstick plain;
     Cost ours{1e300, 1e300}, theirs = ours;
     const auto best = [](Cost& so, Cost now) {
         so.wall = std::min(so.wall, now.wall);
@@ -137,16 +66,16 @@ void renderFrames(benchmark::State& state, const RenderSettings& settings) {
         });
         state.SetIterationTime(cost.wall / 1000);
         best(ours, cost);
-        best(theirs, costOf([&] { plain.render(camera); }));
+        best(theirs, costOf([&] { plain.draw(); }));
     }
     const auto points = static_cast<double>(bundle.pointCount());
     state.SetLabel((*renderer)->device());
     state.counters["Mpts/s"] = points / ours.wall / 1e3;
-    state.counters["plain Mpts/s"] = points / theirs.wall / 1e3;
-    // Processor time of a point, and how often the plain loop's: below 1 is cheaper.
+    state.counters["yardstick Mpts/s"] = points / theirs.wall / 1e3;
+    // Processor time of a point, and how often the yardstick's: below 1 is cheaper.
     state.counters["ns/pt"] = ours.processor * 1e6 / points;
-    state.counters["plain ns/pt"] = theirs.processor * 1e6 / points;
-    state.counters["times plain"] = ours.processor / theirs.processor;
+    state.counters["yardstick ns/pt"] = theirs.processor * 1e6 / points;
+    state.counters["times yardstick"] = ours.processor / theirs.processor;
 }
 
 void splatFrames(benchmark::State& state, SplatRule rule) {
