@@ -9,61 +9,26 @@
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
-#include <OpenEXR/ImfMultiPartOutputFile.h>
-#include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
-#include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfVecAttribute.h>
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <mutex>
 #include <stdexcept>
 #include <system_error>
 
+#include "formats/exr/exr_adapt.hpp"
 #include "formats/exr/exr_streams.hpp"
-#include "formats/files/source_date.hpp"
-#include "lib/base/parallel.hpp"
 
 namespace stx {
 
 namespace {
 
-/// Where the exceptions of OpenEXR become errors.
-template <class Work>
-auto adapt(ErrorCode code, const std::string& where, const Work& work) -> decltype(work()) {
-    const auto failed = [&](ErrorCode why, std::string_view text) {
-        // The library wraps a reason once for each layer; ours names the file already.
-        for (auto quote = text.find("\". "); quote != std::string_view::npos;
-             quote = text.find("\". "))
-            text.remove_prefix(quote + 3);
-        std::string line(text);
-        std::replace(line.begin(), line.end(), '\n', ' ');
-        while (!line.empty() && (line.back() == ' ' || line.back() == '.')) line.pop_back();
-        return failAt(where, why, "{}", line);
-    };
-    try {
-        return work();
-    } catch (const std::bad_alloc&) {
-        return failed(ErrorCode::failed, "there is not enough memory for the OpenEXR file");
-    } catch (const std::exception& e) {
-        return failed(code, e.what());
-    } catch (...) {
-        return failed(ErrorCode::failed, "the OpenEXR library failed without a reason");
-    }
-}
-
-void startThreadsOnce() {
-    static std::once_flag once;
-    std::call_once(once, [] {
-        const int threads = threadCount();
-        Imf::setGlobalThreadCount(threads > 1 ? threads : 0);
-    });
-}
+using exr::adapt;
 
 constexpr const char* kCompressions[] = {"none",  "rle", "zips", "zip",  "piz",
                                          "pxr24", "b44", "b44a", "dwaa", "dwab"};
@@ -298,151 +263,6 @@ Result<void> ExrReader::readPart(int index, const std::vector<ExrPixels>& pixels
         if (buffer.begin() == buffer.end()) return {};
         in.setFrameBuffer(buffer);
         in.readPixels(window.min.y, window.max.y);
-        return {};
-    });
-}
-
-struct ExrWriter::Impl {
-    std::string where;
-    std::vector<ExrPart> parts;
-    std::unique_ptr<exr::OutputStream> stream;
-    std::unique_ptr<Imf::MultiPartOutputFile> file;
-};
-
-namespace {
-
-Imf::Header headerFrom(const ExrPart& part) {
-    const Imath::Box2i display({0, 0}, {part.displayWidth - 1, part.displayHeight - 1});
-    const Imath::Box2i data({part.originX, part.originY},
-                            {part.originX + part.width - 1, part.originY + part.height - 1});
-    Imf::Header header(display, data, static_cast<float>(part.pixelAspectRatio),
-                       Imath::V2f(static_cast<float>(part.screenWindowCenter.x),
-                                  static_cast<float>(part.screenWindowCenter.y)),
-                       static_cast<float>(part.screenWindowWidth), Imf::INCREASING_Y,
-                       Imf::ZIP_COMPRESSION);
-    header.setType(Imf::SCANLINEIMAGE);
-    header.zipCompressionLevel() = part.zipLevel;
-    if (!part.name.empty()) header.setName(part.name);
-    if (!part.view.empty()) header.setView(part.view);
-    Imf::addChromaticities(header, Imf::Chromaticities());
-    for (const auto& c : part.channels) {
-        header.channels().insert(
-            c.name, Imf::Channel(c.type == ExrChannel::Type::half ? Imf::HALF : Imf::FLOAT));
-    }
-    for (const auto& [name, value] : part.attributes) {
-        if (const auto* s = std::get_if<std::string>(&value)) {
-            header.insert(name, Imf::StringAttribute(*s));
-        } else if (const auto* i = std::get_if<std::int64_t>(&value)) {
-            header.insert(name, Imf::IntAttribute(static_cast<int>(*i)));
-        } else if (const auto* d = std::get_if<double>(&value)) {
-            header.insert(name, Imf::DoubleAttribute(*d));
-        } else if (const auto* v2 = std::get_if<glm::dvec2>(&value)) {
-            header.insert(name, Imf::V2dAttribute(Imath::V2d(v2->x, v2->y)));
-        } else if (const auto* v3 = std::get_if<glm::dvec3>(&value)) {
-            header.insert(name, Imf::V3dAttribute(Imath::V3d(v3->x, v3->y, v3->z)));
-        } else if (const auto* m = std::get_if<glm::dmat4>(&value)) {
-            Imath::M44f f;
-            for (int r = 0; r < 4; ++r) {
-                for (int c = 0; c < 4; ++c) f[r][c] = static_cast<float>((*m)[r][c]);
-            }
-            header.insert(name, Imf::M44fAttribute(f));
-        }
-    }
-    if (const auto seconds = sourceDate()) {
-        Imf::addCapDate(header, exrDate(*seconds));
-        Imf::addUtcOffset(header, 0.0f);
-    }
-    return header;
-}
-
-}  // namespace
-
-ExrWriter::ExrWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-ExrWriter::ExrWriter(ExrWriter&&) noexcept = default;
-ExrWriter& ExrWriter::operator=(ExrWriter&&) noexcept = default;
-ExrWriter::~ExrWriter() {
-    if (!impl_ || !impl_->file) return;
-    // An unfinished file still writes its table, which throws on a full disk.
-    try {
-        impl_->file.reset();
-    } catch (...) {
-    }
-}
-
-Result<ExrWriter> ExrWriter::create(OutputFile& file, const std::vector<ExrPart>& parts) {
-    auto impl = std::make_unique<Impl>();
-    impl->where = "cannot write the OpenEXR file";
-    impl->parts = parts;
-    startThreadsOnce();
-    STX_CHECK(adapt(ErrorCode::io, impl->where, [&]() -> Result<void> {
-        std::vector<Imf::Header> headers;
-        for (const auto& part : parts) headers.push_back(headerFrom(part));
-        impl->stream = std::make_unique<exr::OutputStream>(file.temporaryPath());
-        impl->file = std::make_unique<Imf::MultiPartOutputFile>(*impl->stream, headers.data(),
-                                                                static_cast<int>(headers.size()));
-        return {};
-    }));
-    return ExrWriter(std::move(impl));
-}
-
-Result<void> ExrWriter::writePart(int index, const std::vector<ExrConstPixels>& pixels) {
-    const auto width = static_cast<std::size_t>(impl_->parts[index].width);
-    return writePart(index, [&](int y, int) {
-        auto rows = pixels;
-        for (auto& p : rows) p.values += static_cast<std::size_t>(y) * width * p.stride;
-        return rows;
-    });
-}
-
-Result<void> ExrWriter::writePart(int index, const Block& blockOf) {
-    return adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
-        const ExrPart& part = impl_->parts[index];
-        Imf::OutputPart out(*impl_->file, index);
-        const auto window = out.header().dataWindow();
-        // In blocks of whole chunks, so that the halves need little memory.
-        constexpr int kBlock = 256;
-        const std::size_t width = static_cast<std::size_t>(part.width);
-        std::vector<std::vector<half>> halves;
-        for (int y = 0; y < part.height; y += kBlock) {
-            const int rows = std::min(kBlock, part.height - y);
-            const auto pixels = blockOf(y, rows);
-            halves.resize(pixels.size());
-            Imath::Box2i block = window;
-            block.min.y = window.min.y + y;
-            Imf::FrameBuffer buffer;
-            for (std::size_t i = 0; i < pixels.size(); ++i) {
-                const auto& p = pixels[i];
-                const auto* channel = part.channel(p.channel);
-                if (!channel)
-                    return failAt(impl_->where, ErrorCode::failed, "part {} has no channel '{}'",
-                                  index, p.channel);
-                if (channel->type == ExrChannel::Type::half) {
-                    auto& to = halves[i];
-                    to.resize(width * rows);
-                    parallelForBlocks(0, static_cast<std::int64_t>(to.size()), 1 << 16,
-                                      [&](std::int64_t begin, std::int64_t end) {
-                                          for (auto k = begin; k < end; ++k)
-                                              to[k] = half(p.values[k * p.stride]);
-                                      });
-                    buffer.insert(p.channel, Imf::Slice::Make(Imf::HALF, to.data(), block,
-                                                              sizeof(half), sizeof(half) * width));
-                } else {
-                    buffer.insert(p.channel, Imf::Slice::Make(Imf::FLOAT, p.values, block,
-                                                              p.stride * sizeof(float),
-                                                              p.stride * sizeof(float) * width));
-                }
-            }
-            out.setFrameBuffer(buffer);
-            out.writePixels(rows);
-        }
-        return {};
-    });
-}
-
-Result<void> ExrWriter::finish() {
-    return adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
-        impl_->file.reset();
-        impl_->stream->finish();
         return {};
     });
 }

@@ -51,7 +51,7 @@ struct ExrPart {
     bool deep = false;            ///< deep pixels cannot be read
     bool linearPrimaries = true;  ///< chromaticities are absent or those of Rec. 709
     std::string compression;      ///< "zip", "piz", ...; read only
-    int zipLevel = 4;             ///< 1 (fast) to 9; written only
+    int zipLevel = 4;             ///< 1 (fast) to 12, see compressZlib(); written only
     std::uint64_t bytes = 0;      ///< pixels as they lie in the file; read only, 0 = not known
 
     [[nodiscard]] const ExrChannel* channel(std::string_view name) const;

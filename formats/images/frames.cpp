@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstring>
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
@@ -11,28 +12,36 @@
 #include "formats/images/codec_module.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
 #include "lib/model/texture.hpp"
 
 namespace stx {
 
 namespace {
 
-glm::vec3 linearFrom(glm::vec3 coded) {
-    return {linearFromSrgb(coded.r), linearFromSrgb(coded.g), linearFromSrgb(coded.b)};
+/// Of one channel; lights may make it more than 1, which the table does not have.
+float linearFrom(float coded) {
+    return coded > 1.0f ? linearFromSrgb(coded) : linearByTable(coded);
 }
 
-/// Premultiplied linear light of an image that is premultiplied in the frame's colour space.
-Image<glm::vec4> linearImage(const Image<glm::vec4>& image, bool linear,
-                             const std::optional<glm::vec3>& background) {
-    Image<glm::vec4> out(image.width(), image.height());
-    parallelFor(0, image.height(), [&](std::int64_t y) {
-        const auto from = image.row(static_cast<int>(y));
-        const auto to = out.row(static_cast<int>(y));
-        for (std::size_t x = 0; x < to.size(); ++x) {
-            glm::vec4 p = over(from[x], background);
-            // Coded colours are divided first: the curve and the alpha do not commute.
-            if (!linear && p.a > 0.0f) p = {linearFrom(glm::vec3(p) / p.a) * p.a, p.a};
-            to[x] = p;
+/// Premultiplied linear light of some rows of an image that is premultiplied in the frame's colour
+/// space.
+Image<glm::vec4> linearRows(const Image<glm::vec4>& image, int top, int rows, bool linear,
+                            const std::optional<glm::vec3>& background) {
+    Image<glm::vec4> out(image.width(), rows);
+    parallelForBlocks(0, rows, 16, [&](std::int64_t begin, std::int64_t end) {
+        for (auto y = static_cast<int>(begin); y < end; ++y) {
+            const auto from = image.row(top + y);
+            const auto to = out.row(y);
+            for (std::size_t x = 0; x < to.size(); ++x) {
+                glm::vec4 p = over(from[x], background);
+                // Coded colours are divided first: the curve and the alpha do not commute.
+                if (!linear && p.a > 0.0f) {
+                    if (p.a != 1.0f) p = {glm::vec3(p) / p.a, p.a};
+                    p = {glm::vec3(linearFrom(p.r), linearFrom(p.g), linearFrom(p.b)) * p.a, p.a};
+                }
+                to[x] = p;
+            }
         }
     });
     return out;
@@ -95,31 +104,40 @@ Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOpti
         // Planes only scale the third coordinate of NDC, which nobody uses.
         setExrCamera(part, *options.camera, 0.0, 1.0);
     }
-    std::vector<ExrConstPixels> pixels;
-    const auto add = [&](const std::string& name, ExrChannel::Type type, const float* first,
-                         std::size_t stride) {
-        part.channels.push_back({name, type});
-        pixels.push_back({name, first, stride});
-    };
-    const auto colour =
-        linearImage(frame.colour, frame.linear, inSpaceOf(frame, options.background));
     const char* rgba[] = {"R", "G", "B", "A"};
-    for (int c = 0; c < 4; ++c) add(rgba[c], ExrChannel::Type::half, &colour.data()->x + c, 4);
-    Image<glm::vec4> albedo;
-    if (!frame.albedo.empty()) {
-        albedo = linearImage(frame.albedo, frame.linear, {});
-        for (int c = 0; c < 4; ++c)
-            add(std::string("albedo.") + rgba[c], ExrChannel::Type::half, &albedo.data()->x + c, 4);
-    }
-    if (!frame.depth.empty()) add("Z", ExrChannel::Type::float32, frame.depth.data(), 1);
-    if (!frame.normal.empty()) {
-        const float* first = &frame.normal.data()->x;
-        add("N.X", ExrChannel::Type::half, first, 3);
-        add("N.Y", ExrChannel::Type::half, first + 1, 3);
-        add("N.Z", ExrChannel::Type::half, first + 2, 3);
-    }
+    for (const char* c : rgba) part.channels.push_back({c, ExrChannel::Type::half});
+    const bool albedo = !frame.albedo.empty(), normals = !frame.normal.empty();
+    for (const char* c : rgba)
+        if (albedo) part.channels.push_back({std::string("albedo.") + c, ExrChannel::Type::half});
+    if (!frame.depth.empty()) part.channels.push_back({"Z", ExrChannel::Type::float32});
+    for (const char* c : {"N.X", "N.Y", "N.Z"})
+        if (normals) part.channels.push_back({c, ExrChannel::Type::half});
+
+    const auto behind = inSpaceOf(frame, options.background);
+    // Without lights and a background albedo is the colour.
+    const bool same = albedo && !behind &&
+                      std::memcmp(frame.albedo.data(), frame.colour.data(),
+                                  frame.colour.count() * sizeof(glm::vec4)) == 0;
+    Image<glm::vec4> colourRows, albedoRows;
     STX_TRY(auto writer, ExrWriter::create(file, {part}));
-    STX_CHECK(writer.writePart(0, pixels));
+    STX_CHECK(writer.writePart(0, [&](int y, int rows) {
+        std::vector<ExrConstPixels> pixels;
+        colourRows = linearRows(frame.colour, y, rows, frame.linear, behind);
+        const float* colours = &colourRows.data()->x;
+        for (int c = 0; c < 4; ++c) pixels.push_back({rgba[c], colours + c, 4});
+        if (albedo && !same) albedoRows = linearRows(frame.albedo, y, rows, frame.linear, {});
+        const float* albedos = same ? colours : albedo ? &albedoRows.data()->x : nullptr;
+        for (int c = 0; albedo && c < 4; ++c)
+            pixels.push_back({std::string("albedo.") + rgba[c], albedos + c, 4});
+        if (!frame.depth.empty()) pixels.push_back({"Z", frame.depth.row(y).data(), 1});
+        if (normals) {
+            const float* first = &frame.normal.row(y).data()->x;
+            pixels.push_back({"N.X", first, 3});
+            pixels.push_back({"N.Y", first + 1, 3});
+            pixels.push_back({"N.Z", first + 2, 3});
+        }
+        return pixels;
+    }));
     return writer.finish();
 }
 

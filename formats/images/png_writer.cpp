@@ -1,5 +1,5 @@
-// PNG (ISO/IEC 15948) out of whole images: filtered here, compressed by libdeflate, which takes a
-// twentieth of zlib's time for files of the same size.
+// PNG (ISO/IEC 15948) out of whole images: filtered and compressed in one go, which takes a
+// twentieth of the time of a library that does it row by row with zlib.
 
 #include <libdeflate.h>
 
@@ -10,15 +10,12 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/files/deflate.hpp"
 #include "formats/images/reader.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
 namespace {
-
-struct FreeCompressor {
-    void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
-};
 
 using Row = std::vector<std::uint8_t>;
 enum Filter : std::uint8_t { none, sub, up, average, paeth };
@@ -148,11 +145,6 @@ class ChunkWriter {
 Result<Bytes> encodeWholePng(int width, int height, int channels, int bits, const void* values,
                              bool srgb, int level) {
     const Row rows = filteredRows(width, height, channels, bits, values, level <= 1);
-    const std::unique_ptr<libdeflate_compressor, FreeCompressor> compressor(
-        libdeflate_alloc_compressor(level));
-    if (!compressor)
-        return fail(ErrorCode::failed, "there is not enough memory to encode a PNG of {}x{} pixels",
-                    width, height);
     ChunkWriter png;
     png.text("\x89PNG\r\n\x1a\n");
     png.begin("IHDR");
@@ -179,9 +171,9 @@ Result<Bytes> encodeWholePng(int width, int height, int channels, int bits, cons
     png.begin("IDAT");
     Bytes& out = png.bytes();
     const std::size_t at = out.size();
-    out.resize(at + libdeflate_zlib_compress_bound(compressor.get(), rows.size()));
-    const std::size_t size = libdeflate_zlib_compress(compressor.get(), rows.data(), rows.size(),
-                                                      out.data() + at, out.size() - at);
+    out.resize(at + zlibBound(rows.size()));
+    const std::size_t size =
+        compressZlib(std::as_bytes(std::span(rows)), level, std::span(out).subspan(at));
     if (size == 0)
         return fail(ErrorCode::failed, "cannot encode a PNG of {}x{} pixels", width, height);
     out.resize(at + size);

@@ -33,7 +33,7 @@ class ImageReader {
 [[nodiscard]] Result<std::unique_ptr<ImageReader>> openPng(ByteSpan bytes);
 [[nodiscard]] Result<std::unique_ptr<ImageReader>> openJpeg(ByteSpan bytes, const Limits& limits);
 
-/// encodePng() of an image that is taken into memory whole, twice: by libdeflate.
+/// encodePng() of an image that is taken into memory whole, twice.
 [[nodiscard]] Result<Bytes> encodeWholePng(int width, int height, int channels, int bits,
                                            const void* values, bool srgb, int level);
 

@@ -1,0 +1,278 @@
+// OpenEXR files of scan lines and zip compression. The library writes the headers; chunks are
+// compressed and put behind each other here, since the library's own zlib took most of the time.
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIntAttribute.h>
+#include <OpenEXR/ImfMatrixAttribute.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfVecAttribute.h>
+#include <OpenEXR/ImfVersion.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "formats/exr/exr_adapt.hpp"
+#include "formats/exr/exr_file.hpp"
+#include "formats/exr/exr_streams.hpp"
+#include "formats/exr/exr_zip.hpp"
+#include "formats/files/source_date.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+using exr::adapt;
+using exr::kZipRows;
+
+static_assert(std::endian::native == std::endian::little, "files are little-endian, as pixels are");
+
+Imf::Header headerFrom(const ExrPart& part) {
+    const Imath::Box2i display({0, 0}, {part.displayWidth - 1, part.displayHeight - 1});
+    const Imath::Box2i data({part.originX, part.originY},
+                            {part.originX + part.width - 1, part.originY + part.height - 1});
+    Imf::Header header(display, data, static_cast<float>(part.pixelAspectRatio),
+                       Imath::V2f(static_cast<float>(part.screenWindowCenter.x),
+                                  static_cast<float>(part.screenWindowCenter.y)),
+                       static_cast<float>(part.screenWindowWidth), Imf::INCREASING_Y,
+                       Imf::ZIP_COMPRESSION);
+    header.setType(Imf::SCANLINEIMAGE);
+    if (!part.name.empty()) header.setName(part.name);
+    if (!part.view.empty()) header.setView(part.view);
+    Imf::addChromaticities(header, Imf::Chromaticities());
+    for (const auto& c : part.channels) {
+        header.channels().insert(
+            c.name, Imf::Channel(c.type == ExrChannel::Type::half ? Imf::HALF : Imf::FLOAT));
+    }
+    for (const auto& [name, value] : part.attributes) {
+        if (const auto* s = std::get_if<std::string>(&value)) {
+            header.insert(name, Imf::StringAttribute(*s));
+        } else if (const auto* i = std::get_if<std::int64_t>(&value)) {
+            header.insert(name, Imf::IntAttribute(static_cast<int>(*i)));
+        } else if (const auto* d = std::get_if<double>(&value)) {
+            header.insert(name, Imf::DoubleAttribute(*d));
+        } else if (const auto* v2 = std::get_if<glm::dvec2>(&value)) {
+            header.insert(name, Imf::V2dAttribute(Imath::V2d(v2->x, v2->y)));
+        } else if (const auto* v3 = std::get_if<glm::dvec3>(&value)) {
+            header.insert(name, Imf::V3dAttribute(Imath::V3d(v3->x, v3->y, v3->z)));
+        } else if (const auto* m = std::get_if<glm::dmat4>(&value)) {
+            Imath::M44f f;
+            for (int r = 0; r < 4; ++r) {
+                for (int c = 0; c < 4; ++c) f[r][c] = static_cast<float>((*m)[r][c]);
+            }
+            header.insert(name, Imf::M44fAttribute(f));
+        }
+    }
+    if (const auto seconds = sourceDate()) {
+        Imf::addCapDate(header, exrDate(*seconds));
+        Imf::addUtcOffset(header, 0.0f);
+    }
+    return header;
+}
+
+bool hasLongNames(const Imf::Header& header) {
+    constexpr std::size_t kLongest = 31;
+    for (auto it = header.begin(); it != header.end(); ++it)
+        if (std::strlen(it.name()) > kLongest) return true;
+    for (auto it = header.channels().begin(); it != header.channels().end(); ++it)
+        if (std::strlen(it.name()) > kLongest) return true;
+    return false;
+}
+
+void putNumber(exr::OutputStream& stream, std::int32_t value) {
+    char bytes[4];
+    std::memcpy(bytes, &value, 4);
+    stream.write(bytes, 4);
+}
+
+void putOffsets(exr::OutputStream& stream, const std::vector<std::uint64_t>& offsets) {
+    // In pieces, since streams count in ints.
+    constexpr std::size_t kPiece = 1 << 16;
+    for (std::size_t i = 0; i < offsets.size(); i += kPiece) {
+        const std::size_t count = std::min(kPiece, offsets.size() - i);
+        stream.write(reinterpret_cast<const char*>(offsets.data() + i),
+                     static_cast<int>(count * sizeof(std::uint64_t)));
+    }
+}
+
+int chunksOf(int rows) {
+    return (rows + kZipRows - 1) / kZipRows;
+}
+
+}  // namespace
+
+struct ExrWriter::Impl {
+    std::string where;
+    std::vector<ExrPart> parts;
+    std::unique_ptr<exr::OutputStream> stream;
+    std::uint64_t tables = 0;                         ///< where the tables of offsets begin
+    std::vector<std::vector<std::uint64_t>> offsets;  ///< of each part's chunks
+
+    void writeHeaders();
+    void writeChunk(int part, int chunk, const Bytes& bytes);
+    [[nodiscard]] Result<void> writeRows(int part, int top, int rows,
+                                         const std::vector<ExrConstPixels>& pixels);
+};
+
+void ExrWriter::Impl::writeHeaders() {
+    std::vector<Imf::Header> headers;
+    bool longNames = false;
+    const bool multiPart = parts.size() > 1;
+    std::set<std::string> names;
+    for (const auto& part : parts) {
+        headers.push_back(headerFrom(part));
+        if (multiPart) headers.back().setChunkCount(chunksOf(part.height));
+        headers.back().sanityCheck(false, multiPart);
+        longNames = longNames || hasLongNames(headers.back());
+        if (multiPart && !names.insert(part.name).second)
+            throw std::invalid_argument(fmt::format("two parts are called '{}'", part.name));
+        if (part.displayWidth != parts[0].displayWidth ||
+            part.displayHeight != parts[0].displayHeight)
+            throw std::invalid_argument("parts differ in their display windows");
+        offsets.emplace_back(static_cast<std::size_t>(chunksOf(part.height)));
+    }
+    putNumber(*stream, Imf::MAGIC);
+    putNumber(*stream, Imf::EXR_VERSION | (longNames ? Imf::LONG_NAMES_FLAG : 0) |
+                           (multiPart ? Imf::MULTI_PART_FILE_FLAG : 0));
+    for (const auto& header : headers) header.writeTo(*stream);
+    if (multiPart) stream->write("", 1);  // an empty header ends them
+    tables = stream->tellp();
+    for (const auto& table : offsets) putOffsets(*stream, table);
+}
+
+void ExrWriter::Impl::writeChunk(int part, int chunk, const Bytes& bytes) {
+    offsets[part][chunk] = stream->tellp();
+    if (parts.size() > 1) putNumber(*stream, part);
+    putNumber(*stream, parts[part].originY + chunk * kZipRows);
+    putNumber(*stream, static_cast<std::int32_t>(bytes.size()));
+    stream->write(reinterpret_cast<const char*>(bytes.data()), static_cast<int>(bytes.size()));
+}
+
+/// `top` is the first row of a chunk.
+Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
+                                        const std::vector<ExrConstPixels>& pixels) {
+    const ExrPart& part = parts[index];
+    const auto width = static_cast<std::size_t>(part.width);
+    struct Channel {
+        const ExrConstPixels* pixels;
+        bool half;
+        std::size_t at = 0;                 ///< where it begins in a row of the file, 16-bit words
+        std::optional<std::size_t> same{};  ///< where the same values are in the row already
+    };
+    std::map<std::string_view, Channel> channels;  // in the order of the file
+    std::size_t rowBytes = 0;
+    for (const auto& p : pixels) {
+        const auto* channel = part.channel(p.channel);
+        if (!channel)
+            return failAt(where, ErrorCode::failed, "part {} has no channel '{}'", index,
+                          p.channel);
+        const bool half = channel->type == ExrChannel::Type::half;
+        if (channels.emplace(p.channel, Channel{&p, half}).second)
+            rowBytes += width * (half ? 2 : 4);
+    }
+    if (channels.size() != part.channels.size())
+        return failAt(where, ErrorCode::failed, "part {} has {} channels, and {} are given", index,
+                      part.channels.size(), channels.size());
+    if (rowBytes * kZipRows > INT32_MAX)
+        return failAt(where, ErrorCode::unsupported,
+                      "part {} has rows of {} bytes; a chunk of {} rows has less than 2 GiB", index,
+                      rowBytes, kZipRows);
+
+    std::size_t at = 0;
+    std::map<const float*, std::size_t> halves;  // by their first value
+    for (auto& [name, channel] : channels) {
+        channel.at = at;
+        at += width * (channel.half ? 1 : 2);
+        if (!channel.half) continue;
+        const auto [first, isNew] = halves.emplace(channel.pixels->values, channel.at);
+        if (!isNew) channel.same = first->second;
+    }
+
+    std::vector<Bytes> chunks(static_cast<std::size_t>(chunksOf(rows)));
+    parallelFor(0, static_cast<std::int64_t>(chunks.size()), [&](std::int64_t i) {
+        const int first = static_cast<int>(i) * kZipRows;
+        const int count = std::min(kZipRows, rows - first);
+        std::vector<std::uint16_t> raw(rowBytes * count / 2);
+        for (int y = 0; y < count; ++y) {
+            std::uint16_t* const row = raw.data() + y * rowBytes / 2;
+            for (const auto& [name, channel] : channels) {
+                const auto& p = *channel.pixels;
+                const float* from = p.values + (first + y) * width * p.stride;
+                std::uint16_t* const to = row + channel.at;
+                if (channel.same)
+                    std::copy_n(row + *channel.same, width, to);
+                else if (channel.half)
+                    exr::halvesFrom(from, p.stride, {to, width});
+                else
+                    for (std::size_t x = 0; x < width; ++x)
+                        std::memcpy(to + 2 * x, from + x * p.stride, sizeof(float));
+            }
+        }
+        chunks[i] = exr::zipChunk(
+            {reinterpret_cast<const std::uint8_t*>(raw.data()), 2 * raw.size()}, part.zipLevel);
+    });
+    for (std::size_t i = 0; i < chunks.size(); ++i)
+        writeChunk(index, top / kZipRows + static_cast<int>(i), chunks[i]);
+    return {};
+}
+
+ExrWriter::ExrWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ExrWriter::ExrWriter(ExrWriter&&) noexcept = default;
+ExrWriter& ExrWriter::operator=(ExrWriter&&) noexcept = default;
+ExrWriter::~ExrWriter() = default;
+
+Result<ExrWriter> ExrWriter::create(OutputFile& file, const std::vector<ExrPart>& parts) {
+    auto impl = std::make_unique<Impl>();
+    impl->where = "cannot write the OpenEXR file";
+    impl->parts = parts;
+    STX_CHECK(adapt(ErrorCode::io, impl->where, [&]() -> Result<void> {
+        impl->stream = std::make_unique<exr::OutputStream>(file.temporaryPath());
+        impl->writeHeaders();
+        return {};
+    }));
+    return ExrWriter(std::move(impl));
+}
+
+Result<void> ExrWriter::writePart(int index, const std::vector<ExrConstPixels>& pixels) {
+    const auto width = static_cast<std::size_t>(impl_->parts[index].width);
+    return writePart(index, [&](int y, int) {
+        auto rows = pixels;
+        for (auto& p : rows) p.values += static_cast<std::size_t>(y) * width * p.stride;
+        return rows;
+    });
+}
+
+Result<void> ExrWriter::writePart(int index, const Block& blockOf) {
+    return adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
+        // In blocks of whole chunks, so that what is not yet in the file needs little memory.
+        constexpr int kBlock = 16 * kZipRows;
+        const int height = impl_->parts[index].height;
+        for (int y = 0; y < height; y += kBlock) {
+            const int rows = std::min(kBlock, height - y);
+            STX_CHECK(impl_->writeRows(index, y, rows, blockOf(y, rows)));
+        }
+        return {};
+    });
+}
+
+Result<void> ExrWriter::finish() {
+    return adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
+        for (std::size_t i = 0; i < impl_->parts.size(); ++i) {
+            if (std::count(impl_->offsets[i].begin(), impl_->offsets[i].end(), 0u) > 0)
+                return failAt(impl_->where, ErrorCode::failed, "part {} was not written", i);
+        }
+        impl_->stream->seekp(impl_->tables);
+        for (const auto& table : impl_->offsets) putOffsets(*impl_->stream, table);
+        impl_->stream->finish();
+        return {};
+    });
+}
+
+}  // namespace stx

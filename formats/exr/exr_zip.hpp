@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "formats/files/files.hpp"
+
+namespace stx::exr {
+
+/// Scan lines of a chunk of zip compression (OpenEXR file layout, "Scan line blocks").
+constexpr int kZipRows = 16;
+
+/// Half floats of every `stride`-th of `from`, rounded to the nearest, ties to even; beyond their
+/// range infinity. The same as Imath's half, except for the bits of NaN.
+void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> to);
+
+/// The bytes of a chunk as zip compression stores them: even bytes first, then the odd ones, each
+/// as the difference from the one before, deflated at `level` (see compressZlib()). `raw` itself
+/// when that is no smaller, as OpenEXR wants it. Throws std::bad_alloc.
+[[nodiscard]] Bytes zipChunk(std::span<const std::uint8_t> raw, int level);
+
+}  // namespace stx::exr

@@ -1,0 +1,58 @@
+#include "formats/files/deflate.hpp"
+
+#include <libdeflate.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <new>
+#ifdef STX_WITH_ISAL
+#include <isa-l/igzip_lib.h>
+#endif
+
+namespace stx {
+namespace {
+
+struct FreeCompressor {
+    void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
+};
+using Compressor = std::unique_ptr<libdeflate_compressor, FreeCompressor>;
+
+#ifdef STX_WITH_ISAL
+std::size_t compressFast(std::span<const std::byte> from, std::span<std::byte> to) {
+    constexpr std::size_t kBuffer = ISAL_DEF_LVL1_DEFAULT;
+    const auto buffer = std::make_unique_for_overwrite<std::uint8_t[]>(kBuffer);
+    isal_zstream stream;
+    isal_deflate_stateless_init(&stream);
+    stream.level = 1;
+    stream.level_buf = buffer.get();
+    stream.level_buf_size = kBuffer;
+    stream.gzip_flag = IGZIP_ZLIB;
+    stream.end_of_stream = 1;
+    // It only reads what its pointer could write.
+    stream.next_in = reinterpret_cast<std::uint8_t*>(const_cast<std::byte*>(from.data()));
+    stream.avail_in = static_cast<std::uint32_t>(from.size());
+    stream.next_out = reinterpret_cast<std::uint8_t*>(to.data());
+    stream.avail_out = static_cast<std::uint32_t>(std::min<std::size_t>(to.size(), UINT32_MAX));
+    return isal_deflate_stateless(&stream) == COMP_OK ? stream.total_out : 0;
+}
+#endif
+
+}  // namespace
+
+std::size_t zlibBound(std::size_t size) {
+    return libdeflate_zlib_compress_bound(nullptr, size);
+}
+
+std::size_t compressZlib(std::span<const std::byte> from, int level, std::span<std::byte> to) {
+#ifdef STX_WITH_ISAL
+    // It counts in 32 bits, the bytes of the result too.
+    if (level == 1 && from.size() < (1u << 31)) return compressFast(from, to);
+#endif
+    const Compressor compressor(libdeflate_alloc_compressor(level));
+    if (!compressor) throw std::bad_alloc();
+    return libdeflate_zlib_compress(compressor.get(), from.data(), from.size(), to.data(),
+                                    to.size());
+}
+
+}  // namespace stx
