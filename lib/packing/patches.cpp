@@ -2,27 +2,44 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
+#include <utility>
 
 namespace stx {
 namespace {
 
-/// A cut must save this share of the patch's room, and this many pixels: more patches are more
-/// borders to filter across.
-constexpr double kLeastShare = 0.03;
-constexpr std::int64_t kLeastPixels = 192;
+/// A patch must save this many texels: more patches are more borders to filter across. Chosen by
+/// trial: pruned spheres-miv lies in 517 patches on 35 % of its views' pixels with 64, in 244 on
+/// 36 % with 400, in 103 on 39 % with 1600.
+constexpr std::int64_t kLeastPixels = 400;
+/// A box is cut along so many lines at most each way; the parts are cut again, along finer ones.
+/// More lines take longer and save nothing.
+constexpr int kMostCells = 12;
 
-/// From where to where a row or column has content; empty when first > last.
+/// Where content is: pixels from (x0, y0) up to before (x1, y1); empty when x0 >= x1.
 struct Extent {
-    int first = std::numeric_limits<int>::max();
-    int last = -1;
+    int x0 = 1 << 30, y0 = 1 << 30, x1 = 0, y1 = 0;
 
-    void join(Extent o) {
-        first = std::min(first, o.first);
-        last = std::max(last, o.last);
+    void join(const Extent& o) {
+        x0 = std::min(x0, o.x0);
+        y0 = std::min(y0, o.y0);
+        x1 = std::max(x1, o.x1);
+        y1 = std::max(y1, o.y1);
     }
-    [[nodiscard]] bool empty() const { return first > last; }
-    [[nodiscard]] int length() const { return empty() ? 0 : last - first + 1; }
+    [[nodiscard]] bool empty() const { return x0 >= x1; }
+};
+
+/// The runs of `count` cells: first the single ones, then pairs of neighbours, and so on.
+class Runs {
+  public:
+    explicit Runs(int count) : count_(count) {}
+    [[nodiscard]] int size() const { return count_ * (count_ + 1) / 2; }
+    /// The run of `length` cells from cell `first` on.
+    [[nodiscard]] int at(int first, int length) const {
+        return (length - 1) * count_ - (length - 1) * (length - 2) / 2 + first;
+    }
+
+  private:
+    int count_;
 };
 
 class Cutter {
@@ -30,94 +47,102 @@ class Cutter {
     Cutter(const Image<std::uint8_t>& content, int padding)
         : content_(content), padding_(padding) {}
 
-    void cut(Patch box, std::vector<Patch>& out) const {
-        if (!trim(box)) return;
-        std::vector<Extent> columns(box.width), rows(box.height);
-        extents(box, columns, rows);
-        std::int64_t best = room(box.width, box.height);
-        const std::int64_t whole = best;
-        const auto least = std::max(
-            kLeastPixels, static_cast<std::int64_t>(kLeastShare * static_cast<double>(whole)));
-        best -= least;
-        int atColumn = 0, atRow = 0;
-        const int column = bestCut(columns, best);
-        if (column > 0) atColumn = column;
-        const int row = bestCut(rows, best);
-        if (row > 0) {
-            atRow = row;
-            atColumn = 0;
+    /// Cuts a box along the lines of a grid so that its parts, trimmed, take the least room: the
+    /// best of all ways to cut it from side to side again and again, found from the smallest boxes
+    /// of cells up.
+    void cut(const Extent& box, std::vector<Patch>& out) const {
+        const int columns = std::min(box.x1 - box.x0, kMostCells);
+        const int rows = std::min(box.y1 - box.y0, kMostCells);
+        const std::vector<Extent> cells = cellsOf(box, columns, rows);
+        const Runs across(columns), down(rows);
+        const auto stride = static_cast<std::size_t>(down.size());
+        // Of each box of cells, by its columns and rows: room, and the cut that leads to it.
+        std::vector<std::int64_t> room(static_cast<std::size_t>(across.size()) * stride);
+        std::vector<Cut> cuts(room.size());
+        std::vector<Extent> row(static_cast<std::size_t>(rows)), extent;
+        for (int width = 1; width <= columns; ++width) {
+            for (int i = 0; i + width <= columns; ++i) {
+                std::int64_t* here = room.data() + across.at(i, width) * stride;
+                Cut* cut = cuts.data() + across.at(i, width) * stride;
+                for (int j = 0; j < rows; ++j) {
+                    row[j] = {};
+                    for (int k = i; k < i + width; ++k) row[j].join(cells[j * columns + k]);
+                }
+                extent = row;
+                for (int height = 1; height <= rows; ++height) {
+                    for (int j = 0; j + height <= rows; ++j) {
+                        if (height > 1) extent[j].join(row[j + height - 1]);
+                        here[down.at(j, height)] = roomOf(extent[j]);
+                    }
+                }
+                for (int k = 1; k < width; ++k) {
+                    const std::int64_t* left = room.data() + across.at(i, k) * stride;
+                    const std::int64_t* right = room.data() + across.at(i + k, width - k) * stride;
+                    for (std::size_t r = 0; r < stride; ++r)
+                        take(left[r] + right[r], {k, 0}, here[r], cut[r]);
+                }
+                for (int height = 2; height <= rows; ++height)
+                    for (int j = 0; j + height <= rows; ++j)
+                        for (int k = 1; k < height; ++k)
+                            take(here[down.at(j, k)] + here[down.at(j + k, height - k)], {0, k},
+                                 here[down.at(j, height)], cut[down.at(j, height)]);
+            }
         }
-        if (atColumn > 0) {
-            cut({box.x, box.y, atColumn, box.height}, out);
-            cut({box.x + atColumn, box.y, box.width - atColumn, box.height}, out);
-        } else if (atRow > 0) {
-            cut({box.x, box.y, box.width, atRow}, out);
-            cut({box.x, box.y + atRow, box.width, box.height - atRow}, out);
-        } else {
-            out.push_back(box);
-        }
+        const auto follow = [&](const auto& self, int i, int width, int j, int height) -> void {
+            const Cut at = cuts[across.at(i, width) * stride + down.at(j, height)];
+            if (at.column > 0) {
+                self(self, i, at.column, j, height);
+                self(self, i + at.column, width - at.column, j, height);
+            } else if (at.row > 0) {
+                self(self, i, width, j, at.row);
+                self(self, i, width, j + at.row, height - at.row);
+            } else {
+                Extent part;
+                for (int y = j; y < j + height; ++y)
+                    for (int x = i; x < i + width; ++x) part.join(cells[y * columns + x]);
+                if (part.empty()) return;
+                if (width < columns || height < rows)
+                    this->cut(part, out);
+                else
+                    out.push_back({part.x0, part.y0, part.x1 - part.x0, part.y1 - part.y0});
+            }
+        };
+        follow(follow, 0, columns, 0, rows);
     }
 
   private:
-    [[nodiscard]] std::int64_t room(int width, int height) const {
-        if (width == 0 || height == 0) return 0;
-        return (width + 2ll * padding_) * (height + 2ll * padding_);
-    }
+    /// Cells before a cut, across or down; 0, 0 = none.
+    struct Cut {
+        int column = 0, row = 0;
+    };
 
-    /// Content of each column (as rows) and each row (as columns), relative to the box.
-    void extents(const Patch& box, std::vector<Extent>& columns, std::vector<Extent>& rows) const {
-        for (int y = 0; y < box.height; ++y) {
-            const auto line = content_.row(box.y + y).subspan(box.x, box.width);
-            for (int x = 0; x < box.width; ++x) {
-                if (!line[x]) continue;
-                columns[x].join({y, y});
-                rows[y].join({x, x});
+    static void take(std::int64_t room, Cut cut, std::int64_t& best, Cut& bestCut) {
+        if (room >= best) return;
+        best = room;
+        bestCut = cut;
+    }
+    [[nodiscard]] std::int64_t roomOf(const Extent& e) const {
+        if (e.empty()) return 0;
+        return (e.x1 - e.x0 + 2ll * padding_) * (e.y1 - e.y0 + 2ll * padding_) + kLeastPixels;
+    }
+    /// The content of each cell, row by row.
+    [[nodiscard]] std::vector<Extent> cellsOf(const Extent& box, int columns, int rows) const {
+        std::vector<Extent> cells(static_cast<std::size_t>(columns) * rows);
+        const auto line = [](int from, int to, int part, int parts) {
+            return from + static_cast<int>(static_cast<std::int64_t>(to - from) * part / parts);
+        };
+        for (int j = 0; j < rows; ++j) {
+            for (int y = line(box.y0, box.y1, j, rows); y < line(box.y0, box.y1, j + 1, rows);
+                 ++y) {
+                const auto pixels = content_.row(y);
+                for (int i = 0; i < columns; ++i) {
+                    const int end = line(box.x0, box.x1, i + 1, columns);
+                    for (int x = line(box.x0, box.x1, i, columns); x < end; ++x)
+                        if (pixels[x]) cells[j * columns + i].join({x, y, x + 1, y + 1});
+                }
             }
         }
-    }
-
-    /// Shrinks a box to its content; false when it has none.
-    [[nodiscard]] bool trim(Patch& box) const {
-        Extent across, down;
-        for (int y = 0; y < box.height; ++y) {
-            const auto line = content_.row(box.y + y).subspan(box.x, box.width);
-            int first = 0, last = box.width - 1;
-            while (first <= last && !line[first]) ++first;
-            if (first > last) continue;
-            while (!line[last]) --last;
-            across.join({first, last});
-            down.join({y, y});
-        }
-        if (across.empty()) return false;
-        box = {box.x + across.first, box.y + down.first, across.length(), down.length()};
-        return true;
-    }
-
-    /// The cut before line i that leaves the least room for both trimmed parts, when that is below
-    /// `best` (then lowered to it); else 0.
-    int bestCut(const std::vector<Extent>& lines, std::int64_t& best) const {
-        const int count = static_cast<int>(lines.size());
-        // Of lines [i, count): their extent and the first of them that has content.
-        std::vector<Extent> after(count + 1);
-        std::vector<int> firstAfter(count + 1, count);
-        for (int i = count - 1; i >= 0; --i) {
-            after[i] = after[i + 1];
-            after[i].join(lines[i]);
-            firstAfter[i] = lines[i].empty() ? firstAfter[i + 1] : i;
-        }
-        Extent before;
-        int lastBefore = -1, at = 0;
-        for (int i = 1; i < count; ++i) {
-            before.join(lines[i - 1]);
-            if (!lines[i - 1].empty()) lastBefore = i - 1;
-            const std::int64_t both = room(lastBefore + 1, before.length()) +
-                                      room(count - firstAfter[i], after[i].length());
-            if (both < best) {
-                best = both;
-                at = i;
-            }
-        }
-        return at;
+        return cells;
     }
 
     const Image<std::uint8_t>& content_;

@@ -15,9 +15,9 @@ struct Patch {
 };
 
 /// The rectangles that hold all content (points, and pixels with partial coverage) of a view: its
-/// bounding box, cut in two again and again as long as trimming both parts saves more room than
-/// their padding costs. They do not overlap; none for an empty view. Pixels of full alpha without a
-/// depth are not content: nothing is known of them but that the object is there.
+/// bounding box, cut from side to side again and again in the way that takes the least room on an
+/// atlas, padding included. They do not overlap; none for an empty view. Pixels of full alpha
+/// without a depth are not content: nothing is known of them but that the object is there.
 [[nodiscard]] std::vector<Patch> contentPatches(const ReferenceView& view, int padding);
 
 }  // namespace stx

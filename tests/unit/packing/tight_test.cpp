@@ -169,6 +169,19 @@ TEST(Patches, TrimAndCutWhatSavesRoom) {
     EXPECT_EQ(contentPatches(speck, 2).size(), 1u);
 }
 
+TEST(Patches, WhatIsPrunedInTheMiddleIsCutOut) {
+    // No single cut saves room: the middle goes only when the frame around it falls in four.
+    ReferenceView frame = blankView(200, 200);
+    paint(frame, 0, 0, 200, 200);
+    for (int y = 20; y < 180; ++y)
+        for (int x = 30; x < 170; ++x) frame.depth.at(x, y) = kNoDepth;
+    const auto patches = contentPatches(frame, 2);
+    EXPECT_EQ(patches.size(), 4u);
+    int pixels = 0;
+    for (const Patch& p : patches) pixels += p.width * p.height;
+    EXPECT_LE(pixels, (200 * 200 - 160 * 140) * 11 / 10);
+}
+
 TEST(Patches, PixelsOfFullAlphaWithoutADepthAreNoContent) {
     ReferenceView v = blankView(100, 100);
     paint(v, 10, 10, 5, 5);
