@@ -48,17 +48,24 @@ std::string FrameWriter::nameOf(int frame) const {
 }
 
 Result<void> FrameWriter::write(int index, Frame frame, const Camera& camera) {
-    // Only OpenEXR has room for more than colours.
-    const auto format = frameFormat(settings_.pattern);
-    if (settings_.pattern == "-" || !format || *format != FrameFormat::exr) {
+    Item item{index, {}, {}, camera};
+    STX_TRY(const auto format, frameFormat(settings_.pattern));
+    // Only OpenEXR has room for more than 8 bits and colours; what waits is kept small.
+    if (settings_.pattern != "-" && format == FrameFormat::exr) {
+        item.frame = std::move(frame);
+    } else {
         frame.albedo = {};
         frame.depth = {};
         frame.normal = {};
+        item.picture = settings_.pattern == "-"
+                           ? rgba8From(frame, settings_.background.value_or(glm::vec3(0.0f)))
+                           : pictureOf(frame, format, settings_.background);
+        frame.colour = {};
     }
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return queue_.size() < kQueue || error_; });
     if (error_) return tl::unexpected(*error_);
-    queue_.push_back({index, std::move(frame), camera});
+    queue_.push_back(std::move(item));
     changed_.notify_all();
     return {};
 }
@@ -102,18 +109,18 @@ Result<void> FrameWriter::writeOne(const Item& item) {
         file.noClobber = settings_.noClobber;
         file.pngLevel = settings_.compression;
         file.camera = item.camera;
-        return writeFrame(item.frame, nameOf(item.index), file);
+        return item.picture.empty() ? writeFrame(item.frame, nameOf(item.index), file)
+                                    : writePicture(item.picture, nameOf(item.index), file);
     }
     if (!stream_) {
         STX_TRY(streamFile_, OutputFile::create("-"));
         Y4mOptions video;
         video.rateNumerator = settings_.rate.first;
         video.rateDenominator = settings_.rate.second;
-        video.background = settings_.background.value_or(glm::vec3(0.0f));
-        STX_TRY(stream_, Y4mWriter::create(*streamFile_, item.frame.colour.width(),
-                                           item.frame.colour.height(), video));
+        STX_TRY(stream_, Y4mWriter::create(*streamFile_, item.picture.width(),
+                                           item.picture.height(), video));
     }
-    return stream_->write(item.frame);
+    return stream_->write(item.picture);
 }
 
 }  // namespace stx::tools

@@ -12,6 +12,7 @@
 #include "formats/images/y4m.hpp"
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
+#include "lib/model/texture.hpp"
 #include "lib/render/frame.hpp"
 
 namespace stx::tools {
@@ -46,7 +47,8 @@ class FrameWriter {
   private:
     struct Item {
         int index = 0;
-        Frame frame;
+        Frame frame;         ///< for OpenEXR
+        Rgba8Image picture;  ///< for the others
         Camera camera;
     };
     void work();

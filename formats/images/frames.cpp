@@ -55,10 +55,9 @@ std::vector<std::uint8_t> withoutAlpha(const Rgba8Image& rgba) {
 }
 
 /// By the module of image codecs, into the file's temporary name.
-Result<void> writeByModule(const Frame& frame, FrameFormat format, const OutputFile& file,
+Result<void> writeByModule(const Rgba8Image& rgba, FrameFormat format, const OutputFile& file,
                            const FrameOptions& options) {
     STX_TRY(const auto* codecs, loadCodecs());
-    const auto rgba = rgba8From(frame, options.background);
     std::vector<std::uint8_t> rgb;
     codecs::EncodeRequest request;
     const std::string path = file.temporaryPath().string();
@@ -84,11 +83,6 @@ Result<void> writeByModule(const Frame& frame, FrameFormat format, const OutputF
     codecs::Failure failure;
     if (!codecs->encode(request, failure))
         return fail(static_cast<ErrorCode>(failure.code), "{}", failure.message);
-    return {};
-}
-
-Result<void> checkFrame(const Frame& frame) {
-    if (frame.colour.empty()) return fail(ErrorCode::failed, "the frame has no pixels");
     return {};
 }
 
@@ -160,15 +154,18 @@ Result<FrameFormat> frameFormat(const std::filesystem::path& path) {
                 path.string());
 }
 
-Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format, const FrameOptions& options) {
-    STX_CHECK(checkFrame(frame));
+Rgba8Image pictureOf(const Frame& frame, FrameFormat format,
+                     const std::optional<glm::vec3>& background) {
+    return rgba8From(frame,
+                     format == FrameFormat::jpeg && !background ? glm::vec3(0.0f) : background);
+}
+
+Result<Bytes> encodePicture(const Rgba8Image& rgba, FrameFormat format,
+                            const FrameOptions& options) {
     if (format != FrameFormat::png && format != FrameFormat::jpeg)
         return fail(ErrorCode::failed,
                     "an OpenEXR, TIFF or WebP picture is written to a file, not to memory");
-    auto background = options.background;
-    if (format == FrameFormat::jpeg && !background) background = glm::vec3(0.0f);
-    const auto rgba = rgba8From(frame, background);
-    if (!background)
+    if (format == FrameFormat::png && !options.background)
         return encodePng(rgba.width(), rgba.height(), 4, 8, rgba.data(), true, options.pngLevel);
     const auto rgb = withoutAlpha(rgba);
     if (format == FrameFormat::jpeg)
@@ -176,21 +173,29 @@ Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format, const FrameOpt
     return encodePng(rgba.width(), rgba.height(), 3, 8, rgb.data(), true, options.pngLevel);
 }
 
-Result<void> writeFrame(const Frame& frame, const std::filesystem::path& path,
-                        const FrameOptions& options) {
-    STX_CHECK(checkFrame(frame));
+Result<void> writePicture(const Rgba8Image& picture, const std::filesystem::path& path,
+                          const FrameOptions& options) {
     STX_TRY(const FrameFormat format, frameFormat(path));
     STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
-    if (format == FrameFormat::exr) {
-        if (auto ok = writeExrFrame(frame, file, options); !ok)
-            return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
-    } else if (format == FrameFormat::tiff || format == FrameFormat::webp) {
-        if (auto ok = writeByModule(frame, format, file, options); !ok)
+    if (format == FrameFormat::tiff || format == FrameFormat::webp) {
+        if (auto ok = writeByModule(picture, format, file, options); !ok)
             return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
     } else {
-        STX_TRY(const auto bytes, encodeFrame(frame, format, options));
+        STX_TRY(const auto bytes, encodePicture(picture, format, options));
         STX_CHECK(file.write(bytes));
     }
+    return file.commit();
+}
+
+Result<void> writeFrame(const Frame& frame, const std::filesystem::path& path,
+                        const FrameOptions& options) {
+    if (frame.colour.empty()) return fail(ErrorCode::failed, "the frame has no pixels");
+    STX_TRY(const FrameFormat format, frameFormat(path));
+    if (format != FrameFormat::exr)
+        return writePicture(pictureOf(frame, format, options.background), path, options);
+    STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
+    if (auto ok = writeExrFrame(frame, file, options); !ok)
+        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
     return file.commit();
 }
 

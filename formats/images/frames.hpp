@@ -42,8 +42,16 @@ struct FrameOptions {
 /// codecs: error (unsupported) without it. Safe to call from several threads.
 [[nodiscard]] Result<void> writeFrame(const Frame& frame, const std::filesystem::path& path,
                                       const FrameOptions& options = {});
-/// PNG or JPEG as bytes. Error (failed) for the others, which are written to files only.
-[[nodiscard]] Result<Bytes> encodeFrame(const Frame& frame, FrameFormat format,
+/// The 8-bit picture that a frame becomes in a file that is not EXR: with the background behind it,
+/// for JPEG a black one at least.
+[[nodiscard]] Rgba8Image pictureOf(const Frame& frame, FrameFormat format,
+                                   const std::optional<glm::vec3>& background);
+/// Writes what pictureOf() gave as writeFrame() would the frame. Error (failed) for EXR.
+[[nodiscard]] Result<void> writePicture(const Rgba8Image& picture,
+                                        const std::filesystem::path& path,
                                         const FrameOptions& options = {});
+/// PNG or JPEG as bytes. Error (failed) for the others, which are written to files only.
+[[nodiscard]] Result<Bytes> encodePicture(const Rgba8Image& picture, FrameFormat format,
+                                          const FrameOptions& options = {});
 
 }  // namespace stx

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "formats/images/frames.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -97,10 +96,6 @@ Result<void> Y4mWriter::write(const Image<glm::u8vec4>& opaque) {
                     opaque.width(), opaque.height(), width_, height_);
     STX_CHECK(file_->write("FRAME\n"));
     return file_->write(y4mPlanes(opaque, options_));
-}
-
-Result<void> Y4mWriter::write(const Frame& frame) {
-    return write(rgba8From(frame, options_.background));
 }
 
 }  // namespace stx

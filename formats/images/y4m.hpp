@@ -7,7 +7,6 @@
 
 #include "formats/files/files.hpp"
 #include "lib/base/image.hpp"
-#include "lib/render/frame.hpp"
 
 namespace stx {
 
@@ -22,7 +21,6 @@ struct Y4mOptions {
     bool fullRange = false;  ///< 0..255 instead of 16..235; tagged by XCOLORRANGE
     int rateNumerator = 30;  ///< frames per second, > 0
     int rateDenominator = 1;
-    glm::vec3 background{0.0f};  ///< sRGB-coded 0..1; video has no alpha
 };
 
 /// A stream of uncompressed video frames (YUV4MPEG2), for pipes into encoders: planar 8-bit Y'CbCr,
@@ -33,9 +31,9 @@ class Y4mWriter {
     /// size that is not positive.
     [[nodiscard]] static Result<Y4mWriter> create(OutputFile& file, int width, int height,
                                                   const Y4mOptions& options = {});
-    /// Errors: another size than the first frame's, and those of OutputFile::write().
+    /// Video has no alpha: what is not opaque must have a background already. Errors: another size
+    /// than the first frame's, and those of OutputFile::write().
     [[nodiscard]] Result<void> write(const Image<glm::u8vec4>& opaque);
-    [[nodiscard]] Result<void> write(const Frame& frame);
 
   private:
     Y4mWriter(OutputFile& file, int width, int height, const Y4mOptions& options)

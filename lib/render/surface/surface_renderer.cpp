@@ -214,7 +214,8 @@ void SurfaceRenderer::beginExpected(const std::optional<Camera>& next) {
 Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optional<Camera>& next,
                                         Frame& frame) {
     frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
-    Image<float> q(camera.width, camera.height, 0.0f);
+    frame.depth = Image<float>(camera.width, camera.height, 0.0f);
+    Image<float>& q = frame.depth;  // until the end
     STX_TRY(const std::unique_ptr<SurfaceFrame> work, beginFrame(camera));
     const PixelSpace& space = work->space;
     beginExpected(next);
@@ -243,10 +244,8 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
             all.push_back({f.source, f.sourceFromPixel, nullptr});
         fillUnseen({frame.colour, q, space}, all);
     }
-    frame.depth = Image<float>(camera.width, camera.height, kNoDepth);
-    for (std::size_t i = 0; i < q.count(); ++i)
-        if (q.data()[i] > 0.0f)
-            frame.depth.data()[i] = static_cast<float>(space.axis.dist(q.data()[i]));
+    for (float& value : frame.depth.pixels())
+        value = value > 0.0f ? static_cast<float>(space.axis.dist(value)) : kNoDepth;
     return {};
 }
 
