@@ -408,7 +408,7 @@ Warp warpFrom(const glm::dmat4& m) {
     return w;
 }
 
-Place Source::placeInRectangles(int x, int y) const {
+Place Source::placeAmongRectangles(int x, int y) const {
     const int x0 = std::max(x, 0), y0 = std::max(y, 0);
     const int x1 = std::min(x + 1, width - 1), y1 = std::min(y + 1, height - 1);
     // Better one that shows a pixel more around, so that gradients can be read where there are
@@ -424,9 +424,7 @@ Place Source::placeInRectangles(int x, int y) const {
         }
         if (!found && set->reads(r, x0, y0, x1, y1)) found = &r;
     }
-    if (found)
-        return {pages + found->page, found->first + x * found->stepX + y * found->stepY,
-                found->stepX, found->stepY, 0};
+    if (found) return placeIn(*found, x, y);
     Place none;
     for (int j = y0; j <= y1; ++j)
         for (int i = x0; i <= x1; ++i)
@@ -451,6 +449,35 @@ TapPlace Source::tapsInRectangles(int x, int y) const {
             std::min(r->x1 + kAround, width),
             std::min(r->y1 + kAround, height)};
 }
+
+namespace {
+
+/// See Source::placeOfBlock.
+std::vector<std::int32_t> placesOfBlocks(const Source& s) {
+    std::vector<std::int32_t> places;
+    for (int y = 0; y < s.height; y += kBlock) {
+        for (int x = 0; x < s.width; x += kBlock) {
+            const int x1 = std::min(x + kBlock + 1, s.width - 1);
+            const int y1 = std::min(y + kBlock + 1, s.height - 1);
+            const auto near = s.set->near(s.number, x, y);
+            std::int32_t place = Source::kSeveralPlaces;
+            if (near.empty()) {
+                int pruned = 0;
+                for (int j = y; j <= y1; ++j)
+                    for (int i = x; i <= x1; ++i) pruned += s.set->objectOutside(s.number, i, j);
+                if (pruned == 0) place = Source::kNothingThere;
+                if (pruned == (x1 - x + 1) * (y1 - y + 1)) place = Source::kAllPruned;
+            } else if (s.set->reads(s.set->rectangles()[near[0]], std::max(x - 1, 0),
+                                    std::max(y - 1, 0), x1, y1)) {
+                place = static_cast<std::int32_t>(near[0]);
+            }
+            places.push_back(place);
+        }
+    }
+    return places;
+}
+
+}  // namespace
 
 SurfaceScene::SurfaceScene(const PageSet& pageSet) : set(pageSet) {
     bool whole = true;
@@ -480,7 +507,10 @@ SurfaceScene::SurfaceScene(const PageSet& pageSet) : set(pageSet) {
         pages[i].info = Image<std::uint8_t>(page.width(), page.height(), 0);
     }
     // One after the other: a draft takes the memory of a whole view.
-    for (Source& s : sources) prepareSource(s, pages);
+    for (Source& s : sources) {
+        prepareSource(s, pages);
+        if (!s.whole) s.placeOfBlock = placesOfBlocks(s);
+    }
 }
 
 BlockTexels blockTexels(const Source& s, int x0, int y0, BlockBuffer& buffer) {

@@ -131,6 +131,10 @@ struct Source {
 
     const PageSet* set = nullptr;
     const PreparedPage* pages = nullptr;  ///< by number
+    /// Of a view in rectangles, by block: the one rectangle that all of its pixels and those around
+    /// them are read from, or one of these.
+    enum : std::int32_t { kSeveralPlaces = -1, kAllPruned = -2, kNothingThere = -3 };
+    std::vector<std::int32_t> placeOfBlock;
 
     /// Where the pixels (x, y) to (x + 1, y + 1) and, when they have points, their neighbours are.
     /// Pixels outside of the source must not be read.
@@ -176,7 +180,18 @@ struct Source {
     }
 
   private:
-    [[nodiscard]] Place placeInRectangles(int x, int y) const;
+    [[nodiscard]] Place placeIn(const PageRectangle& r, int x, int y) const {
+        return {pages + r.page, r.first + x * r.stepX + y * r.stepY, r.stepX, r.stepY, 0};
+    }
+    [[nodiscard]] Place placeInRectangles(int x, int y) const {
+        const std::int32_t one = placeOfBlock[static_cast<std::size_t>(std::max(y, 0) / kBlock) *
+                                                  static_cast<unsigned>(blocksX) +
+                                              static_cast<unsigned>(std::max(x, 0) / kBlock)];
+        if (one >= 0) return placeIn(set->rectangles()[static_cast<std::size_t>(one)], x, y);
+        if (one == kSeveralPlaces) return placeAmongRectangles(x, y);
+        return {nullptr, 0, 1, 0, one == kAllPruned ? 0b1111u : 0u};
+    }
+    [[nodiscard]] Place placeAmongRectangles(int x, int y) const;
     [[nodiscard]] TapPlace tapsInRectangles(int x, int y) const;
 };
 
