@@ -23,6 +23,8 @@ EXPECTED = ["bin/stx", "include/stx/stx.hpp", "share/man/man1/stx.1", "share/bas
             "share/zsh/vendor-completions/_stx", "share/fish/vendor_completions.d/stx.fish",
             "share/stx/schemas/info.schema.json", "share/stx/schemas/atlas.schema.json",
             "share/doc/stx/README.md", "share/doc/stx/LICENSE"]
+# One for each room of the library that stx.hpp takes types from.
+MOST_HEADERS = 10
 ALLOWED_INCLUDE = re.compile(r"<([a-z_]+|glm/[\w/.]+|fmt/\w+\.h|tl/expected\.hpp)>$")
 
 
@@ -50,6 +52,8 @@ def check_files(prefix, forbidden):
 def check_headers(include, compiler):
     headers = sorted(glob.glob(os.path.join(include, "**", "*"), recursive=True))
     headers = [h for h in headers if os.path.isfile(h)]
+    if len(headers) > MOST_HEADERS:
+        sys.exit(f"{len(headers)} headers are installed, more than {MOST_HEADERS}: {headers}")
     for header in headers:
         with open(header, encoding="utf-8") as file:
             for line in re.findall(r"#\s*include (.+)", file.read()):
