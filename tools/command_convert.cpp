@@ -9,6 +9,7 @@
 #include "formats/open.hpp"
 #include "formats/save.hpp"
 #include "formats/sequences.hpp"
+#include "formats/stx/mesh_views.hpp"
 #include "lib/capture/capture.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
@@ -94,15 +95,8 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
     }
     auto& bundle = std::get<Bundle>(opened);
     if (const auto bits = o.mesh->depthBits) {
-        bool changed = false;
-        for (auto& view : bundle.views) {
-            if (view.depthBits == *bits) continue;
-            view.depthBits = *bits;
-            fitDepthRange(view);
-            changed = true;
-        }
         // Readers of image sets have said it for what they made.
-        if (changed) noteDepthLoss(bundle, program.job);
+        if (setDepthBits(bundle, *bits)) noteDepthLoss(bundle, program.job);
     }
     return std::move(bundle);
 }

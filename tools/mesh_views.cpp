@@ -1,131 +1,71 @@
 #include "tools/mesh_views.hpp"
 
-#include <charconv>
 #include <filesystem>
-#include <numbers>
 
 #include "formats/imagesets/camera_file.hpp"
-#include "lib/quality/capture_quality.hpp"
-#include "lib/selection/selection.hpp"
+#include "formats/stx/mesh_views.hpp"
 #include "tools/camera_options.hpp"
 
 namespace stx::tools {
 namespace {
 
-constexpr int kMostAutoViews = 64;  // that auto:DBdB may come to
-
-/// `auto:N`, or `auto:DBdB` with a quality in decibels.
-struct AutoViews {
-    int count = 0;
-    double decibels = 0;
-};
-
-Result<std::optional<AutoViews>> parseAuto(const std::string& text) {
-    if (text.rfind("auto", 0) != 0) return std::optional<AutoViews>();
-    const auto complain = [&] {
-        return fail(ErrorCode::usage,
-                    "--views is '{}'; auto:N for the N best views (1 to 4096) or auto:DBdB for the "
-                    "fewest that "
-                    "reach a quality, as in auto:38dB, is expected",
-                    text);
-    };
-    if (text.size() < 6 || text[4] != ':') return complain();
-    std::string_view number = std::string_view(text).substr(5);
-    AutoViews result;
-    if (number.size() > 2 && (number.ends_with("dB") || number.ends_with("db"))) {
-        number.remove_suffix(2);
-        const auto parsed =
-            std::from_chars(number.data(), number.data() + number.size(), result.decibels);
-        if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size() ||
-            !(result.decibels > 0 && result.decibels < 100))
-            return complain();
-        return std::optional<AutoViews>(result);
+/// What the options ask for; cameras of a file, which are in the world, as they are in it.
+Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
+    ConvertSettings s;
+    s.views = o.views;
+    std::optional<glm::ivec2> size;
+    if (!o.size.empty()) {
+        STX_TRY(size, parseSize(o.size, program.job.limits));
+        s.width = size->x;
+        s.height = size->y;
     }
-    const auto parsed = std::from_chars(number.data(), number.data() + number.size(), result.count);
-    if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size() ||
-        result.count < 1 || result.count > 4096)
-        return complain();
-    return std::optional<AutoViews>(result);
-}
-
-Result<ViewFraming> framingOf(const MeshViewOptions& o, bool cube, Program& program) {
-    ViewFraming framing;
-    STX_TRY(const auto size, parseSize(o.size.empty() ? "512x512" : o.size, program.job.limits));
-    framing.width = size.x;
-    framing.height = size.y;
-    // The six faces of a cube are orthographic in the standard's own example.
-    framing.orthographic = o.projection == "orthographic" || (o.projection.empty() && cube);
+    if (!o.projection.empty()) s.orthographic = o.projection == "orthographic";
     if (!(o.fovDeg > 0 && o.fovDeg < 170))
         return fail(ErrorCode::usage, "--fov is {:g}; it must be above 0 and below 170 degrees",
                     o.fovDeg);
-    framing.fovRad = o.fovDeg * std::numbers::pi / 180.0;
-    STX_TRY(framing.up, parseDirection(o.up, "--up"));
-    return framing;
+    s.fovRad = glm::radians(o.fovDeg);
+    s.elevationRad = glm::radians(o.elevationDeg.value_or(15.0));
+    STX_TRY(s.up, parseDirection(o.up, "--up"));
+    s.supersampling = o.supersampling;
+    s.depthBits = o.depthBits;
+    s.meshNormals = o.normals == "mesh";
+    return s;
 }
 
-Result<std::vector<Camera>> autoCameras(const Mesh& mesh, const AutoViews& wanted,
-                                        const MeshViewOptions& o, const CaptureSettings& capture,
-                                        Program& program, Selection* selection) {
-    MeshCandidates candidates;
-    STX_TRY(candidates.framing, framingOf(o, false, program));
-    SelectSettings select;
-    select.count = wanted.count > 0 ? wanted.count : kMostAutoViews;
-    candidates.directions = std::max(candidates.directions, std::min(4096, 2 * select.count));
-    STX_TRY(auto chosen, selectMeshViews(mesh, candidates, select, program.job));
-    auto cameras = std::move(chosen.cameras);
-    if (wanted.count == 0) {
-        const auto most = cameras.size();
-        STX_TRY(const auto fewest,
-                fewestCameras(mesh, cameras, capture, wanted.decibels, program.job));
-        cameras.resize(fewest.count);
-        const std::string reached = fmt::format(
-            "{} {:.1f} dB",
-            fewest.count == 1 ? "1 view reaches" : fmt::format("{} views reach", fewest.count),
-            fewest.psnr);
-        if (fewest.psnr < wanted.decibels)
-            program.job.note(
-                fmt::format("{:g} dB is not reached by {}, the most that are tried; {}",
-                            wanted.decibels, counted(most, "view"), reached));
-        else
-            program.say(reached + " in pictures from six sides");
+/// The cameras of a file, where --views names one.
+Result<std::vector<Camera>> camerasOfFile(const MeshViewOptions& o, const Mesh& mesh,
+                                          Program& program) {
+    std::vector<Camera> cameras;
+    std::error_code ec;
+    if (o.views.starts_with("auto") || parseViewLayout(o.views) ||
+        !std::filesystem::exists(o.views, ec))
+        return cameras;
+    std::optional<glm::ivec2> size;
+    if (!o.size.empty()) {
+        STX_TRY(size, parseSize(o.size, program.job.limits));
     }
-    const auto& s = chosen.selection;
-    const auto n = cameras.size();
+    STX_TRY(const auto named, readCameraFile(o.views, program.job, size));
+    for (const auto& n : named) {
+        cameras.push_back(inPicture(n.camera, size));
+        cameras.back().position -= mesh.origin;
+    }
+    return cameras;
+}
+
+/// How good the choice of `auto` views is.
+void sayChoice(const MeshViews& views, Program& program) {
+    const auto n = views.cameras.size();
+    if (views.wanted.count == 0 && views.psnr >= views.wanted.decibels)
+        program.say(fmt::format("{} {:.1f} dB in pictures from six sides",
+                                n == 1 ? "1 view reaches" : fmt::format("{} views reach", n),
+                                views.psnr));
+    const Selection& s = *views.selection;
     const double quality = n > 0 && n <= s.quality.size() ? s.quality[n - 1] : 0.0;
     program.say(fmt::format(
         "{} of {} candidate views: {:.1f} % of the quality of all, at least {:.1f} % of the best "
         "possible choice; {:.1f} % of the surface is seen, {:.1f} % can never be",
-        n, candidates.directions, quality * 100, s.certificate * 100, s.coverage * 100,
+        n, views.candidates, quality * 100, s.certificate * 100, s.coverage * 100,
         s.neverSeen * 100));
-    if (!o.plot.empty()) {
-        const std::string svg = selectionPlotSvg(s, "quality against the number of views");
-        STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
-    }
-    if (selection) *selection = s;
-    return cameras;
-}
-
-Result<std::vector<Camera>> layoutOrFile(const Mesh& mesh, const MeshViewOptions& o,
-                                         Program& program) {
-    std::error_code ec;
-    auto layout = parseViewLayout(o.views);
-    if (!layout) {
-        if (!std::filesystem::exists(o.views, ec)) return propagate(layout);
-        std::optional<glm::ivec2> size;
-        if (!o.size.empty()) {
-            STX_TRY(size, parseSize(o.size, program.job.limits));
-        }
-        STX_TRY(const auto named, readCameraFile(o.views, program.job, size));
-        std::vector<Camera> cameras;
-        for (const auto& n : named) {
-            cameras.push_back(inPicture(n.camera, size));
-            cameras.back().position -= mesh.origin;
-        }
-        return cameras;
-    }
-    STX_TRY(const auto framing, framingOf(o, layout->kind == ViewLayout::Kind::cube, program));
-    layout->elevationRad = o.elevationDeg.value_or(15.0) * std::numbers::pi / 180.0;
-    return layoutCameras(*layout, framing, drawnPoints(mesh));
 }
 
 }  // namespace
@@ -185,8 +125,8 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
 
 Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& command,
                                   Program& program) {
-    STX_TRY(const auto automatic, parseAuto(o.views));
-    STX_CHECK(framingOf(o, false, program));
+    STX_TRY(const auto automatic, parseAutoViews(o.views));
+    STX_CHECK(settingsOf(o, program));
     if (!automatic) STX_CHECK(command.refuse({"--plot"}, "is of --views auto:N"));
     const auto layout = parseViewLayout(o.views);
     if (automatic || (layout && layout->kind != ViewLayout::Kind::ring))
@@ -205,32 +145,21 @@ Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& comma
 Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& program,
                            Selection* selection) {
     STX_CHECK(mesh.check());
-    CaptureSettings capture;
-    capture.supersampling = o.supersampling;
-    capture.depthBits = o.depthBits.value_or(16);
-    capture.meshNormals = o.normals == "mesh";
-    STX_TRY(const auto automatic, parseAuto(o.views));
-    std::vector<Camera> cameras;
-    if (automatic) {
-        STX_TRY(cameras, autoCameras(mesh, *automatic, o, capture, program, selection));
-    } else {
-        STX_TRY(cameras, layoutOrFile(mesh, o, program));
+    STX_TRY(auto settings, settingsOf(o, program));
+    STX_TRY(settings.cameras, camerasOfFile(o, mesh, program));
+    STX_TRY(auto views, chooseViews(mesh, settings, program.job));
+    if (views.selection) {
+        sayChoice(views, program);
+        if (!o.plot.empty()) {
+            const std::string svg =
+                selectionPlotSvg(*views.selection, "quality against the number of views");
+            STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
+        }
+        if (selection) *selection = std::move(*views.selection);
     }
-    STX_TRY(auto bundle, captureBundle(mesh, cameras, capture, program.job));
+    STX_TRY(auto bundle, captureViews(mesh, views.cameras, settings, program.job));
     noteDepthLoss(bundle, program.job);
     return bundle;
-}
-
-void noteDepthLoss(const Bundle& bundle, Job& job) {
-    double worst = 0;
-    for (const auto& view : bundle.views) {
-        if (view.depthBits == 8) worst = std::max(worst, view.depthCode().step() * 0.5);
-    }
-    if (worst > 0)
-        job.note(
-            fmt::format("depth in 8 bits is off by up to {:.3g} scene units; --depth-bits 16 is "
-                        "257 times finer",
-                        worst));
 }
 
 }  // namespace stx::tools

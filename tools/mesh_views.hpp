@@ -3,7 +3,6 @@
 #include <optional>
 #include <string>
 
-#include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/selection/selection.hpp"
 #include "tools/command_line.hpp"
@@ -37,8 +36,5 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
 /// `selection` gets how good the choice is.
 [[nodiscard]] Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& options,
                                          Program& program, Selection* selection = nullptr);
-
-/// Says what 8-bit depth costs, in scene units.
-void noteDepthLoss(const Bundle& bundle, Job& job);
 
 }  // namespace stx::tools

@@ -1,92 +1,11 @@
-#include <algorithm>
-#include <charconv>
-
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
-#include "formats/stx/stx.hpp"
-#include "lib/capture/capture.hpp"
-#include "lib/capture/rasterizer.hpp"
-#include "lib/selection/selection.hpp"
+#include "formats/stx/mesh_views.hpp"
 
 namespace stx {
 namespace {
-
-/// N of `auto:N`; nothing for other views. Errors (usage) when N is not a number from 1 to 4096.
-Result<std::optional<int>> countOfBest(std::string_view views) {
-    constexpr std::string_view kPrefix = "auto:";
-    if (!views.starts_with(kPrefix)) return std::optional<int>();
-    const auto number = views.substr(kPrefix.size());
-    int count = 0;
-    const auto parsed = std::from_chars(number.data(), number.data() + number.size(), count);
-    if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size() || count < 1 ||
-        count > 4096)
-        return fail(ErrorCode::usage, "views are '{}'; auto:N with N from 1 to 4096 is expected",
-                    views);
-    return std::optional<int>(count);
-}
-
-Result<ViewFraming> framingOf(const ConvertSettings& s, bool cube, const Limits& limits) {
-    if (s.width < 1 || s.height < 1 || s.width > limits.maxImageSide ||
-        s.height > limits.maxImageSide)
-        return fail(ErrorCode::usage, "views of {}x{} are asked for; 1 to {} pixels are possible",
-                    s.width, s.height, limits.maxImageSide);
-    if (!(s.fovRad > 0 && s.fovRad < glm::radians(170.0)))
-        return fail(ErrorCode::usage,
-                    "fovRad is {:g}; it must be above 0 and below 170 degrees in radians",
-                    s.fovRad);
-    ViewFraming framing;
-    framing.width = s.width;
-    framing.height = s.height;
-    framing.orthographic = s.orthographic.value_or(cube);
-    framing.fovRad = s.fovRad;
-    if (!(glm::length(s.up) > 0))
-        return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
-    framing.up = s.up;
-    return framing;
-}
-
-Result<std::vector<Camera>> camerasAround(const Mesh& mesh, const ConvertSettings& s, Job& job) {
-    if (!s.cameras.empty()) return s.cameras;
-    STX_TRY(const auto best, countOfBest(s.views));
-    if (best) {
-        MeshCandidates candidates;
-        STX_TRY(candidates.framing, framingOf(s, false, job.limits));
-        candidates.directions = std::max(candidates.directions, std::min(4096, 2 * *best));
-        SelectSettings select;
-        select.count = *best;
-        STX_TRY(auto chosen, selectMeshViews(mesh, candidates, select, job));
-        return std::move(chosen.cameras);
-    }
-    STX_TRY(auto layout, parseViewLayout(s.views));
-    STX_TRY(const auto framing, framingOf(s, layout.kind == ViewLayout::Kind::cube, job.limits));
-    layout.elevationRad = s.elevationRad;
-    return layoutCameras(layout, framing, drawnPoints(mesh));
-}
-
-Result<Bundle> captured(const Mesh& mesh, const ConvertSettings& s, Job& job) {
-    STX_CHECK(mesh.check());
-    if (s.supersampling < 1 || s.supersampling > 8)
-        return fail(ErrorCode::usage, "supersampling is {}; 1 to 8 is possible", s.supersampling);
-    STX_TRY(const auto cameras, camerasAround(mesh, s, job));
-    CaptureSettings capture;
-    capture.supersampling = s.supersampling;
-    capture.depthBits = s.depthBits.value_or(16);
-    capture.meshNormals = s.meshNormals;
-    return captureBundle(mesh, cameras, capture, job);
-}
-
-void noteDepthLoss(const Bundle& bundle, Job& job) {
-    double worst = 0;
-    for (const auto& view : bundle.views) {
-        if (view.depthBits == 8) worst = std::max(worst, view.depthCode().step() * 0.5);
-    }
-    if (worst > 0)
-        job.note(fmt::format(
-            "depth in 8 bits is off by up to {:.3g} scene units; 16 bits are 257 times finer",
-            worst));
-}
 
 Bounds boundsOf(const Atlas& atlas) {
     if (atlas.bounds) return *atlas.bounds;
@@ -143,7 +62,9 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
                     *settings.depthBits);
     Result<Bundle> bundle = Bundle();
     if (const auto* mesh = std::get_if<Mesh>(&model)) {
-        bundle = captured(*mesh, settings, job);
+        STX_CHECK(mesh->check());
+        STX_TRY(const auto views, chooseViews(*mesh, settings, job));
+        bundle = captureViews(*mesh, views.cameras, settings, job);
     } else if (const auto* atlas = std::get_if<Atlas>(&model)) {
         bundle = unpack(*atlas, job);
     } else {
@@ -152,11 +73,7 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
     if (!bundle) return bundle;
     if (!settings.title.empty()) bundle->title = settings.title;
     if (settings.depthBits) {
-        for (auto& view : bundle->views) {
-            if (view.depthBits == *settings.depthBits) continue;
-            view.depthBits = *settings.depthBits;
-            fitDepthRange(view);
-        }
+        setDepthBits(*bundle, *settings.depthBits);
         noteDepthLoss(*bundle, job);
     }
     return bundle;

@@ -1,0 +1,139 @@
+#include "formats/stx/mesh_views.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+#include "lib/base/counted.hpp"
+#include "lib/capture/capture.hpp"
+#include "lib/capture/rasterizer.hpp"
+#include "lib/quality/capture_quality.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kMostViews = 4096;    // of auto:N
+constexpr int kMostAutoViews = 64;  // that auto:DBdB may come to
+
+CaptureSettings captureSettings(const ConvertSettings& s) {
+    CaptureSettings capture;
+    capture.supersampling = s.supersampling;
+    capture.depthBits = s.depthBits.value_or(16);
+    capture.meshNormals = s.meshNormals;
+    return capture;
+}
+
+Result<ViewFraming> framingOf(const ConvertSettings& s, bool cube, const Limits& limits) {
+    if (s.width < 1 || s.height < 1 || s.width > limits.maxImageSide ||
+        s.height > limits.maxImageSide)
+        return fail(ErrorCode::usage, "views of {}x{} are asked for; 1 to {} pixels are possible",
+                    s.width, s.height, limits.maxImageSide);
+    if (!(s.fovRad > 0 && s.fovRad < glm::radians(170.0)))
+        return fail(ErrorCode::usage,
+                    "fovRad is {:g}; it must be above 0 and below 170 degrees in radians",
+                    s.fovRad);
+    if (!(glm::length(s.up) > 0))
+        return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
+    ViewFraming framing;
+    framing.width = s.width;
+    framing.height = s.height;
+    // The six faces of a cube are orthographic in the standard's own example.
+    framing.orthographic = s.orthographic.value_or(cube);
+    framing.fovRad = s.fovRad;
+    framing.up = s.up;
+    return framing;
+}
+
+Result<MeshViews> bestViews(const Mesh& mesh, const AutoViews& wanted, const ConvertSettings& s,
+                            Job& job) {
+    MeshCandidates candidates;
+    STX_TRY(candidates.framing, framingOf(s, false, job.limits));
+    SelectSettings select;
+    select.count = wanted.count > 0 ? wanted.count : kMostAutoViews;
+    candidates.directions = std::max(candidates.directions, std::min(kMostViews, 2 * select.count));
+    STX_TRY(auto chosen, selectMeshViews(mesh, candidates, select, job));
+    MeshViews views{std::move(chosen.cameras), wanted, std::move(chosen.selection),
+                    candidates.directions, 0.0};
+    if (wanted.count > 0) return views;
+    const auto most = views.cameras.size();
+    STX_TRY(const auto fewest,
+            fewestCameras(mesh, views.cameras, captureSettings(s), wanted.decibels, job));
+    views.cameras.resize(static_cast<std::size_t>(fewest.count));
+    views.psnr = fewest.psnr;
+    if (fewest.psnr < wanted.decibels)
+        job.note(fmt::format(
+            "{:g} dB is not reached by {}, the most that are tried; {} {:.1f} dB", wanted.decibels,
+            counted(most, "view"),
+            fewest.count == 1 ? "1 view reaches" : fmt::format("{} views reach", fewest.count),
+            fewest.psnr));
+    return views;
+}
+
+}  // namespace
+
+Result<std::optional<AutoViews>> parseAutoViews(std::string_view views) {
+    if (!views.starts_with("auto")) return std::optional<AutoViews>();
+    const auto complain = [&] {
+        return fail(ErrorCode::usage,
+                    "the views are '{}'; auto:N for the N best (1 to {}) or auto:DBdB for the "
+                    "fewest that reach a quality, as in auto:38dB, is expected",
+                    views, kMostViews);
+    };
+    if (views.size() < 6 || views[4] != ':') return complain();
+    std::string_view number = views.substr(5);
+    const auto parse = [&](auto& value) {
+        const auto end = number.data() + number.size();
+        const auto parsed = std::from_chars(number.data(), end, value);
+        return parsed.ec == std::errc() && parsed.ptr == end;
+    };
+    AutoViews result;
+    if (number.size() > 2 && (number.ends_with("dB") || number.ends_with("db"))) {
+        number.remove_suffix(2);
+        if (!parse(result.decibels) || !(result.decibels > 0 && result.decibels < 100))
+            return complain();
+    } else if (!parse(result.count) || result.count < 1 || result.count > kMostViews) {
+        return complain();
+    }
+    return std::optional<AutoViews>(result);
+}
+
+Result<MeshViews> chooseViews(const Mesh& mesh, const ConvertSettings& s, Job& job) {
+    if (!s.cameras.empty()) return MeshViews{s.cameras, {}, {}, 0, 0.0};
+    STX_TRY(const auto wanted, parseAutoViews(s.views));
+    if (wanted) return bestViews(mesh, *wanted, s, job);
+    STX_TRY(auto layout, parseViewLayout(s.views));
+    STX_TRY(const auto framing, framingOf(s, layout.kind == ViewLayout::Kind::cube, job.limits));
+    layout.elevationRad = s.elevationRad;
+    STX_TRY(auto cameras, layoutCameras(layout, framing, drawnPoints(mesh)));
+    return MeshViews{std::move(cameras), {}, {}, 0, 0.0};
+}
+
+Result<Bundle> captureViews(const Mesh& mesh, const std::vector<Camera>& cameras,
+                            const ConvertSettings& s, Job& job) {
+    if (s.supersampling < 1 || s.supersampling > 8)
+        return fail(ErrorCode::usage, "supersampling is {}; 1 to 8 is possible", s.supersampling);
+    return captureBundle(mesh, cameras, captureSettings(s), job);
+}
+
+bool setDepthBits(Bundle& bundle, int bits) {
+    bool changed = false;
+    for (auto& view : bundle.views) {
+        if (view.depthBits == bits) continue;
+        view.depthBits = bits;
+        fitDepthRange(view);
+        changed = true;
+    }
+    return changed;
+}
+
+void noteDepthLoss(const Bundle& bundle, Job& job) {
+    double worst = 0;
+    for (const auto& view : bundle.views) {
+        if (view.depthBits == 8) worst = std::max(worst, view.depthCode().step() * 0.5);
+    }
+    if (worst > 0)
+        job.note(fmt::format(
+            "depth in 8 bits is off by up to {:.3g} scene units; 16 bits are 257 times finer",
+            worst));
+}
+
+}  // namespace stx

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "formats/stx/stx.hpp"
+#include "lib/selection/selection.hpp"
+
+namespace stx {
+
+/// `auto:N`, or `auto:DBdB` with a quality in decibels.
+struct AutoViews {
+    int count = 0;  ///< 1..4096; 0 = the fewest that reach `decibels`
+    double decibels = 0;
+};
+
+/// Nothing for other views than `auto`. Errors (usage): a number out of range.
+[[nodiscard]] Result<std::optional<AutoViews>> parseAutoViews(std::string_view views);
+
+/// The cameras that see a mesh, and how they were chosen.
+struct MeshViews {
+    std::vector<Camera> cameras;
+    AutoViews wanted;
+    /// The rest is of `auto` views only.
+    std::optional<Selection> selection;
+    int candidates = 0;  ///< directions that they were chosen from
+    double psnr = 0;     ///< that the cameras reach, dB, of auto:DBdB
+};
+
+/// Chooses views by ConvertSettings, see there. A note says when auto:DBdB is not reached. Errors
+/// (usage): settings out of range.
+[[nodiscard]] Result<MeshViews> chooseViews(const Mesh& mesh, const ConvertSettings& settings,
+                                            Job& job);
+
+/// What the cameras see of a mesh that has passed check(), as convert() gives it. Errors: settings
+/// (usage), those of captureBundle().
+[[nodiscard]] Result<Bundle> captureViews(const Mesh& mesh, const std::vector<Camera>& cameras,
+                                          const ConvertSettings& settings, Job& job);
+
+/// Gives all views these depth bits and the range that suits them; false when all had them.
+bool setDepthBits(Bundle& bundle, int bits);
+
+/// Notes what 8-bit depth costs, in scene units, when a view has it.
+void noteDepthLoss(const Bundle& bundle, Job& job);
+
+}  // namespace stx
