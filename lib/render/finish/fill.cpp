@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/surface/votes.hpp"
@@ -32,8 +33,14 @@ constexpr int kDepths = 48, kHiddenDepths = 2;
 constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f;
 
 // Backgrounds (fillBackground).
-/// Side of the cells that are crossed in one step where they are empty, pixels.
-constexpr int kCell = 32;
+/// Pixels farther than this from any surface are filled from a picture of half the size, nearer
+/// ones by rays; from half of it on both are mixed.
+constexpr int kNearSurface = 32;
+/// Pixels no farther than this from surface have a ray that meets it: the rays are no further
+/// apart than a pixel there.
+constexpr int kSurelyMet = 4;
+/// Distances to surface are counted up to this.
+constexpr int kFarthestCounted = 255;
 /// Directions that surface is looked for in.
 constexpr int kRays = 32;
 /// Pixels averaged where a ray meets surface, while they differ by no more than this share of q.
@@ -105,6 +112,157 @@ float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float 
     return 0.0f;
 }
 
+/// How far each pixel is from the nearest closed one, the larger of columns and rows, at most
+/// kFarthestCounted.
+Image<std::uint8_t> distancesToSurface(const OpenFrame& frame) {
+    const int width = frame.q.width(), height = frame.q.height();
+    Image<std::uint8_t> distances(width, height);
+    const auto next = [](int d) {
+        return static_cast<std::uint8_t>(std::min(d + 1, kFarthestCounted));
+    };
+    parallelForBlocks(0, height, 32, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            const auto row = distances.row(y);
+            std::uint8_t d = kFarthestCounted;
+            for (int x = 0; x < width; ++x) row[x] = d = closed(frame, x, y) ? 0 : next(d);
+            for (int x = width - 2; x >= 0; --x) row[x] = std::min(row[x], next(row[x + 1]));
+        }
+    });
+    const auto pass = [&](int y, int before) {
+        const auto row = distances.row(y);
+        const auto other = distances.row(before);
+        for (int x = 0; x < width; ++x) {
+            const int nearest =
+                std::min({other[std::max(x - 1, 0)], other[x], other[std::min(x + 1, width - 1)]});
+            row[x] = std::min(row[x], next(nearest));
+        }
+    };
+    for (int y = 1; y < height; ++y) pass(y, y - 1);
+    for (int y = height - 2; y >= 0; --y) pass(y, y + 1);
+    return distances;
+}
+
+/// The frame at half the size, rounded up: each pixel is the mean of the closed ones among its
+/// four, and open where there is none.
+void halve(const OpenFrame& frame, Image<glm::vec4>& albedo, Image<float>& q) {
+    const int width = (frame.q.width() + 1) / 2, height = (frame.q.height() + 1) / 2;
+    albedo = Image<glm::vec4>(width, height, glm::vec4(0.0f));
+    q = Image<float>(width, height, 0.0f);
+    parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            for (int x = 0; x < width; ++x) {
+                float count = 0;
+                for (int k = 0; k < 4; ++k) {
+                    const int nx = 2 * x + k % 2, ny = 2 * y + k / 2;
+                    if (!frame.q.contains(nx, ny) || !closed(frame, nx, ny)) continue;
+                    const Hit hit = hitAt(frame, nx, ny, 0);
+                    albedo.at(x, y) += glm::vec4(hit.colour, 1.0f);
+                    q.at(x, y) += hit.q;
+                    count += 1;
+                }
+                if (count == 0) continue;
+                albedo.at(x, y) /= count;
+                q.at(x, y) /= count;
+            }
+        }
+    });
+}
+
+/// The filled half of a frame between its pixels, at pixel (x, y) of the frame.
+Fill sampleOf(const Image<glm::vec4>& albedo, const Image<float>& q, int x, int y) {
+    const int lastX = q.width() - 1, lastY = q.height() - 1;
+    const float u = 0.5f * static_cast<float>(x) - 0.25f, v = 0.5f * static_cast<float>(y) - 0.25f;
+    const int x0 = static_cast<int>(std::floor(u)), y0 = static_cast<int>(std::floor(v));
+    const float tu = u - static_cast<float>(x0), tv = v - static_cast<float>(y0);
+    Fill fill{x, y, glm::vec3(0.0f), 0.0f};
+    for (int k = 0; k < 4; ++k) {
+        const int nx = std::clamp(x0 + k % 2, 0, lastX), ny = std::clamp(y0 + k / 2, 0, lastY);
+        const float weight = (k % 2 ? tu : 1 - tu) * (k / 2 ? tv : 1 - tv);
+        fill.colour += weight * glm::vec3(albedo.at(nx, ny));
+        fill.q += weight * q.at(nx, ny);
+    }
+    return fill;
+}
+
+/// 0 up to `t` = 0, 1 from `t` = 1 on.
+float smoothStep(float t) {
+    t = std::clamp(t, 0.0f, 1.0f);
+    return t * t * (3 - 2 * t);
+}
+
+const std::array<glm::vec2, kRays>& rayDirections() {
+    static const auto rays = [] {
+        std::array<glm::vec2, kRays> directions;
+        for (int k = 0; k < kRays; ++k) {
+            const float angle = static_cast<float>(k) * (6.2831853f / kRays);
+            directions[static_cast<std::size_t>(k)] = {std::cos(angle), std::sin(angle)};
+        }
+        return directions;
+    }();
+    return rays;
+}
+
+/// What surface around shows at an open pixel: where rays through the picture meet it. False where
+/// none does.
+bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int x, int y,
+               Fill& fill) {
+    const int width = frame.q.width(), height = frame.q.height();
+    std::array<Hit, kRays> hits;
+    int count = 0;
+    for (const glm::vec2 ray : rayDirections()) {
+        float along = 1;
+        Hit hit;
+        int averaged = 0;
+        while (averaged < kAveraged) {
+            const float px = static_cast<float>(x) + 0.5f + ray.x * along;
+            const float py = static_cast<float>(y) + 0.5f + ray.y * along;
+            if (!(px >= 0 && py >= 0 && px < static_cast<float>(width) &&
+                  py < static_cast<float>(height)))
+                break;
+            const int nx = static_cast<int>(px), ny = static_cast<int>(py);
+            const int distance = distances.at(nx, ny);
+            if (distance > 0) {
+                if (averaged) break;
+                // No ray crosses more pixels in as many steps.
+                along += static_cast<float>(distance);
+                continue;
+            }
+            along += 1;
+            const Hit here = hitAt(frame, nx, ny, along);
+            if (averaged == 0) {
+                hit = here;
+            } else {
+                if (std::abs(here.q - hit.q) > kSameSurface * frame.space.axis.relativeScale(hit.q))
+                    break;
+                hit.colour += here.colour;
+            }
+            ++averaged;
+        }
+        if (!averaged) continue;
+        hit.colour /= static_cast<float>(averaged);
+        hits[static_cast<std::size_t>(count++)] = hit;
+    }
+    if (!count) return false;
+    float farthest = hits[0].q, nearest = hits[0].q;
+    for (int k = 1; k < count; ++k) {
+        farthest = std::min(farthest, hits[static_cast<std::size_t>(k)].q);
+        nearest = std::max(nearest, hits[static_cast<std::size_t>(k)].q);
+    }
+    const float range = nearest - farthest + kLeastRange * frame.space.axis.relativeScale(nearest);
+    glm::vec3 sum(0.0f);
+    float weights = 0, depth = 0;
+    for (int k = 0; k < count; ++k) {
+        const Hit& hit = hits[static_cast<std::size_t>(k)];
+        const float behind = (nearest - hit.q) / range + kNearestWeight;
+        const float weight = behind * behind / (hit.distance * std::sqrt(hit.distance));
+        sum += weight * hit.colour;
+        depth += weight * hit.q;
+        weights += weight;
+    }
+    fill = {x, y, sum / weights, depth / weights};
+    return true;
+}
+
 }  // namespace
 
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
@@ -162,87 +320,40 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
 
 void fillBackground(OpenFrame frame) {
     const int width = frame.q.width(), height = frame.q.height();
-    const int cellsX = (width + kCell - 1) / kCell, cellsY = (height + kCell - 1) / kCell;
-    // Cells without any surface are crossed in one step.
-    std::vector<char> occupied(static_cast<std::size_t>(cellsX) * cellsY, 0);
-    bool any = false;
-    for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) {
-            if (!closed(frame, x, y)) continue;
-            occupied[static_cast<std::size_t>(y / kCell) * cellsX + x / kCell] = 1;
-            any = true;
-        }
+    const Image<std::uint8_t> distances = distancesToSurface(frame);
+    int nearest = kFarthestCounted, farthest = 0;
+    for (const std::uint8_t d : distances.pixels()) {
+        nearest = std::min<int>(nearest, d);
+        farthest = std::max<int>(farthest, d);
     }
-    if (!any) return;
-    std::array<glm::vec2, kRays> rays;
-    for (int k = 0; k < kRays; ++k) {
-        const float angle = static_cast<float>(k) * (6.2831853f / kRays);
-        rays[static_cast<std::size_t>(k)] = {std::cos(angle), std::sin(angle)};
+    if (nearest > 0 || farthest == 0) return;
+    Image<glm::vec4> halfAlbedo;
+    Image<float> halfQ;
+    if (farthest > kSurelyMet) {
+        halve(frame, halfAlbedo, halfQ);
+        fillBackground({halfAlbedo, halfQ, frame.space});
     }
     std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
     parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
-                if (frame.albedo.at(x, y).a >= kClosed) continue;
-                std::array<Hit, kRays> hits;
-                int count = 0;
-                for (int k = 0; k < kRays; ++k) {
-                    const float dx = rays[static_cast<std::size_t>(k)].x;
-                    const float dy = rays[static_cast<std::size_t>(k)].y;
-                    float along = 1;
-                    Hit hit;
-                    int averaged = 0;
-                    while (averaged < kAveraged) {
-                        const float px = static_cast<float>(x) + 0.5f + dx * along;
-                        const float py = static_cast<float>(y) + 0.5f + dy * along;
-                        if (!(px >= 0 && py >= 0 && px < static_cast<float>(width) &&
-                              py < static_cast<float>(height)))
-                            break;
-                        const int nx = static_cast<int>(px), ny = static_cast<int>(py);
-                        if (averaged == 0 &&
-                            !occupied[static_cast<std::size_t>(ny / kCell) * cellsX + nx / kCell]) {
-                            along += kCell / 2;
-                            continue;
-                        }
-                        along += 1;
-                        if (!closed(frame, nx, ny)) {
-                            if (averaged) break;
-                            continue;
-                        }
-                        const Hit here = hitAt(frame, nx, ny, along);
-                        if (averaged == 0) {
-                            hit = here;
-                        } else {
-                            if (std::abs(here.q - hit.q) >
-                                kSameSurface * frame.space.axis.relativeScale(hit.q))
-                                break;
-                            hit.colour += here.colour;
-                        }
-                        ++averaged;
-                    }
-                    if (!averaged) continue;
-                    hit.colour /= static_cast<float>(averaged);
-                    hits[static_cast<std::size_t>(count++)] = hit;
+                const int distance = distances.at(x, y);
+                if (distance == 0 || frame.albedo.at(x, y).a >= kClosed) continue;
+                const float far =
+                    halfQ.empty()
+                        ? 0.0f
+                        : smoothStep(2.0f * static_cast<float>(distance) / kNearSurface - 1);
+                Fill fill{x, y, glm::vec3(0.0f), 0.0f};
+                const bool met = far < 1.0f && alongRays(frame, distances, x, y, fill);
+                if (!met) {
+                    if (halfQ.empty()) continue;
+                    fill = sampleOf(halfAlbedo, halfQ, x, y);
+                } else if (far > 0.0f) {
+                    const Fill beyond = sampleOf(halfAlbedo, halfQ, x, y);
+                    fill.colour = glm::mix(fill.colour, beyond.colour, far);
+                    fill.q = glm::mix(fill.q, beyond.q, far);
                 }
-                if (!count) continue;
-                float farthest = hits[0].q, nearest = hits[0].q;
-                for (int k = 1; k < count; ++k) {
-                    farthest = std::min(farthest, hits[static_cast<std::size_t>(k)].q);
-                    nearest = std::max(nearest, hits[static_cast<std::size_t>(k)].q);
-                }
-                const float range =
-                    nearest - farthest + kLeastRange * frame.space.axis.relativeScale(nearest);
-                glm::vec3 sum(0.0f);
-                float weights = 0, depth = 0;
-                for (int k = 0; k < count; ++k) {
-                    const Hit& hit = hits[static_cast<std::size_t>(k)];
-                    const float behind = (nearest - hit.q) / range + kNearestWeight;
-                    const float weight = behind * behind / (hit.distance * std::sqrt(hit.distance));
-                    sum += weight * hit.colour;
-                    depth += weight * hit.q;
-                    weights += weight;
-                }
-                rows[static_cast<std::size_t>(y)].push_back({x, y, sum / weights, depth / weights});
+                rows[static_cast<std::size_t>(y)].push_back(fill);
             }
         }
     });

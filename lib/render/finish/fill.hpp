@@ -20,6 +20,9 @@ struct OpenFrame {
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources);
 
 /// Fills everything that is open from the background around it: for scenes that fill the frame.
+/// Near surface along rays through the picture, beyond from a picture of half the size that was
+/// filled before, so that the time grows with the pixels however large the openings are. Without
+/// any surface nothing is filled.
 void fillBackground(OpenFrame frame);
 
 }  // namespace stx::surface
