@@ -18,6 +18,8 @@ namespace {
 constexpr float kClosed = 0.999f;
 /// A pixel open by more than this share takes the depth of what fills it.
 constexpr float kMostlyOpen = 0.5f;
+/// Distances to surface are counted up to this, pixels.
+constexpr std::uint8_t kFarthestCounted = 255;
 
 // Small holes (fillUnseen).
 /// How far surface is looked for in each direction, pixels.
@@ -39,8 +41,6 @@ constexpr int kNearSurface = 32;
 /// Pixels no farther than this from surface have a ray that meets it: the rays are no further
 /// apart than a pixel there.
 constexpr int kSurelyMet = 4;
-/// Distances to surface are counted up to this.
-constexpr int kFarthestCounted = 255;
 /// Directions that surface is looked for in.
 constexpr int kRays = 32;
 /// Pixels averaged where a ray meets surface, while they differ by no more than this share of q.
@@ -83,6 +83,39 @@ Hit hitAt(const OpenFrame& frame, int x, int y, float distance) {
     return {glm::vec3(c) / c.a, frame.q.at(x, y), distance};
 }
 
+/// How far each pixel is from the nearest closed one, the larger of columns and rows, at most
+/// kFarthestCounted.
+Image<std::uint8_t> distancesToSurface(const OpenFrame& frame) {
+    const int width = frame.q.width(), height = frame.q.height();
+    Image<std::uint8_t> distances(width, height);
+    const auto next = [](std::uint8_t d) {
+        return static_cast<std::uint8_t>(d + (d < kFarthestCounted ? 1 : 0));
+    };
+    parallelForBlocks(0, height, 32, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            std::uint8_t* row = distances.row(y).data();
+            std::uint8_t d = kFarthestCounted;
+            for (int x = 0; x < width; ++x) row[x] = d = closed(frame, x, y) ? 0 : next(d);
+            for (int x = width - 1; x-- > 0;) row[x] = std::min(row[x], next(row[x + 1]));
+        }
+    });
+    // The nearest of three in the row before, one row farther.
+    const auto pass = [&](int y, int before) {
+        std::uint8_t* row = distances.row(y).data();
+        const std::uint8_t* other = distances.row(before).data();
+        const auto take = [&](int x, std::uint8_t nearest) {
+            row[x] = std::min(row[x], next(nearest));
+        };
+        take(0, std::min(other[0], other[std::min(1, width - 1)]));
+        for (int x = 1; x < width - 1; ++x)
+            take(x, std::min(std::min(other[x - 1], other[x]), other[x + 1]));
+        take(width - 1, std::min(other[std::max(width - 2, 0)], other[width - 1]));
+    };
+    for (int y = 1; y < height; ++y) pass(y, y - 1);
+    for (int y = height - 1; y-- > 0;) pass(y, y + 1);
+    return distances;
+}
+
 constexpr std::array<std::array<int, 2>, 8> kDirections = {
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 
@@ -110,36 +143,6 @@ float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float 
         if (unknown == kHiddenDepths) return q;
     }
     return 0.0f;
-}
-
-/// How far each pixel is from the nearest closed one, the larger of columns and rows, at most
-/// kFarthestCounted.
-Image<std::uint8_t> distancesToSurface(const OpenFrame& frame) {
-    const int width = frame.q.width(), height = frame.q.height();
-    Image<std::uint8_t> distances(width, height);
-    const auto next = [](int d) {
-        return static_cast<std::uint8_t>(std::min(d + 1, kFarthestCounted));
-    };
-    parallelForBlocks(0, height, 32, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            const auto row = distances.row(y);
-            std::uint8_t d = kFarthestCounted;
-            for (int x = 0; x < width; ++x) row[x] = d = closed(frame, x, y) ? 0 : next(d);
-            for (int x = width - 2; x >= 0; --x) row[x] = std::min(row[x], next(row[x + 1]));
-        }
-    });
-    const auto pass = [&](int y, int before) {
-        const auto row = distances.row(y);
-        const auto other = distances.row(before);
-        for (int x = 0; x < width; ++x) {
-            const int nearest =
-                std::min({other[std::max(x - 1, 0)], other[x], other[std::min(x + 1, width - 1)]});
-            row[x] = std::min(row[x], next(nearest));
-        }
-    };
-    for (int y = 1; y < height; ++y) pass(y, y - 1);
-    for (int y = height - 2; y >= 0; --y) pass(y, y + 1);
-    return distances;
 }
 
 /// The frame at half the size, rounded up: each pixel is the mean of the closed ones among its
@@ -267,11 +270,13 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int
 
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
     const int width = frame.q.width(), height = frame.q.height();
+    const Image<std::uint8_t> distances = distancesToSurface(frame);
     std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
     parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
-                if (frame.albedo.at(x, y).a >= kClosed) continue;
+                // Farther from surface no direction meets any.
+                if (distances.at(x, y) > kReach || frame.albedo.at(x, y).a >= kClosed) continue;
                 std::array<Hit, 8> hits;
                 int count = 0;
                 unsigned met = 0;  // a bit for each direction
