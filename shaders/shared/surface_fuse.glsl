@@ -16,6 +16,11 @@ float sameWithin(float q) {
     return kSame * relativeScale(frameAxis(), q) + tile.step * qPerUnit(frameAxis(), q);
 }
 
+// Samples of a pixel are one piece while they differ by no more than this.
+float oneWithin(float q) {
+    return kJump * relativeScale(frameAxis(), q) + tile.step * qPerUnit(frameAxis(), q);
+}
+
 // The slope out of the differences to both sides, where there are any.
 float chooseSlope(bool hasA, float a, bool hasB, float b) {
     if (hasA && hasB) {
@@ -161,9 +166,7 @@ int pieceEnd(int begin) {
     int end = begin + 1;
     for (; end < shownCount; ++end) {
         float before = shownQ[end - 1];
-        if (before - shownQ[end] > kJump * relativeScale(frameAxis(), before) +
-                                       tile.step * qPerUnit(frameAxis(), before))
-            break;
+        if (before - shownQ[end] > oneWithin(before)) break;
     }
     return end;
 }
@@ -219,24 +222,32 @@ Piece pieceOf(int column, int row, int begin, int end) {
     return piece;
 }
 
-// A pixel as a whole: simple while the samples of each source are one surface far from edges, and
-// all sources agree. Then there is no need to look at each sample.
+// A pixel as a whole. A source is sure there when its samples are all of one surface far from its
+// edges. Where the nearest surface is shown by two sure sources, or by the only source that shows
+// anything, and no source has anything before it, there is no need to look at each sample.
 struct WholePixel {
-    bool any, simple;
-    float lowMean, highMean, sum;
-    uint present;  // bit k: source k of the tile
-    int first;     // of them
+    bool any;      // some source has something there
+    float front;   // q of the first source that shows the nearest sure surface
+    float sum;     // of q over those that do
+    uint shown;    // they: bit k is source k of the tile
+    bool steep;    // one of them changes by more than samples of one piece may
+    int first;
+    uint behind;   // sure sources that show what is behind it
+    uint others;   // sources that are not sure
+    float nearest; // q of them
 };
 
 WholePixel startPixel() {
     WholePixel p;
     p.any = false;
-    p.simple = true;
-    p.lowMean = 3.0e38f;
-    p.highMean = 0.0f;
+    p.front = 0.0f;
     p.sum = 0.0f;
-    p.present = 0u;
+    p.shown = 0u;
+    p.steep = false;
     p.first = -1;
+    p.behind = 0u;
+    p.others = 0u;
+    p.nearest = 0.0f;
     return p;
 }
 
@@ -246,29 +257,49 @@ void addSource(INOUT(WholePixel) p, int k, float low, float high, uint flags) {
     p.any = true;
     if (!(low > 0.0f) || (flags & kSampleFlags) != 0u ||
         high - low > kOneSurface * relativeScale(frameAxis(), high)) {
-        p.simple = false;
+        p.others |= 1u << k;
+        p.nearest = max(p.nearest, high);
         return;
     }
     float mean = 0.5f * (high + low);
-    p.lowMean = min(p.lowMean, mean);
-    p.highMean = max(p.highMean, mean);
+    if (p.first >= 0 && mean < p.front - sameWithin(p.front)) {
+        p.behind |= 1u << k;
+        return;
+    }
+    if (p.first < 0 || mean > p.front + sameWithin(p.front)) {
+        p.behind |= p.shown;
+        p.shown = 0u;
+        p.sum = 0.0f;
+        p.steep = false;
+        p.front = mean;
+        p.first = k;
+    }
+    p.shown |= 1u << k;
     p.sum += mean;
-    p.present |= 1u << k;
-    if (p.first < 0) p.first = k;
+    p.steep = p.steep || high - low > oneWithin(high);
 }
 
 bool isSimple(WholePixel p) {
-    return p.simple && !(p.highMean - p.lowMean > sameWithin(p.highMean));
+    if (p.first < 0) return false;
+    if (p.behind == 0u && p.others == 0u) return true;
+    return bitCount(p.shown) > 1 && !p.steep && !(p.nearest > p.front + sameWithin(p.front));
 }
 
-// The piece of a simple pixel; false when it is rejected.
-bool simplePiece(WholePixel p, int column, int row, OUT(Piece) piece) {
-    int count = bitCount(p.present);
+// Whether a simple pixel shows the surface of a source that is not sure: some of its samples are on
+// that surface, and not all of them are extensions. `flags` are those that all of them have.
+bool alsoShows(WholePixel p, float high, uint flags) {
+    return high > p.front - sameWithin(p.front) && (flags & kExtensionBit) == 0u;
+}
+
+// The piece of a simple pixel, to which `also` belong, sources that are not sure; false when it is
+// rejected.
+bool simplePiece(WholePixel p, uint also, int column, int row, OUT(Piece) piece) {
+    int count = bitCount(p.shown);
     piece.x = float(tile.x + column) + 0.5f;
     piece.y = float(tile.y + row) + 0.5f;
     piece.q = p.sum / float(count);
     piece.share = 1.0f;
-    piece.seenBy = p.present;
+    piece.seenBy = p.shown | also;
     piece.at = uint(row * kTile + column);
     if (count == 1 && tile.count > 1u &&
         rejected(piece.q, 0u, p.first, piece.x, piece.y, column * S + S / 2, row * S + S / 2))

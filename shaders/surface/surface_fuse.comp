@@ -14,6 +14,22 @@ uint sampleOf(int k, int i, int j) {
 #include "shared/surface_votes.glsl"
 #include "shared/surface_fuse.glsl"
 
+// The samples of source k in a pixel: the least, the greatest, flags of any, and flags of all that
+// are there.
+uvec4 rangeOf(int k, ivec2 pixel) {
+    uvec4 range = uvec4(0xffffffffu, 0u, 0u, 0xffffffffu);
+    for (int j = 0; j < S; ++j) {
+        for (int i = 0; i < S; ++i) {
+            uint value = sampleOf(k, pixel.x * S + i, pixel.y * S + j);
+            range.x = min(range.x, value);
+            range.y = max(range.y, value);
+            range.z |= value;
+            if (value != 0u) range.w &= value;
+        }
+    }
+    return range;
+}
+
 shared uint groupCount, groupFirst;
 
 void main() {
@@ -31,22 +47,19 @@ void main() {
     Piece only;
     if (tile.x + pixel.x < frame.size.x && tile.y + pixel.y < frame.size.y) {
         WholePixel whole = startPixel();
-        for (int k = 0; k < int(tile.count) && whole.simple; ++k) {
+        for (int k = 0; k < int(tile.count); ++k) {
             if (locals[tile.first + uint(k)].y == kNoSlot) continue;
-            uint low = 0xffffffffu, high = 0u, flags = 0u;
-            for (int j = 0; j < S; ++j) {
-                for (int i = 0; i < S; ++i) {
-                    uint value = sampleOf(k, pixel.x * S + i, pixel.y * S + j);
-                    low = min(low, value);
-                    high = max(high, value);
-                    flags |= value;
-                }
-            }
-            addSource(whole, k, uintBitsToFloat(low), uintBitsToFloat(high), flags);
+            uvec4 range = rangeOf(k, pixel);
+            addSource(whole, k, uintBitsToFloat(range.x), uintBitsToFloat(range.y), range.z);
         }
         simple = whole.any && isSimple(whole);
         if (simple) {
-            count = simplePiece(whole, pixel.x, pixel.y, only) ? 1u : 0u;
+            uint also = 0u;
+            for (uint left = whole.others; left != 0u; left &= left - 1u) {
+                uvec4 range = rangeOf(findLSB(left), pixel);
+                if (alsoShows(whole, uintBitsToFloat(range.y), range.w)) also |= 1u << findLSB(left);
+            }
+            count = simplePiece(whole, also, pixel.x, pixel.y, only) ? 1u : 0u;
         } else if (whole.any) {
             fuseSamples(pixel.x, pixel.y);
             for (int begin = 0; begin < shownCount; begin = pieceEnd(begin)) ++count;

@@ -45,5 +45,57 @@ TEST(Fuse, OneSurfaceInAPixelHasNoFlagsWhateverItsMean) {
     }
 }
 
+/// What a pixel of four samples shows when two sources show a wall at q = 1 and a third shows
+/// `third`. What they see is nearer than all that: none has a vote against anything.
+Pieces besideTwo(const std::array<std::uint32_t, 4>& third) {
+    Bundle bundle;
+    bundle.views = {wallAt(0.5f), wallAt(0.5f), wallAt(0.5f)};
+    const SurfaceScene scene(bundle);
+    const PixelSpace space(cameraOf(kTile), 4.0);
+    const Warp same = warpFrom(glm::dmat4(1.0));
+    const SampleGrid grid{2};
+    const std::vector<float> wall(grid.count(), 1.0f);
+    std::vector<float> other(grid.count(), 0.0f);
+    for (std::size_t k = 0; k < 4; ++k)
+        other[k / 2 * static_cast<std::size_t>(grid.stride()) + k % 2] =
+            std::bit_cast<float>(third[k]);
+    const std::vector<LocalSource> sources{{&scene.sources[0], same, wall.data()},
+                                           {&scene.sources[1], same, wall.data()},
+                                           {&scene.sources[2], same, other.data()}};
+    Pieces pieces;
+    fuseTile(sources, grid, space.axis, 0, 0, 1, 1, pieces);
+    return pieces;
+}
+
+TEST(Fuse, WhatTwoSourcesAgreeOnNeedsNoThird) {
+    const auto bits = [](float q, std::uint32_t flags) {
+        return (std::bit_cast<std::uint32_t>(q) & ~kSampleFlags) | flags;
+    };
+    const std::uint32_t nearEdge = bits(1.0f, kNearEdgeBit),
+                        extension = bits(1.0f, kNearEdgeBit | kExtensionBit),
+                        behind = bits(0.5f, kNearEdgeBit), before = bits(1.5f, kNearEdgeBit);
+    struct Case {
+        const char* name;
+        std::array<std::uint32_t, 4> third;
+        std::uint32_t seenBy;
+    };
+    for (const Case& c : {Case{"nothing", {0, 0, 0, 0}, 3u},
+                          Case{"the wall, near its edge", {nearEdge, nearEdge, 0, 0}, 7u},
+                          Case{"an extension", {extension, extension, extension, 0}, 3u},
+                          Case{"an extension and the wall", {extension, nearEdge, 0, 0}, 7u},
+                          Case{"something behind", {behind, behind, behind, behind}, 3u}}) {
+        const Pieces pieces = besideTwo(c.third);
+        ASSERT_EQ(pieces.size(), 1u) << c.name;
+        EXPECT_EQ(pieces.q[0], 1.0f) << c.name;
+        EXPECT_EQ(pieces.share[0], 1.0f) << c.name;
+        EXPECT_EQ(pieces.sources[0], c.seenBy) << c.name;
+    }
+    // What the third shows before the wall is not passed over.
+    const Pieces inFront = besideTwo({before, 0, 0, 0});
+    ASSERT_EQ(inFront.size(), 2u);
+    EXPECT_NEAR(inFront.q[0], 1.5f, 1e-5f);
+    EXPECT_NEAR(inFront.share[0], 0.25f, 1e-6f);
+}
+
 }  // namespace
 }  // namespace stx::surface

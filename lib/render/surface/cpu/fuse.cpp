@@ -10,24 +10,32 @@ namespace stx::surface {
 namespace shared {
 namespace {
 
-/// Least and greatest sample, and all flags, of each pixel of a row, S x S samples in each.
+/// What one source has in the pixels of a row of a tile.
+struct RowRange {
+    std::array<float, kTile> low, high;            ///< least and greatest sample
+    std::array<std::uint32_t, kTile> any, common;  ///< flags of any, and of all that are there
+};
+
+/// Of pixels of S x S samples each.
 template <int S>
-void summarisePixels(const float* lines, int stride, float* low, float* high,
-                     std::uint32_t* flags) {
+void summarisePixels(const float* lines, int stride, RowRange& out) {
     for (int x = 0; x < kTile; ++x) {
         float least = lines[x * S], most = least;
-        std::uint32_t bits = 0;
+        std::uint32_t any = 0, common = ~0u;
         for (int j = 0; j < S; ++j) {
             for (int i = 0; i < S; ++i) {
                 const float q = lines[j * stride + x * S + i];
                 least = std::min(least, q);
                 most = std::max(most, q);
-                bits |= std::bit_cast<std::uint32_t>(q);
+                const auto bits = std::bit_cast<std::uint32_t>(q);
+                any |= bits;
+                common &= bits == 0 ? ~0u : bits;
             }
         }
-        low[x] = least;
-        high[x] = most;
-        flags[x] = bits;
+        out.low[x] = least;
+        out.high[x] = most;
+        out.any[x] = any;
+        out.common[x] = common;
     }
 }
 
@@ -60,27 +68,35 @@ struct Fuser : Votes {
 #include "shaders/shared/surface_fuse.glsl"
 
     void fuseRow(int row, int columns, Pieces& pieces) {
-        // Per source and pixel: the range of its samples and all their flags.
-        std::array<std::array<float, kTile>, kMostTileSources> low, high;
-        std::array<std::array<std::uint32_t, kTile>, kMostTileSources> flags;
+        std::array<RowRange, kMostTileSources> ranges;
+        std::array<int, kMostTileSources> list;  // sources that have samples
+        int count = 0;
         for (std::size_t s = 0; s < locals.size(); ++s) {
             if (!locals[s].samples) continue;
+            list[static_cast<std::size_t>(count++)] = static_cast<int>(s);
             const float* lines = locals[s].samples + static_cast<std::ptrdiff_t>(row) * S * stride;
             constexpr std::array summarise = {summarisePixels<1>, summarisePixels<2>,
                                               summarisePixels<3>, summarisePixels<4>};
-            summarise[static_cast<std::size_t>(S - 1)](lines, stride, low[s].data(), high[s].data(),
-                                                       flags[s].data());
+            summarise[static_cast<std::size_t>(S - 1)](lines, stride, ranges[s]);
         }
         for (int column = 0; column < columns; ++column) {
-            const auto k = static_cast<std::size_t>(column);
+            const auto x = static_cast<std::size_t>(column);
             WholePixel whole = startPixel();
-            for (std::size_t s = 0; s < locals.size() && whole.simple; ++s)
-                if (locals[s].samples)
-                    addSource(whole, static_cast<int>(s), low[s][k], high[s][k], flags[s][k]);
+            for (int i = 0; i < count; ++i) {
+                const int k = list[static_cast<std::size_t>(i)];
+                const RowRange& range = ranges[static_cast<std::size_t>(k)];
+                addSource(whole, k, range.low[x], range.high[x], range.any[x]);
+            }
             if (!whole.any) continue;
             Piece piece;
             if (isSimple(whole)) {
-                if (simplePiece(whole, column, row, piece)) pieces.add(piece);
+                uint also = 0;
+                for (uint left = whole.others; left != 0; left &= left - 1) {
+                    const int k = findLSB(left);
+                    const RowRange& range = ranges[static_cast<std::size_t>(k)];
+                    if (alsoShows(whole, range.high[x], range.common[x])) also |= 1u << k;
+                }
+                if (simplePiece(whole, also, column, row, piece)) pieces.add(piece);
                 continue;
             }
             fuseSamples(column, row);
