@@ -9,8 +9,9 @@
 namespace stx::surface {
 namespace {
 
-/// Shares of q by which a block may reach out of its range: extensions, and a little for rounding.
-constexpr float kBlockMargin = 1.05f * kExtensionReach;
+/// What a block may reach out of its range by, relative to SourceBlock::reach, and the share of q
+/// that rounding may add.
+constexpr float kBlockMargin = 1.05f, kBlockRounding = 1e-5f;
 
 void addBounds(const Source& s, Bounds& bounds) {
     for (int by = 0; by < s.blocksY; ++by) {
@@ -46,7 +47,8 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
         if (!(block.qMax > 0)) continue;
         const auto bx = static_cast<float>(index % s.blocksX * kBlock);
         const auto by = static_cast<float>(index / s.blocksX * kBlock);
-        const float margin = kBlockMargin * s.space.axis.relativeScale(block.qMax);
+        const float margin =
+            kBlockMargin * block.reach + kBlockRounding * s.space.axis.relativeScale(block.qMax);
         float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
         bool front = false, behind = false;
         for (int corner = 0; corner < 8; ++corner) {

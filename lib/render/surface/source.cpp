@@ -1,6 +1,7 @@
 #include "lib/render/surface/source.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
@@ -291,6 +292,23 @@ float unevenness(const Source& s, const Draft& d) {
     return *middle;
 }
 
+/// See SourceBlock::reach: leaves are near their pixels, extensions go on with a pixel's gradient.
+float reachOf(const Source& s, const Draft& d, const SourceBlock& block, int x0, int y0) {
+    const float scale = s.space.axis.relativeScale(block.qMax);
+    float reach = block.leafEnd > block.leafBegin ? s.flat * scale : 0.0f;
+    for (int j = 0; block.anyEdge && j < kBlock; ++j) {
+        for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
+            const int x = x0 + std::countr_zero(left), y = y0 + j;
+            const glm::vec2 g =
+                gradientFrom(&d.q.at(x, y), &d.info.at(x, y), 1, s.width, x > 0, y > 0);
+            reach =
+                std::max(reach, std::min(kHalfBesideBackground * (std::abs(g.x) + std::abs(g.y)),
+                                         kExtensionReach * scale));
+        }
+    }
+    return reach;
+}
+
 void findLeaves(Source& s, const Draft& d) {
     s.noise = std::min(unevenness(s, d), kMostNoise);
     const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
@@ -318,6 +336,7 @@ void findLeaves(Source& s, const Draft& d) {
             block.leafBegin = static_cast<std::uint32_t>(leaves.size());
             divide(s, d, x0, y0, kBlock, s.flat, block, leaves);
             block.leafEnd = static_cast<std::uint32_t>(leaves.size());
+            block.reach = reachOf(s, d, block, x0, y0);
         }
     });
     for (int by = 0; by < s.blocksY; ++by) {

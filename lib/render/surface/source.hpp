@@ -73,6 +73,7 @@ struct Leaf {
 /// What one 16x16 block of a source holds.
 struct SourceBlock {
     float qMin = 0, qMax = 0;  ///< over the block and one pixel around; 0, 0 = nothing here
+    float reach = 0;           ///< by which what is drawn may leave that range, in q
     std::uint32_t leafBegin = 0, leafEnd = 0;
     std::array<std::uint16_t, kBlock> cells{};  ///< 2x2 quads, by upper left pixel, in no leaf
     std::array<std::uint16_t, kBlock> edges{};  ///< pixels that lay out an extension
