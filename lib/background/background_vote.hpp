@@ -1,0 +1,26 @@
+#pragma once
+
+#include "lib/background/depth_layers.hpp"
+#include "lib/background/frame_gauge.hpp"
+#include "lib/background/temporal.hpp"
+
+namespace stx::temporal {
+
+/// Which of a pixel's layers is the background, and of what colour.
+struct Vote {
+    int frames = 0;
+    double support = 0.04;
+    bool fillsFrame = true;  ///< emptiness is what the sensor missed, not what is behind all
+    glm::vec3 gain{1.0f};    ///< of the light that the model gets
+    float noise = 0;  ///< how much brightness differs from frame to frame, steps of 0..255
+    double firstTime = 0;
+
+    /// Sets a pixel of the model; leaves it empty when the background was not seen there.
+    template <class Sample>
+    void decide(const PixelLayers<Sample>& layers, std::size_t pixel, BackgroundModel& model) const;
+};
+
+/// Drops pixels that no neighbour agrees with, and closes single open ones between equal depths.
+void checkNeighbours(BackgroundModel& model, const DepthNoise& noise, float step);
+
+}  // namespace stx::temporal

@@ -1,0 +1,168 @@
+#include "lib/background/frame_gauge.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stx::temporal {
+namespace {
+
+/// Points of the grid: enough for medians.
+constexpr double kGridPoints = 20000;
+/// Differences of depth are counted in steps of this factor from kLeastShare on.
+constexpr float kLeastShare = 1e-5f;
+constexpr float kStepsPerOctave = 4;
+/// Fewer samples than these of one distance say nothing of it; those of all do.
+constexpr std::uint32_t kFewSamples = 200;
+/// A median of differences of two equal Gaussians is this many standard deviations.
+constexpr float kMedianOfDifference = 0.954f;
+constexpr float kDeviations = 3;
+/// Noise above this share of the distance is movement.
+constexpr float kMostShare = 0.05f;
+
+/// Colours that differ by more than this from what a gain explains are of something else, in steps
+/// of 0..255: in the first and in the last round.
+constexpr std::array<float, 4> kOutlier = {40, 20, 12, 8};
+/// Too dark or too bright to tell light, steps of 0..255.
+constexpr float kDarkest = 8, kBrightest = 247;
+/// Fewer points than these tell no gain.
+constexpr int kFewPoints = 50;
+/// Gains are believed within a factor of two.
+constexpr float kMostGain = 2;
+/// A mean remembers this many frames.
+constexpr float kMemory = 200;
+
+}  // namespace
+
+std::size_t DepthNoise::binOf(float dist) {
+    const float bin = 2 * std::log2(std::max(dist, 1e-9f)) + kBins / 2;
+    return static_cast<std::size_t>(std::clamp(bin, 0.0f, static_cast<float>(kBins - 1)));
+}
+
+void DepthNoise::add(float before, float now) {
+    const float share = std::abs(now - before) / before;
+    const float step = 1 + kStepsPerOctave * std::log2(std::max(share, kLeastShare) / kLeastShare);
+    const int slot = share < kLeastShare ? 0 : std::min(static_cast<int>(step), kSteps - 1);
+    ++counts_[binOf(before)][static_cast<std::size_t>(slot)];
+}
+
+void DepthNoise::update() {
+    const auto median = [](const std::array<std::uint32_t, kSteps>& counts, std::uint64_t total) {
+        std::uint64_t below = 0;
+        int slot = 0;
+        while (slot < kSteps && 2 * (below + counts[static_cast<std::size_t>(slot)]) < total)
+            below += counts[static_cast<std::size_t>(slot++)];
+        if (slot == 0) return 0.0f;
+        return kLeastShare * std::exp2((static_cast<float>(slot) - 0.5f) / kStepsPerOctave);
+    };
+    std::array<std::uint32_t, kSteps> all{};
+    std::uint64_t total = 0;
+    for (const auto& counts : counts_) {
+        for (std::size_t i = 0; i < kSteps; ++i) {
+            all[i] += counts[i];
+            total += counts[i];
+        }
+    }
+    if (total == 0) return;
+    const float common = median(all, total);
+    for (std::size_t bin = 0; bin < kBins; ++bin) {
+        std::uint64_t here = 0;
+        for (const std::uint32_t n : counts_[bin]) here += n;
+        const float middle = here < kFewSamples ? common : median(counts_[bin], here);
+        share_[bin] = std::min(kDeviations / kMedianOfDifference * middle, kMostShare);
+    }
+}
+
+Gauge::Gauge(const Camera& camera) {
+    const double pixels = static_cast<double>(camera.width) * camera.height;
+    const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kGridPoints))));
+    for (int y = step / 2; y < camera.height; y += step) {
+        for (int x = step / 2; x < camera.width; x += step) {
+            Point p;
+            p.pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
+                      static_cast<std::uint32_t>(x);
+            points_.push_back(p);
+        }
+    }
+}
+
+glm::vec3 Gauge::gainOf(const std::vector<glm::vec3>& now) const {
+    glm::vec3 gain(1.0f);
+    for (int channel = 0; channel < 3; ++channel) {
+        // A quotient of sums is not drawn to whole steps as a median of quotients is. Several
+        // rounds leave out what moved, stands in shadow or is too bright to tell.
+        for (const float outlier : kOutlier) {
+            double ours = 0, theirs = 0;
+            int count = 0;
+            for (std::size_t i = 0; i < points_.size(); ++i) {
+                const Point& p = points_[i];
+                const float a = now[i][channel], b = p.colour[channel];
+                if (!(p.count > 0) || !(a > kDarkest && a < kBrightest && b > kDarkest)) continue;
+                if (std::abs(a - gain[channel] * b) > outlier) continue;
+                ours += a;
+                theirs += b;
+                ++count;
+            }
+            if (count < kFewPoints) break;
+            const auto quotient = static_cast<float>(ours / theirs);
+            gain[channel] = std::clamp(quotient, 1 / kMostGain, kMostGain);
+        }
+    }
+    return gain;
+}
+
+FrameGauge Gauge::measure(const ReferenceView& frame) {
+    const auto step = static_cast<float>(frame.depthBits == 32 ? 0.0 : frame.depthCode().step());
+    std::vector<glm::vec3> now(points_.size(), glm::vec3(-1.0f));
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+        Point& p = points_[i];
+        const float dist = frame.depth.data()[p.pixel];
+        if (hasPoint(dist) && dist > 0 && p.before > 0) noise_.add(p.before, dist);
+    }
+    noise_.update();
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+        const Point& p = points_[i];
+        const float dist = frame.depth.data()[p.pixel];
+        if (!hasPoint(dist) || !(dist > 0)) continue;
+        const bool same =
+            p.count > 0 && std::abs(dist - p.depth) <= p.depth * noise_.tolerance(p.depth, step);
+        if (same || p.count == 0) now[i] = stepsOf(frame.texture, p.pixel);
+    }
+    FrameGauge gauge;
+    gauge.gain = gainOf(now);
+    std::vector<float> differences;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+        Point& p = points_[i];
+        const float dist = frame.depth.data()[p.pixel];
+        const bool point = hasPoint(dist) && dist > 0;
+        const glm::vec3 colour = stepsOf(frame.texture, p.pixel) / gauge.gain;
+        if (frames_ > 0)
+            differences.push_back(std::abs(brightness(colour) - brightness(p.beforeColour)));
+        p.beforeColour = colour;
+        p.before = point ? dist : 0.0f;
+        if (now[i].x >= 0) {
+            p.count = std::min(p.count + 1, kMemory);
+            p.depth += (dist - p.depth) / p.count;
+            p.colour += (colour - p.colour) / p.count;
+        } else if (point && dist > p.depth * (1 + 2 * noise_.tolerance(p.depth, step))) {
+            // Something before the background went away.
+            p.depth = dist;
+            p.colour = colour;
+            p.count = 1;
+        }
+    }
+    if (!differences.empty()) {
+        const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+        std::nth_element(differences.begin(), middle, differences.end());
+        gauge.noise = *middle;
+    }
+    gains_ += glm::dvec3(gauge.gain);
+    noises_ += gauge.noise;
+    ++frames_;
+    return gauge;
+}
+
+glm::vec3 Gauge::meanGain() const {
+    return frames_ > 0 ? glm::vec3(gains_ / static_cast<double>(frames_)) : glm::vec3(1.0f);
+}
+
+}  // namespace stx::temporal

@@ -1,0 +1,347 @@
+#include "lib/background/temporal.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+
+#include "lib/background/background_vote.hpp"
+#include "lib/background/depth_layers.hpp"
+#include "lib/background/frame_gauge.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/capture/capture.hpp"
+#include "lib/render/scene/page_set.hpp"
+
+namespace stx {
+namespace {
+
+using temporal::Measurement;
+using temporal::Worth;
+
+/// Samples this near to a depth edge of their own frame may be mixtures of two surfaces, pixels.
+constexpr int kMixedReach = 2;
+/// Depths of neighbours differ by this share or more at an edge, and by this many tolerances.
+constexpr float kEdgeShare = 0.03f, kEdgeTolerances = 2;
+/// Nothing moves where brightness, averaged over 3x3 pixels, changed by less than this many times
+/// what it does in the middle of the picture's pixels, and these steps.
+constexpr float kQuietTimes = 2, kQuietSteps = 1.5f;
+/// Rows that are worked on together.
+constexpr std::int64_t kRows = 8;
+/// Alpha of a pixel that its surface covers in full.
+constexpr float kFullAlpha = 0.999f;
+
+float alphaOf(const ReferenceView& frame, std::size_t pixel) {
+    return PageSet::alphaOf(frame.texture, pixel);
+}
+
+}  // namespace
+
+struct TemporalBackground::Impl {
+    ReferenceView like;  ///< the first frame without its images
+    bool linear = false;
+    TemporalBackgroundSettings settings;
+    int rows = 0;   ///< of a pass
+    int pass = 0, passCount = 1;
+
+    // Of one pass.
+    temporal::Gauge gauge;
+    std::variant<std::vector<temporal::PixelLayers<temporal::ByteSample>>,
+                 std::vector<temporal::PixelLayers<temporal::HalfSample>>>
+        pixels;
+    Image<std::uint8_t> before;  ///< brightness in the frame before, of these rows and one around
+    double firstTime = 0, lastTime = 0;
+    int frames = 0;
+    std::int64_t borderPoints = 0, borderPixels = 0;
+
+    int framesOfPass = 0;  ///< of the first pass, once it is over
+    BackgroundModel model;
+
+    explicit Impl(const ReferenceView& first) : gauge(first.camera) {}
+
+    [[nodiscard]] int width() const { return like.camera.width; }
+    [[nodiscard]] int height() const { return like.camera.height; }
+    [[nodiscard]] int firstRow() const { return pass * rows; }
+    [[nodiscard]] int endRow() const { return std::min(firstRow() + rows, height()); }
+
+    void beginPass();
+    [[nodiscard]] Result<void> checkFrame(const ReferenceView& frame, double time) const;
+    /// 1 for pixels within kMixedReach of a depth edge, of the rows of the pass.
+    [[nodiscard]] Image<std::uint8_t> mixedPixels(const ReferenceView& frame) const;
+    /// How much brightness changed since the frame before, of the rows of the pass and one around.
+    [[nodiscard]] Image<std::uint8_t> changes(const ReferenceView& frame, glm::vec3 gain);
+    void insert(const ReferenceView& frame, const temporal::FrameGauge& light, float time);
+    void countBorder(const ReferenceView& frame);
+};
+
+void TemporalBackground::Impl::beginPass() {
+    gauge = temporal::Gauge(like.camera);
+    const auto count = static_cast<std::size_t>(endRow() - firstRow()) * width();
+    if (linear)
+        pixels = std::vector<temporal::PixelLayers<temporal::HalfSample>>(count);
+    else
+        pixels = std::vector<temporal::PixelLayers<temporal::ByteSample>>(count);
+    before = {};
+    frames = 0;
+    borderPoints = borderPixels = 0;
+}
+
+Result<void> TemporalBackground::Impl::checkFrame(const ReferenceView& frame, double time) const {
+    STX_CHECK(frame.checkHeader());
+    if (frame.camera.width != width() || frame.camera.height != height())
+        return fail(ErrorCode::invalidInput, "the frame has {}x{} pixels, those before have {}x{}",
+                    frame.camera.width, frame.camera.height, width(), height());
+    if (!sameCamera(frame.camera, like.camera))
+        return fail(ErrorCode::invalidInput,
+                    "the camera moved; a background that remembers needs a still camera");
+    if (frame.texture.isLinear() != linear)
+        return fail(ErrorCode::invalidInput, "the frame has {} colours, those before have {} ones",
+                    linear ? "sRGB" : "linear", linear ? "linear" : "sRGB");
+    if (!std::isfinite(time) || (frames > 0 && !(time > lastTime)))
+        return fail(ErrorCode::invalidInput, "the frame is of {:g} s, the one before of {:g} s",
+                    time, lastTime);
+    return {};
+}
+
+Image<std::uint8_t> TemporalBackground::Impl::mixedPixels(const ReferenceView& frame) const {
+    const int w = width(), h = height(), top = firstRow();
+    const auto step = static_cast<float>(frame.depthBits == 32 ? 0.0 : frame.depthCode().step());
+    const Image<float>& depth = frame.depth;
+    const temporal::DepthNoise& noise = gauge.noise();
+    const auto jumps = [&](float a, float b) {
+        const bool pointA = hasPoint(a), pointB = hasPoint(b);
+        if (!pointA || !pointB) return pointA != pointB;
+        const float near = std::min(a, b), far = std::max(a, b);
+        if (far - near <= kEdgeShare * far) return false;
+        return far - near > kEdgeTolerances * far * noise.tolerance(far, step);
+    };
+    // An edge is marked on the pixels on both of its sides, and widened by what is left.
+    constexpr int kReach = kMixedReach - 1;
+    const int from = std::max(top - kReach, 0), to = std::min(endRow() + kReach, h);
+    Image<std::uint8_t> across(w, to - from, std::uint8_t{0});
+    parallelForBlocks(from, to, kRows, [&](std::int64_t begin, std::int64_t end) {
+        std::vector<std::uint8_t> edge(static_cast<std::size_t>(w));
+        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+            std::fill(edge.begin(), edge.end(), std::uint8_t{0});
+            const auto row = depth.row(y);
+            for (int x = 0; x + 1 < w; ++x) {
+                const auto i = static_cast<std::size_t>(x);
+                if (jumps(row[i], row[i + 1])) edge[i] = edge[i + 1] = 1;
+            }
+            for (const int other : {y - 1, y + 1}) {
+                if (other < 0 || other >= h) continue;
+                const auto beside = depth.row(other);
+                for (std::size_t i = 0; i < edge.size(); ++i)
+                    if (jumps(row[i], beside[i])) edge[i] = 1;
+            }
+            for (int x = 0; x < w; ++x) {
+                if (!edge[static_cast<std::size_t>(x)]) continue;
+                for (int k = std::max(x - kReach, 0); k <= std::min(x + kReach, w - 1); ++k)
+                    across.at(k, y - from) = 1;
+            }
+        }
+    });
+    Image<std::uint8_t> mixed(w, endRow() - top, std::uint8_t{0});
+    parallelForBlocks(top, endRow(), kRows, [&](std::int64_t begin, std::int64_t end) {
+        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
+            for (int k = std::max(y - kReach, from); k <= std::min(y + kReach, to - 1); ++k)
+                for (int x = 0; x < w; ++x) mixed.at(x, y - top) |= across.at(x, k - from);
+    });
+    return mixed;
+}
+
+Image<std::uint8_t> TemporalBackground::Impl::changes(const ReferenceView& frame, glm::vec3 gain) {
+    const int w = width();
+    const int from = std::max(firstRow() - 1, 0), to = std::min(endRow() + 1, height());
+    const bool first = before.empty();
+    if (first) before = Image<std::uint8_t>(w, to - from, std::uint8_t{0});
+    Image<std::uint8_t> changed(w, to - from, std::uint8_t{0});
+    parallelForBlocks(from, to, kRows, [&](std::int64_t begin, std::int64_t end) {
+        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+            for (int x = 0; x < w; ++x) {
+                const glm::vec3 colour =
+                    temporal::stepsOf(frame.texture, static_cast<std::size_t>(y) * w + x) / gain;
+                const auto now = static_cast<std::uint8_t>(
+                    std::clamp(temporal::brightness(colour) + 0.5f, 0.0f, 255.0f));
+                std::uint8_t& was = before.at(x, y - from);
+                if (!first) changed.at(x, y - from) = static_cast<std::uint8_t>(std::abs(now - was));
+                was = now;
+            }
+        }
+    });
+    return changed;
+}
+
+void TemporalBackground::Impl::insert(const ReferenceView& frame, const temporal::FrameGauge& light,
+                                      float time) {
+    const int w = width(), top = firstRow(), changesTop = std::max(top - 1, 0);
+    const auto step = static_cast<float>(frame.depthBits == 32 ? 0.0 : frame.depthCode().step());
+    const Image<std::uint8_t> mixed = mixedPixels(frame), changed = changes(frame, light.gain);
+    const float quiet = kQuietTimes * light.noise + kQuietSteps;
+    const auto frameNumber = static_cast<std::uint32_t>(frames);
+    const auto moves = [&](int x, int y) {
+        int sum = 0, count = 0;
+        for (int j = std::max(y - 1 - changesTop, 0);
+             j <= std::min(y + 1 - changesTop, changed.height() - 1); ++j) {
+            for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
+                sum += changed.at(i, j);
+                ++count;
+            }
+        }
+        return static_cast<float>(sum) > quiet * static_cast<float>(count);
+    };
+    std::visit(
+        [&](auto& all) {
+            parallelForBlocks(top, endRow(), kRows, [&](std::int64_t begin, std::int64_t end) {
+                for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+                    for (int x = 0; x < w; ++x) {
+                        const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
+                        auto& layers = all[static_cast<std::size_t>(y - top) * w + x];
+                        const float dist = frame.depth.data()[pixel];
+                        const float alpha = alphaOf(frame, pixel);
+                        if (!hasPoint(dist) || !(dist > 0)) {
+                            if (!(alpha > 0)) ++layers.empty;
+                            continue;
+                        }
+                        Measurement m;
+                        m.q = 1 / dist;
+                        m.tolerance = gauge.noise().tolerance(dist, step);
+                        m.weak = mixed.at(x, y - top) != 0 || alpha < kFullAlpha;
+                        const bool moving = moves(x, y);
+                        const auto worth = static_cast<Worth>((m.weak ? 2 : 0) + (moving ? 1 : 0));
+                        const std::uint32_t random = temporal::randomOf(pixel, frameNumber);
+                        m.key = temporal::keyOf(worth, random);
+                        m.heads = random & 1;
+                        m.time = time;
+                        m.colour = temporal::stepsOf(frame.texture, pixel) / light.gain;
+                        layers.add(m);
+                    }
+                }
+            });
+        },
+        pixels);
+}
+
+void TemporalBackground::Impl::countBorder(const ReferenceView& frame) {
+    const int w = width(), h = height();
+    const auto look = [&](int x, int y) {
+        ++borderPixels;
+        borderPoints += hasPoint(frame.depth.at(x, y)) ||
+                        alphaOf(frame, static_cast<std::size_t>(y) * w + x) >= kFullAlpha;
+    };
+    for (int x = 0; x < w; ++x) {
+        look(x, 0);
+        look(x, h - 1);
+    }
+    for (int y = 0; y < h; ++y) {
+        look(0, y);
+        look(w - 1, y);
+    }
+}
+
+TemporalBackground::TemporalBackground(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+TemporalBackground::TemporalBackground(TemporalBackground&&) noexcept = default;
+TemporalBackground& TemporalBackground::operator=(TemporalBackground&&) noexcept = default;
+TemporalBackground::~TemporalBackground() = default;
+
+Result<TemporalBackground> TemporalBackground::start(const ReferenceView& first,
+                                                     const TemporalBackgroundSettings& settings,
+                                                     Job& job) {
+    STX_CHECK(first.checkHeader());
+    auto impl = std::make_unique<Impl>(first);
+    impl->like.name = first.name;
+    impl->like.camera = first.camera;
+    impl->like.nearPlane = first.nearPlane;
+    impl->like.farPlane = first.farPlane;
+    impl->like.depthBits = first.depthBits;
+    impl->linear = first.texture.isLinear();
+    impl->settings = settings;
+    const int w = impl->width(), h = impl->height();
+    // The model itself, and marks of one frame.
+    const std::uint64_t fixed = static_cast<std::uint64_t>(w) * h * (impl->linear ? 32 : 20);
+    const std::uint64_t row = w * (impl->linear ? kBytesPerLinearPixel : kBytesPerPixel);
+    STX_CHECK(job.limits.checkAllocation(1, fixed + row, "the background"));
+    const std::uint64_t fitting = (job.limits.maxMemoryBytes - fixed) / row;
+    impl->passCount = static_cast<int>((h + fitting - 1) / std::min<std::uint64_t>(fitting, h));
+    if (fitting >= static_cast<std::uint64_t>(h)) impl->passCount = 1;
+    impl->rows = (h + impl->passCount - 1) / impl->passCount;
+    impl->passCount = (h + impl->rows - 1) / impl->rows;
+
+    BackgroundModel& model = impl->model;
+    model.view = impl->like;
+    model.view.depth = Image<float>(w, h, kNoDepth);
+    if (impl->linear)
+        model.view.texture = RgbaFloatImage(w, h, glm::vec4(0));
+    else
+        model.view.texture = Rgba8Image(w, h, glm::u8vec4(0));
+    model.confidence = Image<float>(w, h, 0.0f);
+    model.lastSeen = Image<float>(w, h, 0.0f);
+    impl->beginPass();
+    return TemporalBackground(std::move(impl));
+}
+
+int TemporalBackground::passes() const {
+    return impl_->passCount;
+}
+
+Result<void> TemporalBackground::add(const ReferenceView& frame, double time, Job& job) {
+    Impl& s = *impl_;
+    STX_CHECK(job.checkCancelled());
+    STX_CHECK(s.checkFrame(frame, time));
+    if (s.frames == 0) s.firstTime = time;
+    s.lastTime = time;
+    const temporal::FrameGauge light = s.gauge.measure(frame);
+    s.insert(frame, light, static_cast<float>(time - s.firstTime));
+    s.countBorder(frame);
+    ++s.frames;
+    return {};
+}
+
+Result<void> TemporalBackground::endPass(Job& job) {
+    Impl& s = *impl_;
+    STX_CHECK(job.checkCancelled());
+    if (s.frames == 0)
+        return fail(ErrorCode::invalidInput, "there are no frames to make a background of");
+    if (s.pass > 0 && s.frames != s.framesOfPass)
+        return fail(ErrorCode::invalidInput, "there are {} frames where there were {} before",
+                    s.frames, s.framesOfPass);
+    s.framesOfPass = s.frames;
+    temporal::Vote vote;
+    vote.frames = s.frames;
+    vote.support = s.settings.support;
+    vote.fillsFrame = 2 * s.borderPoints > s.borderPixels;
+    vote.gain = s.gauge.meanGain();
+    vote.noise = s.gauge.meanNoise();
+    vote.firstTime = s.firstTime;
+    std::visit(
+        [&](const auto& all) {
+            parallelForBlocks(s.firstRow(), s.endRow(), kRows, [&](std::int64_t from,
+                                                                   std::int64_t to) {
+                for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y)
+                    for (int x = 0; x < s.width(); ++x)
+                        vote.decide(all[static_cast<std::size_t>(y - s.firstRow()) * s.width() + x],
+                                    static_cast<std::size_t>(y) * s.width() + x, s.model);
+            });
+        },
+        s.pixels);
+    ++s.pass;
+    if (s.pass < s.passCount) s.beginPass();
+    return {};
+}
+
+Result<BackgroundModel> TemporalBackground::finish(Job& job) {
+    Impl& s = *impl_;
+    if (s.pass < s.passCount)
+        return fail(ErrorCode::failed, "only {} of {} passes were made", s.pass, s.passCount);
+    STX_CHECK(job.checkCancelled());
+    s.pixels = {};
+    BackgroundModel& model = s.model;
+    model.frames = s.framesOfPass;
+    const auto step = static_cast<float>(s.like.depthBits == 32 ? 0.0 : s.like.depthCode().step());
+    temporal::checkNeighbours(model, s.gauge.noise(), step);
+    if (model.view.pointCount() > 0) {
+        bleedColour(model.view.texture);
+        fitDepthRange(model.view);
+    }
+    return std::move(model);
+}
+
+}  // namespace stx
