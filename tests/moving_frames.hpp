@@ -97,11 +97,11 @@ struct MovingRoom {
         v.name = camera;
         v.camera = cameras.at(camera)[static_cast<std::size_t>(frame)];
         v.texture = picture(picturePath(camera, frame));
-        v.depth = depth(folder / camera / fmt::format("depth_{:03}.png", frame),
-                        [](std::uint16_t code) {
-                            return code ? static_cast<float>(20.0 / (1.0 + code / 65535.0 * 19.0))
-                                        : stx::kNoDepth;
-                        });
+        v.depth =
+            depth(folder / camera / fmt::format("depth_{:03}.png", frame), [](std::uint16_t code) {
+                return code ? static_cast<float>(20.0 / (1.0 + code / 65535.0 * 19.0))
+                            : stx::kNoDepth;
+            });
         coverPoints(v);
         return v;
     }
@@ -127,7 +127,8 @@ struct SyntheticRoom {
         }
     }
     [[nodiscard]] static double time(int frame) { return frame / double{kFrames - 1}; }
-    [[nodiscard]] stx::ReferenceView read(const std::string& name, const std::string& camera) const {
+    [[nodiscard]] stx::ReferenceView read(const std::string& name,
+                                          const std::string& camera) const {
         stx::ReferenceView v;
         v.name = camera;
         v.camera = cameras.at(camera);
@@ -151,7 +152,9 @@ struct SyntheticRoom {
 };
 
 /// Light that drifts by 4 %, as room.py has it.
-inline float driftAt(double time) { return 1 + 0.04f * static_cast<float>(std::sin(5 * time)); }
+inline float driftAt(double time) {
+    return 1 + 0.04f * static_cast<float>(std::sin(5 * time));
+}
 
 /// The same frame under another light.
 inline void relight(stx::ReferenceView& view, float gain) {
@@ -176,9 +179,9 @@ inline void addSensorNoise(stx::ReferenceView& view, int frame, double time) {
     const int w = view.camera.width, h = view.camera.height;
     for (auto& p : view.texture.rgba8()->pixels())
         for (int c = 0; c < 3; ++c)
-            p[c] = static_cast<std::uint8_t>(std::clamp(
-                std::round(static_cast<float>(p[c]) * driftAt(time) + 2.2f * normal()), 0.0f,
-                255.0f));
+            p[c] = static_cast<std::uint8_t>(
+                std::clamp(std::round(static_cast<float>(p[c]) * driftAt(time) + 2.2f * normal()),
+                           0.0f, 255.0f));
     const stx::Image<float> clean = view.depth;
     stx::Image<float> noisy = clean;
     for (float& z : noisy.pixels()) z += normal() * 0.0015f * z * z;
@@ -196,14 +199,13 @@ inline void addSensorNoise(stx::ReferenceView& view, int frame, double time) {
             float z = noisy.at(x, y);
             if (edge) z = noisy.at((x - dx + w) % w, (y - dy + h) % h);
             const bool missing = (uniform() < 0.004f) | (edge & (uniform() < 0.35f));
-            view.depth.at(x, y) =
-                missing ? stx::kNoDepth : std::round(z * 5000.0f) / 5000.0f;
+            view.depth.at(x, y) = missing ? stx::kNoDepth : std::round(z * 5000.0f) / 5000.0f;
         }
     }
     coverPoints(view);
 }
 
-/// uva-person: 25 frames of a Kinect, numbers 50 to 98.
+/// uva-person: 50 frames of a Kinect, with even numbers.
 inline stx::ReferenceView personFrame(const std::filesystem::path& folder, int number) {
     stx::ReferenceView v;
     v.name = "kinect";

@@ -1,6 +1,7 @@
 #include "lib/background/background_vote.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 #include "lib/base/parallel.hpp"
 
@@ -16,6 +17,11 @@ constexpr float kShadow = 6, kShadowTimes = 6;
 constexpr float kLightShare = 0.25f;
 /// Samples of the best worth are enough by themselves when there are these.
 constexpr int kEnough = 3;
+/// Neighbours within this share of their distance, or this many tolerances, are of one piece.
+constexpr float kSurfaceShare = 0.03f, kSurfaceTolerances = 2;
+/// A piece goes on in what is within this share of its distance; along this share of its outline,
+/// it is a part of something that moves.
+constexpr float kGhostShare = 0.08f, kGhostOutline = 0.5f;
 /// Neighbours within this many tolerances are of one surface.
 constexpr float kNeighbour = 3;
 
@@ -76,10 +82,10 @@ glm::vec3 colourOf(const Layer<Sample>& layer, float noise) {
         apart = difference;
     }
     const auto lighter = static_cast<float>(count - split);
-    const int first =
-        apart > std::max(kShadow, kShadowTimes * noise) && lighter >= std::max(2.0f, kLightShare * static_cast<float>(count))
-            ? split
-            : 0;
+    const int first = apart > std::max(kShadow, kShadowTimes * noise) &&
+                              lighter >= std::max(2.0f, kLightShare * static_cast<float>(count))
+                          ? split
+                          : 0;
     // The mean of the middle half: as steady as a median against what does not belong, with less
     // noise.
     glm::vec3 colour;
@@ -119,9 +125,21 @@ void clearPixel(BackgroundModel& model, std::size_t pixel) {
 }  // namespace
 
 template <class Sample>
-void Vote::decide(const PixelLayers<Sample>& layers, std::size_t pixel,
-                  BackgroundModel& model) const {
+void Vote::decide(const PixelLayers<Sample>& layers, std::size_t pixel, BackgroundModel& model,
+                  InFront& inFront) const {
     const Layer<Sample>* layer = backgroundOf(layers, *this);
+    // Beside edges depth flickers, and where the sensor mostly saw nothing it is not to be trusted.
+    float farthest = layer ? layer->q : 0;
+    if (!layer) {
+        // The farthest may be the background all the same, only seen too seldom.
+        for (const auto& other : layers.layers)
+            if (other.count() > 0 && (farthest == 0 || other.q < farthest)) farthest = other.q;
+    }
+    int others = 0;
+    for (const auto& other : layers.layers)
+        if (others < 2 && other.strong > other.weak &&
+            2 * layers.empty < static_cast<std::uint32_t>(frames) && (!layer || other.q > layer->q))
+            inFront.data()[pixel][others++] = other.q;
     if (!layer) return;
     model.view.depth.data()[pixel] = 1 / layer->q;
     setColour(model.view.texture, pixel, colourOf(*layer, noise) * gain);
@@ -130,8 +148,73 @@ void Vote::decide(const PixelLayers<Sample>& layers, std::size_t pixel,
     model.lastSeen.data()[pixel] = static_cast<float>(firstTime + layer->last);
 }
 
-template void Vote::decide(const PixelLayers<ByteSample>&, std::size_t, BackgroundModel&) const;
-template void Vote::decide(const PixelLayers<HalfSample>&, std::size_t, BackgroundModel&) const;
+template void Vote::decide(const PixelLayers<ByteSample>&, std::size_t, BackgroundModel&,
+                           InFront&) const;
+template void Vote::decide(const PixelLayers<HalfSample>&, std::size_t, BackgroundModel&,
+                           InFront&) const;
+
+void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise& noise,
+                float step) {
+    const Image<float>& depth = model.view.depth;
+    const int w = depth.width(), h = depth.height();
+    const auto tolerance = [&](float dist) {
+        return std::max(kSurfaceShare, kSurfaceTolerances * noise.tolerance(dist, step));
+    };
+    // Pieces of surface: numbers of pixels that lead to the first of their piece.
+    std::vector<std::uint32_t> first(depth.count());
+    std::iota(first.begin(), first.end(), 0u);
+    const auto find = [&](std::uint32_t i) {
+        while (first[i] != i) i = first[i] = first[first[i]];
+        return i;
+    };
+    const auto linked = [&](float a, float b) {
+        return hasPoint(a) && hasPoint(b) && std::abs(a - b) <= std::max(a, b) * tolerance(a);
+    };
+    for (int y = 0; y < h; ++y) {
+        for (int x = 0; x < w; ++x) {
+            const auto i = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(w) +
+                           static_cast<std::uint32_t>(x);
+            for (const auto& [ok, other] : {std::pair{x > 0, i - 1}, {y > 0, i - w}}) {
+                if (!ok || !linked(depth.data()[i], depth.data()[other])) continue;
+                const std::uint32_t a = find(i), b = find(other);
+                first[std::max(a, b)] = std::min(a, b);
+            }
+        }
+    }
+    // Their outlines against what is farther, and where those go on in front of it.
+    struct Outline {
+        std::uint32_t length = 0, goesOn = 0;
+    };
+    std::vector<Outline> outlines(depth.count());
+    for (int y = 0; y < h; ++y) {
+        for (int x = 0; x < w; ++x) {
+            const float here = depth.at(x, y);
+            if (!hasPoint(here)) continue;
+            const auto i = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(w) +
+                           static_cast<std::uint32_t>(x);
+            for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+                if (!depth.contains(x + dx, y + dy)) continue;
+                const float there = depth.at(x + dx, y + dy);
+                if (there <= here || linked(here, there)) continue;
+                Outline& outline = outlines[find(i)];
+                ++outline.length;
+                const glm::vec2 before = inFront.at(x + dx, y + dy);
+                for (int k = 0; k < 2; ++k) {
+                    if (!(before[k] > 0) || std::abs(before[k] * here - 1) > kGhostShare) continue;
+                    ++outline.goesOn;
+                    break;
+                }
+            }
+        }
+    }
+    for (std::uint32_t i = 0; i < first.size(); ++i) {
+        const Outline& outline = outlines[find(i)];
+        if (hasPoint(depth.data()[i]) && outline.goesOn > 0 &&
+            static_cast<float>(outline.goesOn) >=
+                kGhostOutline * static_cast<float>(outline.length))
+            clearPixel(model, i);
+    }
+}
 
 void checkNeighbours(BackgroundModel& model, const DepthNoise& noise, float step) {
     const Image<float> depth = model.view.depth;

@@ -6,19 +6,29 @@
 
 namespace stx::temporal {
 
+/// Inverse distances of what a pixel showed before its background, 0 = nothing.
+using InFront = Image<glm::vec2>;
+
 /// Which of a pixel's layers is the background, and of what colour.
 struct Vote {
     int frames = 0;
     double support = 0.04;
     bool fillsFrame = true;  ///< emptiness is what the sensor missed, not what is behind all
     glm::vec3 gain{1.0f};    ///< of the light that the model gets
-    float noise = 0;  ///< how much brightness differs from frame to frame, steps of 0..255
+    float noise = 0;         ///< how much brightness differs from frame to frame, steps of 0..255
     double firstTime = 0;
 
     /// Sets a pixel of the model; leaves it empty when the background was not seen there.
     template <class Sample>
-    void decide(const PixelLayers<Sample>& layers, std::size_t pixel, BackgroundModel& model) const;
+    void decide(const PixelLayers<Sample>& layers, std::size_t pixel, BackgroundModel& model,
+                InFront& inFront) const;
 };
+
+/// Drops what is no background but the part of a moving thing that never left its place, as that of
+/// somebody who turns: a surface whose outline goes on in what other pixels had before their
+/// background.
+void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise& noise,
+                float step);
 
 /// Drops pixels that no neighbour agrees with, and closes single open ones between equal depths.
 void checkNeighbours(BackgroundModel& model, const DepthNoise& noise, float step);

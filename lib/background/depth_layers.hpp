@@ -85,8 +85,8 @@ struct Measurement {
     float tolerance = 0;  ///< share of q
     bool weak = false;    ///< beside a depth edge, where depth and colour may be mixtures
     std::uint8_t key = 0;
-    bool heads = false;   ///< decides between samples of equal keys
-    float time = 0;       ///< seconds from the first frame
+    bool heads = false;  ///< decides between samples of equal keys
+    float time = 0;      ///< seconds from the first frame
     glm::vec3 colour{0.0f};
 };
 

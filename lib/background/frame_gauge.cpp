@@ -13,8 +13,9 @@ constexpr float kLeastShare = 1e-5f;
 constexpr float kStepsPerOctave = 4;
 /// Fewer samples than these of one distance say nothing of it; those of all do.
 constexpr std::uint32_t kFewSamples = 200;
-/// A median of differences of two equal Gaussians is this many standard deviations.
-constexpr float kMedianOfDifference = 0.954f;
+/// Three quarters of the differences of two equal Gaussians are below this many standard
+/// deviations. (A median may be 0 where a sensor's coarse steps flicker.)
+constexpr float kUpperQuartile = 1.627f;
 constexpr float kDeviations = 3;
 /// Noise above this share of the distance is movement.
 constexpr float kMostShare = 0.05f;
@@ -46,10 +47,11 @@ void DepthNoise::add(float before, float now) {
 }
 
 void DepthNoise::update() {
-    const auto median = [](const std::array<std::uint32_t, kSteps>& counts, std::uint64_t total) {
+    const auto upperQuartile = [](const std::array<std::uint32_t, kSteps>& counts,
+                                  std::uint64_t total) {
         std::uint64_t below = 0;
         int slot = 0;
-        while (slot < kSteps && 2 * (below + counts[static_cast<std::size_t>(slot)]) < total)
+        while (slot < kSteps && 4 * (below + counts[static_cast<std::size_t>(slot)]) < 3 * total)
             below += counts[static_cast<std::size_t>(slot++)];
         if (slot == 0) return 0.0f;
         return kLeastShare * std::exp2((static_cast<float>(slot) - 0.5f) / kStepsPerOctave);
@@ -63,12 +65,12 @@ void DepthNoise::update() {
         }
     }
     if (total == 0) return;
-    const float common = median(all, total);
+    const float common = upperQuartile(all, total);
     for (std::size_t bin = 0; bin < kBins; ++bin) {
         std::uint64_t here = 0;
         for (const std::uint32_t n : counts_[bin]) here += n;
-        const float middle = here < kFewSamples ? common : median(counts_[bin], here);
-        share_[bin] = std::min(kDeviations / kMedianOfDifference * middle, kMostShare);
+        const float spread = here < kFewSamples ? common : upperQuartile(counts_[bin], here);
+        share_[bin] = std::min(kDeviations / kUpperQuartile * spread, kMostShare);
     }
 }
 
@@ -151,7 +153,8 @@ FrameGauge Gauge::measure(const ReferenceView& frame) {
         }
     }
     if (!differences.empty()) {
-        const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+        const auto middle =
+            differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
         std::nth_element(differences.begin(), middle, differences.end());
         gauge.noise = *middle;
     }

@@ -56,10 +56,10 @@ class Gauge {
   private:
     struct Point {
         std::uint32_t pixel = 0;
-        float before = 0;                     ///< depth in the frame before, 0 = none
-        glm::vec3 beforeColour{0.0f};         ///< without its gain
-        float depth = 0;                      ///< mean of the layer whose light is known
-        glm::vec3 colour{0.0f};               ///< and its mean colour, without gains
+        float before = 0;              ///< depth in the frame before, 0 = none
+        glm::vec3 beforeColour{0.0f};  ///< without its gain
+        float depth = 0;               ///< mean of the layer whose light is known
+        glm::vec3 colour{0.0f};        ///< and its mean colour, without gains
         float count = 0;
     };
     [[nodiscard]] glm::vec3 gainOf(const std::vector<glm::vec3>& now) const;

@@ -24,6 +24,9 @@ constexpr float kEdgeShare = 0.03f, kEdgeTolerances = 2;
 /// Nothing moves where brightness, averaged over 3x3 pixels, changed by less than this many times
 /// what it does in the middle of the picture's pixels, and these steps.
 constexpr float kQuietTimes = 2, kQuietSteps = 1.5f;
+/// A scene is all around, not an object in the empty space, when its points are this share of the
+/// pixels: a sensor misses a quarter of a room.
+constexpr double kFilled = 0.5;
 /// Rows that are worked on together.
 constexpr std::int64_t kRows = 8;
 /// Alpha of a pixel that its surface covers in full.
@@ -39,7 +42,7 @@ struct TemporalBackground::Impl {
     ReferenceView like;  ///< the first frame without its images
     bool linear = false;
     TemporalBackgroundSettings settings;
-    int rows = 0;   ///< of a pass
+    int rows = 0;  ///< of a pass
     int pass = 0, passCount = 1;
 
     // Of one pass.
@@ -50,10 +53,11 @@ struct TemporalBackground::Impl {
     Image<std::uint8_t> before;  ///< brightness in the frame before, of these rows and one around
     double firstTime = 0, lastTime = 0;
     int frames = 0;
-    std::int64_t borderPoints = 0, borderPixels = 0;
+    std::int64_t points = 0;  ///< of all frames
 
     int framesOfPass = 0;  ///< of the first pass, once it is over
     BackgroundModel model;
+    temporal::InFront inFront;
 
     explicit Impl(const ReferenceView& first) : gauge(first.camera) {}
 
@@ -69,7 +73,6 @@ struct TemporalBackground::Impl {
     /// How much brightness changed since the frame before, of the rows of the pass and one around.
     [[nodiscard]] Image<std::uint8_t> changes(const ReferenceView& frame, glm::vec3 gain);
     void insert(const ReferenceView& frame, const temporal::FrameGauge& light, float time);
-    void countBorder(const ReferenceView& frame);
 };
 
 void TemporalBackground::Impl::beginPass() {
@@ -81,7 +84,7 @@ void TemporalBackground::Impl::beginPass() {
         pixels = std::vector<temporal::PixelLayers<temporal::ByteSample>>(count);
     before = {};
     frames = 0;
-    borderPoints = borderPixels = 0;
+    points = 0;
 }
 
 Result<void> TemporalBackground::Impl::checkFrame(const ReferenceView& frame, double time) const {
@@ -162,7 +165,8 @@ Image<std::uint8_t> TemporalBackground::Impl::changes(const ReferenceView& frame
                 const auto now = static_cast<std::uint8_t>(
                     std::clamp(temporal::brightness(colour) + 0.5f, 0.0f, 255.0f));
                 std::uint8_t& was = before.at(x, y - from);
-                if (!first) changed.at(x, y - from) = static_cast<std::uint8_t>(std::abs(now - was));
+                if (!first)
+                    changed.at(x, y - from) = static_cast<std::uint8_t>(std::abs(now - was));
                 was = now;
             }
         }
@@ -220,23 +224,6 @@ void TemporalBackground::Impl::insert(const ReferenceView& frame, const temporal
         pixels);
 }
 
-void TemporalBackground::Impl::countBorder(const ReferenceView& frame) {
-    const int w = width(), h = height();
-    const auto look = [&](int x, int y) {
-        ++borderPixels;
-        borderPoints += hasPoint(frame.depth.at(x, y)) ||
-                        alphaOf(frame, static_cast<std::size_t>(y) * w + x) >= kFullAlpha;
-    };
-    for (int x = 0; x < w; ++x) {
-        look(x, 0);
-        look(x, h - 1);
-    }
-    for (int y = 0; y < h; ++y) {
-        look(0, y);
-        look(w - 1, y);
-    }
-}
-
 TemporalBackground::TemporalBackground(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 TemporalBackground::TemporalBackground(TemporalBackground&&) noexcept = default;
 TemporalBackground& TemporalBackground::operator=(TemporalBackground&&) noexcept = default;
@@ -256,7 +243,7 @@ Result<TemporalBackground> TemporalBackground::start(const ReferenceView& first,
     impl->settings = settings;
     const int w = impl->width(), h = impl->height();
     // The model itself, and marks of one frame.
-    const std::uint64_t fixed = static_cast<std::uint64_t>(w) * h * (impl->linear ? 32 : 20);
+    const std::uint64_t fixed = static_cast<std::uint64_t>(w) * h * (impl->linear ? 48 : 36);
     const std::uint64_t row = w * (impl->linear ? kBytesPerLinearPixel : kBytesPerPixel);
     STX_CHECK(job.limits.checkAllocation(1, fixed + row, "the background"));
     const std::uint64_t fitting = (job.limits.maxMemoryBytes - fixed) / row;
@@ -272,6 +259,7 @@ Result<TemporalBackground> TemporalBackground::start(const ReferenceView& first,
         model.view.texture = RgbaFloatImage(w, h, glm::vec4(0));
     else
         model.view.texture = Rgba8Image(w, h, glm::u8vec4(0));
+    impl->inFront = temporal::InFront(w, h, glm::vec2(0.0f));
     model.confidence = Image<float>(w, h, 0.0f);
     model.lastSeen = Image<float>(w, h, 0.0f);
     impl->beginPass();
@@ -288,9 +276,9 @@ Result<void> TemporalBackground::add(const ReferenceView& frame, double time, Jo
     STX_CHECK(s.checkFrame(frame, time));
     if (s.frames == 0) s.firstTime = time;
     s.lastTime = time;
+    s.points += frame.pointCount();
     const temporal::FrameGauge light = s.gauge.measure(frame);
     s.insert(frame, light, static_cast<float>(time - s.firstTime));
-    s.countBorder(frame);
     ++s.frames;
     return {};
 }
@@ -307,19 +295,21 @@ Result<void> TemporalBackground::endPass(Job& job) {
     temporal::Vote vote;
     vote.frames = s.frames;
     vote.support = s.settings.support;
-    vote.fillsFrame = 2 * s.borderPoints > s.borderPixels;
+    const double places = static_cast<double>(s.width()) * s.height() * s.frames;
+    vote.fillsFrame = static_cast<double>(s.points) > kFilled * places;
     vote.gain = s.gauge.meanGain();
     vote.noise = s.gauge.meanNoise();
     vote.firstTime = s.firstTime;
     std::visit(
         [&](const auto& all) {
-            parallelForBlocks(s.firstRow(), s.endRow(), kRows, [&](std::int64_t from,
-                                                                   std::int64_t to) {
-                for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y)
-                    for (int x = 0; x < s.width(); ++x)
-                        vote.decide(all[static_cast<std::size_t>(y - s.firstRow()) * s.width() + x],
-                                    static_cast<std::size_t>(y) * s.width() + x, s.model);
-            });
+            parallelForBlocks(
+                s.firstRow(), s.endRow(), kRows, [&](std::int64_t from, std::int64_t to) {
+                    for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y)
+                        for (int x = 0; x < s.width(); ++x)
+                            vote.decide(
+                                all[static_cast<std::size_t>(y - s.firstRow()) * s.width() + x],
+                                static_cast<std::size_t>(y) * s.width() + x, s.model, s.inFront);
+                });
         },
         s.pixels);
     ++s.pass;
@@ -336,6 +326,7 @@ Result<BackgroundModel> TemporalBackground::finish(Job& job) {
     BackgroundModel& model = s.model;
     model.frames = s.framesOfPass;
     const auto step = static_cast<float>(s.like.depthBits == 32 ? 0.0 : s.like.depthCode().step());
+    temporal::dropGhosts(model, s.inFront, s.gauge.noise(), step);
     temporal::checkNeighbours(model, s.gauge.noise(), step);
     if (model.view.pointCount() > 0) {
         bleedColour(model.view.texture);

@@ -48,9 +48,8 @@ class TemporalBackground {
 
     /// For frames of the size, camera and kind of colour of `first`, which is not yet counted.
     /// Errors: a view that fails checkHeader(), more memory for one row than the job allows.
-    [[nodiscard]] static Result<TemporalBackground> start(const ReferenceView& first,
-                                                          const TemporalBackgroundSettings& settings,
-                                                          Job& job);
+    [[nodiscard]] static Result<TemporalBackground> start(
+        const ReferenceView& first, const TemporalBackgroundSettings& settings, Job& job);
     TemporalBackground(TemporalBackground&&) noexcept;
     TemporalBackground& operator=(TemporalBackground&&) noexcept;
     ~TemporalBackground();

@@ -54,7 +54,8 @@ void keep(const ReferenceView& view, const std::string& name) {
     auto texture = *view.texture.rgba8();
     for (std::size_t i = 0; i < texture.count(); ++i)
         if (!hasPoint(view.depth.data()[i])) texture.data()[i] = {255, 0, 255, 255};
-    const auto bytes = encodePng(view.camera.width, view.camera.height, 4, 8, texture.data(), true, 1);
+    const auto bytes =
+        encodePng(view.camera.width, view.camera.height, 4, 8, texture.data(), true, 1);
     std::FILE* file = std::fopen(fmt::format("{}/{}.png", out, name).c_str(), "wb");
     std::fwrite(bytes->data(), 1, bytes->size(), file);
     std::fclose(file);
@@ -63,8 +64,8 @@ void keep(const ReferenceView& view, const std::string& name) {
 TEST(TemporalBackground, Person) {
     REQUIRE_SHARED(folder, "data/motion/uva-person");
     Job job;
-    const auto model = modelOf([&](int i) { return moving::personFrame(folder, 50 + 2 * i); },
-                               [](int i) { return i / 15.0; }, 25, job);
+    const auto model = modelOf([&](int i) { return moving::personFrame(folder, 2 * i); },
+                               [](int i) { return i / 15.0; }, 50, job);
     keep(model.view, "person");
 }
 
@@ -73,7 +74,8 @@ TEST(TemporalBackground, MovingRoom) {
     Job job;
     const moving::MovingRoom room(folder);
     for (const char* v : {"v0", "v1", "v2"}) {
-        const auto model = modelOf([&](int i) { return room.view(v, i); }, moving::MovingRoom::time, 16, job);
+        const auto model =
+            modelOf([&](int i) { return room.view(v, i); }, moving::MovingRoom::time, 16, job);
         keep(model.view, v);
     }
 }
