@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/model/light_ratio.hpp"
+
 namespace stx::temporal {
 namespace {
 
@@ -20,15 +22,6 @@ constexpr float kDeviations = 3;
 /// Noise above this share of the distance is movement.
 constexpr float kMostShare = 0.05f;
 
-/// Colours that differ by more than this from what a gain explains are of something else, in steps
-/// of 0..255: in the first and in the last round.
-constexpr std::array<float, 4> kOutlier = {40, 20, 12, 8};
-/// Too dark or too bright to tell light, steps of 0..255.
-constexpr float kDarkest = 8, kBrightest = 247;
-/// Fewer points than these tell no gain.
-constexpr int kFewPoints = 50;
-/// Gains are believed within a factor of two.
-constexpr float kMostGain = 2;
 /// A mean remembers this many frames.
 constexpr float kMemory = 200;
 
@@ -87,31 +80,6 @@ Gauge::Gauge(const Camera& camera) {
     }
 }
 
-glm::vec3 Gauge::gainOf(const std::vector<glm::vec3>& now) const {
-    glm::vec3 gain(1.0f);
-    for (int channel = 0; channel < 3; ++channel) {
-        // A quotient of sums is not drawn to whole steps as a median of quotients is. Several
-        // rounds leave out what moved, stands in shadow or is too bright to tell.
-        for (const float outlier : kOutlier) {
-            double ours = 0, theirs = 0;
-            int count = 0;
-            for (std::size_t i = 0; i < points_.size(); ++i) {
-                const Point& p = points_[i];
-                const float a = now[i][channel], b = p.colour[channel];
-                if (!(p.count > 0) || !(a > kDarkest && a < kBrightest && b > kDarkest)) continue;
-                if (std::abs(a - gain[channel] * b) > outlier) continue;
-                ours += a;
-                theirs += b;
-                ++count;
-            }
-            if (count < kFewPoints) break;
-            const auto quotient = static_cast<float>(ours / theirs);
-            gain[channel] = std::clamp(quotient, 1 / kMostGain, kMostGain);
-        }
-    }
-    return gain;
-}
-
 FrameGauge Gauge::measure(const ReferenceView& frame) {
     const auto step = static_cast<float>(frame.depthBits == 32 ? 0.0 : frame.depthCode().step());
     std::vector<glm::vec3> now(points_.size(), glm::vec3(-1.0f));
@@ -130,7 +98,11 @@ FrameGauge Gauge::measure(const ReferenceView& frame) {
         if (same || p.count == 0) now[i] = stepsOf(frame.texture, p.pixel);
     }
     FrameGauge gauge;
-    gauge.gain = gainOf(now);
+    std::vector<LitPair> pairs;
+    for (std::size_t i = 0; i < points_.size(); ++i)
+        if (points_[i].count > 0 && now[i].x >= 0)
+            pairs.push_back({points_[i].colour / 255.0f, now[i] / 255.0f});
+    gauge.gain = lightRatio(pairs);
     std::vector<float> differences;
     for (std::size_t i = 0; i < points_.size(); ++i) {
         Point& p = points_[i];

@@ -62,7 +62,6 @@ class Gauge {
         glm::vec3 colour{0.0f};        ///< and its mean colour, without gains
         float count = 0;
     };
-    [[nodiscard]] glm::vec3 gainOf(const std::vector<glm::vec3>& now) const;
 
     std::vector<Point> points_;
     DepthNoise noise_;

@@ -254,6 +254,7 @@ Result<TemporalBackground> TemporalBackground::start(const ReferenceView& first,
 
     BackgroundModel& model = impl->model;
     model.view = impl->like;
+    model.view.background = true;
     model.view.depth = Image<float>(w, h, kNoDepth);
     if (impl->linear)
         model.view.texture = RgbaFloatImage(w, h, glm::vec4(0));

@@ -32,6 +32,9 @@ struct ReferenceView {
     /// Pixels of full alpha without a depth were pruned: the object is there, other views give its
     /// distance. In other views they are what a sensor missed.
     bool pruned = false;
+    /// What stands behind everything that moves, remembered from other times (TemporalBackground).
+    /// Renderers use it only where no other view shows a surface.
+    bool background = false;
 
     Texture texture;     ///< colour with coverage in alpha
     Image<float> depth;  ///< planar distance in scene units; kNoDepth where there is no point

@@ -1,6 +1,7 @@
 #include "lib/render/renderer.hpp"
 
 #include "lib/render/fallback.hpp"
+#include "lib/render/finish/behind.hpp"
 #include "lib/render/finish/footprint.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
@@ -15,9 +16,21 @@
 namespace stx {
 namespace {
 
+/// A renderer of splats, and another of the views behind them.
+template <class Make>
+Result<std::unique_ptr<Renderer>> splatsBefore(const PageSet& set, const Make& make) {
+    STX_TRY(std::unique_ptr<Renderer> front, Result<std::unique_ptr<Renderer>>(make(set)));
+    if (!set.behind()) return front;
+    STX_TRY(std::unique_ptr<Renderer> behind,
+            Result<std::unique_ptr<Renderer>>(make(*set.behind())));
+    return withBackground(std::move(front), std::move(behind));
+}
+
 Result<std::unique_ptr<Renderer>> makeCpu(const PageSet& set, const RenderSettings& settings,
                                           Job& job) {
-    if (settings.mode == RenderMode::splat) return makeCpuSplatRenderer(set, settings, job);
+    if (settings.mode == RenderMode::splat)
+        return splatsBefore(
+            set, [&](const PageSet& s) { return makeCpuSplatRenderer(s, settings, job); });
     return makeCpuSurfaceRenderer(set, settings, job);
 }
 
@@ -30,7 +43,8 @@ Result<std::unique_ptr<Renderer>> makeGpu(const PageSet& set, const RenderSettin
                                           int device, Job& job) {
     if (settings.mode == RenderMode::surface)
         return gpu::makeGpuSurfaceRenderer(set, settings, device, job);
-    return gpu::makeGpuSplatRenderer(set, settings, device, job);
+    return splatsBefore(
+        set, [&](const PageSet& s) { return gpu::makeGpuSplatRenderer(s, settings, device, job); });
 }
 
 Result<std::unique_ptr<Renderer>> makeGl(const PageSet& set, const RenderSettings& settings,
@@ -38,7 +52,8 @@ Result<std::unique_ptr<Renderer>> makeGl(const PageSet& set, const RenderSetting
     if (settings.mode == RenderMode::surface)
         return fail(ErrorCode::unsupported,
                     "the gl backend draws splats only; use --mode splat or --backend cpu");
-    return gl::makeGlRenderer(set, settings, device, job);
+    return splatsBefore(
+        set, [&](const PageSet& s) { return gl::makeGlRenderer(s, settings, device, job); });
 }
 
 /// What is known of the device asked for; -1: of all.
@@ -104,11 +119,32 @@ Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const PageSet& set,
     return makeCpu(set, settings, job);
 }
 
+/// The views that show what is there now, before the background when it is wanted. A set of
+/// background views only is drawn as any other.
+PageSet inFront(const PageSet& set, const RenderSettings& settings) {
+    const auto views = set.views();
+    const auto isBackground = [](const PageView& v) { return v.background; };
+    if (std::none_of(views.begin(), views.end(), isBackground) ||
+        std::all_of(views.begin(), views.end(), isBackground))
+        return set;
+    const PageSet front = set.part(false);
+    if (settings.fill != Fill::background) return front;
+    return front.before(set.part(true).inLightOf(front));
+}
+
 Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
                                            const RenderSettings& settings, int device, Job& job) {
     // Alpha inside of the object is no outline for surfaces to end at.
     bool translucent = false;
-    const PageSet drawn = settings.mode == RenderMode::surface ? set.solid(translucent) : set;
+    const auto solid = [&](const PageSet& views) {
+        if (settings.mode != RenderMode::surface) return views;
+        bool changed = false;
+        PageSet opaque = views.solid(changed);
+        translucent = translucent || changed;
+        return opaque;
+    };
+    PageSet drawn = solid(inFront(set, settings));
+    if (drawn.behind()) drawn = drawn.before(solid(*drawn.behind()));
     if (translucent)
         job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");
     STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));

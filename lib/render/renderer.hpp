@@ -28,8 +28,12 @@ enum class GpuPipeline {
     raster,   ///< Lee & Park's: points drawn with vertex texture fetch; OpenGL 3.3 will do
     compute,  ///< atomic depth minimum, then weighted accumulation; needs OpenGL 4.5
 };
-/// What surface mode does with pixels of a full scene that no reference saw.
-enum class Fill { background, none };
+/// What is put where no reference view shows a surface.
+enum class Fill {
+    background,  ///< the bundle's background views, and what is around where these have nothing
+    spatial,     ///< what is around only (surface mode, in scenes that fill the frame)
+    none,
+};
 
 struct RenderSettings {
     RenderMode mode = RenderMode::surface;

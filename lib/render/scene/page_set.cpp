@@ -47,6 +47,7 @@ PageView viewFrom(const ReferenceView& from) {
     v.farPlane = from.farPlane;
     v.depthBits = from.depthBits;
     v.pruned = from.pruned;
+    v.background = from.background;
     return v;
 }
 
@@ -218,6 +219,7 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
     view.farPlane = from.farPlane;
     view.depthBits = from.depthBits;
     view.pruned = from.pruned;
+    view.background = from.background;
     if (linear())
         view.texture = RgbaFloatImage(width, height, glm::vec4(0));
     else

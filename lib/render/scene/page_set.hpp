@@ -59,7 +59,8 @@ struct PageView {
     Camera camera;
     double nearPlane = 0, farPlane = 0;  ///< scene units
     int depthBits = 16;
-    bool pruned = false;  ///< see ReferenceView::pruned
+    bool pruned = false;      ///< see ReferenceView::pruned
+    bool background = false;  ///< see ReferenceView::background
     bool hasNormals = false, hasSplats = false;
     /// Its rectangles in PageSet::rectangles().
     std::uint32_t firstRectangle = 0, rectangleCount = 0;
@@ -104,6 +105,22 @@ class PageSet {
     /// a pixel the object covers at its outline: points with translucent points all around them,
     /// and those beside such, get full alpha. `changed` tells whether there were any.
     [[nodiscard]] PageSet solid(bool& changed) const;
+
+    /// The views that are background, or those that are not, with their pages only. Empty when
+    /// there are none: nothing can be drawn from it then.
+    [[nodiscard]] PageSet part(bool background) const;
+    /// The same with colours in the light of another set: where a view of that has the same camera,
+    /// colours are multiplied by what they differ by where both show the same surface (for each
+    /// channel, robustly; nothing below half a step of 8 bits, nothing above a factor of two).
+    [[nodiscard]] PageSet inLightOf(const PageSet& other) const;
+    /// What is drawn where nothing else is: background views. Null when there are none.
+    [[nodiscard]] const PageSet* behind() const { return behind_.get(); }
+    /// The same views in front of a background.
+    [[nodiscard]] PageSet before(PageSet background) const {
+        PageSet set = *this;
+        set.behind_ = std::make_shared<const PageSet>(std::move(background));
+        return set;
+    }
 
     /// World bounds of all points: those that the file gives, else computed from the pixels.
     [[nodiscard]] Bounds bounds() const;
@@ -182,7 +199,8 @@ class PageSet {
         int padding = 0;  ///< texels around each rectangle that may be read
         bool pruned = false;
         std::shared_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles
-        std::vector<std::shared_ptr<const Texture>> solid;  ///< of solid()
+        /// Of solid() and inLightOf().
+        std::vector<std::shared_ptr<const Texture>> changed;
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
     static void addBundle(const Bundle& bundle, Data& data);
@@ -190,6 +208,7 @@ class PageSet {
     static void buildIndex(Data& data);
 
     std::shared_ptr<const Data> data_;
+    std::shared_ptr<const PageSet> behind_;
 };
 
 inline const PageRectangle* PageSet::find(std::size_t view, int x0, int y0, int x1, int y1) const {

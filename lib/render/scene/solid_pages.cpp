@@ -79,11 +79,13 @@ PageSet PageSet::solid(bool& changed) const {
             if (auto* image = texture->rgbaFloat()) image->data()[p].w = 1.0f;
         }
         data->pages[i].texture = texture.get();
-        data->solid.push_back(std::move(texture));
+        data->changed.push_back(std::move(texture));
     }
     if (!data) return *this;
     changed = true;
-    return PageSet(std::move(data));
+    PageSet set(std::move(data));
+    set.behind_ = behind_;
+    return set;
 }
 
 }  // namespace stx

@@ -42,9 +42,10 @@ class SurfaceBackend {
 /// Surface mode with a backend: each reference is warped as a surface, the surfaces are fused and
 /// checked against what the other references see, and each pixel's colour is fitted to the samples
 /// of the references that see it. Prepares every view. A camera that is exactly that of a reference
-/// gets that reference's pixels. Errors: the backend's.
+/// gets that reference's pixels. Where the set has views behind it, a second backend draws these.
+/// Errors: the backends'.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeSurfaceRenderer(
     const PageSet& set, const RenderSettings& settings, Job& job,
-    std::unique_ptr<SurfaceBackend> backend);
+    std::unique_ptr<SurfaceBackend> backend, std::unique_ptr<SurfaceBackend> behind);
 
 }  // namespace stx::surface

@@ -204,6 +204,20 @@ float SurfaceFrame::qLimit() const {
                               : static_cast<float>(space.axis.q(0.0));
 }
 
+void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted) {
+    for (FrameSource& f : frame.sources) {
+        std::uint32_t kept = 0, begin = 0;
+        for (std::size_t t = 0; t < wanted.size(); ++t) {
+            const std::uint32_t end = f.tileBegin[t + 1];
+            if (wanted[t])
+                for (std::uint32_t b = begin; b < end; ++b) f.blocks[kept++] = f.blocks[b];
+            begin = end;
+            f.tileBegin[t + 1] = kept;
+        }
+        f.blocks.resize(kept);
+    }
+}
+
 Bounds boundsOf(const SurfaceScene& scene) {
     Bounds bounds;
     for (const Source& s : scene.sources) addBounds(s, bounds);

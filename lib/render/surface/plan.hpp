@@ -71,6 +71,9 @@ struct SurfaceFrame {
     [[nodiscard]] float qLimit() const;
 };
 
+/// Leaves out tiles, those of 0.
+void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted);
+
 /// World bounds of all blocks of all sources.
 [[nodiscard]] Bounds boundsOf(const SurfaceScene& scene);
 

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/finish/behind.hpp"
 #include "lib/render/finish/fill.hpp"
 #include "lib/render/surface/backend.hpp"
 #include "lib/surface/depth_gradient.hpp"
@@ -42,6 +43,8 @@ class SurfaceRenderer final : public Renderer {
     [[nodiscard]] std::string backend() const override { return backend_->name(); }
     [[nodiscard]] std::string device() const override { return backend_->device(); }
     [[nodiscard]] Result<void> prepareBackend() { return backend_->prepare(scene_, effort_, job_); }
+    /// What is drawn where this renderer's views show nothing.
+    void putBehind(std::unique_ptr<SurfaceRenderer> behind) { behind_ = std::move(behind); }
 
   private:
     void findNormals();
@@ -63,6 +66,13 @@ class SurfaceRenderer final : public Renderer {
     }
     [[nodiscard]] Result<void> drawFrame(const Camera& camera, const std::optional<Camera>& next,
                                          Frame& frame);
+    /// What the backend drew: colours, q, and normals when they are wanted.
+    [[nodiscard]] Result<void> collect(const SurfaceFrame& work, Frame& frame, Image<float>& q);
+    /// Draws the background where a frame is open.
+    [[nodiscard]] Result<void> drawBehind(const SurfaceFrame& work, Frame& frame, Image<float>& q);
+    /// Only those tiles of a frame, 32 pixels wide, that `wanted` has; its depth, too.
+    [[nodiscard]] Result<Frame> drawTiles(const Camera& camera,
+                                          std::span<const std::uint8_t> wanted);
     /// The view that is exactly the camera's, -1 = none.
     [[nodiscard]] int viewAt(const Camera& camera) const;
     [[nodiscard]] Frame copyOf(const Source& source) const;
@@ -79,7 +89,15 @@ class SurfaceRenderer final : public Renderer {
     std::optional<Camera> expected_;
     std::unique_ptr<SurfaceFrame> begun_;  ///< under way before it was asked for
     std::unique_ptr<SurfaceBackend> backend_;
+    std::unique_ptr<SurfaceRenderer> behind_;  ///< may be null
 };
+
+Image<float> depthOf(const Image<float>& q, const DepthAxis& axis) {
+    Image<float> depth(q.width(), q.height(), kNoDepth);
+    for (std::size_t i = 0; i < q.count(); ++i)
+        if (q.data()[i] > 0.0f) depth.data()[i] = static_cast<float>(axis.dist(q.data()[i]));
+    return depth;
+}
 
 void SurfaceRenderer::findNormals() {
     normals_.resize(scene_.pages.size());
@@ -213,14 +231,72 @@ void SurfaceRenderer::beginExpected(const std::optional<Camera>& next) {
 
 Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optional<Camera>& next,
                                         Frame& frame) {
-    frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
-    frame.depth = Image<float>(camera.width, camera.height, 0.0f);
-    Image<float>& q = frame.depth;  // until the end
     STX_TRY(const std::unique_ptr<SurfaceFrame> work, beginFrame(camera));
     const PixelSpace& space = work->space;
     beginExpected(next);
+    Image<float> q;
+    STX_CHECK(collect(*work, frame, q));
+    if (behind_) STX_CHECK(drawBehind(*work, frame, q));
+    if (fillsFrame_ && settings_.fill != Fill::none) {
+        fillBackground({frame.colour, q, space});
+    } else {
+        std::vector<LocalSource> all;
+        for (const FrameSource& f : work->sources)
+            all.push_back({f.source, f.sourceFromPixel, nullptr});
+        fillUnseen({frame.colour, q, space}, all);
+    }
+    frame.depth = depthOf(q, space.axis);
+    return {};
+}
+
+Result<void> SurfaceRenderer::drawBehind(const SurfaceFrame& work, Frame& frame, Image<float>& q) {
+    const PixelSpace& space = work.space;
+    const int width = frame.colour.width(), height = frame.colour.height();
+    const int tilesX = (width + kTile - 1) / kTile, tilesY = (height + kTile - 1) / kTile;
+    std::vector<std::uint8_t> open(static_cast<std::size_t>(tilesX) * tilesY, 0);
+    bool any = false;
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            if (frame.colour.at(x, y).a >= kCoveredInFull) continue;
+            open[static_cast<std::size_t>(y / kTile) * tilesX + x / kTile] = 1;
+            any = true;
+        }
+    }
+    if (!any) return {};
+    STX_TRY(const Frame background, behind_->drawTiles(space.camera, open));
+    frame.depth = depthOf(q, space.axis);
+    stx::putBehind(frame, background, [&](int x, int y, float depth) {
+        const auto at = static_cast<float>(space.axis.q(depth));
+        return std::none_of(work.sources.begin(), work.sources.end(), [&](const FrameSource& f) {
+            return seesPast({f.source, f.sourceFromPixel, nullptr}, static_cast<float>(x) + 0.5f,
+                            static_cast<float>(y) + 0.5f, at);
+        });
+    });
+    for (std::size_t i = 0; i < q.count(); ++i) {
+        const float depth = frame.depth.data()[i];
+        q.data()[i] = hasPoint(depth) ? static_cast<float>(space.axis.q(depth)) : 0.0f;
+    }
+    return {};
+}
+
+Result<Frame> SurfaceRenderer::drawTiles(const Camera& camera,
+                                         std::span<const std::uint8_t> wanted) {
+    auto work = plan(camera);
+    keepTiles(*work, wanted);
+    STX_CHECK(backend_->begin(*work));
+    Frame frame;
+    Image<float> q;
+    STX_CHECK(collect(*work, frame, q));
+    frame.depth = depthOf(q, work->space.axis);
+    return frame;
+}
+
+Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Image<float>& q) {
+    const Camera& camera = work.space.camera;
+    frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
+    q = Image<float>(camera.width, camera.height, 0.0f);
     Image<glm::vec3> origin;
-    if (work->wantOrigin) {
+    if (work.wantOrigin) {
         origin = Image<glm::vec3>(camera.width, camera.height, glm::vec3(-1, 0, 0));
         frame.normal = Image<glm::vec3>(camera.width, camera.height, glm::vec3(0.0f));
     }
@@ -236,16 +312,6 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
                               frame.normal.data()[i] = normalAt(s, at.y, at.z);
                           }
                       });
-    if (fillsFrame_ && settings_.fill == Fill::background) {
-        fillBackground({frame.colour, q, space});
-    } else {
-        std::vector<LocalSource> all;
-        for (const FrameSource& f : work->sources)
-            all.push_back({f.source, f.sourceFromPixel, nullptr});
-        fillUnseen({frame.colour, q, space}, all);
-    }
-    for (float& value : frame.depth.pixels())
-        value = value > 0.0f ? static_cast<float>(space.axis.dist(value)) : kNoDepth;
     return {};
 }
 
@@ -272,9 +338,16 @@ Result<Frame> SurfaceRenderer::render(const Camera& camera) {
 
 Result<std::unique_ptr<Renderer>> makeSurfaceRenderer(const PageSet& set,
                                                       const RenderSettings& settings, Job& job,
-                                                      std::unique_ptr<SurfaceBackend> backend) {
+                                                      std::unique_ptr<SurfaceBackend> backend,
+                                                      std::unique_ptr<SurfaceBackend> behind) {
     auto renderer = std::make_unique<SurfaceRenderer>(set, settings, job, std::move(backend));
     STX_CHECK(renderer->prepareBackend());
+    if (set.behind()) {
+        auto background =
+            std::make_unique<SurfaceRenderer>(*set.behind(), settings, job, std::move(behind));
+        STX_CHECK(background->prepareBackend());
+        renderer->putBehind(std::move(background));
+    }
     return std::unique_ptr<Renderer>(std::move(renderer));
 }
 

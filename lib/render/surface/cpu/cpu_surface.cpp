@@ -98,7 +98,8 @@ std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const PageSet& set, const Rende
                                                  Job& job) {
     // The processor's backend cannot fail before a frame is asked for.
     return std::move(*surface::makeSurfaceRenderer(
-        set, settings, job, std::make_unique<surface::CpuSurfaceBackend>(job)));
+        set, settings, job, std::make_unique<surface::CpuSurfaceBackend>(job),
+        set.behind() ? std::make_unique<surface::CpuSurfaceBackend>(job) : nullptr));
 }
 
 }  // namespace stx

@@ -443,10 +443,18 @@ void GpuSurfaceBackend::drop() {
 Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(const PageSet& set,
                                                          const RenderSettings& settings, int device,
                                                          Job& job) {
-    STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
-    STX_CHECK(context->requireModern("surface mode on the GPU", "--mode splat or --backend cpu"));
-    return surface::makeSurfaceRenderer(set, settings, job,
-                                        std::make_unique<GpuSurfaceBackend>(std::move(context)));
+    const auto backend = [&]() -> Result<std::unique_ptr<surface::SurfaceBackend>> {
+        STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
+        STX_CHECK(
+            context->requireModern("surface mode on the GPU", "--mode splat or --backend cpu"));
+        return std::make_unique<GpuSurfaceBackend>(std::move(context));
+    };
+    STX_TRY(auto front, backend());
+    std::unique_ptr<surface::SurfaceBackend> behind;
+    if (set.behind()) {
+        STX_TRY(behind, backend());
+    }
+    return surface::makeSurfaceRenderer(set, settings, job, std::move(front), std::move(behind));
 }
 
 }  // namespace stx::gpu
