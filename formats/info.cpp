@@ -50,6 +50,7 @@ Json viewJson(const ReferenceView& view, glm::dvec3 origin) {
               {"farPlane", view.farPlane}};
     addLens(view.camera, j);
     if (view.pruned) j["pruned"] = true;
+    if (view.background) j["background"] = true;
     return j;
 }
 
@@ -363,13 +364,14 @@ std::string describeAsText(const Json& info) {
             }
             out += fmt::format(
                 "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, at {:.10g} {:.10g} "
-                "{:.10g}{}{}\n",
+                "{:.10g}{}{}{}\n",
                 i++, text(v["name"]), text(v["width"]), text(v["height"]), text(v["depthBits"]),
                 v["nearPlane"].get<double>(), v["farPlane"].get<double>(), lensText(v),
                 v["position"][0].get<double>(), v["position"][1].get<double>(),
                 v["position"][2].get<double>(),
                 v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "",
-                v.contains("pruned") ? ", pruned" : "");
+                v.contains("pruned") ? ", pruned" : "",
+                v.contains("background") ? ", background" : "");
         }
     }
     if (info.contains("streams")) {

@@ -42,6 +42,7 @@ Json jsonOf(const ReferenceView& v) {
     j["farPlane"] = v.farPlane;
     j["depthBits"] = v.depthBits;
     j["pruned"] = v.pruned;
+    if (v.background) j["background"] = true;
     return j;
 }
 
@@ -192,6 +193,7 @@ Result<void> readView(const Reader& r, const Limits& limits, int version, bool p
     // Older versions did not write it: there fewer pixels than before meant that all were pruned.
     v.pruned = prunedByCount;
     STX_CHECK(r.flag("pruned", v.pruned, false));
+    STX_CHECK(r.flag("background", v.background, false));
     c.position = {position[0], position[1], position[2]};
     // The constructor takes w x y z.
     c.orientation =

@@ -113,6 +113,7 @@ void setExrCamera(ExrPart& part, const ReferenceView& view) {
     a["stx:farPlane"] = view.farPlane;
     a["stx:depthBits"] = std::int64_t{view.depthBits};
     if (view.pruned) a["stx:pruned"] = std::int64_t{1};
+    if (view.background) a["stx:background"] = std::int64_t{1};
 }
 
 Result<ReferenceView> exrCamera(const ExrPart& part) {
@@ -166,6 +167,8 @@ Result<ReferenceView> exrCamera(const ExrPart& part) {
     view.depthBits = static_cast<int>(*bits);
     const auto* pruned = part.attribute<std::int64_t>("stx:pruned");
     view.pruned = pruned && *pruned != 0;
+    const auto* background = part.attribute<std::int64_t>("stx:background");
+    view.background = background && *background != 0;
     return view;
 }
 

@@ -105,6 +105,7 @@ void addOwnKeys(Json& json, const ReferenceView& view, glm::dvec3 origin) {
     json["farPlane"] = view.farPlane;
     json["depthBits"] = view.depthBits;
     if (view.pruned) json["stx:pruned"] = true;
+    if (view.background) json["stx:background"] = true;
 }
 
 Json transformsFrame(const ReferenceView& view, const std::string& name, const char* depthEnding,

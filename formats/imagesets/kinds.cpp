@@ -32,10 +32,13 @@ Result<Json> readJson(const path& file, const Limits& limits) {
 Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view) {
     STX_TRY(const auto name, findText(camera, "stx:name", where));
     view.exactName = name.value_or("");
-    if (const auto it = camera.find("stx:pruned"); it != camera.end()) {
+    for (const auto& [key, to] :
+         {std::pair{"stx:pruned", &view.pruned}, std::pair{"stx:background", &view.background}}) {
+        const auto it = camera.find(key);
+        if (it == camera.end()) continue;
         if (!it->is_boolean())
-            return failAt(where, ErrorCode::invalidInput, "'stx:pruned' must be true or false");
-        view.pruned = it->get<bool>();
+            return failAt(where, ErrorCode::invalidInput, "'{}' must be true or false", key);
+        *to = it->get<bool>();
     }
     STX_TRY(const auto q, findNumbers(camera, "stx:quaternion", 4, where));
     if (q) {

@@ -116,6 +116,7 @@ Result<ReferenceView> finish(const SetView& set, std::string name, const Camera&
     coverOnlyPoints(texture, depth, ownAlpha, pruned);
     ReferenceView view;
     view.pruned = pruned;
+    view.background = set.background;
     view.name = std::move(name);
     view.camera = camera;
     view.texture = std::move(texture);

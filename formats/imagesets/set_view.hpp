@@ -69,6 +69,7 @@ struct SetView {
     int depthBits = 0;                        ///< with planes: 8, 16, 32
     std::optional<glm::dvec3> localPosition;  ///< of an export of ours that has an origin
     bool pruned = false;                      ///< see ReferenceView::pruned
+    bool background = false;                  ///< see ReferenceView::background
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
 };
 

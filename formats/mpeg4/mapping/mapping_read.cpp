@@ -82,6 +82,8 @@ class BundleReader {
                 if (pad != notes.paddings.end()) removePadding(view, pad->second);
                 const auto pruned = notes.pruned.find({plans[i].defName, static_cast<int>(layer)});
                 if (pruned != notes.pruned.end()) markPruned(view, plans[i], pruned->second);
+                view.background =
+                    notes.backgrounds.contains({plans[i].defName, static_cast<int>(layer)});
                 applySimilarity(view, plans[i].worldFromLocal);
                 bundle.views.push_back(std::move(view));
             }
@@ -105,6 +107,7 @@ class BundleReader {
             all.names.merge(notes.names);
             all.paddings.merge(notes.paddings);
             all.pruned.merge(notes.pruned);
+            all.backgrounds.merge(notes.backgrounds);
             if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
             if (!notes.bounds) continue;
             places.push_back(info.worldFromLocal);

@@ -93,6 +93,9 @@ class SceneWriter {
                 if (!images[i + k]->pruned.empty())
                     notes.pruned[{children.back()->defName, static_cast<int>(k)}] =
                         std::move(images[i + k]->pruned);
+            for (std::size_t k = 0; k < layers; ++k)
+                if (bundle_.views[i + k].background)
+                    notes.backgrounds.emplace(children.back()->defName, static_cast<int>(k));
             for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
             i += layers - 1;
         }

@@ -81,6 +81,11 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             const auto layer = w.size() == 4 ? integerFromText(w[2]) : std::nullopt;
             if (layer && *layer >= 0 && *layer <= 1 << 20)
                 notes.pruned[{std::string(w[1]), static_cast<int>(*layer)}] = w[3];
+        } else if (line.starts_with("background ")) {
+            const auto w = words(line, 4);
+            const auto layer = w.size() == 3 ? integerFromText(w[2]) : std::nullopt;
+            if (layer && *layer >= 0 && *layer <= 1 << 20)
+                notes.backgrounds.emplace(std::string(w[1]), static_cast<int>(*layer));
         }
     }
     return notes;
@@ -100,6 +105,8 @@ std::vector<std::string> ViewNotes::text() const {
                                    pad.right, pad.bottom, pad.cx, pad.cy));
     for (const auto& [key, where] : pruned)
         info.push_back(fmt::format("pruned {} {} {}", key.first, key.second, where));
+    for (const auto& [defName, layer] : backgrounds)
+        info.push_back(fmt::format("background {} {}", defName, layer));
     return info;
 }
 

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@
 ///     "name DEFNAME the view's own name"
 ///     "padding DEFNAME left top right bottom cx cy"
 ///     "pruned DEFNAME layer where"
+///     "background DEFNAME layer" (see ReferenceView::background)
 ///
 /// Padding is in pixels, cx and cy are the principal point without it. A pruned view is layer 0 of
 /// its DepthImage, or a further one of a PointTexture; where it was pruned is "alpha" (full alpha
@@ -37,6 +39,9 @@ struct ViewNotes {
     std::map<std::string, Pad> paddings;  ///< by DEF name
     /// Where views were pruned, by DEF name and layer: kPrunedInAlpha, or the text of a mask.
     std::map<std::pair<std::string, int>, std::string> pruned;
+
+    /// Views that are background, by DEF name and layer.
+    std::set<std::pair<std::string, int>> backgrounds;
 
     /// Strings that are not ours, or do not parse, are passed over.
     [[nodiscard]] static ViewNotes parse(const std::vector<std::string>& info);
