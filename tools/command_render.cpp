@@ -23,7 +23,7 @@ struct RenderOptions {
     TimeOptions time;
     Backend backend = Backend::automatic;
     RenderSettings settings;  ///< without the lighting
-    std::string background = "none";
+    std::string background;  ///< empty: not given
     std::vector<std::string> lights;
     std::string ambient = "0.2", specular = "0";
     double shininess = 32;
@@ -98,9 +98,17 @@ Result<Light> parseLight(const std::string& text, glm::dvec3 origin) {
     return light;
 }
 
-/// A colour; nothing for `none`.
+/// What --background says is put where no view shows a surface; nothing for a colour.
+std::optional<Fill> fillOf(const std::string& background) {
+    if (background == "temporal") return Fill::background;
+    if (background == "spatial") return Fill::spatial;
+    if (background == "none") return Fill::none;
+    return {};
+}
+
+/// A colour; nothing for the words that are none.
 Result<std::optional<glm::vec3>> parseBackground(const std::string& text) {
-    if (text == "none") return std::optional<glm::vec3>();
+    if (text.empty() || fillOf(text)) return std::optional<glm::vec3>();
     STX_TRY(const auto colour, parseColour(text, "--background"));
     return std::optional<glm::vec3>(colour);
 }
@@ -119,6 +127,9 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
         STX_CHECK(command.refuse({"--compression"}, "is of .png pictures"));
     if (o.backend == Backend::cpu)
         STX_CHECK(command.refuse({"--device"}, "is of GPUs; it does not go with --backend cpu"));
+    if (fillOf(o.background))
+        STX_CHECK(command.refuse({"--fill"}, "says what --background " + o.background +
+                                                 " says already; give one of them"));
     if (o.settings.splat != SplatRule::paper)
         STX_CHECK(command.refuse({"--splat-coefficient"}, "is of --splat paper"));
     return {};
@@ -148,6 +159,7 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
 
 Result<RenderSettings> settingsOf(const RenderOptions& o) {
     RenderSettings s = o.settings;
+    s.fill = fillOf(o.background).value_or(s.fill);
     // What only OpenEXR can hold.
     if (const auto format = frameFormat(o.output); format && *format == FrameFormat::exr)
         s.normals = true;
@@ -449,12 +461,15 @@ void addRender(CommandLine& line, Program& program) {
         .group(drawing);
     c.choice<Fill>("--fill", o->settings.fill,
                    {{"background", Fill::background}, {"none", Fill::none}},
-                   "What no view saw in full scenes: background or none (default background)")
+                   "What no view shows: background (--background temporal) or none (default "
+                   "background)")
         .group(drawing);
     c.option("--background", o->background,
-             "Colour behind the object: values of 0 to 1, #rrggbb or a name such as white; none "
-             "keeps alpha (default none)")
-        .takes("COLOUR|none")
+             "What stands where no view shows a surface. temporal: the bundle's background views, "
+             "then what is around, in scenes that fill the frame (default); spatial: what is "
+             "around only; none: nothing, alpha is kept. Or a colour behind all of it: values of 0 "
+             "to 1, #rrggbb or a name such as white")
+        .takes("temporal|spatial|none|COLOUR")
         .group(drawing);
     const char* lighting = "Lighting (Phong, in linear light; off without --light)";
     c.option("--light", o->lights,

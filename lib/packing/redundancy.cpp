@@ -72,7 +72,9 @@ Result<std::vector<PruneView>> preparePruning(const Bundle& bundle, const std::v
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
         PruneView& p = views[i];
         for (const int j : rank) {
-            if (j != i && mayShow(views[j], p)) p.partners.push_back(j);
+            // What shows now and what is remembered do not stand for each other.
+            const bool alike = views[j].view->background == p.view->background;
+            if (j != i && alike && mayShow(views[j], p)) p.partners.push_back(j);
         }
         if (p.partners.size() <= kMostPartners) return;
         // The nearest by direction and place, still in the order of rank.

@@ -2,36 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include "lib/background/temporal.hpp"
+#include "tests/golden/background/frames_of.hpp"
 #include "tests/moving_frames.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx {
 namespace {
 
-/// Streams `count` frames.
-BackgroundModel modelOf(const std::function<ReferenceView(int)>& frame,
-                        const std::function<double(int)>& time, int count, Job& job) {
-    auto background = TemporalBackground::start(frame(0), {}, job);
-    EXPECT_TRUE(background) << background.error().text();
-    for (int pass = 0; pass < background->passes(); ++pass) {
-        for (int i = 0; i < count; ++i) {
-            const auto ok = background->add(frame(i), time(i), job);
-            EXPECT_TRUE(ok) << ok.error().text();
-        }
-        const auto ok = background->endPass(job);
-        EXPECT_TRUE(ok) << ok.error().text();
-    }
-    auto model = background->finish(job);
-    EXPECT_TRUE(model) << model.error().text();
-    return *std::move(model);
-}
-
-struct Figures {
+struct ModelFigures {
     double psnr = 0, open = 0, wrongDepth = 0;
 };
 
-Figures against(const ReferenceView& truth, const ReferenceView& model) {
+ModelFigures against(const ReferenceView& truth, const ReferenceView& model) {
     double sum = 0;
     std::int64_t known = 0, all = 0, wrong = 0;
     for (std::size_t i = 0; i < truth.depth.count(); ++i) {
@@ -64,8 +46,8 @@ void keep(const ReferenceView& view, const std::string& name) {
 TEST(TemporalBackground, Person) {
     REQUIRE_SHARED(folder, "data/motion/uva-person");
     Job job;
-    const auto model = modelOf([&](int i) { return moving::personFrame(folder, 2 * i); },
-                               [](int i) { return i / 15.0; }, 50, job);
+    const auto model = backgroundOf([&](int i) { return moving::personFrame(folder, 2 * i); },
+                                    [](int i) { return i / 15.0; }, 50, job);
     keep(model.view, "person");
 }
 
@@ -75,7 +57,7 @@ TEST(TemporalBackground, MovingRoom) {
     const moving::MovingRoom room(folder);
     for (const char* v : {"v0", "v1", "v2"}) {
         const auto model =
-            modelOf([&](int i) { return room.view(v, i); }, moving::MovingRoom::time, 16, job);
+            backgroundOf([&](int i) { return room.view(v, i); }, moving::MovingRoom::time, 16, job);
         keep(model.view, v);
     }
 }
@@ -85,14 +67,14 @@ TEST(TemporalBackground, IsTheEmptyRoom) {
     const moving::SyntheticRoom room(folder);
     Job job;
     for (const bool noisy : {false, true}) {
-        const auto model = modelOf(
+        const auto model = backgroundOf(
             [&](int i) {
                 auto view = room.frame(i);
                 if (noisy) moving::addSensorNoise(view, i, room.time(i));
                 return view;
             },
             moving::SyntheticRoom::time, moving::SyntheticRoom::kFrames, job);
-        const Figures f = against(room.empty("ref"), model.view);
+        const ModelFigures f = against(room.empty("ref"), model.view);
         fmt::print("{}: {:.2f} dB, open {:.4f}, wrong depth {:.4f}\n", noisy ? "noisy" : "clean",
                    f.psnr, f.open, f.wrongDepth);
         keep(model.view, fmt::format("room_{}", noisy));
