@@ -92,11 +92,10 @@ class SurfaceRenderer final : public Renderer {
     std::unique_ptr<SurfaceRenderer> behind_;  ///< may be null
 };
 
-Image<float> depthOf(const Image<float>& q, const DepthAxis& axis) {
-    Image<float> depth(q.width(), q.height(), kNoDepth);
-    for (std::size_t i = 0; i < q.count(); ++i)
-        if (q.data()[i] > 0.0f) depth.data()[i] = static_cast<float>(axis.dist(q.data()[i]));
-    return depth;
+Image<float> depthOf(Image<float> q, const DepthAxis& axis) {
+    for (float& value : q.pixels())
+        value = value > 0.0f ? static_cast<float>(axis.dist(value)) : kNoDepth;
+    return q;
 }
 
 void SurfaceRenderer::findNormals() {
@@ -245,7 +244,7 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
             all.push_back({f.source, f.sourceFromPixel, nullptr});
         fillUnseen({frame.colour, q, space}, all);
     }
-    frame.depth = depthOf(q, space.axis);
+    frame.depth = depthOf(std::move(q), space.axis);
     return {};
 }
 
@@ -287,7 +286,7 @@ Result<Frame> SurfaceRenderer::drawTiles(const Camera& camera,
     Frame frame;
     Image<float> q;
     STX_CHECK(collect(*work, frame, q));
-    frame.depth = depthOf(q, work->space.axis);
+    frame.depth = depthOf(std::move(q), work->space.axis);
     return frame;
 }
 
