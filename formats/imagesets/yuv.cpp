@@ -20,10 +20,29 @@ std::uint64_t planeValues(const YuvFormat& f) {
     return values;
 }
 
-/// `count` samples from the `skip`-th of a frame.
-Result<std::vector<std::uint16_t>> readSamples(const std::filesystem::path& path,
-                                               const YuvFormat& f, int frame, std::uint64_t skip,
-                                               std::uint64_t count, const Limits& limits) {
+/// Samples of a frame `raw`. `name` is for messages: "frame 3".
+Result<std::vector<std::uint16_t>> samplesOf(std::span<const std::byte> raw, const YuvFormat& f,
+                                             const std::string& name) {
+    const std::size_t bytesEach = f.bits > 8 ? 2 : 1;
+    std::vector<std::uint16_t> samples(raw.size() / bytesEach);
+    const auto byte = [&](std::size_t i) { return std::to_integer<unsigned>(raw[i]); };
+    for (std::size_t i = 0; i < samples.size(); ++i)
+        samples[i] = static_cast<std::uint16_t>(bytesEach == 2 ? byte(2 * i) | byte(2 * i + 1) << 8
+                                                               : byte(i));
+    const int largest = (1 << f.bits) - 1;
+    for (const auto sample : samples) {
+        if (sample > largest)
+            return fail(ErrorCode::invalidInput,
+                        "{} holds the value {}; {} bits reach only to {} (another format?)", name,
+                        sample, f.bits, largest);
+    }
+    return samples;
+}
+
+/// `count` samples from the beginning of a frame.
+Result<std::vector<std::byte>> readFrameBytes(const std::filesystem::path& path, const YuvFormat& f,
+                                              int frame, std::uint64_t count,
+                                              const Limits& limits) {
     STX_TRY(const int frames, yuvFrameCount(path, f));
     if (frame < 0 || frame >= frames)
         return failAt(inQuotes(path.string()), ErrorCode::invalidInput,
@@ -32,27 +51,11 @@ Result<std::vector<std::uint16_t>> readSamples(const std::filesystem::path& path
     if (auto ok = limits.checkAllocation(count, 4, "a frame"); !ok)
         return tl::unexpected(ok.error().at(inQuotes(path.string())));
     std::ifstream file(path, std::ios::binary);
-    const std::uint64_t bytesEach = f.bits > 8 ? 2 : 1;
-    file.seekg(static_cast<std::streamoff>(frame * f.frameBytes() + skip * bytesEach));
-    std::vector<std::uint16_t> samples(count);
-    auto* raw = reinterpret_cast<std::uint8_t*>(samples.data());
-    // 8-bit samples are read into the upper half and spread from there.
-    std::uint8_t* to = bytesEach == 2 ? raw : raw + count;
-    file.read(reinterpret_cast<char*>(to), static_cast<std::streamsize>(count * bytesEach));
+    file.seekg(static_cast<std::streamoff>(frame * f.frameBytes()));
+    std::vector<std::byte> raw(count * (f.bits > 8 ? 2 : 1));
+    file.read(reinterpret_cast<char*>(raw.data()), static_cast<std::streamsize>(raw.size()));
     if (!file) return failAt(inQuotes(path.string()), ErrorCode::io, "cannot be read");
-    for (std::uint64_t i = 0; i < count; ++i) {
-        const std::uint16_t value =
-            bytesEach == 2 ? static_cast<std::uint16_t>(raw[2 * i] | raw[2 * i + 1] << 8) : to[i];
-        samples[i] = value;
-    }
-    const int largest = (1 << f.bits) - 1;
-    for (std::uint64_t i = 0; i < count; ++i) {
-        if (samples[i] > largest)
-            return failAt(inQuotes(path.string()), ErrorCode::invalidInput,
-                          "frame {} holds the value {}; {} bits reach only to {} (another format?)",
-                          frame, samples[i], f.bits, largest);
-    }
-    return samples;
+    return raw;
 }
 
 }  // namespace
@@ -103,7 +106,17 @@ Result<int> yuvFrameCount(const std::filesystem::path& path, const YuvFormat& f)
 
 Result<Rgba8Image> readYuvColour(const std::filesystem::path& path, const YuvFormat& f, int frame,
                                  const YuvColour& colour, const Limits& limits) {
-    STX_TRY(const auto samples, readSamples(path, f, frame, 0, planeValues(f), limits));
+    STX_TRY(const auto raw, readFrameBytes(path, f, frame, planeValues(f), limits));
+    return within(inQuotes(path.string()),
+                  rgbFromYuv(raw, f, colour, fmt::format("frame {}", frame), limits));
+}
+
+Result<Rgba8Image> rgbFromYuv(std::span<const std::byte> frame, const YuvFormat& f,
+                              const YuvColour& colour, const std::string& name,
+                              const Limits& limits) {
+    // Its samples, and its pixels.
+    STX_CHECK(limits.checkAllocation(planeValues(f), 2 + sizeof(glm::u8vec4), "a frame"));
+    STX_TRY(const auto samples, samplesOf(frame, f, name));
     const int cw = (f.width + (1 << f.chromaShiftX) - 1) >> f.chromaShiftX;
     const int ch = (f.height + (1 << f.chromaShiftY) - 1) >> f.chromaShiftY;
     const std::uint16_t* luma = samples.data();
@@ -144,9 +157,12 @@ Result<Rgba8Image> readYuvColour(const std::filesystem::path& path, const YuvFor
             double c[2] = {0, 0};
             if (f.chroma) {
                 // Horizontally, too: the tools around MIV and RVS average 2x2 pixels.
-                // Pixel x lies at (x + 0.5) / 2 - 0.5 among the samples.
-                const int left = f.chromaShiftX ? (x - 1) >> 1 : x;
-                const float weight = !f.chromaShiftX ? 0.0f : (x & 1) ? 0.25f : 0.75f;
+                // Pixel x lies at (x + 0.5) / 2 - 0.5 among the samples, or else at x / 2.
+                const int left = !f.chromaShiftX ? x : f.chromaLeft ? x >> 1 : (x - 1) >> 1;
+                const float weight = !f.chromaShiftX ? 0.0f
+                                     : f.chromaLeft  ? ((x & 1) ? 0.5f : 0.0f)
+                                     : (x & 1)       ? 0.25f
+                                                     : 0.75f;
                 const auto i0 = static_cast<std::size_t>(std::clamp(left, 0, cw - 1));
                 const auto i1 = static_cast<std::size_t>(std::clamp(left + 1, 0, cw - 1));
                 for (int k = 0; k < 2; ++k) {
@@ -170,7 +186,9 @@ Result<Rgba8Image> readYuvColour(const std::filesystem::path& path, const YuvFor
 Result<Image<float>> readYuvLuma(const std::filesystem::path& path, const YuvFormat& f, int frame,
                                  const Limits& limits) {
     const std::uint64_t count = static_cast<std::uint64_t>(f.width) * f.height;
-    STX_TRY(const auto samples, readSamples(path, f, frame, 0, count, limits));
+    STX_TRY(const auto raw, readFrameBytes(path, f, frame, count, limits));
+    STX_TRY(const auto samples,
+            within(inQuotes(path.string()), samplesOf(raw, f, fmt::format("frame {}", frame))));
     Image<float> out(f.width, f.height);
     std::copy(samples.begin(), samples.end(), out.data());
     return out;

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string>
 #include <string_view>
 
 #include "formats/imagesets/image_sets.hpp"
@@ -16,6 +19,9 @@ struct YuvFormat {
     int bits = 8;  ///< above 8 in two bytes, little-endian, in the low bits
     int chromaShiftX = 1, chromaShiftY = 1;
     bool chroma = true;
+    /// Of halved columns: a chroma sample lies on the left one of its two pixels (MPEG-2), instead
+    /// of in their middle.
+    bool chromaLeft = false;
 
     [[nodiscard]] std::uint64_t frameBytes() const;
 };
@@ -27,7 +33,14 @@ struct YuvFormat {
 /// Frames in a file. Errors when its size is not a whole number of them, or it has none.
 [[nodiscard]] Result<int> yuvFrameCount(const std::filesystem::path& path, const YuvFormat& format);
 
-/// One frame as 8-bit RGB; chroma is interpolated, its samples in the middle of their pixels.
+/// One frame in memory, of format.frameBytes() bytes, as 8-bit RGB; chroma is interpolated, its
+/// samples in the middle of their pixels' rows. Errors (invalidInput): a value beyond the bits;
+/// memory over the limit. `name` is for messages.
+[[nodiscard]] Result<Rgba8Image> rgbFromYuv(std::span<const std::byte> frame,
+                                            const YuvFormat& format, const YuvColour& colour,
+                                            const std::string& name, const Limits& limits);
+
+/// The same of one frame of a file.
 [[nodiscard]] Result<Rgba8Image> readYuvColour(const std::filesystem::path& path,
                                                const YuvFormat& format, int frame,
                                                const YuvColour& colour, const Limits& limits);

@@ -1,0 +1,168 @@
+#include "formats/video/video_frames.hpp"
+
+#include <algorithm>
+#include <fstream>
+
+#include "formats/images/images.hpp"
+#include "formats/imagesets/messages.hpp"
+#include "formats/video/numbered_pictures.hpp"
+#include "formats/video/y4m_reader.hpp"
+#include "lib/base/counted.hpp"
+
+namespace stx {
+namespace {
+
+namespace fs = std::filesystem;
+using imagesets::inQuotes;
+
+class PictureFrames final : public VideoFrames {
+  public:
+    PictureFrames(std::vector<fs::path> files, std::string what, Job& job)
+        : files_(std::move(files)), what_(std::move(what)), job_(job) {}
+
+    /// Takes the size from the first picture.
+    Result<void> open() {
+        STX_TRY(const auto picture, read(0));
+        size_ = picture.size();
+        return {};
+    }
+    [[nodiscard]] glm::ivec2 size() const override { return size_; }
+    [[nodiscard]] int count() const override { return static_cast<int>(files_.size()); }
+    [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
+        STX_TRY(auto picture, read(static_cast<std::size_t>(k)));
+        if (picture.size() != size_)
+            return failAt(inQuotes(files_[static_cast<std::size_t>(k)].string()),
+                          ErrorCode::invalidInput,
+                          "it is {}x{}, but the first frame, '{}', is {}x{}; all frames must have "
+                          "one size",
+                          picture.width(), picture.height(), files_[0].string(), size_.x, size_.y);
+        return std::make_shared<const Rgba8Image>(std::move(picture));
+    }
+    [[nodiscard]] std::string name(int k) const override {
+        return files_[static_cast<std::size_t>(k)].stem().string();
+    }
+    [[nodiscard]] std::string description() const override {
+        return fmt::format("{} ({})", what_, counted(files_.size(), "picture"));
+    }
+
+  private:
+    [[nodiscard]] Result<Rgba8Image> read(std::size_t k) const {
+        const auto& file = files_[k];
+        STX_TRY(const auto bytes, readFile(file, job_.limits));
+        return imagesets::within(inQuotes(file.string()),
+                                 decodeRgba8(bytes, file.string(), job_.limits));
+    }
+
+    std::vector<fs::path> files_;
+    std::string what_;
+    Job& job_;
+    glm::ivec2 size_{0};
+};
+
+class Y4mFrames final : public VideoFrames {
+  public:
+    Y4mFrames(Y4mReader reader, fs::path file, Job& job)
+        : reader_(std::move(reader)), file_(std::move(file)), job_(job) {}
+
+    [[nodiscard]] glm::ivec2 size() const override { return {reader_.width(), reader_.height()}; }
+    [[nodiscard]] int count() const override { return reader_.count(); }
+    [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
+        STX_TRY(auto picture,
+                imagesets::within(inQuotes(file_.string()), reader_.frame(k, job_.limits)));
+        return std::make_shared<const Rgba8Image>(std::move(picture));
+    }
+    [[nodiscard]] std::string name(int k) const override {
+        return fmt::format("{}_{:04}", file_.stem().string(), k);
+    }
+    [[nodiscard]] std::string description() const override {
+        return fmt::format("{} ({})", file_.filename().string(), counted(count(), "frame"));
+    }
+
+  private:
+    Y4mReader reader_;
+    fs::path file_;
+    Job& job_;
+};
+
+/// Whether the first bytes, or the ending, are those of a video that has to be decoded.
+bool isCompressedVideo(const fs::path& path, std::string_view head) {
+    const auto has = [&](std::size_t at, std::string_view text) {
+        return head.size() >= at + text.size() && head.substr(at, text.size()) == text;
+    };
+    if (has(4, "ftyp") || has(4, "moov") || has(4, "mdat") || (has(0, "RIFF") && has(8, "AVI ")) ||
+        has(0, "\x1a\x45\xdf\xa3"))
+        return true;
+    std::string ending = path.extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(), [](char c) {
+        return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    });
+    constexpr std::string_view kEndings[] = {
+        ".mp4", ".m4v", ".mov", ".avi", ".mkv",  ".webm", ".mpg",  ".mpeg", ".ts",  ".m2ts", ".mts",
+        ".wmv", ".flv", ".3gp", ".ogv", ".h264", ".264",  ".hevc", ".265",  ".ivf", ".mjpeg"};
+    return std::find(std::begin(kEndings), std::end(kEndings), ending) != std::end(kEndings);
+}
+
+std::string headOfFile(const fs::path& path) {
+    std::string head(16, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(head.data(), static_cast<std::streamsize>(head.size()));
+    head.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, file.gcount())));
+    return head;
+}
+
+Result<std::unique_ptr<VideoFrames>> openPictures(std::vector<fs::path> files, std::string what,
+                                                  Job& job) {
+    auto frames = std::make_unique<PictureFrames>(std::move(files), std::move(what), job);
+    STX_CHECK(frames->open());
+    return frames;
+}
+
+Result<std::unique_ptr<VideoFrames>> openSequence(Result<std::vector<NumberedPicture>> pictures,
+                                                  const fs::path& input, Job& job) {
+    if (!pictures) return propagate(pictures);
+    std::vector<fs::path> files;
+    for (auto& picture : *pictures) files.push_back(std::move(picture.path));
+    return openPictures(std::move(files), input.string(), job);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>& inputs,
+                                                     Job& job) {
+    if (inputs.empty()) return fail(ErrorCode::usage, "no frames are named");
+    std::error_code ec;
+    for (const fs::path& input : inputs) {
+        const bool folder = fs::is_directory(input, ec);
+        const bool there = fs::exists(fs::status(input, ec));
+        if (inputs.size() == 1) {
+            if (folder) return openSequence(numberedPictures(input, job), input, job);
+            if (!there && isSequencePattern(input))
+                return openSequence(picturesOfPattern(input, job), input, job);
+        }
+        if (!there)
+            return fail(ErrorCode::io, "cannot read '{}': there is no such file or folder",
+                        input.string());
+        const bool regular = fs::is_regular_file(input, ec);
+        const std::string head = regular ? headOfFile(input) : std::string();
+        if (regular && isCompressedVideo(input, head))
+            return fail(ErrorCode::unsupported,
+                        "'{}' is compressed video, which is not decoded here; take its frames out "
+                        "first: ffmpeg -i '{}' frame_%04d.png, or as one file: ffmpeg -i '{}' -f "
+                        "yuv4mpegpipe frames.y4m",
+                        input.string(), input.string(), input.string());
+        const bool y4m =
+            Y4mReader::recognises(std::as_bytes(std::span(head))) || input.extension() == ".y4m";
+        if (inputs.size() > 1 && (folder || y4m))
+            return fail(ErrorCode::usage,
+                        "'{}' is {}; of several inputs each must be a picture (give it alone)",
+                        input.string(), folder ? "a folder" : "a video");
+        if (!y4m) continue;
+        STX_TRY(auto source, mpeg4::ByteSource::open(input));
+        STX_TRY(auto reader, imagesets::within(inQuotes(input.string()),
+                                               Y4mReader::open(std::move(source), job)));
+        return std::make_unique<Y4mFrames>(std::move(reader), input, job);
+    }
+    return openPictures(inputs, inputs.size() == 1 ? inputs[0].string() : "pictures", job);
+}
+
+}  // namespace stx

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lib/background/still_frames.hpp"
+
+namespace stx {
+
+/// Frames of plain video out of files.
+class VideoFrames : public StillFrames {
+  public:
+    /// What to call frame k in the names of files that are made from it: the name of its own file
+    /// without the ending, or that of its video with `_0007`.
+    [[nodiscard]] virtual std::string name(int k) const = 0;
+    /// What all frames came from, for messages: "hall (99 pictures)".
+    [[nodiscard]] virtual std::string description() const = 0;
+};
+
+/// Opens what `inputs` name: pictures, one after the other; or one of: a folder of numbered
+/// pictures, a sequence `frame_%04d.png`, a picture, a `.y4m` file. The size is that of the first
+/// frame; no other frame is read yet. Errors: io, invalidInput, and (unsupported) compressed video,
+/// with how to take the frames out of it. `job` must outlive the frames.
+[[nodiscard]] Result<std::unique_ptr<VideoFrames>> openVideoFrames(
+    const std::vector<std::filesystem::path>& inputs, Job& job);
+
+}  // namespace stx

@@ -1,0 +1,56 @@
+#include "lib/background/still_frames.hpp"
+
+#include <optional>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+
+KeptFrames::KeptFrames(StillFrames& frames, std::uint64_t bytes)
+    : frames_(&frames), kept_(static_cast<std::size_t>(frames.count())) {
+    const auto size = frames.size();
+    room_ = bytes / (static_cast<std::uint64_t>(size.x) * size.y * sizeof(glm::u8vec4));
+}
+
+Result<std::shared_ptr<const Rgba8Image>> KeptFrames::frame(int k) {
+    const auto at = static_cast<std::size_t>(k);
+    {
+        const std::lock_guard lock(mutex_);
+        if (kept_[at]) return kept_[at];
+    }
+    // Two threads may read the same frame; both get the same pixels.
+    STX_TRY(auto picture, frames_->frame(k));
+    const std::lock_guard lock(mutex_);
+    if (!kept_[at] && room_ > 0) {
+        kept_[at] = picture;
+        --room_;
+    }
+    return picture;
+}
+
+std::vector<int> spreadFrames(int count, int wanted) {
+    const int n = wanted == 0 ? count : std::min(count, wanted);
+    std::vector<int> which(static_cast<std::size_t>(n));
+    for (std::int64_t i = 0; i < n; ++i)
+        which[static_cast<std::size_t>(i)] =
+            n == 1 ? 0 : static_cast<int>((i * (count - 1) + (n - 1) / 2) / (n - 1));
+    return which;
+}
+
+Result<void> takeFrames(StillFrames& frames, std::span<const int> which,
+                        const std::function<void(std::size_t, const Rgba8Image&)>& take) {
+    std::vector<std::optional<Error>> errors(which.size());
+    parallelFor(0, static_cast<std::int64_t>(which.size()), [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        const auto picture = frames.frame(which[at]);
+        if (picture)
+            take(at, **picture);
+        else
+            errors[at] = picture.error();
+    });
+    for (auto& error : errors)
+        if (error) return tl::unexpected(std::move(*error));
+    return {};
+}
+
+}  // namespace stx

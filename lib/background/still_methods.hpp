@@ -1,0 +1,22 @@
+#pragma once
+
+#include <span>
+
+#include "lib/background/still.hpp"
+
+namespace stx {
+
+/// What a pixel of `select` and `median` may take while it is worked on, beside the frames: most of
+/// it are the counts of 3 x 256 values.
+inline constexpr std::uint64_t kSelectBytesPerPixel = 1700;
+/// The same of `n2pg`, with the frame that is being taken in.
+inline constexpr std::uint64_t kN2pgBytesPerPixel = 24;
+
+/// The methods of stillBackground(); `which` are the frames to look at, at least 2.
+[[nodiscard]] Result<StillBackground> selectBackground(StillFrames& frames,
+                                                       std::span<const int> which,
+                                                       const StillSettings& settings, Job& job);
+[[nodiscard]] Result<StillBackground> n2pgBackground(StillFrames& frames,
+                                                     std::span<const int> which, Job& job);
+
+}  // namespace stx

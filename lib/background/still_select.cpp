@@ -1,0 +1,230 @@
+#include <algorithm>
+#include <limits>
+
+#include "lib/background/still_methods.hpp"
+#include "lib/background/still_motion.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+/// Frames that are looked at together: what is kept of a pixel is touched once for all of them.
+constexpr std::size_t kFramesAtOnce = 16;
+/// Pixels of a piece of a parallel loop.
+constexpr std::int64_t kPixelsAtOnce = 2048;
+
+/// How often each value of one pixel occurred.
+struct ValueCounts {
+    std::uint16_t counts[3][256];
+    std::uint16_t frames;
+
+    void add(glm::u8vec4 p) {
+        ++counts[0][p.r];
+        ++counts[1][p.g];
+        ++counts[2][p.b];
+        ++frames;
+    }
+    /// Of an even number the mean of the two in the middle, rounded up.
+    [[nodiscard]] std::uint8_t median(int channel) const {
+        const auto& values = counts[channel];
+        const int low = (frames - 1) / 2, high = frames / 2;
+        int seen = 0, v = 0;
+        while ((seen += values[v]) <= low) ++v;
+        const int first = v;
+        while (seen <= high) seen += values[++v];
+        return static_cast<std::uint8_t>((first + v + 1) / 2);
+    }
+    /// Frames within kStillAgrees of a value.
+    [[nodiscard]] int near(int channel, int value) const {
+        int n = 0;
+        const int last = std::min(255, value + kStillAgrees);
+        for (int v = std::max(0, value - kStillAgrees); v <= last; ++v) n += counts[channel][v];
+        return n;
+    }
+};
+static_assert(sizeof(ValueCounts) + kFramesAtOnce * 10 <= kSelectBytesPerPixel);
+
+/// A frame's part of a band of rows.
+struct BandFrame {
+    std::vector<glm::u8vec4> colour;
+    LumaRows luma;
+    std::vector<std::uint32_t> motion;
+};
+
+/// Makes the background of a band of rows.
+class BandSelector {
+  public:
+    BandSelector(StillFrames& frames, std::span<const int> which, const StillSettings& settings,
+                 Job& job)
+        : frames_(frames),
+          which_(which),
+          settings_(settings),
+          job_(job),
+          window_(frames.size().x, frames.size().y, settings.windowDivisor,
+                  settings.drift ? MotionScore::gradient : MotionScore::luma) {}
+
+    [[nodiscard]] Result<void> make(int first, int rows, StillBackground& to) {
+        first_ = first;
+        rows_ = rows;
+        pixels_ = static_cast<std::size_t>(rows) * frames_.size().x;
+        largest_.clear();
+        if (settings_.method == StillMethod::select) STX_CHECK(findQuietest());
+        values_.assign(pixels_, ValueCounts{});
+        STX_CHECK(forBlocks([&](std::size_t n) { count(n); }));
+        write(to);
+        return {};
+    }
+
+    std::int64_t steps = 0, allSteps = 0;  ///< of the progress, in frames
+
+  private:
+    /// Calls body(n) with the next n frames of the band in block_, in their order.
+    Result<void> forBlocks(const std::function<void(std::size_t)>& body) {
+        const bool moving = settings_.method == StillMethod::select;
+        const int width = frames_.size().x;
+        block_.resize(std::min(kFramesAtOnce, which_.size()));
+        LumaRows before;
+        for (std::size_t from = 0; from < which_.size(); from += block_.size()) {
+            STX_CHECK(job_.checkCancelled());
+            const std::size_t n = std::min(block_.size(), which_.size() - from);
+            STX_CHECK(takeFrames(
+                frames_, which_.subspan(from, n), [&](std::size_t i, const Rgba8Image& picture) {
+                    BandFrame& f = block_[i];
+                    const auto* at = picture.data() + static_cast<std::size_t>(first_) * width;
+                    f.colour.assign(at, at + pixels_);
+                    if (moving)
+                        f.luma.take(picture, window_.firstNeeded(first_),
+                                    window_.rowsNeeded(first_, rows_));
+                }));
+            if (moving) {
+                parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t k) {
+                    const auto i = static_cast<std::size_t>(k);
+                    block_[i].motion.resize(pixels_);
+                    // Before the first frame there is none: it moves as the second does.
+                    if (from + i == 0) return;
+                    window_.quantities(i == 0 ? before : block_[i - 1].luma, block_[i].luma, first_,
+                                       rows_, block_[i].motion);
+                });
+                if (from == 0) block_[0].motion = block_[1].motion;
+            }
+            body(n);
+            std::swap(before, block_[n - 1].luma);
+            steps += static_cast<std::int64_t>(n);
+            job_.progress(steps, allSteps, "looking at frames");
+        }
+        return {};
+    }
+
+    /// The largest motion that a frame may have to be kept, of each pixel.
+    Result<void> findQuietest() {
+        const auto kept = std::min(static_cast<std::size_t>(settings_.quietest), which_.size());
+        constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
+        quietest_.assign(pixels_ * kept, kNone);
+        STX_CHECK(forBlocks([&](std::size_t n) {
+            forPixels([&](std::size_t p) {
+                std::uint32_t* const first = &quietest_[p * kept];
+                for (std::size_t i = 0; i < n; ++i) {
+                    const std::uint32_t motion = block_[i].motion[p];
+                    std::uint32_t* at = first + kept - 1;
+                    if (motion >= *at) continue;
+                    for (; at > first && at[-1] > motion; --at) *at = at[-1];
+                    *at = motion;
+                }
+            });
+        }));
+        largest_.resize(pixels_);
+        forPixels([&](std::size_t p) {
+            const std::uint32_t* const first = &quietest_[p * kept];
+            double sum = 0;
+            for (std::size_t i = 0; i < kept; ++i) sum += first[i];
+            const double limit = settings_.adaptive * sum / static_cast<double>(kept);
+            largest_[p] = std::max(first[kept - 1],
+                                   static_cast<std::uint32_t>(std::min(limit, double{kNone})));
+        });
+        return {};
+    }
+
+    void count(std::size_t n) {
+        forPixels([&](std::size_t p) {
+            for (std::size_t i = 0; i < n; ++i)
+                if (largest_.empty() || block_[i].motion[p] <= largest_[p])
+                    values_[p].add(block_[i].colour[p]);
+        });
+    }
+
+    void write(StillBackground& to) const {
+        const auto offset = static_cast<std::size_t>(first_) * frames_.size().x;
+        forPixels([&](std::size_t p) {
+            const ValueCounts& v = values_[p];
+            glm::u8vec4 colour(0, 0, 0, 255);
+            int near = v.frames;
+            for (int c = 0; c < 3; ++c) {
+                colour[c] = v.median(c);
+                near = std::min(near, v.near(c, colour[c]));
+            }
+            to.colour.pixels()[offset + p] = colour;
+            to.confidence.pixels()[offset + p] =
+                static_cast<std::uint8_t>((255 * near + v.frames / 2) / v.frames);
+        });
+    }
+
+    template <class Body>
+    void forPixels(const Body& body) const {
+        parallelForBlocks(0, static_cast<std::int64_t>(pixels_), kPixelsAtOnce,
+                          [&](std::int64_t from, std::int64_t to) {
+                              for (auto p = from; p < to; ++p) body(static_cast<std::size_t>(p));
+                          });
+    }
+
+    StillFrames& frames_;
+    std::span<const int> which_;
+    const StillSettings& settings_;
+    Job& job_;
+    MotionWindow window_;
+    int first_ = 0, rows_ = 0;
+    std::size_t pixels_ = 0;
+    std::vector<BandFrame> block_;
+    std::vector<std::uint32_t> quietest_;  ///< motion of the quietest frames, rising
+    std::vector<std::uint32_t> largest_;   ///< empty: every frame is kept
+    std::vector<ValueCounts> values_;
+};
+
+}  // namespace
+
+Result<StillBackground> selectBackground(StillFrames& frames, std::span<const int> which,
+                                         const StillSettings& settings, Job& job) {
+    const auto size = frames.size();
+    const std::uint64_t frameBytes = std::uint64_t{sizeof(glm::u8vec4)} * size.x * size.y;
+    const std::uint64_t keptBytes = job.limits.maxMemoryBytes / 2;
+    // Frames that stay in memory cost little to look at again: then bands are no larger than a
+    // processor's caches like them. Else they are as large as memory allows.
+    constexpr std::uint64_t kSmall = 32ull << 20, kLarge = 1ull << 30;
+    const bool all = frameBytes * which.size() <= keptBytes;
+    const std::uint64_t most = job.limits.maxMemoryBytes / 4;
+    const std::uint64_t rowBytes = size.x * (kSelectBytesPerPixel + 4ull * settings.quietest);
+    if (rowBytes > most)
+        return fail(ErrorCode::failed,
+                    "a row of {} pixels takes {} bytes, but a quarter of --max-memory is {}; raise "
+                    "it",
+                    size.x, rowBytes, most);
+    const std::uint64_t room = std::max(rowBytes, std::min(all ? kSmall : kLarge, most));
+    const int rows = static_cast<int>(std::min<std::uint64_t>(room / rowBytes, size.y));
+    const int bands = (size.y + rows - 1) / rows;
+    const int passes = bands * (settings.method == StillMethod::select ? 2 : 1);
+    KeptFrames kept(frames, passes > 1 ? keptBytes : 0);
+    StillBackground out;
+    out.colour = Rgba8Image(size.x, size.y);
+    out.confidence = Image<std::uint8_t>(size.x, size.y);
+    out.framesUsed = static_cast<int>(which.size());
+    BandSelector selector(kept, which, settings, job);
+    selector.allSteps = static_cast<std::int64_t>(which.size()) * passes;
+    for (int band = 0; band < bands; ++band) {
+        // Of equal height, but for one row.
+        const int first = static_cast<int>(std::int64_t{size.y} * band / bands);
+        const int end = static_cast<int>(std::int64_t{size.y} * (band + 1) / bands);
+        STX_CHECK(selector.make(first, end - first, out));
+    }
+    return out;
+}
+
+}  // namespace stx

@@ -1,0 +1,234 @@
+#include <chrono>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/images/frames.hpp"
+#include "formats/images/images.hpp"
+#include "formats/video/video_frames.hpp"
+#include "lib/background/still.hpp"
+#include "tools/commands.hpp"
+
+namespace stx::tools {
+namespace {
+
+struct BackgroundOptions {
+    std::vector<std::string> inputs;
+    std::string output, confidence, maskOf, maskOutput;
+    std::string method = "select";
+    StillSettings settings;
+};
+
+/// A mask that is asked for.
+struct MaskTarget {
+    int frame = 0;
+    std::string path;
+};
+
+Result<void> checkPngTarget(const std::string& option, const std::string& path,
+                            const Program& program) {
+    if (!path.ends_with(".png"))
+        return fail(ErrorCode::usage, "{} is '{}'; its name must end in .png", option, path);
+    return checkTarget(path, program);
+}
+
+/// The pattern of the masks' names; beside the background when there is none.
+std::string maskPattern(const BackgroundOptions& o) {
+    if (!o.maskOutput.empty()) return o.maskOutput;
+    const std::filesystem::path output(o.output == "-" ? "background" : o.output);
+    return (output.parent_path() / (output.stem().string() + "_mask_%04d.png")).string();
+}
+
+/// The files of the masks; an error before the work, not after it.
+Result<std::vector<MaskTarget>> maskTargets(const BackgroundOptions& o, const VideoFrames& frames,
+                                            const Program& program) {
+    std::vector<MaskTarget> targets;
+    if (o.maskOf.empty()) return targets;
+    int first = 0, end = frames.count();
+    if (o.maskOf != "all") {
+        STX_TRY(const auto number, parseNumbers(o.maskOf, 1, "--mask-of"));
+        first = static_cast<int>(std::min(std::max(number[0], -1.0), 2e9));
+        if (first < 0 || first >= end || first != number[0])
+            return fail(ErrorCode::usage,
+                        "--mask-of is {}; 'all' or a frame from 0 to {} is expected", o.maskOf,
+                        end - 1);
+        end = first + 1;
+    }
+    const std::string pattern = maskPattern(o);
+    std::set<std::string> names = {o.output, o.confidence};
+    for (int k = first; k < end; ++k) {
+        std::string path = pattern;
+        if (const auto at = path.find("{stem}"); at != std::string::npos)
+            path.replace(at, 6, frames.name(k));
+        path = frameName(path, k).value_or(path);
+        if (!names.insert(path).second)
+            return fail(ErrorCode::usage,
+                        "two outputs have the name '{}'; give masks names of their own by "
+                        "--mask-output 'mask_%04d.png' or '{{stem}}.png'",
+                        path);
+        STX_CHECK(checkPngTarget("--mask-output", path, program));
+        targets.push_back({k, path});
+    }
+    return targets;
+}
+
+Result<void> writeGrey(const Image<std::uint8_t>& image, const std::string& path,
+                       const Program& program) {
+    STX_TRY(const auto png, encodePng(image.width(), image.height(), 1, 8, image.data(), false));
+    return writeFile(path, png, program.outputOptions());
+}
+
+Result<void> writeColour(const Rgba8Image& image, const std::string& path, const Program& program) {
+    Frame frame;
+    frame.colour = Image<glm::vec4>(image.width(), image.height());
+    for (std::size_t i = 0; i < image.count(); ++i)
+        frame.colour.pixels()[i] = glm::vec4(image.pixels()[i]) / 255.0f;
+    FrameOptions options;
+    options.background = glm::vec3(0);  // there is no alpha
+    options.pngLevel = 6;
+    options.noClobber = program.common.noClobber;
+    return writeFrame(frame, path, options);
+}
+
+Result<void> writeMasks(const std::vector<MaskTarget>& targets, const Rgba8Image& background,
+                        VideoFrames& frames, Program& program) {
+    std::int64_t done = 0;
+    for (const MaskTarget& target : targets) {
+        STX_CHECK(program.job.checkCancelled());
+        STX_TRY(const auto frame, frames.frame(target.frame));
+        STX_TRY(const auto mask, foregroundMask(background, *frame));
+        STX_CHECK(writeGrey(mask, target.path, program));
+        program.job.progress(++done, static_cast<std::int64_t>(targets.size()), "writing masks");
+    }
+    return {};
+}
+
+double meanConfidence(const Image<std::uint8_t>& confidence) {
+    std::uint64_t sum = 0;
+    for (const auto c : confidence.pixels()) sum += c;
+    return static_cast<double>(sum) / 255.0 / static_cast<double>(confidence.count());
+}
+
+/// The background of plain frames. What else can have one (a bundle with time) would be told apart
+/// by its one input before this is called.
+Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    STX_CHECK(checkTarget(o.output, program));
+    STX_CHECK(frameFormat(o.output));
+    if (!o.confidence.empty()) {
+        STX_CHECK(checkPngTarget("--confidence", o.confidence, program));
+        if (o.confidence == o.output)
+            return fail(ErrorCode::usage, "-o and --confidence are both '{}'; give them two names",
+                        o.output);
+    }
+    const std::vector<std::filesystem::path> inputs(o.inputs.begin(), o.inputs.end());
+    preloadCodecs(inputs[0]);
+    STX_TRY(const auto frames, openVideoFrames(inputs, program.job));
+    STX_TRY(const auto masks, maskTargets(o, *frames, program));
+    STX_TRY(const auto background, stillBackground(*frames, o.settings, program.job));
+    STX_CHECK(writeColour(background.colour, o.output, program));
+    if (!o.confidence.empty()) STX_CHECK(writeGrey(background.confidence, o.confidence, program));
+    STX_CHECK(writeMasks(masks, background.colour, *frames, program));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format("{} → {} ({}), {}x{} of {}, {}", frames->description(),
+                            std::filesystem::path(o.output).filename().string(),
+                            humanBytes(bytesOf(o.output)), frames->size().x, frames->size().y,
+                            counted(background.framesUsed, "frame"), humanSeconds(seconds)));
+    auto maskNames = nlohmann::ordered_json::array();
+    for (const MaskTarget& mask : masks)
+        maskNames.push_back({{"frame", mask.frame}, {"output", mask.path}});
+    STX_CHECK(program.writeReport({{"$schema", "background-report.schema.json"},
+                                   {"inputs", o.inputs},
+                                   {"output", o.output},
+                                   {"method", o.method},
+                                   {"width", frames->size().x},
+                                   {"height", frames->size().y},
+                                   {"frames", frames->count()},
+                                   {"framesUsed", background.framesUsed},
+                                   {"confidence", meanConfidence(background.confidence)},
+                                   {"masks", maskNames},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+}  // namespace
+
+void addBackground(CommandLine& line, Program& program) {
+    Command c = line.add("background",
+                         "The background of plain video of a camera that stands still, without "
+                         "those who pass\n\n"
+                         "  stx background frames/ -o background.png\n"
+                         "  stx background frame_%04d.png -o background.png --method n2pg\n"
+                         "  stx background hall.y4m -o background.png --mask-of all");
+    auto o = std::make_shared<BackgroundOptions>();
+    c.option("FRAMES", o->inputs,
+             "Pictures in the order of time, a folder of numbered pictures, their names as "
+             "frame_%04d.png, or a .y4m file")
+        .required();
+    c.option("-o,--output", o->output, "Picture to write (.png, .jpg, .tif, .webp, .exr)")
+        .required()
+        .takes("IMAGE");
+    c.option(
+         "--method",
+         [o](const std::string& text) -> Result<void> {
+             o->method = text;
+             o->settings.method = text == "n2pg"     ? StillMethod::n2pg
+                                  : text == "median" ? StillMethod::median
+                                                     : StillMethod::select;
+             return {};
+         },
+         "select: of each pixel the frames in which least moves around it, and their median (the "
+         "best); n2pg: one pass that updates pixels with a stable nearest-neighbour pixel gradient "
+         "(the steps of Zhao, Lu and Han 2016; the formulas, which they do not give, are ours); "
+         "median: of all frames (default select)")
+        .oneOf({"select", "n2pg", "median"});
+    c.option("--frames", o->settings.frames, "Frames to look at, spread evenly (default: all)")
+        .range(2, 65535)
+        .takes("K");
+    c.option("--confidence", o->confidence,
+             "Write how far frames agree with each pixel: 0 (none) to 255 (all)")
+        .takes("FILE.png");
+    const char* masks = "Masks";
+    c.option("--mask-of", o->maskOf,
+             "Write what of this frame (from 0), or of all, is not background: white in a grey PNG")
+        .takes("FRAME|all")
+        .group(masks);
+    c.option("--mask-output", o->maskOutput,
+             "Names of the masks; %04d stands for the frame, {stem} for the name of its file "
+             "(default: the name of -o with _mask_%04d.png)")
+        .takes("PATTERN")
+        .group(masks);
+    const char* select = "Method select";
+    c.option("--quietest", o->settings.quietest, "Frames that are kept of each pixel (default 19)")
+        .range(1, 255)
+        .takes("S")
+        .group(select);
+    c.option("--window", o->settings.windowDivisor,
+             "Motion is summed over a square around the pixel: the picture's shorter side over "
+             "this (default 6)")
+        .range(1, 1000)
+        .takes("N")
+        .group(select);
+    c.option("--adaptive", o->settings.adaptive,
+             "Keep frames with up to this many times the kept ones' mean motion, too; 0 keeps no "
+             "more (default 1.15)")
+        .range(0.0, 1000.0)
+        .takes("RATIO")
+        .group(select);
+    c.flag("--drift", o->settings.drift,
+           "Motion is the change of gradients: light that changes slowly is none")
+        .group(select);
+    c.sharedOptions(program.common, kOutput);
+    c.runs([o, c](Program& p) -> Result<int> {
+        if (o->settings.method != StillMethod::select)
+            STX_CHECK(c.refuse({"--quietest", "--window", "--adaptive", "--drift"},
+                               "is of --method select"));
+        if (o->maskOf.empty())
+            STX_CHECK(c.refuse({"--mask-output"}, "is of masks; give --mask-of, too"));
+        return backgroundOfFrames(*o, p);
+    });
+}
+
+}  // namespace stx::tools
