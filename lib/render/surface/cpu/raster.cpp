@@ -134,29 +134,112 @@ HWY_INLINE void drawLeaf(const Target& t, const Warp& warp, const Leaf& leaf, fl
     fillPolygon<4, false>(t, v, grow, 0);
 }
 
+/// The corners of the cells of a block in the tile, row by row.
+struct CellGrid {
+    static constexpr int kSide = kBlock + 1;
+    /// Whole vectors may be loaded from each corner on.
+    static constexpr int kPitch = kBlock + 16;
+    float x[kSide][kPitch], y[kSide][kPitch], q[kSide][kPitch], w[kSide][kPitch];
+    bool allFront = true;
+
+    [[nodiscard]] Vertex at(int i, int j) const {
+        return {x[j][i], y[j][i], q[j][i], w[j][i] > 0.0f};
+    }
+
+    /// Row j: corners whose first is at (sx, sy) in the source; `depths` has kPitch values, `count`
+    /// of which matter.
+    HWY_INLINE void projectRow(const Warp& warp, int j, float sx, float sy, const float* depths,
+                               int count) {
+        const hn::ScalableTag<float> d;
+        using V = hn::Vec<decltype(d)>;
+        const int n = static_cast<int>(hn::Lanes(d));
+        const auto& m = warp.m;
+        const V steps = hn::ConvertTo(d, hn::Iota(hn::RebindToSigned<decltype(d)>(), 0));
+        for (int i = 0; i < count; i += n) {
+            const V vx = hn::Add(hn::Set(d, sx + static_cast<float>(i)), steps);
+            const V vq = hn::LoadU(d, depths + i);
+            const auto row = [&](int r) HWY_ATTR {
+                return hn::MulAdd(
+                    hn::Set(d, m[r]), vx,
+                    hn::MulAdd(hn::Set(d, m[r + 2]), vq, hn::Set(d, m[r + 1] * sy + m[r + 3])));
+            };
+            const V denominator = row(12);
+            const V inverse = hn::Div(hn::Set(d, 1.0f), denominator);
+            hn::StoreU(hn::Mul(row(0), inverse), d, &x[j][i]);
+            hn::StoreU(hn::Mul(row(4), inverse), d, &y[j][i]);
+            hn::StoreU(hn::Mul(row(8), inverse), d, &q[j][i]);
+            hn::StoreU(denominator, d, &w[j][i]);
+        }
+        for (int i = 0; i < count; ++i) allFront &= w[j][i] > 0.0f;
+    }
+
+    /// Which cells of row j may show in the tile: those that reach into it and do not turn away
+    /// whichever way they are drawn. All corners must be in front.
+    [[nodiscard]] HWY_INLINE std::uint32_t showing(int j, const Target& t) const {
+        const hn::ScalableTag<float> d;
+        using V = hn::Vec<decltype(d)>;
+        const int n = static_cast<int>(hn::Lanes(d));
+        const V first = hn::Set(d, -kCrack),
+                last = hn::Set(d, static_cast<float>(t.side - 1) + kCrack);
+        std::uint32_t mask = 0;
+        for (int i = 0; i < kBlock; i += n) {
+            const V x00 = hn::LoadU(d, &x[j][i]), x10 = hn::LoadU(d, &x[j][i + 1]);
+            const V x01 = hn::LoadU(d, &x[j + 1][i]), x11 = hn::LoadU(d, &x[j + 1][i + 1]);
+            const V y00 = hn::LoadU(d, &y[j][i]), y10 = hn::LoadU(d, &y[j][i + 1]);
+            const V y01 = hn::LoadU(d, &y[j + 1][i]), y11 = hn::LoadU(d, &y[j + 1][i + 1]);
+            const auto least = [&](V a, V b, V c, V e)
+                                   HWY_ATTR { return hn::Min(hn::Min(a, b), hn::Min(c, e)); };
+            const auto most = [&](V a, V b, V c, V e)
+                                  HWY_ATTR { return hn::Max(hn::Max(a, b), hn::Max(c, e)); };
+            const auto inside = hn::And(hn::And(hn::Le(least(x00, x10, x01, x11), last),
+                                                hn::Ge(most(x00, x10, x01, x11), first)),
+                                        hn::And(hn::Le(least(y00, y10, y01, y11), last),
+                                                hn::Ge(most(y00, y10, y01, y11), first)));
+            // Twice the areas of the triangles that leave out one corner each.
+            const auto area = [&](V ax, V ay, V bx, V by, V cx, V cy) HWY_ATTR {
+                return hn::Sub(hn::Mul(hn::Sub(bx, ax), hn::Sub(cy, ay)),
+                               hn::Mul(hn::Sub(by, ay), hn::Sub(cx, ax)));
+            };
+            const V facing =
+                most(area(x00, y00, x10, y10, x11, y11), area(x00, y00, x11, y11, x01, y01),
+                     area(x00, y00, x10, y10, x01, y01), area(x10, y10, x11, y11, x01, y01));
+            const auto shows = hn::And(inside, hn::Ge(facing, hn::Zero(d)));
+            std::uint8_t bits[8] = {};
+            hn::StoreMaskBits(d, shows, bits);
+            std::uint32_t lanes = 0;
+            std::memcpy(&lanes, bits, sizeof(lanes));
+            mask |= (lanes & ((1u << n) - 1)) << i;
+        }
+        return mask;
+    }
+};
+
 /// Draws the cells of a block, whose first pixel is (x0, y0).
 HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
                             const SourceBlock& block, const BlockTexels& texels, int x0, int y0) {
-    constexpr int kSide = kBlock + 1;
-    Vertex grid[kSide][kSide];
+    CellGrid grid;
     const int xEnd = std::min(x0 + kBlock, s.width - 1), yEnd = std::min(y0 + kBlock, s.height - 1);
-    std::uint32_t needed[kSide] = {};
+    std::uint32_t needed[CellGrid::kSide] = {};
     for (int j = 0; j < kBlock; ++j) {
         needed[j] |= block.cells[j];
         needed[j + 1] |= block.cells[j];
     }
+    float depths[CellGrid::kPitch] = {};
+    const int columns = xEnd - x0 + 1;
     for (int y = y0; y <= yEnd; ++y) {
         if (!needed[y - y0]) continue;
-        const float* q = texels.q + texels.at(0, y - y0);
-        for (int x = 0; x <= xEnd - x0; ++x)
-            grid[y - y0][x] = project(warp, static_cast<float>(x0 + x) + 0.5f,
-                                      static_cast<float>(y) + 0.5f, q[x]);
+        std::memcpy(depths, texels.q + texels.at(0, y - y0),
+                    static_cast<std::size_t>(columns) * sizeof(float));
+        grid.projectRow(warp, y - y0, static_cast<float>(x0) + 0.5f, static_cast<float>(y) + 0.5f,
+                        depths, columns);
     }
     for (int j = 0; j < kBlock; ++j) {
-        for (std::uint32_t left = block.cells[j]; left; left &= left - 1) {
+        std::uint32_t cells = block.cells[j];
+        if (cells && grid.allFront) cells &= grid.showing(j, t);
+        for (std::uint32_t left = cells; left; left &= left - 1) {
             const int i = __builtin_ctz(left);
-            const Vertex &v00 = grid[j][i], &v10 = grid[j][i + 1];
-            const Vertex &v01 = grid[j + 1][i], &v11 = grid[j + 1][i + 1];
+            const Vertex v00 = grid.at(i, j), v10 = grid.at(i + 1, j);
+            const Vertex v01 = grid.at(i, j + 1), v11 = grid.at(i + 1, j + 1);
             const std::uint32_t bits = cellNearEdge(texels, i, j) ? kNearEdgeBit : 0;
             const auto triangle = [&](const Vertex& a, const Vertex& b, const Vertex& c) HWY_ATTR {
                 const Vertex corners[3] = {a, b, c};
