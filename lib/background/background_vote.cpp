@@ -22,6 +22,8 @@ constexpr float kSurfaceShare = 0.03f, kSurfaceTolerances = 2;
 /// A piece goes on in what is within this share of its distance; along this share of its outline,
 /// it is a part of something that moves.
 constexpr float kGhostShare = 0.08f, kGhostOutline = 0.5f;
+/// Of a piece of fewer pixels any part of the outline is enough.
+constexpr std::uint32_t kSpeck = 24;
 /// Neighbours within this many tolerances are of one surface.
 constexpr float kNeighbour = 3;
 
@@ -183,7 +185,7 @@ void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise
     }
     // Their outlines against what is farther, and where those go on in front of it.
     struct Outline {
-        std::uint32_t length = 0, goesOn = 0;
+        std::uint32_t pixels = 0, length = 0, goesOn = 0;
     };
     std::vector<Outline> outlines(depth.count());
     for (int y = 0; y < h; ++y) {
@@ -192,6 +194,7 @@ void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise
             if (!hasPoint(here)) continue;
             const auto i = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(w) +
                            static_cast<std::uint32_t>(x);
+            ++outlines[find(i)].pixels;
             for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
                 if (!depth.contains(x + dx, y + dy)) continue;
                 const float there = depth.at(x + dx, y + dy);
@@ -208,11 +211,11 @@ void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise
         }
     }
     for (std::uint32_t i = 0; i < first.size(); ++i) {
+        if (!hasPoint(depth.data()[i])) continue;
         const Outline& outline = outlines[find(i)];
-        if (hasPoint(depth.data()[i]) && outline.goesOn > 0 &&
-            static_cast<float>(outline.goesOn) >=
-                kGhostOutline * static_cast<float>(outline.length))
-            clearPixel(model, i);
+        const float least =
+            outline.pixels < kSpeck ? 0.0f : kGhostOutline * static_cast<float>(outline.length);
+        if (outline.goesOn > 0 && static_cast<float>(outline.goesOn) >= least) clearPixel(model, i);
     }
 }
 

@@ -68,6 +68,7 @@ ReferenceView withoutImages(const ReferenceView& view) {
     v.farPlane = view.farPlane;
     v.depthBits = view.depthBits;
     v.pruned = view.pruned;
+    v.background = view.background;
     return v;
 }
 

@@ -10,14 +10,15 @@ namespace stx {
 namespace {
 
 struct ModelFigures {
-    double psnr = 0, open = 0, wrongDepth = 0;
+    double psnr = 0;        ///< of known pixels, dB
+    double open = 0;        ///< share of pixels that are not known
+    double wrongDepth = 0;  ///< share of known pixels whose depth is off by more than 2 %
 };
 
 ModelFigures against(const ReferenceView& truth, const ReferenceView& model) {
     double sum = 0;
-    std::int64_t known = 0, all = 0, wrong = 0;
+    std::int64_t known = 0, wrong = 0;
     for (std::size_t i = 0; i < truth.depth.count(); ++i) {
-        ++all;
         const float z = model.depth.data()[i];
         if (!hasPoint(z)) continue;
         ++known;
@@ -27,41 +28,11 @@ ModelFigures against(const ReferenceView& truth, const ReferenceView& model) {
             sum += d * d / 3;
         }
     }
-    return {-10 * std::log10(sum / known), double(all - known) / all, double(wrong) / known};
+    const auto all = static_cast<double>(truth.depth.count()), some = static_cast<double>(known);
+    return {-10 * std::log10(sum / some), 1 - some / all, static_cast<double>(wrong) / some};
 }
 
-void keep(const ReferenceView& view, const std::string& name) {
-    const char* out = std::getenv("STX_DEV_OUT");
-    if (!out) return;
-    auto texture = *view.texture.rgba8();
-    for (std::size_t i = 0; i < texture.count(); ++i)
-        if (!hasPoint(view.depth.data()[i])) texture.data()[i] = {255, 0, 255, 255};
-    const auto bytes =
-        encodePng(view.camera.width, view.camera.height, 4, 8, texture.data(), true, 1);
-    std::FILE* file = std::fopen(fmt::format("{}/{}.png", out, name).c_str(), "wb");
-    std::fwrite(bytes->data(), 1, bytes->size(), file);
-    std::fclose(file);
-}
-
-TEST(TemporalBackground, Person) {
-    REQUIRE_SHARED(folder, "data/motion/uva-person");
-    Job job;
-    const auto model = backgroundOf([&](int i) { return moving::personFrame(folder, 2 * i); },
-                                    [](int i) { return i / 15.0; }, 50, job);
-    keep(model.view, "person");
-}
-
-TEST(TemporalBackground, MovingRoom) {
-    REQUIRE_SHARED(folder, "data/motion/moving-room");
-    Job job;
-    const moving::MovingRoom room(folder);
-    for (const char* v : {"v0", "v1", "v2"}) {
-        const auto model =
-            backgroundOf([&](int i) { return room.view(v, i); }, moving::MovingRoom::time, 16, job);
-        keep(model.view, v);
-    }
-}
-
+// Measured: clean 66.3 dB, noisy 46.9 dB, 0.02 % open, 0.8 % of wrong depth.
 TEST(TemporalBackground, IsTheEmptyRoom) {
     REQUIRE_SHARED(folder, "data/motion/synthetic-room");
     const moving::SyntheticRoom room(folder);
@@ -75,10 +46,25 @@ TEST(TemporalBackground, IsTheEmptyRoom) {
             },
             moving::SyntheticRoom::time, moving::SyntheticRoom::kFrames, job);
         const ModelFigures f = against(room.empty("ref"), model.view);
-        fmt::print("{}: {:.2f} dB, open {:.4f}, wrong depth {:.4f}\n", noisy ? "noisy" : "clean",
-                   f.psnr, f.open, f.wrongDepth);
-        keep(model.view, fmt::format("room_{}", noisy));
+        EXPECT_GT(f.psnr, noisy ? 46.4 : 60.0);
+        EXPECT_LE(f.open, 0.001);
+        EXPECT_LE(f.wrongDepth, noisy ? 0.012 : 0.001);
     }
+}
+
+// A person turns on the spot, 0.75 to 1.1 m before a Kinect; wall and chair are beyond 2 m.
+TEST(TemporalBackground, HasNoGhostOfAPersonWhoTurns) {
+    REQUIRE_SHARED(folder, "data/motion/uva-person");
+    Job job;
+    const auto model = backgroundOf([&](int i) { return moving::personFrame(folder, 2 * i); },
+                                    [](int i) { return i / 15.0; }, 50, job);
+    std::int64_t known = 0, near = 0;
+    for (const float z : model.view.depth.pixels()) {
+        known += hasPoint(z);
+        near += z < 1.8f;
+    }
+    EXPECT_EQ(near, 0);
+    EXPECT_GT(static_cast<double>(known) / static_cast<double>(model.view.depth.count()), 0.6);
 }
 
 }  // namespace
