@@ -24,6 +24,8 @@ constexpr float kSurfaceShare = 0.03f, kSurfaceTolerances = 2;
 constexpr float kGhostShare = 0.08f, kGhostOutline = 0.5f;
 /// Of a piece of fewer pixels any part of the outline is enough.
 constexpr std::uint32_t kSpeck = 24;
+/// Fewer pixels than these, which nothing beside them agrees with, are flying ones of the sensor.
+constexpr std::uint32_t kFlying = 4;
 /// Neighbours within this many tolerances are of one surface.
 constexpr float kNeighbour = 3;
 
@@ -215,7 +217,9 @@ void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise
         const Outline& outline = outlines[find(i)];
         const float least =
             outline.pixels < kSpeck ? 0.0f : kGhostOutline * static_cast<float>(outline.length);
-        if (outline.goesOn > 0 && static_cast<float>(outline.goesOn) >= least) clearPixel(model, i);
+        if (outline.pixels < kFlying ||
+            (outline.goesOn > 0 && static_cast<float>(outline.goesOn) >= least))
+            clearPixel(model, i);
     }
 }
 

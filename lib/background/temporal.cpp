@@ -245,8 +245,11 @@ Result<TemporalBackground> TemporalBackground::start(const ReferenceView& first,
     // The model itself, and marks of one frame.
     const std::uint64_t fixed = static_cast<std::uint64_t>(w) * h * (impl->linear ? 48 : 36);
     const std::uint64_t row = w * (impl->linear ? kBytesPerLinearPixel : kBytesPerPixel);
-    STX_CHECK(job.limits.checkAllocation(1, fixed + row, "the background"));
-    const std::uint64_t fitting = (job.limits.maxMemoryBytes - fixed) / row;
+    Limits limits = job.limits;
+    if (settings.maxMemoryBytes)
+        limits.maxMemoryBytes = std::min(limits.maxMemoryBytes, settings.maxMemoryBytes);
+    STX_CHECK(limits.checkAllocation(1, fixed + row, "the background"));
+    const std::uint64_t fitting = (limits.maxMemoryBytes - fixed) / row;
     impl->passCount = static_cast<int>((h + fitting - 1) / std::min<std::uint64_t>(fitting, h));
     if (fitting >= static_cast<std::uint64_t>(h)) impl->passCount = 1;
     impl->rows = (h + impl->passCount - 1) / impl->passCount;

@@ -1,0 +1,105 @@
+#include "lib/background/sequence_background.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <set>
+
+#include "lib/render/scene/page_set.hpp"
+
+namespace stx {
+namespace {
+
+/// One view of the sequence; without a background when its camera moves.
+struct CameraBackground {
+    std::string name;
+    Camera camera;
+    std::optional<TemporalBackground> background;
+};
+
+Result<void> addFrame(std::vector<CameraBackground>& cameras, const Bundle& bundle, double time,
+                      int pass, Job& job) {
+    if (bundle.views.size() != cameras.size())
+        return fail(ErrorCode::invalidInput, "there are {} views where the first frame has {}",
+                    bundle.views.size(), cameras.size());
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        CameraBackground& c = cameras[i];
+        const ReferenceView& view = bundle.views[i];
+        if (!c.background || pass >= c.background->passes()) continue;
+        if (!sameCamera(view.camera, c.camera)) {
+            job.note(fmt::format(
+                "the camera of view '{}' moves; a background that remembers needs a still one, so "
+                "it gets none",
+                c.name));
+            c.background.reset();
+            continue;
+        }
+        if (auto ok = c.background->add(view, time, job); !ok)
+            return tl::unexpected(ok.error().at(fmt::format("view '{}'", c.name)));
+    }
+    return {};
+}
+
+std::string backgroundName(const std::string& name, std::set<std::string>& taken) {
+    std::string own = name + " background";
+    for (int n = 2; !taken.insert(own).second; ++n) own = fmt::format("{} background {}", name, n);
+    return own;
+}
+
+}  // namespace
+
+Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double> times,
+                                                         const FrameReader& read,
+                                                         const TemporalBackgroundSettings& settings,
+                                                         Job& job) {
+    if (times.empty())
+        return fail(ErrorCode::invalidInput, "there are no frames to make a background of");
+    std::vector<CameraBackground> cameras;
+    int passes = 1;
+    std::set<std::string> names;
+    const auto total = [&] { return static_cast<std::int64_t>(times.size()) * passes; };
+    for (int pass = 0; pass < passes; ++pass) {
+        for (std::size_t frame = 0; frame < times.size(); ++frame) {
+            auto bundle = read(frame, job);
+            if (!bundle) return propagate(bundle);
+            // Backgrounds that are there already are no frames.
+            std::erase_if(bundle->views, [](const ReferenceView& v) { return v.background; });
+            if (cameras.empty()) {
+                TemporalBackgroundSettings each = settings;
+                each.maxMemoryBytes = (settings.maxMemoryBytes ? settings.maxMemoryBytes
+                                                               : job.limits.maxMemoryBytes) /
+                                      std::max<std::size_t>(bundle->views.size(), 1);
+                for (const ReferenceView& view : bundle->views) {
+                    STX_TRY(auto background, TemporalBackground::start(view, each, job));
+                    passes = std::max(passes, background.passes());
+                    names.insert(view.name);
+                    cameras.push_back({view.name, view.camera, std::move(background)});
+                }
+            }
+            if (auto ok = addFrame(cameras, *bundle, times[frame], pass, job); !ok)
+                return tl::unexpected(ok.error().at(fmt::format("frame {}", frame)));
+            job.progress(static_cast<std::int64_t>(times.size()) * pass +
+                             static_cast<std::int64_t>(frame) + 1,
+                         total(), "remembering");
+        }
+        for (CameraBackground& c : cameras)
+            if (c.background && pass < c.background->passes())
+                STX_CHECK(c.background->endPass(job));
+    }
+    std::vector<BackgroundModel> models;
+    for (CameraBackground& c : cameras) {
+        if (!c.background) continue;
+        STX_TRY(auto model, c.background->finish(job));
+        if (model.view.pointCount() == 0) {
+            job.note(
+                fmt::format("nothing stays behind what moves in view '{}'; it gets no "
+                            "background",
+                            c.name));
+            continue;
+        }
+        model.view.name = backgroundName(c.name, names);
+        models.push_back(std::move(model));
+    }
+    return models;
+}
+
+}  // namespace stx
