@@ -14,7 +14,8 @@ class PlannedBlocks : public testing::TestWithParam<AnalyticScene> {};
 TEST_P(PlannedBlocks, AreAllThatShowInATile) {
     const Bundle bundle = analyticBundle(GetParam(), 4);
     const SurfaceScene scene(bundle);
-    const Effort effort{.samplesPerPixel = 2};
+    Effort effort;
+    effort.samplesPerPixel = 2;
     const Camera camera = analyticCamera(GetParam(), 0.4, 4);
     const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
     const SampleGrid grid{effort.samplesPerPixel};

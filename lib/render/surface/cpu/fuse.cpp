@@ -16,27 +16,49 @@ struct RowRange {
     std::array<std::uint32_t, kTile> any, common;  ///< flags of any, and of all that are there
 };
 
-/// Of pixels of S x S samples each.
+/// Of pixels of S x S samples each; false when there is nothing in any of them.
 template <int S>
-void summarisePixels(const float* lines, int stride, RowRange& out) {
-    for (int x = 0; x < kTile; ++x) {
-        float least = lines[x * S], most = least;
-        std::uint32_t any = 0, common = ~0u;
-        for (int j = 0; j < S; ++j) {
-            for (int i = 0; i < S; ++i) {
-                const float q = lines[j * stride + x * S + i];
-                least = std::min(least, q);
-                most = std::max(most, q);
-                const auto bits = std::bit_cast<std::uint32_t>(q);
-                any |= bits;
-                common &= bits == 0 ? ~0u : bits;
-            }
-        }
-        out.low[x] = least;
-        out.high[x] = most;
-        out.any[x] = any;
-        out.common[x] = common;
+bool summarisePixels(const float* lines, int stride, RowRange& out) {
+    constexpr int kSide = kTile * S;
+    // Down the columns first, which vectors do.
+    std::array<float, kSide> low, high;
+    std::array<std::uint32_t, kSide> any, common;
+    for (int i = 0; i < kSide; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const auto bits = std::bit_cast<std::uint32_t>(lines[i]);
+        low[k] = high[k] = lines[i];
+        any[k] = bits;
+        common[k] = bits == 0 ? ~0u : bits;
     }
+    for (int j = 1; j < S; ++j) {
+        const float* line = lines + static_cast<std::ptrdiff_t>(j) * stride;
+        for (int i = 0; i < kSide; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            const float q = line[i];
+            const auto bits = std::bit_cast<std::uint32_t>(q);
+            low[k] = q < low[k] ? q : low[k];
+            high[k] = q > high[k] ? q : high[k];
+            any[k] |= bits;
+            common[k] &= bits == 0 ? ~0u : bits;
+        }
+    }
+    std::uint32_t all = 0;
+    for (const std::uint32_t bits : any) all |= bits;
+    if (all == 0) return false;
+    for (std::size_t x = 0; x < kTile; ++x) {
+        const std::size_t first = x * S;
+        out.low[x] = low[first];
+        out.high[x] = high[first];
+        out.any[x] = any[first];
+        out.common[x] = common[first];
+        for (std::size_t i = first + 1; i < first + S; ++i) {
+            out.low[x] = std::min(out.low[x], low[i]);
+            out.high[x] = std::max(out.high[x], high[i]);
+            out.any[x] |= any[i];
+            out.common[x] &= common[i];
+        }
+    }
+    return true;
 }
 
 struct Fuser : Votes {
@@ -69,15 +91,15 @@ struct Fuser : Votes {
 
     void fuseRow(int row, int columns, Pieces& pieces) {
         std::array<RowRange, kMostTileSources> ranges;
-        std::array<int, kMostTileSources> list;  // sources that have samples
+        std::array<int, kMostTileSources> list;  // sources that have something there
         int count = 0;
         for (std::size_t s = 0; s < locals.size(); ++s) {
             if (!locals[s].samples) continue;
-            list[static_cast<std::size_t>(count++)] = static_cast<int>(s);
             const float* lines = locals[s].samples + static_cast<std::ptrdiff_t>(row) * S * stride;
             constexpr std::array summarise = {summarisePixels<1>, summarisePixels<2>,
                                               summarisePixels<3>, summarisePixels<4>};
-            summarise[static_cast<std::size_t>(S - 1)](lines, stride, ranges[s]);
+            if (summarise[static_cast<std::size_t>(S - 1)](lines, stride, ranges[s]))
+                list[static_cast<std::size_t>(count++)] = static_cast<int>(s);
         }
         for (int column = 0; column < columns; ++column) {
             const auto x = static_cast<std::size_t>(column);

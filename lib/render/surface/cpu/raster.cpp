@@ -228,8 +228,11 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
     const int columns = xEnd - x0 + 1;
     for (int y = y0; y <= yEnd; ++y) {
         if (!needed[y - y0]) continue;
-        std::memcpy(depths, texels.q + texels.at(0, y - y0),
-                    static_cast<std::size_t>(columns) * sizeof(float));
+        const float* q = texels.q + texels.at(0, y - y0);
+        if (columns == CellGrid::kSide)  // by far most: a copy of fixed length is inlined
+            std::memcpy(depths, q, CellGrid::kSide * sizeof(float));
+        else
+            std::copy_n(q, columns, depths);
         grid.projectRow(warp, y - y0, static_cast<float>(x0) + 0.5f, static_cast<float>(y) + 0.5f,
                         depths, columns);
     }
