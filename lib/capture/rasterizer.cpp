@@ -32,8 +32,20 @@ struct SetUp {
     Affine edge[3];   ///< >= 0 inside; proportional to the perspective-correct barycentrics
     Affine nearness;  ///< perspective: 1/dist; orthographic: -dist
     std::uint32_t triangle = 0;
-    int x0 = 0, y0 = 0, x1 = -1, y1 = -1;  ///< pixels touched, inclusive
+    glm::dvec2 low{0.0}, high{0.0};  ///< its box in the picture, pixels, a little too large
 };
+
+/// Samples of n a pixel, the first at 0.5 / n, from a place on, up to another.
+int firstSample(double from, int n) {
+    return static_cast<int>(std::ceil(from * n - 0.5));
+}
+int lastSample(double to, int n) {
+    return static_cast<int>(std::floor(to * n - 0.5));
+}
+bool holdsSample(const SetUp& s, int n) {
+    return firstSample(s.low.x, n) <= lastSample(s.high.x, n) &&
+           firstSample(s.low.y, n) <= lastSample(s.high.y, n);
+}
 
 class Rasterizer {
   public:
@@ -46,7 +58,8 @@ class Rasterizer {
     Result<RasterImage> run(const RasterSettings& settings, Job& job);
 
   private:
-    bool setUp(std::uint32_t triangle, SetUp& out) const;
+    /// False for what no sample of `samples` a pixel and side, and no pixel's centre, can see.
+    bool setUp(std::uint32_t triangle, int samples, SetUp& out) const;
     /// What is seen at the samples of a tile.
     struct Tile {
         std::vector<float> depth;        ///< nearness of the opaque surface
@@ -82,7 +95,7 @@ class Rasterizer {
     std::vector<SetUp> setUps_;
 };
 
-bool Rasterizer::setUp(std::uint32_t triangle, SetUp& out) const {
+bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
     const auto& t = mesh_.triangles[triangle];
     glm::dvec3 v[3];  // (x * w, y * w, w) in pixels
     double dist[3];
@@ -110,9 +123,9 @@ bool Rasterizer::setUp(std::uint32_t triangle, SetUp& out) const {
     out.nearness = {n.x, n.y, n.z};
     out.triangle = triangle;
 
-    out.x0 = out.y0 = 0;
-    out.x1 = camera_.width - 1;
-    out.y1 = camera_.height - 1;
+    const glm::dvec2 size(camera_.width, camera_.height);
+    out.low = glm::dvec2(0.0);
+    out.high = size;
     if (allInFront) {
         glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-low);
         for (int k = 0; k < 3; ++k) {
@@ -122,16 +135,29 @@ bool Rasterizer::setUp(std::uint32_t triangle, SetUp& out) const {
         }
         if (!(high.x >= 0 && high.y >= 0 && low.x < camera_.width && low.y < camera_.height))
             return false;
-        out.x0 = static_cast<int>(std::max(0.0, std::floor(low.x)));
-        out.y0 = static_cast<int>(std::max(0.0, std::floor(low.y)));
-        out.x1 = static_cast<int>(std::min(camera_.width - 1.0, std::floor(high.x)));
-        out.y1 = static_cast<int>(std::min(camera_.height - 1.0, std::floor(high.y)));
+        constexpr double kMargin = 0.001;  // far more than rounding takes; the edges decide
+        out.low = glm::max(low - kMargin, 0.0);
+        out.high = glm::min(high + kMargin, size);
+        // Most of the triangles of a dense mesh lie between the samples.
+        if (!holdsSample(out, samples) && !holdsSample(out, 1)) return false;
     }
-    return out.x0 <= out.x1 && out.y0 <= out.y1;
+    return true;
 }
 
 bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, int& from,
                           int& to) {
+    // A few samples are asked one by one.
+    constexpr int kFew = 4;
+    if (to - from < kFew) {
+        const auto inside = [&](int i) {
+            const double x = origin + i * step;
+            return std::all_of(std::begin(s.edge), std::end(s.edge),
+                               [&](const Affine& e) { return e.a * x + (e.b * y + e.c) >= 0; });
+        };
+        while (from <= to && !inside(from)) ++from;
+        while (from <= to && !inside(to)) --to;
+        return from <= to;
+    }
     // Shrink [from, to] by each edge; the exact predicate decides at the ends, and being monotone
     // in x it holds in between.
     for (const auto& e : s.edge) {
@@ -209,14 +235,14 @@ void Rasterizer::drawTile(const std::vector<std::uint32_t>& list, int tileX, int
     const double step = 1.0 / samples;
     const double originX = tileX * kTile + 0.5 * step, originY = tileY * kTile + 0.5 * step;
     const auto drawLines = [&](const SetUp& s, const auto& drawLine) {
-        const int px0 = std::max(s.x0 - tileX * kTile, 0),
-                  px1 = std::min(s.x1 - tileX * kTile, kTile - 1);
-        const int py0 = std::max(s.y0 - tileY * kTile, 0),
-                  py1 = std::min(s.y1 - tileY * kTile, kTile - 1);
-        for (int row = py0 * samples; row < (py1 + 1) * samples; ++row) {
-            drawLine(originY + row * step, px0 * samples, (px1 + 1) * samples - 1,
-                     static_cast<std::size_t>(row) * side);
-        }
+        const glm::dvec2 corner(tileX * kTile, tileY * kTile);
+        const glm::dvec2 low = s.low - corner, high = s.high - corner;
+        const int from = std::max(firstSample(low.x, samples), 0),
+                  to = std::min(lastSample(high.x, samples), side - 1);
+        if (from > to) return;
+        const int last = std::min(lastSample(high.y, samples), side - 1);
+        for (int row = std::max(firstSample(low.y, samples), 0); row <= last; ++row)
+            drawLine(originY + row * step, from, to, static_cast<std::size_t>(row) * side);
     };
     bool translucent = false;
     for (const auto index : list) {
@@ -401,14 +427,16 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     setUps_.reserve(mesh_.triangles.size());
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
         SetUp s;
-        if (setUp(t, s)) setUps_.push_back(s);
+        if (setUp(t, settings.supersampling, s)) setUps_.push_back(s);
     }
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
     for (std::uint32_t i = 0; i < setUps_.size(); ++i) {
         const auto& s = setUps_[i];
-        for (int ty = s.y0 / kTile; ty <= s.y1 / kTile; ++ty) {
-            for (int tx = s.x0 / kTile; tx <= s.x1 / kTile; ++tx)
+        const glm::ivec2 first = glm::ivec2(s.low) / kTile,
+                         last = glm::min(glm::ivec2(s.high), glm::ivec2(w, h) - 1) / kTile;
+        for (int ty = first.y; ty <= last.y; ++ty) {
+            for (int tx = first.x; tx <= last.x; ++tx)
                 bins[static_cast<std::size_t>(ty) * tilesX + tx].push_back(i);
         }
     }
