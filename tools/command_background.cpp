@@ -5,7 +5,9 @@
 
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
+#include "formats/sequences.hpp"
 #include "formats/video/video_frames.hpp"
+#include "lib/background/sequence_background.hpp"
 #include "lib/background/still.hpp"
 #include "tools/commands.hpp"
 
@@ -109,8 +111,56 @@ double meanConfidence(const Image<std::uint8_t>& confidence) {
     return static_cast<double>(sum) / 255.0 / static_cast<double>(confidence.count());
 }
 
-/// The background of plain frames. What else can have one (a bundle with time) would be told apart
-/// by its one input before this is called.
+/// What the cameras of a bundle with time see behind all that moves, as views of the bundle.
+Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    if (o.inputs.size() != 1)
+        return fail(ErrorCode::usage, "{} inputs for '{}'; one bundle with time is expected",
+                    o.inputs.size(), o.output);
+    STX_CHECK(checkTarget(o.output, program));
+    preloadCodecs(o.inputs[0]);
+    STX_TRY(auto frames, openSequence(o.inputs[0], {}, program.job));
+    if (!frames->timeline().moves())
+        return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
+                      "it has one frame; a background is found in what others uncover");
+    auto found = rememberBackgrounds(
+        frames->timeline().times,
+        [&](std::size_t frame, Job& job) { return frames->frame(frame, job); }, {}, program.job);
+    if (!found) return tl::unexpected(found.error().at(fmt::format("'{}'", o.inputs[0])));
+    if (found->empty())
+        return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
+                      "no camera stands still and sees what others hide");
+    auto views = nlohmann::ordered_json::array();
+    for (const BackgroundModel& model : *found) {
+        const auto seen = model.view.pointCount();
+        views.push_back(
+            {{"name", model.view.name},
+             {"seen", static_cast<double>(seen) / static_cast<double>(model.view.depth.count())}});
+    }
+    const Timeline timeline = frames->timeline();
+    frames = withBackgrounds(std::move(frames), std::move(*found));
+    SaveOptions save;
+    save.noClobber = program.common.noClobber;
+    STX_CHECK(saveSequence(*frames, o.output, save, program.job));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format("{} → {} ({}), {} of {}, {}",
+                            std::filesystem::path(o.inputs[0]).filename().string(),
+                            std::filesystem::path(o.output).filename().string(),
+                            humanBytes(bytesOf(o.output)), counted(views.size(), "background"),
+                            counted(timeline.count(), "frame"), humanSeconds(seconds)));
+    STX_CHECK(program.writeReport({{"$schema", "background-report.schema.json"},
+                                   {"inputs", o.inputs},
+                                   {"output", o.output},
+                                   {"method", "temporal"},
+                                   {"frames", timeline.count()},
+                                   {"views", views},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+/// The background of plain frames.
 Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
@@ -157,17 +207,21 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
 
 void addBackground(CommandLine& line, Program& program) {
     Command c = line.add("background",
-                         "The background of plain video of a camera that stands still, without "
-                         "those who pass\n\n"
+                         "What a camera that stands still sees without those who pass: a picture "
+                         "out of plain\nvideo, or views of a bundle with time\n\n"
                          "  stx background frames/ -o background.png\n"
                          "  stx background frame_%04d.png -o background.png --method n2pg\n"
-                         "  stx background hall.y4m -o background.png --mask-of all");
+                         "  stx background hall.y4m -o background.png --mask-of all\n"
+                         "  stx background film.mp4 -o film_with_background.mp4");
     auto o = std::make_shared<BackgroundOptions>();
     c.option("FRAMES", o->inputs,
              "Pictures in the order of time, a folder of numbered pictures, their names as "
-             "frame_%04d.png, or a .y4m file")
+             "frame_%04d.png, or a .y4m file; or a bundle with time (.mp4, an image set, "
+             "name_%04d.exr)")
         .required();
-    c.option("-o,--output", o->output, "Picture to write (.png, .jpg, .tif, .webp, .exr)")
+    c.option("-o,--output", o->output,
+             "Picture to write (.png, .jpg, .tif, .webp, .exr); of a bundle with time: it with a "
+             "background view for each still camera (.mp4, .xmt, .bt, name_%04d.exr)")
         .required()
         .takes("IMAGE");
     c.option(
@@ -227,6 +281,12 @@ void addBackground(CommandLine& line, Program& program) {
                                "is of --method select"));
         if (o->maskOf.empty())
             STX_CHECK(c.refuse({"--mask-output"}, "is of masks; give --mask-of, too"));
+        if (holdsSequences(o->output)) {
+            STX_CHECK(c.refuse({"--method", "--frames", "--confidence", "--mask-of",
+                                "--mask-output", "--quietest", "--window", "--adaptive", "--drift"},
+                               "is of plain video, whose background is a picture"));
+            return backgroundOfBundle(*o, p);
+        }
         return backgroundOfFrames(*o, p);
     });
 }

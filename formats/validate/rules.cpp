@@ -14,6 +14,8 @@ constexpr const char* kMp4 = "ISO/IEC 14496-14, 3";
 constexpr const char* kOd = "ISO/IEC 14496-1, 7.2.6";
 constexpr const char* kBifs = "ISO/IEC 14496-11, 8.6";
 constexpr const char* kDibr = "ISO/IEC 14496-16, 4.5.4";
+constexpr const char* kMovie = "ISO/IEC 14772-1, 6.28";
+constexpr const char* kClock = "ISO/IEC 14496-1, 7.3";
 constexpr const char* kV2 = "ISO/IEC 14496-16, 4.5.4 (V2 nodes)";
 
 constexpr Rule kRules[] = {
@@ -88,6 +90,15 @@ constexpr Rule kRules[] = {
     {6006, warning, kV2, "SimpleTextureV2 with splats is in a DepthImageV2"},
     {6007, warning, kV2, "normals have length 1"},
     {6008, warning, kV2, "normals point to the viewer"},
+
+    {7001, error, kFile, "images of a view that move have pictures of the same times"},
+    {7002, error, kFile, "MovieTextures of a view start, stop, run and loop together"},
+    {7003, warning, kClock, "a MovieTexture that loops has a clock of its own (OCR_ES_ID)"},
+    {7004, error, "ISO/IEC 14496-12, 8.6.2", "the first picture of a stream stands alone (sync)"},
+    {7005, warning, kMovie, "pictures that change in time are in a MovieTexture"},
+    {7006, warning, kMovie, "a MovieTexture runs forwards (speed above 0)"},
+    {7007, error, kDibr, "all pictures of a stream have the same size"},
+    {7008, warning, "ISO/IEC 14496-12, 8.6.6", "the edit list shows every picture"},
 };
 
 }  // namespace

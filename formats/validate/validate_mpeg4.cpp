@@ -12,6 +12,7 @@
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "formats/validate/findings.hpp"
+#include "formats/validate/validate_movies.hpp"
 
 namespace stx {
 
@@ -307,6 +308,7 @@ class DocumentValidator {
             checkPointTexture(node, *texture, where);
         } else {
             checkSimpleTexture(node, *texture, where, inOctree);
+            checkMovies(*texture, *images_, where, job_.limits, findings_);
         }
     }
 

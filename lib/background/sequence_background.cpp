@@ -102,4 +102,20 @@ Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double>
     return models;
 }
 
+std::unique_ptr<Sequence> withBackgrounds(std::unique_ptr<Sequence> frames,
+                                          std::vector<BackgroundModel> backgrounds) {
+    auto added = std::make_shared<Bundle>();
+    for (BackgroundModel& model : backgrounds) added->views.push_back(std::move(model.view));
+    const Bounds more = added->computeBounds();
+    return changed(std::move(frames), [added, more](Bundle& frame, Job&) -> Result<void> {
+        std::erase_if(frame.views, [](const ReferenceView& view) { return view.background; });
+        frame.views.insert(frame.views.end(), added->views.begin(), added->views.end());
+        if (frame.bounds && !more.empty()) {
+            frame.bounds->add(more.min);
+            frame.bounds->add(more.max);
+        }
+        return {};
+    });
+}
+
 }  // namespace stx

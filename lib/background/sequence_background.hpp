@@ -1,11 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "lib/background/temporal.hpp"
-#include "lib/model/bundle.hpp"
+#include "lib/model/sequence.hpp"
 
 namespace stx {
 
@@ -20,5 +21,10 @@ using FrameReader = std::function<Result<Bundle>(std::size_t frame, Job& job)>;
 [[nodiscard]] Result<std::vector<BackgroundModel>> rememberBackgrounds(
     std::span<const double> times, const FrameReader& read,
     const TemporalBackgroundSettings& settings, Job& job);
+
+/// The frames with one more view for each background, the same in all frames. Backgrounds that
+/// they had are left out.
+[[nodiscard]] std::unique_ptr<Sequence> withBackgrounds(std::unique_ptr<Sequence> frames,
+                                                        std::vector<BackgroundModel> backgrounds);
 
 }  // namespace stx

@@ -83,7 +83,7 @@ TEST(SpheresMiv, TheCenterViewIsRenderedAsWellAsTheDesignPromises) {
     RenderSettings settings;
     auto renderer = makeRenderer(Backend::cpu, *bundle, settings, -1, job);
     ASSERT_TRUE(renderer) << renderer.error().text();
-    for (const auto& [name, camera] : *cameras) {
+    for (const auto& [name, camera, time] : *cameras) {
         if (name != "gt_center") continue;
         const auto frame = (*renderer)->render(camera);
         ASSERT_TRUE(frame);

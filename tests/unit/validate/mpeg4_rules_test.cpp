@@ -219,7 +219,8 @@ TEST(Validate, EveryRuleHasASampleThatBreaksIt) {
         }
     }
     // Rules that other tests break: below, and in the other files of this folder.
-    const Numbers elsewhere = {1001, 1002, 1003, 4030, 5001, 5002, 5003, 5004};
+    const Numbers elsewhere = {1001, 1002, 1003, 4030, 5001, 5002, 5003, 5004,
+                               7001, 7002, 7003, 7004, 7005, 7006, 7007, 7008};
     for (const Rule& rule : ruleCatalogue())
         EXPECT_TRUE(broken.contains(rule.number) || elsewhere.contains(rule.number))
             << rule.number << " has no sample";
@@ -284,7 +285,7 @@ TEST(Validate, NumbersAscendAndBelongToTheirRange) {
     int last = 1000;
     for (const Rule& rule : ruleCatalogue()) {
         EXPECT_GT(rule.number, last);
-        EXPECT_LT(rule.number, 7000);
+        EXPECT_LT(rule.number, 8000);
         EXPECT_EQ(findRule(rule.number), &rule);
         last = rule.number;
     }

@@ -1,0 +1,114 @@
+// Rules 7xxx: each broken once in a sound film.
+
+#include "formats/mpeg4/mapping/sequence_write.hpp"
+#include "formats/validate/validate_mpeg4.hpp"
+#include "tests/unit/sequences/moving_views.hpp"
+#include "tests/unit/validate/numbers.hpp"
+
+namespace stx::mpeg4 {
+namespace {
+
+/// A film whose first view moves in colour and depth (object descriptors 2 and 3).
+struct Film {
+    Document document;
+    ElementaryStream& stream(int id) {
+        auto& update = std::get<UpdateObjectDescriptors>(document.odFrames[0].commands[0]);
+        for (ObjectDescriptor& od : update.descriptors)
+            if (od.id == id) return od.streams[0];
+        throw std::runtime_error("no stream");
+    }
+    NodePtr texture() {
+        const auto& root = std::get<ReplaceScene>(document.frames[0].commands[0]).root;
+        for (const NodePtr& node : root->get<NodeList>("children"))
+            if (node->is("DepthImage")) return node->get<NodePtr>("diTexture");
+        return nullptr;
+    }
+    NodePtr movie(const char* field = "texture") { return texture()->get<NodePtr>(field); }
+};
+
+Film film() {
+    TemporaryFolder folder("movie_rules");
+    Job job;
+    MovingViews frames(4, 25, false);
+    auto spool = PictureSpool::create(folder.path());
+    auto document = sceneFromSequence(frames, {}, *spool, job);
+    if (!document) throw std::runtime_error(document.error().text());
+    return {std::move(*document)};
+}
+
+Numbers brokenBy(const std::function<void(Film&)>& change) {
+    Film broken = film();
+    change(broken);
+    Job job;
+    return numbersOf(validate(broken.document, {}, {}, job));
+}
+
+TEST(ValidateMovies, AFilmOfOursIsSound) {
+    EXPECT_EQ(brokenBy([](Film&) {}), Numbers{});
+}
+
+TEST(ValidateMovies, PicturesOfAPairHaveTheSameTimes) {
+    EXPECT_EQ(brokenBy([](Film& f) { f.stream(3).samples.pop_back(); }), Numbers{7001});
+    EXPECT_EQ(brokenBy([](Film& f) { f.stream(3).samples[2].time += 10; }), Numbers{7001});
+}
+
+TEST(ValidateMovies, PairsRunTogether) {
+    EXPECT_EQ(brokenBy([](Film& f) { f.movie()->set("startTime", 1.0); }), Numbers{7002});
+    EXPECT_EQ(brokenBy([](Film& f) { f.movie("depth")->set("speed", 2.0f); }), Numbers{7002});
+    EXPECT_EQ(brokenBy([](Film& f) { f.stream(3).ocrEsId = std::uint16_t{3}; }), Numbers{7002});
+}
+
+TEST(ValidateMovies, LoopsNeedAClock) {
+    const auto loop = [](Film& f) {
+        f.movie()->set("loop", true);
+        f.movie("depth")->set("loop", true);
+    };
+    EXPECT_EQ(brokenBy(loop), Numbers{7003});
+    EXPECT_EQ(brokenBy([&](Film& f) {
+                  loop(f);
+                  f.stream(2).ocrEsId = f.stream(3).ocrEsId = std::uint16_t{3};
+              }),
+              Numbers{});
+}
+
+TEST(ValidateMovies, TheFirstPictureStandsAlone) {
+    EXPECT_EQ(brokenBy([](Film& f) { f.stream(2).samples[0].sync = false; }), Numbers{7004});
+}
+
+TEST(ValidateMovies, PicturesInTimeAreInAMovieTexture) {
+    EXPECT_EQ(brokenBy([](Film& f) {
+                  for (const char* field : {"texture", "depth"}) {
+                      NodePtr still = makeNode("ImageTexture");
+                      still->set("url", f.movie(field)->value(std::string_view("url")));
+                      f.texture()->set(std::string_view(field), still);
+                  }
+              }),
+              Numbers{7005});
+}
+
+TEST(ValidateMovies, MoviesRunForwards) {
+    EXPECT_EQ(brokenBy([](Film& f) {
+                  f.movie()->set("speed", -1.0f);
+                  f.movie("depth")->set("speed", -1.0f);
+              }),
+              Numbers{7006});
+}
+
+TEST(ValidateMovies, PicturesKeepTheirSize) {
+    EXPECT_EQ(brokenBy([](Film& f) {
+                  const std::vector<std::uint8_t> grey(4 * 4, 128);
+                  f.stream(3).samples[2].data =
+                      ByteRange::of(*encodePng(4, 4, 1, 8, grey.data(), false));
+              }),
+              Numbers{7007});
+}
+
+TEST(ValidateMovies, EditListsShowEveryPicture) {
+    EXPECT_EQ(brokenBy([](Film& f) {
+                  for (const int id : {2, 3}) f.stream(id).edits = {1000, {{80, 0, 0x10000}}};
+              }),
+              Numbers{7008});
+}
+
+}  // namespace
+}  // namespace stx::mpeg4
