@@ -23,7 +23,7 @@ struct RenderOptions {
     TimeOptions time;
     Backend backend = Backend::automatic;
     RenderSettings settings;  ///< without the lighting
-    std::string background;  ///< empty: not given
+    std::string background;   ///< empty: not given
     std::vector<std::string> lights;
     std::string ambient = "0.2", specular = "0";
     double shininess = 32;
