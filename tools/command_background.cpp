@@ -176,9 +176,10 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
     STX_TRY(const auto frames, openVideoFrames(inputs, program.job));
     STX_TRY(const auto masks, maskTargets(o, *frames, program));
     STX_TRY(const auto background, stillBackground(*frames, o.settings, program.job));
-    STX_CHECK(writeColour(background.colour, o.output, program));
-    if (!o.confidence.empty()) STX_CHECK(writeGrey(background.confidence, o.confidence, program));
+    // The background last: where it is, the rest is, too.
     STX_CHECK(writeMasks(masks, background.colour, *frames, program));
+    if (!o.confidence.empty()) STX_CHECK(writeGrey(background.confidence, o.confidence, program));
+    STX_CHECK(writeColour(background.colour, o.output, program));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();

@@ -46,6 +46,8 @@ def commands_for(name, have):
     """What may be handed a model or a bundle."""
     ending = os.path.splitext(name)[1].lower()
     lines = [["info", "IN"], ["validate", "IN"], ["convert", "IN"] + CONVERT, ["render", "IN"] + RENDER]
+    if ending == ".y4m":
+        lines = [["background", "IN", "-o", "OUT/a.png"], ["background", "IN", "-o", "OUT/a.png", "--method", "n2pg"]]
     if ending == ".json":
         lines = [["info", "IN"], ["validate", "IN"], ["render", "IN"] + RENDER]
     if ending in (".json", ".mp4", ".exr", ".xmt", ".bt"):
@@ -68,6 +70,8 @@ def malformed(shared, have, folder):
             lines = [["convert", model, "--texture", "IN"] + CONVERT, ["info", "IN"]]
             if "compare" in have:
                 lines.append(["compare", "IN", "IN"])
+            if "background" in have:
+                lines.append(["background", "IN", "IN", "-o", "OUT/a.png"])
             if name.endswith(".exr"):
                 lines += commands_for(name, have)
             for line in lines:
@@ -88,7 +92,13 @@ def own_files(args, folder):
     made.append(os.path.join(folder, "atlas", "atlas.json"))
     must([args.stx, "pack", made[0], "-o", os.path.join(folder, "atlas.exr")], folder)
     made.append(os.path.join(folder, "atlas.exr"))
-    return made + models(folder)
+    return made + models(folder) + videos(folder)
+
+
+def videos(folder):
+    """Uncompressed video, from the seeds of fuzzing."""
+    seeds = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../fuzz/corpus/y4m")
+    return [copy_into(os.path.join(seeds, name), folder) for name in ("420jpeg.y4m", "420p10.y4m")]
 
 
 def models(folder):

@@ -52,6 +52,7 @@ def commands(inputs):
     yield Command("render png", ["render", bundle, "-o", "t.png", "--backend", "cpu", "--size", "400x400"], ["t.png"])
     yield Command("render sequence", ["render", atlas, "-o", "t_%04d.png", "--orbit", "6", "--backend", "cpu", "--size",
                                       "200x200"], [f"t_{i:04d}.png" for i in range(6)])
+    yield Command("background", ["background", inputs["frames"], "-o", "t.png"], ["t.png"], ["--method", "median"])
 
 
 def state(folder, target):
@@ -290,6 +291,10 @@ def main():
         inputs = {"mesh": quad(folder), "bundle": os.path.join(folder, "in.mp4"), "atlas": os.path.join(folder, "in")}
         must([args.stx, "convert", inputs["mesh"], "-o", "in.mp4", "--views", "ring:4", "--size", "160x160"], folder)
         must([args.stx, "pack", "in.mp4", "-o", "in"], folder)
+        inputs["frames"] = os.path.join(folder, "frames")
+        os.makedirs(inputs["frames"])
+        must([args.stx, "render", "in.mp4", "-o", "frames/f_%04d.png", "--orbit", "8", "--backend", "cpu", "--size",
+              "200x200", "--background", "white"], folder)
         inputs["other"] = os.path.join(folder, "other.mp4")
         must([args.stx, "convert", inputs["mesh"], "-o", "other.mp4", "--views", "ring:2", "--size", "20x20"], folder)
         all_commands = list(commands(inputs))

@@ -39,6 +39,9 @@ def main():
         must([args.stx, "convert", args.model, "-o", "in.exr", "--views", "sphere:5", "--size", "96x80"], top)
         must([args.stx, "bake", "in.exr", "-o", "baked.mp4"], top)
         must([args.stx, "convert", "quad.obj", "-o", "quad.mp4", "--views", "cube", "--size", "40x40"], top)
+        os.mkdir(os.path.join(top, "frames"))
+        must([args.stx, "render", "in.exr", "-o", "frames/f_%04d.png", "--orbit", "24", "--size", "90x70", "--backend", "cpu",
+              "--background", "white"], top)
         views = ["--views", "sphere:5", "--size", "96x80"]
         jobs = {
             "convert mp4": ["convert", args.model, "-o", "OUT/a.mp4"] + views,
@@ -60,6 +63,10 @@ def main():
                              "--backend", "cpu", "--eye=0.25,0.5,3.5"],
             "render mesh": ["render", args.model, "-o", "OUT/a.exr", "--size", "120x90"],
             "extract": ["extract", "IN/in.exr", "-o", "OUT/images"],
+            "background": ["background", "IN/frames", "-o", "OUT/a.png", "--confidence", "OUT/c.png", "--mask-of", "all",
+                           "--mask-output", "OUT/m_%04d.png"],
+            "background in bands": ["background", "IN/frames/f_%04d.png", "-o", "OUT/a.png", "--drift", "--max-memory", "1"],
+            "background n2pg": ["background", "IN/frames", "-o", "OUT/a.exr", "--method", "n2pg"],
             "batch": ["convert", "IN/quad.obj", "IN/in.exr", "-o", "OUT/{stem}.mp4", "--jobs", "2", "--views", "ring:2",
                       "--size", "40x40"],
         }
