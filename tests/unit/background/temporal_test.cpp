@@ -4,39 +4,12 @@
 
 #include "lib/background/sequence_background.hpp"
 #include "lib/base/parallel.hpp"
+#include "tests/wall_with_block.hpp"
 
 namespace stx {
 namespace {
 
-constexpr int kWidth = 48, kHeight = 36;
-constexpr float kWall = 4.0f;
-
-glm::u8vec3 wallColour(int x, int y) {
-    return {90 + 2 * x, 80 + 3 * y, 120 + (x * 7 + y * 5) % 40};
-}
-
-/// A wall, with a block of another colour before it that covers columns x0 to x1.
-ReferenceView wallWithBlock(int x0, int x1, float depth, float light = 1.0f) {
-    ReferenceView view;
-    view.name = "camera";
-    view.camera =
-        Camera::fromFieldOfView({0, 0, 0}, {1, 0, 0, 0}, {1.0, 0.8}, false, kWidth, kHeight);
-    view.nearPlane = 0.5;
-    view.farPlane = 8;
-    view.depthBits = 32;
-    view.depth = Image<float>(kWidth, kHeight, kWall);
-    Rgba8Image colour(kWidth, kHeight);
-    for (int y = 0; y < kHeight; ++y) {
-        for (int x = 0; x < kWidth; ++x) {
-            const bool block = x >= x0 && x < x1 && y >= 8;
-            const glm::vec3 c = block ? glm::vec3(30, 60, 200) : glm::vec3(wallColour(x, y));
-            colour.at(x, y) = glm::u8vec4(glm::u8vec3(c * light + 0.5f), 255);
-            if (block) view.depth.at(x, y) = depth;
-        }
-    }
-    view.texture = std::move(colour);
-    return view;
-}
+using test::kHeight, test::kWall, test::kWidth, test::wallColour, test::wallWithBlock;
 
 using Film = std::function<ReferenceView(int)>;
 
@@ -112,11 +85,11 @@ TEST(TemporalBackground, AnObjectInEmptySpaceLeavesNothing) {
 }
 
 TEST(TemporalBackground, ColoursAreThoseWithoutShadow) {
-    // A shadow lies on the right half in 12 of 30 frames.
+    // A shadow lies on the right quarter in 12 of 30 frames.
     const Film film = [](int i) {
         ReferenceView view = wallWithBlock(0, 0, 2.0f);
         for (int y = 0; i > 8 && i <= 20 && y < kHeight; ++y) {
-            for (int x = kWidth / 2; x < kWidth; ++x) {
+            for (int x = kWidth * 3 / 4; x < kWidth; ++x) {
                 glm::u8vec4& c = view.texture.rgba8()->at(x, y);
                 c = glm::u8vec4(glm::u8vec3(glm::vec3(c) * 0.8f), 255);
             }

@@ -7,6 +7,7 @@
 #include "tests/torus_bundle.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 #include "tests/unit/surface/analytic.hpp"
+#include "tests/wall_with_block.hpp"
 
 namespace stx {
 namespace {
@@ -81,6 +82,10 @@ TEST_P(GpuRenderers, DrawAtlasesFromTheirTextures) {
         test::expectAgreement(test::drawOn(Backend::gpu, *atlas, s, camera), *expected,
                               lit ? "lit" : "unlit", 20);
     }
+}
+
+TEST_P(GpuRenderers, DrawTheBackgroundBehind) {
+    agree(test::wallWithBackground(), settings(), test::besideWall(), "background");
 }
 
 TEST_P(GpuRenderers, DrawOrthographicCameras) {
