@@ -37,10 +37,12 @@ constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f;
 // Backgrounds (fillBackground).
 /// Pixels farther than this from any surface are filled from a picture of half the size, nearer
 /// ones by rays; from half of it on both are mixed.
-constexpr int kNearSurface = 32;
+constexpr int kNearSurface = 16;
 /// Pixels no farther than this from surface have a ray that meets it: the rays are no further
 /// apart than a pixel there.
 constexpr int kSurelyMet = 4;
+/// No ray is longer: what is farther weighs next to nothing beside what is near.
+constexpr float kLongestRay = 512;
 /// Directions that surface is looked for in.
 constexpr int kRays = 32;
 /// Pixels averaged where a ray meets surface, while they differ by no more than this share of q.
@@ -216,7 +218,7 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int
         float along = 1;
         Hit hit;
         int averaged = 0;
-        while (averaged < kAveraged) {
+        while (averaged < kAveraged && along <= kLongestRay) {
             const float px = static_cast<float>(x) + 0.5f + ray.x * along;
             const float py = static_cast<float>(y) + 0.5f + ray.y * along;
             if (!(px >= 0 && py >= 0 && px < static_cast<float>(width) &&
