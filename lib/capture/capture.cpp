@@ -145,12 +145,15 @@ std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
         ++next;
         return true;
     };
-    std::vector<glm::vec3> points;
-    points.reserve(mesh.triangles.size() * 3 + mesh.points.size() * 6);
+    // Each corner once: a dense mesh has six triangles around each.
+    std::vector<bool> corner(mesh.positions.size());
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         if (isStray(i)) continue;
-        for (int k = 0; k < 3; ++k) points.push_back(mesh.positions[mesh.triangles[i][k]]);
+        for (int k = 0; k < 3; ++k) corner[mesh.triangles[i][k]] = true;
     }
+    std::vector<glm::vec3> points;
+    for (std::size_t i = 0; i < corner.size(); ++i)
+        if (corner[i]) points.push_back(mesh.positions[i]);
     // Loose points are drawn as discs, which must fit into the frame, too.
     const float radius = pointRadius(mesh);
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {

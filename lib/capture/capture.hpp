@@ -34,8 +34,8 @@ struct CaptureSettings {
 /// nothing to a view without points. `depthBits` 32 keeps the distances.
 void fitDepthRange(ReferenceView& view);
 
-/// What of a mesh is drawn, as points that cameras frame: the corners of its triangles, and those
-/// of the discs that its loose points become; not its strays (findStrays()).
+/// What of a mesh is drawn, as points that cameras frame: the corners of its triangles, each vertex
+/// once, and those of the discs that its loose points become; not its strays (findStrays()).
 [[nodiscard]] std::vector<glm::vec3> drawnPoints(const Mesh& mesh);
 
 }  // namespace stx

@@ -32,7 +32,7 @@ struct SetUp {
     Affine edge[3];   ///< >= 0 inside; proportional to the perspective-correct barycentrics
     Affine nearness;  ///< perspective: 1/dist; orthographic: -dist
     std::uint32_t triangle = 0;
-    glm::dvec2 low{0.0}, high{0.0};  ///< its box in the picture, pixels, a little too large
+    glm::vec2 low{0.0f}, high{0.0f};  ///< its box in the picture, pixels, a little too large
 };
 
 /// Samples of n a pixel, the first at 0.5 / n, from a place on, up to another.
@@ -124,7 +124,7 @@ bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
     out.triangle = triangle;
 
     const glm::dvec2 size(camera_.width, camera_.height);
-    out.low = glm::dvec2(0.0);
+    out.low = glm::vec2(0.0f);
     out.high = size;
     if (allInFront) {
         glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-low);
@@ -135,9 +135,10 @@ bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
         }
         if (!(high.x >= 0 && high.y >= 0 && low.x < camera_.width && low.y < camera_.height))
             return false;
-        constexpr double kMargin = 0.001;  // far more than rounding takes; the edges decide
-        out.low = glm::max(low - kMargin, 0.0);
-        out.high = glm::min(high + kMargin, size);
+        // More than rounding takes, to floats too; the edges decide.
+        const double margin = 0.001 + 1e-6 * std::max(size.x, size.y);
+        out.low = glm::max(low - margin, 0.0);
+        out.high = glm::min(high + margin, size);
         // Most of the triangles of a dense mesh lie between the samples.
         if (!holdsSample(out, samples) && !holdsSample(out, 1)) return false;
     }
@@ -236,7 +237,7 @@ void Rasterizer::drawTile(const std::vector<std::uint32_t>& list, int tileX, int
     const double originX = tileX * kTile + 0.5 * step, originY = tileY * kTile + 0.5 * step;
     const auto drawLines = [&](const SetUp& s, const auto& drawLine) {
         const glm::dvec2 corner(tileX * kTile, tileY * kTile);
-        const glm::dvec2 low = s.low - corner, high = s.high - corner;
+        const glm::dvec2 low = glm::dvec2(s.low) - corner, high = glm::dvec2(s.high) - corner;
         const int from = std::max(firstSample(low.x, samples), 0),
                   to = std::min(lastSample(high.x, samples), side - 1);
         if (from > to) return;
