@@ -261,6 +261,8 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     const std::string where = inQuotes(path.string());
     STX_TRY(Motion motion, within(where, motionOf(set, options)));
     takeEvery(set, motion, options.every);
+    // What is not there says more than a number that is too large.
+    if (!motion.moves()) STX_CHECK(dropMissing(set, options.strict, job));
     const auto frames = motion.moves() ? static_cast<int>(motion.times.size()) : set.frames;
     if (options.frame >= frames)
         return failAt(where, ErrorCode::invalidInput,

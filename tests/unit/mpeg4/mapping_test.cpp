@@ -247,7 +247,7 @@ TEST(Mapping, AlphaIsDepthWhereThereIsNoDepthImage) {
     EXPECT_EQ(view.texture.rgba8()->at(0, 0).a, 0);
     EXPECT_NE(
         errorOf("DepthImage { diTexture SimpleTexture { texture PixelTexture { image 1 1 3 1 } } }")
-            .find("no depth"),
+            .find("the depth image is NULL"),
         std::string::npos);
 }
 
