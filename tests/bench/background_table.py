@@ -7,7 +7,7 @@ Prints, for each sequence (a folder with input/, derived_background.png, derived
 method: AGE, the mean absolute difference of luma (BT.601, 0..255); pEPs, the share of pixels that
 differ by more than 20; PSNR of luma; the processor's seconds. Only pixels whose background is known count.
 MOG2 with its defaults, getBackgroundImage(), where python3-opencv is installed. Exit code 1 when a
-figure misses what issue and README.md here promise.
+figure misses what is promised.
 """
 
 import argparse
