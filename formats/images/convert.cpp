@@ -51,22 +51,30 @@ Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
             }
         });
     };
-    if (const auto* v8 = std::get_if<0>(&image.values)) {
-        pixel(v8->data(), [](auto red, auto green, auto blue, const auto* alpha) {
-            return glm::u8vec4(red, green, blue, alpha ? *alpha : 255);
-        });
-    } else if (const auto* v16 = std::get_if<1>(&image.values)) {
-        const auto to8 = [](std::uint32_t v) {
-            return static_cast<std::uint8_t>((v * 255u + 32767u) / 65535u);
+    const bool premultiplied = image.premultiplied && a >= 0;
+    // Integers, of which `white` is the largest.
+    const auto integers = [&](const auto* values, std::uint32_t white) {
+        const auto to8 = [white](std::uint32_t v) {
+            return static_cast<std::uint8_t>((v * 255u + white / 2) / white);
         };
-        pixel(v16->data(), [&](auto red, auto green, auto blue, const auto* alpha) {
-            return glm::u8vec4(to8(red), to8(green), to8(blue), alpha ? to8(*alpha) : 255);
+        pixel(values, [&](auto red, auto green, auto blue, const auto* alpha) {
+            const std::uint32_t cover = alpha ? *alpha : white;
+            const auto colour = [&](std::uint32_t v) {
+                if (premultiplied && cover > 0)
+                    v = std::min((v * white + cover / 2) / cover, white);
+                return to8(v);
+            };
+            return glm::u8vec4(colour(red), colour(green), colour(blue), to8(cover));
         });
+    };
+    if (const auto* v8 = std::get_if<0>(&image.values)) {
+        integers(v8->data(), 255);
+    } else if (const auto* v16 = std::get_if<1>(&image.values)) {
+        integers(v16->data(), 65535);
     } else {
         const auto to8 = [](float v) {
             return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255.0f + 0.5f);
         };
-        const bool premultiplied = image.premultiplied && a >= 0;
         const auto colour = [&](float v, float alpha) {
             if (premultiplied && alpha > 0.0f) v /= alpha;
             return to8(image.linear ? srgbFromLinear(v) : v);

@@ -34,7 +34,7 @@ struct DecodedImage {
     std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> values;
     std::vector<std::string> channelNames;  ///< "R", "G", "B", "A", "Y", "Z", …
     bool linear = false;                    ///< float formats (EXR, HDR): linear light
-    bool premultiplied = false;             ///< there is alpha, and colours hold it (EXR)
+    bool premultiplied = false;             ///< there is alpha, and colours hold it (EXR, TIFF)
     /// Where the stored pixels (EXR: the data window) lie in the picture (the display window), and
     /// the size of that; other formats: 0, 0 and the image's own size.
     int originX = 0, originY = 0;
@@ -56,8 +56,8 @@ struct DecodedImage {
                                                      const Limits& limits);
 
 /// 8-bit sRGB RGBA with straight alpha of any decoded image (grey is spread, missing alpha is 255,
-/// 16 bits are rounded, linear floats are coded as sRGB, premultiplied floats divided). The size is
-/// that of the stored pixels.
+/// 16 bits are rounded, linear floats are coded as sRGB, premultiplied colours divided). The size
+/// is that of the stored pixels.
 [[nodiscard]] Image<glm::u8vec4> rgba8From(const DecodedImage& image);
 
 /// Float RGBA with straight alpha of any decoded image, in the image's own coding: integers / their

@@ -247,6 +247,23 @@ TEST(Rgba8From, FindsChannelsByNameAndDividesPremultipliedFloats) {
     EXPECT_EQ(rgba8From(image).at(0, 0), glm::u8vec4(255, 188, 0, 128));
 }
 
+TEST(Rgba8From, DividesPremultipliedColours) {
+    // As TIFF has them with associated alpha; colours above the alpha are damage and stay in range.
+    DecodedImage image;
+    image.width = 3;
+    image.height = 1;
+    image.channels = 4;
+    image.channelNames = {"R", "G", "B", "A"};
+    image.premultiplied = true;
+    image.values = std::vector<std::uint8_t>{100, 50, 0, 128, 9, 9, 9, 0, 200, 7, 0, 100};
+    const auto bytes = rgba8From(image);
+    EXPECT_EQ(bytes.at(0, 0), glm::u8vec4(199, 100, 0, 128));
+    EXPECT_EQ(bytes.at(1, 0), glm::u8vec4(9, 9, 9, 0));
+    EXPECT_EQ(bytes.at(2, 0), glm::u8vec4(255, 18, 0, 100));
+    image.values = std::vector<std::uint16_t>{25700, 12850, 0, 32896, 0, 0, 0, 0, 0, 0, 0, 65535};
+    EXPECT_EQ(rgba8From(image).at(0, 0), glm::u8vec4(199, 100, 0, 128));
+}
+
 TEST(Probe, FindsTransparencyAndPalettes) {
     Bytes png =
         bytesOf({0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0,   0, 0, 13, 'I', 'H', 'D', 'R',
