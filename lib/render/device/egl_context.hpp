@@ -69,6 +69,17 @@ class EglContext {
     std::unique_ptr<Impl> impl_;
 };
 
+/// Destroys objects of a context while it is current. Where it cannot be bound any more they are
+/// gone with it, and only their names are dropped.
+template <class Objects>
+void destroyIn(EglContext& context, std::unique_ptr<Objects>& objects) {
+    if (!objects) return;
+    if (auto current = context.makeCurrent())
+        objects.reset();
+    else
+        (void)objects.release();
+}
+
 /// False where EGL says of each device that it is software, without opening any: opening one takes
 /// a tenth of a second, and Mesa's shader cache starts a thread of the lowest priority, which a
 /// busy machine lets end many seconds later. True is only a maybe.

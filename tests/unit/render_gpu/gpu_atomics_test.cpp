@@ -22,6 +22,7 @@ void PrintTo(const Kind& kind, std::ostream* out) {
 struct Drawn {
     Frame frame;
     Sums sums = Sums::integers;
+    std::vector<std::string> notes;
 };
 
 Result<Drawn> drawWith(const gpu::Faults& faults, const Bundle& bundle,
@@ -30,7 +31,7 @@ Result<Drawn> drawWith(const gpu::Faults& faults, const Bundle& bundle,
     Job job;
     STX_TRY(auto renderer, gpu::makeGpuSplatRenderer(bundle, settings, -1, job));
     STX_TRY(auto frame, renderer->render(camera));
-    return Drawn{std::move(frame), gpu::lastSplatCounts(*renderer).sums};
+    return Drawn{std::move(frame), gpu::lastSplatCounts(*renderer).sums, job.takeNotes()};
 }
 
 gpu::ContextAbilities abilities() {
@@ -135,6 +136,8 @@ TEST(GpuAtomicsChoice, WorksWhereADriverNamesWhatItDoesNotCompile) {
     const auto drawn = drawWith(faults, bundle, settingsFor(false), camera);
     ASSERT_TRUE(drawn) << drawn.error().text();
     EXPECT_EQ(drawn->sums, Sums::integers);
+    ASSERT_EQ(drawn->notes.size(), 1u);
+    EXPECT_NE(drawn->notes[0].find("does not compile its 64-bit atomics"), std::string::npos);
     test::expectAgreement(drawn->frame, test::drawOnCpu(bundle, settingsFor(false), camera),
                           "fallback");
 }

@@ -35,14 +35,7 @@ class GlRenderer final : public Renderer {
           limits_(limits),
           points_(makePointArrays(set, settings_.lighting.on())) {}
 
-    ~GlRenderer() override {
-        if (!targets_) return;
-        // Where the context cannot be bound any more its objects are gone with it.
-        if (auto current = context_->makeCurrent())
-            targets_.reset();
-        else
-            (void)targets_.release();
-    }
+    ~GlRenderer() override { destroyIn(*context_, targets_); }
 
     Result<Frame> render(const Camera& camera) override;
     std::string backend() const override { return "gl"; }

@@ -1,5 +1,4 @@
 #include <array>
-#include <map>
 
 #include "lib/render/device/gl_object.hpp"
 #include "lib/render/device/growing_buffer.hpp"
@@ -16,24 +15,20 @@ constexpr int kLargestPiece = 4096;
 class ComputeSplats final : public SplatPipeline {
   public:
     ComputeSplats(const EglContext& context, const GpuScene& scene, const RenderSettings& settings)
-        : context_(context), scene_(scene), rule_(settings.splat) {
-        variant_.translucent = scene.translucent;
-        variant_.normals = settings.wantNormals();
-        variant_.lit = settings.lighting.on();
-        variant_.sizes = scene.hasSizes;
-        variant_.linear = scene.linear;
+        : context_(context), scene_(scene), programs_(false, scene, settings) {
+        SplatVariant& variant = programs_.variant;
         // Round splats of the paper's rule may reach beyond what the plan says of a block.
-        variant_.cull = settings.cullHidden && settings.splat != SplatRule::paper;
+        variant.cull = settings.cullHidden && settings.splat != SplatRule::paper;
         const auto& able = context.abilities();
         // Linear colours need a float's range; 8-bit ones sum exactly in integers, two to a 64-bit
         // atomic where there is one.
         if (scene.linear && able.atomicFloat)
-            variant_.sums = Sums::floats;
+            variant.sums = Sums::floats;
         else if (able.atomicInt64)
-            variant_.sums = Sums::pairs;
+            variant.sums = Sums::pairs;
     }
 
-    Result<void> prepare();
+    Result<void> prepare(Job& job);
     Result<void> draw(SplatFrame& frame, int slot) override;
     Result<SplatPlanes> map(int slot) override;
     void unmap(int) override {}
@@ -47,8 +42,6 @@ class ComputeSplats final : public SplatPipeline {
         return variant_.sums == Sums::pairs ? (n + 1) / 2 * 2 : n;
     }
     [[nodiscard]] std::int64_t bytesEach() const { return variant_.normals ? 48 : 20; }
-    Result<GLuint> program(SplatProgram kind, int pass, SplatShape rule);
-    Result<void> buildPrograms();
     void bind(const SplatFrame& frame);
     void setDraw(int firstTask, int tasks, FrameUniforms& uniforms) const;
     Result<void> drawTasks(int pass, SplatFrame& frame);
@@ -57,9 +50,8 @@ class ComputeSplats final : public SplatPipeline {
 
     const EglContext& context_;
     const GpuScene& scene_;
-    SplatRule rule_;
-    SplatVariant variant_;
-    std::map<std::string, GlProgram> programs_;
+    SplatPrograms programs_;
+    const SplatVariant& variant_ = programs_.variant;
     GlBuffer uniforms_;
     GrowingBuffer views_, tasks_, lights_, front_, sums_, visible_, tiles_;
     GrowingBuffer colour_, depth_, normal_, albedo_;
@@ -71,40 +63,19 @@ class ComputeSplats final : public SplatPipeline {
     int lastTasks_ = 0;
 };
 
-Result<GLuint> ComputeSplats::program(SplatProgram kind, int pass, SplatShape rule) {
-    const std::string key =
-        fmt::format("{} {} {}", static_cast<int>(kind), pass, static_cast<int>(rule));
-    if (const auto found = programs_.find(key); found != programs_.end())
-        return found->second.get();
-    STX_TRY(GlProgram built,
-            buildProgram(splatHeader(variant_, pass, rule), splatStages(false, kind)));
-    const GLuint name = built.get();
-    programs_.emplace(key, std::move(built));
-    return name;
-}
-
-Result<void> ComputeSplats::buildPrograms() {
-    std::vector<SplatShape> rules{SplatShape::uniform, SplatShape::small, SplatShape::ellipse};
-    if (rule_ == SplatRule::point) rules = {SplatShape::point};
-    if (rule_ == SplatRule::paper) rules = {SplatShape::paper};
-    for (const SplatShape rule : rules)
-        for (const int pass : {1, 2}) STX_CHECK(program(SplatProgram::splats, pass, rule));
-    STX_CHECK(program(SplatProgram::resolve, 0, SplatShape::point));
-    if (!variant_.cull) return {};
-    STX_CHECK(program(SplatProgram::tiles, 0, SplatShape::point));
-    STX_CHECK(program(SplatProgram::cull, 0, SplatShape::point));
-    return {};
-}
-
-Result<void> ComputeSplats::prepare() {
+Result<void> ComputeSplats::prepare(Job& job) {
     uniforms_ = GlBuffer::create();
     glNamedBufferStorage(uniforms_.get(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
-    if (auto built = buildPrograms(); !built) {
+    if (auto built = programs_.build(); !built) {
         if (variant_.sums == Sums::integers) return built;
         // A driver that names the extension and then does not take it.
-        variant_.sums = Sums::integers;
+        job.note(fmt::format(
+            "'{}' does not compile its {} atomics; sums are added in integers of "
+            "32 bits, which is slower",
+            context_.device().name, variant_.sums == Sums::floats ? "float" : "64-bit"));
+        programs_.variant.sums = Sums::integers;
         programs_.clear();
-        STX_CHECK(buildPrograms());
+        STX_CHECK(programs_.build());
     }
     return context_.check("preparing the renderer");
 }
@@ -143,25 +114,17 @@ void ComputeSplats::setDraw(int firstTask, int tasks, FrameUniforms& uniforms) c
 }
 
 Result<void> ComputeSplats::drawTasks(int pass, SplatFrame& frame) {
-    const auto dispatch = [&](SplatShape rule, int first, int count) -> Result<void> {
-        if (count == 0) return {};
-        STX_TRY(const GLuint name, program(SplatProgram::splats, pass, rule));
-        glUseProgram(name);
-        setDraw(first, count, frame.uniforms);
-        // A dispatch has at most 65535 groups a side; the shader counts in rows of 32768.
-        glDispatchCompute(static_cast<GLuint>(std::min(count, 32768)),
-                          static_cast<GLuint>((count + 32767) / 32768), 1);
-        return {};
-    };
-    const int large = frame.uniformTasks + frame.smallTasks;
-    const int all = static_cast<int>(frame.tasks.size());
-    const SplatShape first = rule_ == SplatRule::point   ? SplatShape::point
-                             : rule_ == SplatRule::paper ? SplatShape::paper
-                                                         : SplatShape::uniform;
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-    STX_CHECK(dispatch(first, 0, frame.uniformTasks));
-    STX_CHECK(dispatch(SplatShape::small, frame.uniformTasks, frame.smallTasks));
-    return dispatch(SplatShape::ellipse, large, all - large);
+    return drawRuns(
+        frame, programs_.rule(), [&](SplatShape shape, int first, int count) -> Result<void> {
+            STX_TRY(const GLuint name, programs_.get(SplatProgram::splats, pass, shape));
+            glUseProgram(name);
+            setDraw(first, count, frame.uniforms);
+            // A dispatch has at most 65535 groups a side; the shader counts in rows of 32768.
+            glDispatchCompute(static_cast<GLuint>(std::min(count, 32768)),
+                              static_cast<GLuint>((count + 32767) / 32768), 1);
+            return {};
+        });
 }
 
 /// Marks the tasks that lie behind what the visibility pass found, by the farthest front distance
@@ -174,12 +137,12 @@ Result<void> ComputeSplats::cull(SplatFrame& frame) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 10, visible_.buffer.get());
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 11, tiles_.buffer.get());
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    STX_TRY(const GLuint farthest, program(SplatProgram::tiles, 0, SplatShape::point));
+    STX_TRY(const GLuint farthest, programs_.get(SplatProgram::tiles));
     glUseProgram(farthest);
     setDraw(0, static_cast<int>(frame.tasks.size()), frame.uniforms);
     glDispatchCompute(static_cast<GLuint>(tiles.x), static_cast<GLuint>(tiles.y), 1);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    STX_TRY(const GLuint mark, program(SplatProgram::cull, 0, SplatShape::point));
+    STX_TRY(const GLuint mark, programs_.get(SplatProgram::cull));
     glUseProgram(mark);
     glDispatchCompute(static_cast<GLuint>((frame.tasks.size() + 63) / 64), 1, 1);
     return {};
@@ -206,7 +169,7 @@ Result<void> ComputeSplats::resolve(SplatFrame& frame, int slot) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 8, normal_.buffer.get());
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 9, albedo_.buffer.get());
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    STX_TRY(const GLuint name, program(SplatProgram::resolve, 0, SplatShape::point));
+    STX_TRY(const GLuint name, programs_.get(SplatProgram::resolve));
     glUseProgram(name);
     setDraw(0, 0, frame.uniforms);
     glDispatchCompute(static_cast<GLuint>((size.x + 15) / 16),
@@ -264,9 +227,9 @@ SplatCounts ComputeSplats::counts() {
 
 Result<std::unique_ptr<SplatPipeline>> makeComputeSplats(const EglContext& context,
                                                          const GpuScene& scene,
-                                                         const RenderSettings& settings) {
+                                                         const RenderSettings& settings, Job& job) {
     auto made = std::make_unique<ComputeSplats>(context, scene, settings);
-    STX_CHECK(made->prepare());
+    STX_CHECK(made->prepare(job));
     return std::unique_ptr<SplatPipeline>(std::move(made));
 }
 

@@ -41,14 +41,7 @@ class GpuSplatRenderer final : public Renderer {
           settings_(std::move(settings)),
           limits_(limits) {}
 
-    ~GpuSplatRenderer() override {
-        if (!resources_) return;
-        // Where the context cannot be bound any more its objects are gone with it.
-        if (auto current = context_->makeCurrent())
-            resources_.reset();
-        else
-            (void)resources_.release();
-    }
+    ~GpuSplatRenderer() override { destroyIn(*context_, resources_); }
 
     Result<void> prepare(Job& job);
     Result<Frame> render(const Camera& camera) override;
@@ -92,7 +85,7 @@ Result<void> GpuSplatRenderer::prepare(Job& job) {
     resources_ = std::make_unique<Resources>();
     STX_TRY(resources_->scene, GpuScene::upload(set_, *context_, settings_.wantNormals(), job));
     const auto make = pipeline == GpuPipeline::compute ? makeComputeSplats : makeRasterSplats;
-    STX_TRY(resources_->pipeline, make(*context_, resources_->scene, settings_));
+    STX_TRY(resources_->pipeline, make(*context_, resources_->scene, settings_, job));
     return {};
 }
 

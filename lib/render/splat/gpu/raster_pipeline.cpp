@@ -1,5 +1,4 @@
 #include <array>
-#include <map>
 
 #include "lib/render/device/gl_object.hpp"
 #include "lib/render/device/returned_buffer.hpp"
@@ -39,19 +38,23 @@ struct Table {
     }
 };
 
+/// OpenGL 3.3 binds by name, not in the shader.
+void connectUnits(GLuint program) {
+    glUseProgram(program);
+    for (std::size_t unit = 0; unit < kUnits.size(); ++unit)
+        if (const GLint at = glGetUniformLocation(program, kUnits[unit]); at >= 0)
+            glUniform1i(at, static_cast<GLint>(unit));
+    if (const GLuint block = glGetUniformBlockIndex(program, "FrameBlock");
+        block != GL_INVALID_INDEX)
+        glUniformBlockBinding(program, block, 0);
+}
+
 /// Lee & Park's pipeline: points drawn with vertex texture fetch, the least distance by MIN
 /// blending, then sums by additive blending. Everything is OpenGL 3.3.
 class RasterSplats final : public SplatPipeline {
   public:
     RasterSplats(const EglContext& context, const GpuScene& scene, const RenderSettings& settings)
-        : context_(context), scene_(scene), rule_(settings.splat) {
-        variant_.raster = true;
-        variant_.translucent = scene.translucent;
-        variant_.normals = settings.wantNormals();
-        variant_.lit = settings.lighting.on();
-        variant_.sizes = scene.hasSizes;
-        variant_.linear = scene.linear;
-    }
+        : context_(context), scene_(scene), programs_(true, scene, settings, connectUnits) {}
 
     Result<void> prepare();
     Result<void> draw(SplatFrame& frame, int slot) override;
@@ -63,7 +66,6 @@ class RasterSplats final : public SplatPipeline {
     }
 
   private:
-    Result<GLuint> program(SplatProgram kind, int pass, SplatShape rule);
     Result<void> makeTargets(glm::ivec2 size);
     void setDraw(int tasks, FrameUniforms& uniforms) const;
     Result<void> drawTasks(int pass, SplatFrame& frame);
@@ -72,9 +74,8 @@ class RasterSplats final : public SplatPipeline {
 
     const EglContext& context_;
     const GpuScene& scene_;
-    SplatRule rule_;
-    SplatVariant variant_;
-    std::map<std::string, GlProgram> programs_;
+    SplatPrograms programs_;
+    const SplatVariant& variant_ = programs_.variant;
     GlVertexArray noAttributes_;
     GlBuffer uniforms_;
     std::unique_ptr<Table> views_, tasks_, lights_;
@@ -90,25 +91,6 @@ class RasterSplats final : public SplatPipeline {
     };
     std::array<Slot, 2> slots_;
 };
-
-Result<GLuint> RasterSplats::program(SplatProgram kind, int pass, SplatShape rule) {
-    const std::string key =
-        fmt::format("{} {} {}", static_cast<int>(kind), pass, static_cast<int>(rule));
-    if (const auto found = programs_.find(key); found != programs_.end())
-        return found->second.get();
-    STX_TRY(GlProgram built,
-            buildProgram(splatHeader(variant_, pass, rule), splatStages(true, kind)));
-    const GLuint name = built.get();
-    // OpenGL 3.3 binds by name, not in the shader.
-    glUseProgram(name);
-    for (std::size_t unit = 0; unit < kUnits.size(); ++unit)
-        if (const GLint at = glGetUniformLocation(name, kUnits[unit]); at >= 0)
-            glUniform1i(at, static_cast<GLint>(unit));
-    if (const GLuint block = glGetUniformBlockIndex(name, "FrameBlock"); block != GL_INVALID_INDEX)
-        glUniformBlockBinding(name, block, 0);
-    programs_.emplace(key, std::move(built));
-    return name;
-}
 
 Result<void> RasterSplats::prepare() {
     noAttributes_ = GlVertexArray::generate();
@@ -127,12 +109,7 @@ Result<void> RasterSplats::prepare() {
     // The tasks of a draw must fit into a texture buffer, too.
     tasksAtOnce_ = std::min(context_.abilities().verticesAtOnce / (256 * 6),
                             texels / static_cast<int>(sizeof(TaskEntry) / 16));
-    std::vector<SplatShape> rules{SplatShape::uniform, SplatShape::small, SplatShape::ellipse};
-    if (rule_ == SplatRule::point) rules = {SplatShape::point};
-    if (rule_ == SplatRule::paper) rules = {SplatShape::paper};
-    for (const SplatShape rule : rules)
-        for (const int pass : {1, 2}) STX_CHECK(program(SplatProgram::splats, pass, rule));
-    STX_CHECK(program(SplatProgram::resolve, 0, SplatShape::point));
+    STX_CHECK(programs_.build());
     return context_.check("preparing the renderer");
 }
 
@@ -198,8 +175,7 @@ void RasterSplats::setDraw(int tasks, FrameUniforms& uniforms) const {
 
 Result<void> RasterSplats::drawRun(int pass, SplatShape rule, SplatFrame& frame, int first,
                                    int count) {
-    if (count == 0) return {};
-    STX_TRY(const GLuint name, program(SplatProgram::splats, pass, rule));
+    STX_TRY(const GLuint name, programs_.get(SplatProgram::splats, pass, rule));
     glUseProgram(name);
     const bool quads = rule == SplatShape::ellipse || rule == SplatShape::paper;
     for (int done = 0; done < count; done += tasksAtOnce_) {
@@ -216,14 +192,9 @@ Result<void> RasterSplats::drawRun(int pass, SplatShape rule, SplatFrame& frame,
 }
 
 Result<void> RasterSplats::drawTasks(int pass, SplatFrame& frame) {
-    const int large = frame.uniformTasks + frame.smallTasks;
-    const int all = static_cast<int>(frame.tasks.size());
-    const SplatShape rule = rule_ == SplatRule::point   ? SplatShape::point
-                            : rule_ == SplatRule::paper ? SplatShape::paper
-                                                        : SplatShape::uniform;
-    STX_CHECK(drawRun(pass, rule, frame, 0, frame.uniformTasks));
-    STX_CHECK(drawRun(pass, SplatShape::small, frame, frame.uniformTasks, frame.smallTasks));
-    return drawRun(pass, SplatShape::ellipse, frame, large, all - large);
+    return drawRuns(frame, programs_.rule(), [&](SplatShape shape, int first, int count) {
+        return drawRun(pass, shape, frame, first, count);
+    });
 }
 
 Result<void> RasterSplats::resolve(SplatFrame& frame, int slot) {
@@ -237,7 +208,7 @@ Result<void> RasterSplats::resolve(SplatFrame& frame, int slot) {
     bindTexture(kNormalSums, GL_TEXTURE_2D, normal_.get());
     lights_->upload(kLights, GL_RGBA32F, frame.lights.data(),
                     frame.lights.size() * sizeof(LightEntry));
-    STX_TRY(const GLuint name, program(SplatProgram::resolve, 0, SplatShape::point));
+    STX_TRY(const GLuint name, programs_.get(SplatProgram::resolve));
     glUseProgram(name);
     setDraw(0, frame.uniforms);
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -326,7 +297,7 @@ void RasterSplats::unmap(int slot) {
 
 Result<std::unique_ptr<SplatPipeline>> makeRasterSplats(const EglContext& context,
                                                         const GpuScene& scene,
-                                                        const RenderSettings& settings) {
+                                                        const RenderSettings& settings, Job&) {
     auto made = std::make_unique<RasterSplats>(context, scene, settings);
     STX_CHECK(made->prepare());
     return std::unique_ptr<SplatPipeline>(std::move(made));

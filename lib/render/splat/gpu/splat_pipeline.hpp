@@ -65,12 +65,27 @@ class SplatPipeline {
     [[nodiscard]] virtual SplatCounts counts() { return {}; }
 };
 
-/// Pipelines over a scene, which must outlive them. Errors: the driver's, about its shaders.
+/// Draws the tasks of a frame, those of one shape at once: draw(shape, first task, tasks).
+template <class Draw>
+[[nodiscard]] Result<void> drawRuns(const SplatFrame& frame, SplatRule rule, const Draw& draw) {
+    const int large = frame.uniformTasks + frame.smallTasks;
+    const int rest = static_cast<int>(frame.tasks.size()) - large;
+    if (frame.uniformTasks > 0) STX_CHECK(draw(uniformShape(rule), 0, frame.uniformTasks));
+    if (frame.smallTasks > 0)
+        STX_CHECK(draw(SplatShape::small, frame.uniformTasks, frame.smallTasks));
+    if (rest > 0) STX_CHECK(draw(SplatShape::ellipse, large, rest));
+    return {};
+}
+
+/// Pipelines over a scene, which must outlive them. A note tells of atomics that the driver names
+/// and does not compile. Errors: the driver's, about its shaders.
 [[nodiscard]] Result<std::unique_ptr<SplatPipeline>> makeComputeSplats(const EglContext& context,
                                                                        const GpuScene& scene,
-                                                                       const RenderSettings& s);
+                                                                       const RenderSettings& s,
+                                                                       Job& job);
 [[nodiscard]] Result<std::unique_ptr<SplatPipeline>> makeRasterSplats(const EglContext& context,
                                                                       const GpuScene& scene,
-                                                                      const RenderSettings& s);
+                                                                      const RenderSettings& s,
+                                                                      Job& job);
 
 }  // namespace stx::gpu

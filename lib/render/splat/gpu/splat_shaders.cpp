@@ -54,6 +54,48 @@ std::vector<ShaderStage> splatStages(bool raster, SplatProgram program) {
     return compute("splat_cull.comp", splat_cull_comp);
 }
 
+SplatShape uniformShape(SplatRule rule) {
+    return rule == SplatRule::point   ? SplatShape::point
+           : rule == SplatRule::paper ? SplatShape::paper
+                                      : SplatShape::uniform;
+}
+
+SplatPrograms::SplatPrograms(bool raster, const GpuScene& scene, const RenderSettings& settings,
+                             std::function<void(GLuint)> onBuilt)
+    : rule_(settings.splat), onBuilt_(std::move(onBuilt)) {
+    variant.raster = raster;
+    variant.translucent = scene.translucent;
+    variant.normals = settings.wantNormals();
+    variant.lit = settings.lighting.on();
+    variant.sizes = scene.hasSizes;
+    variant.linear = scene.linear;
+}
+
+Result<GLuint> SplatPrograms::get(SplatProgram kind, int pass, SplatShape shape) {
+    const std::string key =
+        fmt::format("{} {} {}", static_cast<int>(kind), pass, static_cast<int>(shape));
+    if (const auto found = built_.find(key); found != built_.end()) return found->second.get();
+    STX_TRY(GlProgram built,
+            buildProgram(splatHeader(variant, pass, shape), splatStages(variant.raster, kind)));
+    const GLuint name = built.get();
+    if (onBuilt_) onBuilt_(name);
+    built_.emplace(key, std::move(built));
+    return name;
+}
+
+Result<void> SplatPrograms::build() {
+    std::vector<SplatShape> shapes{uniformShape(rule_)};
+    if (shapes[0] == SplatShape::uniform)
+        shapes.insert(shapes.end(), {SplatShape::small, SplatShape::ellipse});
+    for (const SplatShape shape : shapes)
+        for (const int pass : {1, 2}) STX_CHECK(get(SplatProgram::splats, pass, shape));
+    STX_CHECK(get(SplatProgram::resolve));
+    if (!variant.cull) return {};
+    STX_CHECK(get(SplatProgram::tiles));
+    STX_CHECK(get(SplatProgram::cull));
+    return {};
+}
+
 std::vector<ShaderText> allSplatShaders() {
     std::vector<ShaderText> out;
     const auto add = [&](const SplatVariant& v, SplatProgram program, int pass, SplatShape rule) {

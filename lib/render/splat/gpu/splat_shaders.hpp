@@ -1,9 +1,13 @@
 #pragma once
 
+#include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "lib/render/device/shader_program.hpp"
+#include "lib/render/renderer.hpp"
+#include "lib/render/splat/gpu/gpu_scene.hpp"
 
 namespace stx::gpu {
 
@@ -37,6 +41,31 @@ struct SplatVariant {
 enum class SplatProgram { splats, resolve, tiles, cull };
 /// The stages of a program, without their header.
 [[nodiscard]] std::vector<ShaderStage> splatStages(bool raster, SplatProgram program);
+
+/// The shape of splats of a frame's first tasks, which share one (SplatFrame::uniformTasks).
+[[nodiscard]] SplatShape uniformShape(SplatRule rule);
+
+/// The programs of a pipeline, built when they are first asked for.
+class SplatPrograms {
+  public:
+    SplatVariant variant;
+
+    /// `onBuilt` gets each new program.
+    SplatPrograms(bool raster, const GpuScene& scene, const RenderSettings& settings,
+                  std::function<void(GLuint)> onBuilt = {});
+    /// A program; `pass` and `shape` are of SplatProgram::splats. Errors: the driver's.
+    [[nodiscard]] Result<GLuint> get(SplatProgram kind, int pass = 0,
+                                     SplatShape shape = SplatShape::point);
+    /// Builds all that frames will need. Errors: the driver's.
+    [[nodiscard]] Result<void> build();
+    void clear() { built_.clear(); }
+    [[nodiscard]] SplatRule rule() const { return rule_; }
+
+  private:
+    SplatRule rule_;
+    std::function<void(GLuint)> onBuilt_;
+    std::map<std::string, GlProgram> built_;
+};
 
 /// Every shader of splat mode in every variant.
 [[nodiscard]] std::vector<ShaderText> allSplatShaders();

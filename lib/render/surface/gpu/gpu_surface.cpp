@@ -94,14 +94,7 @@ class GpuSurfaceBackend final : public surface::SurfaceBackend {
   public:
     explicit GpuSurfaceBackend(std::shared_ptr<EglContext> context)
         : context_(std::move(context)) {}
-    ~GpuSurfaceBackend() override {
-        if (!resources_) return;
-        // Where the context cannot be bound any more its objects are gone with it.
-        if (auto current = context_->makeCurrent())
-            resources_.reset();
-        else
-            (void)resources_.release();
-    }
+    ~GpuSurfaceBackend() override { destroyIn(*context_, resources_); }
 
     Result<void> prepare(const SurfaceScene& scene, const surface::Effort& effort,
                          Job& job) override;
