@@ -39,6 +39,7 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
     struct Range {
         std::uint32_t block;
         int x0, y0, x1, y1;
+        double middle;
     };
     std::vector<Range> ranges;
     f.tileBegin.assign(static_cast<std::size_t>(tilesX) * tilesY + 1, 0);
@@ -80,8 +81,14 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
         x1 = std::min(x1 + 0.5f, limitX - 0.5f);
         y1 = std::min(y1 + 0.5f, limitY - 0.5f);
         if (!(x0 <= x1 && y0 <= y1)) continue;
-        const Range r{index, static_cast<int>(x0) / kTile, static_cast<int>(y0) / kTile,
-                      static_cast<int>(x1) / kTile, static_cast<int>(y1) / kTile};
+        const glm::dvec4 h = f.pixelFromSource * glm::dvec4(bx + 0.5 * kBlock, by + 0.5 * kBlock,
+                                                            0.5 * (block.qMin + block.qMax), 1.0);
+        const Range r{index,
+                      static_cast<int>(x0) / kTile,
+                      static_cast<int>(y0) / kTile,
+                      static_cast<int>(x1) / kTile,
+                      static_cast<int>(y1) / kTile,
+                      h.w > 0 ? h.z / h.w : 0.0};
         ranges.push_back(r);
         for (int ty = r.y0; ty <= r.y1; ++ty)
             for (int tx = r.x0; tx <= r.x1; ++tx)
@@ -89,11 +96,15 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
     }
     for (std::size_t t = 1; t < f.tileBegin.size(); ++t) f.tileBegin[t] += f.tileBegin[t - 1];
     f.blocks.resize(f.tileBegin.back());
+    f.middles.resize(f.tileBegin.back());
     std::vector<std::uint32_t> next(f.tileBegin.begin(), f.tileBegin.end() - 1);
     for (const Range& r : ranges)
         for (int ty = r.y0; ty <= r.y1; ++ty)
-            for (int tx = r.x0; tx <= r.x1; ++tx)
-                f.blocks[next[static_cast<std::size_t>(ty * tilesX + tx)]++] = r.block;
+            for (int tx = r.x0; tx <= r.x1; ++tx) {
+                const std::uint32_t at = next[static_cast<std::size_t>(ty * tilesX + tx)]++;
+                f.blocks[at] = r.block;
+                f.middles[at] = r.middle;
+            }
     return f;
 }
 
@@ -157,14 +168,9 @@ std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
     double q = 0;
     int blocks = 0;
     for (const FrameSource& f : sources) {
-        for (const std::uint32_t index : f.blocksOf(tile)) {
-            const SourceBlock& block = f.source->blocks[index];
-            const glm::dvec4 h =
-                f.pixelFromSource * glm::dvec4((index % f.source->blocksX + 0.5) * kBlock,
-                                               (index / f.source->blocksX + 0.5) * kBlock,
-                                               0.5 * (block.qMin + block.qMax), 1.0);
-            if (!(h.w > 0)) continue;
-            q += h.z / h.w;
+        for (const double middle : f.middlesOf(tile)) {
+            if (!(middle > 0)) continue;
+            q += middle;
             ++blocks;
         }
     }

@@ -45,10 +45,15 @@ struct FrameSource {
     Ray fromEye{};
     std::vector<std::uint32_t> tileBegin;  ///< tile t has blocks[tileBegin[t] .. tileBegin[t + 1])
     std::vector<std::uint32_t> blocks;
+    std::vector<double> middles;  ///< of each of them: q in the frame of its middle, 0 = behind
 
     [[nodiscard]] std::span<const std::uint32_t> blocksOf(int tile) const {
         const auto t = static_cast<std::size_t>(tile);
         return {blocks.data() + tileBegin[t], tileBegin[t + 1] - tileBegin[t]};
+    }
+    [[nodiscard]] std::span<const double> middlesOf(int tile) const {
+        const auto t = static_cast<std::size_t>(tile);
+        return {middles.data() + tileBegin[t], tileBegin[t + 1] - tileBegin[t]};
     }
 };
 
