@@ -146,17 +146,17 @@ void solveFirstRow(INOUT_ARRAY(float, m, 15), OUT_ARRAY(float, row, 6)) {
 
 // The colour of a piece, and in w the source that weighs most, -1 = none.
 vec4 shadePiece(Piece piece) {
-    // The best few, heaviest first.
-    float topWeight[MOST];
-    int top[MOST];
-    for (int k = 0; k < MOST; ++k) {
+    // The best few, heaviest first, and the first that is left out.
+    float topWeight[MOST + 1];
+    int top[MOST + 1];
+    for (int k = 0; k <= MOST; ++k) {
         topWeight[k] = 0.0f;
         top[k] = -1;
     }
     for (uint left = piece.seenBy; left != 0u; left &= left - 1u) {
         int s = sourceOf(findLSB(left));
         float weight = viewOf(s, piece).weight;
-        for (int k = 0; k < MOST; ++k) {
+        for (int k = 0; k <= MOST; ++k) {
             if (weight > topWeight[k]) {
                 float w = topWeight[k];
                 int t = top[k];
@@ -167,6 +167,9 @@ vec4 shadePiece(Piece piece) {
             }
         }
     }
+    // Those that stay fade to nothing where another takes their place, as the camera moves on.
+    for (int k = 0; k < MOST; ++k)
+        topWeight[k] = max(topWeight[k] - topWeight[MOST], kLeastKeptWeight * topWeight[k]);
 
     float m[15];
     for (int i = 0; i < 15; ++i) m[i] = 0.0f;
@@ -174,6 +177,7 @@ vec4 shadePiece(Piece piece) {
     for (int k = 0; k < MOST; ++k) {
         if (top[k] < 0) break;
         SourceView view = viewOf(top[k], piece);
+        view.weight = topWeight[k];
         ivec2 base = firstTap(view);
         Taps place = tapPlaceOf(top[k], base);
         taps[k] = view.plain ? 0xffffu : tapsOnSurface(top[k], piece, view);
@@ -212,6 +216,7 @@ vec4 shadePiece(Piece piece) {
     for (int k = 0; k < MOST; ++k) {
         if (top[k] < 0) break;
         SourceView view = viewOf(top[k], piece);
+        view.weight = topWeight[k];
         ivec2 base = firstTap(view);
         Taps place = tapPlaceOf(top[k], base);
         bool weigh = !view.plain && hasAlpha(top[k]);

@@ -1,5 +1,6 @@
 #include "lib/render/surface/cpu/cpu_surface.hpp"
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -171,6 +172,38 @@ TEST(CpuSurface, NovelViewsMatchTheScene) {
     EXPECT_GT(psnr(draw(bundle, novel, with(Quality::draft)), ball, novel), 30.0);
     EXPECT_GT(psnr(draw(bundle, novel, with(Quality::normal)), ball, novel), 36.0);
     EXPECT_GT(psnr(draw(bundle, novel, with(Quality::best)), ball, novel), 38.0);
+}
+
+// Every view paints the plane in a grey of its own, so that each change of the views that a pixel
+// takes its colour from would show. More of them see it than it takes.
+TEST(CpuSurface, ViewsFadeWhenOthersTakeTheirPlace) {
+    const Scene floor = [](glm::dvec3 from, glm::dvec3 along) {
+        return plane(
+            0, [](double, double) { return true; }, from, along);
+    };
+    const auto eye = [](double degrees) {
+        const double a = glm::radians(degrees);
+        return glm::dvec3(3 * std::sin(a), 0.3, 3 * std::cos(a));
+    };
+    std::vector<Camera> cameras;
+    for (int i = -3; i <= 3; ++i) cameras.push_back(at(eye(18.0 * i), {0, 0, 0}, 48, 0.5));
+    Bundle bundle = bundleOf(floor, cameras);
+    const std::array<std::uint8_t, 7> greys{40, 220, 90, 130, 30, 240, 120};
+    for (std::size_t i = 0; i < greys.size(); ++i)
+        bundle.views[i].texture =
+            Texture(Rgba8Image(48, 48, glm::u8vec4(greys[i], greys[i], greys[i], 255)));
+    Job job;
+    for (const Quality quality : {Quality::draft, Quality::normal, Quality::best}) {
+        const auto renderer = makeCpuSurfaceRenderer(bundle, with(quality), job);
+        double last = -1, largest = 0;
+        for (int step = 0; step < 240; ++step) {
+            const Camera camera = at(eye(-12.03 + 0.1 * step), {0, 0, 0}, 16, 0.167);
+            const double here = 255.0 * renderer->render(camera)->colour.at(8, 8).r;
+            if (last >= 0) largest = std::max(largest, std::abs(here - last));
+            last = here;
+        }
+        EXPECT_LT(largest, 1.0) << "quality " << static_cast<int>(quality);
+    }
 }
 
 TEST(CpuSurface, MapsBetweenBothProjections) {

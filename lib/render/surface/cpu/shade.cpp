@@ -368,13 +368,17 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     }
     for (int l = 0; l < g.count; ++l) best[l] = static_cast<std::int8_t>(top[l]);
     if (count > settings.mostSources) {
+        const int most = settings.mostSources;
         for (int l = 0; l < g.count; ++l) {
             float kept[32];
             for (int k = 0; k < count; ++k) kept[k] = views[list[k]].weight[l];
-            std::nth_element(kept, kept + settings.mostSources - 1, kept + count, std::greater<>());
-            const float least = kept[settings.mostSources - 1];
-            for (int k = 0; k < count; ++k)
-                if (views[list[k]].weight[l] < least) views[list[k]].weight[l] = 0.0f;
+            std::nth_element(kept, kept + most, kept + count, std::greater<>());
+            const float dropped = kept[most], least = *std::min_element(kept, kept + most);
+            for (int k = 0; k < count; ++k) {
+                float& weight = views[list[k]].weight[l];
+                weight =
+                    weight < least ? 0.0f : std::max(weight - dropped, kLeastKeptWeight * weight);
+            }
         }
     }
 
