@@ -13,6 +13,7 @@
 #include "formats/imagesets/image_sets.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/render/renderer.hpp"
+#include "tests/naive_warp.hpp"
 #include "tests/shared_data.hpp"
 
 using namespace stx;
@@ -26,30 +27,6 @@ struct Warped {
     double covered = 0;       ///< share of the picture
     double own = 0;           ///< the renderer's, on all that it covers
 };
-
-/// Each pixel carried to the nearest pixel of the other camera; the nearest point wins.
-std::pair<Rgba8Image, Image<std::uint8_t>> naiveWarp(const ReferenceView& from, const Camera& to) {
-    Rgba8Image out(to.width, to.height, {0, 0, 0, 255});
-    Image<std::uint8_t> mask(to.width, to.height);
-    Image<float> nearest(to.width, to.height, kNoDepth);
-    const glm::dmat4 cameraFromWorld = to.cameraFromWorld();
-    for (int y = 0; y < from.depth.height(); ++y) {
-        for (int x = 0; x < from.depth.width(); ++x) {
-            if (!hasPoint(from.depth.at(x, y))) continue;
-            const glm::dvec3 p(cameraFromWorld * glm::dvec4(from.worldPoint(x, y), 1));
-            if (!(p.z < 0)) continue;
-            const glm::dvec3 at = to.project(p);
-            const int u = static_cast<int>(std::floor(at.x)),
-                      v = static_cast<int>(std::floor(at.y));
-            if (!out.contains(u, v) || nearest.at(u, v) <= at.z) continue;
-            nearest.at(u, v) = static_cast<float>(at.z);
-            out.at(u, v) = from.texture.rgba8()->at(x, y);
-            out.at(u, v).a = 255;
-            mask.at(u, v) = 255;
-        }
-    }
-    return {std::move(out), std::move(mask)};
-}
 
 double psnr(const Rgba8Image& a, const Rgba8Image& b, const Image<std::uint8_t>& mask) {
     CompareSettings settings;
@@ -86,7 +63,8 @@ Warped warp(const ReferenceView& asStored, const ReferenceView& from, const Came
         out.data()[i].a = 255;
     }
     Warped w;
-    const auto [naive, naiveMask] = naiveWarp(asStored, to);
+    auto [naive, naiveMask] = naiveWarp(asStored, to);
+    for (auto& p : naive.pixels()) p.a = 255;
     w.naive = psnr(naive, truth, naiveMask);
     w.naiveCovered = share(naiveMask);
     w.own = psnr(out, truth, mask);

@@ -1,0 +1,29 @@
+// Gives the depth of a bundle the faults of sensors and stereo, see tests/noisy_depth.hpp:
+//   noisy_depth BUNDLE OUT.exr noise0.5|noise2|codes8|missing3|edges1
+
+#include "tests/noisy_depth.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "formats/exr/bundle_exr.hpp"
+#include "formats/open.hpp"
+
+int main(int argc, char** argv) {
+    using namespace stx;
+    const auto run = [&]() -> Result<void> {
+        Job job;
+        STX_TRY(Bundle bundle, openBundle(argv[1], {}, job));
+        if (!noisy::damage(bundle, argv[3]))
+            return fail(ErrorCode::usage,
+                        "'{}' is not noise0.5, noise2, codes8, missing3 or edges1", argv[3]);
+        return writeExrBundle(bundle, argv[2], job);
+    };
+    if (argc != 4) {
+        std::fprintf(stderr, "usage: noisy_depth BUNDLE OUT.exr KIND\n");
+        return 1;
+    }
+    const auto done = run();
+    if (!done) std::fprintf(stderr, "%s\n", done.error().text().c_str());
+    std::_Exit(done ? 0 : 4);
+}

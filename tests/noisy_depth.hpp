@@ -1,0 +1,97 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <string>
+
+#include "lib/model/bundle.hpp"
+
+/// Depth as sensors and stereo give it, made from exact depth. The same on every machine.
+namespace noisy {
+
+/// 0..1, above 0, of a pixel of a view.
+inline double uniform(std::uint64_t view, std::uint64_t pixel, std::uint64_t what) {
+    std::uint64_t h = (view << 40) ^ (pixel << 3) ^ what;
+    for (int round = 0; round < 2; ++round) {  // splitmix64
+        h += 0x9e3779b97f4a7c15u;
+        h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9u;
+        h = (h ^ (h >> 27)) * 0x94d049bb133111ebu;
+        h ^= h >> 31;
+    }
+    return (static_cast<double>(h >> 11) + 0.5) / 9007199254740992.0;
+}
+
+inline double normal(std::uint64_t view, std::uint64_t pixel) {
+    return std::sqrt(-2 * std::log(uniform(view, pixel, 0))) *
+           std::cos(2 * std::numbers::pi * uniform(view, pixel, 1));
+}
+
+/// Every distance times 1 plus normal noise of this standard deviation.
+inline void addNoise(stx::Bundle& bundle, double share) {
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        auto& view = bundle.views[i];
+        for (std::size_t k = 0; k < view.depth.count(); ++k) {
+            float& dist = view.depth.data()[k];
+            if (!stx::hasPoint(dist)) continue;
+            const double noise = std::clamp(1 + share * normal(i, k), 0.5, 1.5);
+            dist = static_cast<float>(dist * noise);
+            view.nearPlane = std::min(view.nearPlane, 0.999 * dist);
+            view.farPlane = std::max(view.farPlane, 1.001 * dist);
+        }
+    }
+}
+
+/// Distances in steps of an 8-bit depth code between the planes of each view.
+inline void quantise(stx::Bundle& bundle) {
+    for (auto& view : bundle.views) {
+        view.depthBits = 8;
+        const stx::DepthCode code = view.depthCode();
+        for (float& dist : view.depth.pixels())
+            if (stx::hasPoint(dist)) dist = static_cast<float>(code.decode(code.encode(dist)));
+    }
+}
+
+/// Takes the depth of this share of the points away; their colour stays.
+inline void loseDepth(stx::Bundle& bundle, double share) {
+    for (std::size_t i = 0; i < bundle.views.size(); ++i)
+        for (std::size_t k = 0; k < bundle.views[i].depth.count(); ++k)
+            if (uniform(i, k, 2) < share) bundle.views[i].depth.data()[k] = stx::kNoDepth;
+}
+
+/// Surfaces in front grow over what is behind them by so many pixels, as stereo's do.
+inline void displaceEdges(stx::Bundle& bundle, int pixels) {
+    for (auto& view : bundle.views) {
+        const stx::Image<float> exact = view.depth;
+        for (int y = 0; y < exact.height(); ++y) {
+            for (int x = 0; x < exact.width(); ++x) {
+                float& dist = view.depth.at(x, y);
+                if (!stx::hasPoint(dist)) continue;
+                for (int j = -pixels; j <= pixels; ++j)
+                    for (int i = -pixels; i <= pixels; ++i)
+                        if (exact.contains(x + i, y + j) && stx::hasPoint(exact.at(x + i, y + j)))
+                            dist = std::min(dist, exact.at(x + i, y + j));
+            }
+        }
+    }
+}
+
+/// By name: noise0.5, noise2 (percent), codes8, missing3, edges1.
+inline bool damage(stx::Bundle& bundle, const std::string& kind) {
+    if (kind == "noise0.5")
+        addNoise(bundle, 0.005);
+    else if (kind == "noise2")
+        addNoise(bundle, 0.02);
+    else if (kind == "codes8")
+        quantise(bundle);
+    else if (kind == "missing3")
+        loseDepth(bundle, 0.03);
+    else if (kind == "edges1")
+        displaceEdges(bundle, 1);
+    else
+        return false;
+    return true;
+}
+
+}  // namespace noisy
