@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/surface/depth_noise.hpp"
 
 namespace stx::surface {
 namespace {
@@ -361,6 +362,19 @@ double validShareOf(const Draft& d) {
     return object > 0 ? static_cast<double>(points) / static_cast<double>(object) : 1.0;
 }
 
+/// The median distance of a view's points, scene units; orthographic: what shares of q are shares
+/// of.
+float typicalDist(const Source& s, const Draft& d) {
+    if (!s.space.axis.inverse) return static_cast<float>(s.space.axis.unit);
+    std::vector<float> values;
+    for (std::size_t i = 0; i < d.q.count(); i += 7)
+        if (d.q.data()[i] > 0.0f) values.push_back(d.q.data()[i]);
+    if (values.empty()) return 0.0f;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return 1.0f / *middle;
+}
+
 void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
     const Camera& camera = s.view->camera;
     s.width = camera.width;
@@ -375,6 +389,11 @@ void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
     s.hasAlpha = std::find(covered.data(), covered.data() + covered.count(), 0) !=
                  covered.data() + covered.count();
     s.validShare = validShareOf(d);
+    const float noise = depthNoise(d.q, s.space.axis);
+    closePinholes(d.q, d.covered, s.space.axis, noise);
+    // What smoothing leaves is like the step of a coarser depth code.
+    const float left = smoothDepth(d.q, s.space.axis, noise);
+    if (left > 0) s.step = std::max(s.step, left * typicalDist(s, d));
     findLinks(s, d);
     findEdges(s, d);
     findLeaves(s, d);

@@ -119,7 +119,7 @@ struct Source {
     int width = 0, height = 0;
     bool hasAlpha = false;  ///< some pixel is not fully covered
     float freeAlpha = kFreeAlpha;
-    float step = 0;           ///< scene units between neighbouring depth codes
+    float step = 0;           ///< scene units between neighbouring depth codes, or left by noise
     double validShare = 1.0;  ///< of the pixels of the object (points, or full alpha): with depth
     float noise = 0;          ///< how far, as a share of q, pixels stray from their neighbours
     float flat = 0;           ///< share of q by which pixels may leave the plane of a piece

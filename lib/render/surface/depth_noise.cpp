@@ -1,0 +1,184 @@
+#include "lib/render/surface/depth_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx::surface {
+namespace {
+
+// Where no source is named the value was chosen by trial on the sets of tests/bench/README.md with
+// noise added.
+
+/// One in twenty pixels has a smaller one, where the smallest of the four second differences
+/// through a pixel is taken, of independent normal noise of standard deviation 1 (by simulation).
+/// On smooth surfaces the median would do; among leaves most differences are no noise.
+constexpr float kSmallestOfFour = 0.0416f;
+/// Less noise than this share of q is left as it is: what codes and small shapes look like.
+constexpr float kLeastNoise = 0.001f;
+/// Radii of the windows that are tried, pixels.
+constexpr int kRadii[] = {1, 2, 4, 6, 8};
+/// Windows larger than one that leaves this share of q are not needed.
+constexpr float kAim = 0.001f;
+/// The window grows while all estimates so far agree within so many of their standard deviations.
+constexpr float kAgree = 2.0f;
+/// Points further from the plane than so many standard deviations are on another surface.
+constexpr float kFirstBand = 4.0f, kBand = 2.5f;
+/// What is left counts as so many of its standard deviations.
+constexpr float kDoubt = 2.0f;
+/// Neighbours that must be on one surface around a pinhole, within this share of q and kBand
+/// standard deviations. (Between leaves fewer are not a surface.)
+constexpr int kLeastNeighbours = 8;
+constexpr float kPinholeBand = 0.004f;
+
+/// q = q0 + gx dx + gy dy around a pixel.
+struct LocalPlane {
+    float q0 = 0, gx = 0, gy = 0;
+    int points = 0;
+    float alike = 0;  ///< how many points of full weight would say as much
+};
+
+/// The weighted least-squares plane of the points around (x, y) that are near a plane; far ones
+/// count less. That plane itself, where they do not tell.
+LocalPlane fitAround(const Image<float>& q, int x, int y, int radius, const LocalPlane& near,
+                     float band) {
+    float n = 0, nn = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sq = 0, sxq = 0, syq = 0;
+    LocalPlane out = near;
+    out.points = 0;
+    const float reach = 1.0f / static_cast<float>((radius + 1) * (radius + 1));
+    const float inverseBand = 1.0f / band;
+    const int y0 = std::max(y - radius, 0), y1 = std::min(y + radius, q.height() - 1);
+    const int x0 = std::max(x - radius, 0), x1 = std::min(x + radius, q.width() - 1);
+    for (int ny = y0; ny <= y1; ++ny) {
+        const auto row = q.row(ny);
+        const auto dy = static_cast<float>(ny - y);
+        for (int nx = x0; nx <= x1; ++nx) {
+            const float there = row[static_cast<std::size_t>(nx)];
+            if (!(there > 0.0f)) continue;
+            const auto dx = static_cast<float>(nx - x);
+            const float above = there - near.q0;
+            const float e = (above - near.gx * dx - near.gy * dy) * inverseBand;
+            const float onSurface = 1.0f - e * e, close = 1.0f - (dx * dx + dy * dy) * reach;
+            if (!(onSurface > 0.0f) || !(close > 0.0f)) continue;
+            const float w = onSurface * onSurface * close;
+            ++out.points;
+            n += w;
+            nn += w * w;
+            sx += w * dx;
+            sy += w * dy;
+            sxx += w * dx * dx;
+            sxy += w * dx * dy;
+            syy += w * dy * dy;
+            sq += w * above;
+            sxq += w * dx * above;
+            syq += w * dy * above;
+        }
+    }
+    if (!(n > 0.0f)) return out;
+    const float inverse = 1.0f / n;
+    out.alike = n * n / nn;
+    const float mx = sx * inverse, my = sy * inverse, mq = sq * inverse;
+    const float xx = sxx - mx * sx, xy = sxy - mx * sy, yy = syy - my * sy;
+    const float xq = sxq - mx * sq, yq = syq - my * sq;
+    const float det = xx * yy - xy * xy;
+    if (!(det > 0.01f * xx * yy) || !(xx > 0.5f) || !(yy > 0.5f)) {
+        // Points on a line, or hardly any: their mean.
+        out.q0 = near.q0 + mq - near.gx * mx - near.gy * my;
+        return out;
+    }
+    out.gx = (xq * yy - yq * xy) / det;
+    out.gy = (yq * xx - xq * xy) / det;
+    out.q0 = near.q0 + mq - out.gx * mx - out.gy * my;
+    return out;
+}
+
+}  // namespace
+
+float depthNoise(const Image<float>& q, const DepthAxis& axis) {
+    std::vector<float> values;
+    const int step = std::max(1, q.height() / 64);
+    for (int y = std::max(1, step / 2); y + 1 < q.height(); y += step) {
+        for (int x = 1; x + 1 < q.width(); x += 3) {
+            const float here = q.at(x, y);
+            if (!(here > 0.0f)) continue;
+            const auto bend = [&](int dx, int dy) {
+                const float a = q.at(x - dx, y - dy), b = q.at(x + dx, y + dy);
+                return a > 0.0f && b > 0.0f ? std::abs(a - 2.0f * here + b) : -1.0f;
+            };
+            const float least = std::min({bend(1, 0), bend(0, 1), bend(1, 1), bend(1, -1)});
+            if (least >= 0.0f) values.push_back(least / axis.relativeScale(here));
+        }
+    }
+    if (values.empty()) return 0.0f;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 20);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle / kSmallestOfFour;
+}
+
+float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise) {
+    if (noise < kLeastNoise) return 0.0f;
+    const Image<float> from = q;
+    std::vector<double> left(static_cast<std::size_t>(q.height()), 0.0);
+    std::vector<std::int64_t> points(left.size(), 0);
+    parallelForBlocks(0, q.height(), 8, [&](std::int64_t first, std::int64_t last) {
+        for (int y = static_cast<int>(first); y < last; ++y) {
+            for (int x = 0; x < q.width(); ++x) {
+                const float here = from.at(x, y);
+                if (!(here > 0.0f)) continue;
+                const float sigma = noise * axis.relativeScale(here);
+                LocalPlane plane{here};
+                float value = here, least = here - kAgree * sigma, most = here + kAgree * sigma;
+                float doubt = sigma;
+                for (const int radius : kRadii) {
+                    plane = fitAround(from, x, y, radius, plane,
+                                      (radius == kRadii[0] ? kFirstBand : kBand) * sigma);
+                    const float deviation = sigma / std::sqrt(std::max(plane.alike, 1.0f));
+                    least = std::max(least, plane.q0 - kAgree * deviation);
+                    most = std::min(most, plane.q0 + kAgree * deviation);
+                    if (least > most) break;  // the surface bends
+                    value = plane.q0;
+                    doubt = deviation;
+                    if (deviation < kAim * axis.relativeScale(here)) break;
+                }
+                if (value > 0.0f) q.at(x, y) = value;
+                left[static_cast<std::size_t>(y)] += doubt / axis.relativeScale(here);
+                ++points[static_cast<std::size_t>(y)];
+            }
+        }
+    });
+    double sum = 0;
+    std::int64_t count = 0;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+        sum += left[i];
+        count += points[i];
+    }
+    return count > 0 ? kDoubt * static_cast<float>(sum / static_cast<double>(count)) : 0.0f;
+}
+
+void closePinholes(Image<float>& q, const Image<std::uint8_t>& covered, const DepthAxis& axis,
+                   float noise) {
+    const Image<float> from = q;
+    parallelForBlocks(1, q.height() - 1, 16, [&](std::int64_t first, std::int64_t last) {
+        for (int y = static_cast<int>(first); y < last; ++y) {
+            for (int x = 1; x + 1 < q.width(); ++x) {
+                if (from.at(x, y) != 0.0f || !covered.at(x, y)) continue;
+                float around[8];
+                int count = 0;
+                for (int k = 0; k < 9; ++k) {
+                    const float there = from.at(x - 1 + k % 3, y - 1 + k / 3);
+                    if (there > 0.0f) around[count++] = there;
+                }
+                if (count < kLeastNeighbours) continue;
+                std::nth_element(around, around + count / 2, around + count);
+                const float middle = around[count / 2];
+                const float band = (kPinholeBand + kBand * noise) * axis.relativeScale(middle);
+                const LocalPlane plane = fitAround(from, x, y, 1, {middle}, band);
+                if (plane.points >= kLeastNeighbours && plane.q0 > 0.0f) q.at(x, y) = plane.q0;
+            }
+        }
+    });
+}
+
+}  // namespace stx::surface
