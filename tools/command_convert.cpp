@@ -396,6 +396,11 @@ void addConvert(CommandLine& line, Program& program) {
              "likewise")
         .takes("PATTERN")
         .group(sets);
+    c.option("--mask", set.maskPattern,
+             "Names of pictures that are white where the object is, {stem} of the colour picture's "
+             "file or {name} in them; 'stx background --mask-of all' makes such masks")
+        .takes("PATTERN")
+        .group(sets);
     c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels")
         .positive()
         .group(sets);

@@ -4,6 +4,7 @@
 
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/mixed_pixels.hpp"
+#include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/raise_depth.hpp"
 #include "formats/imagesets/resample.hpp"
@@ -68,7 +69,37 @@ std::int64_t countPoints(const Image<float>& depth) {
                          [](float d) { return hasPoint(d); });
 }
 
-Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options, Job& job) {
+/// Takes away what a mask does not show: its grey is the share of a pixel that belongs to the
+/// object.
+Result<void> applyMask(const SetView& set, const std::string& pattern, StoredView& stored,
+                       Job& job) {
+    std::string name = filled(pattern, {set.name, 0, 0, 0});
+    if (const auto at = name.find("{stem}"); at != std::string::npos)
+        name.replace(at, 6, std::filesystem::path(set.texture.name).stem().string());
+    const std::string where = fmt::format("'{}'", name);
+    STX_TRY(const auto bytes, readFile(name, job.limits));
+    STX_TRY(const auto mask, within(where, decodeRgba8(bytes, name, job.limits)));
+    if (mask.width() != stored.texture.width() || mask.height() != stored.texture.height())
+        return failAt(where, ErrorCode::invalidInput,
+                      "the mask is {}x{}, but its picture '{}' has {}x{} pixels; both must match",
+                      mask.width(), mask.height(), set.texture.name, stored.texture.width(),
+                      stored.texture.height());
+    for (std::size_t i = 0; i < mask.count(); ++i) {
+        const int share = mask.data()[i].r;
+        if (auto* coded = stored.texture.rgba8()) {
+            auto& alpha = coded->data()[i].a;
+            const int own = stored.alpha ? alpha : 255;
+            alpha = static_cast<std::uint8_t>((own * share + 127) / 255);
+        } else {
+            auto& alpha = stored.texture.rgbaFloat()->data()[i].a;
+            alpha = (stored.alpha ? alpha : 1.0f) * static_cast<float>(share) / 255.0f;
+        }
+    }
+    stored.alpha = true;
+    return {};
+}
+
+Result<StoredView> readStored(const SetView& set, const ImageSetOptions& options, Job& job) {
     if (set.load) return set.load(set, job);
     StoredView stored;
     STX_TRY(auto colour, readColour(set.texture, options.yuv, job));
@@ -77,6 +108,12 @@ Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options
     STX_TRY(auto depth, readDepth(set.depth, job));
     stored.depth = std::move(depth.values);
     stored.depthBits = depth.bits;
+    return stored;
+}
+
+Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options, Job& job) {
+    STX_TRY(auto stored, readStored(set, options, job));
+    if (!options.maskPattern.empty()) STX_CHECK(applyMask(set, options.maskPattern, stored, job));
     return stored;
 }
 

@@ -59,10 +59,10 @@ TEST(BackgroundView, ComesBackFromEveryContainer) {
         std::vector<bool> marks = marksOf(back->views);
         std::sort(marks.begin(), marks.end());
         EXPECT_EQ(marks, (std::vector<bool>{false, false, true}));
-        for (const ReferenceView& view : back->views)
-            if (view.background)
-                EXPECT_LT(glm::length(view.camera.position - bundle.views[0].camera.position),
-                          1e-6);
+        for (const ReferenceView& view : back->views) {
+            if (!view.background) continue;
+            EXPECT_LT(glm::length(view.camera.position - bundle.views[0].camera.position), 1e-6);
+        }
     }
 }
 

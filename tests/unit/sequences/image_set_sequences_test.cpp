@@ -170,6 +170,33 @@ TEST(MovingSets, NormalisedDisparityIsRead) {
     EXPECT_NEAR(bundle->views[0].depth.at(0, 0), 2, 1e-4) << "the largest code is the near plane";
 }
 
+TEST(MovingSets, MasksTakeAwayWhatIsNotTheObject) {
+    TemporaryFolder folder;
+    const auto set = writeShots(folder, {{"a", 0, 0, 1}, {"a", 1, 0, 2}});
+    std::vector<std::uint8_t> mask(8 * 6, 0);
+    mask[8 * 2 + 3] = 255;
+    for (const char* name : {"m_c0.png", "m_c1.png"})
+        writeBytes(folder / name, *encodePng(8, 6, 1, 8, mask.data(), false));
+    ImageSetOptions options;
+    options.maskPattern = folder / "m_{stem}.png";
+    const auto sequence = opened(set, options);
+    ASSERT_TRUE(sequence);
+    Job job;
+    const auto frame = sequence->frame(1, job);
+    ASSERT_TRUE(frame) << frame.error().text();
+    EXPECT_EQ(frame->views[0].pointCount(), 1);
+    EXPECT_TRUE(hasPoint(frame->views[0].depth.at(3, 2)));
+
+    writeBytes(folder / "m_c0.png", *encodePng(4, 4, 1, 8, mask.data(), false));
+    const auto wrong = sequence->frame(0, job);
+    ASSERT_FALSE(wrong);
+    EXPECT_NE(wrong.error().text().find("the mask is 4x4"), std::string::npos);
+    std::filesystem::remove(folder / "m_c0.png");
+    const auto missing = sequence->frame(0, job);
+    ASSERT_FALSE(missing);
+    EXPECT_EQ(missing.error().code, ErrorCode::io);
+}
+
 TEST(MovingSets, TheMovingRoomHasFourCameras) {
     REQUIRE_SHARED(set, "data/motion/moving-room/transforms.json");
     const auto sequence = opened(set);
