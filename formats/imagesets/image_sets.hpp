@@ -55,8 +55,8 @@ struct ImageSetOptions {
     /// Names of the images relative to the set's folder with {name} {w} {h} {format} {frame}
     /// {frame:04} in them (MIV); empty = the usual names.
     std::string texturePattern, depthPattern;
-    /// Pictures of what belongs to the object, white on black, as large as the colour pictures: file
-    /// names with {stem} (of the colour picture's file) and {name} in them; empty: none.
+    /// Pictures of what belongs to the object, white on black, as large as the colour pictures:
+    /// file names with {stem} (of the colour picture's file) and {name} in them; empty: none.
     std::string maskPattern;
     /// Older Middlebury sets: focal length in pixels, scene units from the first to the last view,
     /// and what is added to a disparity (dmin of 2006); 0 = not given.

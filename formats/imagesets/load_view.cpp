@@ -2,6 +2,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "formats/images/images.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/mixed_pixels.hpp"
 #include "formats/imagesets/patterns.hpp"
