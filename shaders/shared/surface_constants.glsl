@@ -60,8 +60,8 @@ CONSTANT int kMostTileSources = 32;
 // Shading the pieces.
 // Views weigh exp(-kAngleFalloff * angle).
 CONSTANT float kAngleFalloff = 3.0f;
-// Views that a piece takes colours from weigh less by what the first weighs that it leaves out, so that
-// they fade when views take each other's place; of equal ones each keeps this share.
+// Views that a piece takes colours from weigh less, the nearer their weight is to that of the first
+// that it leaves out, so that they fade when views take each other's place; equal ones keep this share.
 CONSTANT float kLeastKeptWeight = 0.02f;
 // Pixels this far from an edge count in full, those on it kEdgeWeight.
 CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.01f;

@@ -168,8 +168,10 @@ vec4 shadePiece(Piece piece) {
         }
     }
     // Those that stay fade to nothing where another takes their place, as the camera moves on.
-    for (int k = 0; k < MOST; ++k)
-        topWeight[k] = max(topWeight[k] - topWeight[MOST], kLeastKeptWeight * topWeight[k]);
+    for (int k = 0; k < MOST; ++k) {
+        float ratio = topWeight[MOST] / max(topWeight[k], 1e-20f);
+        topWeight[k] *= max(1.0f - ratio * ratio, kLeastKeptWeight);
+    }
 
     float m[15];
     for (int i = 0; i < 15; ++i) m[i] = 0.0f;

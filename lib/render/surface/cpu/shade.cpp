@@ -376,8 +376,8 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             const float dropped = kept[most], least = *std::min_element(kept, kept + most);
             for (int k = 0; k < count; ++k) {
                 float& weight = views[list[k]].weight[l];
-                weight =
-                    weight < least ? 0.0f : std::max(weight - dropped, kLeastKeptWeight * weight);
+                const float ratio = dropped / std::max(weight, 1e-20f);
+                weight *= weight < least ? 0.0f : std::max(1.0f - ratio * ratio, kLeastKeptWeight);
             }
         }
     }
