@@ -17,6 +17,8 @@
 #include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "tests/golden/render/spheres_miv.hpp"
+#include "tests/naive_warp.hpp"
+#include "tests/noisy_depth.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx {
@@ -75,6 +77,47 @@ INSTANTIATE_TEST_SUITE_P(Sets, HardScenes,
                          testing::Values(Set{"statue", 38.0, 43.0, 43.25},
                                          Set{"oaktree", 25.9, 30.9, 31.6}),
                          [](const auto& set) { return std::string(set.param.name); });
+
+struct Faults {
+    const char* set;
+    const char* kind;  ///< see noisy::damage()
+    double best;       ///< dB, the first novel view
+};
+
+class FaultyDepth : public testing::TestWithParam<Faults> {};
+
+TEST_P(FaultyDepth, StaysAboveTheNaiveWarp) {
+    const Faults& faults = GetParam();
+    REQUIRE_SHARED(folder, std::string("data/imagesets/") + faults.set);
+    Job job;
+    auto bundle = readImageSet(folder / "transforms.json", {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    ASSERT_TRUE(noisy::damage(*bundle, faults.kind));
+    const auto cameras = readCameraFile(folder / "transforms_test.json", job);
+    ASSERT_TRUE(cameras) << cameras.error().text();
+    const Camera& camera = (*cameras)[0].camera;
+    const auto truth = spheres::picture(folder / "test/rgb_000.png");
+    double naive = 0;
+    for (const ReferenceView& view : bundle->views)
+        naive = std::max(naive, *compare(naiveWarp(view, camera).picture, truth)->psnrRgb);
+    const auto renderer = makeRenderer(Backend::cpu, *bundle, settingsOf(Quality::best), -1, job);
+    const double best = psnr(*(*renderer)->render(camera), truth);
+    std::printf("%s, %s: best %.2f dB, naive warp %.2f dB\n", faults.set, faults.kind, best, naive);
+    EXPECT_GT(best, faults.best - kTolerance);
+    EXPECT_GT(best, naive);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sets, FaultyDepth,
+                         testing::Values(Faults{"statue", "noise0.5", 38.84},
+                                         Faults{"statue", "noise2", 34.04},
+                                         Faults{"statue", "missing3", 45.51},
+                                         Faults{"oaktree", "noise0.5", 26.12},
+                                         Faults{"oaktree", "noise2", 24.29}),
+                         [](const auto& faults) {
+                             std::string name = std::string(faults.param.set) + faults.param.kind;
+                             std::erase(name, '.');
+                             return name;
+                         });
 
 // A sheet whose border every view shows: each more view could bite another piece out of it.
 TEST(HardScenesPlane, BetterQualityIsNoWorseOnATwoSidedSheet) {
