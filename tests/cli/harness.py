@@ -1,5 +1,6 @@
 """What the Python tests of the program share: running it, small inputs, looking for leftovers."""
 import argparse
+import json
 import os
 import resource
 import shutil
@@ -139,3 +140,15 @@ def copy_into(source, folder):
     else:
         shutil.copyfile(source, target)
     return target
+
+
+def film_set(stx, bundle, folder):
+    """Makes an image set with time in `folder`: a bundle's views are pictures of one camera, which moves."""
+    must([stx, "extract", bundle, "-o", folder], os.path.dirname(folder))
+    path = os.path.join(folder, "transforms.json")
+    with open(path, encoding="utf-8") as file:
+        data = json.load(file)
+    for i, frame in enumerate(data["frames"]):
+        frame.update(time=i / 10, camera="c")
+    with open(path, "w", encoding="utf-8") as file:
+        json.dump(data, file)

@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 
-from harness import PREFIX, arguments, must, quad, run, temporaries, tree, write
+from harness import PREFIX, arguments, film_set, must, quad, run, temporaries, tree, write
 
 FAILED = []
 
@@ -52,7 +52,9 @@ def commands(inputs):
     yield Command("render png", ["render", bundle, "-o", "t.png", "--backend", "cpu", "--size", "400x400"], ["t.png"])
     yield Command("render sequence", ["render", atlas, "-o", "t_%04d.png", "--orbit", "6", "--backend", "cpu", "--size",
                                       "200x200"], [f"t_{i:04d}.png" for i in range(6)])
-    yield Command("background", ["background", inputs["frames"], "-o", "t.png"], ["t.png"], ["--method", "median"])
+    yield Command("background", ["background", inputs["frames"], "-o", "t.png"], ["t.png"], ["--method", "n2pg"])
+    yield Command("convert film", ["convert", inputs["film"], "-o", "t.mp4"], ["t.mp4"], ["--every", "2"])
+    yield Command("bake film", ["bake", inputs["film"], "-o", "t.mp4"], ["t.mp4"], ["--method", "paper"])
 
 
 def state(folder, target):
@@ -297,6 +299,8 @@ def main():
               "200x200", "--background", "white"], folder)
         inputs["other"] = os.path.join(folder, "other.mp4")
         must([args.stx, "convert", inputs["mesh"], "-o", "other.mp4", "--views", "ring:2", "--size", "20x20"], folder)
+        inputs["film"] = os.path.join(folder, "film")
+        film_set(args.stx, inputs["bundle"], inputs["film"])
         all_commands = list(commands(inputs))
         kills = left = 0
         for command in all_commands:

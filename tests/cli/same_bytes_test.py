@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 
-from harness import arguments, commands_of, must, quad, run, tree
+from harness import arguments, commands_of, film_set, must, quad, run, tree
 
 
 def german(folder):
@@ -39,6 +39,8 @@ def main():
         must([args.stx, "convert", args.model, "-o", "in.exr", "--views", "sphere:5", "--size", "96x80"], top)
         must([args.stx, "bake", "in.exr", "-o", "baked.mp4"], top)
         must([args.stx, "convert", "quad.obj", "-o", "quad.mp4", "--views", "cube", "--size", "40x40"], top)
+        film_set(args.stx, os.path.join(top, "in.exr"), os.path.join(top, "film"))
+        must([args.stx, "convert", "film", "-o", "film.mp4"], top)
         os.mkdir(os.path.join(top, "frames"))
         must([args.stx, "render", "in.exr", "-o", "frames/f_%04d.png", "--orbit", "24", "--size", "90x70", "--backend", "cpu",
               "--background", "white"], top)
@@ -66,6 +68,9 @@ def main():
             "background": ["background", "IN/frames", "-o", "OUT/a.png", "--confidence", "OUT/c.png", "--mask-of", "all",
                            "--mask-output", "OUT/m_%04d.png"],
             "background in bands": ["background", "IN/frames/f_%04d.png", "-o", "OUT/a.png", "--drift", "--max-memory", "1"],
+            "convert film": ["convert", "IN/film", "-o", "OUT/a.mp4"],
+            "render film": ["render", "IN/film.mp4", "-o", "OUT/a_%02d.png", "--orbit", "1", "--times", "all", "--size", "90x70",
+                            "--backend", "cpu"],
             "background n2pg": ["background", "IN/frames", "-o", "OUT/a.exr", "--method", "n2pg"],
             "batch": ["convert", "IN/quad.obj", "IN/in.exr", "-o", "OUT/{stem}.mp4", "--jobs", "2", "--views", "ring:2",
                       "--size", "40x40"],
