@@ -117,6 +117,14 @@ Result<void> dropMissing(SetDescription& set, bool strict, Job& job) {
     return {};
 }
 
+/// Errors with the first file of a view that is not there.
+Result<void> checkFilesAreThere(const SetDescription& set) {
+    for (const SetView& view : set.views)
+        for (const PictureSource* source : {&view.texture, &view.depth})
+            if (source->missing) return tl::unexpected(*source->missing);
+    return {};
+}
+
 /// Bounds, and an origin where the coordinates of a set are too large for floats.
 void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
     bundle.bounds = bundle.computeBounds();
@@ -143,9 +151,7 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
         return failAt(where, ErrorCode::invalidInput,
                       "it has no view; at least one with a picture and a depth image is expected");
     STX_CHECK(dropMissing(set, options.strict, job));
-    for (const SetView& view : set.views)
-        for (const PictureSource* source : {&view.texture, &view.depth})
-            if (source->missing) return tl::unexpected(*source->missing);
+    STX_CHECK(checkFilesAreThere(set));
     STX_CHECK(checkViewCount(set.views.size(), job.limits, where));
     std::uint64_t pixels = 0;
     for (const SetView& view : set.views)
@@ -262,7 +268,10 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     STX_TRY(Motion motion, within(where, motionOf(set, options)));
     takeEvery(set, motion, options.every);
     // What is not there says more than a number that is too large.
-    if (!motion.moves()) STX_CHECK(dropMissing(set, options.strict, job));
+    if (!motion.moves()) {
+        STX_CHECK(dropMissing(set, options.strict, job));
+        STX_CHECK(checkFilesAreThere(set));
+    }
     const auto frames = motion.moves() ? static_cast<int>(motion.times.size()) : set.frames;
     if (options.frame >= frames)
         return failAt(where, ErrorCode::invalidInput,
