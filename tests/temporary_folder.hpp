@@ -7,8 +7,10 @@
 /// An empty folder for one test, gone afterwards.
 class TemporaryFolder {
   public:
-    TemporaryFolder() {
-        std::string name = (std::filesystem::temp_directory_path() / "stx-test-XXXXXX").string();
+    /// `what` is for who finds it: a test that was killed leaves it.
+    explicit TemporaryFolder(const std::string& what = "test") {
+        std::string name =
+            (std::filesystem::temp_directory_path() / ("stx-" + what + "-XXXXXX")).string();
         path_ = ::mkdtemp(name.data());
     }
     ~TemporaryFolder() {

@@ -10,6 +10,7 @@
 
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/text/bt.hpp"
+#include "tests/temporary_folder.hpp"
 
 namespace stx::mpeg4 {
 
@@ -81,25 +82,6 @@ inline void expectSameCamera(const Camera& a, const Camera& b, double tolerance 
     EXPECT_LT(glm::length(a.position - b.position), tolerance * (1 + glm::length(a.position)));
     EXPECT_GT(std::abs(glm::dot(a.orientation, b.orientation)), 1 - tolerance);
 }
-
-/// A folder that is gone after the test.
-class TemporaryFolder {
-  public:
-    explicit TemporaryFolder(const std::string& name)
-        : path_(std::filesystem::path(testing::TempDir()) /
-                ("stx_" + name + "_" + std::to_string(::getpid()))) {
-        std::filesystem::remove_all(path_);
-        std::filesystem::create_directories(path_);
-    }
-    ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-    [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
-        return path_ / name;
-    }
-    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
-  private:
-    std::filesystem::path path_;
-};
 
 inline Bytes bytesOfFile(const std::filesystem::path& path) {
     auto bytes = readFile(path, Limits());
