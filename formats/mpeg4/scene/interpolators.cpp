@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "lib/geometry/camera.hpp"
 
@@ -107,9 +108,10 @@ class Events {
 /// The clocks that routes leave, each once.
 std::vector<NodePtr> clocksOf(const Scene& scene) {
     std::vector<NodePtr> clocks;
+    std::unordered_set<const Node*> seen;
     for (const Route& route : scene.routes)
         if (isField(route.from, route.fromField, "fraction_changed") &&
-            route.from->is("TimeSensor") && std::ranges::find(clocks, route.from) == clocks.end())
+            route.from->is("TimeSensor") && seen.insert(route.from.get()).second)
             clocks.push_back(route.from);
     return clocks;
 }
