@@ -1,23 +1,13 @@
 // BIFS access units. Input: a config in two bytes, then access units, each behind its size in a
 // byte.
 
-#include <cstdio>
-#include <cstdlib>
 #include <set>
 
 #include "formats/mpeg4/bifs/bifs.hpp"
+#include "tests/fuzz/violated.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;
-
-namespace {
-
-[[noreturn]] void violated(const char* what, const std::string& detail) {
-    std::fprintf(stderr, "violated: %s: %s\n", what, detail.c_str());
-    std::abort();
-}
-
-}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size < 2) return 0;
@@ -81,7 +71,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             again.push_back({frame.time, std::move(*commands)});
         }
         if (!quantised && !renumbered && !sameFrames(frames, again))
-            violated("what is encoded decodes to the same", "");
+            violated("what is encoded decodes to the same");
     }
     return 0;
 }

@@ -1,7 +1,9 @@
-// BT: what reads, writes, and reads back the same; and the way from the scene to a bundle.
+// BT: what reads, writes, and reads back the same; and the way from the scene to bundles,
+// at its first moment and in time.
 
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/text/bt.hpp"
+#include "tests/fuzz/scene_in_time.hpp"
 #include "tests/fuzz/text_round_trip.hpp"
 
 using namespace stx;
@@ -16,16 +18,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!sameFrames(trip->document.frames, trip->again.frames, {.ids = false, .names = false}))
         violated("what is written reads back the same");
     SceneReadOptions options;
-    // No image library: any picture is two grey pixels.
-    options.decode = [](ByteSpan, std::string_view, const Limits&) -> Result<DecodedImage> {
-        DecodedImage image;
-        image.width = 2;
-        image.height = image.channels = 1;
-        image.values = std::vector<std::uint8_t>{0, 200};
-        image.channelNames = {"Y"};
-        return image;
-    };
+    options.decode = tinyPicture;
     const auto bundle = bundleFromScene(trip->document, options, job);
     if (bundle && !bundle->check()) violated("a bundle that is read keeps its rules");
+    sceneInTime(trip->document, job);
     return 0;
 }

@@ -1,19 +1,13 @@
 // MP4 files: anything may be in them; what is read can be written, and reads back the same.
 
-#include <cstdio>
-#include <cstdlib>
-
 #include "formats/mpeg4/container/isobmff.hpp"
+#include "tests/fuzz/scene_in_time.hpp"
+#include "tests/fuzz/violated.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;
 
 namespace {
-
-[[noreturn]] void violated(const char* what, const std::string& detail) {
-    std::fprintf(stderr, "violated: %s: %s\n", what, detail.c_str());
-    std::abort();
-}
 
 /// Quantised normals and rotations come back only within a step, so such scenes are not compared.
 bool isQuantised(const Document& document) {
@@ -33,23 +27,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto source = ByteSource::fromView({reinterpret_cast<const std::byte*>(data), size});
     const auto document = readMp4(source, job);
     if (!document) {
-        if (document.error().message.empty()) violated("an error has a message", "");
+        if (document.error().message.empty()) violated("an error has a message");
         return 0;
     }
     for (const ObjectDescriptor* descriptor : document->objectDescriptors())
         for (const ElementaryStream& stream : descriptor->streams)
             for (const Sample& sample : stream.samples)
-                if (!sample.data.load(job.limits)) violated("a sample lies in the file", "");
+                if (!sample.data.load(job.limits)) violated("a sample lies in the file");
     (void)composeScene(document->frames);
+    sceneInTime(*document, job);
 
     const auto bytes = writeMp4(*document, job);
     if (!bytes) return 0;
     const auto again = readMp4(ByteSource::fromView(*bytes), job);
     if (!again) violated("what is written can be read", again.error().text());
     if (!isQuantised(*document) && !sameFrames(document->frames, again->frames))
-        violated("what is written reads the same", "");
+        violated("what is written reads the same");
     const auto twice = writeMp4(*again, job);
     if (!twice || (*twice != *bytes && !isQuantised(*document)))
-        violated("writing again gives the same bytes", "");
+        violated("writing again gives the same bytes");
     return 0;
 }

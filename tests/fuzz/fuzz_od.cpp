@@ -1,20 +1,14 @@
 // Descriptors. Input: a byte that chooses OD frame, IOD or ES_Descriptor, then the bytes.
 
 #include <array>
-#include <cstdio>
-#include <cstdlib>
 
 #include "formats/mpeg4/bifs/descriptors.hpp"
+#include "tests/fuzz/violated.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;
 
 namespace {
-
-[[noreturn]] void violated(const char* what) {
-    std::fprintf(stderr, "violated: %s\n", what);
-    std::abort();
-}
 
 void frame(ByteSpan bytes) {
     constexpr std::array<std::uint32_t, 3> kMpod = {10, 11, 70000};

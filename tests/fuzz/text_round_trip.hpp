@@ -1,20 +1,14 @@
 #pragma once
 
-#include <cstdio>
-#include <cstdlib>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "formats/mpeg4/scene/document.hpp"
 #include "lib/base/job.hpp"
+#include "tests/fuzz/violated.hpp"
 
 namespace stx {
-
-[[noreturn]] inline void violated(const char* what) {
-    std::fprintf(stderr, "violated: %s\n", what);
-    std::abort();
-}
 
 /// A document that a fuzzer's text gave, and what became of it in writing and reading again.
 struct TextRoundTrip {
@@ -35,10 +29,7 @@ std::optional<TextRoundTrip> textRoundTrip(std::string_view text, const Read& re
         return std::nullopt;
     }
     auto again = read(*written, "again", job);
-    if (!again) {
-        std::fprintf(stderr, "%s\n%s\n", again.error().text().c_str(), written->c_str());
-        violated("what is written reads");
-    }
+    if (!again) violated("what is written reads", again.error().text() + "\n" + *written);
     return TextRoundTrip{std::move(*document), std::move(*again), std::move(*written)};
 }
 
