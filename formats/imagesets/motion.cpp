@@ -10,6 +10,9 @@
 namespace stx::imagesets {
 namespace {
 
+/// A set in time lasts no longer, in seconds: nanoseconds that are taken for seconds still pass.
+constexpr double kLongest = 1e15;
+
 using Pose = std::tuple<double, double, double, double, double, double, double>;
 
 Pose poseOf(const Camera& c) {
@@ -99,6 +102,13 @@ Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& option
     if (times.size() < 2) return motion;
     motion.start = times.front();
     for (double& time : times) time -= motion.start;
+    if (!(times.back() <= kLongest))
+        return fail(ErrorCode::invalidInput,
+                    "the times of the pictures span {:g}; seconds are expected, or take all as "
+                    "views of one moment (--still)",
+                    times.back());
+    // Counted from the first, times can round to one.
+    times.erase(std::unique(times.begin(), times.end()), times.end());
     motion.times = std::move(times);
 
     const auto takers = takersOf(set);

@@ -73,6 +73,26 @@ TEST(MovingSets, CamerasShowTheirLastPicture) {
     EXPECT_EQ(sequence->frame(1, job)->views[0].name, "b");
 }
 
+TEST(MovingSets, TimesThatAreNoneAreNamed) {
+    TemporaryFolder folder;
+    const auto set = writeShots(folder, {{"a", -1e308, 0, 1}, {"a", 1e308, 0, 2}});
+    Job job;
+    const auto read = openImageSet(set, {}, job);
+    ASSERT_FALSE(read);
+    EXPECT_EQ(read.error().code, ErrorCode::invalidInput);
+    EXPECT_NE(read.error().text().find("--still"), std::string::npos) << read.error().text();
+}
+
+TEST(MovingSets, TimesThatRoundToOneAreOneMoment) {
+    TemporaryFolder folder;
+    // The spacing of numbers near 1e9 is 1.2e-7.
+    const auto set = writeShots(folder, {{"a", -1e9, 0, 1}, {"a", 1, 0, 2}, {"b", 1 + 1e-9, 1, 3}});
+    const auto sequence = opened(set);
+    ASSERT_TRUE(sequence);
+    EXPECT_TRUE(sequence->timeline().check());
+    EXPECT_EQ(sequence->timeline().count(), 2u);
+}
+
 TEST(MovingSets, PicturesOfOnePoseAreOneCamera) {
     TemporaryFolder folder;
     const auto set =
