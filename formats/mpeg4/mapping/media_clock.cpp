@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace stx::mpeg4 {
 namespace {
@@ -30,6 +31,13 @@ constexpr double kSameTime = 1e-6;
 
 }  // namespace
 
+std::uint64_t ticksAt(double seconds, std::uint32_t timescale) {
+    const double ticks = std::floor(seconds * timescale + 0.5);
+    if (!(ticks > 0)) return 0;
+    constexpr auto kLast = std::numeric_limits<std::uint64_t>::max();
+    return ticks < static_cast<double>(kLast) ? static_cast<std::uint64_t>(ticks) : kLast;
+}
+
 std::size_t Presentation::sampleAt(double time) const {
     const auto next = std::upper_bound(shown.begin(), shown.end(), time + kSameTime,
                                        [](double t, const Shown& entry) { return t < entry.time; });
@@ -57,13 +65,15 @@ Presentation presentationOf(const ElementaryStream& stream) {
         if (edit.mediaTime < 0) continue;
         const double media = static_cast<double>(edit.mediaTime) * tick;
         // The picture under way when the edit begins, and those that begin in it.
-        bool first = true;
-        for (std::size_t i = 0; i < all.shown.size(); ++i) {
-            const Presentation::Shown& entry = all.shown[i];
-            const double next = i + 1 < all.shown.size() ? all.shown[i + 1].time : all.duration;
-            if (next <= media + kSameTime || entry.time >= media + length - kSameTime) continue;
+        const auto begun =
+            std::ranges::upper_bound(all.shown, media + kSameTime, {}, &Presentation::Shown::time);
+        auto entry = begun == all.shown.begin() ? begun : std::prev(begun);
+        if (begun == all.shown.end() && all.duration <= media + kSameTime) continue;
+        for (bool first = true;
+             entry != all.shown.end() && entry->time < media + length - kSameTime; ++entry) {
+            if (edited.shown.size() == kMostMoments) return all;
             edited.shown.push_back(
-                {first ? from : from + std::max(0.0, entry.time - media), entry.sample});
+                {first ? from : from + std::max(0.0, entry->time - media), entry->sample});
             first = false;
         }
     }

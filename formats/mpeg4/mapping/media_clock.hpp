@@ -1,11 +1,22 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "formats/mpeg4/scene/document.hpp"
 
 namespace stx::mpeg4 {
+
+/// A presentation has no more moments than that: a day at 25 a second is 2,160,000. Short edit
+/// lists and clocks could ask for any number.
+inline constexpr std::size_t kMostMoments = 4'000'000;
+/// Nor later ones, in seconds: 31,000 years.
+inline constexpr double kLatestMoment = 1e12;
+
+/// The nearest tick of a clock; 0 for times before its start, the last that there is for times that
+/// it cannot count.
+[[nodiscard]] std::uint64_t ticksAt(double seconds, std::uint32_t timescale);
 
 /// When the samples of a stream are shown, counted from the stream's start: decoding time plus
 /// composition offset, through the edit list (ISO/IEC 14496-12, 8.6).
@@ -21,8 +32,8 @@ struct Presentation {
     /// one.
     [[nodiscard]] std::size_t sampleAt(double time) const;
 };
-/// Samples that the edit list leaves out are never shown; an edit list that leaves out all is
-/// passed over.
+/// Samples that the edit list leaves out are never shown; an edit list that leaves out all, or that
+/// shows more than kMostMoments pictures, is passed over.
 [[nodiscard]] Presentation presentationOf(const ElementaryStream& stream);
 
 /// The time of its stream that a texture shows at `now` seconds of the scene. A MovieTexture runs

@@ -13,8 +13,6 @@ namespace {
 constexpr double kSameMoment = 1e-6;
 /// Moments a second where only interpolators move.
 constexpr double kSmoothRate = 25;
-/// More moments than that are not listed: a day at 25 a second is 2,160,000.
-constexpr std::size_t kMostMoments = 4'000'000;
 /// Decoded pictures that are kept, at most.
 constexpr std::uint64_t kCacheBytes = 256u << 20;
 
@@ -52,8 +50,7 @@ class SceneSequence : public Sequence {
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
         const double now = timeline_.times[index];
-        STX_TRY(Scene * scene, moments_.at(static_cast<std::uint64_t>(
-                                   std::floor(now * document_.sceneStream.timescale + 0.5))));
+        STX_TRY(Scene * scene, moments_.at(ticksAt(now, document_.sceneStream.timescale)));
         applyInterpolators(*scene, now);
         images_.setTime(now);
         STX_TRY(auto bundle, bundleOfMoment(document_, *scene, images_, options_, job));
@@ -96,14 +93,17 @@ Result<Timeline> timelineOf(const Document& document, const StreamImages& images
     for (const ClockSpan& span : clockSpans(scene)) {
         if (!pictures) {
             const double steps = (span.end - span.begin) * kSmoothRate;
-            if (steps > static_cast<double>(kMostMoments))
-                return fail(ErrorCode::unsupported, "a TimeSensor runs for {:g} s",
-                            span.end - span.begin);
+            if (times.size() + steps > static_cast<double>(kMostMoments))
+                return fail(ErrorCode::unsupported,
+                            "a TimeSensor runs for {:g} s; that and what else moves are more than "
+                            "{} moments",
+                            span.end - span.begin, kMostMoments);
             for (int i = 0; i < steps; ++i) times.push_back(span.begin + i / kSmoothRate);
         }
         end = std::max(end, pictures ? end : span.end);
     }
-    std::erase_if(times, [&](double t) { return !std::isfinite(t) || t < start; });
+    if (end > kLatestMoment) end = 0;
+    std::erase_if(times, [&](double t) { return !(t >= start && t <= kLatestMoment); });
     std::ranges::sort(times);
     times.erase(std::unique(times.begin(), times.end(),
                             [](double a, double b) { return b - a <= kSameMoment; }),

@@ -61,8 +61,7 @@ void StreamImages::setTime(double now) {
     if (!byId_.empty() && document.odFrames.size() <= 1) return;
     for (const ObjectDescriptor* od : document.objectDescriptors()) byId_[od->id] = od;
     if (document.odFrames.empty()) return;
-    const auto ticks =
-        static_cast<std::uint64_t>(std::max(0.0, now) * document.odStream.timescale + 0.5);
+    const auto ticks = ticksAt(now, document.odStream.timescale);
     for (const ObjectDescriptor* od : document.objectDescriptors(ticks)) byId_[od->id] = od;
 }
 

@@ -190,6 +190,27 @@ TEST(MediaClock, FollowsCompositionTimesAndEdits) {
     EXPECT_EQ(shown.sampleAt(0.54), 2u);
 }
 
+TEST(MediaClock, ShortListsDoNotBecomeLongOnes) {
+    // Each edit shows all pictures again: nine million of 3000 edits.
+    ElementaryStream stream;
+    for (std::uint64_t i = 0; i < 3000; ++i) {
+        stream.samples.push_back({});
+        stream.samples.back().time = i;
+        stream.samples.back().duration = 1;
+    }
+    stream.edits = {1000, std::vector<Edit>(3000, {3000, 0, 0x10000})};
+    EXPECT_EQ(presentationOf(stream).shown.size(), 3000u);
+    stream.edits.edits.resize(3);
+    EXPECT_EQ(presentationOf(stream).shown.size(), 9000u);
+}
+
+TEST(MediaClock, TimesThatNoClockCountsAreItsLast) {
+    EXPECT_EQ(ticksAt(0.0404, 1000), 40u);
+    EXPECT_EQ(ticksAt(-1, 1000), 0u);
+    EXPECT_EQ(ticksAt(std::nan(""), 1000), 0u);
+    EXPECT_EQ(ticksAt(1e300, 1000), ~std::uint64_t{0});
+}
+
 TEST(MediaClock, RunsAsMovieTexturesDo) {
     // 14772-1, 6.28.
     EXPECT_DOUBLE_EQ(mediaTimeOf(*movie(false), 2, 0.5), 0.5);
@@ -247,6 +268,53 @@ TEST(Interpolators, MoveWhatRoutesReach) {
     clock->set("loop", true);
     applyInterpolators(scene, 1 + 2 * 3 + 0.5);
     EXPECT_NEAR(place->get<glm::vec3>("translation").x, 2, 1e-5);
+}
+
+namespace {
+
+/// A scene whose clocks, `count` of them, run for `seconds` each, one after the other.
+Document clocksOf(int count, double seconds) {
+    NodePtr group = makeNode("Group");
+    ReplaceScene scene;
+    scene.root = group;
+    NodePtr scalar = makeNode("ScalarInterpolator");
+    for (int i = 0; i < count; ++i) {
+        NodePtr clock = makeNode("TimeSensor");
+        clock->set("cycleInterval", seconds);
+        clock->set("startTime", i * seconds);
+        group->edit<NodeList>("children").push_back(clock);
+        scene.routes.push_back({0, "", clock, clock->info->find("fraction_changed"), scalar,
+                                scalar->info->find("set_fraction")});
+    }
+    Document document;
+    document.frames.push_back({0, {Command(std::move(scene))}});
+    return document;
+}
+
+}  // namespace
+
+TEST(Mpeg4Sequences, ClocksHaveNoMoreMomentsTogether) {
+    Job job;
+    const auto some = sequenceFromScene(clocksOf(2, 100), {}, job);
+    ASSERT_TRUE(some) << some.error().text();
+    EXPECT_EQ((*some)->timeline().count(), 5000u);
+    // 2.5 million each.
+    const auto many = sequenceFromScene(clocksOf(2, 100'000), {}, job);
+    ASSERT_FALSE(many);
+    EXPECT_EQ(many.error().code, ErrorCode::unsupported);
+    EXPECT_NE(many.error().text().find("more than 4000000 moments"), std::string::npos)
+        << many.error().text();
+}
+
+TEST(Mpeg4Sequences, MomentsBeyondAllClocksAreLeftOut) {
+    Document document = clocksOf(1, 0.2);
+    document.sceneStream.timescale = 1;
+    document.frames.push_back({~std::uint64_t{0}, {}});
+    Job job;
+    const auto sequence = sequenceFromScene(document, {}, job);
+    ASSERT_TRUE(sequence) << sequence.error().text();
+    EXPECT_EQ((*sequence)->timeline().count(), 5u);
+    EXPECT_NEAR((*sequence)->timeline().duration, 0.2, 1e-9);
 }
 
 TEST(Mpeg4Sequences, AReferenceFileMovesAsItsTextSays) {
