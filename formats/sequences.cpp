@@ -61,6 +61,9 @@ Result<std::unique_ptr<Sequence>> openExrFiles(const fs::path& pattern, Job& job
                              pattern.string(), kUsualRate));
     }
     if (line.moves()) line.duration = 2 * line.times.back() - line.times[line.count() - 2];
+    // Times far apart or near each other may not be so when they are counted from the first.
+    if (const auto sound = line.check(); !sound)
+        return tl::unexpected(sound.error().at(fmt::format("'{}'", pattern.string())));
     return std::make_unique<ExrSequence>(std::move(files), std::move(line));
 }
 

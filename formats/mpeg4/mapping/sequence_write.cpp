@@ -1,10 +1,11 @@
 #include "formats/mpeg4/mapping/sequence_write.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <map>
 
+#include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/view_images.hpp"
 #include "lib/base/parallel.hpp"
 
@@ -67,9 +68,7 @@ class SequenceWriter {
     [[nodiscard]] std::string placeOf(std::size_t i) const {
         return fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i]);
     }
-    [[nodiscard]] std::uint64_t ticks(double seconds) const {
-        return static_cast<std::uint64_t>(std::llround(seconds * scale_));
-    }
+    [[nodiscard]] std::uint64_t ticks(double seconds) const { return ticksAt(seconds, scale_); }
 
     /// A frame with the ranges of the sequence. Its notes are said once, of the first frame.
     Result<Bundle> frame(std::size_t i) {
@@ -277,8 +276,10 @@ class SequenceWriter {
                 auto& samples = stream->samples;
                 for (std::size_t i = 0; i < samples.size(); ++i) {
                     const std::uint64_t next = i + 1 < samples.size() ? samples[i + 1].time : end;
+                    const std::uint64_t shown =
+                        next > samples[i].time ? next - samples[i].time : scale_;
                     samples[i].duration = static_cast<std::uint32_t>(
-                        next > samples[i].time ? next - samples[i].time : scale_);
+                        std::min<std::uint64_t>(shown, std::numeric_limits<std::uint32_t>::max()));
                 }
                 const NodePtr still =
                     std::get<NodePtr>(texture->value(std::string_view(kRoles[r])));

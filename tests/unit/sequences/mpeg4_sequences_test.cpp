@@ -164,6 +164,41 @@ TEST(Mpeg4Sequences, WhatCannotMoveIsSaid) {
     EXPECT_EQ(one.error().code, ErrorCode::usage);
 }
 
+namespace {
+
+/// Two frames at times of its own.
+class FarApart : public MovingViews {
+  public:
+    FarApart(double second, double duration) : MovingViews(2) {
+        timeline_.times = {0, second};
+        timeline_.duration = duration;
+    }
+};
+
+}  // namespace
+
+TEST(Mpeg4Sequences, ALastPictureStaysAsLongAsASampleCan) {
+    TemporaryFolder folder("sequences");
+    Job job;
+    FarApart frames(1, 1e7);  // ten thousand million milliseconds
+    auto spool = PictureSpool::create(folder.path());
+    ASSERT_TRUE(spool);
+    const auto document = sceneFromSequence(frames, {}, *spool, job);
+    ASSERT_TRUE(document) << document.error().text();
+    EXPECT_EQ(document->findObjectDescriptor(2)->streams[0].samples.back().duration, 0xFFFFFFFFu);
+}
+
+TEST(ExrSequences, TimesThatHaveNoEndAreRefused) {
+    TemporaryFolder folder("sequences");
+    Job job;
+    FarApart frames(1e308, 1.5e308);
+    ASSERT_TRUE(saveSequence(frames, folder / "a_%03d.exr", {}, job));
+    const auto read = openSequence(folder / "a_%03d.exr", {}, job);
+    ASSERT_FALSE(read);
+    EXPECT_EQ(read.error().code, ErrorCode::invalidInput);
+    EXPECT_NE(read.error().text().find("a_%03d.exr"), std::string::npos) << read.error().text();
+}
+
 TEST(MediaClock, FollowsCompositionTimesAndEdits) {
     // Decoding order is not the order of showing.
     ElementaryStream stream = streamOf({0, 40, 80});
