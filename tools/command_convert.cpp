@@ -154,7 +154,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     const bool countPoints = !program.common.report.empty();
     std::optional<Bundle> bundle;
     std::error_code ec;
-    // `name_%04d.exr` is no file.
+    // `name_%04d.exr` is not a file's name.
     if (std::filesystem::exists(input, ec) || !frameName(input.string(), 0)) {
         STX_TRY(bundle, convertDocument(input, target, saveOptions(o, program),
                                         o.mesh->depthBits.has_value(), countPoints, program.job));

@@ -17,7 +17,7 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 
 /// The bytes of a chunk as zip compression stores them: even bytes first, then the odd ones, each
 /// as the difference from the one before, deflated at `level` (see compressZlib()). `raw` itself
-/// when that is no smaller, as OpenEXR wants it. Throws std::bad_alloc.
+/// when that does not make it smaller, as OpenEXR wants it. Throws std::bad_alloc.
 [[nodiscard]] Bytes zipChunk(std::span<const std::uint8_t> raw, int level);
 
 }  // namespace stx::exr

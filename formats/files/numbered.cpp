@@ -61,8 +61,8 @@ Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
         files.push_back(std::move(file));
     }
     if (files.empty())
-        return fail(ErrorCode::io, "cannot read '{}': there is no file of that name and a number",
-                    pattern);
+        return fail(ErrorCode::io,
+                    "cannot read '{}': no file has that name with a number in its place", pattern);
     std::ranges::sort(files, {}, &NumberedFile::number);
     return files;
 }

@@ -32,7 +32,7 @@ Result<Similarity> similarityOf(const Json& file, const char* matrixKey, const c
     Similarity out;
     STX_TRY(const glm::dmat4 matrix, needMatrix(file, matrixKey, where));
     out.shift = glm::dvec3(matrix[3]);
-    // It turns poses, not pixels: corrections are told as if the focal length were 1000 pixels.
+    // It turns poses, not pixels: notes give corrections in pixels of a focal length of 1000.
     STX_TRY(out.rotation, repairRotation(glm::dmat3(matrix), 1000.0,
                                          fmt::format("{}: '{}'", where, matrixKey), job));
     STX_TRY(const auto scale, findNumber(file, scaleKey, where));

@@ -297,7 +297,7 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
     STX_TRY(Motion motion, within(where, motionOf(set, options)));
     takeEvery(set, motion, options.every);
     if (set.views.empty())
-        return failAt(where, ErrorCode::invalidInput, "there is no view in it; one is the least");
+        return failAt(where, ErrorCode::invalidInput, "it has no view; at least one is expected");
     if (set.frames == 1 && !motion.moves()) {
         STX_TRY(auto still, readViews(std::move(set), where, options, job));
         return sequenceOf(std::move(still));

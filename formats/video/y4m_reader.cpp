@@ -12,7 +12,7 @@ constexpr std::string_view kMagic = "YUV4MPEG2";
 constexpr std::string_view kFrame = "FRAME";
 /// Lines are shorter in every file that means well.
 constexpr std::size_t kLongestLine = 1024;
-/// More frames are no video but a claim: a year at 30 a second would be a thousand million.
+/// More frames are refused as damage: a year at 30 a second would be a thousand million.
 constexpr std::size_t kMostFrames = 1u << 24;
 
 std::string atByte(std::uint64_t offset) {

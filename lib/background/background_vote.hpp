@@ -24,9 +24,9 @@ struct Vote {
                 InFront& inFront) const;
 };
 
-/// Drops what is no background but the part of a moving thing that never left its place, as that of
-/// somebody who turns: a surface whose outline goes on in what other pixels had before their
-/// background.
+/// Drops parts of moving things that never left their place and so look like background, as the
+/// middle of somebody who turns: a surface whose outline goes on in what other pixels had before
+/// their background.
 void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise& noise,
                 float step);
 

@@ -52,7 +52,8 @@ Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double>
                                                          const TemporalBackgroundSettings& settings,
                                                          Job& job) {
     if (times.empty())
-        return fail(ErrorCode::invalidInput, "there are no frames to make a background of");
+        return fail(ErrorCode::invalidInput,
+                    "the sequence has no frames; a background is made of at least two");
     std::vector<CameraBackground> cameras;
     int passes = 1;
     std::set<std::string> names;
@@ -61,7 +62,7 @@ Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double>
         for (std::size_t frame = 0; frame < times.size(); ++frame) {
             auto bundle = read(frame, job);
             if (!bundle) return propagate(bundle);
-            // Backgrounds that are there already are no frames.
+            // Background views that it has already are not pictures of this moment.
             std::erase_if(bundle->views, [](const ReferenceView& v) { return v.background; });
             if (cameras.empty()) {
                 TemporalBackgroundSettings each = settings;

@@ -24,7 +24,7 @@ struct LumaRows {
 enum class MotionScore {
     luma,  ///< |change of luma|
     /// |change of the nearest-neighbour pixel gradient|: light that gets brighter or darker
-    /// everywhere is no motion.
+    /// everywhere does not count as motion.
     gradient,
 };
 

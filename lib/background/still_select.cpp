@@ -196,8 +196,8 @@ Result<StillBackground> selectBackground(StillFrames& frames, std::span<const in
     const auto size = frames.size();
     const std::uint64_t frameBytes = std::uint64_t{sizeof(glm::u8vec4)} * size.x * size.y;
     const std::uint64_t keptBytes = job.limits.maxMemoryBytes / 2;
-    // Frames that stay in memory cost little to look at again: then bands are no larger than a
-    // processor's caches like them. Else they are as large as memory allows.
+    // Frames that stay in memory cost little to look at again: then bands are small enough for a
+    // processor's caches. Else they are as large as memory allows.
     constexpr std::uint64_t kSmall = 32ull << 20, kLarge = 1ull << 30;
     const bool all = frameBytes * which.size() <= keptBytes;
     const std::uint64_t most = job.limits.maxMemoryBytes / 4;

@@ -291,7 +291,8 @@ Result<void> TemporalBackground::endPass(Job& job) {
     Impl& s = *impl_;
     STX_CHECK(job.checkCancelled());
     if (s.frames == 0)
-        return fail(ErrorCode::invalidInput, "there are no frames to make a background of");
+        return fail(ErrorCode::invalidInput,
+                    "no frame was added; a background is made of at least two");
     if (s.pass > 0 && s.frames != s.framesOfPass)
         return fail(ErrorCode::invalidInput, "there are {} frames where there were {} before",
                     s.frames, s.framesOfPass);

@@ -12,7 +12,7 @@ struct LitPair {
 };
 
 /// How much brighter b is than a, for each channel, whatever a part of the pairs says that shows
-/// something else, stands in shadow, or is too dark or too bright to tell. Within a factor of two;
+/// something else, is in shadow, or is too dark or too bright to tell. Within a factor of two;
 /// 1 when too few pairs are left.
 [[nodiscard]] glm::vec3 lightRatio(std::span<const LitPair> pairs);
 

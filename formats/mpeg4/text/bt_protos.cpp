@@ -58,10 +58,9 @@ Result<void> BtReader::readLink(const NodePtr& node, int field) {
     STX_CHECK(takeWord("IS"));
     const std::string where = lexer_.where();
     if (bufferDepth_ > 0)
-        return failAt(
-            where, ErrorCode::unsupported,
-            "IS stands in a buffer of commands, which has no such links in BIFS; give the "
-            "field a value");
+        return failAt(where, ErrorCode::unsupported,
+                      "IS is in a buffer of commands, which has no such links in BIFS; give the "
+                      "field a value");
     STX_TRY(const auto linked, takeName("the name of a field of the PROTO"));
     if (proto_ == nullptr)
         return failAt(where, ErrorCode::invalidInput, "IS stands outside of a PROTO");

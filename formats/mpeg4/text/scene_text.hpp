@@ -77,13 +77,13 @@ class TextNames {
     const TextNames* outer_ = nullptr;
     mutable std::unordered_map<const Node*, std::string> names_;
     mutable std::unordered_map<std::string, int> taken_;
-    /// For buffers: what each scene has, in order; none when there is no buffer.
+    /// For buffers: what each scene has, in order; empty for a presentation without buffers.
     std::vector<BufferScene> scenes_;
     std::size_t scene_ = 0;  ///< scenes begun
     std::unordered_set<const Node*> written_;
 };
 
-/// The commands of a buffer that stands in `depth` others. Where they have no text they are left
+/// The commands of a buffer that is nested in `depth` others. Where they have no text they are left
 /// out and `fits` says why, unless it does already for another.
 [[nodiscard]] std::vector<Command> commandsToWrite(const TextNames& names,
                                                    const CommandBuffer& buffer, int depth,

@@ -18,7 +18,8 @@ class TextBuffers {
     /// Makes room for the commands of a buffer in the body of `proto` (null: in the scene). They
     /// become a field of `node`.
     [[nodiscard]] std::size_t add(NodePtr node, int field, const Proto* proto);
-    /// The same for a buffer that is the value of a command: this value stands for it until then.
+    /// The same for a buffer that is the value of a command: this value keeps its place until
+    /// encode().
     [[nodiscard]] FieldValue addValue(const Proto* proto);
     /// The number of a buffer that addValue() gave.
     [[nodiscard]] std::size_t last() const { return buffers_.size() - 1; }
@@ -39,7 +40,7 @@ class TextBuffers {
         std::vector<NodePtr> brought;
         CommandBuffer coded;
     };
-    /// Puts coded buffers where values of commands stand for them.
+    /// Puts the coded buffers in the places that values of addValue() keep.
     void fill(std::vector<Command>& commands) const;
 
     std::vector<Buffer> buffers_;

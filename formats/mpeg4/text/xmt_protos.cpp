@@ -86,7 +86,7 @@ Result<void> XmtReader::readLinks(xml_node element, const NodePtr& node) {
         return failAt(where(element), ErrorCode::invalidInput, "<IS> stands outside of a PROTO");
     if (bufferDepth_ > 0)
         return failAt(where(element), ErrorCode::unsupported,
-                      "<IS> stands in a buffer of commands, which has no such links in BIFS; give "
+                      "<IS> is in a buffer of commands, which has no such links in BIFS; give "
                       "the field a value");
     for (const xml_node child : elements(element)) {
         if (localName(child) != "connect") return unexpectedElement(child, "connect in IS");
@@ -199,7 +199,7 @@ Result<void> XmtReader::passBuffer(xml_node element, std::size_t number) {
     if (localName(element) != "buffer") return unexpectedElement(element, "buffer");
     if (bufferDepth_ >= kMaxBufferNesting)
         return failAt(where(element), ErrorCode::unsupported,
-                      "buffers of commands hold each other more than {} deep", kMaxBufferNesting);
+                      "buffers of commands are nested more than {} deep", kMaxBufferNesting);
     STX_CHECK(names_.countNode());
     passed_.push_back({element, number});
     return {};

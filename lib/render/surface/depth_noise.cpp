@@ -14,7 +14,7 @@ namespace {
 
 /// One in twenty pixels has a smaller one, where the smallest of the four second differences
 /// through a pixel is taken, of independent normal noise of standard deviation 1 (by simulation).
-/// On smooth surfaces the median would do; among leaves most differences are no noise.
+/// On smooth surfaces the median would do; among leaves most differences are not noise.
 constexpr float kSmallestOfFour = 0.0416f;
 /// Less noise than this share of q is left as it is: what codes and small shapes look like.
 constexpr float kLeastNoise = 0.001f;

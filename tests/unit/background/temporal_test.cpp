@@ -34,7 +34,7 @@ int wallPixels(const ReferenceView& view) {
 }
 
 TEST(TemporalBackground, WhoStandsStillForMostOfTheTimeIsNotTakenIn) {
-    // In 26 of 30 frames the block stands in the middle.
+    // In 26 of 30 frames the block is in the middle.
     const Film film = [](int i) {
         return i < 26 ? wallWithBlock(18, 30, 2.0f) : wallWithBlock(2, 12, 2.0f);
     };
