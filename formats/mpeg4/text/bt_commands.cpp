@@ -84,21 +84,23 @@ Result<FieldValue> BtReader::readCommandValue(const Target& target, bool item) {
         return holder->value(index);
     }
     if (type == FieldType::SFCommandBuffer && lexer_.peek().kind == Kind::openBrace) {
-        FieldValue stands = buffers_.addValue(proto_);
+        FieldValue placeholder = buffers_.addValue(proto_);
         STX_CHECK(passBuffer(buffers_.last()));
-        return stands;
+        return placeholder;
     }
     return readFieldValue(lexer_, type, false);
 }
 
 Result<void> BtReader::passBuffer(std::size_t number) {
     const std::string where = lexer_.where();
-    if (bufferDepth_ >= kMaxBufferNesting)
-        return failAt(where, ErrorCode::unsupported,
-                      "buffers of commands hold each other more than {} deep", kMaxBufferNesting);
     STX_CHECK(take(Kind::openBrace, "'{'"));
-    STX_CHECK(names_.countNode());
-    passed_.push_back({lexer_, number});
+    const auto read = [this, begin = lexer_]() -> Result<void> {
+        BtLexer outer = std::exchange(lexer_, begin);
+        while (lexer_.peek().kind != Kind::closeBrace) STX_CHECK(readCommand(0));
+        lexer_ = std::move(outer);
+        return {};
+    };
+    STX_CHECK(addBuffer(number, where, read));
     for (int open = 1; open > 0;) {
         if (lexer_.peek().kind == Kind::openBrace) ++open;
         if (lexer_.peek().kind == Kind::closeBrace) --open;
@@ -107,34 +109,6 @@ Result<void> BtReader::passBuffer(std::size_t number) {
         STX_TRY([[maybe_unused]] const auto taken, lexer_.take());
     }
     return {};
-}
-
-Result<void> BtReader::readBuffers() {
-    for (PassedBuffer& buffer : std::exchange(passed_, {})) {
-        BtLexer outerLexer = std::exchange(lexer_, std::move(buffer.lexer));
-        NodeNames outerNames = std::move(names_);
-        names_ = NodeNames::inside(outerNames);
-        auto outerFrames = std::exchange(document_.frames, {});
-        const bool outerInCommand = inCommand_;
-        ++bufferDepth_;
-        STX_CHECK(readBufferCommands());
-        --bufferDepth_;
-        inCommand_ = outerInCommand;
-        std::vector<Command> commands;
-        for (CommandFrame& frame : document_.frames) commands = std::move(frame.commands);
-        buffers_.put(buffer.number, std::move(commands), names_);
-        document_.frames = std::move(outerFrames);
-        outerNames.goOn(names_);
-        names_ = std::move(outerNames);
-        lexer_ = std::move(outerLexer);
-    }
-    return {};
-}
-
-Result<void> BtReader::readBufferCommands() {
-    while (lexer_.peek().kind != Kind::closeBrace) STX_CHECK(readCommand(0));
-    STX_CHECK(readBuffers());
-    return names_.resolve();
 }
 
 Result<void> BtReader::readReplace(std::uint64_t time) {

@@ -7,10 +7,8 @@ namespace stx::mpeg4 {
 using Kind = BtToken::Kind;
 
 NodePtr BtReader::makeNamedNode(std::string_view type) const {
-    for (auto scope = protoScopes_.rbegin(); scope != protoScopes_.rend(); ++scope)
-        for (auto proto = scope->rbegin(); proto != scope->rend(); ++proto)
-            if ((*proto)->name == type) return makeInstance(*proto);
-    return makeNode(type);
+    NodePtr instance = makeNamedInstance(type);
+    return instance ? instance : makeNode(type);
 }
 
 bool BtReader::isDeclaration() const {
@@ -46,38 +44,14 @@ Result<FieldInfo> BtReader::readDeclaration() {
 Result<int> BtReader::readOwnField(Node& script) {
     const std::string where = lexer_.where();
     STX_TRY(const FieldInfo field, readDeclaration());
-    if (ownFieldCount(script) >= kMaxOwnFields || !addScriptField(script, field, std::nullopt))
-        return failAt(where, ErrorCode::invalidInput,
-                      "a Script has no room for the {} '{}': the name is taken, it has {} fields, "
-                      "or the kind is not one of a Script",
-                      name(field.kind), excerpt(field.name), kMaxOwnFields);
-    return script.info->find(field.name);
+    return addOwnField(script, field, where);
 }
 
 Result<void> BtReader::readLink(const NodePtr& node, int field) {
     STX_CHECK(takeWord("IS"));
     const std::string where = lexer_.where();
-    if (bufferDepth_ > 0)
-        return failAt(where, ErrorCode::unsupported,
-                      "IS is in a buffer of commands, which has no such links in BIFS; give the "
-                      "field a value");
     STX_TRY(const auto linked, takeName("the name of a field of the PROTO"));
-    if (proto_ == nullptr)
-        return failAt(where, ErrorCode::invalidInput, "IS stands outside of a PROTO");
-    const int index = proto_->type.findIgnoringCase(linked);
-    if (index < 0)
-        return failAt(where, ErrorCode::invalidInput, "PROTO {} has no field '{}'", proto_->name,
-                      excerpt(linked));
-    const FieldInfo& own = node->info->fields[field];
-    const FieldInfo& other = proto_->type.fields[index];
-    if (own.type != other.type)
-        return failAt(where, ErrorCode::invalidInput, "{}.{} is {} and IS {}, which is {}",
-                      node->info->name, own.name, name(own.type), other.name, name(other.type));
-    if (node->isSet(field) || !linked_.emplace(node.get(), field).second)
-        return failAt(where, ErrorCode::invalidInput, "{}.{} has a value already", node->info->name,
-                      own.name);
-    proto_->links.push_back({node, field, index});
-    return {};
+    return addLink(node, field, linked, where);
 }
 
 Result<void> BtReader::readValueInto(const NodePtr& node, int index, int depth, int& height) {
@@ -104,81 +78,43 @@ Result<void> BtReader::readValueInto(const NodePtr& node, int index, int depth, 
 
 Result<void> BtReader::readProto(int depth) {
     const std::string where = lexer_.where();
-    if (depth > job_.limits.maxNesting || ++protoCount_ > kMaxProtos)
-        return failAt(where, ErrorCode::invalidInput,
-                      "there are more than {} PROTOs, or they nest deeper than {}", kMaxProtos,
-                      job_.limits.maxNesting);
-    const auto proto = std::make_shared<Proto>();
-    proto->isExtern = isWord("EXTERNPROTO");
+    const bool isExtern = isWord("EXTERNPROTO");
     STX_TRY([[maybe_unused]] const auto word, lexer_.take());
-    STX_TRY(proto->name, takeName("the name of a PROTO"));
-    if (!isScriptName(proto->name) || findNode(proto->name))
-        return failAt(where, ErrorCode::invalidInput,
-                      "'{}' is no name for a PROTO: letters, digits and _, and no node's name",
-                      excerpt(proto->name));
-    STX_CHECK(names_.countNode());
+    STX_TRY(auto protoName, takeName("the name of a PROTO"));
+    STX_TRY(const auto proto, makeProto(std::move(protoName), depth, where));
+    proto->isExtern = isExtern;
     STX_CHECK(readInterface(*proto, depth));
-    if (proto->isExtern) {
-        STX_TRY(auto urls, readFieldValue(lexer_, FieldType::MFURL, false));
-        proto->urls = std::get<std::vector<Url>>(std::move(urls));
-    } else {
-        NodeNames outer = std::exchange(names_, names_.ofBody());
-        Proto* const outerProto = std::exchange(proto_, proto.get());
-        const bool outerInCommand = std::exchange(inCommand_, false);
-        auto outerPassed = std::exchange(passed_, {});
-        STX_CHECK(readProtoBody(*proto, depth));
-        inCommand_ = outerInCommand;
-        passed_ = std::move(outerPassed);
-        proto_ = outerProto;
-        outer.countOn(names_);
-        names_ = std::move(outer);
-    }
+    if (!isExtern) return readInside(proto, [&] { return readProtoBody(*proto, depth); });
+    STX_TRY(auto urls, readFieldValue(lexer_, FieldType::MFURL, false));
+    proto->urls = std::get<std::vector<Url>>(std::move(urls));
     protoScopes_.back().push_back(proto);
     return {};
 }
 
 Result<void> BtReader::readInterface(Proto& proto, int depth) {
     STX_CHECK(take(Kind::openBracket, fmt::format("'[' behind PROTO {}", excerpt(proto.name))));
-    std::vector<FieldInfo> fields;
-    auto defaults = std::make_shared<FieldDefaults>();
+    Interface interface;
     while (lexer_.peek().kind != Kind::closeBracket) {
         const std::string where = lexer_.where();
         if (!isDeclaration()) return unexpected("field, exposedField, eventIn, eventOut or ']'");
         STX_TRY(const FieldInfo field, readDeclaration());
-        for (const FieldInfo& other : fields)
-            if (other.name == field.name)
-                return failAt(where, ErrorCode::invalidInput, "PROTO {} has two fields '{}'",
-                              proto.name, excerpt(field.name));
-        if (static_cast<int>(fields.size()) >= kMaxOwnFields)
-            return failAt(where, ErrorCode::invalidInput, "PROTO {} has more than {} fields",
-                          proto.name, kMaxOwnFields);
-        STX_CHECK(names_.countNode());
-        FieldValue value = emptyValue(field.type);
-        const bool hasValue =
-            field.kind == FieldKind::field || field.kind == FieldKind::exposedField;
         // An EXTERNPROTO may leave the values to where it is.
         const bool leftOut =
             proto.isExtern && (lexer_.peek().kind == Kind::closeBracket || isDeclaration());
-        if (hasValue && !leftOut) {
-            const NodePtr holder = holderOf(field);
+        const auto readValue = [&](const NodePtr& holder) -> Result<void> {
             int height = 0;
-            STX_CHECK(readValueInto(holder, 0, depth, height));
-            value = holder->value(0);
-        }
-        defaults->values.push_back(std::move(value));
-        fields.push_back(field);
+            return leftOut ? Result<void>() : readValueInto(holder, 0, depth, height);
+        };
+        STX_CHECK(addField(interface, proto, field, where, readValue));
     }
     STX_TRY([[maybe_unused]] const auto bracket, lexer_.take());
-    proto.type = makeNodeInfo(proto.name, {}, fields);
-    proto.type.isProto = true;
-    proto.type.defaults = std::move(defaults);
+    setInterface(proto, std::move(interface));
     return {};
 }
 
 Result<void> BtReader::readProtoBody(Proto& proto, int depth) {
     const std::string where = lexer_.where();
     STX_CHECK(take(Kind::openBrace, fmt::format("'{{' of PROTO {}", excerpt(proto.name))));
-    protoScopes_.emplace_back();
     while (lexer_.peek().kind != Kind::closeBrace) {
         if (lexer_.peek().kind == Kind::end)
             return unexpected(fmt::format("'}}' for PROTO {} at {}", excerpt(proto.name), where));
@@ -203,10 +139,6 @@ Result<void> BtReader::readProtoBody(Proto& proto, int depth) {
         proto.body.push_back(std::move(node));
     }
     STX_TRY([[maybe_unused]] const auto brace, lexer_.take());
-    STX_CHECK(readBuffers());
-    STX_CHECK(names_.resolve());
-    proto.protos = std::move(protoScopes_.back());
-    protoScopes_.pop_back();
     return {};
 }
 

@@ -312,7 +312,7 @@ Result<NodePtr> BtReader::readNodeBody(const std::string& defName, const std::st
             continue;
         }
         const FieldInfo& field = node->info->fields[index];
-        if (linked_.contains({node.get(), index}))
+        if (isLinked(node, index))
             return failAt(fieldWhere, ErrorCode::invalidInput, "{}.{} has an IS already", type,
                           field.name);
         if (!field.hasValue())

@@ -2,26 +2,24 @@
 
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/bt_lexer.hpp"
-#include "formats/mpeg4/text/scene_text.hpp"
-#include "formats/mpeg4/text/text_buffers.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
+#include "formats/mpeg4/text/text_reader.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 
 namespace stx::mpeg4 {
 
 /// Reads a BT document by descent, a token ahead. Structure, nodes and descriptors are in
 /// bt_reader.cpp, the commands of `AT time { ... }` in bt_commands.cpp.
-class BtReader {
+class BtReader : private TextReader {
   public:
     BtReader(std::string_view text, const std::string& fileName, Job& job)
-        : lexer_(text, fileName), job_(job), names_(job.limits) {}
+        : TextReader(job), lexer_(text, fileName) {}
 
     Result<Document> read();
 
@@ -133,9 +131,6 @@ class BtReader {
 
     /// `{ REPLACE ... }`, passed over until the nodes that it may name are known.
     Result<void> passBuffer(std::size_t number);
-    /// Reads the commands of the buffers passed over so far.
-    Result<void> readBuffers();
-    Result<void> readBufferCommands();
 
     Result<void> readNodeList(const NodePtr& owner, int index, int depth, int& height, bool waits);
 
@@ -147,26 +142,11 @@ class BtReader {
     };
 
     BtLexer lexer_;
-    Job& job_;
-    NodeNames names_;
-    Document document_;
     std::optional<TextDescriptor> iod_;
     std::vector<OdUpdate> odUpdates_;
     std::map<std::string, std::uint32_t> routeIds_;
     std::uint64_t lastTime_ = 0;
     bool haveScene_ = false;
-    std::vector<std::vector<ProtoPtr>> protoScopes_ = std::vector<std::vector<ProtoPtr>>(1);
-    Proto* proto_ = nullptr;                        ///< whose body is read
-    std::set<std::pair<const Node*, int>> linked_;  ///< fields with an IS
-    std::size_t protoCount_ = 0;
-    struct PassedBuffer {
-        BtLexer lexer;  ///< at its first command
-        std::size_t number;
-    };
-    std::vector<PassedBuffer> passed_;
-    TextBuffers buffers_;
-    int bufferDepth_ = 0;  ///< in how many buffers the commands that are read are
-    bool inCommand_ = false;
     bool rap_ = false;  ///< the block that is read is a place where a reader may begin
 };
 

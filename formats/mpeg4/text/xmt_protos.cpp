@@ -5,13 +5,6 @@
 
 namespace stx::mpeg4 {
 
-NodePtr XmtReader::makeNamedInstance(std::string_view type) const {
-    for (auto scope = protoScopes_.rbegin(); scope != protoScopes_.rend(); ++scope)
-        for (auto proto = scope->rbegin(); proto != scope->rend(); ++proto)
-            if ((*proto)->name == type) return makeInstance(*proto);
-    return nullptr;
-}
-
 Result<FieldInfo> XmtReader::readDeclaration(xml_node element) const {
     FieldInfo field;
     field.name = element.attribute("name").value();
@@ -58,12 +51,8 @@ Result<void> XmtReader::readOwnField(xml_node element, const NodePtr& script, in
                                      int& below) {
     STX_TRY(const FieldInfo field, readDeclaration(element));
     STX_CHECK(names_.countNode());
-    if (ownFieldCount(*script) >= kMaxOwnFields || !addScriptField(*script, field, std::nullopt))
-        return failAt(where(element), ErrorCode::invalidInput,
-                      "a Script has no room for the {} '{}': the name is taken, it has {} fields, "
-                      "or the kind is not one of a Script",
-                      name(field.kind), excerpt(field.name), kMaxOwnFields);
-    return readDeclaredValue(element, script, script->info->find(field.name), depth, below);
+    STX_TRY(const int index, addOwnField(*script, field, where(element)));
+    return readDeclaredValue(element, script, index, depth, below);
 }
 
 Result<void> XmtReader::readFieldValues(xml_node element, const NodePtr& instance, int depth,
@@ -82,48 +71,20 @@ Result<void> XmtReader::readFieldValues(xml_node element, const NodePtr& instanc
 }
 
 Result<void> XmtReader::readLinks(xml_node element, const NodePtr& node) {
-    if (proto_ == nullptr)
-        return failAt(where(element), ErrorCode::invalidInput, "<IS> stands outside of a PROTO");
-    if (bufferDepth_ > 0)
-        return failAt(where(element), ErrorCode::unsupported,
-                      "<IS> is in a buffer of commands, which has no such links in BIFS; give "
-                      "the field a value");
     for (const xml_node child : elements(element)) {
         if (localName(child) != "connect") return unexpectedElement(child, "connect in IS");
         const std::string_view own = child.attribute("nodeField").value();
-        const std::string_view linked = child.attribute("protoField").value();
         const int field = node->info->findIgnoringCase(own);
-        const int index = proto_->type.findIgnoringCase(linked);
-        if (field < 0 || index < 0)
+        if (field < 0)
             return failAt(where(child), ErrorCode::invalidInput, "{} has no field '{}'",
-                          field < 0 ? node->info->name : proto_->name,
-                          excerpt(field < 0 ? own : linked));
-        const FieldType ownType = node->info->fields[static_cast<std::size_t>(field)].type;
-        const FieldType other = proto_->type.fields[static_cast<std::size_t>(index)].type;
-        if (ownType != other)
-            return failAt(where(child), ErrorCode::invalidInput,
-                          "{}.{} is {} and IS {}, which is {}", node->info->name, own,
-                          name(ownType), linked, name(other));
-        STX_CHECK(names_.countNode());
-        if (node->isSet(field) || !linked_.emplace(node.get(), field).second)
-            return failAt(where(child), ErrorCode::invalidInput, "{}.{} has a value already",
-                          node->info->name, own);
-        proto_->links.push_back({node, field, index});
+                          node->info->name, excerpt(own));
+        STX_CHECK(addLink(node, field, child.attribute("protoField").value(), where(child)));
     }
     return {};
 }
 
 Result<void> XmtReader::readProto(xml_node element, int depth) {
-    if (depth > job_.limits.maxNesting || ++protoCount_ > kMaxProtos)
-        return failAt(where(element), ErrorCode::invalidInput,
-                      "there are more than {} PROTOs, or they nest deeper than {}", kMaxProtos,
-                      job_.limits.maxNesting);
-    const auto proto = std::make_shared<Proto>();
-    proto->name = element.attribute("name").value();
-    if (!isScriptName(proto->name) || findNode(proto->name))
-        return failAt(where(element), ErrorCode::invalidInput,
-                      "'{}' is no name for a PROTO: letters, digits and _, and no node's name",
-                      excerpt(proto->name));
+    STX_TRY(const auto proto, makeProto(element.attribute("name").value(), depth, where(element)));
     const auto locations = element.attribute("locations");
     proto->isExtern = !locations.empty();
     if (proto->isExtern) {
@@ -131,51 +92,21 @@ Result<void> XmtReader::readProto(xml_node element, int depth) {
                 attributeValue(element, "locations", locations.value(), FieldType::MFURL));
         proto->urls = std::get<std::vector<Url>>(std::move(urls));
     }
-    NodeNames outer = std::exchange(names_, names_.ofBody());
-    Proto* const outerProto = std::exchange(proto_, proto.get());
-    const bool outerInCommand = std::exchange(inCommand_, false);
-    auto outerPassed = std::exchange(passed_, {});
-    protoScopes_.emplace_back();
-    STX_CHECK(names_.countNode());
-    STX_CHECK(readProtoContent(element, *proto, depth));
-    proto->protos = std::move(protoScopes_.back());
-    protoScopes_.pop_back();
-    inCommand_ = outerInCommand;
-    passed_ = std::move(outerPassed);
-    proto_ = outerProto;
-    outer.countOn(names_);
-    names_ = std::move(outer);
-    protoScopes_.back().push_back(proto);
-    return {};
+    return readInside(proto, [&] { return readProtoContent(element, *proto, depth); });
 }
 
 Result<void> XmtReader::readProtoContent(xml_node element, Proto& proto, int depth) {
-    std::vector<FieldInfo> fields;
-    auto defaults = std::make_shared<FieldDefaults>();
+    Interface interface;
     for (const xml_node child : elements(element)) {
         if (localName(child) != "field") continue;
         STX_TRY(const FieldInfo field, readDeclaration(child));
-        STX_CHECK(names_.countNode());
-        for (const FieldInfo& other : fields)
-            if (other.name == field.name)
-                return failAt(where(child), ErrorCode::invalidInput, "PROTO {} has two fields '{}'",
-                              proto.name, excerpt(field.name));
-        if (static_cast<int>(fields.size()) >= kMaxOwnFields)
-            return failAt(where(child), ErrorCode::invalidInput, "PROTO {} has more than {} fields",
-                          proto.name, kMaxOwnFields);
-        FieldValue value = emptyValue(field.type);
-        if (field.kind == FieldKind::field || field.kind == FieldKind::exposedField) {
-            const NodePtr holder = holderOf(field);
+        const auto readValue = [&](const NodePtr& holder) {
             int below = 0;
-            STX_CHECK(readDeclaredValue(child, holder, 0, depth, below));
-            value = holder->value(0);
-        }
-        defaults->values.push_back(std::move(value));
-        fields.push_back(field);
+            return readDeclaredValue(child, holder, 0, depth, below);
+        };
+        STX_CHECK(addField(interface, proto, field, where(child), readValue));
     }
-    proto.type = makeNodeInfo(proto.name, {}, fields);
-    proto.type.isProto = true;
-    proto.type.defaults = std::move(defaults);
+    setInterface(proto, std::move(interface));
     if (proto.isExtern) return {};
     for (const xml_node child : elements(element)) {
         const std::string_view type = localName(child);
@@ -191,40 +122,13 @@ Result<void> XmtReader::readProtoContent(xml_node element, Proto& proto, int dep
             if (node) proto.body.push_back(std::move(node));
         }
     }
-    STX_CHECK(readBuffers());
-    return names_.resolve();
+    return {};
 }
 
 Result<void> XmtReader::passBuffer(xml_node element, std::size_t number) {
     if (localName(element) != "buffer") return unexpectedElement(element, "buffer");
-    if (bufferDepth_ >= kMaxBufferNesting)
-        return failAt(where(element), ErrorCode::unsupported,
-                      "buffers of commands are nested more than {} deep", kMaxBufferNesting);
-    STX_CHECK(names_.countNode());
-    passed_.push_back({element, number});
-    return {};
-}
-
-Result<void> XmtReader::readBuffers() {
-    for (const PassedBuffer& buffer : std::exchange(passed_, {})) {
-        NodeNames outerNames = std::move(names_);
-        names_ = NodeNames::inside(outerNames);
-        auto outerFrames = std::exchange(document_.frames, {});
-        const bool outerInCommand = inCommand_;
-        ++bufferDepth_;
-        STX_CHECK(readCommands(buffer.element, 0.0, 1));
-        STX_CHECK(readBuffers());
-        STX_CHECK(names_.resolve());
-        --bufferDepth_;
-        inCommand_ = outerInCommand;
-        std::vector<Command> commands;
-        for (CommandFrame& frame : document_.frames) commands = std::move(frame.commands);
-        buffers_.put(buffer.number, std::move(commands), names_);
-        document_.frames = std::move(outerFrames);
-        outerNames.goOn(names_);
-        names_ = std::move(outerNames);
-    }
-    return {};
+    return addBuffer(number, where(element),
+                     [this, element] { return readCommands(element, 0.0, 1); });
 }
 
 }  // namespace stx::mpeg4

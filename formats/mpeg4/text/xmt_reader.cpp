@@ -33,9 +33,9 @@ Result<FieldValue> XmtReader::commandValue(xml_node node, const Node& target, in
     }
     const auto inner = elements(node);
     if (type == FieldType::SFCommandBuffer && !inner.empty()) {
-        FieldValue stands = buffers_.addValue(proto_);
+        FieldValue placeholder = buffers_.addValue(proto_);
         STX_CHECK(passBuffer(inner[0], buffers_.last()));
-        return stands;
+        return placeholder;
     }
     return attributeValue(node, "value", node.attribute("value").value(), type);
 }

@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
-#include "formats/mpeg4/text/scene_text.hpp"
-#include "formats/mpeg4/text/text_buffers.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
+#include "formats/mpeg4/text/text_reader.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
 #include "formats/mpeg4/text/xmt_lines.hpp"
@@ -19,14 +17,10 @@ using pugi::xml_node;
 
 /// Reads an XMT-A document from its XML tree. PROTOs and the fields of Scripts are in
 /// xmt_protos.cpp.
-class XmtReader {
+class XmtReader : private TextReader {
   public:
     XmtReader(std::string_view text, std::string fileName, Job& job)
-        : text_(text),
-          fileName_(std::move(fileName)),
-          lines_(text),
-          job_(job),
-          names_(job.limits) {}
+        : TextReader(job), text_(text), fileName_(std::move(fileName)), lines_(text) {}
 
     Result<Document> read() {
         // The tree takes at most so many bytes for each '<' and '=' of the text.
@@ -504,7 +498,7 @@ class XmtReader {
         const FieldInfo& field = node->info->fields[index];
         if (field.type == FieldType::SFCommandBuffer)
             return passBuffer(wrapper, buffers_.add(node, index, proto_));
-        if (itemType(field.type) != FieldType::SFNode || linked_.contains({node.get(), index}))
+        if (itemType(field.type) != FieldType::SFNode || isLinked(node, index))
             return failAt(where(wrapper), ErrorCode::invalidInput,
                           "{}.{} holds no nodes: write it as an attribute of <{}>",
                           node->info->name, field.name, node->info->name);
@@ -540,12 +534,8 @@ class XmtReader {
     // ---- Buffers of commands (xmt_protos.cpp)
     /// <buffer>, to be read when the nodes that its commands may name are known.
     Result<void> passBuffer(xml_node element, std::size_t number);
-    /// Reads the commands of the buffers passed over so far.
-    Result<void> readBuffers();
 
     // ---- PROTOs, and the fields of Scripts that are declared like theirs (xmt_protos.cpp)
-    /// Null: there is no such PROTO.
-    [[nodiscard]] NodePtr makeNamedInstance(std::string_view type) const;
     Result<FieldInfo> readDeclaration(xml_node element) const;
     /// The value of a declared field: an attribute, or elements.
     Result<void> readDeclaredValue(xml_node element, const NodePtr& node, int index, int depth,
@@ -561,23 +551,8 @@ class XmtReader {
     std::string_view text_;
     std::string fileName_;
     Lines lines_;
-    Job& job_;
-    NodeNames names_;
     pugi::xml_document xml_;
-    Document document_;
     TextIds odIds_, esIds_;
-    std::vector<std::vector<ProtoPtr>> protoScopes_ = std::vector<std::vector<ProtoPtr>>(1);
-    Proto* proto_ = nullptr;                        ///< whose body is read
-    std::set<std::pair<const Node*, int>> linked_;  ///< fields with an IS
-    std::size_t protoCount_ = 0;
-    struct PassedBuffer {
-        xml_node element;
-        std::size_t number;
-    };
-    std::vector<PassedBuffer> passed_;
-    TextBuffers buffers_;
-    int bufferDepth_ = 0;  ///< in how many buffers the commands that are read are
-    bool inCommand_ = false;
 };
 
 }  // namespace stx::mpeg4

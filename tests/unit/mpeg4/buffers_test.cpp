@@ -201,7 +201,7 @@ TEST(Buffers, RefuseWhatTheyCannotHold) {
     std::string deep = "DELETE N0";
     for (int i = 0; i < 5; ++i)
         deep = "APPEND TO N0.children Conditional { buffer { " + deep + " } }";
-    EXPECT_NE(errorOf(deep).find("hold each other more than 4 deep"), std::string::npos);
+    EXPECT_NE(errorOf(deep).find("are nested more than 4 deep"), std::string::npos);
     EXPECT_NE(btErrorOf("PROTO P [ field SFBool b TRUE ] { DEF A Group { } Conditional { buffer { "
                         "APPEND TO A.children PointLight { on IS b } } } } Group { }")
                   .find("has no such links in BIFS"),

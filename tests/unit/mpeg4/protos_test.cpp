@@ -274,7 +274,7 @@ TEST(Proto, ErrorsNameWhatIsWrong) {
         btErrorOf("PROTO A [ field SFInt32 a 1 ] { Transform { translation IS a } } Group { }")
             .find("SFVec3f and IS a, which is SFInt32"),
         std::string::npos);
-    EXPECT_NE(btErrorOf("PROTO Group [ ] { } Group { }").find("no name for a PROTO"),
+    EXPECT_NE(btErrorOf("PROTO Group [ ] { } Group { }").find("not a name for a PROTO"),
               std::string::npos);
     EXPECT_NE(btErrorOf("PROTO A [ ] { A { } } Group { }").find("found 'A', expected a node"),
               std::string::npos);
