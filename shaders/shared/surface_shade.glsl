@@ -48,7 +48,7 @@ SourceView viewOf(int s, Piece piece) {
     float series = t * (t * (t / 6.0f + 0.5f) + 1.0f) + 1.0f;
     ivec2 pixel = ivec2(min(int(u), size.x - 1), min(int(v), size.y - 1));
     float edge = edgeDistanceOf(s, placeOf(s, pixel), 0, 0);
-    view.weight = min(1.0f, sqrt(max(det, 0.0f))) / series *
+    view.weight = min(1.0f, sqrt(max(det, kLeastArea))) / series *
                   (kEdgeWeight + (1.0f - kEdgeWeight) * min(edge / kEdgeFade, 1.0f));
     view.plain = edge >= kEdgeFade;
     return view;

@@ -85,7 +85,7 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
                     hn::Sqrt(hn::Max(hn::NegMulAdd(c(2.0f), cosine, c(2.0f)), hn::Zero(d))));
         const V series =
             hn::MulAdd(t, hn::MulAdd(t, hn::MulAdd(t, c(1.0f / 6), c(0.5f)), one), one);
-        V weight = hn::Div(hn::Min(one, hn::Sqrt(hn::Max(det, hn::Zero(d)))), series);
+        V weight = hn::Div(hn::Min(one, hn::Sqrt(hn::Max(det, c(kLeastArea)))), series);
         const auto inFrame = hn::And(
             hn::And(hn::Ge(u, hn::Zero(d)), hn::Lt(u, c(static_cast<float>(s.source->width)))),
             hn::And(hn::Ge(v, hn::Zero(d)), hn::Lt(v, c(static_cast<float>(s.source->height)))));
