@@ -148,7 +148,7 @@ void addPack(CommandLine& line, Program& program) {
     c.option(
          "--min-psnr", o->minPsnr,
          "Prune only as far as pictures of what is kept reach this against pictures of all: RGB, "
-         "the worst of up to 8, rendered from poses of the views and half way between them")
+         "the worst of up to 12, rendered from poses of the views and half way between them")
         .takes("DB")
         .range(0.0, 200.0)
         .group(pruning);

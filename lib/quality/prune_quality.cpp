@@ -10,7 +10,7 @@
 namespace stx {
 namespace {
 
-constexpr int kPoses = 4;
+constexpr int kPoses = 6;
 constexpr int kMostSide = 1024;
 /// Estimates between which the search goes on, dB. The first gives nothing back.
 constexpr double kLeast = 1, kMost = 72, kNear = 1.5;

@@ -6,7 +6,7 @@ namespace stx {
 
 /// Prunes as far as rendered pictures still reach `wantedPsnr` (RGB, dB, over 0): the blocks that
 /// replacements show worst come back until they do. Pictures are of surface mode at normal quality,
-/// before and after, from up to four of the views' own poses and from half way between each of
+/// before and after, from up to six of the views' own poses and from half way between each of
 /// these and the view nearest to it, at most 1024 pixels to a side; the worst counts, and
 /// PruneReport::psnr is its PSNR. When nothing less than all pixels reaches it, all stay.
 /// `settings.minPsnr` is not looked at. Notes of attempts that were given up are not passed on.

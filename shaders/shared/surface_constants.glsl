@@ -65,7 +65,7 @@ CONSTANT float kAngleFalloff = 3.0f;
 CONSTANT float kLeastKeptWeight = 0.02f;
 // Views weigh by the root of the area that they show of a piece's plane, and never less than that
 // of this area: the plane of a few samples on an edge may be turned away from every view that shows them.
-CONSTANT float kLeastArea = 1e-8f;
+CONSTANT float kLeastArea = 1e-16f;
 // Pixels this far from an edge count in full, those on it kEdgeWeight.
 CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.01f;
 // A sample covers its own pixel, so a coarse source spreads by this share of its Jacobian.

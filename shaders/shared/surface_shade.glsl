@@ -35,10 +35,12 @@ SourceView viewOf(int s, Piece piece) {
     float vy = (my.y + my.z * piece.qy - v * wy) * inverse;
     float det = ux * vy - uy * vx;
     float inverseDet = 1.0f / max(det, 1e-4f);
-    view.xu = vy * inverseDet;
-    view.xv = -uy * inverseDet;
-    view.yu = -vx * inverseDet;
-    view.yv = ux * inverseDet;
+    // A plane that is turned away says nothing of how pixels lie to each other.
+    bool turned = !(det > 0.0f);
+    view.xu = turned ? 1.0f : vy * inverseDet;
+    view.xv = turned ? 0.0f : -uy * inverseDet;
+    view.yu = turned ? 0.0f : -vx * inverseDet;
+    view.yv = turned ? 1.0f : ux * inverseDet;
     vec3 a = vec3(rowAt(frame.eyeX, x, y, q), rowAt(frame.eyeY, x, y, q), rowAt(frame.eyeZ, x, y, q));
     vec3 b = vec3(rowAt(sources[s].rayX, x, y, q), rowAt(sources[s].rayY, x, y, q),
                   rowAt(sources[s].rayZ, x, y, q));

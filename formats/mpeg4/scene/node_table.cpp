@@ -226,40 +226,6 @@ FieldType itemType(FieldType type) {
     }
 }
 
-FieldType listType(FieldType type) {
-    using enum FieldType;
-    switch (type) {
-        case SFInt32:
-            return MFInt32;
-        case SFFloat:
-            return MFFloat;
-        case SFTime:
-            return MFTime;
-        case SFString:
-            return MFString;
-        case SFURL:
-            return MFURL;
-        case SFVec2f:
-            return MFVec2f;
-        case SFVec3f:
-            return MFVec3f;
-        case SFColor:
-            return MFColor;
-        case SFRotation:
-            return MFRotation;
-        case SFNode:
-            return MFNode;
-        case SFVec4f:
-            return MFVec4f;
-        case SFScript:
-            return MFScript;
-        case SFAttrRef:
-            return MFAttrRef;
-        default:
-            return type;
-    }
-}
-
 std::optional<int> codeBits(Ndt type, int version) {
     const auto row = static_cast<std::size_t>(type);
     if (row == 0 || row >= std::size(kNdtRows) || version < 1 || version > kNdtVersions) return {};

@@ -53,7 +53,6 @@ enum class FieldType : std::uint8_t {
 [[nodiscard]] std::optional<FieldType> fieldTypeOfName(std::string_view name);
 [[nodiscard]] bool isMultiple(FieldType type);     ///< MFxxx
 [[nodiscard]] FieldType itemType(FieldType type);  ///< SFxxx of MFxxx; SFxxx is its own
-[[nodiscard]] FieldType listType(FieldType type);  ///< MFxxx of SFxxx that have one
 
 enum class FieldKind : std::uint8_t { field, exposedField, eventIn, eventOut };
 

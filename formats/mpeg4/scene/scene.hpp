@@ -335,9 +335,6 @@ struct SameOptions {
 /// contains itself.
 [[nodiscard]] Result<int> nestingDepth(const NodePtr& root);
 
-/// A deep copy that shares where the original shares.
-[[nodiscard]] NodePtr cloneNode(const NodePtr& node);
-
 /// What an instance of a PROTO shows: a copy of the first node of the body, with the values of the
 /// instance where the body has a link. Null for an EXTERNPROTO. `copied`: how many nodes were.
 [[nodiscard]] NodePtr bodyOf(const Node& instance, std::size_t& copied);

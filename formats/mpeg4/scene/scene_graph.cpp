@@ -338,10 +338,6 @@ std::unordered_map<const Node*, NodePtr> copiesOf(const NodePtr& root) {
 
 }  // namespace
 
-NodePtr cloneNode(const NodePtr& node) {
-    return node ? copiesOf(node).at(node.get()) : nullptr;
-}
-
 NodePtr bodyOf(const Node& instance, std::size_t& copied) {
     copied = 0;
     if (!instance.proto || instance.proto->body.empty()) return nullptr;

@@ -96,10 +96,12 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         hn::StoreU(hn::IfThenElseZero(active, weight), d, &out.weight[l]);
         hn::StoreU(hn::IfThenElse(active, u, one), d, &out.u[l]);
         hn::StoreU(hn::IfThenElse(active, v, one), d, &out.v[l]);
-        hn::StoreU(hn::IfThenElse(active, hn::Mul(vy, inverseDet), one), d, &out.xu[l]);
-        hn::StoreU(hn::IfThenElseZero(active, hn::Neg(hn::Mul(uy, inverseDet))), d, &out.xv[l]);
-        hn::StoreU(hn::IfThenElseZero(active, hn::Neg(hn::Mul(vx, inverseDet))), d, &out.yu[l]);
-        hn::StoreU(hn::IfThenElse(active, hn::Mul(ux, inverseDet), one), d, &out.yv[l]);
+        // A plane that is turned away says nothing of how pixels lie to each other.
+        const auto facing = hn::And(active, hn::Gt(det, hn::Zero(d)));
+        hn::StoreU(hn::IfThenElse(facing, hn::Mul(vy, inverseDet), one), d, &out.xu[l]);
+        hn::StoreU(hn::IfThenElseZero(facing, hn::Neg(hn::Mul(uy, inverseDet))), d, &out.xv[l]);
+        hn::StoreU(hn::IfThenElseZero(facing, hn::Neg(hn::Mul(vx, inverseDet))), d, &out.yu[l]);
+        hn::StoreU(hn::IfThenElse(facing, hn::Mul(ux, inverseDet), one), d, &out.yv[l]);
     }
     alignas(64) std::int32_t edge[kGroup];
     findEdges(*s.source, out, edge);
