@@ -85,6 +85,8 @@ Result<FileKind> recognise(const fs::path& path) {
         const auto reader = ExrReader::open(path, Limits());
         return reader && isExrAtlas(*reader) ? FileKind::atlas : FileKind::exr;
     }
+    // Matroska: Azure Kinect records in it.
+    if (startsWith(head, "\x1a\x45\xdf\xa3")) return FileKind::imageSet;
     if (mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path)) return FileKind::mpeg4;
     if (startsWith(head, "\x89PNG") || startsWith(head, "\xff\xd8\xff")) return FileKind::image;
     if (isMesh(path, head)) return FileKind::mesh;

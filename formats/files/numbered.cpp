@@ -40,9 +40,8 @@ Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
     const auto place = placeholderOf(name);
     std::vector<NumberedFile> files;
     std::error_code error;
-    for (std::filesystem::directory_iterator it(folderOf(path), error), end; place && it != end;
-         it.increment(error)) {
-        if (error) break;
+    for (std::filesystem::directory_iterator it(folderOf(path), error), end;
+         place && !error && it != end; it.increment(error)) {
         const std::string found = it->path().filename().string();
         const std::string_view before = std::string_view(name).substr(0, place->begin);
         const std::string_view after = std::string_view(name).substr(place->end);
@@ -51,18 +50,23 @@ Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
             continue;
         const std::string_view digits = std::string_view(found).substr(
             before.size(), found.size() - before.size() - after.size());
-        NumberedFile file{0, it->path()};
+        NumberedFile file;
         const auto [last, wrong] =
             std::from_chars(digits.data(), digits.data() + digits.size(), file.number);
         // As the pattern writes it: `%04d` does not name a_5.exr.
-        if (wrong != std::errc() || last != digits.data() + digits.size() ||
+        if (wrong != std::errc() || last != digits.data() + digits.size() || file.number < 0 ||
             fmt::format("{:0{}}", file.number, place->width) != digits)
             continue;
+        // Names are those of the pattern, without "./" in front.
+        file.path = path.parent_path() / found;
         files.push_back(std::move(file));
     }
+    if (error)
+        return fail(ErrorCode::io, "cannot read the folder '{}': {}", folderOf(path).string(),
+                    error.message());
     if (files.empty())
-        return fail(ErrorCode::io,
-                    "cannot read '{}': no file has that name with a number in its place", pattern);
+        return fail(ErrorCode::io, "cannot read '{}': no file is named so, whatever the number",
+                    pattern);
     std::ranges::sort(files, {}, &NumberedFile::number);
     return files;
 }

@@ -17,8 +17,8 @@ struct NumberedFile {
     std::int64_t number = 0;
     std::filesystem::path path;
 };
-/// The files there are of a pattern, by number. The number is in the file's name, not in a
-/// folder's. Errors (io): none is there.
+/// The files there are of a pattern, by number, each once. The number, from 0, is in the file's
+/// name as printf would write it, and not in a folder's. Errors (io): none is there.
 [[nodiscard]] Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern);
 
 }  // namespace stx

@@ -33,24 +33,10 @@ fs::path ownFolder() {
     return fs::canonical(isLibrary ? object->l_name : "/proc/self/exe", ec).parent_path();
 }
 
-std::vector<std::string> placesOfModule() {
-    // Somebody who names a module wants that one and no other.
-    if (const char* named = std::getenv("STX_CODECS"); named && *named) return {named};
-    constexpr const char* kModule = "stx/stx_codecs.so";
-    const fs::path folder = ownFolder();
-    std::vector<std::string> places;
-    if (!folder.empty()) {
-        places.push_back(folder / kModule);  // of lib/libstx.so
-        // Of bin/stx, installed or in the build tree.
-        places.push_back((folder / STX_LIB_FROM_BIN / kModule).lexically_normal());
-    }
-    return places;
-}
-
 Result<const codecs::Table*> load() {
     std::string tried;
     std::error_code ec;
-    for (const auto& place : placesOfModule()) {
+    for (const auto& place : placesOfModule("STX_CODECS", "stx_codecs.so")) {
         tried += tried.empty() ? "" : "; ";
         if (!fs::exists(place, ec)) {
             tried += fmt::format("'{}' does not exist", place);
@@ -111,6 +97,20 @@ bool holdsImageThatNeedsCodecs(const fs::path& folder) {
 }
 
 }  // namespace
+
+std::vector<std::string> placesOfModule(const char* variable, const char* module) {
+    // Somebody who names a module wants that one and no other.
+    if (const char* named = std::getenv(variable); named && *named) return {named};
+    const fs::path file = fs::path("stx") / module;
+    const fs::path folder = ownFolder();
+    std::vector<std::string> places;
+    if (!folder.empty()) {
+        places.push_back(folder / file);  // of lib/libstx.so
+        // Of bin/stx, installed or in the build tree.
+        places.push_back((folder / STX_LIB_FROM_BIN / file).lexically_normal());
+    }
+    return places;
+}
 
 Result<const codecs::Table*> loadCodecs() {
     static const Result<const codecs::Table*> loaded = load();

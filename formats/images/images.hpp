@@ -32,6 +32,9 @@ struct ImageInfo {
 struct DecodedImage {
     int width = 0, height = 0, channels = 0;
     std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> values;
+    /// Of integers that do not reach to their largest value (video of 10 bits): the bits that they
+    /// have; else 0.
+    int usedBits = 0;
     std::vector<std::string> channelNames;  ///< "R", "G", "B", "A", "Y", "Z", …
     bool linear = false;                    ///< float formats (EXR, HDR): linear light
     bool premultiplied = false;             ///< there is alpha, and colours hold it (EXR, TIFF)

@@ -1,6 +1,7 @@
 #include "formats/imagesets/image_sets.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "formats/imagesets/kinds.hpp"
@@ -16,12 +17,13 @@ namespace stx {
 Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
                                                          const ImageSetOptions& options, Job& job) {
     std::string kind = options.from;
-    if (kind.empty()) {
+    if (kind.empty() && !namesFilms(options)) {
         STX_TRY(kind, recogniseImageSet(path));
     }
     std::error_code ec;
     if (!std::filesystem::exists(path, ec))
         return failAt(inQuotes(path.string()), ErrorCode::io, "there is no such file or folder");
+    if (namesFilms(options)) return describeFilms(path, options, job);
     const KindEntry* entry = kindNamed(kind);
     if (!entry) {
         std::string known;
@@ -40,6 +42,8 @@ Result<void> checkOptions(const ImageSetOptions& o) {
     if (o.depthBits != 8 && o.depthBits != 16 && o.depthBits != 32)
         return fail(ErrorCode::usage, "depth in {} bits; 8, 16 and 32 are possible", o.depthBits);
     if (o.frame < 0) return fail(ErrorCode::usage, "frame {}; frames count from 0", o.frame);
+    if (!(o.depthUnit >= 0) || std::isinf(o.depthUnit))
+        return fail(ErrorCode::usage, "the depth's unit is {:g}; it must be above 0", o.depthUnit);
     if (o.every < 1) return fail(ErrorCode::usage, "each {}-th view; 1 is the least", o.every);
     if ((o.depthMin != 0 || o.depthMax != 0) && !(o.depthMin > 0 && o.depthMin < o.depthMax))
         return fail(ErrorCode::usage,
@@ -258,6 +262,22 @@ class SetSequence : public Sequence {
     Motion motion_;
 };
 
+/// A set of one moment: opening it reads no pixel.
+class StillSet : public Sequence {
+  public:
+    StillSet(std::string where, ImageSetOptions options, SetDescription set)
+        : where_(std::move(where)), options_(std::move(options)), set_(std::move(set)) {}
+
+    Result<Bundle> frame(std::size_t, Job& job) override {
+        return readViews(set_, where_, options_, job);
+    }
+
+  private:
+    std::string where_;
+    ImageSetOptions options_;
+    SetDescription set_;
+};
+
 }  // namespace
 
 Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
@@ -298,10 +318,8 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
     takeEvery(set, motion, options.every);
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "it has no view; at least one is expected");
-    if (set.frames == 1 && !motion.moves()) {
-        STX_TRY(auto still, readViews(std::move(set), where, options, job));
-        return sequenceOf(std::move(still));
-    }
+    if (set.frames == 1 && !motion.moves())
+        return std::make_unique<StillSet>(where, options, std::move(set));
     return std::make_unique<SetSequence>(path, options, std::move(set), std::move(motion));
 }
 

@@ -50,10 +50,13 @@ struct ImageSetOptions {
     int every = 1;  ///< takes each N-th view, for recordings of thousands
     /// A view whose files are missing is an error, not a note (transforms, TUM, 7-Scenes).
     bool strict = false;
-    /// Depth range that the set itself does not have (MSR), scene units; 0, 0 = not given.
+    /// Depth range that the set itself does not have (MSR, films), scene units; 0, 0 = not given.
     double depthMin = 0, depthMax = 0;
+    /// Scene units of one step of a film's depth; 0: as the file of cameras says.
+    double depthUnit = 0;
     /// Names of the images relative to the set's folder with {name} {w} {h} {format} {frame}
-    /// {frame:04} in them (MIV); empty = the usual names.
+    /// {frame:04} in them (MIV); empty = the usual names. Names of films (.mp4, .mov, .mkv, .webm,
+    /// .avi): their frames are those of the cameras in `path`, a JSON file.
     std::string texturePattern, depthPattern;
     /// Pictures of what belongs to the object, white on black, as large as the colour pictures:
     /// file names with {stem} (of the colour picture's file) and {name} in them; empty: none.
@@ -100,7 +103,8 @@ struct ImageSetKind {
 
 /// All frames of a set, one of a set without time. Which pictures belong to one camera the set says
 /// (`camera` of transforms.json); else those of one pose do, and where no pose comes twice, one
-/// camera moves. Errors as readImageSet(); (usage) refinePoses, which is of one moment.
+/// camera moves. Reads no pixel before a frame is asked for. Errors as readImageSet(); (usage)
+/// refinePoses, which is of one moment.
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,
                                                              const ImageSetOptions& options,
                                                              Job& job);

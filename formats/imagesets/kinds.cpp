@@ -91,7 +91,9 @@ std::string firstThere(const path& folder, const std::vector<std::string>& names
 }
 
 std::string withImageEnding(const path& folder, const std::string& name) {
-    std::vector<std::string> names{name};
+    std::error_code ec;
+    if (!name.empty() && std::filesystem::is_regular_file(folder / name, ec)) return name;
+    std::vector<std::string> names;
     for (const char* ending : {".png", ".jpg", ".jpeg", ".exr", ".webp", ".tif", ".tiff", ".PNG",
                                ".JPG", ".bmp", ".ppm"})
         names.push_back(name + ending);

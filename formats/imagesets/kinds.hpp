@@ -23,11 +23,25 @@ using std::filesystem::path;
 [[nodiscard]] Result<SetDescription> describeSevenScenes(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeExr(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeCamerasJson(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeAzureKinect(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describePanorama(const path&, const ImageSetOptions&, Job&);
 
 /// By options.from, or whatever kind the path is recognised as. Files that the set names and that
 /// are not there are no errors yet: PictureSource::missing.
 [[nodiscard]] Result<SetDescription> describeSet(const path&, const ImageSetOptions&, Job&);
+
+/// Whether the names of the pictures in the options are those of films.
+[[nodiscard]] bool namesFilms(const ImageSetOptions& options);
+/// Frames of films, a colour and a depth one for each camera of a JSON file; several poses for one
+/// film are those of a camera that moves.
+[[nodiscard]] Result<SetDescription> describeFilms(const path&, const ImageSetOptions&, Job&);
+
+/// Of transforms.json: what its integers of depth are, by integer_depth_scale or depth_coding;
+/// nothing where it does not say.
+[[nodiscard]] Result<std::optional<Distances>> transformsDistances(const Json& file,
+                                                                   const std::string& where);
+/// Of a camera of MIV's list.
+[[nodiscard]] Result<Distances> mivDistances(const Json& camera, const std::string& where);
 
 /// What a JSON file with cameras is.
 enum class JsonKind { transforms, miv, cameras, cameraPath, none };

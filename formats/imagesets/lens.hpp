@@ -10,6 +10,8 @@ namespace stx::imagesets {
 /// right, y down, of the plane at distance 1:
 /// x' = x (1 + k1 r2 + k2 r4 + k3 r6) + 2 p1 x y + p2 (r2 + 2 x x), y' alike; then the image point
 /// is (fx x' + skew y' + cx, fy y' + cy). SIMPLE_RADIAL: k1; RADIAL: k1 k2; OPENCV: k1 k2 p1 p2.
+/// With `rational` (FULL_OPENCV, Azure Kinect) the radial factor is divided by 1 + k4 r2 + k5 r4 +
+/// k6 r6.
 struct Lens {
     double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0;
     double skew = 0;  ///< pixels
@@ -17,10 +19,12 @@ struct Lens {
     /// p1 and p2 are not used.
     bool fisheye = false;
     double k4 = 0;
+    bool rational = false;
+    double k5 = 0, k6 = 0;
 
     [[nodiscard]] bool ideal() const { return !distorts() && skew == 0; }
     [[nodiscard]] bool distorts() const {
-        return fisheye || k1 != 0 || k2 != 0 || k3 != 0 || p1 != 0 || p2 != 0;
+        return fisheye || rational || k1 != 0 || k2 != 0 || k3 != 0 || p1 != 0 || p2 != 0;
     }
     /// Where the pixel position of the ideal pinhole is in the real picture.
     [[nodiscard]] glm::dvec2 realFromIdeal(const Camera& camera, glm::dvec2 pixel) const;

@@ -41,6 +41,11 @@ Result<MivDepth> depthOf(const Json& camera, const std::string& where) {
     return d;
 }
 
+Distances distancesOf(const MivDepth& range) {
+    return normalisedDisparity(
+        range.nearest, range.farthest >= kInfinity ? kEndless : range.farthest, range.invalidZero);
+}
+
 Result<void> setProjection(const Json& c, const std::string& where, SetView& view) {
     STX_TRY(const auto resolution, needNumbers(c, "Resolution", 2, where));
     Camera& camera = view.camera;
@@ -229,6 +234,11 @@ Result<PictureSource> sourceOf(const std::string& name, const Search& search, bo
 
 }  // namespace
 
+Result<Distances> mivDistances(const Json& camera, const std::string& where) {
+    STX_TRY(const MivDepth range, depthOf(camera, where));
+    return distancesOf(range);
+}
+
 Result<std::vector<SetView>> mivViews(const Json& file, Job& job) {
     const Json& cameras = file["cameras"];
     STX_CHECK(checkViewCount(cameras.size(), job.limits, "'cameras'"));
@@ -334,9 +344,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         STX_TRY(view.depth,
                 within(place, sourceOf(depth, forDepth, isNumbered(options.depthPattern), frames,
                                        job.limits)));
-        view.distances = normalisedDisparity(
-            range.nearest, range.farthest >= kInfinity ? kEndless : range.farthest,
-            range.invalidZero);
+        view.distances = distancesOf(range);
         if (set.views.empty() &&
             (isNumbered(options.texturePattern) || isNumbered(options.depthPattern))) {
             Search nextTexture = forTexture, nextDepth = forDepth;

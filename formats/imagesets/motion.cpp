@@ -84,7 +84,7 @@ Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& option
         return motion;
     }
     // A recording from a moving camera: its pictures are views of a scene that stands still.
-    const bool recording = std::ranges::any_of(set.views, &SetView::sensor);
+    const bool recording = !set.film && std::ranges::any_of(set.views, &SetView::sensor);
     if (!options.moving.value_or(!recording)) return motion;
     if (timed < set.views.size())
         return fail(ErrorCode::invalidInput,

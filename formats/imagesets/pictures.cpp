@@ -8,6 +8,7 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/text_lines.hpp"
+#include "formats/video/film.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -120,6 +121,14 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         out.texture = std::move(image);
         return out;
     }
+    if (source.film) {
+        STX_TRY(const auto picture, source.film->picture(source.frame));
+        if (picture.bits() > 8)
+            job.note(fmt::format("colour of {} bits is rounded to 8", picture.bits()));
+        STX_TRY(auto image, within(inQuotes(source.name), picture.colour(job.limits)));
+        out.texture = std::move(image);
+        return out;
+    }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
     if (const auto info = probeImage(bytes); info && info->bits == 8) {
         // What two components of a JPEG are, it does not say.
@@ -186,6 +195,21 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
         STX_TRY(out.values, readYuvLuma(source.path, *source.yuv, source.frame, job.limits));
         return out;
     }
+    if (source.film) {
+        STX_TRY(const auto picture, source.film->picture(source.frame));
+        if (!picture.hasLuma())
+            return failAt(inQuotes(source.name), ErrorCode::invalidInput,
+                          "its pixels are colours; depth is grey, or luma, of 8 to 16 bits: "
+                          "ffmpeg -i IN -c:v ffv1 -pix_fmt gray16le OUT.mkv");
+        if (picture.saysLimited())
+            job.note(
+                fmt::format("'{}' says that its range is limited (16 to 235); its depth is "
+                            "taken as it is coded",
+                            source.name));
+        out.bits = picture.bits();
+        out.values = picture.luma();
+        return out;
+    }
     if (source.colmap || source.path.extension() == ".pfm") {
         STX_TRY(const auto bytes, readFile(source.path, job.limits));
         const auto parse = source.colmap ? parseColmapDepth : parsePfm;
@@ -209,6 +233,10 @@ Result<StoredDepth> readDepth(const PictureSource& source, Job& job) {
 }
 
 Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job) {
+    if (source.film) {
+        STX_TRY(const auto picture, source.film->picture(source.frame));
+        return glm::ivec2(picture.width(), picture.height());
+    }
     STX_TRY(const auto bytes, readFile(source.path, job.limits));
     if (const auto info = probeImage(bytes)) return glm::ivec2(info->width, info->height);
     STX_TRY(const auto image, decode(source, bytes, job));

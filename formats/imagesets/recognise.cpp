@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "formats/imagesets/messages.hpp"
+#include "formats/video/film.hpp"
 
 namespace stx {
 namespace imagesets {
@@ -26,17 +27,58 @@ const std::vector<KindEntry>& entries() {
         {{"tum", "TUM or ICL-NUIM RGB-D recording"}, describeRgbd},
         {{"7scenes", "Microsoft's 7-Scenes recording"}, describeSevenScenes},
         {{"exr", "OpenEXR pictures with Z: one part, several, several views"}, describeExr},
+        {{"azure-kinect", "Azure Kinect's recording (.mkv); needs the module of video"},
+         describeAzureKinect},
         {{"panorama", "a folder with an equirectangular picture and its depth"}, describePanorama},
         {{"cameras", "a folder with our own cameras.json"}, describeCamerasJson},
     };
     return all;
 }
 
+/// Whether the first list of a file is `frames`, as in transforms.json: a look at its beginning, as
+/// such files can have megabytes of frames.
+class BeginsWithFrames : public Json::json_sax_t {
+  public:
+    [[nodiscard]] bool found() const { return found_; }
+
+    bool start_object(std::size_t) override { return depth_++ < 1 || key_ != "frames"; }
+    bool end_object() override { return depth_-- > 0; }
+    bool start_array(std::size_t) override {
+        found_ = depth_ == 1 && key_ == "frames";
+        return depth_++ > 0 && !found_;
+    }
+    bool end_array() override { return depth_-- > 0; }
+    bool key(std::string& name) override {
+        if (depth_ == 1) key_ = name;
+        return true;
+    }
+    bool null() override { return true; }
+    bool boolean(bool) override { return true; }
+    bool number_integer(Json::number_integer_t) override { return true; }
+    bool number_unsigned(Json::number_unsigned_t) override { return true; }
+    bool number_float(Json::number_float_t, const std::string&) override { return true; }
+    bool string(std::string&) override { return true; }
+    bool binary(Json::binary_t&) override { return true; }
+    bool parse_error(std::size_t, const std::string&, const Json::exception&) override {
+        return false;
+    }
+
+  private:
+    int depth_ = 0;
+    std::string key_;
+    bool found_ = false;
+};
+
 /// The kind of a JSON file by its keys; empty when it is something else.
 Result<std::string> kindOfJson(const path& file) {
     Limits limits;
     limits.maxMemoryBytes = 256u << 20;
-    STX_TRY(const Json json, readJson(file, limits));
+    STX_TRY(const auto bytes, readFile(file, limits));
+    const auto* text = reinterpret_cast<const char*>(bytes.data());
+    BeginsWithFrames look;
+    (void)Json::sax_parse(text, text + bytes.size(), &look);
+    if (look.found()) return std::string("transforms");
+    STX_TRY(const Json json, within(inQuotes(file.string()), parseJson(bytes)));
     switch (jsonKindOf(json)) {
         case JsonKind::transforms:
             return std::string("transforms");
@@ -91,6 +133,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
         }
         if (name.ends_with(".gt.freiburg")) return std::string("tum");
         if (path.extension() == ".exr") return std::string("exr");
+        if (filmFormatOf(path) == "matroska") return std::string("azure-kinect");
         return failAt(
             where, ErrorCode::invalidInput,
             "this is no image set: a .json with cameras, calib.txt, calibParams-*.txt, an "

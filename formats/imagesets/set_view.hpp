@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,10 @@
 #include "formats/imagesets/yuv.hpp"
 #include "lib/model/bundle.hpp"
 
+namespace stx {
+class Film;
+}
+
 /// What the readers of the kinds hand to the common way from files to reference views.
 namespace stx::imagesets {
 
@@ -20,7 +25,8 @@ struct PictureSource {
     std::filesystem::path path;
     std::string name;              ///< for messages, not quoted
     std::optional<YuvFormat> yuv;  ///< raw planes; else by the file (images, PFM)
-    int frame = 0;                 ///< of raw planes
+    std::shared_ptr<Film> film;    ///< the picture is one of a film
+    int frame = 0;                 ///< of raw planes and films
     std::optional<Error> missing;  ///< why there is no such file; reading it then ends with this
     bool colmap = false;           ///< COLMAP's depth maps: `w&h&c&` and floats
 };
@@ -81,6 +87,9 @@ struct SetDescription {
     /// Of sets whose views are those of ImageSetOptions::frame; of others, motionOf() finds them.
     int frames = 1;
     double rate = 25;  ///< frames a second, where the set has frames without times
+    /// Its cameras stand still or are told, so that its pictures are of a scene that moves even
+    /// where a sensor took them.
+    bool film = false;
 };
 
 /// Reads the images of one view and does what is common to all kinds: sizes, lens, mixed pixels,

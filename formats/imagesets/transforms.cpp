@@ -184,6 +184,20 @@ Result<std::optional<Distances>> codedDistances(const Json& file, const std::str
 
 }  // namespace
 
+Result<std::optional<Distances>> transformsDistances(const Json& file, const std::string& where) {
+    STX_TRY(const auto coded, codedDistances(file, where));
+    if (coded) return coded;
+    STX_TRY(auto unit, within(where, findNumber(file, "integer_depth_scale", "")));
+    if (!unit) {
+        STX_TRY(unit, within(where, findNumber(file, "depth_unit_scale_factor", "")));
+    }
+    if (!unit) return std::nullopt;
+    if (!(*unit > 0))
+        return failAt(where, ErrorCode::invalidInput,
+                      "the depth's scale is {:g}; it must be above 0", *unit);
+    return scaledIntegers(*unit);
+}
+
 Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
     const Json& frames = file["frames"];
     STX_CHECK(checkViewCount(frames.size(), job.limits, "'frames'"));

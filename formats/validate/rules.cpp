@@ -41,7 +41,7 @@ constexpr Rule kRules[] = {
     {2023, error, kOd, "each stream of an image has a picture"},
     {2024, warning, kOd, "each object descriptor is used by the scene"},
     {2025, error, kOd, "the bytes of an image are what objectTypeIndication says"},
-    {2026, warning, kOd, "images are JPEG (0x6C) or PNG (0x6D)"},
+    {2026, warning, kOd, "images are JPEG (0x6C) or PNG (0x6D), a MovieTexture's video, too"},
     {2027, warning, "ISO/IEC 14496-11, 8.5",
      "objectTypeIndication of the scene gives the version of its config"},
     {2028, error, kOd, "no two streams have the same ES_ID"},

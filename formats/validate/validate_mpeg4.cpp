@@ -98,6 +98,7 @@ class DocumentValidator {
                 fmt::format("objectTypeIndication {}", document_.bifsConfig.version));
 
         const std::set<int> named = namedDescriptors();
+        ofMovies_ = namedDescriptors("MovieTexture");
         std::set<int> present;
         for (const OdFrame& frame : document_.odFrames) {
             for (const OdCommand& command : frame.commands) {
@@ -124,15 +125,17 @@ class DocumentValidator {
             if (!named.contains(id))
                 add(2024, odName(id), "no node that names it", "a url of a texture");
     }
-    /// Object descriptors that some node of the scene, or a command, names.
-    std::set<int> namedDescriptors() const {
+    /// Object descriptors that some node of the scene, or a command, names; or a node of one type.
+    std::set<int> namedDescriptors(std::string_view type = {}) const {
         std::set<int> named;
         for (const CommandFrame& frame : document_.frames)
             for (const Command& command : frame.commands) {
                 forEachNode(command, [&](const NodePtr& node) {
+                    if (!type.empty() && !node->is(type)) return;
                     for (const Node::SetField& field : node->setFields)
                         collectUrls(field.value, named);
                 });
+                if (!type.empty()) continue;
                 std::visit(
                     [&](const auto& c) {
                         if constexpr (requires { c.value; }) collectUrls(c.value, named);
@@ -148,6 +151,13 @@ class DocumentValidator {
             for (const Url& url : *urls)
                 if (url.objectDescriptorId != 0) ids.insert(url.objectDescriptorId);
     }
+    /// MPEG-4 Visual, H.264, HEVC, MPEG-2 and MPEG-1 video (ISO/IEC 14496-1 table 5).
+    static bool isVideoCoding(int objectTypeIndication) {
+        return objectTypeIndication == 0x20 || objectTypeIndication == oti::kAvc ||
+               objectTypeIndication == oti::kHevc ||
+               (objectTypeIndication >= 0x60 && objectTypeIndication <= 0x65) ||
+               objectTypeIndication == 0x6A;
+    }
     void checkImageStream(const ObjectDescriptor& od, const ElementaryStream& stream) {
         if (stream.streamType != StreamType::visual && stream.streamType != StreamType::none)
             return;
@@ -157,9 +167,10 @@ class DocumentValidator {
         }
         if (stream.samples.empty()) return;
         if (stream.objectTypeIndication != oti::kJpeg && stream.objectTypeIndication != oti::kPng) {
-            add(2026, odName(od.id),
-                fmt::format("objectTypeIndication 0x{:02X}", stream.objectTypeIndication),
-                "0x6C (JPEG) or 0x6D (PNG)");
+            if (!(isVideoCoding(stream.objectTypeIndication) && ofMovies_.contains(od.id)))
+                add(2026, odName(od.id),
+                    fmt::format("objectTypeIndication 0x{:02X}", stream.objectTypeIndication),
+                    "0x6C (JPEG) or 0x6D (PNG)");
             return;
         }
         ByteRange head = stream.samples[0].data;
@@ -427,8 +438,12 @@ class DocumentValidator {
         const auto decode = [&](const NodePtr& image,
                                 std::string_view what) -> std::optional<DecodedImage> {
             if (!images_->probe(*image)) return {};  // reported already
-            auto decoded = images_->decode(*image, source_.decode, job_.limits);
+            auto decoded = images_->decode(
+                *image, source_.decode, job_.limits,
+                what == "depth" ? StreamImages::Samples::codes : StreamImages::Samples::colours);
             if (decoded) return std::move(*decoded);
+            // Video that is not decoded here breaks no rule.
+            if (decoded.error().code == ErrorCode::unsupported) return {};
             add(4005, where, fmt::format("{}: {}", what, decoded.error().text()),
                 "an image that can be decoded");
             return {};
@@ -514,6 +529,7 @@ class DocumentValidator {
     Job& job_;
     Findings findings_;
     const StreamImages* images_ = nullptr;
+    std::set<int> ofMovies_;  ///< object descriptors that a MovieTexture names
     int decoded_ = 0;
     int emptyViews_ = 0;
 };

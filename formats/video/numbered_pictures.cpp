@@ -41,7 +41,7 @@ Result<std::vector<std::string>> namesIn(const fs::path& folder) {
 }
 
 /// Sorts, and says what is missing. Error (invalidInput) when two have one number.
-Result<void> inOrder(std::vector<NumberedPicture>& pictures, const std::string& name, Job& job) {
+Result<void> inOrder(std::vector<NumberedFile>& pictures, const std::string& name, Job& job) {
     std::sort(pictures.begin(), pictures.end(), [](const auto& a, const auto& b) {
         return a.number != b.number ? a.number < b.number : a.path < b.path;
     });
@@ -68,30 +68,11 @@ Result<void> inOrder(std::vector<NumberedPicture>& pictures, const std::string& 
     return {};
 }
 
-/// `name_%04d.png` in its parts.
-struct SequencePattern {
-    std::string prefix, suffix;
-    std::size_t digits = 0;  ///< at least
-};
-
-std::optional<SequencePattern> parsePattern(const fs::path& pattern) {
-    const std::string name = pattern.filename().string();
-    const auto percent = name.find('%');
-    if (percent == std::string::npos) return std::nullopt;
-    std::size_t at = percent + 1;
-    while (at < name.size() && isDigit(name[at])) ++at;
-    if (at >= name.size() || name[at] != 'd' || at - percent > 4) return std::nullopt;
-    SequencePattern out{name.substr(0, percent), name.substr(at + 1), 0};
-    const auto digits = std::string_view(name).substr(percent + 1, at - percent - 1);
-    out.digits = static_cast<std::size_t>(numberOf(digits).value_or(0));
-    return out;
-}
-
 }  // namespace
 
-Result<std::vector<NumberedPicture>> numberedPictures(const fs::path& folder, Job& job) {
+Result<std::vector<NumberedFile>> numberedPictures(const fs::path& folder, Job& job) {
     STX_TRY(const auto names, namesIn(folder));
-    std::map<std::string, std::vector<NumberedPicture>> sequences;
+    std::map<std::string, std::vector<NumberedFile>> sequences;
     for (const std::string& name : names) {
         const fs::path path(name);
         std::string ending = path.extension().string();
@@ -127,32 +108,11 @@ Result<std::vector<NumberedPicture>> numberedPictures(const fs::path& folder, Jo
 }
 
 bool isSequencePattern(const fs::path& pattern) {
-    return parsePattern(pattern).has_value();
+    return frameName(pattern.filename().string(), 0).has_value();
 }
 
-Result<std::vector<NumberedPicture>> picturesOfPattern(const fs::path& pattern, Job& job) {
-    const auto parts = parsePattern(pattern);
-    if (!parts)
-        return fail(ErrorCode::usage, "'{}' has no %d, %04d or the like in it", pattern.string());
-    const fs::path folder = pattern.has_parent_path() ? pattern.parent_path() : fs::path(".");
-    STX_TRY(const auto names, namesIn(folder));
-    std::vector<NumberedPicture> pictures;
-    for (const std::string& name : names) {
-        if (name.size() <= parts->prefix.size() + parts->suffix.size() ||
-            !name.starts_with(parts->prefix) || !name.ends_with(parts->suffix))
-            continue;
-        const auto digits = std::string_view(name).substr(
-            parts->prefix.size(), name.size() - parts->prefix.size() - parts->suffix.size());
-        if (!std::all_of(digits.begin(), digits.end(), isDigit)) continue;
-        // As printf writes it: filled up with zeros, and no more of them.
-        if (digits.size() < parts->digits ||
-            (digits.size() > std::max<std::size_t>(1, parts->digits) && digits[0] == '0'))
-            continue;
-        if (const auto number = numberOf(digits))
-            pictures.push_back({*number, pattern.parent_path() / name});
-    }
-    if (pictures.empty())
-        return fail(ErrorCode::io, "no file is named '{}', whatever the number", pattern.string());
+Result<std::vector<NumberedFile>> picturesOfPattern(const fs::path& pattern, Job& job) {
+    STX_TRY(auto pictures, numberedFiles(pattern.string()));
     STX_CHECK(inOrder(pictures, pattern.string(), job));
     return pictures;
 }

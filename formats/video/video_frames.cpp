@@ -5,6 +5,7 @@
 
 #include "formats/images/images.hpp"
 #include "formats/imagesets/messages.hpp"
+#include "formats/video/film.hpp"
 #include "formats/video/numbered_pictures.hpp"
 #include "formats/video/y4m_reader.hpp"
 #include "lib/base/counted.hpp"
@@ -84,14 +85,59 @@ class Y4mFrames final : public VideoFrames {
     Job& job_;
 };
 
+class FilmFrames final : public VideoFrames {
+  public:
+    FilmFrames(std::unique_ptr<Film> film, int track, Job& job)
+        : film_(std::move(film)), job_(job) {
+        const Film::Track& of = film_->tracks()[static_cast<std::size_t>(track)];
+        size_ = {of.width, of.height};
+    }
+
+    [[nodiscard]] glm::ivec2 size() const override { return size_; }
+    [[nodiscard]] int count() const override { return film_->count(); }
+    [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
+        STX_TRY(const auto picture, film_->picture(k));
+        const std::string where = fmt::format("{}: frame {}", inQuotes(film_->path().string()), k);
+        STX_TRY(auto colour, imagesets::within(where, picture.colour(job_.limits)));
+        if (colour.size() != size_)
+            return failAt(where, ErrorCode::invalidInput,
+                          "it is {}x{}, but the track is {}x{}; all frames must have one size",
+                          colour.width(), colour.height(), size_.x, size_.y);
+        return std::make_shared<const Rgba8Image>(std::move(colour));
+    }
+    [[nodiscard]] std::string name(int k) const override {
+        return fmt::format("{}_{:04}", film_->path().stem().string(), k);
+    }
+    [[nodiscard]] std::string description() const override {
+        return fmt::format("{} ({})", film_->path().filename().string(), counted(count(), "frame"));
+    }
+
+  private:
+    std::unique_ptr<Film> film_;
+    Job& job_;
+    glm::ivec2 size_{0};
+};
+
+Result<std::unique_ptr<VideoFrames>> openFilm(const fs::path& input, Job& job) {
+    auto opened = Film::open(input, job.limits);
+    if (!opened && opened.error().code == ErrorCode::unsupported)
+        return fail(ErrorCode::unsupported,
+                    "{}; or take its frames out first: ffmpeg -i '{}' frame_%04d.png",
+                    opened.error().text(), input.string());
+    if (!opened) return propagate(opened);
+    auto& film = **opened;
+    const int track = film.firstVideo();
+    STX_CHECK(film.select(track));
+    const auto videos = std::ranges::count_if(film.tracks(), &Film::Track::video);
+    if (videos > 1)
+        job.note(fmt::format("{} has {} tracks of video; the first is taken",
+                             inQuotes(input.string()), videos));
+    return std::make_unique<FilmFrames>(std::move(*opened), track, job);
+}
+
 /// Whether the first bytes, or the ending, are those of a video that has to be decoded.
 bool isCompressedVideo(const fs::path& path, std::string_view head) {
-    const auto has = [&](std::size_t at, std::string_view text) {
-        return head.size() >= at + text.size() && head.substr(at, text.size()) == text;
-    };
-    if (has(4, "ftyp") || has(4, "moov") || has(4, "mdat") || (has(0, "RIFF") && has(8, "AVI ")) ||
-        has(0, "\x1a\x45\xdf\xa3"))
-        return true;
+    if (!filmFormatOf(std::as_bytes(std::span(head))).empty()) return true;
     std::string ending = path.extension().string();
     std::transform(ending.begin(), ending.end(), ending.begin(), [](char c) {
         return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -117,7 +163,7 @@ Result<std::unique_ptr<VideoFrames>> openPictures(std::vector<fs::path> files, s
     return frames;
 }
 
-Result<std::unique_ptr<VideoFrames>> openSequence(Result<std::vector<NumberedPicture>> pictures,
+Result<std::unique_ptr<VideoFrames>> openSequence(Result<std::vector<NumberedFile>> pictures,
                                                   const fs::path& input, Job& job) {
     if (!pictures) return propagate(pictures);
     std::vector<fs::path> files;
@@ -144,18 +190,14 @@ Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>
                         input.string());
         const bool regular = fs::is_regular_file(input, ec);
         const std::string head = regular ? headOfFile(input) : std::string();
-        if (regular && isCompressedVideo(input, head))
-            return fail(ErrorCode::unsupported,
-                        "'{}' is compressed video, which is not decoded here; take its frames out "
-                        "first: ffmpeg -i '{}' frame_%04d.png, or as one file: ffmpeg -i '{}' -f "
-                        "yuv4mpegpipe frames.y4m",
-                        input.string(), input.string(), input.string());
+        const bool film = regular && isCompressedVideo(input, head);
         const bool y4m =
             Y4mReader::recognises(std::as_bytes(std::span(head))) || input.extension() == ".y4m";
-        if (inputs.size() > 1 && (folder || y4m))
+        if (inputs.size() > 1 && (folder || y4m || film))
             return fail(ErrorCode::usage,
                         "'{}' is {}; of several inputs each must be a picture (give it alone)",
                         input.string(), folder ? "a folder" : "a video");
+        if (film) return openFilm(input, job);
         if (!y4m) continue;
         STX_TRY(auto source, mpeg4::ByteSource::open(input));
         STX_TRY(auto reader, imagesets::within(inQuotes(input.string()),

@@ -20,9 +20,10 @@ class VideoFrames : public StillFrames {
 };
 
 /// Opens what `inputs` name: pictures, one after the other; or one of: a folder of numbered
-/// pictures, a sequence `frame_%04d.png`, a picture, a `.y4m` file. The size is that of the first
-/// frame; no other frame is read yet. Errors: io, invalidInput, and (unsupported) compressed video,
-/// with how to take the frames out of it. `job` must outlive the frames.
+/// pictures, a sequence `frame_%04d.png`, a picture, a `.y4m` file, a film (.mp4, .mov, .mkv,
+/// .webm, .avi). The size is that of the first frame; no other frame is read yet. Errors: io,
+/// invalidInput, and (unsupported) compressed video where the module of video is not, with how to
+/// take the frames out of it. `job` must outlive the frames.
 [[nodiscard]] Result<std::unique_ptr<VideoFrames>> openVideoFrames(
     const std::vector<std::filesystem::path>& inputs, Job& job);
 

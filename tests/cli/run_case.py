@@ -12,8 +12,10 @@
 In > and ! lines, {*} stands for any text within the line; a line {...} for any number of lines.
 $MODEL is the sample model, $SHARED the folder of real inputs, $SOURCE the checkout. A line
 `needs: path` skips the case (exit code 77) when the path under $SHARED is missing; `needs-program:
-name` when the program is not installed; `needs-gpu:` when stx finds no OpenGL without a display.
+name` when the program is not installed; `needs-gpu:` when stx finds no OpenGL without a display;
+`needs-video:` when the module of video was not built.
 """
+import glob
 import os
 import re
 import shutil
@@ -36,7 +38,7 @@ def matches(expected, got):
 
 
 def parse(path):
-    steps, needs, programs, gpu = [], [], [], False
+    steps, needs, programs, gpu, video = [], [], [], False, False
     for number, raw in enumerate(open(path, encoding="utf-8"), 1):
         line = raw.rstrip("\n")
         if not line or line.startswith("#"):
@@ -50,6 +52,9 @@ def parse(path):
         if line.startswith("needs-gpu:"):
             gpu = True
             continue
+        if line.startswith("needs-video:"):
+            video = True
+            continue
         kind, text = line[0], line[2:]
         if kind == "$":
             steps.append({"command": text, "line": number, "code": 0, ">": [], "!": [], "=": [], "-": []})
@@ -59,12 +64,12 @@ def parse(path):
             steps[-1][kind].append(text)
         else:
             sys.exit(f"{path}:{number}: a line starts with $ ? > ! = or -, not '{kind}'")
-    return steps, needs, programs, gpu
+    return steps, needs, programs, gpu, video
 
 
 def main():
     case, stx, model, shared, source = sys.argv[1:6]
-    steps, needs, programs, gpu = parse(case)
+    steps, needs, programs, gpu, video = parse(case)
     for need in needs:
         if not os.path.exists(os.path.join(shared, need)):
             print(f"SKIPPED: needs {os.path.join(shared, need)}, which is not here")
@@ -75,6 +80,9 @@ def main():
             return 77
     if gpu and subprocess.run([stx, "render", "--list-devices"], capture_output=True).returncode:
         print("SKIPPED: needs OpenGL without a display, which is not here")
+        return 77
+    if video and not glob.glob(os.path.join(os.path.dirname(stx), "..", "lib*", "**", "stx_video.so"), recursive=True):
+        print("SKIPPED: needs the module of video, which was not built (libavformat-dev)")
         return 77
     env = dict(os.environ, MODEL=model, SHARED=shared, SOURCE=source,
                PATH=os.path.dirname(stx) + ":" + os.environ["PATH"])

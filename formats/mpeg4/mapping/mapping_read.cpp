@@ -297,7 +297,9 @@ class BundleReader {
     }
 
     Result<DecodedImage> decode(const NodePtr& texture, std::string_view what) const {
-        auto image = images_->decode(*texture, options_.decode, job_.limits);
+        auto image = images_->decode(
+            *texture, options_.decode, job_.limits,
+            what == "depth" ? StreamImages::Samples::codes : StreamImages::Samples::colours);
         if (!image) return tl::unexpected(image.error().at(std::string(what)));
         return image;
     }

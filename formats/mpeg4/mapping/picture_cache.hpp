@@ -18,6 +18,7 @@ class PictureCache {
     struct Key {
         const ElementaryStream* stream = nullptr;
         std::size_t sample = 0;
+        bool codes = false;  ///< StreamImages::Samples::codes
         auto operator<=>(const Key&) const = default;
     };
 

@@ -143,8 +143,46 @@ Result<Bytes> StreamImages::load(const Node& texture, const Limits& limits) cons
     return tl::unexpected(last);
 }
 
+Result<DecodedImage> StreamImages::decodeVideo(const ElementaryStream& stream, std::size_t sample,
+                                               Samples samples, const Limits& limits) const {
+    if (stream.samples.empty())
+        return fail(ErrorCode::invalidInput, "its stream has no picture in this file");
+    auto picture = video_->picture(stream, sample, limits);
+    if (!picture && picture.error().code == ErrorCode::unsupported)
+        return fail(ErrorCode::unsupported,
+                    "the image is a stream of objectTypeIndication 0x{:02X}{}: {}. Take the "
+                    "pictures out first (ffmpeg -i FILE picture_%04d.png); conversions between "
+                    ".mp4, .bt and .xmt keep the stream",
+                    stream.objectTypeIndication, videoName(stream.objectTypeIndication),
+                    picture.error().message);
+    if (!picture) return propagate(picture);
+    DecodedImage out;
+    out.width = out.displayWidth = picture->width();
+    out.height = out.displayHeight = picture->height();
+    if (samples == Samples::codes && picture->hasLuma()) {
+        out.channels = 1;
+        out.channelNames = {"Y"};
+        auto codes = picture->lumaCodes();
+        if (picture->bits() == 8) {
+            out.values = std::vector<std::uint8_t>(codes.begin(), codes.end());
+        } else {
+            out.usedBits = picture->bits();
+            out.values = std::move(codes);
+        }
+        return out;
+    }
+    STX_TRY(const auto colour, picture->colour(limits));
+    out.channels = 3;
+    out.channelNames = {"R", "G", "B"};
+    std::vector<std::uint8_t> values;
+    values.reserve(colour.count() * 3);
+    for (const glm::u8vec4 p : colour.pixels()) values.insert(values.end(), {p.r, p.g, p.b});
+    out.values = std::move(values);
+    return out;
+}
+
 Result<DecodedImage> StreamImages::decode(const Node& texture, const ImageDecoder& decoder,
-                                          const Limits& limits) const {
+                                          const Limits& limits, Samples samples) const {
     if (texture.is("PixelTexture")) {
         const auto& image = texture.get<PixelImage>("image");
         if (image.width < 1 || image.height < 1)
@@ -152,21 +190,19 @@ Result<DecodedImage> StreamImages::decode(const Node& texture, const ImageDecode
         return decodedFromPixels(image);
     }
     const ElementaryStream* from = stream(texture);
-    if (from && isVideo(*from))
-        return fail(ErrorCode::unsupported,
-                    "the image is a stream of objectTypeIndication 0x{:02X}{}; JPEG (0x6C) and PNG "
-                    "(0x6D) are read. Take the pictures out first (ffmpeg -i FILE "
-                    "picture_%04d.png); conversions between .mp4, .bt and .xmt keep the stream",
-                    from->objectTypeIndication, videoName(from->objectTypeIndication));
-    const PictureCache::Key key{from,
-                                from && !from->samples.empty() ? sampleAt(texture, *from) : 0};
+    const PictureCache::Key key{from, from && !from->samples.empty() ? sampleAt(texture, *from) : 0,
+                                samples == Samples::codes};
     if (cache_ && from)
         if (auto kept = cache_->find(key)) return *kept;
-    STX_TRY(const auto bytes, load(texture, limits));
-    const auto* urls = urlsOf(texture);
-    const Url& url = urls->front();
-    auto image = decoder(
-        bytes, url.text.empty() ? fmt::format("od:{}", url.objectDescriptorId) : url.text, limits);
+    const auto read = [&]() -> Result<DecodedImage> {
+        if (from && isVideo(*from)) return decodeVideo(*from, key.sample, samples, limits);
+        STX_TRY(const auto bytes, load(texture, limits));
+        const Url& url = urlsOf(texture)->front();
+        return decoder(bytes,
+                       url.text.empty() ? fmt::format("od:{}", url.objectDescriptorId) : url.text,
+                       limits);
+    };
+    auto image = read();
     if (cache_ && from && image) cache_->keep(key, *image);
     return image;
 }

@@ -8,6 +8,7 @@
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/picture_cache.hpp"
+#include "formats/mpeg4/mapping/stream_video.hpp"
 
 namespace stx::mpeg4 {
 
@@ -15,6 +16,9 @@ namespace stx::mpeg4 {
 /// of a stream with several pictures the one of a moment.
 class StreamImages {
   public:
+    /// What is in a picture of video: colours, or codes of depth, which are luma as it is.
+    enum class Samples { colours, codes };
+
     /// Object descriptors as they are at the scene's start; ones that come later serve where
     /// there is none then. The document must outlive this.
     [[nodiscard]] static Result<StreamImages> make(const Document& document,
@@ -31,9 +35,11 @@ class StreamImages {
     /// is not a file in the folder.
     [[nodiscard]] Result<Bytes> load(const Node& texture, const Limits& limits) const;
     /// The decoded picture, PixelTexture included. Errors: those of load() and of the decoder, an
-    /// empty PixelTexture, a node of another type, a stream that is neither JPEG nor PNG.
+    /// empty PixelTexture, a node of another type, a stream that neither an image codec nor the
+    /// module of video reads.
     [[nodiscard]] Result<DecodedImage> decode(const Node& texture, const ImageDecoder& decoder,
-                                              const Limits& limits) const;
+                                              const Limits& limits,
+                                              Samples samples = Samples::colours) const;
     /// The header of the picture. Errors as load().
     [[nodiscard]] Result<ImageInfo> probe(const Node& texture) const;
 
@@ -45,11 +51,15 @@ class StreamImages {
   private:
     /// The sample that a texture shows at the moment. The stream must have one.
     [[nodiscard]] std::size_t sampleAt(const Node& texture, const ElementaryStream& stream) const;
+    [[nodiscard]] Result<DecodedImage> decodeVideo(const ElementaryStream& stream,
+                                                   std::size_t sample, Samples samples,
+                                                   const Limits& limits) const;
 
     const Document* document_ = nullptr;
     double now_ = 0;
     mutable std::unordered_map<const ElementaryStream*, Presentation> presentations_;
     std::shared_ptr<PictureCache> cache_;
+    std::shared_ptr<StreamVideo> video_ = std::make_shared<StreamVideo>();
     std::unordered_map<int, const ObjectDescriptor*> byId_;
     std::filesystem::path folder_;
     Limits limits_;

@@ -88,8 +88,10 @@ Result<Image<float>> depthFromImage(const DecodedImage& image, int channel, int 
     Image<float> depth(image.width, image.height, kNoDepth);
     STX_CHECK(withSamples(image, "depth", [&](const auto& values, unsigned cmax) {
         const bool few = greyBits == 1 || greyBits == 2 || greyBits == 4;
-        const DepthCode code{nearPlane, farPlane, few ? (1u << greyBits) - 1 : cmax};
-        const unsigned spread = cmax / code.dmax;
+        const int bits = image.usedBits > 0 ? image.usedBits : few ? greyBits : 0;
+        const DepthCode code{nearPlane, farPlane, bits > 0 ? (1u << bits) - 1 : cmax};
+        // PNG's few bits are spread over eight; video's are not spread.
+        const unsigned spread = image.usedBits > 0 ? 1 : cmax / code.dmax;
         for (std::size_t i = 0; i < depth.count(); ++i) {
             const unsigned d =
                 values[i * static_cast<std::size_t>(image.channels) + channel] / spread;

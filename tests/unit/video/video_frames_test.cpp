@@ -5,6 +5,7 @@
 #include "formats/images/images.hpp"
 #include "formats/images/y4m.hpp"
 #include "formats/video/numbered_pictures.hpp"
+#include "formats/video/video_module.hpp"
 #include "formats/video/y4m_reader.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -86,7 +87,7 @@ TEST(VideoFrames, APatternTakesItsOwnNamesOnly) {
     for (const auto& p : *pictures) names.push_back(p.path.filename().string());
     EXPECT_EQ(names, (std::vector<std::string>{"a_0001.png", "a_0002.png", "a_10000.png"}));
     EXPECT_EQ(picturesOfPattern(folder / "a_%d.png", job)->size(), 2u);  // 3, 10000
-    EXPECT_TRUE(has(errorOf({folder / "c_%04d.png"}, ErrorCode::io), "no file is named"));
+    EXPECT_TRUE(has(errorOf({folder / "c_%04d.png"}, ErrorCode::io), "no file is named so"));
 }
 
 TEST(VideoFrames, SeveralSequencesInAFolderAreAQuestion) {
@@ -125,11 +126,12 @@ TEST(VideoFrames, WhatIsNoFrameSaysWhatToDo) {
     writeText(folder / "clip.bin", std::string_view("\0\0\0\x18"
                                                     "ftypmp42",
                                                     12));
-    const auto mp4 = errorOf({folder / "clip.bin"}, ErrorCode::unsupported);
-    EXPECT_TRUE(has(mp4, "ffmpeg -i") && has(mp4, "frame_%04d.png") && has(mp4, "yuv4mpegpipe"))
-        << mp4;
+    if (videoModule().present)
+        EXPECT_TRUE(has(errorOf({folder / "clip.bin"}, ErrorCode::invalidInput),
+                        "clip.bin': it is cut off: it should have 24 bytes, and has 12"));
     writeText(folder / "clip.AVI", "anything");
-    errorOf({folder / "clip.AVI"}, ErrorCode::unsupported);
+    const auto avi = errorOf({folder / "clip.AVI"}, ErrorCode::unsupported);
+    EXPECT_TRUE(has(avi, "ffmpeg -i") && has(avi, "frame_%04d.png")) << avi;
     EXPECT_TRUE(has(errorOf({folder / "a.png", folder.path()}, ErrorCode::usage), "is a folder"));
 }
 

@@ -1,0 +1,253 @@
+// Films as image sets: a colour and a depth film for each camera, matched by time.
+
+#include "formats/imagesets/film_frames.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/messages.hpp"
+#include "formats/imagesets/patterns.hpp"
+#include "formats/video/film.hpp"
+#include "lib/base/counted.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+/// Times of two clocks that mean one moment differ by less than rounding to milliseconds.
+constexpr double kRounding = 0.001;
+
+bool isFilmName(const std::string& name) {
+    std::string ending = path(name).extension().string();
+    for (char& c : ending)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    constexpr std::string_view kEndings[] = {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi"};
+    return std::ranges::find(kEndings, ending) != std::end(kEndings);
+}
+
+/// The median distance of neighbours; 0 of one frame.
+double stepOf(const std::vector<double>& times) {
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+    if (steps.empty()) return 0;
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    return *middle;
+}
+
+int nearest(const std::vector<double>& times, double time) {
+    const auto next = std::ranges::lower_bound(times, time);
+    if (next == times.begin()) return 0;
+    const auto before = std::prev(next);
+    const bool later = next != times.end() && *next - time < time - *before;
+    return static_cast<int>((later ? next : before) - times.begin());
+}
+
+/// A film that the command names: in the folder of the cameras, or from where we are. What the
+/// cameras' file puts into the name for {name} reaches nothing outside.
+Result<std::shared_ptr<Film>> openNamed(const path& folder, const std::string& pattern,
+                                        const Placeholders& words, Job& job) {
+    const std::string name = filled(pattern, words);
+    std::error_code ec;
+    const path inFolder = (folder / name).lexically_normal();
+    const path file = std::filesystem::exists(inFolder, ec) ? inFolder : path(name);
+    if (pattern.find("{name}") != std::string::npos && !job.limits.allowOutside &&
+        (words.name.find('/') != std::string::npos || words.name == ".."))
+        return failAt(inQuotes(name), ErrorCode::invalidInput,
+                      "the camera's name '{}' leads to another folder; give --allow-outside if it "
+                      "may",
+                      words.name);
+    if (!std::filesystem::exists(file, ec))
+        return failAt(inQuotes(name), ErrorCode::io,
+                      "there is no such film in '{}' or where stx runs", folder.string());
+    STX_TRY(auto film, Film::open(file, job.limits));
+    STX_CHECK(film->select(film->firstVideo()));
+    return std::shared_ptr<Film>(std::move(film));
+}
+
+/// What the cameras' file says of depth, for each of its views.
+Result<std::vector<Distances>> distancesOf(const Json& json, std::size_t count,
+                                           const std::string& where,
+                                           const ImageSetOptions& options) {
+    Distances all;
+    if (options.depthUnit > 0) {
+        all = scaledIntegers(options.depthUnit);
+    } else if (options.depthMax > 0) {
+        all = normalisedDisparity(options.depthMin, options.depthMax, true);
+    } else if (jsonKindOf(json) == JsonKind::miv) {
+        std::vector<Distances> each;
+        for (std::size_t i = 0; i < count; ++i) {
+            STX_TRY(each.emplace_back(),
+                    mivDistances(json["cameras"][i], fmt::format("{}: cameras[{}]", where, i)));
+        }
+        return each;
+    } else if (jsonKindOf(json) == JsonKind::transforms) {
+        STX_TRY(const auto told, transformsDistances(json, where));
+        if (told) all = *told;
+    }
+    if (!all)
+        return failAt(where, ErrorCode::invalidInput,
+                      "it does not say what the values of depth are; give --depth-unit (scene "
+                      "units of one step, 0.001 for millimetres in metres) or --depth-range");
+    return std::vector<Distances>(count, all);
+}
+
+/// One film of colour and one of depth.
+struct FilmPair {
+    std::string name;
+    std::shared_ptr<Film> colour, depth;
+    std::vector<std::size_t> views;  ///< of the cameras' file: one, or the poses of one that moves
+};
+
+/// The pose of a frame: one for all, one for each, or by its time from the film's start.
+Result<std::size_t> poseOf(const FilmPair& pair, const std::vector<SetView>& views,
+                           std::size_t frame, std::size_t frames, double time,
+                           const std::string& where) {
+    if (pair.views.size() == 1) return pair.views[0];
+    const bool timed =
+        std::ranges::all_of(pair.views, [&](std::size_t v) { return views[v].time.has_value(); });
+    if (timed) {
+        std::size_t best = pair.views[0];
+        double least = std::numeric_limits<double>::infinity();
+        for (const std::size_t v : pair.views)
+            if (const double away = std::abs(*views[v].time - time); away < least) {
+                least = away;
+                best = v;
+            }
+        return best;
+    }
+    if (pair.views.size() == frames) return pair.views[frame];
+    return failAt(
+        where, ErrorCode::invalidInput,
+        "it has {} cameras for {} frames of '{}'; one camera, one for each frame, cameras "
+        "with 'time', or names of films with {{name}} are expected",
+        pair.views.size(), frames, pair.colour->path().filename().string());
+}
+
+}  // namespace
+
+bool namesFilms(const ImageSetOptions& options) {
+    return isFilmName(options.texturePattern) || isFilmName(options.depthPattern);
+}
+
+PictureSource frameOf(const std::shared_ptr<Film>& film, int frame) {
+    PictureSource source;
+    source.path = film->path();
+    source.name = film->path().filename().string();
+    source.film = film;
+    source.frame = frame;
+    return source;
+}
+
+Result<std::vector<FramePair>> pairFrames(const Film& colour, const Film& depth,
+                                          const std::string& where, Job& job) {
+    const auto &ct = colour.times(), &dt = depth.times();
+    const double slack = std::max(stepOf(ct), stepOf(dt)) / 2 + kRounding;
+    std::vector<FramePair> pairs;
+    for (int i = 0; i < depth.count(); ++i) {
+        const double time = dt[static_cast<std::size_t>(i)];
+        const int k = nearest(ct, time);
+        if (std::abs(ct[static_cast<std::size_t>(k)] - time) <= slack)
+            pairs.push_back({k, i, time});
+    }
+    if (pairs.size() < dt.size() && ct.size() == dt.size()) {
+        job.note(
+            fmt::format("{}: the films begin at {:.4g} s and {:.4g} s; their {} frames are "
+                        "matched one by one",
+                        where, ct.front(), dt.front(), ct.size()));
+        pairs.clear();
+        for (int i = 0; i < depth.count(); ++i)
+            pairs.push_back({i, i, dt[static_cast<std::size_t>(i)]});
+    }
+    if (pairs.empty())
+        return failAt(where, ErrorCode::invalidInput,
+                      "no frame of depth ({:.4g} to {:.4g} s) is of the time of a frame of colour "
+                      "({:.4g} to {:.4g} s)",
+                      dt.front(), dt.back(), ct.front(), ct.back());
+    if (pairs.size() < dt.size())
+        job.note(
+            fmt::format("{}: {} of {} frames of depth are left out, as no frame of colour is "
+                        "of their time",
+                        where, dt.size() - pairs.size(), dt.size()));
+    return pairs;
+}
+
+Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& options, Job& job) {
+    if (options.texturePattern.empty() || options.depthPattern.empty())
+        return fail(ErrorCode::usage,
+                    "films come in pairs: give --texture and --depth, with the cameras' file as "
+                    "input");
+    std::error_code ec;
+    const path file = std::filesystem::is_directory(given, ec) ? given / "transforms.json" : given;
+    const path folder = folderOf(file);
+    const std::string where = inQuotes(file.string());
+    STX_TRY(const Json json, readJson(file, job.limits));
+    std::vector<SetView> views;
+    switch (jsonKindOf(json)) {
+        case JsonKind::transforms: {
+            STX_TRY(views, within(where, transformsViews(json, job)));
+            break;
+        }
+        case JsonKind::miv: {
+            STX_TRY(views, within(where, mivViews(json, job)));
+            break;
+        }
+        case JsonKind::cameras: {
+            STX_TRY(views, within(where, camerasJsonViews(json, job)));
+            break;
+        }
+        default:
+            return failAt(
+                where, ErrorCode::invalidInput,
+                "the cameras of films are those of a transforms.json, of MIV's list or of "
+                "our cameras.json; this is none of them");
+    }
+    if (views.empty()) return failAt(where, ErrorCode::invalidInput, "it has no camera");
+    STX_TRY(const auto distances, distancesOf(json, views.size(), where, options));
+
+    const bool each = options.texturePattern.find("{name}") != std::string::npos ||
+                      options.depthPattern.find("{name}") != std::string::npos;
+    std::vector<FilmPair> pairs;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        if (!each && i > 0) {
+            pairs[0].views.push_back(i);
+            continue;
+        }
+        const SetView& view = views[i];
+        const Placeholders words{view.name, view.camera.width, view.camera.height, options.frame};
+        FilmPair pair;
+        pair.name = !each && !view.taker.empty() ? view.taker : view.name;
+        STX_TRY(pair.colour, openNamed(folder, options.texturePattern, words, job));
+        STX_TRY(pair.depth, openNamed(folder, options.depthPattern, words, job));
+        pair.views = {i};
+        pairs.push_back(std::move(pair));
+    }
+    SetDescription set;
+    set.title = pairs[0].colour->path().stem().string();
+    set.film = true;
+    STX_TRY(set.origin, originOf(json, where));
+    std::uint64_t count = 0;
+    for (const FilmPair& pair : pairs) count += static_cast<std::uint64_t>(pair.depth->count());
+    STX_CHECK(checkViewCount(count, job.limits, where));
+    for (const FilmPair& pair : pairs) {
+        const std::string films = fmt::format("{} and {}", inQuotes(pair.colour->path().string()),
+                                              inQuotes(pair.depth->path().string()));
+        STX_TRY(const auto frames, pairFrames(*pair.colour, *pair.depth, films, job));
+        for (std::size_t k = 0; k < frames.size(); ++k) {
+            STX_TRY(const std::size_t pose,
+                    poseOf(pair, views, k, frames.size(), frames[k].time - frames[0].time, where));
+            SetView view = views[pose];
+            view.name = pair.name;
+            view.taker = pair.name;
+            view.time = frames[k].time;
+            view.texture = frameOf(pair.colour, frames[k].colour);
+            view.depth = frameOf(pair.depth, frames[k].depth);
+            view.distances = distances[pose];
+            view.planes.reset();
+            set.views.push_back(std::move(view));
+        }
+    }
+    return set;
+}
+
+}  // namespace stx::imagesets

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "formats/imagesets/set_view.hpp"
+
+namespace stx::imagesets {
+
+/// A frame of a film of depth with the frame of colour of the same moment.
+struct FramePair {
+    int colour = 0, depth = 0;
+    double time = 0;  ///< of the depth, seconds by the film's clock
+};
+
+/// Pairs by time: to each time of depth the nearest of colour, within half a frame of colour. Where
+/// films have as many frames and their clocks do not agree, one by one, with a note; frames of
+/// depth without colour are left out, with a note. `where` is for messages. Errors (invalidInput):
+/// no pair.
+[[nodiscard]] Result<std::vector<FramePair>> pairFrames(const Film& colour, const Film& depth,
+                                                        const std::string& where, Job& job);
+
+/// A picture of a film, to be read later.
+[[nodiscard]] PictureSource frameOf(const std::shared_ptr<Film>& film, int frame);
+
+}  // namespace stx::imagesets

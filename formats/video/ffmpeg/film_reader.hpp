@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+
+#include "formats/video/ffmpeg/decoder.hpp"
+#include "formats/video/wire.hpp"
+
+namespace stx::video {
+
+/// A file of video by its descriptor. Nothing else is opened, whatever the file asks for.
+class FilmReader {
+  public:
+    /// `format`: libavformat's name of the only reader that is tried.
+    FilmReader(int file, const std::string& format);
+    ~FilmReader();
+    FilmReader(const FilmReader&) = delete;
+    FilmReader& operator=(const FilmReader&) = delete;
+
+    /// Tracks and attachments, packed.
+    [[nodiscard]] std::vector<std::byte> describe() const;
+    /// Reads through the track once. Its access units, packed.
+    [[nodiscard]] std::vector<std::byte> select(int track);
+    /// The next access unit that is fed is the one of these times, or the track's first.
+    void seek(std::int64_t dts, std::int64_t pts);
+    /// Feeds the next one; false at the end.
+    bool step(std::int64_t wanted);
+    [[nodiscard]] Decoder& decoder();
+
+  private:
+    /// The next access unit of the track; null at the end.
+    [[nodiscard]] const AVPacket* next();
+    void rewind();
+
+    struct Source {
+        int file = -1;
+        std::int64_t at = 0, size = 0;
+    } source_;
+    AVFormatContext* film_ = nullptr;
+    PacketPtr packet_;
+    std::optional<Decoder> decoder_;
+    int track_ = -1;
+    bool held_ = false;  ///< packet_ is still to be fed
+    bool ended_ = false;
+};
+
+}  // namespace stx::video

@@ -1,0 +1,119 @@
+#include <algorithm>
+
+#include "formats/video/ffmpeg/decoder.hpp"
+#include "formats/video/wire.hpp"
+
+namespace stx::video {
+namespace {
+
+/// Luma alone, or luma and chroma, each in a plane of its own, 8 to 16 bits.
+bool isPlanes(const AVPixFmtDescriptor& format) {
+    if (format.flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_BITSTREAM |
+                        AV_PIX_FMT_FLAG_HWACCEL | AV_PIX_FMT_FLAG_FLOAT | AV_PIX_FMT_FLAG_BAYER))
+        return false;
+    const int count = format.nb_components - ((format.flags & AV_PIX_FMT_FLAG_ALPHA) ? 1 : 0);
+    if (count != 1 && count != 3) return false;
+    if (format.log2_chroma_w > 1 || format.log2_chroma_h > format.log2_chroma_w) return false;
+    for (int i = 0; i < count; ++i) {
+        const AVComponentDescriptor& c = format.comp[i];
+        const int bytes = c.depth > 8 ? 2 : 1;
+        if (c.plane != i || c.step != bytes || c.offset != 0 || c.shift != 0 || c.depth < 8 ||
+            c.depth > 16 || c.depth != format.comp[0].depth)
+            return false;
+    }
+    return true;
+}
+
+void addPlane(std::vector<std::byte>& to, const AVFrame& frame, int plane, int width, int height,
+              int bytes, bool bigEndian) {
+    for (int y = 0; y < height; ++y) {
+        const auto* row = reinterpret_cast<const std::byte*>(
+            frame.data[plane] + static_cast<std::ptrdiff_t>(y) * frame.linesize[plane]);
+        const auto at = to.size();
+        to.insert(to.end(), row, row + static_cast<std::size_t>(width) * bytes);
+        if (!bigEndian || bytes == 1) continue;
+        for (std::size_t i = at; i + 1 < to.size(); i += 2) std::swap(to[i], to[i + 1]);
+    }
+}
+
+struct FreeScaler {
+    void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+};
+
+/// Other forms of pixels, through libswscale.
+std::vector<std::byte> rgbaOf(const AVFrame& frame, bool bt601, bool fullRange) {
+    const auto width = frame.width, height = frame.height;
+    const std::unique_ptr<SwsContext, FreeScaler> scaler(sws_getContext(
+        width, height, static_cast<AVPixelFormat>(frame.format), width, height, AV_PIX_FMT_RGBA,
+        SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_BITEXACT, nullptr, nullptr,
+        nullptr));
+    if (!scaler)
+        refuse(ErrorCode::unsupported, "pixels of the kind {} are not read",
+               av_get_pix_fmt_name(static_cast<AVPixelFormat>(frame.format)));
+    const int* matrix = sws_getCoefficients(bt601 ? SWS_CS_ITU601 : SWS_CS_ITU709);
+    sws_setColorspaceDetails(scaler.get(), matrix, fullRange ? 1 : 0, matrix, 1, 0, 1 << 16,
+                             1 << 16);
+    std::vector<std::byte> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+                               4);
+    std::uint8_t* planes[4] = {reinterpret_cast<std::uint8_t*>(out.data())};
+    const int strides[4] = {width * 4};
+    if (sws_scale(scaler.get(), frame.data, frame.linesize, 0, height, planes, strides) != height)
+        refuse(ErrorCode::failed, "libswscale cannot convert the picture");
+    return out;
+}
+
+}  // namespace
+
+std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec) {
+    const auto pixels = static_cast<AVPixelFormat>(frame.format);
+    const AVPixFmtDescriptor* format = av_pix_fmt_desc_get(pixels);
+    if (!format || frame.width < 1 || frame.height < 1)
+        refuse(ErrorCode::invalidInput, "a picture has no pixels");
+    PictureHeader header;
+    header.width = frame.width;
+    header.height = frame.height;
+    const bool grey =
+        format->nb_components - ((format->flags & AV_PIX_FMT_FLAG_ALPHA) ? 1 : 0) == 1;
+    const bool jpegPixels = pixels == AV_PIX_FMT_YUVJ420P || pixels == AV_PIX_FMT_YUVJ422P ||
+                            pixels == AV_PIX_FMT_YUVJ444P || pixels == AV_PIX_FMT_YUVJ440P;
+    header.limitedSaid = frame.color_range == AVCOL_RANGE_MPEG;
+    // Where it is not said, luma alone is of full range, and luma with chroma is not.
+    header.fullRange = frame.color_range == AVCOL_RANGE_JPEG || jpegPixels ||
+                       (grey && frame.color_range == AVCOL_RANGE_UNSPECIFIED);
+    header.bt601 = frame.colorspace == AVCOL_SPC_BT470BG ||
+                   frame.colorspace == AVCOL_SPC_SMPTE170M || frame.colorspace == AVCOL_SPC_FCC ||
+                   // As players take it.
+                   (frame.colorspace == AVCOL_SPC_UNSPECIFIED && frame.height < 720);
+    const AVChromaLocation chroma = frame.chroma_location != AVCHROMA_LOC_UNSPECIFIED
+                                        ? frame.chroma_location
+                                        : codec.chroma_sample_location;
+    header.chromaLeft = chroma == AVCHROMA_LOC_UNSPECIFIED
+                            ? codec.codec_id != AV_CODEC_ID_MJPEG && !jpegPixels
+                            : chroma != AVCHROMA_LOC_CENTER && chroma != AVCHROMA_LOC_TOP &&
+                                  chroma != AVCHROMA_LOC_BOTTOM;
+    Packer out;
+    if (!isPlanes(*format)) {
+        header.rgba = 1;
+        const auto rgba = rgbaOf(frame, header.bt601 != 0, header.fullRange != 0);
+        out.put(header);
+        out.add(rgba.data(), rgba.size());
+        return std::move(out.bytes);
+    }
+    header.bits = format->comp[0].depth;
+    header.chroma = !grey;
+    header.chromaShiftX = format->log2_chroma_w;
+    header.chromaShiftY = format->log2_chroma_h;
+    out.put(header);
+    const int bytes = header.bits > 8 ? 2 : 1;
+    const bool bigEndian = (format->flags & AV_PIX_FMT_FLAG_BE) != 0;
+    addPlane(out.bytes, frame, 0, frame.width, frame.height, bytes, bigEndian);
+    if (!grey) {
+        const int width = AV_CEIL_RSHIFT(frame.width, header.chromaShiftX);
+        const int height = AV_CEIL_RSHIFT(frame.height, header.chromaShiftY);
+        for (const int plane : {1, 2})
+            addPlane(out.bytes, frame, plane, width, height, bytes, bigEndian);
+    }
+    return std::move(out.bytes);
+}
+
+}  // namespace stx::video

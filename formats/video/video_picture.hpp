@@ -1,0 +1,39 @@
+#pragma once
+
+#include "formats/files/files.hpp"
+#include "formats/imagesets/yuv.hpp"
+#include "formats/video/wire.hpp"
+#include "lib/base/image.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx {
+
+/// A decoded picture of video as its decoder gave it.
+class VideoPicture {
+  public:
+    /// Of an answer of the process. Errors: sizes that are not what they say, or over the limits.
+    [[nodiscard]] static Result<VideoPicture> from(Bytes answer, const Limits& limits);
+
+    [[nodiscard]] int width() const { return header_.width; }
+    [[nodiscard]] int height() const { return header_.height; }
+    /// Of a sample of luma: 8 to 16.
+    [[nodiscard]] int bits() const { return header_.bits; }
+    /// Luma is there as it was coded; else the picture has colours only.
+    [[nodiscard]] bool hasLuma() const { return header_.rgba == 0; }
+    /// Its stream says that 16 (of 8 bits) is black; what holds depth should not.
+    [[nodiscard]] bool saysLimited() const { return header_.limitedSaid != 0; }
+
+    /// 8-bit colour by the matrix and the range that the stream tells; BT.601 below 720 lines and
+    /// BT.709 from there, of limited range (full where only luma is), where it does not.
+    [[nodiscard]] Result<Rgba8Image> colour(const Limits& limits) const;
+    /// The values of luma as they are, whatever range the stream tells. Needs hasLuma().
+    [[nodiscard]] Image<float> luma() const;
+    [[nodiscard]] std::vector<std::uint16_t> lumaCodes() const;
+
+  private:
+    video::PictureHeader header_;
+    Bytes bytes_;  ///< with the header in front
+};
+
+}  // namespace stx

@@ -1,0 +1,178 @@
+#pragma once
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+/// What is said between this process and the one that decodes video: a request and its answer, one
+/// after the other. Both ends are of one build and one machine, so values go as they are in memory.
+namespace stx::video {
+
+enum class Tag : std::uint32_t {
+    // Requests.
+    openFilm = 1,   ///< text: name of the container's reader
+    selectTrack,    ///< int32: a track of the film; reads through it once
+    seek,           ///< int64, int64: where to read on, in the track's ticks: seconds by dts, pts
+    step,           ///< int64: feed the next access unit of the track; the time that is wanted
+    openStream,     ///< int32 objectTypeIndication; bytes: the decoder's configuration
+    push,           ///< int64 time, int64 wanted, bytes: feed this access unit
+    end,            ///< int64 wanted: nothing comes after; gives what waits in the decoder
+    flush,          ///< forget what came so far
+    take,           ///< int64: the picture of that time, which is ready
+    openEncoder,    ///< EncoderRequest
+    encode,         ///< int32 encoder, int64 time, bytes: planes
+    finishEncoder,  ///< int32 encoder
+    // Answers.
+    film = 100,  ///< tracks, attachments
+    index,       ///< of a track
+    done,
+    ready,    ///< uint8: the track has ended; then the times of pictures that can be taken
+    picture,  ///< PictureHeader, then its samples
+    encoder,  ///< bytes: the decoder's configuration
+    coded,    ///< access units
+    failure,  ///< int32 ErrorCode, text
+};
+
+/// How the samples of a picture lie behind this header: planes Y, Cb, Cr from the top, without
+/// gaps, or 8-bit RGBA.
+struct PictureHeader {
+    std::int32_t width = 0, height = 0;
+    std::int32_t bits = 8;  ///< of a sample; above 8 in two bytes, little-endian
+    std::int32_t chromaShiftX = 0, chromaShiftY = 0;
+    std::uint8_t chroma = 0, chromaLeft = 0, bt601 = 0, fullRange = 0, rgba = 0;
+    std::uint8_t limitedSaid = 0;  ///< the stream itself says that its range is limited
+    std::uint8_t unused[2] = {};
+};
+
+struct EncoderRequest {
+    std::int32_t width = 0, height = 0;
+    std::int32_t bits = 8;        ///< 8 or 10
+    std::int32_t grey = 0;        ///< 1: luma alone; 0: 4:2:0
+    std::int32_t crf = -1;        ///< 0..51; -1: lossless
+    std::uint32_t timescale = 0;  ///< ticks a second
+    double rate = 25;             ///< pictures a second, on average
+};
+
+/// Puts values behind each other.
+class Packer {
+  public:
+    template <class T>
+    void put(const T& value) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        add(&value, sizeof(T));
+    }
+    void putBytes(std::span<const std::byte> from) {
+        put(static_cast<std::uint64_t>(from.size()));
+        add(from.data(), from.size());
+    }
+    void putText(std::string_view text) { putBytes(std::as_bytes(std::span(text))); }
+
+    /// Bytes without their number: the last of a message.
+    void add(const void* from, std::size_t size) {
+        const std::size_t at = bytes.size();
+        bytes.resize(at + size);
+        if (size > 0) std::memcpy(bytes.data() + at, from, size);
+    }
+
+    std::vector<std::byte> bytes;
+};
+
+/// Takes them apart again; what is not there is 0 or empty, and ok() false.
+class Unpacker {
+  public:
+    explicit Unpacker(std::span<const std::byte> bytes) : bytes_(bytes) {}
+    template <class T>
+    T get() {
+        static_assert(std::is_trivially_copyable_v<T>);
+        T value{};
+        if (bytes_.size() < sizeof(T)) {
+            ok_ = false;
+            return value;
+        }
+        std::memcpy(&value, bytes_.data(), sizeof(T));
+        bytes_ = bytes_.subspan(sizeof(T));
+        return value;
+    }
+    std::span<const std::byte> getBytes() {
+        const auto size = get<std::uint64_t>();
+        if (size > bytes_.size()) {
+            ok_ = false;
+            return {};
+        }
+        const auto out = bytes_.first(size);
+        bytes_ = bytes_.subspan(size);
+        return out;
+    }
+    std::string getText() {
+        const auto bytes = getBytes();
+        return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+    }
+    [[nodiscard]] bool ok() const { return ok_; }
+    [[nodiscard]] std::span<const std::byte> rest() const { return bytes_; }
+
+  private:
+    std::span<const std::byte> bytes_;
+    bool ok_ = true;
+};
+
+inline bool sendAll(int fd, const void* bytes, std::size_t size) {
+    const auto* from = static_cast<const char*>(bytes);
+    while (size > 0) {
+        const auto n = ::send(fd, from, size, MSG_NOSIGNAL);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return false;
+        from += n;
+        size -= static_cast<std::size_t>(n);
+    }
+    return true;
+}
+
+/// False at the end, an error, or when nothing comes for so many milliseconds (-1: waits on).
+inline bool receiveAll(int fd, void* bytes, std::size_t size, int patienceMs) {
+    auto* to = static_cast<char*>(bytes);
+    while (size > 0) {
+        pollfd ready = {fd, POLLIN, 0};
+        const int polled = ::poll(&ready, 1, patienceMs);
+        if (polled < 0 && errno == EINTR) continue;
+        if (polled <= 0) return false;
+        const auto n = ::read(fd, to, size);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return false;
+        to += n;
+        size -= static_cast<std::size_t>(n);
+    }
+    return true;
+}
+
+struct MessageHead {
+    Tag tag{};
+    std::uint32_t unused = 0;
+    std::uint64_t size = 0;
+};
+
+inline bool sendMessage(int fd, Tag tag, std::span<const std::byte> bytes = {}) {
+    const MessageHead head{tag, 0, bytes.size()};
+    return sendAll(fd, &head, sizeof(head)) && sendAll(fd, bytes.data(), bytes.size());
+}
+
+/// Messages of more than `most` bytes are refused.
+inline bool receiveMessage(int fd, Tag& tag, std::vector<std::byte>& bytes, std::uint64_t most,
+                           int patienceMs) {
+    MessageHead head;
+    if (!receiveAll(fd, &head, sizeof(head), patienceMs) || head.size > most) return false;
+    tag = head.tag;
+    bytes.resize(head.size);
+    return receiveAll(fd, bytes.data(), bytes.size(), patienceMs);
+}
+
+}  // namespace stx::video

@@ -1,0 +1,165 @@
+// Films as image sets: pairs of colour and depth, and Azure Kinect's recordings.
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "formats/imagesets/image_sets.hpp"
+#include "tests/ffmpeg.hpp"
+#include "tests/shared_data.hpp"
+#include "tests/unit/imagesets/set_writer.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kFrames = 8, kWidth = 32, kHeight = 24;
+
+/// colour.mp4 (lossless RGB cannot be: H.264 of high quality) and depth.mkv, 16-bit codes.
+void writeFilms(const TemporaryFolder& folder, const std::string& depthOptions = "",
+                const std::string& depthRate = "25") {
+    films::writePictures(folder.path(), kFrames, kWidth, kHeight);
+    films::writeCodes(folder / "codes.raw", kFrames, kWidth, kHeight, 4000);
+    films::ffmpeg(folder.path(),
+                  "-framerate 25 -i c%d.png -c:v libx264 -crf 4 -pix_fmt yuv444p -g 4 colour.mp4");
+    films::ffmpeg(folder.path(), fmt::format("-f rawvideo -pix_fmt gray16le -s {}x{} -r {} -i "
+                                             "codes.raw {} -c:v ffv1 depth.mkv",
+                                             kWidth, kHeight, depthRate, depthOptions));
+}
+
+std::string pose(double x, const std::string& more = "") {
+    return fmt::format("{{\"transform_matrix\":[[1,0,0,{}],[0,1,0,0],[0,0,1,0],[0,0,0,1]]{}}}", x,
+                       more);
+}
+
+std::filesystem::path writeCameras(const TemporaryFolder& folder, const std::string& frames,
+                                   const std::string& head = "\"integer_depth_scale\":0.001,") {
+    sets::writeText(folder / "camera.json",
+                    fmt::format("{{\"w\":{},\"h\":{},\"fl_x\":30,{}\"frames\":[{}]}}", kWidth,
+                                kHeight, head, frames));
+    return folder / "camera.json";
+}
+
+ImageSetOptions filmOptions() {
+    ImageSetOptions options;
+    options.texturePattern = "colour.mp4";
+    options.depthPattern = "depth.mkv";
+    return options;
+}
+
+TEST(FilmPairs, AreASetInTime) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    writeFilms(folder);
+    Job job;
+    const auto read = openImageSet(writeCameras(folder, pose(3)), filmOptions(), job);
+    ASSERT_TRUE(read) << read.error().text();
+    const Timeline& line = (*read)->timeline();
+    ASSERT_EQ(line.count(), std::size_t{kFrames});
+    EXPECT_NEAR(line.rate(), 25, 0.2);
+    for (const int k : {0, 5, 2, 7}) {
+        const auto bundle = (*read)->frame(static_cast<std::size_t>(k), job);
+        ASSERT_TRUE(bundle) << bundle.error().text();
+        ASSERT_EQ(bundle->views.size(), 1u);
+        const ReferenceView& view = bundle->views[0];
+        EXPECT_EQ(view.camera.position.x, 3);
+        EXPECT_EQ(view.camera.fx, 30);
+        const auto colours = films::picture(kWidth, kHeight, k);
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x) {
+                const int code = films::code(x, y, k, 4000);
+                ASSERT_EQ(hasPoint(view.depth.at(x, y)), code > 0) << x << ' ' << y;
+                if (code == 0) continue;
+                // 16 bits over the span of a frame.
+                ASSERT_NEAR(view.depth.at(x, y), code * 0.001, 4.0 / 65534);
+                const glm::ivec3 off = glm::abs(glm::ivec3(view.texture.rgba8()->at(x, y)) -
+                                                glm::ivec3(colours.at(x, y)));
+                ASSERT_LT(std::max({off.r, off.g, off.b}), 14) << x << ' ' << y << " of " << k;
+            }
+    }
+}
+
+TEST(FilmPairs, CamerasMoveByTheirTimes) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    writeFilms(folder);
+    Job job;
+    const auto set = writeCameras(folder, pose(1, ",\"time\":0") + "," + pose(2, ",\"time\":0.13"));
+    const auto read = openImageSet(set, filmOptions(), job);
+    ASSERT_TRUE(read) << read.error().text();
+    EXPECT_EQ((*read)->frame(1, job)->views[0].camera.position.x, 1);
+    EXPECT_EQ((*read)->frame(2, job)->views[0].camera.position.x, 2);
+    EXPECT_EQ((*read)->frame(7, job)->views[0].camera.position.x, 2);
+}
+
+TEST(FilmPairs, FramesAreMatchedByTime) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    // Half as many frames of depth: each has the colour of its time.
+    writeFilms(folder, "-frames:v 4", "12.5");
+    Job job;
+    const auto read = openImageSet(writeCameras(folder, pose(0)), filmOptions(), job);
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_EQ((*read)->timeline().count(), 4u);
+    const auto bundle = (*read)->frame(2, job);
+    ASSERT_TRUE(bundle);
+    const auto colours = films::picture(kWidth, kHeight, 4);
+    EXPECT_NEAR(bundle->views[0].texture.rgba8()->at(9, 9).b, colours.at(9, 9).b, 3);
+    EXPECT_NEAR(bundle->views[0].depth.at(9, 9), films::code(9, 9, 2, 4000) * 0.001, 1e-3);
+}
+
+TEST(FilmPairs, WhatIsMissingIsSaid) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    writeFilms(folder);
+    const auto errorOf = [&](const std::string& frames, const ImageSetOptions& options,
+                             const std::string& head = "") {
+        Job job;
+        const auto read = openImageSet(writeCameras(folder, frames, head), options, job);
+        EXPECT_FALSE(read);
+        return read ? std::string() : read.error().text();
+    };
+    EXPECT_NE(errorOf(pose(0), filmOptions()).find("--depth-unit"), std::string::npos);
+    EXPECT_NE(errorOf(pose(0) + "," + pose(1), filmOptions(), "\"integer_depth_scale\":1,")
+                  .find("2 cameras for 8 frames"),
+              std::string::npos);
+    auto options = filmOptions();
+    options.depthPattern.clear();
+    EXPECT_NE(errorOf(pose(0), options).find("films come in pairs"), std::string::npos);
+    options.depthPattern = "gone.mkv";
+    options.depthUnit = 1;
+    EXPECT_NE(errorOf(pose(0), options).find("'gone.mkv': there is no such film"),
+              std::string::npos);
+}
+
+TEST(AzureKinect, ColourIsWarpedToDepth) {
+    REQUIRE_SHARED(recording, "data/motion/azure-kinect/recording.mkv");
+    if (const auto video = videoModule(); !video.present) GTEST_SKIP() << video.reason;
+    Job job;
+    const auto read = openImageSet(recording, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_GE((*read)->timeline().count(), 2u);
+    const auto bundle = (*read)->frame(0, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    ASSERT_EQ(bundle->views.size(), 1u);
+    const ReferenceView& view = bundle->views[0];
+    // calibration.json: 0.49278 and 0.4929 of 1024 pixels; 0.51297 and 0.51692 less the crop.
+    EXPECT_EQ(view.camera.width, 640);
+    EXPECT_EQ(view.camera.height, 576);
+    EXPECT_NEAR(view.camera.fx, 504.608, 0.01);
+    EXPECT_NEAR(view.camera.fy, 504.733, 0.01);
+    EXPECT_NEAR(view.camera.cx, 333.281, 0.01);
+    EXPECT_NEAR(view.camera.cy, 349.330, 0.01);
+    // Most of the middle has depth and colour.
+    std::vector<float> depths;
+    for (int y = 200; y < 376; ++y)
+        for (int x = 220; x < 420; ++x)
+            if (hasPoint(view.depth.at(x, y))) depths.push_back(view.depth.at(x, y));
+    ASSERT_GT(depths.size(), 200u * 176u / 2);
+    std::nth_element(depths.begin(),
+                     depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
+    EXPECT_GT(depths[depths.size() / 2], 0.2f);
+    EXPECT_LT(depths[depths.size() / 2], 6.0f);
+}
+
+}  // namespace
+}  // namespace stx

@@ -1,0 +1,220 @@
+// Films: any picture at random, exact where the coding is, damage told. ffmpeg makes them.
+
+#include "formats/video/film.hpp"
+
+#include <fstream>
+#include <thread>
+
+#include "formats/video/video_frames.hpp"
+#include "tests/ffmpeg.hpp"
+#include "tests/temporary_folder.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kCount = 40, kWide = 48, kHigh = 32;
+/// Forwards, backwards, over groups of pictures and within them.
+constexpr int kOrder[] = {0, 1, 2, 17, 16, 3, 39, 38, 20, 21, 22, 0, 39, 13, 12, 11};
+
+std::unique_ptr<Film> openedFilm(const std::filesystem::path& path) {
+    auto film = Film::open(path, {});
+    EXPECT_TRUE(film) << film.error().text();
+    if (!film) return nullptr;
+    const auto chosen = (*film)->select((*film)->firstVideo());
+    EXPECT_TRUE(chosen) << chosen.error().text();
+    return chosen ? std::move(*film) : nullptr;
+}
+
+/// A coding of depth that loses nothing.
+struct DepthCoding {
+    const char* name;
+    const char* input;  ///< of the raw codes
+    int bits;
+    const char* arguments;
+    const char* file;
+};
+
+class LosslessDepth : public testing::TestWithParam<DepthCoding> {};
+
+TEST_P(LosslessDepth, ComesBackToTheBitInAnyOrder) {
+    REQUIRE_VIDEO();
+    const DepthCoding& coding = GetParam();
+    const TemporaryFolder folder;
+    const int largest = (1 << coding.bits) - 1;
+    films::writeCodes(folder / "codes.raw", kCount, kWide, kHigh, largest);
+    films::ffmpeg(folder.path(),
+                  fmt::format("-f rawvideo -pix_fmt {} -s {}x{} -r 25 -i codes.raw {} {}",
+                              coding.input, kWide, kHigh, coding.arguments, coding.file));
+    const auto film = openedFilm(folder / coding.file);
+    ASSERT_TRUE(film);
+    ASSERT_EQ(film->count(), kCount);
+    for (int k = 0; k < kCount; ++k)
+        EXPECT_NEAR(film->times()[static_cast<std::size_t>(k)], k / 25.0, 0.0011);
+    for (const int k : kOrder) {
+        const auto picture = film->picture(k);
+        ASSERT_TRUE(picture) << picture.error().text();
+        ASSERT_TRUE(picture->hasLuma());
+        EXPECT_EQ(picture->bits(), coding.bits);
+        const auto codes = picture->lumaCodes();
+        for (int y = 0; y < kHigh; ++y)
+            for (int x = 0; x < kWide; ++x)
+                ASSERT_EQ(codes[static_cast<std::size_t>(y) * kWide + static_cast<std::size_t>(x)],
+                          films::code(x, y, k, largest))
+                    << "frame " << k << ", pixel " << x << ' ' << y;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, LosslessDepth,
+    testing::Values(
+        DepthCoding{"ffv1_16", "gray16le", 16, "-c:v ffv1", "d.mkv"},
+        DepthCoding{"ffv1_avi", "gray16le", 16, "-c:v ffv1", "d.avi"},
+        DepthCoding{"big_endian", "gray16le", 16, "-c:v rawvideo -pix_fmt gray16be", "d.mkv"},
+        DepthCoding{"h264_8", "gray", 8, "-c:v libx264 -qp 0 -pix_fmt gray -g 15 -bf 3", "d.mp4"},
+        DepthCoding{"h264_10", "gray10le", 10, "-c:v libx264 -qp 0 -pix_fmt gray10le -g 15 -bf 3",
+                    "d.mkv"},
+        DepthCoding{"hevc_12", "gray12le", 12,
+                    "-c:v libx265 -x265-params lossless=1:keyint=10:log-level=none -pix_fmt "
+                    "gray12le",
+                    "d.mp4"}),
+    [](const auto& coding) { return std::string(coding.param.name); });
+
+/// Colour, against ffmpeg's own decoding, in order, of the same file.
+class ColourFilms : public testing::TestWithParam<std::pair<const char*, const char*>> {};
+
+TEST_P(ColourFilms, AreWhatFfmpegDecodes) {
+    REQUIRE_VIDEO();
+    const auto& [file, arguments] = GetParam();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), kCount, kWide, kHigh);
+    films::ffmpeg(folder.path(), fmt::format("-framerate 25 -i c%d.png {} {}", arguments, file));
+    films::ffmpeg(folder.path(), fmt::format("-i {} -vsync passthrough all.y4m", file));
+    Job job;
+    const auto film = openVideoFrames({folder / file}, job);
+    ASSERT_TRUE(film) << film.error().text();
+    const auto expected = openVideoFrames({folder / "all.y4m"}, job);
+    ASSERT_TRUE(expected) << expected.error().text();
+    ASSERT_EQ((*film)->count(), kCount);
+    ASSERT_EQ((*expected)->count(), kCount);
+    EXPECT_EQ((*film)->size(), glm::ivec2(kWide, kHigh));
+    EXPECT_EQ((*film)->name(7), "f_0007");
+    for (const int k : kOrder) {
+        const auto is = (*film)->frame(k);
+        ASSERT_TRUE(is) << is.error().text();
+        const auto wanted = (*expected)->frame(k);
+        ASSERT_TRUE(wanted);
+        for (std::size_t i = 0; i < (*is)->count(); ++i)
+            ASSERT_EQ((*is)->data()[i], (*wanted)->data()[i]) << "frame " << k << ", pixel " << i;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, ColourFilms,
+    testing::Values(
+        std::pair{"f.mp4", "-c:v libx264 -pix_fmt yuv420p -g 12 -bf 2"},
+        std::pair{"f.mkv", "-c:v libx264 -pix_fmt yuv420p -g 250 -bf 3"},
+        // Pictures after a key picture that are shown before it, and need those before it.
+        std::pair{"f.mov",
+                  "-c:v libx265 -pix_fmt yuv420p -x265-params "
+                  "open-gop=1:keyint=8:bframes=3:log-level=none -tag:v hvc1"},
+        std::pair{"f.avi", "-c:v mjpeg -q:v 3 -pix_fmt yuvj420p"},
+        std::pair{"f.webm", "-c:v libvpx -pix_fmt yuv420p"}),
+    [](const auto& coding) { return std::string(coding.param.first).substr(2); });
+
+TEST(Films, ThreadsGetTheSame) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writeCodes(folder / "codes.raw", kCount, kWide, kHigh, 255);
+    films::ffmpeg(folder.path(),
+                  fmt::format("-f rawvideo -pix_fmt gray -s {}x{} -r 25 -i codes.raw "
+                              "-c:v libx264 -qp 0 -pix_fmt gray d.mp4",
+                              kWide, kHigh));
+    const auto film = openedFilm(folder / "d.mp4");
+    ASSERT_TRUE(film);
+    std::vector<int> wrong(3, 0);
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 3; ++t)
+        threads.emplace_back([&, t] {
+            for (int k = t; k < kCount; k += 3) {
+                const auto picture = film->picture(k);
+                if (!picture || picture->lumaCodes()[5] != films::code(5, 0, k, 255))
+                    ++wrong[static_cast<std::size_t>(t)];
+            }
+        });
+    for (auto& thread : threads) thread.join();
+    EXPECT_EQ(wrong, std::vector<int>(3, 0));
+}
+
+TEST(Films, DamageIsOneSentence) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), kCount, kWide, kHigh);
+    for (const auto& [file, arguments] :
+         {std::pair{"f.mp4", "-c:v libx264 -pix_fmt yuv420p -movflags +faststart"},
+          std::pair{"f.mkv", "-c:v ffv1 -slicecrc 1"}}) {
+        films::ffmpeg(folder.path(), fmt::format("-i c%d.png {} {}", arguments, file));
+        const Bytes whole = *readFile(folder / file, {});
+        // Whatever is broken: a sentence of the file, or the picture; never a crash.
+        int errors = 0;
+        for (int trial = 0; trial < 24; ++trial) {
+            Bytes broken = whole;
+            if (trial % 3 == 0) {
+                broken.resize(whole.size() * static_cast<std::size_t>(trial + 1) / 25);
+            } else {
+                const std::size_t at = whole.size() * static_cast<std::size_t>(trial + 1) / 26;
+                for (std::size_t i = at; i < std::min(at + 40, whole.size()); ++i)
+                    broken[i] ^= std::byte{0x5a};
+            }
+            ASSERT_TRUE(writeFile(folder / "broken", broken));
+            std::optional<Error> error;
+            if (auto film = Film::open(folder / "broken", {}); !film) {
+                error = film.error();
+            } else if (auto chosen = (*film)->select((*film)->firstVideo()); !chosen) {
+                error = chosen.error();
+            } else {
+                for (int k = 0; k < (*film)->count() && !error; ++k)
+                    if (const auto picture = (*film)->picture(k); !picture) error = picture.error();
+            }
+            if (!error) continue;
+            ++errors;
+            EXPECT_TRUE(error->code == ErrorCode::invalidInput ||
+                        error->code == ErrorCode::unsupported)
+                << error->text();
+            EXPECT_NE(error->text().find("broken'"), std::string::npos) << error->text();
+            EXPECT_EQ(error->text().find('\n'), std::string::npos) << error->text();
+        }
+        EXPECT_GT(errors, 8) << file;
+    }
+}
+
+TEST(Films, ListsAndAddressesAreNoFilms) {
+    const TemporaryFolder folder;
+    for (const std::string_view text :
+         {"#EXTM3U\n/etc/passwd\n", "ffconcat version 1.0\nfile /etc/passwd\n",
+          "<?xml version='1.0'?><MPD></MPD>", "v=0\no=- 0 0 IN IP4 127.0.0.1\n"}) {
+        ASSERT_TRUE(writeFile(folder / "list.mp4", std::as_bytes(std::span(text))));
+        const auto film = Film::open(folder / "list.mp4", {});
+        ASSERT_FALSE(film);
+        EXPECT_EQ(film.error().code, ErrorCode::unsupported);
+        EXPECT_NE(film.error().text().find("no .mp4, .mov, .mkv"), std::string::npos);
+    }
+}
+
+TEST(Films, MemoryIsBounded) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::ffmpeg(folder.path(),
+                  "-f lavfi -i color=size=1024x1024:rate=5:duration=1 -c:v ffv1 f.mkv");
+    Limits limits;
+    limits.maxMemoryBytes = 1u << 20;
+    auto film = Film::open(folder / "f.mkv", limits);
+    if (film) {
+        const auto chosen = (*film)->select(0);
+        const auto picture = chosen ? (*film)->picture(0) : tl::unexpected(chosen.error());
+        ASSERT_FALSE(picture);
+        EXPECT_NE(picture.error().text().find("f.mkv'"), std::string::npos);
+    }
+}
+
+}  // namespace
+}  // namespace stx
