@@ -39,6 +39,7 @@ mpeg4::SceneWriteOptions mpeg4Scene(const SaveOptions& options) {
     }
     scene.pointTexture = options.pointTexture;
     scene.octreeLevels = options.octreeLevels;
+    scene.h264 = options.h264;
     return scene;
 }
 
@@ -55,7 +56,8 @@ Result<std::optional<Bundle>> convertDocument(const fs::path& input, const fs::p
     STX_TRY(const auto from, recognise(input));
     STX_TRY(const auto to, containerOf(target));
     if (from != FileKind::mpeg4 || to != FileKind::mpeg4 || changesDepth ||
-        options.jpegQuality != 0 || options.pointTexture || options.octreeLevels > 0)
+        options.jpegQuality != 0 || options.h264 >= 0 || options.pointTexture ||
+        options.octreeLevels > 0)
         return std::nullopt;
     STX_TRY(const auto document, readMpeg4(input, job));
     STX_CHECK(writeMpeg4(document, target, job, mpeg4Write(options)));

@@ -23,6 +23,8 @@ struct ConvertOptions {
     std::string output;
     std::shared_ptr<MeshViewOptions> mesh = std::make_shared<MeshViewOptions>();
     std::string colour = "png";
+    std::string video;
+    std::optional<int> crf;
     std::optional<int> quality;
     bool pointTexture = false;
     int octreeLevels = 0;
@@ -48,6 +50,7 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
+    if (!o.video.empty()) save.h264 = o.crf.value_or(18);
     save.pointTexture = o.pointTexture;
     save.octreeLevels = o.octreeLevels;
     save.bifsVersion = o.bifsVersion;
@@ -103,14 +106,25 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
 
 /// What was converted, for the summary and the report.
 struct Converted {
-    Bundle bundle;  ///< the first frame, without images where nobody needs them
+    std::size_t views = 0;
+    glm::ivec2 size{0};  ///< of the first view
+    std::int64_t points = 0;
     Timeline timeline;
 };
+
+Converted summaryOf(const Bundle& bundle, bool countPoints) {
+    Converted done;
+    done.views = bundle.views.size();
+    if (done.views > 0) done.size = {bundle.views[0].camera.width, bundle.views[0].camera.height};
+    if (countPoints) done.points = bundle.pointCount();
+    return done;
+}
 
 /// Frames in time, where the input has them and the target takes them; nothing otherwise.
 Result<std::optional<Converted>> convertSequence(const std::filesystem::path& input,
                                                  const std::filesystem::path& target,
-                                                 const ConvertOptions& o, Program& program) {
+                                                 const ConvertOptions& o, bool countPoints,
+                                                 Program& program) {
     if (!holdsSequences(target) || o.frameGiven || o.open.set.refinePoses) return std::nullopt;
     // A mesh, an atlas and one .exr stand still.
     if (o.open.set.from.empty()) {
@@ -124,8 +138,7 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     STX_TRY(auto frames, openSequence(input, open, program.job));
     const bool numbered = frameName(target.filename().string(), 0).has_value();
     if (!frames->timeline().moves() && !numbered) {
-        // What stands still is read once more, by the way that meshes and atlases take, too: no
-        // pixel has been read of an MPEG-4 file, and of a set the way is the same.
+        // What stands still goes the way that meshes and atlases take, too: no pixel has been read.
         (void)program.job.takeNotes();
         return std::nullopt;
     }
@@ -136,11 +149,14 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
         });
     noteUnused(input, false, o, program);
     Converted done;
-    done.timeline = frames->timeline();
-    Job quiet;
-    quiet.limits = program.job.limits;
-    STX_TRY(done.bundle, frames->frame(0, quiet));
+    const Timeline timeline = frames->timeline();
+    // The first frame is looked at when it passes.
+    frames = changed(std::move(frames), [&done, countPoints](Bundle& bundle, Job&) -> Result<void> {
+        if (done.views == 0) done = summaryOf(bundle, countPoints);
+        return {};
+    });
     STX_CHECK(saveSequence(*frames, target, saveOptions(o, program), program.job));
+    done.timeline = timeline;
     return done;
 }
 
@@ -152,30 +168,33 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     STX_CHECK(containerOf(target));
     // Only the report has the points, for which the images must be decoded.
     const bool countPoints = !program.common.report.empty();
-    std::optional<Bundle> bundle;
+    std::optional<Converted> done;
     std::error_code ec;
     // `name_%04d.exr` is not a file's name.
     if (std::filesystem::exists(input, ec) || !frameName(input.string(), 0)) {
-        STX_TRY(bundle, convertDocument(input, target, saveOptions(o, program),
-                                        o.mesh->depthBits.has_value(), countPoints, program.job));
+        STX_TRY(const auto passed,
+                convertDocument(input, target, saveOptions(o, program),
+                                o.mesh->depthBits.has_value(), countPoints, program.job));
+        if (passed) {
+            noteUnused(input, false, o, program);
+            done = summaryOf(*passed, countPoints);
+        }
     }
-    Timeline timeline;
-    if (bundle) {
-        noteUnused(input, false, o, program);
-    } else if (auto moving = convertSequence(input, target, o, program); !moving || *moving) {
-        if (!moving) return propagate(moving);
-        bundle = std::move((*moving)->bundle);
-        timeline = std::move((*moving)->timeline);
-    } else {
-        STX_TRY(bundle, makeBundle(input, o, program));
+    if (!done) {
+        STX_TRY(done, convertSequence(input, target, o, countPoints, program));
+    }
+    if (!done) {
+        STX_TRY(const auto bundle, makeBundle(input, o, program));
         STX_CHECK(program.job.checkCancelled());
-        STX_CHECK(saveBundle(*bundle, target, saveOptions(o, program), program.job));
+        STX_CHECK(saveBundle(bundle, target, saveOptions(o, program), program.job));
+        done = summaryOf(bundle, countPoints);
     }
-    const std::size_t views = bundle->views.size();
+    const Timeline& timeline = done->timeline;
+    if (!o.video.empty() && !timeline.moves())
+        program.job.note("--video is of films and not used: nothing moves");
     std::string sizes;
-    if (views > 0)
-        sizes = fmt::format(", {} {}x{}", counted(views, "view"), bundle->views[0].camera.width,
-                            bundle->views[0].camera.height);
+    if (done->views > 0)
+        sizes = fmt::format(", {} {}x{}", counted(done->views, "view"), done->size.x, done->size.y);
     if (timeline.moves())
         sizes += fmt::format(", {} over {:.4g} s", counted(timeline.count(), "frame"),
                              timeline.duration);
@@ -185,11 +204,10 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     program.say(fmt::format("{} ({}) → {} ({}){}, {}", input.filename().string(),
                             humanBytes(bytesOf(input)), target.filename().string(),
                             humanBytes(bytesOf(target)), sizes, humanSeconds(seconds)));
-    nlohmann::ordered_json entry{
-        {"input", input.string()},  {"output", target.string()},
-        {"status", "ok"},           {"exitCode", 0},
-        {"views", views},           {"points", countPoints ? bundle->pointCount() : 0},
-        {"bytes", bytesOf(target)}, {"seconds", seconds}};
+    nlohmann::ordered_json entry{{"input", input.string()},  {"output", target.string()},
+                                 {"status", "ok"},           {"exitCode", 0},
+                                 {"views", done->views},     {"points", done->points},
+                                 {"bytes", bytesOf(target)}, {"seconds", seconds}};
     if (timeline.moves()) {
         entry["frames"] = timeline.count();
         entry["duration"] = timeline.duration;
@@ -264,11 +282,16 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     o.frameGiven = !command.given({"--frame", "--frames"}).empty();
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
+    if (o.video.empty()) STX_CHECK(command.refuse({"--crf"}, "is of --video"));
+    if (!o.video.empty())
+        STX_CHECK(
+            command.refuse({"--point-texture", "--octree-image"}, "does not go with --video"));
     const auto container = containerOf(o.output);
     if (container && *container == FileKind::exr) {
         if (o.colour == "jpeg")
             STX_CHECK(command.refuse(
                 {"--colour"}, "jpeg is of MPEG-4 containers; .exr keeps colours as they are"));
+        STX_CHECK(command.refuse({"--video"}, "is of MPEG-4 containers, not of .exr"));
         STX_CHECK(command.refuse({"--point-texture"}, "is of MPEG-4 containers, not of .exr"));
     }
     if (!o.frames.empty()) return convertFrames(o, program);
@@ -310,6 +333,7 @@ void addConvert(CommandLine& line, Program& program) {
         "  stx convert model.glb -o model.mp4 --views sphere:16 --size 512x512\n"
         "  stx convert model.mp4 -o model.xmt\n"
         "  stx convert capture/transforms.json -o capture.exr\n"
+        "  stx convert camera.json --texture colour.mp4 --depth depth.mkv -o film.mp4\n"
         "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
     auto o = std::make_shared<ConvertOptions>();
     c.option("IN", o->inputs,
@@ -329,6 +353,14 @@ void addConvert(CommandLine& line, Program& program) {
         .oneOf({"png", "jpeg"})
         .group(coding);
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100).group(coding);
+    c.option("--video", o->video,
+             "h264: pictures of a film that change as video (MPEG-4; needs the module of video): "
+             "colour lossy, depth lossless in 8 or 10 bits (default: each picture exact)")
+        .oneOf({"h264"})
+        .group(coding);
+    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
+        .range(0, 51)
+        .group(coding);
     c.flag("--point-texture", o->pointTexture, "Write PointTexture nodes (MPEG-4)").group(coding);
     c.option("--octree-image", o->octreeLevels,
              "Write an OctreeImage (MPEG-4): 2^LEVELS voxels on a side, a picture for each view")
@@ -387,13 +419,19 @@ void addConvert(CommandLine& line, Program& program) {
             .group(sets);
     };
     auto& set = o->open.set;
-    numbers("--depth-range", "MIN,MAX", "What the depth of MSR 3D Video sets spans",
+    numbers("--depth-range", "MIN,MAX",
+            "What the depth of MSR 3D Video sets spans, and of films: normalised disparity",
             {&set.depthMin, &set.depthMax});
+    c.option("--depth-unit", set.depthUnit,
+             "Scene units of one step of a film's depth, as in 0.001 for millimetres (default: as "
+             "the cameras' file says)")
+        .positive()
+        .group(sets);
     numbers("--intrinsics", "FX,FY,CX,CY", "Of TUM and 7-Scenes recordings that do not hold them",
             {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
     c.option("--depth", set.depthPattern,
              "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
-             "likewise")
+             "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN")
         .takes("PATTERN")
         .group(sets);
     c.option("--mask", set.maskPattern,

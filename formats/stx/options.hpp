@@ -12,8 +12,11 @@ struct OpenOptions {
 };
 
 struct SaveOptions {
-    bool noClobber = false;     ///< error (io) when the target exists
-    int jpegQuality = 0;        ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
+    bool noClobber = false;  ///< error (io) when the target exists
+    int jpegQuality = 0;     ///< 0 = PNG, exact; 1..100 = colour as JPEG (MPEG-4, atlas folders)
+    /// MPEG-4 films: pictures that change as H.264 video, colour of this quality (0 best, 51
+    /// worst), depth lossless in 8 or 10 bits; -1: as PNG or JPEG pictures.
+    int h264 = -1;
     bool pointTexture = false;  ///< MPEG-4: PointTexture nodes instead of SimpleTexture
     int octreeLevels = 0;       ///< MPEG-4: an OctreeImage of 1..16 levels; 0 = none
     int bifsVersion = 0;  ///< MPEG-4: 1 or 2, of the scene's stream; 0 = as it is, 1 for new ones

@@ -72,6 +72,9 @@ struct SceneWriteOptions {
     bool pointTexture = false;
     /// OctreeImage of so many levels instead of depth images, see octree_write.hpp; 0: none.
     int octreeLevels = 0;
+    /// Of sequences: pictures that change become H.264 video, colour of this quality (0..51), depth
+    /// lossless in 8 or 10 bits; -1: PNG or JPEG pictures.
+    int h264 = -1;
     /// Range of each view's splats in scene units, of a sequence whose frames share it; empty or 0:
     /// the largest that the view has.
     std::vector<float> splatRanges;

@@ -4,10 +4,14 @@
 #include <array>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/mapping/texture_images.hpp"
+#include "formats/mpeg4/mapping/video_write.hpp"
 #include "formats/mpeg4/mapping/view_images.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/model/same_pictures.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -28,13 +32,23 @@ const Bytes& imageOf(const ViewImages& images, std::size_t role) {
     return *all[role];
 }
 
+/// Whether two frames of a view are coded alike: the lens counts, too, as pictures are padded by
+/// it.
+bool codedAlike(const ReferenceView& a, const ReferenceView& b) {
+    const Camera &c = a.camera, &d = b.camera;
+    return c.orthographic == d.orthographic && c.fx == d.fx && c.fy == d.fy && c.cx == d.cx &&
+           c.cy == d.cy && samePictures(a, b);
+}
+
 /// A view on its way into the document.
 struct ViewTrack {
     NodePtr node;  ///< the DepthImage that is shown now
     Camera camera;
+    ReferenceView before;  ///< of the frame before
     std::array<ElementaryStream*, kRoles.size()> streams{};
     std::array<Bytes, kRoles.size()> last;
     std::array<bool, kRoles.size()> changed{};
+    std::array<int, 2> video{-1, -1};  ///< of colour and depth in H.264: VideoStreams' number
 };
 
 class SequenceWriter {
@@ -56,7 +70,7 @@ class SequenceWriter {
             job_.progress(static_cast<std::int64_t>(count + i),
                           static_cast<std::int64_t>(2 * count), "writing frames");
             STX_CHECK(job_.checkCancelled());
-            STX_TRY(const auto bundle, frame(i));
+            STX_TRY(auto bundle, frame(i));
             if (auto done = add(bundle, i); !done)
                 return tl::unexpected(done.error().at(placeOf(i)));
         }
@@ -132,10 +146,11 @@ class SequenceWriter {
         if (range.normals != view.hasNormals() || range.splats != view.hasSplats())
             return fail(ErrorCode::unsupported,
                         "normals or splats are there in some frames only; bake all or none");
-        if (view.pruned && options_.texture == SceneWriteOptions::Texture::jpeg)
+        if (view.pruned && (asVideo() || options_.texture == SceneWriteOptions::Texture::jpeg))
             return fail(ErrorCode::unsupported,
                         "a pruned view that moves keeps its mark in the alpha of its colour, "
-                        "which JPEG does not have; use PNG");
+                        "which {} does not have; use PNG",
+                        asVideo() ? "H.264" : "JPEG");
         range.nearPlane = std::min(range.nearPlane, view.nearPlane);
         range.farPlane = std::max(range.farPlane, view.farPlane);
         range.depthBits = std::max(range.depthBits, view.depthBits);
@@ -154,6 +169,11 @@ class SequenceWriter {
         STX_TRY(document_, sceneFromBundle(bundle, options, job_));
         scale_ = frames_.timeline().timescale();
         document_.sceneStream.timescale = scale_;
+        const Timeline& timeline = frames_.timeline();
+        const double span = timeline.times.back() - timeline.times.front();
+        video_.emplace(options_.h264,
+                       span > 0 ? static_cast<double>(timeline.count() - 1) / span : 25.0,
+                       job_.limits, [this](const Bytes& bytes) { return spool_.add(bytes); });
         std::map<int, ElementaryStream*> streams;
         for (OdFrame& odFrame : document_.odFrames)
             for (OdCommand& command : odFrame.commands)
@@ -183,15 +203,30 @@ class SequenceWriter {
             tracks_.push_back(std::move(track));
         }
         first_ = headersOf(bundle);
+        for (std::size_t k = 0; k < tracks_.size(); ++k) {
+            if (asVideo()) {
+                auto images = imagesOf(bundle.views[k], k);
+                if (!images)
+                    return tl::unexpected(
+                        images.error().at(fmt::format("view '{}'", bundle.views[k].name)));
+                tracks_[k].last[0] = std::move(images->texture);
+                tracks_[k].last[1] = std::move(images->depth);
+                worstDepth_ = std::max(worstDepth_, images->worstDepth);
+            }
+            tracks_[k].before = std::move(bundle.views[k]);
+        }
         return {};
     }
 
-    Result<void> add(const Bundle& bundle, std::size_t index) {
+    Result<void> add(Bundle& bundle, std::size_t index) {
         STX_CHECK(checkSameViews(first_, bundle));
         std::vector<Result<ViewImages>> images(bundle.views.size());
         parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
             const auto k = static_cast<std::size_t>(i);
-            images[k] = encodeView(bundle.views[k], options_, job_.limits, ranges_[k].longestSplat);
+            // What stands still, as a background does, is coded once.
+            images[k] = codedAlike(bundle.views[k], tracks_[k].before)
+                            ? imagesAgain(tracks_[k], bundle.views[k])
+                            : imagesOf(bundle.views[k], k);
         });
         const std::uint64_t now = ticks(frames_.timeline().times[index]);
         for (std::size_t k = 0; k < images.size(); ++k) {
@@ -200,8 +235,45 @@ class SequenceWriter {
             if (!done)
                 return tl::unexpected(
                     done.error().at(fmt::format("view '{}'", bundle.views[k].name)));
+            tracks_[k].before = std::move(bundle.views[k]);
         }
         return {};
+    }
+
+    /// What the streams of a view get: files, or planes of what becomes video.
+    Result<ViewImages> imagesOf(const ReferenceView& view, std::size_t k) {
+        ViewImages images;
+        if (!asVideo() || isWrittenAsV2(view, options_)) {
+            STX_TRY(images, encodeView(view, options_, job_.limits, ranges_[k].longestSplat));
+        } else {
+            STX_TRY(images.padding,
+                    centringPadding(view.camera, std::min(job_.limits.maxImageSide, 65535)));
+        }
+        if (!asVideo()) return images;
+        const Node& node = *tracks_[k].node;
+        const int bits = videoDepthBits(writtenDepthBits(view, options_));
+        const DepthCode code{node.get<float>("nearPlane"), node.get<float>("farPlane"),
+                             (1u << bits) - 1};
+        STX_TRY(images.depth, depthPlane(view.depth, code, images.padding, images.worstDepth));
+        bool clamped = false;
+        const Rgba8Image colour = rgba8FromTexture(view.texture, clamped);
+        images.coverageLost = !alphaFollowsDepth(colour, view.depth);
+        images.texture = yuvPlanes(padded(colour, images.padding));
+        return images;
+    }
+    [[nodiscard]] bool asVideo() const { return options_.h264 >= 0; }
+
+    /// The images of the frame before, around a camera that may have moved.
+    Result<ViewImages> imagesAgain(const ViewTrack& track, const ReferenceView& view) const {
+        ViewImages images;
+        STX_TRY(images.padding,
+                centringPadding(view.camera, std::min(job_.limits.maxImageSide, 65535)));
+        images.texture = track.last[0];
+        images.depth = track.last[1];
+        images.normal = track.last[2];
+        images.splatU = track.last[3];
+        images.splatV = track.last[4];
+        return images;
     }
 
     Result<void> addView(ViewTrack& track, const ViewImages& images, const ReferenceView& view,
@@ -216,6 +288,10 @@ class SequenceWriter {
         for (std::size_t r = 0; any && r < kRoles.size(); ++r) {
             ElementaryStream* stream = track.streams[r];
             if (!stream) continue;
+            if (asVideo() && r < track.video.size()) {
+                STX_CHECK(addVideo(track, images, r, view, now));
+                continue;
+            }
             Sample sample;
             sample.time = now;
             sample.data = stream->samples.back().data;
@@ -227,6 +303,56 @@ class SequenceWriter {
         }
         if (view.camera == track.camera) return {};
         return moveCamera(track, images, view, now);
+    }
+
+    /// A picture of a stream that is video from its first change on; before, it may stay an image.
+    Result<void> addVideo(ViewTrack& track, const ViewImages& images, std::size_t r,
+                          const ReferenceView& view, std::uint64_t now) {
+        ElementaryStream& stream = *track.streams[r];
+        const Bytes& planes = imageOf(images, r);
+        int& number = track.video[r];
+        if (number < 0 && planes == track.last[r]) {
+            Sample again;
+            again.time = now;
+            again.data = stream.samples.back().data;
+            stream.samples.push_back(std::move(again));
+            return {};
+        }
+        if (number < 0) {
+            const auto before = std::move(stream.samples);
+            const Padding& p = images.padding;
+            STX_TRY(number,
+                    video_->begin(stream, view.camera.width + p.left + p.right,
+                                  view.camera.height + p.top + p.bottom, r == 1,
+                                  r == 1 ? videoDepthBits(writtenDepthBits(view, options_)) : 8));
+            for (const Sample& sample : before)
+                STX_CHECK(video_->add(number, sample.time, track.last[r]));
+        }
+        track.last[r] = planes;
+        worstDepth_ = std::max(worstDepth_, images.worstDepth);
+        coverageLost_ = coverageLost_ || images.coverageLost;
+        return video_->add(number, now, planes);
+    }
+
+    /// What H.264 loses.
+    void noteVideo() {
+        bool colour = false, depth = false;
+        for (const ViewTrack& track : tracks_) {
+            colour = colour || track.video[0] >= 0;
+            depth = depth || track.video[1] >= 0;
+        }
+        if (colour)
+            job_.note(
+                fmt::format("colour is H.264 of quality {} with half of its chroma, which is "
+                            "lossy",
+                            options_.h264));
+        if (colour && coverageLost_)
+            job_.note("H.264 has no alpha: soft edges of the coverage are lost");
+        if (depth)
+            job_.note(
+                fmt::format("depth that moves is lossless H.264 of 8 or 10 bits: at most "
+                            "{:.4g} scene units off",
+                            worstDepth_));
     }
 
     /// A new node in the old one's place. It has its name, and so its id: see assignNodeIds().
@@ -258,6 +384,8 @@ class SequenceWriter {
 
     /// Durations, and MovieTextures where a stream has become one.
     Result<void> finish() {
+        STX_CHECK(video_->finish());
+        if (asVideo()) noteVideo();
         STX_TRY(const ByteSource source, spool_.source());
         for (const ViewTrack& track : tracks_)
             for (ElementaryStream* stream : track.streams)
@@ -302,6 +430,9 @@ class SequenceWriter {
     Bundle first_;  ///< names and cameras
     std::vector<ViewTrack> tracks_;
     std::uint32_t scale_ = 1000;
+    std::optional<VideoStreams> video_;
+    double worstDepth_ = 0;
+    bool coverageLost_ = false;
 };
 
 }  // namespace

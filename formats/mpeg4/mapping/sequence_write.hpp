@@ -35,9 +35,10 @@ class PictureSpool {
 /// changes are replaced by commands (REPLACE of the DepthImage, which keeps its id). One depth
 /// range and one range of splats serve a view for the whole sequence, so that what stands still
 /// keeps its codes; every frame is read twice for it. A picture that repeats the one before it
-/// lasts longer, colour and depth of a view alike. Errors: those of sceneFromBundle() and of the
-/// frames, with the frame's time; (unsupported) PointTexture and OctreeImage, which cannot move,
-/// and JPEG colour of pruned views; (invalidInput) views that come, go or change their size.
+/// lasts longer, colour and depth of a view alike. With options.h264 colour and depth that change
+/// are H.264 tracks of full range in place of pictures. Errors: those of sceneFromBundle() and of
+/// the frames, with the frame's time; (unsupported) PointTexture and OctreeImage, which cannot
+/// move, and JPEG colour of pruned views; (invalidInput) views that come, go or change their size.
 [[nodiscard]] Result<Document> sceneFromSequence(Sequence& frames, const SceneWriteOptions& options,
                                                  PictureSpool& spool, Job& job);
 

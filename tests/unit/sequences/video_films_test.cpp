@@ -1,0 +1,215 @@
+// Films of MPEG-4 whose pictures are video: other software's are read, ours are written and read.
+
+#include <set>
+
+#include "formats/files/files.hpp"
+#include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
+#include "formats/sequences.hpp"
+#include "tests/ffmpeg.hpp"
+#include "tests/shared_data.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/sequences/moving_views.hpp"
+
+namespace stx {
+namespace {
+
+/// 16-bit values, little-endian, that ffmpeg decodes: luma as it is coded.
+std::vector<std::uint16_t> rawFrames(const TemporaryFolder& folder, const std::string& input,
+                                     int track, const std::string& pixels, std::size_t frameBytes,
+                                     std::size_t lumaCount, std::size_t frame) {
+    films::ffmpeg(folder.path(),
+                  fmt::format("-i '{}' -map 0:{} -vsync passthrough -f rawvideo -pix_fmt {} raw",
+                              input, track, pixels));
+    const auto bytes = readFile(folder / "raw", {});
+    EXPECT_TRUE(bytes);
+    std::vector<std::uint16_t> out(lumaCount);
+    EXPECT_GE(bytes->size(), (frame + 1) * frameBytes);
+    std::memcpy(out.data(), bytes->data() + frame * frameBytes, lumaCount * 2);
+    return out;
+}
+
+TEST(VideoFilms, OtherSoftwaresH264IsReadAsFfmpegReadsIt) {
+    REQUIRE_SHARED(file, "reference/motion/avc.mp4");
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    Job job;
+    const auto read = openSequence(file, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    // Of a second and a half there are moments of pictures, commands and the interpolator.
+    const auto document = readMpeg4(file, job);
+    ASSERT_TRUE(document);
+    const auto path = std::filesystem::absolute(file).string();
+    for (const std::size_t frame : {std::size_t{0}, std::size_t{7}, std::size_t{3}}) {
+        const std::size_t moment = (*read)->timeline().frameAt(static_cast<double>(frame) / 25.0);
+        const auto bundle = (*read)->frame(moment, job);
+        ASSERT_TRUE(bundle) << bundle.error().text();
+        ASSERT_EQ(bundle->views.size(), 1u);
+        const ReferenceView& view = bundle->views[0];
+        ASSERT_EQ(view.depth.size(), glm::ivec2(64, 48));
+        const auto codes = rawFrames(folder, path, 3, "yuv420p10le", 64 * 48 * 3, 64 * 48, frame);
+        const DepthCode code{1, 5, 1023};
+        int points = 0;
+        for (std::size_t i = 0; i < codes.size(); ++i) {
+            ASSERT_EQ(hasPoint(view.depth.data()[i]), codes[i] > 0) << i;
+            if (codes[i] == 0) continue;
+            ++points;
+            ASSERT_NEAR(view.depth.data()[i], code.decode(codes[i]), 1e-5) << i;
+        }
+        EXPECT_GT(points, 100);
+    }
+}
+
+TEST(VideoFilms, HevcDepthIsRead) {
+    REQUIRE_SHARED(file, "reference/motion/hevc.mp4");
+    REQUIRE_VIDEO();
+    Job job;
+    const auto read = openSequence(file, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const auto first = (*read)->frame(0, job);
+    ASSERT_TRUE(first) << first.error().text();
+    EXPECT_GT(first->pointCount(), 100);
+}
+
+TEST(VideoFilms, ReadInAnyOrderIsTheSame) {
+    REQUIRE_SHARED(file, "reference/motion/m4v.mp4");
+    REQUIRE_VIDEO();
+    Job job;
+    const auto read = openSequence(file, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const auto again = openSequence(file, {}, job);
+    ASSERT_TRUE(again);
+    const std::size_t count = (*read)->timeline().count();
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto forwards = (*read)->frame(i, job);
+        ASSERT_TRUE(forwards) << forwards.error().text();
+        const auto backwards = (*again)->frame(count - 1 - i, job);
+        ASSERT_TRUE(backwards) << backwards.error().text();
+        const auto same = (*again)->frame(i, job);
+        ASSERT_TRUE(same);
+        expectSameFrame(*same, *forwards);
+    }
+}
+
+/// Frames of MovingViews, saved with H.264 and opened again.
+struct Written {
+    TemporaryFolder folder{"video"};
+    std::filesystem::path path = folder / "a.mp4";
+    MovingViews frames;
+    std::vector<std::string> notes;
+
+    explicit Written(int count, int crf = 6) : frames(count) {
+        Job job;
+        SaveOptions save;
+        save.h264 = crf;
+        const auto done = saveSequence(frames, path, save, job);
+        EXPECT_TRUE(done) << done.error().text();
+        notes = job.takeNotes();
+    }
+};
+
+TEST(VideoFilms, WrittenDepthIsExactToItsBits) {
+    REQUIRE_VIDEO();
+    Written film(30);
+    Job job;
+    const auto read = openSequence(film.path, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    ASSERT_EQ((*read)->timeline().count(), 30u);
+    EXPECT_NEAR((*read)->timeline().rate(), 25, 1e-6);
+    for (const std::size_t k : {std::size_t{0}, std::size_t{29}, std::size_t{4}}) {
+        const auto is = (*read)->frame(k, job);
+        ASSERT_TRUE(is) << is.error().text();
+        const auto expected = film.frames.frame(k, job);
+        const ReferenceView& a = is->views[0];
+        const ReferenceView& b = expected->views[0];
+        const DepthCode code{b.nearPlane, b.farPlane, 1023};
+        for (std::size_t i = 0; i < a.depth.count(); ++i) {
+            const float db = b.depth.data()[i];
+            ASSERT_EQ(hasPoint(a.depth.data()[i]), hasPoint(db)) << i;
+            if (!hasPoint(db)) continue;
+            ASSERT_NEAR(a.depth.data()[i], code.decode(code.encode(db)), 1e-5) << i;
+        }
+        // The second view stands still: pictures, exact.
+        ASSERT_EQ(*is->views[1].texture.rgba8(), *expected->views[1].texture.rgba8());
+    }
+    const auto said = [&](const char* part) {
+        return std::ranges::any_of(film.notes, [&](const std::string& note) {
+            return note.find(part) != std::string::npos;
+        });
+    };
+    EXPECT_TRUE(said("colour is H.264 of quality 6"));
+    EXPECT_TRUE(said("lossless H.264 of 8 or 10 bits"));
+}
+
+TEST(VideoFilms, FfmpegReadsWhatWeWrite) {
+    REQUIRE_VIDEO();
+    Written film(30);
+    Job job;
+    // Track 1 and 2 are the scene and its descriptors: 0 and 1 of ffmpeg's count.
+    const auto expected = film.frames.frame(17, job);
+    const ReferenceView& view = expected->views[0];
+    const auto codes = rawFrames(film.folder, "a.mp4", 3, "yuv420p10le", 24 * 16 * 3, 24 * 16, 17);
+    const DepthCode code{view.nearPlane, view.farPlane, 1023};
+    for (std::size_t i = 0; i < codes.size(); ++i)
+        ASSERT_EQ(codes[i], code.encode(view.depth.data()[i])) << i;
+    const std::string probe =
+        "cd '" + film.folder.path().string() +
+        "' && ffprobe -v error -select_streams v -show_entries "
+        "stream=codec_name,color_range,nb_frames,profile -of csv=p=0 a.mp4 > tracks.txt";
+    ASSERT_EQ(std::system(probe.c_str()), 0);
+    const auto text = *readFile(film.folder / "tracks.txt", {});
+    const std::string tracks(reinterpret_cast<const char*>(text.data()), text.size());
+    EXPECT_NE(tracks.find("h264,High,pc,30"), std::string::npos) << tracks;
+    EXPECT_NE(tracks.find("h264,High 4:4:4 Predictive,pc,30"), std::string::npos) << tracks;
+}
+
+TEST(VideoFilms, TheSameBytesAgain) {
+    REQUIRE_VIDEO();
+    Written a(12), b(12);
+    EXPECT_EQ(*readFile(a.path, {}), *readFile(b.path, {}));
+}
+
+TEST(VideoFilms, PassThroughTexts) {
+    REQUIRE_VIDEO();
+    Written film(6);
+    Job job;
+    for (const char* text : {"t.bt", "t.xmt"}) {
+        auto document = readMpeg4(film.path, job);
+        ASSERT_TRUE(document);
+        ASSERT_TRUE(writeMpeg4(*document, film.folder / text, job));
+        const auto read = openSequence(film.folder / text, {}, job);
+        ASSERT_TRUE(read) << read.error().text();
+        const auto is = (*read)->frame(3, job);
+        ASSERT_TRUE(is) << is.error().text();
+        const auto direct = openSequence(film.path, {}, job);
+        expectSameFrame(*is, *(*direct)->frame(3, job));
+    }
+}
+
+TEST(VideoFilms, OddSidesAreSaid) {
+    REQUIRE_VIDEO();
+    class Odd : public MovingViews {
+      public:
+        using MovingViews::MovingViews;
+        Result<Bundle> frame(std::size_t index, Job& job) override {
+            auto bundle = MovingViews::frame(index, job);
+            ReferenceView view = mpeg4::makeView(25, 16, 16, 1);
+            view.depth.at(1, 0) = 3.0f + static_cast<float>(index);
+            bundle->views[0] = std::move(view);
+            return bundle;
+        }
+    };
+    const TemporaryFolder folder;
+    Odd frames(3);
+    Job job;
+    SaveOptions save;
+    save.h264 = 20;
+    const auto done = saveSequence(frames, folder / "a.mp4", save, job);
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().code, ErrorCode::unsupported);
+    EXPECT_NE(done.error().text().find("25x16"), std::string::npos) << done.error().text();
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.mp4"));
+}
+
+}  // namespace
+}  // namespace stx
