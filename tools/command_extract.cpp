@@ -1,11 +1,12 @@
 #include <chrono>
+#include <cmath>
 
 #include <nlohmann/json.hpp>
 
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/meshes/meshes.hpp"
-#include "formats/open.hpp"
+#include "formats/sequences.hpp"
 #include "lib/base/parallel.hpp"
 #include "tools/commands.hpp"
 
@@ -16,6 +17,7 @@ struct ExtractOptions {
     std::string input, output;
     std::string cameras = "transforms";
     std::string depth = "exr";
+    std::optional<double> time;
     PointWriteOptions points;
 };
 
@@ -53,6 +55,18 @@ Points pointsOf(const Bundle& bundle) {
     return out;
 }
 
+/// The frame that is meant: points are of one moment.
+Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
+                             bool points, const std::string& input) {
+    if (time && !(*time >= 0 && std::isfinite(*time)))
+        return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *time);
+    if (points && !time && timeline.moves())
+        return fail(ErrorCode::usage,
+                    "'{}' has {} frames, and points are of one moment; give --time T, in seconds",
+                    input, timeline.count());
+    return timeline.frameAt(time.value_or(0));
+}
+
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     ExtractOptions o = options;
@@ -73,9 +87,16 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
-    STX_TRY(const auto bundle, openBundle(o.input, {}, program.job));
+    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    const Timeline timeline = frames->timeline();
+    STX_TRY(const std::size_t moment, momentOf(o.time, timeline, points, o.input));
     std::string what;
+    std::size_t views = 0;
+    std::int64_t pointCount = 0;
     if (points) {
+        STX_TRY(const auto bundle, frames->frame(moment, program.job));
+        views = bundle.views.size();
+        pointCount = bundle.pointCount();
         STX_CHECK(program.job.limits.checkAllocation(
             static_cast<std::uint64_t>(bundle.pointCount()), 28, "the points"));
         const auto found = pointsOf(bundle);
@@ -95,8 +116,18 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
                                              : ExportOptions::Kind::transforms;
         write.noClobber = program.common.noClobber;
         write.floatDepth = o.depth == "exr";
-        STX_CHECK(exportImages(bundle, o.output, write, program.job));
-        what = counted(bundle.views.size(), "view");
+        if (timeline.moves() && o.time) {
+            STX_TRY(frames, someFrames(std::move(frames), {moment}));
+        }
+        const std::size_t count = frames->timeline().count();
+        frames = changed(std::move(frames), [&](Bundle& bundle, Job&) -> Result<void> {
+            if (views == 0) pointCount = bundle.pointCount();
+            views = bundle.views.size();
+            return {};
+        });
+        STX_CHECK(exportFrames(*frames, o.output, write, program.job));
+        what = counted(views, "view");
+        if (count > 1) what += " of " + counted(count, "frame");
     }
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -108,8 +139,8 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     STX_CHECK(program.writeReport({{"$schema", "extract-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
-                                   {"views", bundle.views.size()},
-                                   {"points", bundle.pointCount()},
+                                   {"views", views},
+                                   {"points", pointCount},
                                    {"seconds", seconds}}));
     return 0;
 }
@@ -122,9 +153,10 @@ void addExtract(CommandLine& line, Program& program) {
                  "Images and cameras of a bundle as plain files, or its points as .ply or .drc\n\n"
                  "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
                  "  stx extract model.mp4 -o folder --cameras miv\n"
+                 "  stx extract film.mp4 -o folder            all frames, with their times\n"
                  "  stx extract model.mp4 -o points.ply");
     auto o = std::make_shared<ExtractOptions>();
-    c.option("BUNDLE", o->input, "Bundle or atlas").required();
+    c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
     c.option("-o,--output", o->output, "Folder, points.ply or points.drc").required().takes("OUT");
     c.option(
          "--cameras", o->cameras,
@@ -134,6 +166,8 @@ void addExtract(CommandLine& line, Program& program) {
     c.option("--depth", o->depth,
              "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
         .oneOf({"exr", "png"});
+    c.option("--time", o->time, "Of a film: the moment, in seconds from its start (default: all)")
+        .takes("T");
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.sharedOptions(program.common, kOutput | kOutside);

@@ -4,8 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/atlas/atlas_files.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
-#include "formats/open.hpp"
+#include "formats/sequences.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/quality/prune_quality.hpp"
 #include "tools/commands.hpp"
@@ -20,6 +21,7 @@ struct PackOptions {
     std::string budget;
     PruneSettings pruning;
     double minPsnr = 0;
+    std::optional<double> time;
     std::string colour = "png";
     std::optional<int> quality;
 };
@@ -56,19 +58,15 @@ Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std
     return smaller;
 }
 
-Result<int> packBundle(const PackOptions& options, Program& program) {
-    PackOptions o = options;
-    STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
+/// One bundle into one atlas.
+Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, Program& program) {
     const auto start = std::chrono::steady_clock::now();
-    if (o.quality && o.colour != "jpeg")
-        return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
-    STX_CHECK(checkTarget(o.output, program));
-    preloadCodecs(o.input);
     PruneSettings pruning = o.pruning;
     if (!o.budget.empty()) {
         STX_TRY(pruning.budget, parsePixels(o.budget));
     }
-    STX_TRY(auto bundle, openBundle(o.input, {}, program.job));
+    if (!opened) return propagate(opened);
+    Bundle bundle = std::move(*opened);
     PackSettings settings = o.settings;
     std::string pruned;
     if (o.prune || pruning.budget > 0 || o.minPsnr > 0) {
@@ -112,6 +110,44 @@ Result<int> packBundle(const PackOptions& options, Program& program) {
     return 0;
 }
 
+/// An atlas holds one moment: that of --time, or one atlas for each frame.
+Result<int> packInput(const PackOptions& options, Program& program) {
+    PackOptions o = options;
+    STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
+    if (o.quality && o.colour != "jpeg")
+        return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
+    if (o.time && !(*o.time >= 0 && std::isfinite(*o.time)))
+        return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *o.time);
+    STX_CHECK(checkTarget(o.output, program));
+    preloadCodecs(o.input);
+    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    const Timeline timeline = frames->timeline();
+    const std::size_t count = timeline.count();
+    const bool numbered = frameName(o.output, 0).has_value();
+    if (o.time || !numbered) {
+        if (!o.time && timeline.moves())
+            return fail(ErrorCode::usage,
+                        "'{}' has {} frames, and an atlas holds one; give --time T, in seconds, or "
+                        "a numbered name for one atlas each, as in -o 'atlas_%04d'",
+                        o.input, count);
+        return packBundle(o, frames->frame(timeline.frameAt(o.time.value_or(0)), program.job),
+                          program);
+    }
+    if (!program.common.report.empty() && count > 1)
+        return fail(ErrorCode::usage,
+                    "--report is of one atlas, and {} are made; give --time T for one", count);
+    // By default equal cells in the order of the views: the same places in all atlases.
+    for (std::size_t i = 0; i < count; ++i) {
+        STX_CHECK(program.job.checkCancelled());
+        PackOptions one = o;
+        one.output = *frameName(o.output, static_cast<int>(i));
+        STX_CHECK(checkTarget(one.output, program));
+        STX_TRY(const int done, packBundle(one, frames->frame(i, program.job), program));
+        if (done != 0) return done;
+    }
+    return 0;
+}
+
 }  // namespace
 
 void addPack(CommandLine& line, Program& program) {
@@ -119,10 +155,15 @@ void addPack(CommandLine& line, Program& program) {
         "pack",
         "Merge the reference views into at most 4 textures: colour, depth, normal, splat\n\n"
         "  stx pack model.exr -o atlas           a folder: atlas.json and images\n"
+        "  stx pack film.mp4 -o 'atlas_%04d'     an atlas for each frame\n"
         "  stx pack model.exr -o atlas.exr --layout tight");
     auto o = std::make_shared<PackOptions>();
-    c.option("BUNDLE", o->input, "Bundle to pack").required();
-    c.option("-o,--output", o->output, "Folder, or one .exr file").required().takes("ATLAS");
+    c.option("BUNDLE", o->input, "Bundle or film to pack").required();
+    c.option("-o,--output", o->output, "Folder, or one .exr file; of a film a numbered name")
+        .required()
+        .takes("ATLAS");
+    c.option("--time", o->time, "Of a film: the moment to pack, in seconds from its start")
+        .takes("T");
     c.choice<PackSettings::Layout>(
         "--layout", o->settings.layout,
         {{"grid", PackSettings::Layout::grid}, {"tight", PackSettings::Layout::tight}},
@@ -153,7 +194,7 @@ void addPack(CommandLine& line, Program& program) {
         .range(0.0, 200.0)
         .group(pruning);
     c.sharedOptions(program.common, kOutput | kOutside);
-    c.runs([o](Program& p) { return packBundle(*o, p); });
+    c.runs([o](Program& p) { return packInput(*o, p); });
 }
 
 }  // namespace stx::tools

@@ -6,6 +6,7 @@
 #include "formats/images/images.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
+#include "formats/sequences.hpp"
 #include "lib/selection/selection.hpp"
 #include "tools/commands.hpp"
 #include "tools/mesh_views.hpp"
@@ -59,21 +60,79 @@ Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, const Com
     return 0;
 }
 
+/// Moments of a film that are looked at.
+constexpr std::size_t kMoments = 8;
+
+/// The bundle; of a film, that of the moment in which most is seen, of a few.
+Result<Bundle> momentWithMost(Sequence& frames, Job& job) {
+    STX_TRY(auto best, frames.frame(0, job));
+    const Timeline& timeline = frames.timeline();
+    const std::size_t count = std::min(timeline.count(), kMoments);
+    std::int64_t most = best.pointCount();
+    for (std::size_t i = 1; i < count; ++i) {
+        STX_CHECK(job.checkCancelled());
+        Job quiet;
+        quiet.limits = job.limits;
+        STX_TRY(auto bundle, frames.frame(i * (timeline.count() - 1) / (count - 1), quiet));
+        if (bundle.pointCount() <= most) continue;
+        most = bundle.pointCount();
+        best = std::move(bundle);
+    }
+    if (timeline.moves())
+        job.note(
+            fmt::format("views are chosen by what they see at {:.4g} s", best.time.value_or(0)));
+    return best;
+}
+
+/// Chooses among the views; those of the background, which show what no other view does, stay.
+Result<Selection> selectInFront(const Bundle& bundle, const SelectSettings& settings, Job& job) {
+    std::vector<int> numbers, behind;
+    for (std::size_t i = 0; i < bundle.views.size(); ++i)
+        (bundle.views[i].background ? behind : numbers).push_back(static_cast<int>(i));
+    if (behind.empty() || numbers.empty()) return selectViews(bundle, settings, job);
+    STX_TRY(auto selection, selectViews(keepViews(bundle, numbers), settings, job));
+    for (int& view : selection.views) view = numbers[static_cast<std::size_t>(view)];
+    selection.views.insert(selection.views.end(), behind.begin(), behind.end());
+    return selection;
+}
+
 Result<int> select(const SelectOptions& o, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
-    STX_TRY(auto opened, openRenderable(o.input, {}, program.job));
-    if (const auto* mesh = std::get_if<Mesh>(&opened))
-        return selectAroundMesh(*mesh, o, command, program);
-    const auto& bundle = std::get<Bundle>(opened);
+    const auto kind = recognise(o.input);
+    if (kind && *kind == FileKind::mesh) {
+        STX_TRY(const auto opened, openRenderable(o.input, {}, program.job));
+        return selectAroundMesh(std::get<Mesh>(opened), o, command, program);
+    }
+    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    const Timeline timeline = frames->timeline();
+    if (timeline.moves() && !holdsSequences(o.output))
+        return fail(
+            ErrorCode::usage,
+            "'{}' has {} frames, and '{}' holds one; .mp4, .xmt, .bt and a numbered name as "
+            "in name_%04d.exr hold more",
+            o.input, timeline.count(), o.output);
+    STX_TRY(auto bundle, momentWithMost(*frames, program.job));
     SelectSettings settings = o.settings;
     settings.share = o.sharePercent.value_or(settings.count > 0 ? 100.0 : 95.0) / 100.0;
-    STX_TRY(const auto selection, selectViews(bundle, settings, program.job));
+    STX_TRY(const auto selection, selectInFront(bundle, settings, program.job));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
-    STX_CHECK(saveBundle(keepViews(bundle, selection.views), o.output, save, program.job));
+    const std::size_t of = bundle.views.size();
+    if (timeline.moves()) {
+        bundle = {};
+        frames = changed(std::move(frames), [&](Bundle& frame, Job&) -> Result<void> {
+            const auto time = frame.time;
+            frame = keepViews(frame, selection.views);
+            frame.time = time;
+            return {};
+        });
+        STX_CHECK(saveSequence(*frames, o.output, save, program.job));
+    } else {
+        STX_CHECK(saveBundle(keepViews(bundle, selection.views), o.output, save, program.job));
+    }
     if (!o.plot.empty()) {
         const std::string svg =
             selectionPlotSvg(selection, std::filesystem::path(o.input).filename().string());
@@ -87,14 +146,14 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
         "{} → {}, {} of {} views, {:.1f} % of the quality of all, at least {:.1f} % of the best "
         "possible "
         "choice; they see {:.1f} % of the surface, all see {:.1f} %; {}",
-        std::filesystem::path(o.input).filename().string(), o.output, selection.views.size(),
-        bundle.views.size(), quality * 100, selection.certificate * 100, selection.coverage * 100,
+        std::filesystem::path(o.input).filename().string(), o.output, selection.views.size(), of,
+        quality * 100, selection.certificate * 100, selection.coverage * 100,
         selection.coverageOfAll * 100, humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "select-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
                                    {"views", selection.views},
-                                   {"of", bundle.views.size()},
+                                   {"of", of},
                                    {"quality", selection.quality},
                                    {"certificate", selection.certificate},
                                    {"coverage", selection.coverage},
@@ -111,7 +170,7 @@ void addSelect(CommandLine& line, Program& program) {
                          "  stx select model.exr -o fewer.exr --count 12\n"
                          "  stx select model.exr -o fewer.exr --share 98 --plot quality.svg");
     auto o = std::make_shared<SelectOptions>();
-    c.option("IN", o->input, "Bundle to choose from, or a mesh to look at from all sides")
+    c.option("IN", o->input, "Bundle or film to choose from, or a mesh to look at from all sides")
         .required();
     c.option("-o,--output", o->output, "Bundle to write").required().takes("OUT");
     c.option("--count", o->settings.count, "Number of views to keep").range(1, 65536).takes("N");

@@ -2,132 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include <glm/gtc/constants.hpp>
 #include <nlohmann/json.hpp>
 
-#include "formats/exr/exr_file.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export_colmap.hpp"
+#include "formats/imagesets/export_files.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
 namespace {
 
-using Json = nlohmann::ordered_json;
-using imagesets::inQuotes;
+using namespace imagesets;
+using Json = OutputJson;
 using std::filesystem::path;
 
 constexpr double kDegree = 180.0 / glm::pi<double>();
-
-/// Names that are safe in any file system, each once.
-std::vector<std::string> fileNames(const Bundle& bundle) {
-    std::vector<std::string> names;
-    std::set<std::string> taken;
-    for (const ReferenceView& view : bundle.views) {
-        std::string name;
-        for (const char c : view.name) {
-            const bool fine = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                              (c >= '0' && c <= '9') || c == '-' || c == '_';
-            name += fine ? c : '_';
-        }
-        if (name.empty()) name = "view";
-        name = name.substr(0, 100);
-        std::string unique = name;
-        for (int i = 2; !taken.insert(unique).second; ++i) unique = fmt::format("{}_{}", name, i);
-        names.push_back(std::move(unique));
-    }
-    return names;
-}
-
-Result<void> writeExr(const path& file, int width, int height,
-                      const std::vector<ExrConstPixels>& pixels) {
-    ExrPart part;
-    part.width = part.displayWidth = width;
-    part.height = part.displayHeight = height;
-    for (const ExrConstPixels& p : pixels)
-        part.channels.push_back({p.channel, ExrChannel::Type::float32});
-    STX_TRY(auto output, OutputFile::create(file));
-    STX_TRY(auto writer, ExrWriter::create(output, {part}));
-    STX_CHECK(writer.writePart(0, pixels));
-    STX_CHECK(writer.finish());
-    return output.commit();
-}
-
-/// Gives the file's ending.
-Result<void> writeColour(const ReferenceView& view, const path& withoutEnding) {
-    const int width = view.texture.width(), height = view.texture.height();
-    if (const auto* bytes = view.texture.rgba8()) {
-        STX_TRY(const auto png, encodePng(width, height, 4, 8, bytes->data(), true));
-        return writeFile(path(withoutEnding) += ".png", png);
-    }
-    // OpenEXR's colours are premultiplied.
-    RgbaFloatImage image = *view.texture.rgbaFloat();
-    for (glm::vec4& c : image.pixels()) c = glm::vec4(glm::vec3(c) * c.a, c.a);
-    const float* at = &image.data()->x;
-    return writeExr(path(withoutEnding) += ".exr", width, height,
-                    {{"R", at, 4}, {"G", at + 1, 4}, {"B", at + 2, 4}, {"A", at + 3, 4}});
-}
-
-const char* colourEnding(const ReferenceView& view) {
-    return view.texture.isLinear() ? ".exr" : ".png";
-}
-
-Result<void> writeFloatDepth(const ReferenceView& view, const path& file) {
-    return writeExr(file, view.depth.width(), view.depth.height(), {{"Z", view.depth.data(), 1}});
-}
-
-template <class Code>
-Result<void> writeIntegerDepth(const ReferenceView& view, const path& file, const Code& code) {
-    std::vector<std::uint16_t> codes(view.depth.count());
-    for (std::size_t i = 0; i < codes.size(); ++i) {
-        const float d = view.depth.data()[i];
-        // A valid point never becomes "none".
-        codes[i] = !hasPoint(d)
-                       ? std::uint16_t{0}
-                       : static_cast<std::uint16_t>(std::clamp(std::round(code(d)), 1.0, 65535.0));
-    }
-    STX_TRY(const auto png,
-            encodePng(view.depth.width(), view.depth.height(), 1, 16, codes.data(), false));
-    return writeFile(file, png);
-}
-
-/// What brings a view back to the bit; other programs do not look at it.
-void addOwnKeys(Json& json, const ReferenceView& view, glm::dvec3 origin) {
-    const glm::dquat& q = view.camera.orientation;
-    json["stx:name"] = view.name;
-    const glm::dvec3& p = view.camera.position;
-    if (origin != glm::dvec3(0.0)) json["stx:position"] = {p.x, p.y, p.z};
-    json["stx:quaternion"] = {q.x, q.y, q.z, q.w};
-    json["nearPlane"] = view.nearPlane;
-    json["farPlane"] = view.farPlane;
-    json["depthBits"] = view.depthBits;
-    if (view.pruned) json["stx:pruned"] = true;
-    if (view.background) json["stx:background"] = true;
-}
-
-Json transformsFrame(const ReferenceView& view, const std::string& name, const char* depthEnding,
-                     glm::dvec3 origin) {
-    const Camera& c = view.camera;
-    Json frame;
-    frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(view));
-    frame["depth_file_path"] = fmt::format("depth/{}{}", name, depthEnding);
-    frame["camera_model"] = c.orthographic ? "ORTHOGRAPHIC" : "PINHOLE";
-    frame["w"] = c.width;
-    frame["h"] = c.height;
-    frame["fl_x"] = c.fx;
-    frame["fl_y"] = c.fy;
-    frame["cx"] = c.cx;
-    frame["cy"] = c.cy;
-    glm::dmat4 m = c.worldFromCamera();
-    m[3] += glm::dvec4(origin, 0.0);
-    for (int row = 0; row < 4; ++row)
-        frame["transform_matrix"].push_back({m[0][row], m[1][row], m[2][row], m[3][row]});
-    addOwnKeys(frame, view, origin);
-    return frame;
-}
 
 /// yaw, pitch, roll in degrees: R = Ry(yaw) Rx(-pitch) Rz(-roll) in our axes.
 glm::dvec3 mivRotation(const glm::dquat& orientation) {

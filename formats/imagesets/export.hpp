@@ -5,6 +5,7 @@
 #include "formats/files/files.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/sequence.hpp"
 
 namespace stx {
 
@@ -28,6 +29,13 @@ struct ExportOptions {
 /// stx:origin). readImageSet() gives the same bundle again. Errors: io; invalidInput for what the
 /// kind cannot say.
 [[nodiscard]] Result<void> exportImages(const Bundle& bundle, const std::filesystem::path& folder,
+                                        const ExportOptions& options, Job& job);
+
+/// The same of a sequence: transforms.json with `time` and `camera`, a picture and a depth for each
+/// frame of a view; frames that repeat the one before name its files. openImageSet() gives the same
+/// sequence again. A sequence of one frame is exported as its bundle. Errors: as exportImages();
+/// (usage) another kind, which has one moment only.
+[[nodiscard]] Result<void> exportFrames(Sequence& frames, const std::filesystem::path& folder,
                                         const ExportOptions& options, Job& job);
 
 }  // namespace stx

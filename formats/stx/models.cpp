@@ -2,6 +2,7 @@
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/open.hpp"
 #include "formats/save.hpp"
+#include "formats/sequences.hpp"
 #include "formats/stx/mesh_views.hpp"
 
 namespace stx {
@@ -53,6 +54,11 @@ Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
     save.jpegQuality = options.jpegQuality;
     save.output.noClobber = options.noClobber;
     return writeAtlas(atlas, target, job, save);
+}
+
+Result<void> save(Sequence& frames, const std::filesystem::path& target, const SaveOptions& options,
+                  Job& job) {
+    return saveSequence(frames, target, options, job);
 }
 
 Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {

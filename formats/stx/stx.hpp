@@ -41,6 +41,7 @@
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/mesh.hpp"
+#include "lib/model/sequence.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
 #include "lib/render/renderer.hpp"
@@ -76,8 +77,23 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 [[nodiscard]] Result<void> save(const Atlas& atlas, const std::filesystem::path& target,
                                 const SaveOptions& options, Job& job);
 
+/// Opens what holds views in time: an .mp4, .xmt or .bt with pictures that move, an image set with
+/// time, `name_%04d.exr`, Azure Kinect's .mkv; whatever stands still is one frame. No picture is
+/// read before a frame is asked for: timeline() tells when they are shown,
+/// timeline().frameAt(seconds) which is shown then, frame(number, job) gives it as a bundle.
+/// Errors: as open().
+[[nodiscard]] Result<std::unique_ptr<Sequence>> openSequence(const std::filesystem::path& path,
+                                                             const OpenOptions& options, Job& job);
+
+/// Writes a film, frame by frame in bounded memory: .mp4, .xmt, .bt, or `name_%04d.exr`. One frame
+/// is saved as its bundle. Errors: as those of a bundle; (usage) a target that holds one frame
+/// only.
+[[nodiscard]] Result<void> save(Sequence& frames, const std::filesystem::path& target,
+                                const SaveOptions& options, Job& job);
+
+// sequenceOf(Bundle), someFrames(frames, numbers), changed(frames, change), and
 // validateFile(path, ValidateOptions, Job&)   every rule that a bundle or an atlas breaks
-// is declared in the headers above.
+// are declared in the headers above.
 
 // ---- Bundles ----
 

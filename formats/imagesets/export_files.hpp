@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "lib/model/bundle.hpp"
+
+/// The files of an image set that is written, one by one.
+namespace stx::imagesets {
+
+using OutputJson = nlohmann::ordered_json;
+
+/// Names of the views that are safe in any file system, each once.
+[[nodiscard]] std::vector<std::string> fileNames(const Bundle& bundle);
+
+/// Colour as PNG, or OpenEXR where it is linear: colourEnding() is added to the name.
+[[nodiscard]] Result<void> writeColour(const ReferenceView& view,
+                                       const std::filesystem::path& withoutEnding);
+[[nodiscard]] const char* colourEnding(const ReferenceView& view);
+
+/// Depth as OpenEXR floats, or as 16-bit PNG of code(distance), rounded to 1..65535; 0 is no point.
+[[nodiscard]] Result<void> writeFloatDepth(const ReferenceView& view,
+                                           const std::filesystem::path& file);
+[[nodiscard]] Result<void> writeIntegerDepth(const ReferenceView& view,
+                                             const std::filesystem::path& file,
+                                             const std::function<double(double)>& code);
+
+/// What brings a view back to the bit; other programs do not look at it.
+void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin);
+/// A view in the frames of transforms.json, with images/NAME and depth/NAME.
+[[nodiscard]] OutputJson transformsFrame(const ReferenceView& view, const std::string& name,
+                                         const char* depthEnding, glm::dvec3 origin);
+
+}  // namespace stx::imagesets

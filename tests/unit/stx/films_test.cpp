@@ -1,0 +1,28 @@
+// Films through the public header.
+
+#include "formats/stx/stx.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/sequences/moving_views.hpp"
+
+namespace stx {
+namespace {
+
+TEST(PublicFilms, AreSavedOpenedAndReadAtATime) {
+    const TemporaryFolder folder;
+    Job job;
+    MovingViews frames(4);
+    const auto saved = save(frames, folder / "film.mp4", {}, job);
+    ASSERT_TRUE(saved) << saved.error().text();
+    const auto film = openSequence(folder / "film.mp4", {}, job);
+    ASSERT_TRUE(film) << film.error().text();
+    EXPECT_EQ((*film)->timeline().count(), 4u);
+    const auto now = (*film)->frame((*film)->timeline().frameAt(0.09), job);
+    ASSERT_TRUE(now) << now.error().text();
+    expectSameFrame(*now, *frames.frame(2, job));
+    const auto refused = save(**film, folder / "film.exr", {}, job);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::usage);
+}
+
+}  // namespace
+}  // namespace stx
