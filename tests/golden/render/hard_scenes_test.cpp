@@ -16,10 +16,10 @@
 #include "lib/render/frame_picture.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
-#include "tests/golden/render/spheres_miv.hpp"
 #include "tests/naive_warp.hpp"
 #include "tests/noisy_depth.hpp"
 #include "tests/shared_data.hpp"
+#include "tests/spheres_miv.hpp"
 
 namespace stx {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "lib/metrics/compare.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
-#include "tests/golden/render/spheres_miv.hpp"
 #include "tests/shared_data.hpp"
+#include "tests/spheres_miv.hpp"
 
 namespace stx {
 namespace {

@@ -9,8 +9,8 @@
 #include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "tests/shared_data.hpp"
+#include "tests/spheres_miv.hpp"
 #include "tests/unit/packing/holes.hpp"
-#include "tests/unit/packing/spheres_miv.hpp"
 
 namespace stx {
 namespace {
@@ -131,10 +131,9 @@ TEST(PruneModels, SpotReachesTheQualityAskedFor) {
 
 TEST(PruneModels, SpheresReachTheQualityAskedFor) {
     REQUIRE_SHARED(folder, "data/imagesets/spheres-miv");
-    Camera near, centre;
-    const auto bundle = spheres::load(folder, "gt_center", centre);
-    ASSERT_TRUE(bundle && spheres::load(folder, "gt_near", near));
-    expectFortyDecibels(*bundle, {centre, near});
+    const auto set = spheres::cameras(folder);
+    expectFortyDecibels(spheres::bundle(folder), {spheres::cameraNamed(set, "gt_center"),
+                                                  spheres::cameraNamed(set, "gt_near")});
 }
 
 }  // namespace

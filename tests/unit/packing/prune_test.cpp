@@ -9,9 +9,9 @@
 #include "lib/packing/packing.hpp"
 #include "lib/render/surface/cpu/cpu_surface.hpp"
 #include "tests/shared_data.hpp"
+#include "tests/spheres_miv.hpp"
 #include "tests/torus_bundle.hpp"
 #include "tests/unit/packing/holes.hpp"
-#include "tests/unit/packing/spheres_miv.hpp"
 #include "tests/unit/surface/analytic.hpp"
 
 namespace stx {
@@ -220,23 +220,21 @@ TEST(Prune, RefusesNonsense) {
 
 TEST(Prune, SpheresAt31PercentStayAbove43Decibels) {
     REQUIRE_SHARED(folder, "data/imagesets/spheres-miv");
-    Camera camera;
-    auto bundle = spheres::load(folder, "gt_center", camera);
-    ASSERT_TRUE(bundle) << bundle.error().text();
+    const Camera camera = spheres::cameraNamed(spheres::cameras(folder), "gt_center");
+    auto bundle = spheres::bundle(folder);
     PruneSettings settings;
-    settings.budget = bundle->pointCount() * 31 / 100;
+    settings.budget = bundle.pointCount() * 31 / 100;
     Job job;
-    const auto report = prune(*bundle, settings, job);
+    const auto report = prune(bundle, settings, job);
     ASSERT_TRUE(report) << report.error().text();
     EXPECT_LE(report->keptPixels, settings.budget);
-    const auto truth = spheres::decodeFile(folder / "gt_center_color.png");
-    ASSERT_TRUE(truth);
-    const Frame frame = draw(*bundle, camera);
+    const auto truth = spheres::picture(folder / "gt_center_color.png");
+    const Frame frame = draw(bundle, camera);
     Rgba8Image picture(camera.width, camera.height);
     for (std::size_t i = 0; i < picture.count(); ++i)
         picture.pixels()[i] =
             glm::u8vec4(glm::clamp(frame.colour.pixels()[i], 0.0f, 1.0f) * 255.0f + 0.5f);
-    const auto difference = compare(picture, rgba8From(*truth));
+    const auto difference = compare(picture, truth);
     ASSERT_TRUE(difference);
     fmt::print(
         "spheres-miv, {:.1f} % kept: center {:.2f} dB Y\n",

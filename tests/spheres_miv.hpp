@@ -3,28 +3,14 @@
 #include <filesystem>
 #include <string>
 
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
-
-#include "formats/files/files.hpp"
-#include "formats/images/images.hpp"
 #include "lib/model/bundle.hpp"
+#include "tests/plain_files.hpp"
 
-/// The image set spheres-miv of the shared data, read without the image-set readers, so that a
-/// mistake of theirs and one of the renderer cannot cancel out.
+/// The image set spheres-miv of the shared data, read as plain_files.hpp says.
 namespace spheres {
 
-inline stx::DecodedImage decoded(const std::filesystem::path& path) {
-    auto bytes = stx::readFile(path, stx::Limits{});
-    EXPECT_TRUE(bytes) << bytes.error().text();
-    auto image = stx::decodeImage(*bytes, path.filename().string(), stx::Limits{});
-    EXPECT_TRUE(image) << image.error().text();
-    return *std::move(image);
-}
-
-inline stx::Image<glm::u8vec4> picture(const std::filesystem::path& path) {
-    return stx::rgba8From(decoded(path));
-}
+using plain::decoded;
+using plain::picture;
 
 /// MIV: x forward, y left, z up; rotation yaw, pitch, roll in degrees.
 inline stx::Camera camera(const nlohmann::json& j) {
@@ -54,10 +40,7 @@ inline stx::Camera cameraNamed(const nlohmann::json& set, const std::string& nam
 }
 
 inline nlohmann::json cameras(const std::filesystem::path& folder) {
-    auto bytes = stx::readFile(folder / "cameras.json", stx::Limits{});
-    EXPECT_TRUE(bytes);
-    const auto* text = reinterpret_cast<const char*>(bytes->data());
-    return nlohmann::json::parse(text, text + bytes->size());
+    return plain::json(folder / "cameras.json");
 }
 
 /// The four sources v0 to v3.
