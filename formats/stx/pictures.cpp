@@ -1,6 +1,7 @@
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/render/finish/environment_behind.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
 
 namespace stx {
@@ -15,7 +16,9 @@ Result<std::unique_ptr<Renderer>> borrow(const Model& model, const RenderSetting
         return makeRenderer(backend, *atlas, settings, device, job);
     const auto& mesh = std::get<Mesh>(model);
     STX_CHECK(mesh.check());
-    return makeMeshRenderer(mesh, settings, job);
+    auto renderer = makeMeshRenderer(mesh, settings, job);
+    if (settings.environment) renderer = withEnvironment(std::move(renderer), settings.environment);
+    return renderer;
 }
 
 /// A renderer together with what it draws from.

@@ -60,7 +60,8 @@ struct Atlas {
     std::string layout = "grid";  ///< "grid" or "tight"
     int padding = 2;              ///< pixels around each rectangle, filled from its edge
     std::optional<Bounds> bounds;
-    glm::dvec3 origin{0.0};  ///< as Bundle::origin
+    glm::dvec3 origin{0.0};                          ///< as Bundle::origin
+    std::shared_ptr<const Environment> environment;  ///< as Bundle::environment
     std::string title;
     /// Object pixels before and after pruning.
     std::int64_t sourcePixels = 0;

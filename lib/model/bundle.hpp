@@ -1,9 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "lib/environment/environment.hpp"
 #include "lib/model/reference_view.hpp"
 
 namespace stx {
@@ -16,6 +18,8 @@ struct Bundle {
     glm::dvec3 origin{0.0};
     /// World bounds of all points, when known (WorldInfo, an EXR attribute).
     std::optional<Bounds> bounds;
+    /// What stands far behind the object in all directions (Background); null: nothing.
+    std::shared_ptr<const Environment> environment;
     /// Of a moment of a sequence: seconds from the sequence's start (Sequence).
     std::optional<double> time;
 

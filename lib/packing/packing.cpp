@@ -166,6 +166,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     atlas.padding = settings.padding;
     atlas.bounds = bundle.bounds;
     atlas.origin = bundle.origin;
+    atlas.environment = bundle.environment;
     atlas.title = bundle.title;
     const std::vector<int> source = keptViews(bundle, tight, layout.rectangles, job);
     for (const int i : source) atlas.views.push_back(withoutImages(bundle.views[i]));
@@ -255,6 +256,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     bundle.title = atlas.title;
     bundle.bounds = atlas.bounds;
     bundle.origin = atlas.origin;
+    bundle.environment = atlas.environment;
     bundle.views.resize(atlas.views.size());
     std::vector<Image<std::uint8_t>> givenOf(atlas.views.size());
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {

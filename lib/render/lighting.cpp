@@ -21,6 +21,14 @@ struct Phong {
     [[nodiscard]] vec4 lightVector(int i) const {
         return {light(i).vector, light(i).kind == Light::Kind::point ? 1.0f : 0.0f};
     }
+    [[nodiscard]] vec3 environmentDiffuse(vec3 normal) const {
+        return lighting.environment ? lighting.environment->diffuse(normal) : vec3(0.0f);
+    }
+    [[nodiscard]] vec3 environmentGloss(vec3 direction) const {
+        return lighting.environment && lighting.specular != vec3(0.0f)
+                   ? lighting.environment->glossy(direction)
+                   : vec3(0.0f);
+    }
     [[nodiscard]] static vec3 decoded(vec3 c) {
         return {linearByTable(c.x), linearByTable(c.y), linearByTable(c.z)};
     }

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <glm/glm.hpp>
+
+#include "lib/environment/environment_light.hpp"
 
 namespace stx {
 
@@ -16,14 +19,17 @@ struct Light {
     bool inCameraSpace = false;  ///< moves with the camera (a headlight)
 };
 
-/// Phong lighting, all amounts linear light; off while there is no light.
+/// Phong lighting, all amounts linear light; off while there is no light. An environment lights
+/// from all sides: its diffuse light adds to the ambient one, its gloss is what the mirrored
+/// direction sees through a Phong lobe.
 struct Lighting {
     std::vector<Light> lights;
+    std::shared_ptr<const EnvironmentLight> environment;  ///< null: none
     glm::vec3 ambient{0.2f};
     glm::vec3 specular{0.0f};
     float shininess = 32.0f;  ///< exponent, > 0
 
-    [[nodiscard]] bool on() const { return !lights.empty(); }
+    [[nodiscard]] bool on() const { return !lights.empty() || environment; }
 };
 
 /// Phong: albedo * (ambient + sum of diffuse) + sum of specular, in linear light. All vectors in

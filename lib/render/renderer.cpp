@@ -2,6 +2,7 @@
 
 #include "lib/render/fallback.hpp"
 #include "lib/render/finish/behind.hpp"
+#include "lib/render/finish/environment_behind.hpp"
 #include "lib/render/finish/footprint.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
@@ -132,8 +133,19 @@ PageSet inFront(const PageSet& set, const RenderSettings& settings) {
     return front.before(set.part(true).inLightOf(front));
 }
 
+/// The environment that is shown behind what has this one; null: none.
+Result<std::shared_ptr<const EnvironmentMap>> environmentOf(
+    const RenderSettings& settings, const std::shared_ptr<const Environment>& own, Job& job) {
+    if (settings.environment || !settings.ownEnvironment || !own) return settings.environment;
+    return EnvironmentMap::make(*own, job.limits);
+}
+
 Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
-                                           const RenderSettings& settings, int device, Job& job) {
+                                           const RenderSettings& wanted,
+                                           const std::shared_ptr<const Environment>& own,
+                                           int device, Job& job) {
+    STX_TRY(const auto environment, environmentOf(wanted, own, job));
+    RenderSettings settings = wanted;
     // Alpha inside of the object is no outline for surfaces to end at.
     bool translucent = false;
     const auto solid = [&](const PageSet& views) {
@@ -147,8 +159,11 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     if (drawn.behind()) drawn = drawn.before(solid(*drawn.behind()));
     if (translucent)
         job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");
+    // What is around an open place is a guess; the environment is known.
+    if (environment) settings.fill = Fill::none;
     STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));
     if (averages(backend, settings)) made = withFootprint(std::move(made), drawn, job.limits);
+    if (environment) made = withEnvironment(std::move(made), environment);
     return made;
 }
 
@@ -158,14 +173,14 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
                                                const RenderSettings& settings, int device,
                                                Job& job) {
     STX_CHECK(bundle.check());
-    return makeFrom(backend, bundle, settings, device, job);
+    return makeFrom(backend, bundle, settings, bundle.environment, device, job);
 }
 
 Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Atlas& atlas,
                                                const RenderSettings& settings, int device,
                                                Job& job) {
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
-    return makeFrom(backend, set, settings, device, job);
+    return makeFrom(backend, set, settings, atlas.environment, device, job);
 }
 
 std::vector<Device> listDevices(Job& job) {

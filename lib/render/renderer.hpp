@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lib/base/job.hpp"
+#include "lib/environment/environment_map.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/render/frame.hpp"
@@ -45,6 +46,11 @@ struct RenderSettings {
     /// Frames carry albedo and normals without lights, too. Not on Backend::gl.
     bool normals = false;
     Fill fill = Fill::background;
+    /// What is seen where nothing covers a pixel in full, in place of what is around it; null: the
+    /// environment that a bundle or an atlas has, if `ownEnvironment`. Frames are opaque then as
+    /// far as the environment is; their depth and albedo are the object's alone.
+    std::shared_ptr<const EnvironmentMap> environment;
+    bool ownEnvironment = true;
     Lighting lighting;
 
     [[nodiscard]] bool wantNormals() const { return normals || lighting.on(); }

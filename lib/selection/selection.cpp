@@ -98,6 +98,7 @@ Bundle keepViews(const Bundle& bundle, const std::vector<int>& views) {
     kept.title = bundle.title;
     kept.bounds = bundle.bounds;
     kept.origin = bundle.origin;
+    kept.environment = bundle.environment;
     for (const int v : sorted) kept.views.push_back(bundle.views[v]);
     return kept;
 }

@@ -1,10 +1,13 @@
 // Phong lighting with any number of lights. From outside: vec3 ambientLight(), vec3 specularLight()
 // (the material's), float shininess(), int lightCount(), vec3 lightColour(i),
 //   vec4 lightVector(i)  w = 0: the way the light travels, w = 1: its position
+//   vec3 environmentDiffuse(vec3 normal), vec3 environmentGloss(vec3 direction)  0 where there is
+//   none
 //   vec3 decoded(vec3), vec3 coded(vec3)  sRGB to linear light and back, 0..1
 // All vectors in one space; `normal` and `toEye` of length 1.
 vec3 shadePhong(vec3 albedo, vec3 position, vec3 normal, vec3 toEye) {
-    vec3 diffuse = ambientLight(), gloss = vec3(0.0f);
+    vec3 diffuse = ambientLight() + environmentDiffuse(normal);
+    vec3 gloss = environmentGloss(normal * (2.0f * dot(normal, toEye)) - toEye);
     for (int i = 0; i < lightCount(); ++i) {
         vec4 v = lightVector(i);
         vec3 toLight = v.w == 0.0f ? -vec3(v) : vec3(v) - position;

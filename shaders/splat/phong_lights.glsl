@@ -9,6 +9,11 @@ vec4 lightVector(int i) { return lights[i].vector; }
 vec3 lightColour(int i) { return lights[i].colour.rgb; }
 #endif
 vec3 ambientLight() { return frame.ambient.rgb; }
+// Behind the lights, where ambient.w says so. Gloss has no place here; the processor draws it.
+vec3 harmonic(int i) { return lightColour(frame.counts.w + i); }
+#include "shared/environment_light.glsl"
+vec3 environmentDiffuse(vec3 n) { return frame.ambient.w > 0.0 ? harmonicLight(n) : vec3(0.0); }
+vec3 environmentGloss(vec3 direction) { return vec3(0.0); }
 vec3 specularLight() { return frame.specular.rgb; }
 float shininess() { return frame.specular.w; }
 int lightCount() { return frame.counts.w; }

@@ -249,6 +249,9 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
 
 Result<std::unique_ptr<Renderer>> makeGlRenderer(const PageSet& set, const RenderSettings& settings,
                                                  int device, Job& job) {
+    if (settings.lighting.environment)
+        return fail(ErrorCode::unsupported,
+                    "the gl backend has no light of an environment; use --backend gpu or cpu");
     if (settings.lighting.lights.size() > kMaxLights)
         return fail(ErrorCode::unsupported,
                     "{} lights; the gl backend has {}, use --backend gpu or cpu",

@@ -213,6 +213,10 @@ PipelineChoice choosePipeline(const Device& device, const ContextAbilities& abil
 Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const PageSet& set,
                                                        const RenderSettings& settings, int device,
                                                        Job& job) {
+    if (settings.lighting.environment && settings.lighting.specular != glm::vec3(0.0f))
+        return fail(ErrorCode::unsupported,
+                    "splats on a GPU have no gloss of an environment; use --backend cpu, --mode "
+                    "surface, or --specular 0");
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
     auto renderer =
         std::make_unique<GpuSplatRenderer>(std::move(context), set, settings, job.limits);

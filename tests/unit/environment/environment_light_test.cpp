@@ -1,0 +1,102 @@
+// Diffuse and glossy light of an environment, against the integrals themselves.
+#include <random>
+
+#include <gtest/gtest.h>
+#include <glm/gtc/constants.hpp>
+
+#include "lib/model/texture.hpp"
+#include "lib/render/lighting.hpp"
+#include "tests/painted_environment.hpp"
+
+namespace stx {
+namespace {
+
+std::shared_ptr<const EnvironmentLight> lightOf(const Environment& environment, float shininess) {
+    const auto map = EnvironmentMap::make(environment, Limits());
+    if (!map) return nullptr;
+    const auto light = EnvironmentLight::make(*map, shininess, Limits());
+    return light ? *light : nullptr;
+}
+
+glm::dvec3 linearLight(glm::dvec3 direction) {
+    const glm::dvec3 c = paintedColour(direction);
+    return {linearFromSrgb(static_cast<float>(c.r)), linearFromSrgb(static_cast<float>(c.g)),
+            linearFromSrgb(static_cast<float>(c.b))};
+}
+
+/// The mean of the light around `about`, weighed by max(0, cosine)^power.
+glm::dvec3 meanLight(glm::dvec3 about, double power) {
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    glm::dvec3 sum(0);
+    double weights = 0;
+    for (int i = 0; i < 200000; ++i) {
+        const glm::dvec3 d =
+            glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+        const double cosine = glm::dot(d, about);
+        if (cosine <= 0) continue;
+        const double w = std::pow(cosine, power);
+        sum += linearLight(d) * w;
+        weights += w;
+    }
+    return sum / weights;
+}
+
+TEST(EnvironmentLight, LightOfOneColourLeavesThatColour) {
+    Environment e;
+    for (int f = 0; f < 6; ++f)
+        e.pictures.emplace_back(RgbaFloatImage(4, 4, glm::vec4(0.5, 2, 0.25, 1)));
+    for (const float shininess : {5.0f, 100.0f, 1000.0f}) {
+        const auto light = lightOf(e, shininess);
+        ASSERT_TRUE(light);
+        for (const glm::vec3 d : {glm::vec3(0, 1, 0), {0.6f, 0, -0.8f}, {-1, 0, 0}}) {
+            EXPECT_LT(glm::distance(light->diffuse(d), glm::vec3(0.5, 2, 0.25)), 0.01);
+            EXPECT_LT(glm::distance(light->glossy(d), glm::vec3(0.5, 2, 0.25)), 0.01);
+        }
+    }
+}
+
+TEST(EnvironmentLight, IsTheIntegralOfWhatIsAround) {
+    Environment e = paintedCube(64);
+    const auto soft = lightOf(e, 10), narrow = lightOf(e, 200);
+    ASSERT_TRUE(soft && narrow);
+    for (const glm::dvec3 d :
+         {glm::dvec3(0, 1, 0), glm::dvec3(0.6, 0, -0.8), glm::normalize(glm::dvec3(-1, -2, 1))}) {
+        const glm::vec3 n(d);
+        EXPECT_LT(glm::distance(glm::dvec3(soft->diffuse(n)), meanLight(d, 1)), 0.01);
+        EXPECT_LT(glm::distance(glm::dvec3(soft->glossy(n)), meanLight(d, 10)), 0.01);
+        EXPECT_LT(glm::distance(glm::dvec3(narrow->glossy(n)), meanLight(d, 200)), 0.02);
+    }
+}
+
+TEST(EnvironmentLight, TurnsWithTheEnvironment) {
+    Environment e;
+    e.skyColours = {{1, 1, 1}, {0, 0, 0}};
+    e.skyAngles = {glm::half_pi<double>()};
+    e.orientation = glm::angleAxis(glm::half_pi<double>(), glm::dvec3(0, 0, 1));  // up becomes -X
+    const auto light = lightOf(e, 10);
+    ASSERT_TRUE(light);
+    EXPECT_GT(light->diffuse({-1, 0, 0}).r, 3 * light->diffuse({1, 0, 0}).r);
+    EXPECT_GT(light->glossy({-1, 0, 0}).r, 10 * light->glossy({1, 0, 0}).r);
+}
+
+TEST(EnvironmentLight, ShadesSurfaces) {
+    Environment e;
+    for (int f = 0; f < 6; ++f)
+        e.pictures.emplace_back(RgbaFloatImage(4, 4, glm::vec4(glm::vec3(0.5), 1)));
+    Lighting lighting;
+    lighting.ambient = glm::vec3(0.0f);
+    EXPECT_FALSE(lighting.on());
+    lighting.environment = lightOf(e, 20);
+    EXPECT_TRUE(lighting.on());
+    const glm::vec3 albedo(0.8, 0.4, 0.2), n(0, 0, 1), toEye = glm::normalize(glm::vec3(1, 0, 2));
+    EXPECT_LT(glm::distance(shadePhong(lighting, albedo, {}, n, toEye, true), albedo * 0.5f),
+              0.005);
+    lighting.specular = glm::vec3(0.25f);
+    EXPECT_LT(glm::distance(shadePhong(lighting, albedo, {}, n, toEye, true),
+                            albedo * 0.5f + glm::vec3(0.125f)),
+              0.005);
+}
+
+}  // namespace
+}  // namespace stx
