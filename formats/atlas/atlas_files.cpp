@@ -5,6 +5,7 @@
 
 #include "formats/atlas/atlas_json.hpp"
 #include "formats/atlas/atlas_textures.hpp"
+#include "formats/exr/environment_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/parallel.hpp"
@@ -18,6 +19,7 @@ namespace {
 using Type = ExrChannel::Type;
 
 constexpr const char* kIndexFile = "atlas.json";
+constexpr const char* kEnvironmentFile = "environment.exr";
 constexpr const char* kOpaque = "sRGB8-opaque";
 
 bool isExrName(const fs::path& path) {
@@ -27,7 +29,7 @@ bool isExrName(const fs::path& path) {
 
 /// All that a folder of ours may hold, for the replacing of one. Digits stand for any number.
 std::vector<std::string> ownNames() {
-    std::vector<std::string> names = {kIndexFile};
+    std::vector<std::string> names = {kIndexFile, kEnvironmentFile};
     for (const char* attribute : {"colour", "depth", "normal", "splat"}) {
         for (const char* ending : {".png", "_1.png", ".exr", "_1.exr"})
             names.push_back(std::string(attribute) + ending);
@@ -53,6 +55,7 @@ AtlasHeader headerOf(const Atlas& atlas, bool inOneExr, bool jpeg = false) {
     a.bounds = atlas.bounds;
     a.origin = atlas.origin;
     a.title = atlas.title;
+    if (atlas.environment && !inOneExr) header.environmentFile = kEnvironmentFile;
     a.sourcePixels = atlas.sourcePixels;
     a.keptPixels = atlas.keptPixels;
     header.pages = static_cast<int>(atlas.pages.size());
@@ -205,6 +208,9 @@ Result<void> writeFolder(const Atlas& atlas, const fs::path& path, Job& job,
     for (auto& result : done) {
         if (!result) return propagate(result);
     }
+    if (atlas.environment)
+        STX_CHECK(writeEnvironmentExr(*atlas.environment, folder.temporaryPath() / kEnvironmentFile,
+                                      job));
     const std::string json = atlasJson(header);
     STX_CHECK(writeFile(folder.temporaryPath() / kIndexFile, std::as_bytes(std::span(json))));
     STX_CHECK(job.checkCancelled());
@@ -229,6 +235,12 @@ Result<void> writeExr(const Atlas& atlas, const fs::path& path, Job& job,
     parts[0].attributes["stx:version"] = std::int64_t{1};
     parts[0].attributes["stx:kind"] = std::string("atlas");
     parts[0].attributes["stx:atlas"] = atlasJson(header);
+    std::optional<ExrEnvironmentPart> environment;
+    if (atlas.environment) {
+        STX_TRY(environment, environmentPart(*atlas.environment, job));
+        joinParts(environment->part, parts);
+        parts.push_back(environment->part);
+    }
     STX_TRY(auto file, OutputFile::create(path, options));
     STX_TRY(auto writer, ExrWriter::create(file, parts));
     for (int i = 0; i < header.pages; ++i) {
@@ -236,6 +248,7 @@ Result<void> writeExr(const Atlas& atlas, const fs::path& path, Job& job,
         const auto colour = premultipliedLinear(atlas.pages[i].texture);
         STX_CHECK(writer.writePart(i, pixelsOf(i, colour)));
     }
+    if (environment) STX_CHECK(writeEnvironmentPart(writer, header.pages, *environment));
     STX_CHECK(writer.finish());
     return file.commit();
 }
@@ -387,10 +400,11 @@ Result<AtlasHeader> exrHeader(const ExrReader& reader, const Limits& limits,
     if (!json || !isExrAtlas(reader))
         return failAt(reader.where(), ErrorCode::invalidInput, "it holds no stx atlas");
     STX_TRY(auto header, atlasFromJson(*json, reader.where() + ": stx:atlas", limits, checks));
-    if (static_cast<int>(reader.parts().size()) != header.pages)
+    const auto pages =
+        static_cast<int>(reader.parts().size()) - (environmentPartOf(reader) >= 0 ? 1 : 0);
+    if (pages != header.pages)
         return failAt(reader.where(), ErrorCode::invalidInput,
-                      "it has {} parts, but the atlas {} pages", reader.parts().size(),
-                      header.pages);
+                      "it has {} parts, but the atlas {} pages", pages, header.pages);
     for (auto& t : header.textures) {
         if (t.coding != "float")
             return failAt(reader.where(), ErrorCode::invalidInput,
@@ -446,6 +460,10 @@ Result<Atlas> readFolder(const fs::path& path, Job& job) {
     for (std::size_t i = 0; i < coverage.size(); ++i) {
         if (!coverage[i].empty()) setAlpha(*atlas.pages[i].texture.rgba8(), coverage[i]);
     }
+    if (!header.environmentFile.empty()) {
+        STX_TRY(const auto file, resolveInside(folder, header.environmentFile, job.limits));
+        STX_TRY(atlas.environment, readEnvironmentExr(file, job));
+    }
     return checked(std::move(atlas), header, where);
 }
 
@@ -461,6 +479,9 @@ Result<Atlas> readExr(const fs::path& path, Job& job) {
             if (t.page == i) attributes.push_back(t.attribute);
         }
         STX_CHECK(readFloats(reader, i, attributes, header.linear, atlas.pages[i]));
+    }
+    if (const int at = environmentPartOf(reader); at >= 0) {
+        STX_TRY(atlas.environment, readEnvironmentPart(reader, at, job));
     }
     return checked(std::move(atlas), header, reader.where());
 }

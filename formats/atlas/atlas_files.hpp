@@ -43,6 +43,7 @@ struct AtlasHeader {
     int pages = 0;
     bool linear = false;
     std::vector<AtlasTexture> textures;  ///< at most 4
+    std::string environmentFile;         ///< of a folder: its environment; empty: none
 
     /// Share of the page area that rectangles cover, 0..1.
     [[nodiscard]] double used() const;
@@ -65,6 +66,7 @@ struct AtlasSaveOptions {
 /// Writes an atlas: one multi-part OpenEXR file (a part for each page) when the name ends in .exr,
 /// else a folder of atlas.json (formats/atlas/atlas.schema.json) and at most four images:
 /// colour.png, depth.png, normal.png, splat.png, those of page k > 0 as colour_k.png and so on.
+/// The environment is environment.exr, or a part of its own (environment_exr.hpp).
 /// 8- and 16-bit depth comes back to the code and normals to 1/32767; an atlas with a view of 32
 /// depth bits gets .exr images, and everything comes back to the bit. Linear colour is colour.exr.
 /// Depth that belongs to no rectangle or its padding is dropped with a note. Colours under alpha 0

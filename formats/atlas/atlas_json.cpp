@@ -314,6 +314,7 @@ std::string atlasJson(const AtlasHeader& header) {
     if (atlas.bounds && !atlas.bounds->empty())
         top["bounds"] = {{"min", arrayOf(atlas.bounds->min)}, {"max", arrayOf(atlas.bounds->max)}};
     if (atlas.origin != glm::dvec3(0.0)) top["origin"] = arrayOf(atlas.origin);
+    if (!header.environmentFile.empty()) top["environment"] = header.environmentFile;
     top["pixels"] = {{"source", atlas.sourcePixels}, {"kept", atlas.keptPixels}};
     std::string text = "{\n";
     for (const auto& [key, value] : top.items())
@@ -363,6 +364,8 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
         STX_CHECK(top.vector("origin", origin));
         atlas.origin = {origin[0], origin[1], origin[2]};
     }
+    if (json.contains("environment"))
+        STX_CHECK(top.text("environment", header.environmentFile, false));
     if (const auto pixels = top.object("pixels")) {
         STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));
         STX_CHECK(pixels->number("kept", atlas.keptPixels, 0, 1e15));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "formats/exr/environment_exr.hpp"
 #include "formats/exr/exr_colour.hpp"
 #include "lib/base/parallel.hpp"
 
@@ -17,6 +18,7 @@
 //              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d) · stx:origin (v3d; where it
 //              is not 0: added to positions and bounds, gives the world's) · stx:time (double,
 //              seconds; of a frame of a sequence)
+//   the last:  the environment, where there is one: environment_exr.hpp
 namespace stx {
 
 namespace {
@@ -209,9 +211,15 @@ const char* ExrBundleHeader::nodeKind() const {
 
 Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
     STX_CHECK(bundle.checkHeaders());
-    STX_TRY(const auto parts, partsFrom(bundle));
-    STX_TRY(auto writer, ExrWriter::create(file, parts));
+    STX_TRY(auto parts, partsFrom(bundle));
     const auto count = static_cast<std::int64_t>(parts.size());
+    std::optional<ExrEnvironmentPart> environment;
+    if (bundle.environment) {
+        STX_TRY(environment, environmentPart(*bundle.environment, job));
+        joinParts(environment->part, parts);
+        parts.push_back(environment->part);
+    }
+    STX_TRY(auto writer, ExrWriter::create(file, parts));
     for (std::int64_t i = 0; i < count; ++i) {
         STX_CHECK(job.checkCancelled());
         const ReferenceView& view = bundle.views[i];
@@ -235,6 +243,7 @@ Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
         }));
         job.progress(i + 1, count, "writing views");
     }
+    if (environment) STX_CHECK(writeEnvironmentPart(writer, static_cast<int>(count), *environment));
     return writer.finish();
 }
 
@@ -276,6 +285,11 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
             entry.points = static_cast<std::int64_t>(*points);
         entry.bytes = part.bytes;
         header.views.push_back(std::move(entry));
+    }
+    if (const int at = environmentPartOf(reader); at >= 0) {
+        auto environment = environmentHeader(reader.parts()[static_cast<std::size_t>(at)]);
+        if (!environment) return tl::unexpected(environment.error().at(reader.where()));
+        header.environment = std::move(*environment);
     }
     if (header.views.empty())
         return failAt(reader.where(), ErrorCode::invalidInput,
@@ -321,6 +335,9 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     });
     for (auto& result : done) {
         if (!result) return propagate(result);
+    }
+    if (const int at = environmentPartOf(reader); at >= 0) {
+        STX_TRY(bundle.environment, readEnvironmentPart(reader, at, job));
     }
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(reader.where()));
     return bundle;

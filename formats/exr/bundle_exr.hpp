@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/exr/environment_exr.hpp"
 #include "formats/exr/exr_file.hpp"
 #include "formats/files/files.hpp"
 #include "lib/base/job.hpp"
@@ -30,6 +31,7 @@ struct ExrBundleHeader {
     std::optional<double> time;  ///< as Bundle::time
     bool linear = false;         ///< colour is linear floats, not 8-bit sRGB
     std::vector<ExrViewHeader> views;
+    std::optional<ExrEnvironmentHeader> environment;
 
     [[nodiscard]] const char* nodeKind() const;
 };
@@ -44,6 +46,7 @@ struct ExrBundleHeader {
 ///
 /// Cameras are in the standard attributes worldToCamera, worldToNDC, screenWindowCenter and
 /// screenWindowWidth (float, for other programs) and exactly in `stx:` ones (see bundle_exr.cpp).
+/// The environment is a part of its own (environment_exr.hpp).
 /// Errors: what Bundle::check() says; files.
 // clang-format on
 [[nodiscard]] Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job);

@@ -2,6 +2,7 @@
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfEnvmapAttribute.h>
 #include <OpenEXR/ImfFloatAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
@@ -91,6 +92,10 @@ ExrPart partFrom(const Imf::Header& header) {
     part.screenWindowWidth = header.screenWindowWidth();
     part.deep = header.hasType() && !Imf::isImage(header.type());
     part.linearPrimaries = isRec709(header);
+    if (const auto* envmap = header.findTypedAttribute<Imf::EnvmapAttribute>("envmap")) {
+        if (envmap->value() == Imf::ENVMAP_LATLONG) part.envmap = ExrPart::Envmap::latlong;
+        if (envmap->value() == Imf::ENVMAP_CUBE) part.envmap = ExrPart::Envmap::cube;
+    }
     const int compression = header.compression();
     if (compression >= 0 && compression < 10) part.compression = kCompressions[compression];
     for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {

@@ -48,6 +48,9 @@ struct ExrPart {
     double screenWindowWidth = 1.0;
     std::vector<ExrChannel> channels;
     std::map<std::string, ExrAttribute, std::less<>> attributes;
+    /// The standard attribute `envmap`: the picture is all of what is seen around a point.
+    enum class Envmap { none, latlong, cube };
+    Envmap envmap = Envmap::none;
     bool deep = false;            ///< deep pixels cannot be read
     bool linearPrimaries = true;  ///< chromaticities are absent or those of Rec. 709
     std::string compression;      ///< "zip", "piz", ...; read only

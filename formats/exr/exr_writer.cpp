@@ -3,6 +3,7 @@
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfEnvmapAttribute.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
@@ -70,6 +71,10 @@ Imf::Header headerFrom(const ExrPart& part) {
             header.insert(name, Imf::M44fAttribute(f));
         }
     }
+    if (part.envmap != ExrPart::Envmap::none)
+        header.insert("envmap", Imf::EnvmapAttribute(part.envmap == ExrPart::Envmap::cube
+                                                         ? Imf::ENVMAP_CUBE
+                                                         : Imf::ENVMAP_LATLONG));
     if (const auto seconds = sourceDate()) {
         Imf::addCapDate(header, exrDate(*seconds));
         Imf::addUtcOffset(header, 0.0f);

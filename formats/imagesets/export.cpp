@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 #include <nlohmann/json.hpp>
 
+#include "formats/exr/environment_exr.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export_colmap.hpp"
 #include "formats/imagesets/export_files.hpp"
@@ -19,6 +20,7 @@ using namespace imagesets;
 using Json = OutputJson;
 using std::filesystem::path;
 
+constexpr const char* kEnvironmentFile = "environment.exr";
 constexpr double kDegree = 180.0 / glm::pi<double>();
 
 /// yaw, pitch, roll in degrees: R = Ry(yaw) Rx(-pitch) Rz(-roll) in our axes.
@@ -106,6 +108,8 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
         if (view.hasNormals() || view.hasSplats())
             job.note("normals and splats have no place in an image set and are left out");
 
+    if (options.kind == ExportOptions::Kind::colmap && bundle.environment)
+        job.note("COLMAP's workspace has no place for the environment: it is left out");
     if (options.kind == ExportOptions::Kind::colmap)
         return imagesets::exportColmap(bundle, folder, names, options, job);
 
@@ -130,6 +134,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     }
     const glm::dvec3& o = bundle.origin;
     if (o != glm::dvec3(0.0)) json["stx:origin"] = {o.x, o.y, o.z};
+    if (bundle.environment) json["stx:environment"] = kEnvironmentFile;
     const char* depthEnding = options.floatDepth ? ".exr" : ".png";
     for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         const ReferenceView& view = bundle.views[i];
@@ -163,6 +168,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
             own.push_back(fmt::format("depth/{}{}", names[i], depthEnding));
         }
     }
+    own.emplace_back(kEnvironmentFile);
     own.emplace_back(miv ? "cameras.json" : "transforms.json");
     STX_TRY(auto output, OutputFolder::create(folder, {options.noClobber}, own));
     const path& root = output.temporaryPath();
@@ -196,6 +202,8 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     });
     for (auto& result : written)
         if (!result) return propagate(result);
+    if (bundle.environment)
+        STX_CHECK(writeEnvironmentExr(*bundle.environment, root / kEnvironmentFile, job));
     STX_CHECK(writeFile(root / own.back(), std::as_bytes(std::span(text.data(), text.size()))));
     return output.commit();
 }

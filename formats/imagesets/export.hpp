@@ -26,7 +26,8 @@ struct ExportOptions {
 /// Writes a bundle as an image set: a folder that appears whole or not at all. Cameras are exact;
 /// 8-bit colour is PNG with its coverage, linear colour OpenEXR. Normals and splats are dropped
 /// with a note. Cameras are in the world's coordinates, the bundle's origin added (it is kept as
-/// stx:origin). readImageSet() gives the same bundle again. Errors: io; invalidInput for what the
+/// stx:origin). The environment is environment.exr, named as stx:environment (not for COLMAP).
+/// readImageSet() gives the same bundle again. Errors: io; invalidInput for what the
 /// kind cannot say.
 [[nodiscard]] Result<void> exportImages(const Bundle& bundle, const std::filesystem::path& folder,
                                         const ExportOptions& options, Job& job);

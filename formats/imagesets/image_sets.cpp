@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "formats/exr/environment_exr.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/motion.hpp"
@@ -195,6 +196,9 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
         for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));
     }
     makeNamesUnique(bundle.views);
+    if (!set.environment.empty()) {
+        STX_TRY(bundle.environment, readEnvironmentExr(set.environment, job));
+    }
     findOrigin(bundle, set, job);
     STX_CHECK(attendToPoses(bundle, set, options, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
@@ -250,12 +254,17 @@ class SetSequence : public Sequence {
             STX_TRY(now, describeSet(path_, options, job));
             if (set_.origin) now.origin = set_.origin;
         }
+        // Once for all frames: it is what stands still.
+        if (environment_) now.environment.clear();
         STX_TRY(auto bundle, readViews(std::move(now), inQuotes(path_.string()), options_, job));
+        if (!environment_) environment_ = bundle.environment;
+        bundle.environment = environment_;
         bundle.time = timeline_.times[index];
         return bundle;
     }
 
   private:
+    std::shared_ptr<const Environment> environment_;
     std::filesystem::path path_;
     ImageSetOptions options_;
     SetDescription set_;

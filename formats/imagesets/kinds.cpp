@@ -82,6 +82,13 @@ Result<std::optional<glm::dvec3>> originOf(const Json& file, const std::string& 
     return std::optional(glm::dvec3((*n)[0], (*n)[1], (*n)[2]));
 }
 
+Result<path> environmentOf(const Json& file, const path& folder, const std::string& where,
+                           const Limits& limits) {
+    STX_TRY(const auto name, within(where, findText(file, "stx:environment", "")));
+    if (!name) return path();
+    return within(where, resolveInside(folder, *name, limits));
+}
+
 std::string firstThere(const path& folder, const std::vector<std::string>& names) {
     for (const std::string& name : names) {
         std::error_code ec;

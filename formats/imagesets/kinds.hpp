@@ -69,6 +69,11 @@ enum class JsonKind { transforms, miv, cameras, cameraPath, none };
 /// the camera are passed over.
 [[nodiscard]] Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& view);
 
+/// stx:environment of such an export: the file in its folder; empty: none. Errors: names that leave
+/// the folder, a file that is not there.
+[[nodiscard]] Result<path> environmentOf(const Json& file, const path& folder,
+                                         const std::string& where, const Limits& limits);
+
 /// stx:origin of such an export.
 [[nodiscard]] Result<std::optional<glm::dvec3>> originOf(const Json& file,
                                                          const std::string& where);

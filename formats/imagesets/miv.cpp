@@ -300,6 +300,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
     STX_TRY(const auto title, within(where, findText(json, "Content_name", "")));
     set.title = title.value_or("");
     STX_TRY(set.origin, originOf(json, where));
+    STX_TRY(set.environment, environmentOf(json, folder, where, job.limits));
     int frames = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {
         SetView& view = all[i];

@@ -84,6 +84,8 @@ struct SetDescription {
     std::optional<glm::dvec3>
         origin;  ///< of an export of ours; cameras are in the world all the same
     std::vector<SetView> views;
+    /// Of an export of ours: the OpenEXR file of Bundle::environment; empty: none.
+    std::filesystem::path environment;
     /// Of sets whose views are those of ImageSetOptions::frame; of others, motionOf() finds them.
     int frames = 1;
     double rate = 25;  ///< frames a second, where the set has frames without times

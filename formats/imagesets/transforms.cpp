@@ -237,6 +237,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     STX_TRY(const auto title, within(where, findText(json, "stx:title", "")));
     set.title = title.value_or("");
     STX_TRY(set.origin, originOf(json, where));
+    STX_TRY(set.environment, environmentOf(json, folder, where, job.limits));
     STX_TRY(auto scale, within(where, findNumber(json, "integer_depth_scale", "")));
     if (!scale) {
         STX_TRY(scale, within(where, findNumber(json, "depth_unit_scale_factor", "")));
