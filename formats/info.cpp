@@ -4,6 +4,7 @@
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
+#include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/open.hpp"
@@ -54,6 +55,49 @@ Json viewJson(const ReferenceView& view, glm::dvec3 origin) {
     return j;
 }
 
+/// What is known of an environment without its pixels.
+Json environmentJson(const Environment& e, glm::ivec2 size, const std::vector<CubeFace>& faces) {
+    Json j = {{"layout", e.layout == Environment::Layout::cube ? "cube" : "equirectangular"}};
+    if (size.x > 0) {
+        j["width"] = size.x;
+        j["height"] = size.y;
+    }
+    auto names = Json::array();
+    for (const CubeFace face : faces)
+        names.push_back(kCubeFaceNames[static_cast<std::size_t>(face)]);
+    if (e.layout == Environment::Layout::cube) j["faces"] = std::move(names);
+    j["skyColours"] = e.skyColours.size();
+    j["groundColours"] = e.groundColours.size();
+    const auto turn = axisAngleFromQuat(e.orientation);
+    j["orientation"] = {turn.x, turn.y, turn.z, turn.w};
+    return j;
+}
+
+/// Of the first Background of a scene; sizes are those of the first picture.
+void addBackground(const mpeg4::Document& document, const mpeg4::StreamImages& images, Json& out,
+                   const Limits& limits) {
+    if (document.frames.empty()) return;
+    const auto scene = mpeg4::composeScene(document.frames, document.frames.front().time);
+    const auto shown = scene ? mpeg4::shownScene(scene->root, limits)
+                             : Result<mpeg4::ShownScene>(tl::unexpected(scene.error()));
+    if (!shown || shown->backgrounds.empty()) return;
+    const mpeg4::ShownBackground& first = shown->backgrounds.front();
+    Environment e;
+    e.orientation = glm::normalize(first.worldFromLocal);
+    e.skyColours.resize(first.node->get<std::vector<mpeg4::Color>>("skyColor").size());
+    e.groundColours.resize(first.node->get<std::vector<mpeg4::Color>>("groundColor").size());
+    glm::ivec2 size(0);
+    std::vector<CubeFace> faces;
+    for (int f = 0; f < 6; ++f) {
+        const auto texture = mpeg4::faceTexture(*first.node, static_cast<CubeFace>(f));
+        if (!texture) continue;
+        faces.push_back(static_cast<CubeFace>(f));
+        if (const auto info = images.probe(*texture); info && size.x == 0)
+            size = {info->width, info->height};
+    }
+    out["environment"] = environmentJson(e, size, faces);
+}
+
 /// Fills in what only the pixels show.
 void addFromPixels(Json& out, const Bundle& bundle) {
     std::int64_t points = 0;
@@ -71,6 +115,18 @@ void addFromPixels(Json& out, const Bundle& bundle) {
 }
 
 Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
+    {
+        STX_TRY(const auto reader, ExrReader::open(path, job.limits));
+        const int at = environmentPartOf(reader);
+        if (at >= 0 && exrViewParts(reader).empty()) {
+            auto e = environmentHeader(reader.parts()[static_cast<std::size_t>(at)]);
+            if (!e) return tl::unexpected(e.error().at(reader.where()));
+            out["container"] = "exr";
+            out["views"] = Json::array();
+            out["environment"] = environmentJson(e->environment, e->size, e->faces);
+            return {};
+        }
+    }
     STX_TRY(const auto header, readExrBundleHeader(path, job.limits));
     out["container"] = "exr";
     out["nodeKind"] = header.nodeKind();
@@ -92,6 +148,10 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
     if (points >= 0) out["points"] = points;
     addOrigin(out, header.origin);
     if (header.bounds) out["bounds"] = boundsJson(*header.bounds, header.origin);
+    if (const auto& e = header.environment) {
+        out["environment"] = environmentJson(e->environment, e->size, e->faces);
+        streams.push_back({{"name", "environment"}, {"kind", "part"}, {"bytes", e->bytes}});
+    }
     out["streams"] = std::move(streams);
     return {};
 }
@@ -137,6 +197,7 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     STX_TRY(const auto images, mpeg4::StreamImages::make(document, options.folder, job.limits));
     STX_TRY(const auto timeline, mpeg4::timelineOf(document, images));
     addTime(out, timeline);
+    addBackground(document, images, out, job.limits);
     auto streams = Json::array();
     const auto add = [&](const mpeg4::ElementaryStream& stream, const std::string& name,
                          const char* kind) {
@@ -204,6 +265,18 @@ Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
     out["pixels"] = {{"source", header.atlas.sourcePixels}, {"kept", header.atlas.keptPixels}};
     addOrigin(out, header.atlas.origin);
     if (header.atlas.bounds) out["bounds"] = boundsJson(*header.atlas.bounds, header.atlas.origin);
+    const bool folder = !header.environmentFile.empty();
+    if (!folder && out["container"] != "atlas-exr") return {};
+    fs::path file = path;
+    if (folder) {
+        STX_TRY(file, resolveInside(fs::is_directory(path) ? path : folderOf(path),
+                                    header.environmentFile, job.limits));
+    }
+    STX_TRY(const auto reader, ExrReader::open(file, job.limits));
+    if (const int at = environmentPartOf(reader); at >= 0) {
+        STX_TRY(const auto e, environmentHeader(reader.parts()[static_cast<std::size_t>(at)]));
+        out["environment"] = environmentJson(e.environment, e.size, e.faces);
+    }
     return {};
 }
 
@@ -336,6 +409,18 @@ std::string describeAsText(const Json& info) {
     if (info.contains("bounds"))
         out += fmt::format("bounds: {} to {}\n", text(info["bounds"]["min"]),
                            text(info["bounds"]["max"]));
+    if (info.contains("environment")) {
+        const Json& e = info["environment"];
+        out += fmt::format("environment: {}", text(e["layout"]));
+        if (e.contains("width")) out += fmt::format(", {}x{}", text(e["width"]), text(e["height"]));
+        if (e.contains("faces")) out += fmt::format(", {} faces", e["faces"].size());
+        for (const auto& [key, what] :
+             {std::pair{"skyColours", "sky"}, {"groundColours", "ground"}})
+            if (e[key] > 0) out += fmt::format(", {} of {} colour(s)", what, text(e[key]));
+        if (e["orientation"][3] != 0.0)
+            out += fmt::format(", turned by {}", text(e["orientation"]));
+        out += "\n";
+    }
     if (info.contains("pixels"))
         out += fmt::format("pixels: {} of {} kept\n", text(info["pixels"]["kept"]),
                            text(info["pixels"]["source"]));

@@ -6,6 +6,7 @@
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
+#include "lib/environment/environment.hpp"
 
 namespace stx {
 
@@ -32,6 +33,8 @@ std::vector<std::string> earlierImages(const std::filesystem::path& folder) {
         bool ours = stem.starts_with("od") && integerFromText(stem.substr(2)).has_value();
         for (const char* role : {"_texture", "_depth", "_normal", "_splatU", "_splatV"})
             ours = ours || stem.ends_with(role);
+        for (const char* face : kCubeFaceNames)
+            ours = ours || stem == fmt::format("environment_{}", face);
         if (ours) names.push_back(name);
     }
     return names;

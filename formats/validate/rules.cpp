@@ -16,6 +16,7 @@ constexpr const char* kBifs = "ISO/IEC 14496-11, 8.6";
 constexpr const char* kDibr = "ISO/IEC 14496-16, 4.5.4";
 constexpr const char* kMovie = "ISO/IEC 14772-1, 6.28";
 constexpr const char* kClock = "ISO/IEC 14496-1, 7.3";
+constexpr const char* kBackground = "ISO/IEC 14772-1, 6.5";
 constexpr const char* kV2 = "ISO/IEC 14496-16, 4.5.4 (V2 nodes)";
 
 constexpr Rule kRules[] = {
@@ -99,6 +100,10 @@ constexpr Rule kRules[] = {
     {7006, warning, kMovie, "a MovieTexture runs forwards (speed above 0)"},
     {7007, error, kDibr, "all pictures of a stream have the same size"},
     {7008, warning, "ISO/IEC 14496-12, 8.6.6", "the edit list shows every picture"},
+
+    {8001, warning, kBackground, "the pictures of a Background are square and of one size"},
+    {8002, warning, kBackground, "a Background has all six pictures or none"},
+    {8003, error, kBackground, "sky and ground have one angle less than colours, and angles rise"},
 };
 
 }  // namespace

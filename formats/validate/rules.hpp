@@ -6,8 +6,8 @@
 namespace stx {
 
 /// A numbered rule for files, bundles and atlases. 1xxx file, 2xxx MPEG-4's container, descriptors
-/// and commands, 3xxx camera, 4xxx depth and images, 5xxx atlas, 6xxx normal and splat, 7xxx time.
-/// A number is never used again for something else.
+/// and commands, 3xxx camera, 4xxx depth and images, 5xxx atlas, 6xxx normal and splat, 7xxx time,
+/// 8xxx environment. A number is never used again for something else.
 struct Rule {
     enum class Severity {
         error,    ///< readers cannot show it, or show something else

@@ -12,6 +12,7 @@
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "formats/validate/findings.hpp"
+#include "formats/validate/validate_background.hpp"
 #include "formats/validate/validate_movies.hpp"
 
 namespace stx {
@@ -225,7 +226,10 @@ class DocumentValidator {
                 ++index;
             }
         }
-        if (index == 0) add(4014, "scene", "no DepthImage that is shown", "one at least");
+        checkBackgrounds(shown->backgrounds, *images_, findings_);
+        // A place without an object is a scene, too.
+        if (index == 0 && shown->backgrounds.empty())
+            add(4014, "scene", "no DepthImage that is shown", "one at least");
         checkObject(*shown);
         if (options_.pixels && decoded_ > 0 && decoded_ == emptyViews_)
             add(4007, "scene", "no point in any view", "points (depth codes above 0)");

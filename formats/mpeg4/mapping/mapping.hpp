@@ -37,6 +37,8 @@ struct SceneReadOptions {
     /// Without pixels only headers are read: the views have cameras, planes and depthBits, but
     /// empty images.
     bool pixels = true;
+    /// Whether the Background is read, too; without pixels it never is.
+    bool environment = true;
     /// A scene that shows no view gives a bundle without any, instead of an error.
     bool mayBeEmpty = false;
     /// A note of what moves, and is read as it is at its start.
@@ -80,15 +82,15 @@ struct SceneWriteOptions {
     std::vector<float> splatRanges;
 };
 
-/// A presentation of a bundle: Group { WorldInfo, DepthImage..., Viewpoint, NavigationInfo }, the
-/// WorldInfo with title and bounds (computed where the bundle has none); with octreeLevels Group {
-/// WorldInfo, OctreeImage }, under a Transform where the object is not in the unit cube. Field
-/// values are rounded to float, planes outwards. A principal point off the centre is centred by
-/// padding with pixels without a point (see placement.hpp) and noted; reading the scene back here
-/// undoes it. What is lossy is noted: float depth and 8 bits with the largest error, JPEG, linear
-/// colour, what V1 cannot hold. Errors: (unsupported) more images than MPEG-4 has object
-/// descriptors for, or images that padding makes too large; (usage) options out of range; what
-/// Bundle::check() says.
+/// A presentation of a bundle: Group { WorldInfo, DepthImage..., Background, Viewpoint,
+/// NavigationInfo } (background.hpp), the WorldInfo with title and bounds (computed where the
+/// bundle has none); with octreeLevels Group { WorldInfo, OctreeImage }, under a Transform where
+/// the object is not in the unit cube. Field values are rounded to float, planes outwards. A
+/// principal point off the centre is centred by padding with pixels without a point (see
+/// placement.hpp) and noted; reading the scene back here undoes it. What is lossy is noted: float
+/// depth and 8 bits with the largest error, JPEG, linear colour, what V1 cannot hold. Errors:
+/// (unsupported) more images than MPEG-4 has object descriptors for, or images that padding makes
+/// too large; (usage) options out of range; what Bundle::check() says.
 [[nodiscard]] Result<Document> sceneFromBundle(const Bundle& bundle,
                                                const SceneWriteOptions& options, Job& job);
 

@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/octree.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
@@ -92,6 +93,10 @@ class BundleReader {
             return fail(ErrorCode::invalidInput, "the scene has {} views; at most {} are read",
                         bundle.views.size(), job_.limits.maxViews);
         makeNamesUnique(bundle);
+        if (options_.pixels && options_.environment) {
+            STX_TRY(bundle.environment,
+                    boundEnvironment(shown.backgrounds, images, options_.decode, job_));
+        }
         if (options_.pixels) STX_CHECK(bundle.check());
         return bundle;
     }

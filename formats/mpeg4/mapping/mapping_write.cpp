@@ -1,6 +1,7 @@
 #include <cmath>
 #include <set>
 
+#include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/octree_write.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
@@ -31,6 +32,11 @@ class SceneWriter {
             STX_TRY(auto children, depthImages(notes));
             root = groupOf(std::move(children), notes);
         }
+        if (bundle_.environment) {
+            STX_TRY(NodePtr background,
+                    backgroundFromEnvironment(*bundle_.environment, options_, update_, job_));
+            root->edit<NodeList>("children").push_back(std::move(background));
+        }
         addNavigation(*root);
 
         Document document;
@@ -58,9 +64,6 @@ class SceneWriter {
     }
 
   private:
-    static constexpr int kFirstOd = 2;    ///< 1 is the IOD's
-    static constexpr int kLastOd = 1022;  ///< 1023 is forbidden
-
     [[nodiscard]] std::string viewName(std::size_t i) const {
         return fmt::format("view {} '{}'", i, bundle_.views[i].name);
     }
@@ -220,12 +223,12 @@ class SceneWriter {
             if (options_.octreeLevels == 0 && isV2(view))
                 count += (view.hasNormals() ? 1u : 0u) + (view.hasSplats() ? 2u : 0u);
         }
-        if (count > kLastOd - kFirstOd + 1)
+        if (count > kLastImageOd - kFirstImageOd + 1)
             return fail(ErrorCode::unsupported,
                         "the bundle has {} views with {} images; MPEG-4 has object descriptors for "
                         "{} images "
                         "(select fewer views, or write .exr)",
-                        bundle_.views.size(), count, kLastOd - kFirstOd + 1);
+                        bundle_.views.size(), count, kLastImageOd - kFirstImageOd + 1);
         return {};
     }
 
@@ -255,24 +258,9 @@ class SceneWriter {
 
     /// A texture node with a stream of its own behind it.
     NodePtr textureNode(const std::string& defName, const char* role, Bytes bytes) {
-        const int id = kFirstOd + static_cast<int>(update_.descriptors.size());
-        const bool png = bytes.size() > 1 && bytes[0] == std::byte{0x89};
-        ElementaryStream stream;
-        stream.esId = static_cast<std::uint32_t>(id + 1);
-        stream.objectTypeIndication = png ? oti::kPng : oti::kJpeg;
-        stream.streamType = StreamType::visual;
-        stream.fileName = fmt::format("{}_{}.{}", defName, role, png ? "png" : "jpg");
-        Sample sample;
-        sample.duration = stream.timescale;
-        sample.data = ByteRange::of(std::move(bytes));
-        stream.samples.push_back(std::move(sample));
-        ObjectDescriptor od;
-        od.id = id;
-        od.streams.push_back(std::move(stream));
-        update_.descriptors.push_back(std::move(od));
+        const Url url =
+            addPictureStream(update_, fmt::format("{}_{}", defName, role), std::move(bytes));
         NodePtr node = makeNode("ImageTexture");
-        Url url;
-        url.objectDescriptorId = id;
         node->set("url", std::vector{url});
         // Outside of the window there is nothing to repeat.
         node->set("repeatS", false);

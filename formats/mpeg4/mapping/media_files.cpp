@@ -6,6 +6,7 @@
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
+#include "lib/environment/environment.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -70,6 +71,15 @@ std::map<int, Role> rolesOf(const Document& document) {
     std::map<int, Role> roles;
     int count = 0;
     const auto visit = [&](const NodePtr& node) {
+        if (node->is("Background")) {
+            for (std::size_t f = 0; f < kCubeFaceNames.size(); ++f)
+                for (const Url& one :
+                     node->get<std::vector<Url>>(fmt::format("{}Url", kCubeFaceNames[f])))
+                    if (one.objectDescriptorId != 0)
+                        roles.try_emplace(one.objectDescriptorId,
+                                          Role{"environment", kCubeFaceNames[f]});
+            return;
+        }
         const int index = node->info->find("diTexture");
         if (index < 0) return;
         const auto* texture = std::get_if<NodePtr>(&node->value(index));

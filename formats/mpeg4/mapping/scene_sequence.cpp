@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_set>
 
+#include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/scene/interpolators.hpp"
 
 namespace stx::mpeg4 {
@@ -45,6 +46,11 @@ class SceneSequence : public Sequence {
         STX_TRY(images_, StreamImages::make(document_, options_.folder, job.limits));
         images_.keepPictures(std::min<std::uint64_t>(kCacheBytes, job.limits.maxMemoryBytes / 4));
         STX_TRY(timeline_, timelineOf(document_, images_));
+        // Once for all frames: it is what stands still.
+        if (options_.pixels && options_.environment) {
+            STX_TRY(environment_, environmentFromScene(document_, options_, job));
+            options_.environment = false;
+        }
         return {};
     }
 
@@ -55,10 +61,12 @@ class SceneSequence : public Sequence {
         images_.setTime(now);
         STX_TRY(auto bundle, bundleOfMoment(document_, *scene, images_, options_, job));
         bundle.time = now;
+        bundle.environment = environment_;
         return bundle;
     }
 
   private:
+    std::shared_ptr<const Environment> environment_;
     Document document_;
     SceneReadOptions options_;
     SceneInTime moments_;

@@ -37,6 +37,8 @@ class Walker {
                             limits_.maxViews);
             scene_.nodes.push_back({node, world, parent});
             scene_.above.insert(path_.begin(), path_.end());
+        } else if (type == "Background") {
+            scene_.backgrounds.push_back({node, turn_});
         } else if (type == "WorldInfo") {
             const auto& title = node->get<std::string>("title");
             if (scene_.title.empty()) scene_.title = title;
@@ -52,14 +54,18 @@ class Walker {
         } else if (const auto* children = childrenOf(*node)) {
             if (!isPlainGroup(type)) return visitAsGroup(*node, *children, world, depth);
             glm::dmat4 here = world;
+            const glm::dquat turn = turn_;
             if (type == "Transform") {
+                turn_ = turn_ * quatFromAxisAngle(axisAngle(node->get<Rotation>("rotation")));
                 here = world * transformMatrix(node->get<glm::vec3>("center"),
                                                axisAngle(node->get<Rotation>("rotation")),
                                                node->get<glm::vec3>("scale"),
                                                axisAngle(node->get<Rotation>("scaleOrientation")),
                                                node->get<glm::vec3>("translation"));
             }
-            return visitAll(*children, here, depth);
+            auto done = visitAll(*children, here, depth);
+            turn_ = turn;
+            return done;
         } else if (!isSetting(type)) {
             scene_.leftOut.insert(type);
             if (type == "Shape")
@@ -105,7 +111,8 @@ class Walker {
     static constexpr std::int64_t kMaxVisits = 1 << 21;
     const Limits& limits_;
     ShownScene& scene_;
-    std::vector<const Node*> path_;  ///< from the root to the node that is visited
+    std::vector<const Node*> path_;        ///< from the root to the node that is visited
+    glm::dquat turn_{1.0, 0.0, 0.0, 0.0};  ///< of all Transforms above the node that is visited
     std::int64_t visits_ = 0;
     int groups_ = 0;
 };

@@ -23,13 +23,21 @@ struct ShownInfo {
     glm::dmat4 worldFromLocal{1.0};  ///< of all Transforms above it
 };
 
+/// A Background, and how the nodes above it turn it: nothing else of theirs counts (VRML97, 6.5).
+struct ShownBackground {
+    NodePtr node;
+    glm::dquat worldFromLocal{1.0, 0.0, 0.0, 0.0};
+};
+
 /// What a scene shows, from top to bottom: all children of grouping nodes, only the chosen one of a
 /// Switch and the finest of a LOD; a node that is used twice appears twice. Errors when that is
 /// more than `limits` allow.
 struct ShownScene {
     std::vector<ShownNode> nodes;
-    std::string title;                      ///< of the first WorldInfo with one
-    std::vector<ShownInfo> infos;           ///< of each WorldInfo
+    std::string title;             ///< of the first WorldInfo with one
+    std::vector<ShownInfo> infos;  ///< of each WorldInfo
+    /// The Backgrounds in the order they are met; the first is bound.
+    std::vector<ShownBackground> backgrounds;
     std::unordered_set<const Node*> above;  ///< the nodes that one of `nodes` is in
     std::set<std::string> leftOut;  ///< types of nodes that are no views, groups or settings
     /// Types of grouping nodes that turn, move or choose their children; read as plain groups.

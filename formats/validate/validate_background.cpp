@@ -1,0 +1,78 @@
+#include "formats/validate/validate_background.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/mpeg4/mapping/background.hpp"
+
+namespace stx {
+
+using namespace mpeg4;
+
+namespace {
+
+void checkPictures(const Node& node, const StreamImages& images, const std::string& where,
+                   Findings& findings) {
+    std::vector<glm::ivec2> sizes;
+    std::string listed, missing;
+    int there = 0;
+    for (std::size_t f = 0; f < 6; ++f) {
+        const char* face = kCubeFaceNames[f];
+        const NodePtr texture = faceTexture(node, static_cast<CubeFace>(f));
+        if (!texture) {
+            missing += (missing.empty() ? "no " : ", ") + fmt::format("{}Url", face);
+            continue;
+        }
+        ++there;
+        const auto info = images.probe(*texture);
+        if (!info) {
+            // What is not there at all breaks a rule on descriptors.
+            const ElementaryStream* stream = images.stream(*texture);
+            if (stream && !stream->samples.empty() && stream->samples[0].data.size > 0)
+                findings.add(4005, where, fmt::format("{}Url: {}", face, info.error().message),
+                             "an image");
+            continue;
+        }
+        sizes.emplace_back(info->width, info->height);
+        listed += (listed.empty() ? "" : ", ") +
+                  fmt::format("{} {}", face, sizeText(info->width, info->height));
+    }
+    const auto fits = [&](glm::ivec2 size) { return size.x == size.y && size == sizes[0]; };
+    if (!std::ranges::all_of(sizes, fits))
+        findings.add(8001, where, listed, "six squares of one size");
+    if (there > 0 && there < 6) findings.add(8002, where, missing, "all six pictures");
+}
+
+void checkGradient(const Node& node, const char* what, const std::string& where,
+                   Findings& findings) {
+    const auto& colours = node.get<std::vector<Color>>(fmt::format("{}Color", what));
+    const auto& angles = node.get<std::vector<float>>(fmt::format("{}Angle", what));
+    const bool count = colours.empty() ? angles.empty() : angles.size() + 1 == colours.size();
+    float before = 0;
+    bool rise = true;
+    for (const float angle : angles) {
+        rise = rise && angle >= before && angle <= 3.1415927f;
+        before = angle;
+    }
+    if (!count || !rise)
+        findings.add(8003, where,
+                     fmt::format("{} {}Color and {} {}Angle{}", colours.size(), what, angles.size(),
+                                 what, rise ? "" : " that do not rise from 0 to 3.1415927"),
+                     "one angle less than colours, rising");
+}
+
+}  // namespace
+
+void checkBackgrounds(const std::vector<ShownBackground>& backgrounds, const StreamImages& images,
+                      Findings& findings) {
+    for (const ShownBackground& background : backgrounds) {
+        const Node& node = *background.node;
+        const std::string where =
+            node.defName.empty() ? "Background" : fmt::format("Background '{}'", node.defName);
+        checkPictures(node, images, where, findings);
+        checkGradient(node, "sky", where, findings);
+        checkGradient(node, "ground", where, findings);
+    }
+}
+
+}  // namespace stx
