@@ -91,7 +91,9 @@ Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOpti
     part.width = part.displayWidth = frame.colour.width();
     part.height = part.displayHeight = frame.colour.height();
     part.zipLevel = 1;
-    if (options.camera) {
+    if (options.around) {
+        part.envmap = ExrPart::Envmap::latlong;
+    } else if (options.camera) {
         const double aspect = options.camera->fy / options.camera->fx;
         if (aspect > 1e-5 && aspect < 1e5 && std::abs(aspect - 1.0) > 1e-6)
             part.pixelAspectRatio = aspect;

@@ -33,6 +33,9 @@ struct FrameOptions {
     bool noClobber = false;
     /// EXR: gets into the standard attributes worldToCamera, worldToNDC, screenWindow...
     std::optional<Camera> camera;
+    /// EXR: the picture is equirectangular (renderAround()): it gets the attribute envmap, and Z is
+    /// the length of the ray.
+    bool around = false;
 };
 
 /// Writes one picture whole or not at all, by the name's ending. Linear frames are coded as sRGB

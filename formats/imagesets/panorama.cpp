@@ -5,6 +5,8 @@
 
 #include <glm/gtc/constants.hpp>
 
+#include "lib/render/finish/around.hpp"
+
 namespace stx::imagesets {
 
 bool Panorama::closed() const {
@@ -31,21 +33,7 @@ std::vector<Camera> cubeFaces(const Camera& pose, const Panorama& panorama, int 
     // The middle of a face has f pixels per radian.
     const double perRadian = std::max(width / (panorama.left - panorama.right),
                                       height / (panorama.top - panorama.bottom));
-    const int half = std::max(1, static_cast<int>(std::lround(perRadian)));
-    Camera face = pose;
-    face.orthographic = false;
-    face.width = face.height = 2 * half + 2;
-    face.fx = face.fy = half;
-    face.cx = face.cy = half + 1.0;
-    std::vector<Camera> faces;
-    const double quarter = glm::half_pi<double>();
-    for (const glm::dvec4 turn : {glm::dvec4(0, 1, 0, 0), glm::dvec4(0, 1, 0, quarter),
-                                  glm::dvec4(0, 1, 0, 2 * quarter), glm::dvec4(0, 1, 0, -quarter),
-                                  glm::dvec4(1, 0, 0, quarter), glm::dvec4(1, 0, 0, -quarter)}) {
-        face.orientation = glm::normalize(pose.orientation * quatFromAxisAngle(turn));
-        faces.push_back(face);
-    }
-    return faces;
+    return facesAround(pose, std::max(1, static_cast<int>(std::lround(perRadian))));
 }
 
 }  // namespace stx::imagesets

@@ -1,21 +1,89 @@
-// A folder with one equirectangular picture and its depth (ray length), and no camera: it is at
-// the origin and looks along -Z in the middle of the picture.
+// A folder with one equirectangular picture and its depth (ray length), or an OpenEXR file with
+// both, and no camera: it is at the origin and looks along -Z in the middle of the picture.
 
 #include <algorithm>
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/patterns.hpp"
+#include "formats/imagesets/pictures.hpp"
 
 namespace stx::imagesets {
+namespace {
+
+template <class T>
+Image<T> upperHalf(const Image<T>& image) {
+    Image<T> half(image.width(), image.height() / 2);
+    std::copy_n(image.data(), half.count(), half.data());
+    return half;
+}
+
+/// Two pictures all around, one above the other, are a pair for two eyes.
+bool isPair(int width, int height) {
+    return width == height && height % 2 == 0;
+}
+
+/// Colour and depth; of a pair the upper picture, which by custom is the left eye's.
+Result<StoredView> loadPanorama(const SetView& set, const YuvColour& yuv, Job& job) {
+    StoredView stored;
+    STX_TRY(auto colour, readColour(set.texture, yuv, job));
+    stored.texture = std::move(colour.texture);
+    stored.alpha = colour.alpha;
+    STX_TRY(auto depth, readDepth(set.depth, job));
+    stored.depth = std::move(depth.values);
+    stored.depthBits = depth.bits;
+    const int width = stored.texture.width(), height = stored.texture.height();
+    if (isPair(width, height)) {
+        if (const auto* coded = stored.texture.rgba8())
+            stored.texture = upperHalf(*coded);
+        else
+            stored.texture = upperHalf(*stored.texture.rgbaFloat());
+        job.note(fmt::format(
+            "'{}' is {}x{}: two pictures all around for two eyes; the upper one (left) is read",
+            set.texture.name, width, height));
+    }
+    if (isPair(stored.depth.width(), stored.depth.height())) stored.depth = upperHalf(stored.depth);
+    return stored;
+}
+
+SetDescription setOf(PictureSource texture, PictureSource depth, const ImageSetOptions& options) {
+    SetView view;
+    view.name = "panorama";
+    view.panorama = Panorama();
+    view.texture = std::move(texture);
+    view.depth = std::move(depth);
+    view.load = [yuv = options.yuv](const SetView& set, Job& job) {
+        return loadPanorama(set, yuv, job);
+    };
+    view.distances = [](Image<float>& values, const Camera& camera, int bits,
+                        Job& notes) -> Result<void> {
+        if (bits == 32) return {};
+        if (bits != 16)
+            return fail(ErrorCode::invalidInput,
+                        "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
+        return scaledIntegers(0.001)(values, camera, bits, notes);
+    };
+    SetDescription set;
+    set.views.push_back(std::move(view));
+    return set;
+}
+
+}  // namespace
 
 Result<SetDescription> describePanorama(const path& given, const ImageSetOptions& options,
                                         Job& job) {
     const std::string where = inQuotes(given.string());
     std::error_code ec;
+    if (given.extension() == ".exr" && std::filesystem::is_regular_file(given, ec)) {
+        // Both in one file, as 'stx render --projection equirectangular' writes them.
+        STX_TRY(const auto source,
+                sourceInside(folderOf(given), given.filename().string(), where, job.limits));
+        return setOf(source, source, options);
+    }
     if (!std::filesystem::is_directory(given, ec))
         return failAt(where, ErrorCode::invalidInput,
-                      "a folder with one picture and its depth is expected");
+                      "a folder with one picture and its depth, or an .exr file with both, is "
+                      "expected");
     std::string texture = filled(options.texturePattern, {"", 0, 0, options.frame});
     std::string depth = filled(options.depthPattern, {"", 0, 0, options.frame});
     for (const std::string& name : filesIn(given)) {
@@ -42,22 +110,9 @@ Result<SetDescription> describePanorama(const path& given, const ImageSetOptions
                       "no {} was found in it; a panorama is a picture and a depth image with "
                       "'depth' in its name",
                       texture.empty() ? "picture" : "depth image");
-    SetView view;
-    view.name = "panorama";
-    view.panorama = Panorama();
-    STX_TRY(view.texture, sourceInside(given, texture, where, job.limits));
-    STX_TRY(view.depth, sourceInside(given, depth, where, job.limits));
-    view.distances = [](Image<float>& values, const Camera& camera, int bits,
-                        Job& notes) -> Result<void> {
-        if (bits == 32) return {};
-        if (bits != 16)
-            return fail(ErrorCode::invalidInput,
-                        "the depth has {} bits; 16 (millimetres) or floats are expected", bits);
-        return scaledIntegers(0.001)(values, camera, bits, notes);
-    };
-    SetDescription set;
-    set.views.push_back(std::move(view));
-    return set;
+    STX_TRY(auto textureSource, sourceInside(given, texture, where, job.limits));
+    STX_TRY(auto depthSource, sourceInside(given, depth, where, job.limits));
+    return setOf(std::move(textureSource), std::move(depthSource), options);
 }
 
 }  // namespace stx::imagesets
