@@ -11,8 +11,10 @@
 #include "formats/sequences.hpp"
 #include "formats/stx/mesh_views.hpp"
 #include "lib/capture/capture.hpp"
+#include "lib/render/finish/around.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
+#include "tools/environment_options.hpp"
 #include "tools/mesh_views.hpp"
 
 namespace stx::tools {
@@ -30,6 +32,8 @@ struct ConvertOptions {
     int octreeLevels = 0;
     int bifsVersion = 0;
     OpenOptions open;
+    EnvironmentOptions environment;
+    bool cube = false;        ///< six faces seen from inside
     std::string frames;       ///< A-B
     bool frameGiven = false;  ///< one frame is asked for
     bool still = false, moving = false;
@@ -97,6 +101,9 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
         return bundle;
     }
     auto& bundle = std::get<Bundle>(opened);
+    if (o.cube) {
+        STX_TRY(bundle, cubeFromInside(bundle, program.job));
+    }
     if (const auto bits = o.mesh->depthBits) {
         // Readers of image sets have said it for what they made.
         if (setDepthBits(bundle, *bits)) noteDepthLoss(bundle, program.job);
@@ -125,7 +132,8 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
                                                  const std::filesystem::path& target,
                                                  const ConvertOptions& o, bool countPoints,
                                                  Program& program) {
-    if (!holdsSequences(target) || o.frameGiven || o.open.set.refinePoses) return std::nullopt;
+    if (!holdsSequences(target) || o.frameGiven || o.open.set.refinePoses || o.cube)
+        return std::nullopt;
     // A mesh, an atlas and one .exr stand still.
     if (o.open.set.from.empty()) {
         const auto kind = recognise(input);
@@ -147,6 +155,13 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
             for (ReferenceView& view : bundle.views) view.depthBits = bits;
             return {};
         });
+    if (o.environment.given()) {
+        STX_TRY(auto environment, environmentOf(o.environment, program.job));
+        frames = changed(std::move(frames), [environment](Bundle& bundle, Job&) -> Result<void> {
+            bundle.environment = environment;
+            return {};
+        });
+    }
     noteUnused(input, false, o, program);
     Converted done;
     const Timeline timeline = frames->timeline();
@@ -171,7 +186,8 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     std::optional<Converted> done;
     std::error_code ec;
     // `name_%04d.exr` is not a file's name.
-    if (std::filesystem::exists(input, ec) || !frameName(input.string(), 0)) {
+    if (!o.environment.given() && !o.cube &&
+        (std::filesystem::exists(input, ec) || !frameName(input.string(), 0))) {
         STX_TRY(const auto passed,
                 convertDocument(input, target, saveOptions(o, program),
                                 o.mesh->depthBits.has_value(), countPoints, program.job));
@@ -184,7 +200,10 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
         STX_TRY(done, convertSequence(input, target, o, countPoints, program));
     }
     if (!done) {
-        STX_TRY(const auto bundle, makeBundle(input, o, program));
+        STX_TRY(auto bundle, makeBundle(input, o, program));
+        if (o.environment.given()) {
+            STX_TRY(bundle.environment, environmentOf(o.environment, program.job));
+        }
         STX_CHECK(program.job.checkCancelled());
         STX_CHECK(saveBundle(bundle, target, saveOptions(o, program), program.job));
         done = summaryOf(bundle, countPoints);
@@ -294,6 +313,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
         STX_CHECK(command.refuse({"--video"}, "is of MPEG-4 containers, not of .exr"));
         STX_CHECK(command.refuse({"--point-texture"}, "is of MPEG-4 containers, not of .exr"));
     }
+    STX_CHECK(checkEnvironmentOptions(o.environment, command));
     if (!o.frames.empty()) return convertFrames(o, program);
     STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
     STX_TRY(const auto items, planBatch(inputs, o.output));
@@ -367,10 +387,19 @@ void addConvert(CommandLine& line, Program& program) {
         .range(1, 16)
         .takes("LEVELS")
         .group(coding);
+    c.flag("--cube", o->cube,
+           "Of a sensor that turned in place: the views become the six faces of a cube around it, "
+           "seen from inside")
+        .group(coding);
     c.option("--bifs-version", o->bifsVersion,
              "Of an MPEG-4 scene's stream: 1 or 2 (default 1, or as the input has it)")
         .range(1, 2)
         .group(coding);
+    addEnvironmentOptions(
+        c, o->environment, "Environment: what is behind everything, infinitely far away",
+        "Added to the bundle, in place of one that it has: an equirectangular picture, an OpenEXR "
+        "file with envmap, a folder of six faces, or a scene with a Background; none: takes it "
+        "away");
     const char* many = "Many inputs";
     c.option("--jobs,-j", o->batch.jobs,
              "Inputs at a time, each in a process of its own (default 1)")

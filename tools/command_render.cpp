@@ -8,9 +8,11 @@
 #include "formats/images/images.hpp"
 #include "formats/sequences.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/render/finish/around.hpp"
 #include "lib/render/renderer.hpp"
 #include "tools/camera_options.hpp"
 #include "tools/commands.hpp"
+#include "tools/environment_options.hpp"
 #include "tools/frame_writer.hpp"
 #include "tools/picture_times.hpp"
 
@@ -24,6 +26,8 @@ struct RenderOptions {
     Backend backend = Backend::automatic;
     RenderSettings settings;  ///< without the lighting
     std::string background;   ///< empty: not given
+    EnvironmentOptions environment;
+    bool around = false;  ///< equirectangular pictures
     std::vector<std::string> lights;
     std::string ambient = "0.2", specular = "0";
     double shininess = 32;
@@ -84,8 +88,10 @@ Result<Light> parseLight(const std::string& text, glm::dvec3 origin) {
     else if (body.rfind("point:", 0) == 0)
         light.kind = Light::Kind::point;
     else
-        return fail(ErrorCode::usage,
-                    "--light is '{}'; dir:X,Y,Z[,r,g,b] or point:X,Y,Z[,r,g,b] is expected", text);
+        return fail(
+            ErrorCode::usage,
+            "--light is '{}'; dir:X,Y,Z[,r,g,b], point:X,Y,Z[,r,g,b] or environment is expected",
+            text);
     body = body.substr(body.find(':') + 1);
     const auto commas = std::count(body.begin(), body.end(), ',');
     STX_TRY(const auto v, parseNumbers(body, commas >= 3 ? 6 : 3, "--light"));
@@ -96,6 +102,12 @@ Result<Light> parseLight(const std::string& text, glm::dvec3 origin) {
     if (light.kind == Light::Kind::directional && light.vector == glm::vec3(0.0f))
         return fail(ErrorCode::usage, "--light '{}' has no direction", text);
     return light;
+}
+
+/// The word for --light that is no Light.
+constexpr const char* kEnvironmentLight = "environment";
+bool lightsByEnvironment(const RenderOptions& o) {
+    return std::ranges::find(o.lights, kEnvironmentLight) != o.lights.end();
 }
 
 /// What --background says is put where no view shows a surface; nothing for a colour.
@@ -130,6 +142,12 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
     if (fillOf(o.background))
         STX_CHECK(command.refuse({"--fill"}, "says what --background " + o.background +
                                                  " says already; give one of them"));
+    STX_CHECK(checkEnvironmentOptions(o.environment, command));
+    if (o.background == "spatial" && o.environment.given() && !o.environment.none())
+        return fail(
+            ErrorCode::usage,
+            "--background spatial fills what no view shows from what is around it; that and "
+            "--environment exclude each other");
     if (o.settings.splat != SplatRule::paper)
         STX_CHECK(command.refuse({"--splat-coefficient"}, "is of --splat paper"));
     return {};
@@ -160,10 +178,14 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
 Result<RenderSettings> settingsOf(const RenderOptions& o) {
     RenderSettings s = o.settings;
     s.fill = fillOf(o.background).value_or(s.fill);
+    // Who asks for another background does not want the scene's own.
+    s.ownEnvironment =
+        !o.environment.given() && (o.background.empty() || o.background == "temporal");
     // What only OpenEXR can hold.
     if (const auto format = frameFormat(o.output); format && *format == FrameFormat::exr)
         s.normals = true;
     for (const auto& text : o.lights) {
+        if (text == kEnvironmentLight) continue;
         STX_TRY(const auto light, parseLight(text, glm::dvec3(0.0)));
         s.lighting.lights.push_back(light);
     }
@@ -211,6 +233,7 @@ struct DrawnScene {
     std::unique_ptr<MovingPictures> moving;
     CameraContext context;
     std::int64_t points = 0;
+    bool environment = false;  ///< pixels without the object show one
 };
 
 /// Opens the input: as a sequence when times are asked for.
@@ -221,11 +244,13 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
         STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
         scene.moving = std::make_unique<MovingPictures>(std::move(frames), settings, o.backend,
                                                         o.device, program.job);
+        if (lightsByEnvironment(o)) scene.moving->lightByEnvironment();
         STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
         STX_CHECK(scene.moving->at(times.front(), {}));
         scene.context.views = scene.moving->views();
         scene.context.bounds = scene.moving->bounds();
         scene.context.origin = scene.moving->origin();
+        scene.environment = settings.environment || scene.moving->environment();
         noteUnused(Bundle(), o, command, program);
         return scene;
     }
@@ -234,10 +259,12 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     const auto addViews = [&](const auto& seen) {
         for (const auto& v : seen.views) scene.context.views.push_back(v.camera);
         scene.points = seen.pointCount();
+        scene.environment = settings.ownEnvironment && seen.environment;
     };
     if (const auto* mesh = std::get_if<Mesh>(&scene.model)) STX_CHECK(mesh->check());
     if (const auto* bundle = std::get_if<Bundle>(&scene.model)) addViews(*bundle);
     if (const auto* atlas = std::get_if<Atlas>(&scene.model)) addViews(*atlas);
+    scene.environment = scene.environment || settings.environment;
     scene.context.bounds = boundsOf(scene.model);
     scene.context.origin = originOf(scene.model);
     return scene;
@@ -285,11 +312,44 @@ std::pair<int, int> rateOf(double rate) {
     return {static_cast<int>(std::round(rate * 1000)), 1000};
 }
 
-Result<int> render(const RenderOptions& o, const Command& command, Program& program) {
+/// Lights by an environment: the one that is shown, else the model's own.
+Result<void> lightBy(const Model& model, RenderSettings& settings, Job& job) {
+    std::shared_ptr<const Environment> own;
+    if (const auto* bundle = std::get_if<Bundle>(&model)) own = bundle->environment;
+    if (const auto* atlas = std::get_if<Atlas>(&model)) own = atlas->environment;
+    auto map = settings.environment;
+    if (!map && own) {
+        STX_TRY(map, EnvironmentMap::make(*own, job.limits));
+        if (settings.ownEnvironment) settings.environment = map;
+    }
+    STX_TRY(settings.lighting.environment,
+            environmentLight(std::move(map), settings.lighting, job.limits));
+    return {};
+}
+
+/// The options of pictures all around: what a lens would say is refused.
+Result<void> prepareAround(RenderOptions& o, const Command& command, Program& program) {
+    if (!o.around) return {};
+    STX_CHECK(command.refuse({"--fov", "--ortho"},
+                             "is of a lens; --projection equirectangular sees all around"));
+    if (o.camera.size.empty()) o.camera.size = "1024x512";
+    STX_TRY(const auto size, parseSize(o.camera.size, program.job.limits));
+    if (size.x != 2 * size.y || size.y < 2)
+        return fail(ErrorCode::usage,
+                    "--size is {}x{}; an equirectangular picture is twice as wide as high", size.x,
+                    size.y);
+    return {};
+}
+
+Result<int> render(const RenderOptions& given, const Command& command, Program& program) {
+    RenderOptions o = given;
+    STX_CHECK(prepareAround(o, command, program));
     if (o.listDevices) return printDevices(program);
     if (o.input.empty() || o.output.empty())
         return fail(ErrorCode::usage, "an input and -o OUTPUT are needed. See 'stx render --help'");
     STX_CHECK(checkOptions(o, command));
+    // The environment is what ambient light stands for.
+    if (lightsByEnvironment(o) && command.given({"--ambient"}).empty()) o.ambient = "0";
     STX_TRY(auto settings, settingsOf(o));
     STX_TRY(const auto background, parseBackground(o.background));
     STX_CHECK(checkTarget(o.output, program));
@@ -304,15 +364,24 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     writing.stream = o.fileFormat;
     STX_TRY(writing.rate, parseRate(o.framesPerSecond.empty() ? "25" : o.framesPerSecond));
     writing.compression = o.compression;
+    writing.around = o.around;
     writing.noClobber = program.common.noClobber;
     STX_CHECK(FrameWriter::check(writing));
 
     preloadCodecs(o.input);
+    STX_TRY(const auto around, environmentOf(o.environment, program.job));
+    if (around) {
+        STX_TRY(settings.environment, EnvironmentMap::make(*around, program.job.limits));
+    }
     STX_TRY(auto scene, openScene(o, settings, command, program));
     CameraContext& context = scene.context;
-    for (std::size_t i = 0; i < o.lights.size(); ++i) {
-        STX_TRY(settings.lighting.lights[i], parseLight(o.lights[i], context.origin));
+    std::size_t at = 0;
+    for (const std::string& light : o.lights) {
+        if (light == kEnvironmentLight) continue;
+        STX_TRY(settings.lighting.lights[at++], parseLight(light, context.origin));
     }
+    if (lightsByEnvironment(o) && !scene.moving)
+        STX_CHECK(lightBy(scene.model, settings, program.job));
     STX_TRY(const auto pictures, picturesOf(o, scene, program));
     const auto count = static_cast<int>(pictures.size());
     if (count > 1 && !frameName(o.output, 0) && o.output != "-")
@@ -356,11 +425,13 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
             if (!now) return tl::unexpected(now.error().at(fmt::format("picture {}", i)));
             renderer = *now;
             if (o.camera.view >= 0) camera = ofView(scene.moving->views(), o, camera);
-        } else if (more) {
+        } else if (more && !o.around) {
             renderer->expect(pictures[i + 1].camera);
         }
         const auto start = std::chrono::steady_clock::now();
-        auto frame = renderer->render(camera);
+        auto frame = o.around
+                         ? renderAround(*renderer, camera, camera.width, camera.height, program.job)
+                         : renderer->render(camera);
         if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
         const double milliseconds =
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -369,9 +440,12 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
         ++drawn;
         views.push_back({{"output", name}, {"milliseconds", milliseconds}});
         if (scene.moving) views.back()["time"] = *pictures[i].time;
-        const auto colours = frame->colour.pixels();
-        if (std::all_of(colours.begin(), colours.end(), [](glm::vec4 c) { return !(c.a > 0); }))
-            ++empty;
+        const bool nothing =
+            scene.environment
+                ? std::ranges::none_of(frame->depth.pixels(), [](float d) { return hasPoint(d); })
+                : std::ranges::all_of(frame->colour.pixels(),
+                                      [](glm::vec4 c) { return !(c.a > 0); });
+        if (nothing) ++empty;
         STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), camera));
         program.job.progress(static_cast<std::int64_t>(i) + 1,
                              static_cast<std::int64_t>(pictures.size()), "rendering");
@@ -379,8 +453,10 @@ Result<int> render(const RenderOptions& o, const Command& command, Program& prog
     STX_CHECK(writer.finish());
     if (empty > 0)
         program.job.note(fmt::format(
-            "{} {} nothing: the object is behind or beside the camera; 'stx info' tells its bounds",
-            counted(static_cast<std::size_t>(empty), "picture"), empty == 1 ? "shows" : "show"));
+            "{} {} nothing{}: the object is behind or beside the camera; 'stx info' tells its "
+            "bounds",
+            counted(static_cast<std::size_t>(empty), "picture"), empty == 1 ? "shows" : "show",
+            scene.environment ? " but the environment" : ""));
     program.sayNotes();
     program.say(fmt::format("{} → {}, {} {}x{}, {}{}{}",
                             std::filesystem::path(o.input).filename().string(), o.output,
@@ -413,6 +489,12 @@ void addRender(CommandLine& line, Program& program) {
              ".png, .jpg, .exr, .tif or .webp; name_%04d.png for several; - for a y4m stream")
         .takes("IMAGE");
     addCameraOptions(c, o->camera);
+    c.choice<bool>("--projection", o->around, {{"perspective", false}, {"equirectangular", true}},
+                   "equirectangular: all that is seen from the camera's place, 360 by 180 degrees, "
+                   "what it looks at in the middle (1024x512 by default); in .exr Z is the length "
+                   "of the ray, and 'stx convert --from panorama' reads it back (default: as the "
+                   "camera is)")
+        .group("Camera");
     c.option("--time", o->time.time,
              "The moment of an input that moves, in seconds from its start (default 0)")
         .takes("T")
@@ -471,13 +553,21 @@ void addRender(CommandLine& line, Program& program) {
              "to 1, #rrggbb or a name such as white")
         .takes("temporal|spatial|none|COLOUR")
         .group(drawing);
+    addEnvironmentOptions(
+        c, o->environment, "Environment: what is behind everything, infinitely far away",
+        "Shown where nothing covers a pixel: an equirectangular picture, an OpenEXR file with "
+        "envmap, a folder of six faces, or a scene with a Background; none: not even the scene's "
+        "own, which is shown otherwise (but with --background spatial, none or a colour)");
     const char* lighting = "Lighting (Phong, in linear light; off without --light)";
     c.option("--light", o->lights,
              "dir:X,Y,Z[,r,g,b] shines along X,Y,Z; point:X,Y,Z[,r,g,b] is at X,Y,Z; @camera "
-             "appended: in camera space. Repeat for more")
+             "appended: in camera space; environment: diffuse and glossy light from all around, of "
+             "--environment or the scene's own. Repeat for more")
         .takes("LIGHT")
         .group(lighting);
-    c.option("--ambient", o->ambient, "Ambient light, grey or r,g,b (default 0.2)").group(lighting);
+    c.option("--ambient", o->ambient,
+             "Ambient light, grey or r,g,b (default 0.2; 0 with --light environment)")
+        .group(lighting);
     c.option("--specular", o->specular, "Specular reflection, grey or r,g,b (default 0)")
         .group(lighting);
     c.option("--shininess", o->shininess, "Phong exponent, above 0 (default 32)")

@@ -109,6 +109,7 @@ Result<void> FrameWriter::writeOne(const Item& item) {
         file.noClobber = settings_.noClobber;
         file.pngLevel = settings_.compression;
         file.camera = item.camera;
+        file.around = settings_.around;
         return item.picture.empty() ? writeFrame(item.frame, nameOf(item.index), file)
                                     : writePicture(item.picture, nameOf(item.index), file);
     }

@@ -28,6 +28,7 @@ class FrameWriter {
         std::pair<int, int> rate{25, 1};  ///< frames per second, a fraction
         int compression = 1;              ///< of PNG, 0 (fast, large) to 9
         bool noClobber = false;
+        bool around = false;  ///< pictures are equirectangular
     };
     /// Errors (usage) when the ending or the stream makes no sense.
     [[nodiscard]] static Result<void> check(const Settings& settings);

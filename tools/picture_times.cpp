@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "tools/environment_options.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -96,7 +97,23 @@ Result<Renderer*> MovingPictures::at(double time, std::optional<double> next) {
         bounds_ = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
         origin_ = bundle.origin;
         renderer_.reset();
-        STX_TRY(renderer_, rendererOf(std::move(bundle), settings_, job_, backend_, device_));
+        RenderSettings settings = settings_;
+        // Frames share an environment, which takes a while to prepare.
+        if (!settings.environment && bundle.environment && (settings.ownEnvironment || light_)) {
+            if (own_ != bundle.environment) {
+                STX_TRY(ownMap_, EnvironmentMap::make(*bundle.environment, job_.limits));
+                own_ = bundle.environment;
+                ownLight_ = nullptr;
+            }
+            if (settings.ownEnvironment) settings.environment = ownMap_;
+        }
+        if (light_ && !ownLight_) {
+            const auto& map = settings.environment ? settings.environment : ownMap_;
+            STX_TRY(ownLight_, environmentLight(map, settings.lighting, job_.limits));
+        }
+        if (light_) settings.lighting.environment = ownLight_;
+        environment_ = settings.environment != nullptr;
+        STX_TRY(renderer_, rendererOf(std::move(bundle), settings, job_, backend_, device_));
     }
     if (next) {
         const std::size_t later = timeline().frameAt(*next);

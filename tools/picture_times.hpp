@@ -41,6 +41,11 @@ class MovingPictures {
     [[nodiscard]] std::int64_t points() const { return points_; }
     [[nodiscard]] const Bounds& bounds() const { return bounds_; }
     [[nodiscard]] glm::dvec3 origin() const { return origin_; }
+    /// Light comes from the environment that is given, else from the frames' own; at() fails
+    /// (usage) where there is none.
+    void lightByEnvironment() { light_ = true; }
+    /// Whether that frame is shown before an environment.
+    [[nodiscard]] bool environment() const { return environment_; }
 
     /// The renderer of the frame of a time, which lives until the next call. `next`: the time that
     /// is asked for after it. Errors: those of the frame and of rendererOf().
@@ -59,6 +64,11 @@ class MovingPictures {
     std::optional<std::size_t> comingFrame_, frame_;
     std::unique_ptr<Renderer> renderer_;
     std::vector<Camera> views_;
+    std::shared_ptr<const Environment> own_;  ///< of the frames
+    std::shared_ptr<const EnvironmentMap> ownMap_;
+    std::shared_ptr<const EnvironmentLight> ownLight_;
+    bool environment_ = false;
+    bool light_ = false;
     std::int64_t points_ = 0;
     Bounds bounds_;
     glm::dvec3 origin_{0.0};
