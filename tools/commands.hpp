@@ -13,6 +13,7 @@ void addBake(CommandLine& line, Program& program);
 void addBackground(CommandLine& line, Program& program);
 void addRender(CommandLine& line, Program& program);
 void addInfo(CommandLine& line, Program& program);
+void addSheet(CommandLine& line, Program& program);
 void addExtract(CommandLine& line, Program& program);
 void addValidate(CommandLine& line, Program& program);
 void addCompare(CommandLine& line, Program& program);

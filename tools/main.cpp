@@ -13,8 +13,9 @@ int mainProgram(int argc, char** argv) {
     Program program;
     CommandLine line;
     // In the order of the help.
-    for (const auto add : {addConvert, addSelect, addPack, addBake, addBackground, addRender,
-                           addInfo, addExtract, addValidate, addCompare, addBench, addCompletion})
+    for (const auto add :
+         {addConvert, addSelect, addPack, addBake, addBackground, addRender, addInfo, addSheet,
+          addExtract, addValidate, addCompare, addBench, addCompletion})
         add(line, program);
     const auto request = line.parse(argc, argv);
     if (!request) {

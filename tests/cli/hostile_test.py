@@ -30,7 +30,8 @@ OTHERS = [["extract", "IN", "-o", "OUT/set"], ["extract", "IN", "-o", "OUT/point
           ["extract", "IN", "-o", "OUT/set", "--cameras", "miv", "--depth", "png"],
           ["extract", "IN", "-o", "OUT/points.drc"], ["select", "IN", "-o", "OUT/a.exr", "--count", "1"],
           ["bake", "IN", "-o", "OUT/a.mp4"], ["pack", "IN", "-o", "OUT/atlas"],
-          ["convert", "IN", "-o", "OUT/o.mp4", "--octree-image", "4"]]
+          ["convert", "IN", "-o", "OUT/o.mp4", "--octree-image", "4"],
+          ["sheet", "IN", "-o", "OUT/a.png", "--size", "900x700"], ["info", "IN", "--cameras", "OUT/a.svg"]]
 
 
 class Case:

@@ -53,6 +53,7 @@ def commands(inputs):
     yield Command("render sequence", ["render", atlas, "-o", "t_%04d.png", "--orbit", "6", "--backend", "cpu", "--size",
                                       "200x200"], [f"t_{i:04d}.png" for i in range(6)])
     yield Command("background", ["background", inputs["frames"], "-o", "t.png"], ["t.png"], ["--method", "n2pg"])
+    yield Command("sheet", ["sheet", bundle, "-o", "t.png"], ["t.png"], ["--size", "500x500"])
     yield Command("convert film", ["convert", inputs["film"], "-o", "t.mp4"], ["t.mp4"], ["--every", "2"])
     yield Command("bake film", ["bake", inputs["film"], "-o", "t.mp4"], ["t.mp4"], ["--method", "paper"])
 

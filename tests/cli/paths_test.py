@@ -67,7 +67,8 @@ def runs(args, have, source, where, ok_codes):
              "copy": ["convert", source, "-o", "a.mp4", "--views", "ring:2", "--size", "24x24"],
              "render": ["render", source, "-o", "a.png", "--size", "24x24", "--backend", "cpu"],
              "pack": ["pack", source, "-o", "atlas"], "bake": ["bake", source, "-o", "b.mp4"],
-             "extract": ["extract", source, "-o", "images"]}
+             "extract": ["extract", source, "-o", "images"],
+             "sheet": ["sheet", source, "-o", "a.png"]}
     for name, words in lines.items():
         if words[0] not in have:
             continue

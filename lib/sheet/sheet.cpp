@@ -1,0 +1,236 @@
+#include "lib/sheet/sheet.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lib/base/counted.hpp"
+#include "lib/base/printable.hpp"
+#include "lib/sheet/layout.hpp"
+#include "lib/sheet/tiles.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kViewLines = 4;
+constexpr int kMoments = 6;  ///< of a sequence, unless --columns says how many
+/// Rectangles on a texture: two colours in turns, so that neighbours are told apart.
+constexpr glm::u8vec3 kOutlines[] = {{255, 64, 64}, {64, 160, 255}};
+
+glm::ivec2 largestOf(const std::vector<ReferenceView>& views) {
+    glm::ivec2 largest(1);
+    for (const auto& v : views) largest = glm::max(largest, {v.camera.width, v.camera.height});
+    return largest;
+}
+
+std::string vectorText(glm::dvec3 v) {
+    // -0 is 0.
+    return fmt::format("{:.4g} {:.4g} {:.4g}", v.x + 0.0, v.y + 0.0, v.z + 0.0);
+}
+
+std::string lensText(const Camera& camera) {
+    const glm::dvec2 fov = camera.fieldOfView();
+    if (camera.orthographic) return fmt::format("orthographic {:.4g} x {:.4g}", fov.x, fov.y);
+    return fmt::format("{:.3g} x {:.3g} degrees", glm::degrees(fov.x), glm::degrees(fov.y));
+}
+
+std::string nameText(const ReferenceView& view, std::size_t number) {
+    return fmt::format("{} {}{}{}", number, printable(view.name), view.pruned ? ", pruned" : "",
+                       view.background ? ", background" : "");
+}
+
+/// A direction's part that is next to nothing is rounding.
+glm::dvec3 tidy(glm::dvec3 v) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (std::abs(v[axis]) < 1e-6) v[axis] = 0;
+    return v;
+}
+
+std::vector<std::string> viewLines(const ReferenceView& view, std::size_t number,
+                                   glm::dvec3 origin) {
+    return {nameText(view, number),
+            fmt::format("{}x{}, {}", view.camera.width, view.camera.height, lensText(view.camera)),
+            "at " + vectorText(tidy(view.camera.position) + origin),
+            "towards " + vectorText(tidy(view.camera.forward()))};
+}
+
+/// "12 of 400 views are shown", where not all are.
+std::string shownText(const SheetPlan& plan) {
+    if (plan.shown == plan.content.groups) return {};
+    return fmt::format("{} of {} {} are shown", plan.shown, plan.content.groups, plan.content.what);
+}
+
+std::vector<std::string> headerOf(const SheetPlan& plan, const SheetSettings& settings,
+                                  std::string second) {
+    if (const auto shown = shownText(plan); !shown.empty()) second = shown + "; " + second;
+    return {settings.title, std::move(second)};
+}
+
+/// A texture of an atlas and the rectangles on it.
+Tile withRectangles(Tile tile, const Atlas& atlas, int page) {
+    const glm::dvec2 scale =
+        glm::dvec2(tile.picture.size()) / glm::dvec2(atlas.width(), atlas.height());
+    Canvas canvas(tile.picture.width(), tile.picture.height(), kEmptyColour);
+    canvas.picture({0, 0}, tile.picture);
+    for (const auto& r : atlas.rectangles) {
+        if (r.page != page) continue;
+        const glm::ivec2 from(glm::dvec2(r.atlasX, r.atlasY) * scale);
+        const glm::ivec2 to(glm::dvec2(r.atlasX + r.atlasWidth(), r.atlasY + r.atlasHeight()) *
+                            scale);
+        const glm::u8vec3 colour = kOutlines[r.view % 2];
+        canvas.frame(from, glm::max(to - from, glm::ivec2(1)), colour);
+        const std::string number = std::to_string(r.view);
+        const int width = static_cast<int>(number.size()) * Canvas::kGlyphWidth;
+        // Where the number would hide the rectangle the outline is enough.
+        if (to.x - from.x < width + 6 || to.y - from.y < Canvas::kLineHeight + 4) continue;
+        canvas.fill(from + 1, {width + 3, Canvas::kLineHeight - 1}, {255, 255, 255});
+        canvas.text(from + glm::ivec2(3, 1), number, glm::u8vec3(glm::vec3(colour) * 0.7f), width);
+    }
+    tile.picture = canvas.image();
+    return tile;
+}
+
+}  // namespace
+
+Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& job) {
+    STX_CHECK(bundle.check());
+    bool normals = false, splats = false;
+    for (const auto& v : bundle.views) {
+        normals = normals || v.hasNormals();
+        splats = splats || v.hasSplats();
+    }
+    SheetContent content;
+    content.groups = static_cast<int>(bundle.views.size());
+    content.tiles = 2 + (normals ? 1 : 0) + (splats ? 1 : 0);
+    content.lines = kViewLines;
+    content.headerLines = 2;
+    content.largest = largestOf(bundle.views);
+    STX_TRY(const auto plan, planSheet(content, settings, job.limits));
+    std::vector<SheetGroup> groups;
+    for (int i = 0; i < plan.shown; ++i) {
+        STX_CHECK(job.checkCancelled());
+        const auto number = static_cast<std::size_t>(plan.groupAt(i));
+        const ReferenceView& view = bundle.views[number];
+        SheetGroup group{viewLines(view, number, bundle.origin), {}};
+        group.tiles.push_back(colourTile(view.texture, plan.cell));
+        group.tiles.push_back(depthTile(view.depth, plan.cell));
+        if (view.hasNormals()) group.tiles.push_back(normalTile(view.normal, plan.cell));
+        if (view.hasSplats()) group.tiles.push_back(splatTile(view.splatU, view.splatV, plan.cell));
+        groups.push_back(std::move(group));
+        job.progress(i + 1, plan.shown, "views");
+    }
+    const auto header =
+        headerOf(plan, settings,
+                 fmt::format("{}, {}, {}", bundle.nodeKind(), counted(bundle.views.size(), "view"),
+                             counted(static_cast<std::size_t>(bundle.pointCount()), "point")));
+    return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
+}
+
+Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& job) {
+    STX_CHECK(atlas.check());
+    struct Kind {
+        const char* name;
+        int page;
+    };
+    std::vector<Kind> textures;
+    for (int page = 0; page < static_cast<int>(atlas.pages.size()); ++page) {
+        const AtlasPage& p = atlas.pages[static_cast<std::size_t>(page)];
+        textures.push_back({"colour", page});
+        textures.push_back({"depth", page});
+        if (!p.normal.empty()) textures.push_back({"normal", page});
+        if (!p.splatU.empty()) textures.push_back({"splat", page});
+    }
+    SheetContent content;
+    content.groups = static_cast<int>(textures.size());
+    content.headerLines = 2;
+    content.largest = {atlas.width(), atlas.height()};
+    content.what = "textures";
+    STX_TRY(const auto plan, planSheet(content, settings, job.limits));
+    std::vector<SheetGroup> groups;
+    for (int i = 0; i < plan.shown; ++i) {
+        STX_CHECK(job.checkCancelled());
+        const Kind& kind = textures[static_cast<std::size_t>(plan.groupAt(i))];
+        const AtlasPage& page = atlas.pages[static_cast<std::size_t>(kind.page)];
+        const std::string_view name = kind.name;
+        Tile tile = name == "colour"   ? colourTile(page.texture, plan.cell)
+                    : name == "depth"  ? depthTile(page.depth, plan.cell)
+                    : name == "normal" ? normalTile(page.normal, plan.cell)
+                                       : splatTile(page.splatU, page.splatV, plan.cell);
+        groups.push_back(
+            {{fmt::format("{}, page {}, {}x{}", name, kind.page, atlas.width(), atlas.height())},
+             {}});
+        groups.back().tiles.push_back(withRectangles(std::move(tile), atlas, kind.page));
+    }
+    const auto header =
+        headerOf(plan, settings,
+                 fmt::format("{} layout, {}, {}, {:.1f} % used, {} of {} pixels kept", atlas.layout,
+                             counted(atlas.views.size(), "view"),
+                             counted(atlas.rectangles.size(), "rectangle"), 100 * atlas.used(),
+                             atlas.keptPixels, atlas.sourcePixels));
+    return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
+}
+
+Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job) {
+    const Timeline timeline = frames.timeline();
+    auto first = frames.frame(0, job);
+    if (!first) return propagate(first);
+    const std::size_t views = first->views.size();
+    const int all = static_cast<int>(timeline.count());
+    const int moments = std::min(settings.columns > 0 ? settings.columns : kMoments, all);
+    SheetContent content;
+    content.groups = static_cast<int>(views) * moments;
+    content.tiles = 2;
+    content.lines = 2;
+    content.headerLines = 2;
+    content.largest = largestOf(first->views);
+    content.what = "views at a time";
+    SheetSettings fixed = settings;
+    fixed.columns = moments;
+    STX_TRY(auto plan, planSheet(content, fixed, job.limits));
+    // Rows are whole.
+    const int rows = plan.shown / moments;
+    plan.shown = rows * moments;
+    std::vector<SheetGroup> groups(static_cast<std::size_t>(plan.shown));
+    std::vector<Image<float>> depths(groups.size());
+    std::vector<ValueRange> ranges(static_cast<std::size_t>(rows));
+    std::int64_t points = 0;
+    for (int m = 0; m < moments; ++m) {
+        STX_CHECK(job.checkCancelled());
+        // From the first frame to the last.
+        const auto frame = static_cast<std::size_t>(
+            moments == 1 ? 0 : static_cast<std::int64_t>(m) * (all - 1) / (moments - 1));
+        Result<Bundle> bundle = Bundle();
+        if (frame == 0)
+            bundle = std::move(*first);
+        else
+            bundle = frames.frame(frame, job);
+        if (!bundle)
+            return tl::unexpected(
+                bundle.error().at(fmt::format("at {:g} s", timeline.times[frame])));
+        if (m == 0) points = bundle->pointCount();
+        for (int row = 0; row < rows; ++row) {
+            const auto number = static_cast<std::size_t>(row) * views / static_cast<unsigned>(rows);
+            const ReferenceView& view = bundle->views[number];
+            const auto at = static_cast<std::size_t>(row * moments + m);
+            groups[at].lines = {nameText(view, number),
+                                fmt::format("{:.3f} s, frame {}", timeline.times[frame], frame)};
+            groups[at].tiles.push_back(colourTile(view.texture, plan.cell));
+            ranges[static_cast<std::size_t>(row)].add(rangeOf(view.depth));
+            depths[at] = shrunkValues(view.depth, plan.cell);
+        }
+        job.progress(m + 1, moments, "moments");
+    }
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+        const ValueRange& range = ranges[i / static_cast<std::size_t>(moments)];
+        groups[i].tiles.push_back({falseColour(depths[i], range, kEmptyColour),
+                                   rangeText("depth", range), !range.empty()});
+    }
+    const auto header = headerOf(
+        plan, settings,
+        fmt::format("{} of {} over {:.4g} s, {}, {} in the first",
+                    counted(static_cast<std::size_t>(moments), "moment"),
+                    counted(timeline.count(), "frame"), timeline.duration, counted(views, "view"),
+                    counted(static_cast<std::size_t>(points), "point")));
+    return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
+}
+
+}  // namespace stx

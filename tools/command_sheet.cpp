@@ -1,0 +1,204 @@
+#include <algorithm>
+#include <chrono>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/atlas/atlas_files.hpp"
+#include "formats/exr/bundle_exr.hpp"
+#include "formats/images/images.hpp"
+#include "formats/open.hpp"
+#include "formats/sequences.hpp"
+#include "formats/stx/stx.hpp"
+#include "lib/base/printable.hpp"
+#include "lib/sheet/sheet.hpp"
+#include "tools/commands.hpp"
+
+namespace stx::tools {
+namespace {
+
+constexpr int kMomentsOfPairs = 6;  ///< that are compared, of two inputs that move
+
+struct SheetOptions {
+    std::vector<std::string> inputs;
+    std::string output, size;
+    SheetSettings settings;
+    OpenOptions open;
+};
+
+std::string fileName(const std::string& path) {
+    const std::filesystem::path p(path);
+    return printable((p.has_filename() ? p : p.parent_path()).filename().string());
+}
+
+/// A picture and no bundle: an .exr may be either.
+Result<bool> isPicture(const std::string& path, const Limits& limits) {
+    std::error_code ec;
+    if (frameName(path, 0) && !std::filesystem::exists(path, ec)) return false;
+    STX_TRY(const auto kind, recognise(path));
+    if (kind != FileKind::exr) return kind == FileKind::image || kind == FileKind::unknown;
+    STX_TRY(const auto reader, ExrReader::open(path, limits));
+    return !isExrBundle(reader);
+}
+
+Texture textureOf(Picture picture) {
+    return picture.isLinear() ? Texture(std::move(picture.linear))
+                              : Texture(std::move(picture.coded));
+}
+
+Result<std::vector<SheetPair>> pairsOfPictures(const SheetOptions& o, Job& job) {
+    STX_TRY(auto a, openPicture(o.inputs[0], job));
+    STX_TRY(auto b, openPicture(o.inputs[1], job));
+    std::vector<SheetPair> pairs(1);
+    pairs[0].title = fileName(o.inputs[0]) + " | " + fileName(o.inputs[1]);
+    pairs[0].a = textureOf(std::move(a));
+    pairs[0].b = textureOf(std::move(b));
+    return pairs;
+}
+
+/// The views of two inputs, by their numbers; of what moves at some moments.
+Result<std::vector<SheetPair>> pairsOfViews(const SheetOptions& o, Job& job) {
+    STX_TRY(const auto a, openSequence(o.inputs[0], o.open, job));
+    STX_TRY(const auto b, openSequence(o.inputs[1], o.open, job));
+    const auto count = std::min(a->timeline().count(), b->timeline().count());
+    if (a->timeline().count() != b->timeline().count())
+        job.note(fmt::format("one has {}, the other {}; the first {} are compared",
+                             counted(a->timeline().count(), "frame"),
+                             counted(b->timeline().count(), "frame"), count));
+    const auto most =
+        static_cast<std::size_t>(o.settings.columns > 0 ? o.settings.columns : kMomentsOfPairs);
+    const std::size_t moments = std::min(count, most);
+    std::vector<SheetPair> pairs;
+    std::uint64_t pixels = 0;
+    for (std::size_t m = 0; m < moments; ++m) {
+        STX_CHECK(job.checkCancelled());
+        const std::size_t frame = moments == 1 ? 0 : m * (count - 1) / (moments - 1);
+        STX_TRY(auto first, a->frame(frame, job));
+        STX_TRY(auto second, b->frame(frame, job));
+        const auto views = std::min(first.views.size(), second.views.size());
+        if (m == 0 && first.views.size() != second.views.size())
+            job.note(fmt::format("one has {}, the other {}; the first {} are compared",
+                                 counted(first.views.size(), "view"),
+                                 counted(second.views.size(), "view"), views));
+        for (std::size_t i = 0; i < views; ++i) {
+            ReferenceView &va = first.views[i], &vb = second.views[i];
+            SheetPair pair;
+            pair.title = fmt::format("{} {}{}{}", i, printable(va.name),
+                                     va.name == vb.name ? "" : " | " + printable(vb.name),
+                                     moments > 1 ? fmt::format(", frame {}", frame) : "");
+            pixels += static_cast<std::uint64_t>(va.camera.width) * va.camera.height +
+                      static_cast<std::uint64_t>(vb.camera.width) * vb.camera.height;
+            // As floats, the larger case: a colour and a depth.
+            STX_CHECK(job.limits.checkAllocation(pixels, 20, "the views that are compared"));
+            pair.a = std::move(va.texture);
+            pair.b = std::move(vb.texture);
+            pair.depthA = std::move(va.depth);
+            pair.depthB = std::move(vb.depth);
+            pairs.push_back(std::move(pair));
+        }
+    }
+    return pairs;
+}
+
+Result<Sheet> sheetOfPair(const SheetOptions& o, Job& job) {
+    STX_TRY(const bool first, isPicture(o.inputs[0], job.limits));
+    STX_TRY(const bool second, isPicture(o.inputs[1], job.limits));
+    if (first != second)
+        return fail(ErrorCode::usage,
+                    "'{}' is a picture and '{}' is not; two pictures or two bundles can be "
+                    "compared",
+                    o.inputs[first ? 0 : 1], o.inputs[first ? 1 : 0]);
+    STX_TRY(const auto pairs, first ? pairsOfPictures(o, job) : pairsOfViews(o, job));
+    return sheetOf(pairs, o.settings, job);
+}
+
+Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
+    const std::string& input = o.inputs[0];
+    STX_TRY(const bool picture, isPicture(input, job.limits));
+    if (picture)
+        return fail(ErrorCode::usage,
+                    "'{}' is one picture; a sheet shows a bundle, an atlas or an image set, or "
+                    "compares two pictures",
+                    input);
+    std::error_code ec;
+    if (std::filesystem::exists(input, ec)) {
+        STX_TRY(const auto kind, recognise(input));
+        if (kind == FileKind::atlas) {
+            STX_TRY(const auto atlas, readAtlas(input, job));
+            return sheetOf(atlas, o.settings, job);
+        }
+    }
+    STX_TRY(const auto frames, openSequence(input, o.open, job));
+    if (frames->timeline().moves()) return sheetOf(*frames, o.settings, job);
+    STX_TRY(const auto bundle, frames->frame(0, job));
+    return sheetOf(bundle, o.settings, job);
+}
+
+Result<int> sheet(const SheetOptions& options, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    SheetOptions o = options;
+    if (o.inputs.size() > 2)
+        return fail(ErrorCode::usage, "{} inputs; one, or two to compare, are expected",
+                    o.inputs.size());
+    if (!o.output.ends_with(".png") && o.output != "-")
+        return fail(ErrorCode::usage, "-o is '{}'; a sheet is a .png", o.output);
+    if (!o.size.empty()) {
+        STX_TRY(o.settings.mostSize, parseSize(o.size, program.job.limits));
+    }
+    STX_CHECK(checkTarget(o.output, program));
+    for (const auto& input : o.inputs) {
+        preloadCodecs(input);
+        o.settings.title += (o.settings.title.empty() ? "" : " | ") + fileName(input);
+    }
+    STX_TRY(const auto made,
+            o.inputs.size() == 2 ? sheetOfPair(o, program.job) : sheetOfOne(o, program.job));
+    if (made.shown < made.count)
+        program.job.note(fmt::format("{} of {} fit on the sheet; a larger --size shows more",
+                                     made.shown, made.count));
+    const Rgb8Image& picture = made.picture;
+    STX_TRY(const auto png,
+            encodePng(picture.width(), picture.height(), 3, 8, picture.data(), true));
+    STX_CHECK(writeFile(o.output, png, program.outputOptions()));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format("{} → {} ({}), {}x{}, {} of {} shown, {}", o.settings.title, o.output,
+                            humanBytes(png.size()), picture.width(), picture.height(), made.shown,
+                            made.count, humanSeconds(seconds)));
+    STX_CHECK(program.writeReport({{"$schema", "sheet-report.schema.json"},
+                                   {"inputs", o.inputs},
+                                   {"output", o.output},
+                                   {"width", picture.width()},
+                                   {"height", picture.height()},
+                                   {"shown", made.shown},
+                                   {"count", made.count},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+}  // namespace
+
+void addSheet(CommandLine& line, Program& program) {
+    Command c = line.add(
+        "sheet",
+        "A contact sheet to look at: the views of a bundle with colour, depth, normals and splats; "
+        "an atlas with its rectangles; frames over time; or two inputs and their error\n\n"
+        "  stx sheet model.mp4 -o sheet.png\n"
+        "  stx sheet atlas -o atlas.png\n"
+        "  stx sheet novel.png truth.png -o error.png\n"
+        "  stx sheet before.exr after.mp4 -o both.png --size 4000x8000");
+    auto o = std::make_shared<SheetOptions>();
+    c.option("IN", o->inputs,
+             "Bundle, atlas, image set or what moves; or two of them, or two pictures, to compare")
+        .required();
+    c.option("-o,--output", o->output, "Picture to write (.png)").required().takes("SHEET.png");
+    c.option("--size", o->size, "The sheet is at most this large (default 2600x2600)").takes("WxH");
+    c.option("--columns", o->settings.columns,
+             "Views beside each other; of what moves: moments (default: what fills the sheet best, "
+             "6 moments)")
+        .range(1, 1000)
+        .takes("N");
+    c.sharedOptions(program.common, kOutput | kOutside);
+    c.runs([o](Program& p) { return sheet(*o, p); });
+}
+
+}  // namespace stx::tools
