@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <mutex>
+#include <random>
 #include <set>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -16,9 +18,16 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// What the names of this process's temporaries begin with. Machines that share a file system, and
+/// containers, have processes of the same number, hence the mark.
+std::string ownPrefix() {
+    static const unsigned mark = std::random_device()();
+    return fmt::format("{}{:08x}-{}-", kTemporaryPrefix, mark, ::getpid());
+}
+
 fs::path nextName(const fs::path& folder) {
     static std::atomic<unsigned> counter = 0;
-    return folder / fmt::format("{}{}-{}", kTemporaryPrefix, ::getpid(), counter++);
+    return folder / fmt::format("{}{}", ownPrefix(), counter++);
 }
 
 /// True when `fd` is locked now and still is what `path` names: another run may have taken it for
@@ -107,7 +116,7 @@ void removeStaleTemporariesNow(const fs::path& folder) {
 }
 
 void removeOwnTemporaries() {
-    const std::string prefix = fmt::format("{}{}-", kTemporaryPrefix, ::getpid());
+    const std::string prefix = ownPrefix();
     // Never waits: the thread that holds the lock may be the one that hangs.
     const std::unique_lock lock(foldersUsed().mutex, std::try_to_lock);
     if (!lock) return;

@@ -37,8 +37,8 @@ class Descriptor {
 };
 
 /// Each unfinished output is a file or folder with a name of this kind, beside its target:
-/// `.stx-tmp-<process>-<number>`. Its owner holds an flock() on it, so a run that can lock one
-/// knows that its owner is gone, in whatever container or machine that was.
+/// `.stx-tmp-<random>-<process>-<number>`. Its owner holds an flock() on it, so a run that can lock
+/// one knows that its owner is gone, in whatever container or machine that was.
 inline constexpr const char* kTemporaryPrefix = ".stx-tmp-";
 
 struct Temporary {
