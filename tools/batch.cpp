@@ -219,6 +219,10 @@ void BatchRun::finish(std::size_t item, Json entry) {
         program_.complain(
             fmt::format("error: '{}': {}", items_[item].input, entry.value("message", "")));
     }
+    if (options_.shard.given) {
+        entry["index"] = items_[item].index;
+        entry["shard"] = shardJson(options_.shard, options_.total);
+    }
     entries_[item] = std::move(entry);
     program_.job.progress(static_cast<std::int64_t>(done_),
                           static_cast<std::int64_t>(items_.size()), "inputs");
@@ -404,7 +408,7 @@ Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
     std::vector<BatchItem> items;
     std::map<std::string, std::string> inputOf;
     for (const auto& input : inputs) {
-        BatchItem item{input, outputOf(pattern, input)};
+        BatchItem item{input, outputOf(pattern, input), items.size()};
         const auto key = fs::path(item.output).lexically_normal().string();
         if (const auto [known, fresh] = inputOf.emplace(key, input); !fresh)
             return fail(
@@ -414,6 +418,12 @@ Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
                 known->second, input, item.output);
         items.push_back(std::move(item));
     }
+    return items;
+}
+
+std::vector<BatchItem> itemsOf(std::vector<BatchItem> items, const Shard& shard) {
+    if (shard.given)
+        std::erase_if(items, [&](const BatchItem& item) { return !shard.takes(item.index); });
     return items;
 }
 

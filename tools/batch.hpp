@@ -5,18 +5,22 @@
 #include <vector>
 
 #include "tools/program.hpp"
+#include "tools/shard.hpp"
 
 namespace stx::tools {
 
 /// One input of a batch and what becomes of it.
 struct BatchItem {
     std::string input, output;
+    std::size_t index = 0;  ///< in the whole list, of which this may be a shard
 };
 
 struct BatchOptions {
     int jobs = 1;               ///< inputs at a time
     bool keepGoing = false;     ///< an input that fails does not stop the others
     bool skipExisting = false;  ///< an input whose output exists is done already
+    Shard shard;                ///< entries of reports get the shard and their index
+    std::size_t total = 0;      ///< inputs of all shards
 };
 
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
@@ -31,6 +35,9 @@ struct BatchOptions {
 /// output.
 [[nodiscard]] Result<std::vector<BatchItem>> planBatch(const std::vector<std::string>& inputs,
                                                        const std::string& pattern);
+
+/// Those items that the shard has; all when none was asked for.
+[[nodiscard]] std::vector<BatchItem> itemsOf(std::vector<BatchItem> items, const Shard& shard);
 
 /// Does one item and returns its report: an object with at least input, output, status, exitCode.
 using BatchWork = std::function<Result<nlohmann::ordered_json>(const BatchItem&, Program&)>;

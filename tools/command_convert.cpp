@@ -266,11 +266,23 @@ Result<int> convertFrames(const ConvertOptions& o, Program& program) {
                       count - 1);
     (void)program.job.takeNotes();  // said again with each frame
     auto entries = nlohmann::ordered_json::array();
-    for (int frame = static_cast<int>(first); frame <= static_cast<int>(last); ++frame) {
+    const auto total = static_cast<std::size_t>(last - first) + 1;
+    const auto part = o.batch.shard.rangeOf(total);
+    for (std::size_t i = part.first; i < part.end; ++i) {
+        const int frame = static_cast<int>(first) + static_cast<int>(i);
         ConvertOptions one = o;
         one.open.set.frame = frame;
         const auto target = imagesets::filled(o.output, {"", 0, 0, frame});
-        STX_TRY(auto entry, convertOne(o.inputs[0], target, one, program));
+        std::error_code ec;
+        nlohmann::ordered_json entry = {
+            {"input", o.inputs[0]}, {"output", target}, {"status", "skipped"}, {"exitCode", 0}};
+        if (!o.batch.skipExisting || !std::filesystem::exists(target, ec)) {
+            STX_TRY(entry, convertOne(o.inputs[0], target, one, program));
+        }
+        if (o.batch.shard.given) {
+            entry["index"] = i;
+            entry["shard"] = shardJson(o.batch.shard, total);
+        }
         entries.push_back(std::move(entry));
     }
     STX_CHECK(program.writeReport(
@@ -324,7 +336,9 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
         return convertOne(item.input, item.output, o, p);
     };
     // One name on the command line is one conversion; a list is a batch, however short.
-    if (items.size() > 1 || o.inputs[0][0] == '@') return runBatch(items, o.batch, work, program);
+    o.batch.total = items.size();
+    if (items.size() > 1 || o.inputs[0][0] == '@' || o.batch.shard.given)
+        return runBatch(itemsOf(items, o.batch.shard), o.batch, work, program);
 
     std::error_code ec;
     nlohmann::ordered_json entry;
@@ -410,6 +424,7 @@ void addConvert(CommandLine& line, Program& program) {
         .group(many);
     c.flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
         .group(many);
+    addShardOption(c, o->batch.shard, "inputs, or of --frames", many);
     const char* sets = kSetHeading;
     std::vector<std::string> kinds;
     for (const ImageSetKind& kind : imageSetKinds()) kinds.emplace_back(kind.name);

@@ -15,6 +15,7 @@
 #include "tools/environment_options.hpp"
 #include "tools/frame_writer.hpp"
 #include "tools/picture_times.hpp"
+#include "tools/shard.hpp"
 
 namespace stx::tools {
 namespace {
@@ -35,6 +36,7 @@ struct RenderOptions {
     std::string framesPerSecond;  ///< empty: that of the input, else 25
     int compression = 1;
     bool skipExisting = false, listDevices = false;
+    Shard shard;
     int device = -1;
     OpenOptions open;
 };
@@ -132,6 +134,8 @@ Result<void> checkOptions(const RenderOptions& o, const Command& command) {
                                  "is of lighting; give --light, too"));
     if (o.time.time)
         STX_CHECK(command.refuse({"--times"}, "and --time exclude each other; give one"));
+    if (o.output == "-")
+        STX_CHECK(command.refuse({"--shard"}, "is of numbered files; a stream is one piece"));
     if (o.output != "-")
         STX_CHECK(command.refuse({"--fps"}, "is of a stream on stdout, -o - --file-format y4m"));
     if (const auto format = frameFormat(o.output);
@@ -220,8 +224,10 @@ Result<int> printDevices(Program& program) {
 /// Under --no-clobber: errors when one of the pictures exists.
 Result<void> checkFrames(const RenderOptions& o, int count, const Program& program) {
     if (!program.common.noClobber || o.skipExisting) return {};
-    for (int i = 0; i < count; ++i) {
-        if (const auto name = frameName(o.output, i)) STX_CHECK(checkTarget(*name, program));
+    const auto part = o.shard.rangeOf(static_cast<std::size_t>(count));
+    for (std::size_t i = part.first; i < part.end; ++i) {
+        if (const auto name = frameName(o.output, static_cast<int>(i)))
+            STX_CHECK(checkTarget(*name, program));
     }
     return {};
 }
@@ -409,15 +415,17 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     double total = 0;
     int drawn = 0, empty = 0;
     Renderer* renderer = scene.still.get();
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const auto part = o.shard.rangeOf(pictures.size());
+    for (std::size_t i = part.first; i < part.end; ++i) {
         const auto name = writer.nameOf(static_cast<int>(i));
         std::error_code ec;
         if (o.skipExisting && o.output != "-" && std::filesystem::exists(name, ec)) {
             views.push_back({{"output", name}, {"skipped", true}});
+            if (o.shard.given) views.back()["index"] = i;
             continue;
         }
         STX_CHECK(program.job.checkCancelled());
-        const bool more = !o.skipExisting && i + 1 < pictures.size();
+        const bool more = !o.skipExisting && i + 1 < part.end;
         Camera camera = pictures[i].camera;
         if (scene.moving) {
             auto now = scene.moving->at(*pictures[i].time,
@@ -440,6 +448,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
         ++drawn;
         views.push_back({{"output", name}, {"milliseconds", milliseconds}});
         if (scene.moving) views.back()["time"] = *pictures[i].time;
+        if (o.shard.given) views.back()["index"] = i;
         const bool nothing =
             scene.environment
                 ? std::ranges::none_of(frame->depth.pixels(), [](float d) { return hasPoint(d); })
@@ -447,8 +456,8 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
                                       [](glm::vec4 c) { return !(c.a > 0); });
         if (nothing) ++empty;
         STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), camera));
-        program.job.progress(static_cast<std::int64_t>(i) + 1,
-                             static_cast<std::int64_t>(pictures.size()), "rendering");
+        program.job.progress(static_cast<std::int64_t>(i - part.first) + 1,
+                             static_cast<std::int64_t>(part.end - part.first), "rendering");
     }
     STX_CHECK(writer.finish());
     if (empty > 0)
@@ -458,19 +467,23 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
             counted(static_cast<std::size_t>(empty), "picture"), empty == 1 ? "shows" : "show",
             scene.environment ? " but the environment" : ""));
     program.sayNotes();
-    program.say(fmt::format("{} → {}, {} {}x{}, {}{}{}",
-                            std::filesystem::path(o.input).filename().string(), o.output,
-                            counted(pictures.size(), "picture"), pictures[0].camera.width,
-                            pictures[0].camera.height, renderer ? renderer->backend() : "",
-                            drawn > 0 ? fmt::format(", {:.1f} ms each", total / drawn) : "",
-                            drawn < count ? fmt::format(", {} skipped", count - drawn) : ""));
-    STX_CHECK(
-        program.writeReport({{"$schema", "render-report.schema.json"},
-                             {"backend", renderer ? renderer->backend() : ""},
-                             {"device", renderer ? renderer->device() : ""},
-                             {"mode", settings.mode == RenderMode::splat ? "splat" : "surface"},
-                             {"points", scene.moving ? scene.moving->points() : scene.points},
-                             {"views", views}}));
+    program.say(fmt::format(
+        "{} → {}, {} {}x{}, {}{}{}", std::filesystem::path(o.input).filename().string(), o.output,
+        counted(part.end - part.first, "picture"), pictures[0].camera.width,
+        pictures[0].camera.height, renderer ? renderer->backend() : "",
+        drawn > 0 ? fmt::format(", {:.1f} ms each", total / drawn) : "",
+        static_cast<std::size_t>(drawn) < part.end - part.first
+            ? fmt::format(", {} skipped", part.end - part.first - static_cast<std::size_t>(drawn))
+            : ""));
+    nlohmann::ordered_json report = {
+        {"$schema", "render-report.schema.json"},
+        {"backend", renderer ? renderer->backend() : ""},
+        {"device", renderer ? renderer->device() : ""},
+        {"mode", settings.mode == RenderMode::splat ? "splat" : "surface"},
+        {"points", scene.moving ? scene.moving->points() : scene.points},
+        {"views", views}};
+    if (o.shard.given) report["shard"] = shardJson(o.shard, pictures.size());
+    STX_CHECK(program.writeReport(report));
     return 0;
 }
 
@@ -590,6 +603,7 @@ void addRender(CommandLine& line, Program& program) {
         .group(output);
     c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")
         .group(output);
+    addShardOption(c, o->shard, "pictures", output);
     c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group(output);

@@ -18,6 +18,7 @@ void addExtract(CommandLine& line, Program& program);
 void addValidate(CommandLine& line, Program& program);
 void addCompare(CommandLine& line, Program& program);
 void addBench(CommandLine& line, Program& program);
+void addReport(CommandLine& line, Program& program);
 void addCompletion(CommandLine& line, Program& program);
 
 }  // namespace stx::tools

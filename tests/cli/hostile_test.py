@@ -49,6 +49,8 @@ def commands_for(name, have):
     lines = [["info", "IN"], ["validate", "IN"], ["convert", "IN"] + CONVERT, ["render", "IN"] + RENDER]
     if ending == ".y4m":
         lines = [["background", "IN", "-o", "OUT/a.png"], ["background", "IN", "-o", "OUT/a.png", "--method", "n2pg"]]
+    if ending == ".jsonl":
+        lines = [["report", "merge", "IN"]]
     if ending == ".json":
         lines = [["info", "IN"], ["validate", "IN"], ["render", "IN"] + RENDER]
     if ending in (".json", ".mp4", ".exr", ".xmt", ".bt"):
@@ -93,6 +95,11 @@ def own_files(args, folder):
     made.append(os.path.join(folder, "atlas", "atlas.json"))
     must([args.stx, "pack", made[0], "-o", os.path.join(folder, "atlas.exr")], folder)
     made.append(os.path.join(folder, "atlas.exr"))
+    for name, words in (("convert.jsonl", ["convert", f"@{folder}/list", "-o", f"{folder}/{{stem}}.bt", "--size", "24x24"]),
+                        ("render.jsonl", ["render", made[0], "-o", f"{folder}/p_%d.png", "--orbit", "3", "--size", "24x24"])):
+        write(os.path.join(folder, "list"), model.encode() + b"\n")
+        must([args.stx] + words + ["--shard", "1/2", "--report", name], folder)
+        made.append(os.path.join(folder, name))
     return made + models(folder) + videos(folder)
 
 

@@ -1,0 +1,128 @@
+#include <algorithm>
+#include <span>
+
+#include "lib/base/printable.hpp"
+#include "tools/batch.hpp"
+#include "tools/commands.hpp"
+#include "tools/report_merge.hpp"
+
+namespace stx::tools {
+namespace {
+
+constexpr std::size_t kMostNamed = 20;  ///< of what is missing, for people; --missing has all
+
+struct ReportOptions {
+    std::string action, output, missing, outputs;
+    std::vector<std::string> files, inputs;
+};
+
+/// The list of what is to be done again: missing and failed inputs, a line each.
+Result<std::string> listOfRest(const MergedReport& merged, const std::vector<std::string>& names) {
+    std::map<std::size_t, std::string> rest = merged.failed();
+    // There are as many names as the reports tell of inputs.
+    for (const auto& gap : merged.missing())
+        for (std::size_t i = gap.first; i <= gap.last; ++i) rest[i] = names[i];
+    std::string text;
+    for (const auto& [index, name] : rest) text += name + "\n";
+    return text;
+}
+
+Result<int> report(const ReportOptions& o, Program& program) {
+    for (const auto& target : {o.output, o.missing, o.outputs})
+        if (!target.empty()) STX_CHECK(checkTarget(target, program));
+    std::vector<std::string> names;
+    if (!o.inputs.empty()) {
+        STX_TRY(names, expandInputs(o.inputs, program.job.limits));
+    }
+    if (!o.missing.empty() && names.empty())
+        return fail(ErrorCode::usage,
+                    "--missing needs the names of all inputs; give --inputs "
+                    "@LIST as it was given to stx convert");
+    MergedReport merged;
+    for (const auto& file : o.files) {
+        STX_CHECK(program.job.checkCancelled());
+        STX_TRY(const auto bytes, readFile(file, program.job.limits));
+        const auto added = merged.add({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+        if (!added) return tl::unexpected(added.error().at(fmt::format("'{}'", file)));
+    }
+    if (merged.total() == 0)
+        return fail(ErrorCode::invalidInput, "no report tells of an input or a picture");
+    if (!names.empty() && names.size() != merged.total())
+        return fail(ErrorCode::invalidInput,
+                    "--inputs names {} inputs, but the reports are of {}; the list must be the one "
+                    "that was converted",
+                    names.size(), merged.total());
+    if (!o.output.empty()) {
+        const std::string text = merged.text();
+        STX_CHECK(writeFile(o.output, std::as_bytes(std::span(text)), program.outputOptions()));
+    }
+    if (!o.missing.empty()) {
+        STX_TRY(const auto text, listOfRest(merged, names));
+        STX_CHECK(writeFile(o.missing, std::as_bytes(std::span(text)), program.outputOptions()));
+    }
+    if (!o.outputs.empty()) {
+        std::string text;
+        for (const auto& name : merged.outputs()) text += name + "\n";
+        STX_CHECK(writeFile(o.outputs, std::as_bytes(std::span(text)), program.outputOptions()));
+    }
+    for (const auto& run : merged.failedRuns())
+        program.job.note("a run ended before its work: " + run);
+    const auto counts = merged.counts();
+    const char* what = merged.ofPictures() ? "pictures" : "inputs";
+    const bool whole = merged.missingCount() == 0 && counts.failed == 0;
+    const auto gaps = merged.missing();
+    if (program.common.format == "json") {
+        auto list = nlohmann::ordered_json::array();
+        for (const auto& gap : gaps) list.push_back({gap.first, gap.last});
+        program.printJson({{"$schema", "report-merge.schema.json"},
+                           {"of", what},
+                           {"total", merged.total()},
+                           {"ok", counts.ok},
+                           {"skipped", counts.skipped},
+                           {"failed", counts.failed},
+                           {"missing", merged.missingCount()},
+                           {"gaps", std::move(list)}});
+    } else {
+        std::string text =
+            fmt::format("{} {}: {} done, {} skipped, {} failed, {} missing\n", merged.total(), what,
+                        counts.ok, counts.skipped, counts.failed, merged.missingCount());
+        std::size_t named = 0;
+        for (const auto& gap : gaps)
+            for (std::size_t i = gap.first; i <= gap.last && named < kMostNamed; ++i, ++named)
+                text += fmt::format("missing {}{}\n", i,
+                                    names.empty() ? "" : " '" + printable(names[i]) + "'");
+        if (merged.missingCount() > kMostNamed)
+            text += fmt::format("and {} more\n", merged.missingCount() - named);
+        program.print(text);
+    }
+    return whole ? 0 : static_cast<int>(ErrorCode::difference);
+}
+
+}  // namespace
+
+void addReport(CommandLine& line, Program& program) {
+    Command c = line.add(
+        "report",
+        "Joins the reports of shards and tells what is missing; exit code 7 when something is "
+        "missing or failed\n\n"
+        "  stx report merge shard_*.jsonl -o all.jsonl\n"
+        "  stx report merge shard_*.jsonl --inputs @list.txt --missing rest.txt");
+    auto o = std::make_shared<ReportOptions>();
+    c.option("ACTION", o->action, "What to do").required().oneOf({"merge"});
+    c.option("REPORTS", o->files, "Reports of 'stx convert' or 'stx render', made with --shard")
+        .required();
+    c.option("-o,--output", o->output, "Write the joined report").takes("FILE");
+    c.option("--inputs", o->inputs, "The inputs as they were given to 'stx convert', for names")
+        .takes("@LIST");
+    c.option("--missing", o->missing,
+             "Write the names of the inputs that are missing or failed, as a list to convert")
+        .takes("FILE");
+    c.option("--outputs", o->outputs,
+             "Write the names of the outputs that are done or skipped, a line each")
+        .takes("FILE");
+    c.flag("--no-clobber", program.common.noClobber, "Refuse to replace existing files");
+    c.sharedOptions(program.common, kFormat);
+    c.runs([o](Program& p) { return report(*o, p); });
+}
+
+}  // namespace stx::tools

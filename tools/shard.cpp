@@ -1,0 +1,53 @@
+#include "tools/shard.hpp"
+
+#include <charconv>
+
+#include <nlohmann/json.hpp>
+
+namespace stx::tools {
+namespace {
+
+constexpr std::int64_t kMostShards = 1000000;
+
+Result<void> parseShard(const std::string& text, Shard& shard) {
+    const auto slash = text.find('/');
+    std::int64_t number = 0, count = 0;
+    const auto whole = [](std::string_view part, std::int64_t& to) {
+        const auto parsed = std::from_chars(part.data(), part.data() + part.size(), to);
+        return parsed.ec == std::errc() && parsed.ptr == part.data() + part.size();
+    };
+    const std::string_view view = text;
+    if (slash == std::string::npos || !whole(view.substr(0, slash), number) ||
+        !whole(view.substr(slash + 1), count) || number < 1 || count < number ||
+        count > kMostShards)
+        return fail(ErrorCode::usage,
+                    "it is '{}'; K/N with 1 <= K <= N <= {} is expected, as in 3/8", text,
+                    kMostShards);
+    shard = {number, count, true};
+    return {};
+}
+
+}  // namespace
+
+Shard::Range Shard::rangeOf(std::size_t length) const {
+    const auto n = static_cast<std::uint64_t>(count), k = static_cast<std::uint64_t>(number);
+    return {static_cast<std::size_t>(length * (k - 1) / n),
+            static_cast<std::size_t>(length * k / n)};
+}
+
+void addShardOption(Command command, Shard& shard, const char* what, const char* heading) {
+    command
+        .option(
+            "--shard", [&shard](const std::string& text) { return parseShard(text, shard); },
+            fmt::format("Only part K of N of the {}, from 1: for N runs that do all of it without "
+                        "speaking to each other; 'stx report merge' joins their reports",
+                        what))
+        .takes("K/N")
+        .group(heading);
+}
+
+nlohmann::ordered_json shardJson(const Shard& shard, std::size_t total) {
+    return {{"number", shard.number}, {"count", shard.count}, {"total", total}};
+}
+
+}  // namespace stx::tools
