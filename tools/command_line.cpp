@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tools/build_text.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -296,7 +297,7 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         const CLI::App& where = chosen(*app_);
         return Request{where.help(&where == app_.get() ? "" : "stx"), {}, {}};
     } catch (const CLI::CallForVersion&) {
-        return Request{"stx " STX_VERSION "\n", {}, {}};
+        return Request{versionText(), {}, {}};
     } catch (const CLI::ParseError& e) {
         return tl::unexpected(usageError(*app_, e, argc, argv));
     }

@@ -19,6 +19,7 @@ void addValidate(CommandLine& line, Program& program);
 void addCompare(CommandLine& line, Program& program);
 void addBench(CommandLine& line, Program& program);
 void addReport(CommandLine& line, Program& program);
+void addDoctor(CommandLine& line, Program& program);
 void addCompletion(CommandLine& line, Program& program);
 
 }  // namespace stx::tools

@@ -15,7 +15,7 @@ int mainProgram(int argc, char** argv) {
     // In the order of the help.
     for (const auto add :
          {addConvert, addSelect, addPack, addBake, addBackground, addRender, addInfo, addSheet,
-          addExtract, addValidate, addCompare, addBench, addReport, addCompletion})
+          addExtract, addValidate, addCompare, addBench, addReport, addDoctor, addCompletion})
         add(line, program);
     const auto request = line.parse(argc, argv);
     if (!request) {

@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 #include <link.h>
+#include <sys/auxv.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -30,7 +31,11 @@ fs::path ownFolder() {
         ::dladdr1(&inThisObject, &info, reinterpret_cast<void**>(&object), RTLD_DL_LINKMAP) != 0;
     // The program itself has no name there.
     const bool isLibrary = found && object && object->l_name && *object->l_name;
-    return fs::canonical(isLibrary ? object->l_name : "/proc/self/exe", ec).parent_path();
+    auto self = fs::canonical(isLibrary ? object->l_name : "/proc/self/exe", ec);
+    // Without /proc, as in many a chroot: the name that the program was started by.
+    const auto name = reinterpret_cast<const char*>(::getauxval(AT_EXECFN));
+    if (ec && !isLibrary && name) self = fs::canonical(name, ec);
+    return self.parent_path();
 }
 
 Result<const codecs::Table*> load() {

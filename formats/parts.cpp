@@ -1,0 +1,172 @@
+#include "formats/parts.hpp"
+
+#include <dlfcn.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "formats/images/codec_module.hpp"
+#include "lib/base/counted.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/render/cpu_device.hpp"
+#include "lib/render/renderer.hpp"
+
+namespace stx {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Found {
+    PartState state = PartState::here;
+    std::string detail;
+};
+
+Found findProcessor(PartCheck, Job&) {
+    return {PartState::here,
+            fmt::format("{}, {}", cpuDeviceName(), counted(threadCount(), "thread"))};
+}
+
+/// The file of a module of ours, without loading it.
+Found findModule(const char* variable, const char* module) {
+    const auto places = placesOfModule(variable, module);
+    std::error_code ec;
+    for (const auto& place : places)
+        if (fs::exists(place, ec)) return {PartState::here, place};
+    return {PartState::missing,
+            fmt::format("'{}' does not exist", places.empty() ? module : places.back())};
+}
+
+Found findImageCodecs(PartCheck check, Job&) {
+    const auto found = findModule("STX_CODECS", "stx_codecs.so");
+    if (check == PartCheck::whole && found.state == PartState::here)
+        if (const auto loaded = loadCodecs(); !loaded)
+            return {PartState::missing, loaded.error().message};
+    return found;
+}
+
+Found findVideo(PartCheck check, Job&) {
+    auto found = findModule("STX_VIDEO", "stx_video.so");
+    if (check == PartCheck::whole && found.state == PartState::here) {
+        // Whether its libraries are here is known when it is opened.
+        void* module = ::dlopen(found.detail.c_str(), RTLD_NOW | RTLD_LOCAL);
+        if (!module) {
+            const char* why = ::dlerror();
+            return {PartState::missing, why ? why : "it cannot be loaded"};
+        }
+        ::dlclose(module);
+    }
+    return found;
+}
+
+#ifdef STX_WITH_GPU
+std::string joined(const std::vector<std::string>& notes) {
+    return fmt::format("{}", fmt::join(notes, "; "));
+}
+#endif
+
+Found findOpenGl(PartCheck check, Job& job) {
+#ifdef STX_WITH_GPU
+    if (check == PartCheck::quick) return {PartState::here, "built in"};
+    Job asked;
+    asked.limits = job.limits;
+    const auto devices = listDevices(asked);
+    if (devices.empty()) return {PartState::missing, joined(asked.takeNotes())};
+    std::string names;
+    for (const auto& d : devices)
+        names += fmt::format("{}{} ({})", names.empty() ? "" : "; ", d.name, d.version);
+    return {PartState::here, names};
+#else
+    (void)check;
+    (void)job;
+    return {PartState::notBuilt, "-DSTX_WITH_GPU=OFF"};
+#endif
+}
+
+Found findGpu(PartCheck check, Job& job) {
+#ifdef STX_WITH_GPU
+    if (check == PartCheck::quick) return {PartState::here, "not looked for"};
+    Job asked;
+    asked.limits = job.limits;
+    for (const auto& d : listDevices(asked))
+        if (!d.software) return {PartState::here, d.name};
+    return {PartState::missing, "no hardware answers; pictures are drawn on the processor"};
+#else
+    (void)check;
+    (void)job;
+    return {PartState::notBuilt, "-DSTX_WITH_GPU=OFF"};
+#endif
+}
+
+/// A program on the PATH.
+Found findProgram(const char* name) {
+    const char* path = std::getenv("PATH");
+    std::string_view rest = path ? path : "";
+    while (!rest.empty()) {
+        const auto colon = std::min(rest.find(':'), rest.size());
+        const fs::path file = fs::path(rest.substr(0, colon)) / name;
+        std::error_code ec;
+        if (fs::is_regular_file(file, ec) && ::access(file.c_str(), X_OK) == 0)
+            return {PartState::here, file.string()};
+        rest.remove_prefix(std::min(colon + 1, rest.size()));
+    }
+    return {PartState::missing, fmt::format("no program '{}' on the PATH", name)};
+}
+
+Found findFfmpeg(PartCheck, Job&) {
+    return findProgram("ffmpeg");
+}
+
+/// A part and how it is found. A new one is a function above and a row here.
+struct PartRow {
+    const char *name, *use, *packages;
+    bool needed;
+    bool inVersion;  ///< `stx --version` tells it, too
+    Found (*find)(PartCheck, Job&);
+};
+
+constexpr PartRow kParts[] = {
+    {"processor", "all work that no GPU does", "", true, false, findProcessor},
+    {"image codecs", "TIFF, WebP, HDR and most other pictures", "stx libopenimageio2.4", true, true,
+     findImageCodecs},
+    {"video", "films as compressed video", "stx libavformat59 libavcodec59 libswscale6", false,
+     true, findVideo},
+    {"OpenGL", "--backend gpu and gl", "libegl1 libopengl0 libgl1-mesa-dri", false, true,
+     findOpenGl},
+    {"GPU", "drawing many times faster than on the processor",
+     "nvidia-driver, or firmware-amd-graphics, or mesa-vulkan-drivers", false, false, findGpu},
+    {"ffmpeg", "films out of y4m streams, 'stx render -o - | ffmpeg'", "ffmpeg", false, false,
+     findFfmpeg},
+};
+
+}  // namespace
+
+const char* nameOf(PartState state) {
+    switch (state) {
+        case PartState::here:
+            return "ok";
+        case PartState::missing:
+            return "missing";
+        case PartState::notBuilt:
+            break;
+    }
+    return "not built";
+}
+
+std::vector<Part> findParts(PartCheck check, Job& job) {
+    std::vector<Part> parts;
+    for (const PartRow& row : kParts) {
+        // What `--version` leaves out costs it nothing.
+        if (check == PartCheck::quick && !row.inVersion) continue;
+        Found found = row.find(check, job);
+        parts.push_back(
+            {row.name, row.use, row.packages, row.needed, found.state, std::move(found.detail)});
+    }
+    return parts;
+}
+
+}  // namespace stx
