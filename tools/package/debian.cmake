@@ -1,0 +1,36 @@
+# Adds to each Debian package what policy wants beside its files: the copyright, the changelogs, and
+# manual pages that are compressed. Run by cpack once the files of all packages are in place.
+if(NOT CPACK_GENERATOR STREQUAL "DEB")
+    return()
+endif()
+string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
+foreach(component IN LISTS CPACK_COMPONENTS_ALL)
+    string(TOUPPER ${component} upper)
+    set(package ${CPACK_DEBIAN_${upper}_PACKAGE_NAME})
+    set(root ${CPACK_TEMPORARY_DIRECTORY}/${component}/usr)
+    if(NOT IS_DIRECTORY ${root})
+        continue()
+    endif()
+    set(doc ${root}/share/doc/${package})
+    file(MAKE_DIRECTORY ${doc})
+    # Its text is in the file `copyright`.
+    file(REMOVE ${doc}/LICENSE)
+    configure_file(${CPACK_STX_PACKAGE_DIR}/copyright ${doc}/copyright COPYONLY)
+    configure_file(${CPACK_STX_CHANGELOG} ${doc}/changelog COPYONLY)
+    file(WRITE ${doc}/changelog.Debian
+         "stx (${CPACK_PACKAGE_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}) unstable; urgency=medium\n\n"
+         "  * Made by cpack; what changed is in changelog.gz.\n\n"
+         " -- ${CPACK_PACKAGE_CONTACT}  ${date}\n")
+    file(GLOB pages ${root}/share/man/man*/*[0-9])
+    foreach(file IN LISTS pages ITEMS ${doc}/changelog ${doc}/changelog.Debian)
+        execute_process(COMMAND gzip -9 -n ${file} COMMAND_ERROR_IS_FATAL ANY)
+    endforeach()
+    file(GLOB_RECURSE files ${root}/share/*)
+    foreach(file IN LISTS files)
+        set(mode OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+        if(file MATCHES "/samples/[a-z_/]+([.]sh|[.]sbatch)?$")
+            list(APPEND mode OWNER_EXECUTE GROUP_EXECUTE WORLD_EXECUTE)
+        endif()
+        file(CHMOD ${file} PERMISSIONS ${mode})
+    endforeach()
+endforeach()
