@@ -57,6 +57,8 @@ void takeAttribute(const Imf::Attribute& a, const std::string& name, ExrPart& pa
     const auto number = [](const auto& v) { return static_cast<double>(v); };
     const auto matrix = [](const auto& v) { return matrixFrom(v); };
     (void)(take<Imf::StringAttribute>(a, name, part, [](const std::string& v) { return v; }) ||
+           take<Imf::EnvmapAttribute>(a, name, part,
+                                      [](Imf::Envmap v) { return std::int64_t{v}; }) ||
            take<Imf::IntAttribute>(a, name, part, [](int v) { return std::int64_t{v}; }) ||
            take<Imf::FloatAttribute>(a, name, part, number) ||
            take<Imf::DoubleAttribute>(a, name, part, number) ||

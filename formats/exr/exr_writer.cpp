@@ -55,7 +55,9 @@ Imf::Header headerFrom(const ExrPart& part) {
     for (const auto& [name, value] : part.attributes) {
         if (const auto* s = std::get_if<std::string>(&value)) {
             header.insert(name, Imf::StringAttribute(*s));
-        } else if (const auto* i = std::get_if<std::int64_t>(&value)) {
+        } else if (const auto* i = std::get_if<std::int64_t>(&value); i && name == "envmap") {
+            Imf::addEnvmap(header, static_cast<Imf::Envmap>(*i));  // a type of its own
+        } else if (i) {
             header.insert(name, Imf::IntAttribute(static_cast<int>(*i)));
         } else if (const auto* d = std::get_if<double>(&value)) {
             header.insert(name, Imf::DoubleAttribute(*d));
