@@ -1,0 +1,223 @@
+#include "lib/panorama/adjust.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "lib/base/parallel.hpp"
+#include "lib/panorama/small_solver.hpp"
+
+namespace stx::panorama {
+namespace {
+
+/// How much a lens moves what is seen in the corners, standard deviation as a share of their
+/// distance to the middle: where pictures cannot tell, there is no distortion.
+constexpr double kDistortionSpread = 0.03;
+
+/// Unknowns of a pair: turn of a (3), of b (3), logarithm of the focal length, k1 / focal^2.
+constexpr std::size_t kOwn = 8;
+
+struct Block {
+    std::array<double, kOwn * kOwn> matrix{};
+    std::array<double, kOwn> right{};
+    double cost = 0;
+};
+
+/// Distortion is counted at the corner, so that it has the size of a share for every lens.
+TurnLens lensOf(double logFocal, double corner) {
+    const double focal = std::exp(logFocal);
+    return {focal, corner * focal * focal};
+}
+
+double huber(double squared, double threshold) {
+    if (squared <= threshold * threshold) return squared;
+    return 2 * threshold * std::sqrt(squared) - threshold * threshold;
+}
+
+/// Adds what one picture sees of the other's positions. `sign`: +1 when `from` is picture a.
+void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm::dvec2 from,
+             glm::dvec2 to, bool fromIsA, const std::array<TurnLens, 3>& lenses,
+             const std::array<double, 2>& steps, const AdjustSettings& s, bool derive) {
+    std::array<glm::dvec2, 3> seen;
+    glm::dvec3 world(0), inTo(0);
+    for (std::size_t l = 0; l < (derive ? 3 : 1); ++l) {
+        const glm::dvec3 w = worldFromFrom * lenses[l].ray(from);
+        const glm::dvec3 r = w * worldFromTo;  // transposed: to camera space
+        const auto p = lenses[l].position(r);
+        if (!p) {
+            // Behind the camera: as bad as a match that is a whole picture off.
+            if (l == 0) block.cost += huber(4 / (s.pixel * s.pixel), s.huberPixels);
+            return;
+        }
+        seen[l] = *p;
+        if (l == 0) {
+            world = w;
+            inTo = r;
+        }
+    }
+    const glm::dvec2 e = (seen[0] - to) / s.pixel;
+    const double squared = glm::dot(e, e);
+    block.cost += huber(squared, s.huberPixels);
+    if (!derive) return;
+    const double weight =
+        squared <= s.huberPixels * s.huberPixels ? 1.0 : s.huberPixels / std::sqrt(squared);
+    // How the position changes with the ray in the camera.
+    const TurnLens& lens = lenses[0];
+    const double z = -inTo.z;
+    const glm::dvec2 plane = glm::dvec2(inTo) / z;
+    const double r2 = glm::dot(plane, plane), stretch = 1 + lens.k1 * r2;
+    std::array<std::array<double, kOwn>, 2> j{};
+    for (int row = 0; row < 2; ++row) {
+        // d position / d plane, then d plane / d ray.
+        glm::dvec2 byPlane = 2 * lens.k1 * plane[row] * plane;
+        byPlane[row] += stretch;
+        byPlane *= lens.focal / s.pixel;
+        const glm::dvec3 byRay(byPlane.x / z, byPlane.y / z, glm::dot(byPlane, plane) / z);
+        // ray = R_to^T (1 + [w_from] - [w_to]) world
+        const glm::dvec3 byTurn = glm::cross(world, worldFromTo * byRay);
+        auto& own = j[static_cast<std::size_t>(row)];
+        for (int i = 0; i < 3; ++i) {
+            own[static_cast<std::size_t>(i)] = fromIsA ? byTurn[i] : -byTurn[i];
+            own[static_cast<std::size_t>(3 + i)] = -own[static_cast<std::size_t>(i)];
+        }
+        own[6] = (seen[1][row] - seen[0][row]) / (s.pixel * steps[0]);
+        own[7] = (seen[2][row] - seen[0][row]) / (s.pixel * steps[1]);
+        for (std::size_t a = 0; a < kOwn; ++a) {
+            block.right[a] -= weight * own[a] * e[row];
+            for (std::size_t b = 0; b < kOwn; ++b)
+                block.matrix[a * kOwn + b] += weight * own[a] * own[b];
+        }
+    }
+}
+
+std::vector<Block> blocksOf(const TurnModel& model, const std::vector<Pair>& pairs,
+                            const AdjustSettings& s, bool derive) {
+    const std::array<double, 2> steps = {1e-6, 1e-6};
+    const double logFocal = std::log(model.lens.focal);
+    const double corner = model.lens.k1 / (model.lens.focal * model.lens.focal);
+    const std::array<TurnLens, 3> lenses = {model.lens, lensOf(logFocal + steps[0], corner),
+                                            lensOf(logFocal, corner + steps[1])};
+    std::vector<Block> blocks(pairs.size());
+    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+        const Pair& pair = pairs[static_cast<std::size_t>(i)];
+        const auto a = static_cast<std::size_t>(pair.a), b = static_cast<std::size_t>(pair.b);
+        if (!model.known[a] || !model.known[b]) return;
+        const glm::dmat3 ra = glm::mat3_cast(model.worldFromCamera[a]);
+        const glm::dmat3 rb = glm::mat3_cast(model.worldFromCamera[b]);
+        Block& block = blocks[static_cast<std::size_t>(i)];
+        for (const Match& m : pair.matches) {
+            addSide(block, ra, rb, m.a, m.b, true, lenses, steps, s, derive);
+            addSide(block, rb, ra, m.b, m.a, false, lenses, steps, s, derive);
+        }
+    });
+    return blocks;
+}
+
+double priorCost(const TurnLens& lens, const AdjustSettings& s) {
+    const double f = std::log(lens.focal / s.expectedFocal) / s.focalSpread;
+    const double k = lens.k1 / (lens.focal * lens.focal) / kDistortionSpread;
+    return (f * f + k * k) * s.noisePixels * s.noisePixels;
+}
+
+double costOf(const TurnModel& model, const std::vector<Pair>& pairs, const AdjustSettings& s) {
+    double cost = priorCost(model.lens, s);
+    for (const Block& block : blocksOf(model, pairs, s, false)) cost += block.cost;
+    return cost;
+}
+
+}  // namespace
+
+double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSettings& s) {
+    // Where each picture's unknowns begin; the first known one has none.
+    const std::size_t count = model.known.size();
+    std::vector<std::size_t> at(count, SIZE_MAX);
+    std::size_t unknowns = 0;
+    bool first = true;
+    for (std::size_t k = 0; k < count; ++k) {
+        if (!model.known[k]) continue;
+        if (!first) {
+            at[k] = unknowns;
+            unknowns += 3;
+        }
+        first = false;
+    }
+    const std::size_t focalAt = unknowns++, cornerAt = unknowns++;
+    double damping = 1e-4;
+    double cost = costOf(model, pairs, s);
+    for (int iteration = 0; iteration < s.iterations; ++iteration) {
+        const auto blocks = blocksOf(model, pairs, s, true);
+        std::vector<double> matrix(unknowns * unknowns, 0.0), right(unknowns, 0.0);
+        for (std::size_t p = 0; p < pairs.size(); ++p) {
+            std::array<std::size_t, kOwn> index{};
+            for (std::size_t i = 0; i < 3; ++i) {
+                const auto a = at[static_cast<std::size_t>(pairs[p].a)];
+                const auto b = at[static_cast<std::size_t>(pairs[p].b)];
+                index[i] = a == SIZE_MAX ? SIZE_MAX : a + i;
+                index[3 + i] = b == SIZE_MAX ? SIZE_MAX : b + i;
+            }
+            index[6] = s.fixFocal ? SIZE_MAX : focalAt;
+            index[7] = s.fixDistortion ? SIZE_MAX : cornerAt;
+            for (std::size_t i = 0; i < kOwn; ++i) {
+                if (index[i] == SIZE_MAX) continue;
+                right[index[i]] += blocks[p].right[i];
+                for (std::size_t j = 0; j < kOwn; ++j)
+                    if (index[j] != SIZE_MAX)
+                        matrix[index[i] * unknowns + index[j]] += blocks[p].matrix[i * kOwn + j];
+            }
+        }
+        const double corner = model.lens.k1 / (model.lens.focal * model.lens.focal);
+        const double noise = s.noisePixels * s.noisePixels;
+        const double f = noise / (s.focalSpread * s.focalSpread);
+        const double k = noise / (kDistortionSpread * kDistortionSpread);
+        matrix[focalAt * unknowns + focalAt] += f;
+        right[focalAt] -= s.fixFocal ? 0 : f * std::log(model.lens.focal / s.expectedFocal);
+        matrix[cornerAt * unknowns + cornerAt] += k;
+        right[cornerAt] -= s.fixDistortion ? 0 : k * corner;
+
+        bool better = false;
+        double gain = 0;
+        for (int tries = 0; tries < 8 && !better; ++tries) {
+            auto damped = matrix;
+            auto step = right;
+            for (std::size_t i = 0; i < unknowns; ++i)
+                damped[i * unknowns + i] += damping * matrix[i * unknowns + i] + 1e-9;
+            if (solveSymmetric(damped, step)) {
+                TurnModel moved = model;
+                for (std::size_t c = 0; c < count; ++c)
+                    if (at[c] != SIZE_MAX)
+                        moved.worldFromCamera[c] =
+                            glm::normalize(quatOf({step[at[c]], step[at[c] + 1], step[at[c] + 2]}) *
+                                           moved.worldFromCamera[c]);
+                const double logFocal =
+                    std::log(model.lens.focal) + std::clamp(step[focalAt], -0.2, 0.2);
+                moved.lens = lensOf(logFocal, std::clamp(corner + step[cornerAt], -0.25, 0.25));
+                if (s.fixFocal) moved.lens.focal = model.lens.focal;
+                if (s.fixDistortion) moved.lens.k1 = model.lens.k1;
+                const double now = costOf(moved, pairs, s);
+                if (now < cost) {
+                    gain = cost - now;
+                    cost = now;
+                    model = std::move(moved);
+                    better = true;
+                }
+            }
+            damping = better ? std::max(damping * 0.2, 1e-9) : damping * 8;
+        }
+        if (!better || gain < 1e-7 * cost) break;
+    }
+    return cost;
+}
+
+std::optional<glm::dvec2> seenBy(const TurnModel& model, int a, int b, glm::dvec2 p) {
+    const auto& from = model.worldFromCamera[static_cast<std::size_t>(a)];
+    const auto& to = model.worldFromCamera[static_cast<std::size_t>(b)];
+    return model.lens.position(glm::inverse(to) * (from * model.lens.ray(p)));
+}
+
+double differenceOf(const TurnModel& model, const Pair& pair, const Match& match, double pixel) {
+    const auto inB = seenBy(model, pair.a, pair.b, match.a);
+    const auto inA = seenBy(model, pair.b, pair.a, match.b);
+    if (!inA || !inB) return 1e9;
+    return 0.5 * (glm::distance(*inA, match.a) + glm::distance(*inB, match.b)) / pixel;
+}
+
+}  // namespace stx::panorama

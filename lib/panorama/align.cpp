@@ -1,0 +1,407 @@
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+
+#include "lib/base/counted.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/panorama/order.hpp"
+#include "lib/panorama/panorama.hpp"
+#include "lib/panorama/patches.hpp"
+#include "lib/panorama/work_copies.hpp"
+
+namespace stx {
+
+using namespace panorama;
+
+namespace {
+
+constexpr int kMostPictures = 500;
+constexpr int kFeatures = 900;  ///< of a picture
+/// A pair whose matches differ by more than this once all is adjusted is a mistake, work pixels.
+constexpr double kWrongPairPixels = 8;
+/// Focal length of most cameras, halves of the diagonal: 29 mm for 36x24 mm.
+constexpr double kUsualFocal = 1.35;
+
+/// What is known and found while pictures are aligned.
+struct Series {
+    std::vector<WorkCopy> copies;
+    std::vector<Features> features;
+    std::vector<Pyramid> pyramids;
+    std::vector<Pair> pairs;
+    TurnModel model;
+    AdjustSettings adjusting;
+};
+
+double medianOf(std::vector<double> values, double otherwise) {
+    if (values.empty()) return otherwise;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/// Fields of view of 21 to 110 degrees across the diagonal.
+std::vector<double> focalsToTry(double hint) {
+    std::vector<double> focals;
+    for (double f = 0.7; f < 5.5; f *= 1.15) focals.push_back(f);
+    if (hint > 0)
+        for (const double f : {0.93, 1.0, 1.07}) focals.push_back(f * hint);
+    return focals;
+}
+
+/// Rotations, focal length and distortion of all that hang together, from coarse to fine.
+void adjustCoarseToFine(Series& s, bool fixDistortion) {
+    for (const double pixels : {60.0, 15.0, 4.0, 2.0}) {
+        s.adjusting.huberPixels = pixels;
+        s.adjusting.fixDistortion = fixDistortion || pixels > 20;
+        adjust(s.model, s.pairs, s.adjusting);
+    }
+}
+
+double medianDifference(const Series& s, const Pair& pair) {
+    std::vector<double> differences;
+    for (const Match& m : pair.matches)
+        differences.push_back(differenceOf(s.model, pair, m, s.adjusting.pixel));
+    return medianOf(std::move(differences), 1e9);
+}
+
+/// Drops pairs that do not fit to the others; true when there were some.
+bool dropWrongPairs(Series& s) {
+    const auto before = s.pairs.size();
+    std::erase_if(s.pairs, [&](const Pair& pair) {
+        const bool known = s.model.known[static_cast<std::size_t>(pair.a)];
+        return known && medianDifference(s, pair) > kWrongPairPixels;
+    });
+    return s.pairs.size() != before;
+}
+
+/// Whether two pictures may see the same, by the model.
+bool mayOverlap(const Series& s, int a, int b) {
+    const auto& copy = s.copies[static_cast<std::size_t>(a)];
+    const glm::dvec2 other = s.copies[static_cast<std::size_t>(b)].extent(), own = copy.extent();
+    int seen = 0;
+    for (int y = 0; y < 9; ++y)
+        for (int x = 0; x < 9; ++x) {
+            const auto p = seenBy(s.model, a, b, own * glm::dvec2((x - 4) / 4.2, (y - 4) / 4.2));
+            seen += p && std::abs(p->x) < other.x && std::abs(p->y) < other.y;
+        }
+    return seen >= 3;
+}
+
+/// Matches of patches for all pairs that overlap; those of features where patches say too little.
+Result<void> matchPatches(Series& s, const std::vector<Pair>& fromFeatures,
+                          const std::vector<std::pair<int, int>>& forbidden, double reach,
+                          Job& job) {
+    std::vector<Pair> pairs;
+    const auto count = static_cast<int>(s.copies.size());
+    for (int a = 0; a < count; ++a)
+        for (int b = a + 1; b < count; ++b) {
+            if (!s.model.known[static_cast<std::size_t>(a)] ||
+                !s.model.known[static_cast<std::size_t>(b)] || !mayOverlap(s, a, b))
+                continue;
+            if (std::find(forbidden.begin(), forbidden.end(), std::pair(a, b)) != forbidden.end())
+                continue;
+            Pair pair;
+            pair.a = a;
+            pair.b = b;
+            pairs.push_back(std::move(pair));
+        }
+    std::atomic<std::int64_t> done = 0;
+    PatchSettings settings;
+    settings.reach = reach;
+    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+        if (job.cancelled) return;
+        Pair& pair = pairs[static_cast<std::size_t>(i)];
+        const auto a = static_cast<std::size_t>(pair.a), b = static_cast<std::size_t>(pair.b);
+        pair.matches =
+            alignPatches(s.copies, s.pyramids, s.features, s.model, pair.a, pair.b, settings);
+        pair.bFromA = glm::inverse(s.model.worldFromCamera[b]) * s.model.worldFromCamera[a];
+        job.progress(++done, static_cast<std::int64_t>(pairs.size()), "aligning patches");
+    });
+    STX_CHECK(job.checkCancelled());
+    for (const Pair& old : fromFeatures) {
+        const auto it = std::find_if(pairs.begin(), pairs.end(), [&](const Pair& pair) {
+            return pair.a == old.a && pair.b == old.b;
+        });
+        if (it == pairs.end()) continue;
+        if (it->matches.size() < 10)
+            it->matches.insert(it->matches.end(), old.matches.begin(), old.matches.end());
+    }
+    std::erase_if(pairs, [](const Pair& pair) { return pair.matches.size() < 4; });
+    s.pairs = std::move(pairs);
+    return {};
+}
+
+/// Matches far from what all agree on are movers, parallax and mistakes.
+void keepWhatFits(Series& s, double most) {
+    for (Pair& pair : s.pairs) {
+        const double limit = std::clamp(2.5 * medianDifference(s, pair), 0.7, most);
+        std::erase_if(pair.matches, [&](const Match& m) {
+            return differenceOf(s.model, pair, m, s.adjusting.pixel) > limit;
+        });
+    }
+    std::erase_if(s.pairs, [](const Pair& pair) { return pair.matches.size() < 4; });
+}
+
+/// What differs between two pictures is parallax and shapes of lenses more than noise: matches of a
+/// pair say the same about the lens, so that all of them together count as this many.
+constexpr double kOwnOpinions = 12;
+
+/// How far matches are off, pixels, as if each were independent of the others.
+double noiseOf(const Series& s) {
+    double squares = 0, matches = 0;
+    for (const Pair& pair : s.pairs) {
+        std::vector<double> differences;
+        for (const Match& m : pair.matches)
+            differences.push_back(differenceOf(s.model, pair, m, s.adjusting.pixel));
+        std::sort(differences.begin(), differences.end());
+        // Nine tenths of a bell in two dimensions are within 2.15 standard deviations.
+        const double off = differences[differences.size() * 9 / 10] / 2.15;
+        squares += off * off;
+        matches += static_cast<double>(differences.size());
+    }
+    const double pairs = std::max(1.0, static_cast<double>(s.pairs.size()));
+    return std::clamp(std::sqrt(squares / pairs * std::max(1.0, matches / pairs / kOwnOpinions)),
+                      0.01, 20.0);
+}
+
+/// The largest of the angles by which pairs that close a turn disagree with `model`.
+double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
+             const std::vector<int>& closing, bool strongest) {
+    double gap = 0;
+    std::size_t most = 0;
+    for (const int p : closing) {
+        const Pair& pair = pairs[static_cast<std::size_t>(p)];
+        const auto& a = model.worldFromCamera[static_cast<std::size_t>(pair.a)];
+        const auto& b = model.worldFromCamera[static_cast<std::size_t>(pair.b)];
+        const double off =
+            angleBetween(turnOf(pair.matches, model.lens, pair.bFromA), glm::inverse(b) * a);
+        if (strongest) {
+            if (pair.matches.size() <= most) continue;
+            most = pair.matches.size();
+            gap = off;
+        } else {
+            gap = std::max(gap, off);
+        }
+    }
+    return gap;
+}
+
+/// What pairs have in common, from the matches that fit and those that were found `before`.
+void describePairs(const Series& s, const std::vector<Pair>& before, PanoramaAlignment& out) {
+    double squares = 0;
+    std::size_t all = 0;
+    for (const Pair& pair : s.pairs) {
+        const double fullPixel =
+            0.5 * (s.copies[static_cast<std::size_t>(pair.a)].fullHalfDiagonal() +
+                   s.copies[static_cast<std::size_t>(pair.b)].fullHalfDiagonal());
+        const auto differences = [&](const Pair& of) {
+            std::vector<double> values;
+            for (const Match& m : of.matches)
+                values.push_back(differenceOf(s.model, of, m, 1.0) * fullPixel);
+            std::sort(values.begin(), values.end());
+            return values;
+        };
+        PanoramaPair p;
+        p.a = pair.a;
+        p.b = pair.b;
+        p.matches = static_cast<int>(pair.matches.size());
+        double own = 0;
+        for (const double d : differences(pair)) own += d * d;
+        p.rms = std::sqrt(own / static_cast<double>(pair.matches.size()));
+        squares += own;
+        all += pair.matches.size();
+        const auto first = std::find_if(before.begin(), before.end(), [&](const Pair& b) {
+            return b.a == pair.a && b.b == pair.b;
+        });
+        const auto whole = differences(first == before.end() ? pair : *first);
+        p.found = static_cast<int>(whole.size());
+        p.parallax = whole[whole.size() * 9 / 10];
+        out.pairs.push_back(p);
+    }
+    out.rms = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(all, 1)));
+}
+
+std::string listOf(const std::vector<std::string>& names) {
+    std::string text;
+    for (std::size_t i = 0; i < names.size() && i < 4; ++i)
+        text += (i == 0 ? "'" : ", '") + names[i] + "'";
+    if (names.size() > 4) text += fmt::format(" and {} more", names.size() - 4);
+    return text;
+}
+
+/// Says how large the parallax is, where it is.
+void tellParallax(const std::vector<PanoramaPair>& pairs, PictureSource& source, double pixels,
+                  Job& job) {
+    const PanoramaPair* worst = nullptr;
+    int some = 0;
+    for (const auto& pair : pairs) {
+        if (pair.matches < 8 || pair.parallax < pixels) continue;
+        ++some;
+        if (!worst || pair.parallax > worst->parallax) worst = &pair;
+    }
+    if (!worst) return;
+    job.note(
+        fmt::format("parallax: {} by more than {:.1f} pixels that no rotation explains, '{}' and "
+                    "'{}' by {:.1f}; "
+                    "the camera moved, or what it saw did",
+                    some == 1 ? std::string("1 pair of pictures differs")
+                              : fmt::format("{} pairs of pictures differ", some),
+                    pixels, source.name(worst->a), source.name(worst->b), worst->parallax));
+}
+
+}  // namespace
+
+int PanoramaAlignment::used() const {
+    return static_cast<int>(
+        std::count_if(cameras.begin(), cameras.end(), [](const auto& c) { return c.used; }));
+}
+
+Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSettings& settings,
+                                        Job& job) {
+    const int count = source.count();
+    if (count < 2)
+        return fail(ErrorCode::invalidInput,
+                    "a panorama is made of at least 2 pictures, and {} is here", count);
+    if (count > kMostPictures)
+        return fail(ErrorCode::invalidInput,
+                    "{} pictures are too many for one panorama; {} are possible", count,
+                    kMostPictures);
+    Series s;
+    STX_TRY(s.copies, readWorkCopies(source, job));
+    STX_TRY(const auto twins, sameAs(s.copies, job));
+    std::vector<std::string> equal;
+    for (int k = 0; k < count; ++k)
+        if (twins[static_cast<std::size_t>(k)] >= 0) equal.push_back(source.name(k));
+    if (static_cast<int>(equal.size()) == count - 1)
+        return fail(ErrorCode::invalidInput,
+                    "all {} pictures are equal; a camera that turned between them is needed",
+                    count);
+    if (!equal.empty())
+        job.note(fmt::format("{} left out, equal to another: {}",
+                             counted(equal.size(), "picture is", "pictures are"), listOf(equal)));
+
+    s.features.resize(s.copies.size());
+    std::atomic<std::int64_t> done = 0;
+    parallelFor(0, count, [&](std::int64_t i) {
+        if (job.cancelled) return;
+        const auto k = static_cast<std::size_t>(i);
+        if (twins[k] < 0) s.features[k] = findFeatures(s.copies[k], kFeatures);
+        job.progress(++done, count, "looking for features");
+    });
+    STX_CHECK(job.checkCancelled());
+
+    const bool given = settings.fieldOfView > 0;
+    std::vector<double> hints;
+    for (int k = 0; k < count; ++k)
+        if (const double hint = source.focalHint(k); hint > 0) hints.push_back(hint);
+    double hint = medianOf(hints, 0);
+    if (given) hint = s.copies[0].extent().x / std::tan(0.5 * settings.fieldOfView);
+    STX_TRY(auto search, searchPairs(s.copies, s.features,
+                                     given ? std::vector<double>{hint} : focalsToTry(hint), job));
+    s.pairs = std::move(search.pairs);
+    double pixel = 1;
+    for (const WorkCopy& copy : s.copies) pixel = std::min(pixel, 1 / copy.halfDiagonal());
+    s.adjusting.pixel = pixel;
+    s.adjusting.fixFocal = given;
+
+    // Order, start, adjustment; again while pairs turn out to be mistakes.
+    double focal = search.focal;
+    std::vector<std::pair<int, int>> forbidden;
+    PictureTree tree;
+    for (int round = 0; round < 6; ++round) {
+        tree = treeOf(count, s.pairs);
+        if (tree.order.size() < 2)
+            return fail(ErrorCode::invalidInput,
+                        "no two of the {} pictures show the same from one place; neighbours must "
+                        "overlap by a quarter or more, and the camera must only turn",
+                        count);
+        if (settings.closeLoop && !given) focal = focalByClosing(tree, s.pairs, focal);
+        s.model = chain(tree, s.pairs, {focal, 0});
+        if (!settings.closeLoop) {
+            const auto closing = pairsThatClose(tree, s.pairs, s.model);
+            for (auto p = closing.rbegin(); p != closing.rend(); ++p) {
+                const Pair& pair = s.pairs[static_cast<std::size_t>(*p)];
+                forbidden.emplace_back(pair.a, pair.b);
+                s.pairs.erase(s.pairs.begin() + *p);
+            }
+            if (!closing.empty()) continue;
+        }
+        s.adjusting.expectedFocal = hint > 0 ? hint : kUsualFocal;
+        s.adjusting.focalSpread = hint > 0 ? 0.04 : 0.35;
+        adjustCoarseToFine(s, false);
+        focal = s.model.lens.focal;
+        if (!dropWrongPairs(s)) break;
+    }
+    const std::vector<Pair> fromFeatures = s.pairs;
+    const double pairsFocal = search.focal;
+
+    s.pyramids.resize(s.copies.size());
+    parallelFor(0, count, [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        if (s.model.known[k]) s.pyramids[k] = pyramidOf(s.copies[k].grey);
+    });
+    std::vector<Pair> before;  // what does not fit is dropped
+    for (const double reach : {8.0, 3.0}) {
+        STX_CHECK(matchPatches(s, fromFeatures, forbidden, reach, job));
+        if (before.empty()) before = s.pairs;
+        for (const double pixels : {4.0, 1.0}) {
+            s.adjusting.noisePixels = noiseOf(s);
+            s.adjusting.huberPixels = pixels;
+            adjust(s.model, s.pairs, s.adjusting);
+        }
+    }
+    for (const double most : {3.0, 2.0, 1.3, 0.85}) {
+        keepWhatFits(s, most);
+        s.adjusting.huberPixels = 0.5;
+        adjust(s.model, s.pairs, s.adjusting);
+    }
+
+    PanoramaAlignment out;
+    describePairs(s, before, out);
+    tree = treeOf(count, s.pairs);
+    std::vector<std::string> strangers;
+    for (int k = 0; k < count; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        s.model.known[i] = std::find(tree.order.begin(), tree.order.end(), k) != tree.order.end();
+        if (!s.model.known[i] && twins[i] < 0) strangers.push_back(source.name(k));
+    }
+    if (tree.order.size() < 2)
+        return fail(ErrorCode::invalidInput,
+                    "no two of the {} pictures fit together by a rotation alone; the camera must "
+                    "only turn, and neighbours overlap by a quarter or more",
+                    count);
+    if (!strangers.empty())
+        job.note(fmt::format("{} left out, since nothing in {} fits to the others: {}",
+                             counted(strangers.size(), "picture is", "pictures are"),
+                             strangers.size() == 1 ? "it" : "them", listOf(strangers)));
+    const auto closing = pairsThatClose(tree, s.pairs, s.model);
+    out.closed = !closing.empty();
+    if (out.closed) {
+        const TurnModel byPairs = chain(tree, s.pairs, {pairsFocal, 0});
+        out.gapBefore = gapOf(byPairs, s.pairs, closing, true);
+        out.gapAfter = gapOf(s.model, s.pairs, closing, false);
+    }
+    const glm::dquat turn = settings.up == PanoramaUp::first
+                                ? glm::inverse(s.model.worldFromCamera[static_cast<std::size_t>(
+                                      std::find(s.model.known.begin(), s.model.known.end(), true) -
+                                      s.model.known.begin())])
+                                : levelTurn(s.model, upOf(s.model), out.closed);
+    out.focal = s.model.lens.focal;
+    out.k1 = s.model.lens.k1;
+    double largest = 0;
+    for (std::size_t k = 0; k < s.copies.size(); ++k) {
+        PanoramaCamera camera;
+        camera.used = s.model.known[k];
+        camera.size = s.copies[k].fullSize;
+        camera.focal = out.focal * s.copies[k].fullHalfDiagonal();
+        largest = std::max(largest, s.copies[k].fullHalfDiagonal());
+        if (camera.used) camera.worldFromCamera = glm::normalize(turn * s.model.worldFromCamera[k]);
+        out.cameras.push_back(camera);
+    }
+    // A thousandth of the diagonal, two pixels at least.
+    tellParallax(out.pairs, source, std::max(2.0, 2e-3 * largest), job);
+    return out;
+}
+
+}  // namespace stx

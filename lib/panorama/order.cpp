@@ -1,0 +1,258 @@
+#include "lib/panorama/order.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx::panorama {
+namespace {
+
+const glm::dquat kNoTurn(1, 0, 0, 0);
+
+/// The relative turn that the matches of a pair say, to its second picture from its first.
+std::vector<glm::dquat> turnsOf(const std::vector<Pair>& pairs, const TurnLens& lens) {
+    std::vector<glm::dquat> turns(pairs.size());
+    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+        const Pair& pair = pairs[static_cast<std::size_t>(i)];
+        turns[static_cast<std::size_t>(i)] = turnOf(pair.matches, lens, pair.bFromA);
+    });
+    return turns;
+}
+
+TurnModel chainOf(const PictureTree& tree, const std::vector<Pair>& pairs,
+                  const std::vector<glm::dquat>& turns, const TurnLens& lens) {
+    TurnModel model;
+    model.lens = lens;
+    model.worldFromCamera.assign(tree.parent.size(), kNoTurn);
+    model.known.assign(tree.parent.size(), false);
+    for (const int k : tree.order) {
+        const auto i = static_cast<std::size_t>(k);
+        model.known[i] = true;
+        if (tree.parent[i] < 0) continue;
+        const auto p = static_cast<std::size_t>(tree.pair[i]);
+        const auto& before = model.worldFromCamera[static_cast<std::size_t>(tree.parent[i])];
+        const glm::dquat& bFromA = turns[p];
+        // worldFromB = worldFromA aFromB
+        model.worldFromCamera[i] =
+            glm::normalize(before * (pairs[p].b == k ? glm::inverse(bFromA) : bFromA));
+    }
+    return model;
+}
+
+/// The angle of a direction around an axis, radians.
+double yawOf(glm::dvec3 direction, glm::dvec3 up, glm::dvec3 zero) {
+    return std::atan2(glm::dot(direction, glm::cross(up, zero)), glm::dot(direction, zero));
+}
+
+double wrapped(double angle) {
+    return angle - 2 * M_PI * std::round(angle / (2 * M_PI));
+}
+
+}  // namespace
+
+PictureTree treeOf(int pictures, const std::vector<Pair>& pairs) {
+    const auto count = static_cast<std::size_t>(pictures);
+    std::vector<std::size_t> strongest(pairs.size());
+    std::iota(strongest.begin(), strongest.end(), std::size_t{0});
+    std::stable_sort(strongest.begin(), strongest.end(), [&](std::size_t x, std::size_t y) {
+        return pairs[x].matches.size() > pairs[y].matches.size();
+    });
+    // Kruskal's tree.
+    std::vector<int> group(count);
+    std::iota(group.begin(), group.end(), 0);
+    const auto rootOf = [&](int k) {
+        while (group[static_cast<std::size_t>(k)] != k) k = group[static_cast<std::size_t>(k)];
+        return k;
+    };
+    PictureTree tree;
+    tree.inTree.assign(pairs.size(), false);
+    tree.parent.assign(count, -1);
+    tree.pair.assign(count, -1);
+    for (const std::size_t p : strongest) {
+        const int a = rootOf(pairs[p].a), b = rootOf(pairs[p].b);
+        if (a == b) continue;
+        group[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+        tree.inTree[p] = true;
+    }
+    std::vector<std::size_t> members(count, 0);
+    for (int k = 0; k < pictures; ++k) ++members[static_cast<std::size_t>(rootOf(k))];
+    const auto largest =
+        static_cast<int>(std::max_element(members.begin(), members.end()) - members.begin());
+    // The root is the picture with the most matches: the middle of the whole, more or less.
+    std::vector<std::size_t> weight(count, 0);
+    for (const Pair& pair : pairs) {
+        weight[static_cast<std::size_t>(pair.a)] += pair.matches.size();
+        weight[static_cast<std::size_t>(pair.b)] += pair.matches.size();
+    }
+    int root = -1;
+    for (int k = 0; k < pictures; ++k)
+        if (rootOf(k) == largest && (root < 0 || weight[static_cast<std::size_t>(k)] >
+                                                     weight[static_cast<std::size_t>(root)]))
+            root = k;
+    tree.order.push_back(root);
+    std::vector<bool> reached(count, false);
+    reached[static_cast<std::size_t>(root)] = true;
+    for (std::size_t at = 0; at < tree.order.size(); ++at) {
+        for (std::size_t p = 0; p < pairs.size(); ++p) {
+            if (!tree.inTree[p]) continue;
+            const int here = tree.order[at];
+            if (pairs[p].a != here && pairs[p].b != here) continue;
+            const int other = pairs[p].a == here ? pairs[p].b : pairs[p].a;
+            if (reached[static_cast<std::size_t>(other)]) continue;
+            reached[static_cast<std::size_t>(other)] = true;
+            tree.parent[static_cast<std::size_t>(other)] = here;
+            tree.pair[static_cast<std::size_t>(other)] = static_cast<int>(p);
+            tree.order.push_back(other);
+        }
+    }
+    return tree;
+}
+
+TurnModel chain(const PictureTree& tree, const std::vector<Pair>& pairs, const TurnLens& lens) {
+    return chainOf(tree, pairs, turnsOf(pairs, lens), lens);
+}
+
+double focalByClosing(const PictureTree& tree, const std::vector<Pair>& pairs, double focal) {
+    constexpr int kSteps = 50;
+    constexpr double kStep = 0.012;  // of the logarithm: from 0.55 to 1.8 times the focal length
+    std::vector<double> costs;
+    for (int i = -kSteps; i <= kSteps; ++i) {
+        const TurnLens lens{focal * std::exp(kStep * i), 0};
+        const auto turns = turnsOf(pairs, lens);
+        const TurnModel model = chainOf(tree, pairs, turns, lens);
+        double cost = 0;
+        for (std::size_t p = 0; p < pairs.size(); ++p) {
+            const auto a = static_cast<std::size_t>(pairs[p].a);
+            const auto b = static_cast<std::size_t>(pairs[p].b);
+            if (tree.inTree[p] || !model.known[a]) continue;
+            const double off = angleBetween(
+                turns[p], glm::inverse(model.worldFromCamera[b]) * model.worldFromCamera[a]);
+            cost += std::min(off, 1.0) * std::sqrt(static_cast<double>(pairs[p].matches.size()));
+        }
+        costs.push_back(cost);
+    }
+    const auto least = std::min_element(costs.begin(), costs.end());
+    const double start = costs[kSteps];
+    // Only what a turn that closes says is clear; the rest is left to the adjustment.
+    if (*least > 0.6 * start || start - *least < 0.3) return focal;
+    return focal * std::exp(kStep * static_cast<double>(least - costs.begin() - kSteps));
+}
+
+namespace {
+
+/// How unlikely a camera is held so: one of its sides is level, more or less, mostly its own; few
+/// look steeply up or down (else a camera that only rolled would have its axis for up).
+double heldSo(const glm::dmat3& frame, glm::dvec3 up) {
+    constexpr double kLean = M_PI / 180, kPitch = M_PI / 9;
+    constexpr double kSteep = 5, kSideways = 1, kUpsideDown = 3;
+    const double lean = std::abs(glm::dot(frame[0], up)), top = glm::dot(frame[1], up);
+    // Tails as Cauchy's: some are held at any angle.
+    const auto unlikely = [&](double sine) { return std::log(1 + sine * sine / (kLean * kLean)); };
+    const double upright = unlikely(lean) + (top < 0 ? kUpsideDown : 0);
+    const double pitch = std::asin(std::min(1.0, std::abs(glm::dot(frame[2], up)))) / kPitch;
+    return std::min(upright, unlikely(top) + kSideways) +
+           kSteep * (1 - std::exp(-pitch * pitch / kSteep));
+}
+
+}  // namespace
+
+glm::dvec3 upOf(const TurnModel& model) {
+    std::vector<glm::dmat3> frames;
+    for (std::size_t k = 0; k < model.known.size(); ++k)
+        if (model.known[k]) frames.push_back(glm::mat3_cast(model.worldFromCamera[k]));
+    const auto costOfUp = [&](glm::dvec3 up) {
+        double cost = 0;
+        for (const auto& frame : frames) cost += heldSo(frame, up);
+        return cost;
+    };
+    // From each camera's own top and sides, always downhill, in steps that shrink.
+    constexpr std::size_t kMostStarts = 24;
+    double best = 1e300;
+    glm::dvec3 bestUp(0, 1, 0);
+    const std::size_t stride = (frames.size() + kMostStarts - 1) / kMostStarts;
+    for (std::size_t k = 0; k < frames.size(); k += stride)
+        for (const glm::dvec3 start : {frames[k][1], frames[k][0], -frames[k][0]}) {
+            glm::dvec3 up = start;
+            double cost = costOfUp(up);
+            for (double step = 0.2; step > 2e-6;) {
+                const glm::dvec3 across = glm::normalize(glm::cross(
+                    up, std::abs(up.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1)));
+                const glm::dvec3 along = glm::cross(up, across);
+                bool better = false;
+                for (const glm::dvec3 d : {across, -across, along, -along}) {
+                    const glm::dvec3 next = glm::normalize(up + step * d);
+                    const double now = costOfUp(next);
+                    if (!(now < cost)) continue;
+                    cost = now;
+                    up = next;
+                    better = true;
+                    break;
+                }
+                if (!better) step *= 0.5;
+            }
+            if (cost < best - 1e-6) {
+                best = cost;
+                bestUp = up;
+            }
+        }
+    return bestUp;
+}
+
+std::vector<int> pairsThatClose(const PictureTree& tree, const std::vector<Pair>& pairs,
+                                const TurnModel& model) {
+    const glm::dvec3 up = upOf(model);
+    const glm::dvec3 zero = glm::normalize(
+        glm::cross(up, std::abs(up.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1)));
+    const auto forward = [&](int k) {
+        return model.worldFromCamera[static_cast<std::size_t>(k)] * glm::dvec3(0, 0, -1);
+    };
+    // How far each picture is turned from the root, along the tree.
+    std::vector<double> turned(tree.parent.size(), 0.0);
+    for (const int k : tree.order) {
+        const auto i = static_cast<std::size_t>(k);
+        if (tree.parent[i] < 0) continue;
+        turned[i] = turned[static_cast<std::size_t>(tree.parent[i])] +
+                    wrapped(yawOf(forward(k), up, zero) - yawOf(forward(tree.parent[i]), up, zero));
+    }
+    std::vector<int> closing;
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+        const auto a = static_cast<std::size_t>(pairs[p].a);
+        const auto b = static_cast<std::size_t>(pairs[p].b);
+        if (tree.inTree[p] || !model.known[a] || !model.known[b]) continue;
+        // Where b is by this pair's own turn, seen from a.
+        const glm::dquat byPair = model.worldFromCamera[a] * glm::inverse(pairs[p].bFromA);
+        const double own = wrapped(yawOf(byPair * glm::dvec3(0, 0, -1), up, zero) -
+                                   yawOf(forward(pairs[p].a), up, zero));
+        if (std::abs(turned[b] - turned[a] - own) > M_PI) closing.push_back(static_cast<int>(p));
+    }
+    return closing;
+}
+
+glm::dquat levelTurn(const TurnModel& model, glm::dvec3 up, bool closed) {
+    const glm::dvec3 zero = glm::normalize(
+        glm::cross(up, std::abs(up.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1)));
+    std::vector<double> yaws;
+    for (std::size_t k = 0; k < model.known.size(); ++k)
+        if (model.known[k])
+            yaws.push_back(yawOf(model.worldFromCamera[k] * glm::dvec3(0, 0, -1), up, zero));
+    double middle = yaws.front();
+    if (!closed) {
+        // Opposite to the middle of the widest gap.
+        std::sort(yaws.begin(), yaws.end());
+        double widest = -1;
+        for (std::size_t i = 0; i < yaws.size(); ++i) {
+            const double next = i + 1 < yaws.size() ? yaws[i + 1] : yaws[0] + 2 * M_PI;
+            if (next - yaws[i] > widest) {
+                widest = next - yaws[i];
+                middle = yaws[i] + 0.5 * widest + M_PI;
+            }
+        }
+    }
+    const glm::dvec3 ahead = std::cos(middle) * zero + std::sin(middle) * glm::cross(up, zero);
+    const glm::dvec3 back = -ahead, right = glm::cross(up, back);
+    return glm::normalize(glm::quat_cast(glm::transpose(glm::dmat3(right, up, back))));
+}
+
+}  // namespace stx::panorama

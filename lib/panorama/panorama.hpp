@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "lib/base/job.hpp"
+#include "lib/panorama/picture_source.hpp"
+
+/// Panoramas: pictures of a camera that only turned become one picture of all that is around it
+/// (Szeliski and Shum, "Creating full view panoramic image mosaics and environment maps", SIGGRAPH
+/// 1997, and what came after).
+namespace stx {
+
+enum class PanoramaUp {
+    level,  ///< the horizon is level: cameras are held so that their sides or tops are, mostly
+    first,  ///< the first picture's frame
+};
+
+struct PanoramaSettings {
+    /// Full angle across the width of the first picture, radians; 0 = found from the pictures (and
+    /// from what the camera wrote down). One that is given is kept.
+    double fieldOfView = 0;
+    bool closeLoop = true;  ///< pictures that close a full turn may pull it together
+    PanoramaUp up = PanoramaUp::level;
+};
+
+/// Where a picture looked.
+struct PanoramaCamera {
+    bool used = false;  ///< part of the panorama
+    glm::dquat worldFromCamera{1.0, 0.0, 0.0, 0.0};
+    glm::ivec2 size{0};    ///< pixels
+    double focal = 0;      ///< pixels
+    glm::dvec3 gain{1.0};  ///< its linear light is multiplied by this
+};
+
+/// What two pictures have in common.
+struct PanoramaPair {
+    int a = 0, b = 0;
+    int found = 0;        ///< places that look alike in both, more or less where they should be
+    int matches = 0;      ///< those that one rotation explains, and the adjustment used
+    double rms = 0;       ///< of the latter, pixels of the full pictures
+    double parallax = 0;  ///< nine tenths of what was found differs by no more than this, pixels
+};
+
+struct PanoramaAlignment {
+    std::vector<PanoramaCamera> cameras;  ///< of each picture
+    std::vector<PanoramaPair> pairs;
+    double focal = 0;     ///< halves of a picture's diagonal; PanoramaCamera has it in pixels
+    double k1 = 0;        ///< radial distortion, OpenCV's first coefficient
+    double rms = 0;       ///< of all matches that fit, pixels of the full pictures
+    bool closed = false;  ///< the pictures go all around
+    /// Closed: what is missing when the pictures' measured turns are put one after the other with
+    /// the focal length that pairs alone tell, and after all were adjusted together; radians.
+    double gapBefore = 0, gapAfter = 0;
+
+    [[nodiscard]] int used() const;
+};
+
+/// Finds how the pictures look: features and pairs among all of them in any order, rotations, one
+/// focal length, radial distortion, all adjusted together, closed around, and level. The world is
+/// that of Camera: -Z is the middle of the panorama, +Y up. Notes name pictures that fit nowhere,
+/// and parallax. Errors: those of the source; invalidInput when fewer than two different pictures
+/// fit together; cancelled.
+[[nodiscard]] Result<PanoramaAlignment> alignPanorama(PictureSource& source,
+                                                      const PanoramaSettings& settings, Job& job);
+
+/// An equirectangular picture, 2 N x N: the middle looks along -Z, the left half is -X, the upper
+/// one +Y; pixels are areas (their centres are half a pixel inside). 8-bit sRGB; alpha 0 where no
+/// picture looked.
+struct PanoramaImage {
+    Rgba8Image pixels;
+
+    [[nodiscard]] int width() const { return pixels.width(); }
+    [[nodiscard]] int height() const { return pixels.height(); }
+    /// Unit direction of a position (pixels).
+    [[nodiscard]] static glm::dvec3 direction(glm::dvec2 position, int width);
+    /// Position (pixels) of a direction.
+    [[nodiscard]] static glm::dvec2 position(glm::dvec3 direction, int width);
+    /// sRGB-coded colour, 0..1, premultiplied with its alpha, in a direction (Catmull-Rom).
+    [[nodiscard]] glm::vec4 sample(glm::dvec3 direction) const;
+};
+
+struct ComposeSettings {
+    int width = 0;  ///< pixels, even; 0 = as dense as the pictures are, at most kMaxPanoramaWidth
+    /// Movers are drawn once, where pictures disagree; else the nearest picture is taken.
+    bool hideSeams = true;
+};
+inline constexpr int kMaxPanoramaWidth = 8192;
+
+/// The width that ComposeSettings::width = 0 stands for.
+[[nodiscard]] int naturalWidth(const PanoramaAlignment& alignment);
+
+/// Draws the panorama: gains in linear light (put into the alignment's cameras), one picture for
+/// each direction with seams where pictures agree, softened. Pictures are read once more, one after
+/// the other. Errors: those of the source; invalidInput when it needs more memory than allowed;
+/// cancelled.
+[[nodiscard]] Result<PanoramaImage> composePanorama(PictureSource& source,
+                                                    PanoramaAlignment& alignment,
+                                                    const ComposeSettings& settings, Job& job);
+
+/// Faces of a cube around the viewpoint.
+enum class PanoramaFace { front, back, left, right, top, bottom };
+inline constexpr std::array<const char*, 6> kPanoramaFaceNames = {"front", "back", "left",
+                                                                  "right", "top",  "bottom"};
+
+/// The direction (not unit) of a position (0..1, 0..1, from the upper left) on a face, as VRML97's
+/// Background has it (ISO/IEC 14772-1, 6.5): front, back, left and right are upright, seen from
+/// the inside; top has +Z up, bottom -Z.
+[[nodiscard]] glm::dvec3 panoramaFaceDirection(PanoramaFace face, glm::dvec2 position);
+/// The six faces, size x size pixels each, by PanoramaFace; alpha straight.
+[[nodiscard]] std::array<Rgba8Image, 6> panoramaFaces(const PanoramaImage& panorama, int size);
+
+}  // namespace stx

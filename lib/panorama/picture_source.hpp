@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "lib/base/job.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx {
+
+/// Delivers the pictures of a turning camera, one at a time, so that a long series of large ones
+/// needs the memory of a few.
+class PictureSource {
+  public:
+    virtual ~PictureSource() = default;
+    [[nodiscard]] virtual int count() const = 0;
+    /// Picture `k`, upright, 8-bit sRGB; alpha means nothing. As often as wanted, from several
+    /// threads at a time. Errors are those of reading it.
+    [[nodiscard]] virtual Result<Rgba8Image> picture(int k) = 0;
+    /// What to call picture k in messages: the name of its file.
+    [[nodiscard]] virtual std::string name(int k) const = 0;
+    /// Its focal length in halves of the picture's diagonal, when the camera wrote one down; 0 =
+    /// not known.
+    [[nodiscard]] virtual double focalHint(int k) const = 0;
+};
+
+}  // namespace stx

@@ -1,0 +1,59 @@
+#include "lib/panorama/work_copies.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx::panorama {
+namespace {
+
+/// Longer side of the copies: features and patches gain little from more.
+constexpr int kWorkSide = 1200, kLeastSide = 200;
+/// Of a pixel of a copy: colour, luma, and a pyramid of floats.
+constexpr double kBytesPerWorkPixel = 4 + 1 + 4 * 1.3125;
+
+}  // namespace
+
+Result<std::vector<WorkCopy>> readWorkCopies(PictureSource& source, Job& job) {
+    const int count = source.count();
+    // Copies share a quarter of the memory.
+    const double pixels =
+        0.25 * static_cast<double>(job.limits.maxMemoryBytes) / kBytesPerWorkPixel / count;
+    const int side =
+        static_cast<int>(std::min<double>(kWorkSide, std::sqrt(std::max(0.0, pixels / 0.75))));
+    if (side < kLeastSide)
+        return fail(ErrorCode::invalidInput,
+                    "{} pictures need more memory than the limit of {} MiB; raise it with "
+                    "--max-memory",
+                    count, job.limits.maxMemoryBytes >> 20);
+    std::vector<WorkCopy> copies(static_cast<std::size_t>(count));
+    std::vector<Result<void>> read(static_cast<std::size_t>(count));
+    std::atomic<std::int64_t> done = 0;
+    parallelFor(0, count, [&](std::int64_t i) {
+        if (job.cancelled) return;
+        auto picture = source.picture(static_cast<int>(i));
+        if (!picture)
+            read[static_cast<std::size_t>(i)] = propagate(picture);
+        else
+            copies[static_cast<std::size_t>(i)] = makeWorkCopy(std::move(*picture), side);
+        job.progress(++done, count, "reading pictures");
+    });
+    STX_CHECK(job.checkCancelled());
+    for (auto& one : read) STX_CHECK(std::move(one));
+    return copies;
+}
+
+Result<std::vector<int>> sameAs(const std::vector<WorkCopy>& copies, Job& job) {
+    std::vector<int> same(copies.size(), -1);
+    for (std::size_t i = 0; i < copies.size(); ++i) {
+        STX_CHECK(job.checkCancelled());
+        for (std::size_t k = 0; k < i && same[i] < 0; ++k)
+            if (same[k] < 0 && copies[i].colour == copies[k].colour) same[i] = static_cast<int>(k);
+    }
+    return same;
+}
+
+}  // namespace stx::panorama
