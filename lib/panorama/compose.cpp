@@ -1,0 +1,232 @@
+#include <algorithm>
+#include <cmath>
+
+#include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
+#include "lib/panorama/footprints.hpp"
+#include "lib/panorama/panorama.hpp"
+#include "lib/panorama/work_copy.hpp"
+
+namespace stx {
+
+using namespace panorama;
+
+namespace {
+
+/// A picture that is drawn with a cubic filter as wide as the distance of the panorama's pixels.
+class Drawn {
+  public:
+    Drawn(Rgba8Image picture, const PanoramaCamera& camera, const TurnLens& lens, int width)
+        : lens_(lens) {
+        // Pixels of the picture for each of the panorama, in the middle.
+        double scale = camera.focal * 2 * M_PI / width;
+        const int less = std::max(1, static_cast<int>(scale / 1.5));
+        copy_ = makeWorkCopy(std::move(picture),
+                             less > 1 ? std::max(1, std::max(camera.size.x, camera.size.y) / less)
+                                      : std::max(camera.size.x, camera.size.y));
+        scale = std::max(1.0, scale * copy_.colour.width() / camera.size.x);
+        wide_ = scale > 1.05 ? static_cast<float>(scale) : 1.0f;
+        worldFromCamera_ = glm::mat3_cast(camera.worldFromCamera);
+    }
+
+    /// sRGB-coded colour (0..1) and how much the picture covers in a direction; 0 = nothing.
+    [[nodiscard]] glm::vec4 at(glm::dvec3 direction) const {
+        const auto p = lens_.position(direction * worldFromCamera_);
+        if (!p) return glm::vec4(0);
+        const glm::dvec2 pixel = copy_.pixel(*p);
+        const double edge = std::min(
+            {pixel.x, pixel.y, copy_.colour.width() - pixel.x, copy_.colour.height() - pixel.y});
+        if (edge <= -0.5) return glm::vec4(0);
+        return {wide_ > 1 ? wide(pixel) : narrow(pixel),
+                static_cast<float>(std::min(1.0, edge + 0.5))};
+    }
+
+  private:
+    static float cubic(float t) {
+        t = std::abs(t);
+        if (t < 1) return (1.5f * t - 2.5f) * t * t + 1;
+        if (t < 2) return ((-0.5f * t + 2.5f) * t - 4) * t + 2;
+        return 0;
+    }
+    [[nodiscard]] glm::vec3 narrow(glm::dvec2 pixel) const {
+        const double px = pixel.x - 0.5, py = pixel.y - 0.5;
+        const int x0 = static_cast<int>(std::floor(px)), y0 = static_cast<int>(std::floor(py));
+        const auto tx = static_cast<float>(px - x0), ty = static_cast<float>(py - y0);
+        const int w = copy_.colour.width(), h = copy_.colour.height();
+        float wx[4], sums[3] = {0, 0, 0};
+        int xs[4];
+        for (int i = 0; i < 4; ++i) {
+            wx[i] = cubic(static_cast<float>(i - 1) - tx);
+            xs[i] = std::clamp(x0 - 1 + i, 0, w - 1);
+        }
+        for (int j = 0; j < 4; ++j) {
+            const glm::u8vec4* row = copy_.colour.row(std::clamp(y0 - 1 + j, 0, h - 1)).data();
+            const float wy = cubic(static_cast<float>(j - 1) - ty);
+            for (int i = 0; i < 4; ++i) {
+                const glm::u8vec4 c = row[xs[i]];
+                const float weight = wy * wx[i];
+                sums[0] += weight * c.r;
+                sums[1] += weight * c.g;
+                sums[2] += weight * c.b;
+            }
+        }
+        return glm::clamp(glm::vec3(sums[0], sums[1], sums[2]) / 255.0f, 0.0f, 1.0f);
+    }
+    [[nodiscard]] glm::vec3 wide(glm::dvec2 pixel) const {
+        const float px = static_cast<float>(pixel.x) - 0.5f;
+        const float py = static_cast<float>(pixel.y) - 0.5f;
+        const int w = copy_.colour.width(), h = copy_.colour.height();
+        const int x0 = static_cast<int>(std::ceil(px - 2 * wide_));
+        const int x1 = static_cast<int>(std::floor(px + 2 * wide_));
+        const int y0 = static_cast<int>(std::ceil(py - 2 * wide_));
+        const int y1 = static_cast<int>(std::floor(py + 2 * wide_));
+        glm::vec4 sum(0);
+        for (int y = y0; y <= y1; ++y) {
+            const float wy = cubic((static_cast<float>(y) - py) / wide_);
+            const auto row = copy_.colour.row(std::clamp(y, 0, h - 1));
+            for (int x = x0; x <= x1; ++x) {
+                const glm::u8vec4 c = row[static_cast<std::size_t>(std::clamp(x, 0, w - 1))];
+                sum +=
+                    wy * cubic((static_cast<float>(x) - px) / wide_) * glm::vec4(c.r, c.g, c.b, 1);
+            }
+        }
+        return glm::clamp(glm::vec3(sum) / (255.0f * sum.a), 0.0f, 1.0f);
+    }
+
+    WorkCopy copy_;
+    TurnLens lens_;
+    glm::dmat3 worldFromCamera_{1.0};
+    float wide_ = 1;
+};
+
+/// Adds one picture to rows [top, top + sums.height()) of the panorama: linear light, weighted.
+void draw(const Drawn& picture, const Footprint& print, int index, const Image<int>& labels,
+          const glm::dvec3& gain, const Image<glm::vec3>& correction, int width, int top,
+          Image<glm::vec4>& sums) {
+    const double cells = static_cast<double>(labels.width()) / width;
+    const int first = std::max(top, static_cast<int>((print.box.y - 2) / cells));
+    const int last = std::min(top + sums.height(),
+                              static_cast<int>((print.box.y + print.box.height + 2) / cells) + 1);
+    const bool all = print.box.width >= labels.width();
+    const int left = all ? 0 : static_cast<int>(std::floor((print.box.x - 2) / cells));
+    const int right =
+        all ? width
+            : std::min(left + width,
+                       static_cast<int>(std::ceil((print.box.x + print.box.width + 2) / cells)));
+    // Sine and cosine of each column's longitude.
+    std::vector<glm::dvec2> turns;
+    for (int x = left; x < right; ++x) {
+        const double longitude = M_PI * (1 - 2 * (x + 0.5) / width);
+        turns.emplace_back(std::sin(longitude), std::cos(longitude));
+    }
+    parallelForBlocks(first, last, 4, [&](std::int64_t begin, std::int64_t end) {
+        for (auto y = static_cast<int>(begin); y < end; ++y) {
+            const double latitude = M_PI * (0.5 - 2 * (y + 0.5) / width);
+            const double sine = std::sin(latitude), level = std::cos(latitude);
+            const auto cy = static_cast<float>((y + 0.5) * cells - 0.5);
+            const int gy = static_cast<int>(std::floor(cy));
+            const float ty = cy - static_cast<float>(gy);
+            const int ys[2] = {std::clamp(gy, 0, labels.height() - 1),
+                               std::clamp(gy + 1, 0, labels.height() - 1)};
+            for (int x = left; x < right; ++x) {
+                const auto cx = static_cast<float>((x + 0.5) * cells - 0.5);
+                const int gx = static_cast<int>(std::floor(cx));
+                const float tx = cx - static_cast<float>(gx);
+                // How far the cells around are this picture's; and its correction there.
+                float weight = 0;
+                glm::vec4 log(0);
+                for (int c = 0; c < 4; ++c) {
+                    const float share = ((c & 1) ? tx : 1 - tx) * ((c >> 1) ? ty : 1 - ty);
+                    const int column =
+                        ((gx + (c & 1)) % labels.width() + labels.width()) % labels.width();
+                    const int row = ys[c >> 1];
+                    if (labels.at(column, row) == index) weight += share;
+                    const int own = print.column(column, labels.width());
+                    const int ownRow = row - print.box.y;
+                    if (own >= 0 && ownRow >= 0 && ownRow < print.box.height)
+                        log += share * glm::vec4(correction.at(own, ownRow), 1);
+                }
+                if (weight <= 0) continue;
+                const glm::dvec2 turn = turns[static_cast<std::size_t>(x - left)];
+                glm::vec4 colour = picture.at({-level * turn.x, sine, -level * turn.y});
+                if (colour.a <= 0) continue;
+                const glm::vec3 light = withGain({linearByTable(colour.r), linearByTable(colour.g),
+                                                  linearByTable(colour.b)},
+                                                 gain) *
+                                        glm::exp(log.a > 0 ? glm::vec3(log) / log.a : glm::vec3(0));
+                const float w = weight * colour.a;
+                sums.at((x % width + width) % width, y - top) += w * glm::vec4(light, 1);
+            }
+        }
+    });
+}
+
+}  // namespace
+
+int naturalWidth(const PanoramaAlignment& alignment) {
+    double focal = 0;
+    for (const PanoramaCamera& camera : alignment.cameras)
+        if (camera.used) focal = std::max(focal, camera.focal);
+    const double width = std::clamp(2 * M_PI * focal, 64.0, double{kMaxPanoramaWidth});
+    return static_cast<int>(width) / 4 * 4;
+}
+
+Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& alignment,
+                                      const ComposeSettings& settings, Job& job) {
+    const int width = settings.width > 0 ? settings.width : naturalWidth(alignment);
+    if (width < 2 || width % 2 != 0)
+        return fail(ErrorCode::usage,
+                    "a panorama of {} pixels in width; an even number is expected", width);
+    const int height = width / 2;
+    const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+    STX_CHECK(job.limits.checkAllocation(pixels, 8, "the panorama"));
+    const TurnLens lens{alignment.focal, alignment.k1};
+    const int gridWidth = gridWidthFor(alignment, width);
+    STX_TRY(const auto prints, footprintsOf(source, alignment, gridWidth, job));
+    const auto gains = findGains(prints, gridWidth);
+    for (std::size_t i = 0; i < prints.size(); ++i)
+        alignment.cameras[static_cast<std::size_t>(prints[i].picture)].gain = gains[i];
+    STX_TRY(const auto labels, findSeams(prints, gains, gridWidth, settings.hideSeams, job));
+    const auto corrections = findCorrections(prints, gains, gridWidth);
+
+    PanoramaImage out{Rgba8Image(width, height)};
+    // Sums of a band of rows share a quarter of the memory.
+    const auto rowBytes = static_cast<std::uint64_t>(width) * sizeof(glm::vec4);
+    const int band = static_cast<int>(std::clamp<std::uint64_t>(
+        job.limits.maxMemoryBytes / 4 / rowBytes, 1, static_cast<std::uint64_t>(height)));
+    const std::int64_t bands = (height + band - 1) / band;
+    std::int64_t done = 0;
+    for (int top = 0; top < height; top += band) {
+        Image<glm::vec4> sums(width, std::min(band, height - top), glm::vec4(0));
+        const double from = static_cast<double>(top) * gridWidth / width - 3;
+        const double to = static_cast<double>(top + sums.height()) * gridWidth / width + 3;
+        for (std::size_t k = 0; k < prints.size(); ++k) {
+            STX_CHECK(job.checkCancelled());
+            job.progress(++done, bands * static_cast<std::int64_t>(prints.size()), "drawing");
+            const GridBox& box = prints[k].box;
+            if (box.y + box.height < from || box.y > to) continue;
+            STX_TRY(auto picture, source.picture(prints[k].picture));
+            const auto& camera = alignment.cameras[static_cast<std::size_t>(prints[k].picture)];
+            if (picture.size() != camera.size)
+                return fail(ErrorCode::io, "'{}' changed while it was read",
+                            source.name(prints[k].picture));
+            draw(Drawn(std::move(picture), camera, lens, width), prints[k], static_cast<int>(k),
+                 labels, camera.gain, corrections[k], width, top, sums);
+        }
+        const Srgb8Tables& tables = srgb8Tables();
+        parallelFor(0, sums.height(), [&](std::int64_t y) {
+            const auto fromRow = sums.row(static_cast<int>(y));
+            const auto toRow = out.pixels.row(top + static_cast<int>(y));
+            for (std::size_t x = 0; x < toRow.size(); ++x) {
+                const glm::vec4 s = fromRow[x];
+                if (s.a <= 1e-3f) continue;
+                const glm::vec3 c = glm::vec3(s) / s.a;
+                toRow[x] = {tables.code(c.r), tables.code(c.g), tables.code(c.b),
+                            static_cast<std::uint8_t>(std::min(1.0f, s.a) * 255.0f + 0.5f)};
+            }
+        });
+    }
+    return out;
+}
+
+}  // namespace stx

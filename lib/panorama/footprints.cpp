@@ -1,0 +1,140 @@
+#include "lib/panorama/footprints.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
+#include "lib/panorama/work_copy.hpp"
+
+namespace stx::panorama {
+namespace {
+
+glm::dvec2 extentOf(glm::ivec2 size) {
+    return glm::dvec2(size) / glm::length(glm::dvec2(size));
+}
+
+/// Linear light between the pixels of a small copy.
+glm::vec3 linearAt(const Image<glm::vec3>& image, glm::dvec2 pixel) {
+    const double px = std::clamp(pixel.x - 0.5, 0.0, image.width() - 1.0);
+    const double py = std::clamp(pixel.y - 0.5, 0.0, image.height() - 1.0);
+    const int x0 = static_cast<int>(px), y0 = static_cast<int>(py);
+    const int x1 = std::min(x0 + 1, image.width() - 1), y1 = std::min(y0 + 1, image.height() - 1);
+    const auto tx = static_cast<float>(px - x0), ty = static_cast<float>(py - y0);
+    return glm::mix(glm::mix(image.at(x0, y0), image.at(x1, y0), tx),
+                    glm::mix(image.at(x0, y1), image.at(x1, y1), tx), ty);
+}
+
+Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const TurnLens& lens,
+                      int gridWidth) {
+    Footprint f;
+    f.box = boxOf(camera, lens, gridWidth);
+    f.colour = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(0));
+    f.inside = Image<float>(f.box.width, f.box.height, 0.0f);
+    f.whole = Image<std::uint8_t>(f.box.width, f.box.height, 0);
+    // As many pixels as the grid has cells in the middle of the picture.
+    const double cells = gridWidth / (2 * M_PI) * lens.focal;  // along half a diagonal
+    const glm::dvec2 extent = extentOf(camera.size);
+    const WorkCopy copy = makeWorkCopy(
+        std::move(picture),
+        std::max(8, static_cast<int>(std::lround(2 * cells * std::max(extent.x, extent.y)))));
+    Image<glm::vec3> light(copy.colour.width(), copy.colour.height());
+    const Srgb8Tables& tables = srgb8Tables();
+    for (std::size_t i = 0; i < light.count(); ++i) {
+        const glm::u8vec4 p = copy.colour.pixels()[i];
+        light.pixels()[i] = {tables.linear(p.r), tables.linear(p.g), tables.linear(p.b)};
+    }
+    const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.worldFromCamera);
+    const double shorter = std::min(extent.x, extent.y);
+    for (int y = 0; y < f.box.height; ++y) {
+        for (int x = 0; x < f.box.width; ++x) {
+            const glm::dvec3 d =
+                PanoramaImage::direction({f.box.x + x + 0.5, f.box.y + y + 0.5}, gridWidth);
+            const auto p = lens.position(d * worldFromCamera);
+            if (!p) continue;
+            const double border = std::min(extent.x - std::abs(p->x), extent.y - std::abs(p->y));
+            if (border <= 0) continue;
+            f.inside.at(x, y) = static_cast<float>(std::max(1e-4, border / shorter));
+            f.whole.at(x, y) = border * cells > 1.5 || border > 0.3 * shorter;
+            f.colour.at(x, y) = linearAt(light, copy.pixel(*p));
+        }
+    }
+    return f;
+}
+
+}  // namespace
+
+GridBox boxOf(const PanoramaCamera& camera, const TurnLens& lens, int gridWidth) {
+    const glm::dvec3 ahead = camera.worldFromCamera * glm::dvec3(0, 0, -1);
+    const double latitude = std::asin(std::clamp(ahead.y, -1.0, 1.0));
+    const double radius =
+        std::acos(std::clamp(-lens.ray(extentOf(camera.size)).z, -1.0, 1.0)) + 4 * M_PI / gridWidth;
+    const int gridHeight = gridWidth / 2;
+    const double perRadian = gridWidth / (2 * M_PI);
+    GridBox box;
+    box.y = std::max(0, static_cast<int>(std::floor((M_PI_2 - latitude - radius) * perRadian)));
+    box.height = std::min(gridHeight,
+                          static_cast<int>(std::ceil((M_PI_2 - latitude + radius) * perRadian))) -
+                 box.y;
+    box.width = gridWidth;
+    if (std::abs(latitude) + radius < M_PI_2 - 1e-3) {
+        const double half = std::asin(std::sin(radius) / std::cos(latitude));
+        const glm::dvec2 middle = PanoramaImage::position(ahead, gridWidth);
+        box.x = static_cast<int>(std::floor(middle.x - half * perRadian));
+        box.width =
+            std::min(gridWidth, static_cast<int>(std::ceil(middle.x + half * perRadian)) - box.x);
+    }
+    return box;
+}
+
+int gridWidthFor(const PanoramaAlignment& alignment, int panoramaWidth) {
+    double angle = 0;
+    int used = 0;
+    for (const PanoramaCamera& camera : alignment.cameras) {
+        if (!camera.used) continue;
+        angle += 2 * std::atan(std::max(camera.size.x, camera.size.y) / (2 * camera.focal));
+        ++used;
+    }
+    const double cells = 2 * M_PI * 160 / (angle / std::max(used, 1));
+    const int width = static_cast<int>(std::clamp(cells, 256.0, 2048.0)) / 2 * 2;
+    return std::min(width, panoramaWidth);
+}
+
+Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
+                                            const PanoramaAlignment& alignment, int gridWidth,
+                                            Job& job) {
+    std::vector<int> used;
+    for (std::size_t k = 0; k < alignment.cameras.size(); ++k)
+        if (alignment.cameras[k].used) used.push_back(static_cast<int>(k));
+    const TurnLens lens{alignment.focal, alignment.k1};
+    std::uint64_t cells = 0;
+    for (const int k : used) {
+        const GridBox box = boxOf(alignment.cameras[static_cast<std::size_t>(k)], lens, gridWidth);
+        cells += static_cast<std::uint64_t>(box.width) * static_cast<std::uint64_t>(box.height);
+    }
+    STX_CHECK(job.limits.checkAllocation(cells, 2 * sizeof(glm::vec3) + 8, "finding seams"));
+    std::vector<Footprint> out(used.size());
+    std::vector<Result<void>> made(used.size());
+    std::atomic<std::int64_t> done = 0;
+    const auto count = static_cast<std::int64_t>(used.size());
+    parallelFor(0, count, [&](std::int64_t i) {
+        if (job.cancelled) return;
+        const auto at = static_cast<std::size_t>(i);
+        auto picture = source.picture(used[at]);
+        if (!picture) {
+            made[at] = propagate(picture);
+            return;
+        }
+        out[at] =
+            footprintOf(std::move(*picture), alignment.cameras[static_cast<std::size_t>(used[at])],
+                        lens, gridWidth);
+        out[at].picture = used[at];
+        job.progress(++done, count, "laying out pictures");
+    });
+    STX_CHECK(job.checkCancelled());
+    for (auto& one : made) STX_CHECK(std::move(one));
+    return out;
+}
+
+}  // namespace stx::panorama

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "lib/panorama/panorama.hpp"
+#include "lib/panorama/turn_lens.hpp"
+
+namespace stx::panorama {
+
+/// A rectangle of an equirectangular grid around what a picture sees. Columns go on across the
+/// grid's edge: column x stands for x modulo the width.
+struct GridBox {
+    int x = 0, y = 0, width = 0, height = 0;
+};
+
+/// The box of a picture on a grid of `gridWidth` x gridWidth / 2 cells.
+[[nodiscard]] GridBox boxOf(const PanoramaCamera& camera, const TurnLens& lens, int gridWidth);
+
+/// A picture on a coarse equirectangular grid, where gains, seams and soft corrections are found.
+struct Footprint {
+    int picture = 0;
+    GridBox box;
+    Image<glm::vec3> colour;  ///< linear light, before gains; of cells that it sees
+    /// How far inside of the picture: 0 = not seen, 1 = the middle.
+    Image<float> inside;
+    /// Cells that the picture fills wholly, so that seams may be in them.
+    Image<std::uint8_t> whole;
+
+    /// Column of the box for one of the grid; -1 = not in the box.
+    [[nodiscard]] int column(int gridX, int gridWidth) const {
+        const int x = ((gridX - box.x) % gridWidth + gridWidth) % gridWidth;
+        return x < box.width ? x : -1;
+    }
+};
+
+/// Cells of a grid on which a picture is about 160 wide.
+[[nodiscard]] int gridWidthFor(const PanoramaAlignment& alignment, int panoramaWidth);
+
+/// Footprints of all used pictures. Errors: those of the source; cancelled.
+[[nodiscard]] Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
+                                                          const PanoramaAlignment& alignment,
+                                                          int gridWidth, Job& job);
+
+/// Gains of linear light that make pictures agree where they overlap, least squares over the
+/// medians of pairs, no gain in the mean; of each footprint.
+[[nodiscard]] std::vector<glm::dvec3> findGains(const std::vector<Footprint>& footprints,
+                                                int gridWidth);
+
+/// Linear light with a gain. What is clipped in the picture stays white when it is made darker.
+[[nodiscard]] inline glm::vec3 withGain(glm::vec3 light, glm::vec3 gain) {
+    const float highest = std::max(light.r, std::max(light.g, light.b));
+    const float t = std::clamp((highest - 0.7f) / 0.3f, 0.0f, 1.0f);
+    return light * glm::mix(gain, glm::max(gain, glm::vec3(1)), t * t * (3 - 2 * t));
+}
+
+/// What is left of differences in light, smooth over each picture: by how much (logarithm) its
+/// light is to be multiplied, so that pictures melt into each other. Of each footprint, on its box.
+[[nodiscard]] std::vector<Image<glm::vec3>> findCorrections(
+    const std::vector<Footprint>& footprints, const std::vector<glm::dvec3>& gains, int gridWidth);
+
+/// For each cell the index of the footprint to show, -1 = none: seams run where pictures agree
+/// (alpha expansion; Boykov, Veksler and Zabih 2001, with the cost of Kwatra et al. 2003). Edges of
+/// what is seen are extended by two cells.
+[[nodiscard]] Result<Image<int>> findSeams(const std::vector<Footprint>& footprints,
+                                           const std::vector<glm::dvec3>& gains, int gridWidth,
+                                           bool hideSeams, Job& job);
+
+}  // namespace stx::panorama

@@ -1,0 +1,342 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
+#include "lib/panorama/footprints.hpp"
+#include "lib/panorama/max_flow.hpp"
+
+namespace stx::panorama {
+namespace {
+
+// Costs are in codes of 8 bits.
+
+/// What a seam costs for each cell it passes, whatever is there: short ones are better.
+constexpr float kSeamLength = 2;
+/// What a seam costs where one of its pictures ends.
+constexpr float kEndOfPicture = 60;
+/// What a picture's edge costs against its middle.
+constexpr float kEdge = 1.5f;
+/// What clipped light costs against light that another picture has.
+constexpr float kClipped = 4;
+/// A cell shows a mover where nothing within this many cells of another picture is like it, while
+/// all that the other one shows there is also in this one: leaves, waves and parallax are in both.
+constexpr int kMoverReach = 3;
+/// It then costs what the difference is above this.
+constexpr float kMoverDifference = 25;
+/// Movers of less (sum of costs) may be noise.
+constexpr float kWeakMover = 250;
+/// Cells around a mover that belong to it.
+constexpr int kMoverMargin = 2;
+constexpr int kRounds = 3;
+
+/// Something that one picture shows and others do not.
+struct Mover {
+    std::size_t picture = 0;
+    std::vector<glm::ivec2> cells;  ///< of the picture's box
+    float strength = 0;
+};
+
+/// Everything that the seams are found with.
+class SeamGrid {
+  public:
+    SeamGrid(const std::vector<Footprint>& prints, const std::vector<glm::dvec3>& gains,
+             int gridWidth)
+        : prints_(prints), width_(gridWidth), height_(gridWidth / 2) {
+        // Differences are seen in coded colours.
+        coded_.resize(prints.size());
+        cost_.resize(prints.size());
+        parallelFor(0, static_cast<std::int64_t>(prints.size()), [&](std::int64_t i) {
+            const auto k = static_cast<std::size_t>(i);
+            const Footprint& f = prints[k];
+            coded_[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(0));
+            cost_[k] = Image<float>(f.box.width, f.box.height, 0.0f);
+            for (std::size_t p = 0; p < coded_[k].count(); ++p) {
+                const glm::vec3 c = withGain(f.colour.pixels()[p], gains[k]);
+                coded_[k].pixels()[p] =
+                    255.0f * glm::vec3(srgbByTable(c.r), srgbByTable(c.g), srgbByTable(c.b));
+                const float out = 1 - std::min(1.0f, f.inside.pixels()[p]);
+                cost_[k].pixels()[p] = kEdge * out * out;
+                const glm::vec3 raw = f.colour.pixels()[p];
+                if (std::max({raw.r, raw.g, raw.b}) > 0.97f) cost_[k].pixels()[p] += kClipped;
+            }
+        });
+        labels_ = Image<int>(width_, height_, -1);
+        startWithMiddles();
+    }
+
+    Image<int>& labels() { return labels_; }
+
+    /// Makes what shows a mover cost more, where another picture does not show it.
+    void avoidMovers() {
+        std::vector<Image<float>> movers(prints_.size());
+        parallelFor(0, static_cast<std::int64_t>(prints_.size()), [&](std::int64_t i) {
+            const auto k = static_cast<std::size_t>(i);
+            const Footprint& f = prints_[k];
+            movers[k] = Image<float>(f.box.width, f.box.height, 0.0f);
+            std::vector<float> found;
+            for (int y = 0; y < f.box.height; ++y)
+                for (int x = 0; x < f.box.width; ++x) {
+                    if (f.inside.at(x, y) <= 0) continue;
+                    const glm::ivec2 p = wrapped({f.box.x + x, f.box.y + y});
+                    found.clear();
+                    for (std::size_t other = 0; other < prints_.size(); ++other) {
+                        if (other == k || !sees(other, p)) continue;
+                        const float own = newIn(k, other, p);
+                        found.push_back(own > kMoverDifference ? own - newIn(other, k, p) : 0);
+                    }
+                    if (found.empty()) continue;
+                    // Half of the others must be without it.
+                    std::sort(found.begin(), found.end());
+                    movers[k].at(x, y) =
+                        std::max(0.0f, found[(found.size() - 1) / 2] - kMoverDifference);
+                }
+        });
+        drawOnce(moversIn(movers));
+    }
+
+    /// Lets one picture take cells from others where that makes the whole better; true when it
+    /// took some.
+    bool expand(std::size_t k) {
+        const Footprint& f = prints_[k];
+        Image<int> nodeOf(f.box.width, f.box.height, -1);
+        std::vector<glm::ivec2> cells;
+        for (int y = 0; y < f.box.height; ++y)
+            for (int x = 0; x < f.box.width; ++x)
+                if (f.whole.at(x, y)) {
+                    nodeOf.at(x, y) = static_cast<int>(cells.size());
+                    cells.emplace_back(x, y);
+                }
+        const auto own = static_cast<int>(k);
+        MaxFlow flow(static_cast<int>(cells.size()));
+        // A cell on the sink's side is taken; it then pays what comes from the source.
+        for (std::size_t i = 0; i < cells.size(); ++i) {
+            const auto n = static_cast<int>(i);
+            const glm::ivec2 p = wrapped({f.box.x + cells[i].x, f.box.y + cells[i].y});
+            const int old = labels_.at(p.x, p.y);
+            flow.addTerminal(n, cost_[k].at(cells[i].x, cells[i].y), dataCost(old, p));
+            for (const glm::ivec2 d :
+                 {glm::ivec2(1, 0), glm::ivec2(0, 1), glm::ivec2(-1, 0), glm::ivec2(0, -1)}) {
+                if (p.y + d.y < 0 || p.y + d.y >= height_) continue;
+                const glm::ivec2 q = wrapped(p + d);
+                const int other = labels_.at(q.x, q.y);
+                if (other < 0) continue;
+                const glm::ivec2 c = cellOf(k, q);
+                const int m = c.x >= 0 ? nodeOf.at(c.x, c.y) : -1;
+                const float both = seamCost(old, other, p, q);    // none is taken
+                const float theirs = seamCost(own, other, p, q);  // p is
+                if (m < 0) {
+                    flow.addTerminal(n, theirs, both);
+                    continue;
+                }
+                if (d.x < 0 || d.y < 0) continue;             // each two once
+                const float mine = seamCost(old, own, p, q);  // q is
+                flow.addTerminal(n, theirs - both, 0);
+                flow.addTerminal(m, -theirs, 0);
+                flow.addEdge(n, m, std::max(0.0f, mine + theirs - both), 0);
+            }
+        }
+        flow.solve();
+        bool changed = false;
+        for (std::size_t i = 0; i < cells.size(); ++i) {
+            if (!flow.onSinkSide(static_cast<int>(i))) continue;
+            const glm::ivec2 p = wrapped({f.box.x + cells[i].x, f.box.y + cells[i].y});
+            changed = changed || labels_.at(p.x, p.y) != own;
+            labels_.at(p.x, p.y) = own;
+        }
+        return changed;
+    }
+
+    /// The edge of what is seen goes on by two cells, so that its pixels get a whole picture.
+    void extend() {
+        for (int pass = 0; pass < 2; ++pass) {
+            const Image<int> before = labels_;
+            for (int y = 0; y < height_; ++y)
+                for (int x = 0; x < width_; ++x) {
+                    if (before.at(x, y) >= 0) continue;
+                    for (const glm::ivec2 d :
+                         {glm::ivec2(1, 0), glm::ivec2(-1, 0), glm::ivec2(0, 1), glm::ivec2(0, -1),
+                          glm::ivec2(1, 1), glm::ivec2(-1, 1), glm::ivec2(1, -1),
+                          glm::ivec2(-1, -1)}) {
+                        if (y + d.y < 0 || y + d.y >= height_) continue;
+                        const glm::ivec2 q = wrapped({x + d.x, y + d.y});
+                        if (before.at(q.x, q.y) < 0) continue;
+                        labels_.at(x, y) = before.at(q.x, q.y);
+                        break;
+                    }
+                }
+        }
+    }
+
+  private:
+    [[nodiscard]] glm::ivec2 wrapped(glm::ivec2 p) const {
+        return {(p.x % width_ + width_) % width_, p.y};
+    }
+    /// The cell of a picture's box; x is -1 outside of it.
+    [[nodiscard]] glm::ivec2 cellOf(std::size_t k, glm::ivec2 p) const {
+        const Footprint& f = prints_[k];
+        const int y = p.y - f.box.y;
+        if (y < 0 || y >= f.box.height) return {-1, -1};
+        return {f.column(p.x, width_), y};
+    }
+    /// Connected cells, the strongest first.
+    [[nodiscard]] std::vector<Mover> moversIn(const std::vector<Image<float>>& costs) const {
+        std::vector<Mover> movers;
+        for (std::size_t k = 0; k < costs.size(); ++k) {
+            Image<float> left = costs[k];
+            for (int y = 0; y < left.height(); ++y)
+                for (int x = 0; x < left.width(); ++x) {
+                    if (left.at(x, y) <= 0) continue;
+                    Mover mover;
+                    mover.picture = k;
+                    float inside = 0;
+                    std::vector<glm::ivec2> open = {{x, y}};
+                    while (!open.empty()) {
+                        const glm::ivec2 c = open.back();
+                        open.pop_back();
+                        const float cost = left.at(c.x, c.y);
+                        if (cost <= 0) continue;
+                        left.at(c.x, c.y) = 0;
+                        mover.cells.push_back(c);
+                        mover.strength += cost;
+                        inside += cost * prints_[k].inside.at(c.x, c.y);
+                        for (int dy = -2; dy <= 2; ++dy)
+                            for (int dx = -2; dx <= 2; ++dx)
+                                if (left.contains(c.x + dx, c.y + dy) &&
+                                    left.at(c.x + dx, c.y + dy) > 0)
+                                    open.emplace_back(c.x + dx, c.y + dy);
+                    }
+                    // Whoever is in the middle of a picture is whole.
+                    mover.strength *= std::min(1.0f, 0.2f + 2 * inside / mover.strength);
+                    movers.push_back(std::move(mover));
+                }
+        }
+        std::stable_sort(movers.begin(), movers.end(),
+                         [](const Mover& a, const Mover& b) { return a.strength > b.strength; });
+        return movers;
+    }
+    /// One picture's movers are kept: the strongest one's. They were there at one moment, so none
+    /// of them is there twice; colours do not tell who is who. Other pictures then cost more where
+    /// they are, and movers of others cost in their own.
+    void drawOnce(const std::vector<Mover>& movers) {
+        std::vector<float> strengths(prints_.size(), 0.0f);
+        for (const Mover& mover : movers)
+            if (mover.strength >= kWeakMover) strengths[mover.picture] += mover.strength;
+        const auto strongest = static_cast<std::size_t>(
+            std::max_element(strengths.begin(), strengths.end()) - strengths.begin());
+        for (const Mover& mover : movers) {
+            const bool keep = mover.picture == strongest && mover.strength >= kWeakMover;
+            const float cost =
+                mover.strength / static_cast<float>(mover.cells.size()) + kMoverDifference;
+            const Footprint& f = prints_[mover.picture];
+            Image<std::uint8_t> around(f.box.width, f.box.height, 0);
+            for (const glm::ivec2 c : mover.cells)
+                for (int dy = -kMoverMargin; dy <= kMoverMargin; ++dy)
+                    for (int dx = -kMoverMargin; dx <= kMoverMargin; ++dx)
+                        if (around.contains(c.x + dx, c.y + dy)) around.at(c.x + dx, c.y + dy) = 1;
+            for (int y = 0; y < around.height(); ++y)
+                for (int x = 0; x < around.width(); ++x) {
+                    if (!around.at(x, y)) continue;
+                    if (!keep) {
+                        cost_[mover.picture].at(x, y) += cost;
+                        continue;
+                    }
+                    const glm::ivec2 p = wrapped({f.box.x + x, f.box.y + y});
+                    for (std::size_t other = 0; other < prints_.size(); ++other) {
+                        const glm::ivec2 c = cellOf(other, p);
+                        if (other != mover.picture && c.x >= 0) cost_[other].at(c.x, c.y) += cost;
+                    }
+                }
+        }
+    }
+    [[nodiscard]] bool sees(std::size_t k, glm::ivec2 p) const {
+        const glm::ivec2 c = cellOf(k, p);
+        return c.x >= 0 && prints_[k].inside.at(c.x, c.y) > 0;
+    }
+    /// How far a cell's colour in one picture is from all that another one shows around it.
+    [[nodiscard]] float newIn(std::size_t k, std::size_t other, glm::ivec2 p) const {
+        const glm::ivec2 own = cellOf(k, p), there = cellOf(other, p);
+        const Footprint& f = prints_[other];
+        const glm::vec3 colour = coded_[k].at(own.x, own.y);
+        float least = 1e9f;
+        for (int dy = -kMoverReach; dy <= kMoverReach; ++dy)
+            for (int dx = -kMoverReach; dx <= kMoverReach; ++dx) {
+                const glm::ivec2 c = there + glm::ivec2(dx, dy);
+                if (!f.inside.contains(c.x, c.y) || f.inside.at(c.x, c.y) <= 0) continue;
+                const glm::vec3 d = colour - coded_[other].at(c.x, c.y);
+                least = std::min(least, glm::dot(d, d));
+            }
+        return std::sqrt(least);
+    }
+    [[nodiscard]] float dataCost(int label, glm::ivec2 p) const {
+        if (label < 0) return 1e6f;
+        const glm::ivec2 c = cellOf(static_cast<std::size_t>(label), p);
+        const auto k = static_cast<std::size_t>(label);
+        // Edges that are not whole are only kept where nothing else is.
+        if (c.x < 0 || !prints_[k].whole.at(c.x, c.y)) return 1e6f;
+        return cost_[k].at(c.x, c.y);
+    }
+    [[nodiscard]] float seamCost(int a, int b, glm::ivec2 p, glm::ivec2 q) const {
+        if (a == b) return 0;
+        if (a < 0 || b < 0) return kEndOfPicture;
+        return kSeamLength + difference(a, b, p) + difference(a, b, q);
+    }
+    [[nodiscard]] float difference(int a, int b, glm::ivec2 p) const {
+        const auto ka = static_cast<std::size_t>(a), kb = static_cast<std::size_t>(b);
+        const glm::ivec2 ca = cellOf(ka, p), cb = cellOf(kb, p);
+        if (ca.x < 0 || cb.x < 0 || prints_[ka].inside.at(ca.x, ca.y) <= 0 ||
+            prints_[kb].inside.at(cb.x, cb.y) <= 0)
+            return kEndOfPicture;
+        return glm::distance(coded_[ka].at(ca.x, ca.y), coded_[kb].at(cb.x, cb.y));
+    }
+    /// Each cell shows the picture whose middle it is nearest to.
+    void startWithMiddles() {
+        Image<float> best(width_, height_, 0.0f);
+        for (std::size_t k = 0; k < prints_.size(); ++k) {
+            const Footprint& f = prints_[k];
+            for (int y = 0; y < f.box.height; ++y)
+                for (int x = 0; x < f.box.width; ++x) {
+                    float inside = f.inside.at(x, y);
+                    if (inside <= 0) continue;
+                    if (f.whole.at(x, y)) inside += 10;  // these first
+                    const glm::ivec2 p = wrapped({f.box.x + x, f.box.y + y});
+                    if (inside <= best.at(p.x, p.y)) continue;
+                    best.at(p.x, p.y) = inside;
+                    labels_.at(p.x, p.y) = static_cast<int>(k);
+                }
+        }
+    }
+
+    const std::vector<Footprint>& prints_;
+    int width_, height_;
+    std::vector<Image<glm::vec3>> coded_;  ///< 0..255, with gains
+    std::vector<Image<float>> cost_;       ///< of showing a picture's cell
+    Image<int> labels_;
+};
+
+}  // namespace
+
+Result<Image<int>> findSeams(const std::vector<Footprint>& prints,
+                             const std::vector<glm::dvec3>& gains, int gridWidth, bool hideSeams,
+                             Job& job) {
+    SeamGrid grid(prints, gains, gridWidth);
+    if (hideSeams) {
+        grid.avoidMovers();
+        std::int64_t done = 0;
+        const auto total = static_cast<std::int64_t>(prints.size()) * kRounds;
+        for (int round = 0; round < kRounds; ++round) {
+            bool changed = false;
+            for (std::size_t k = 0; k < prints.size(); ++k) {
+                STX_CHECK(job.checkCancelled());
+                if (grid.expand(k)) changed = true;
+                job.progress(++done, total, "finding seams");
+            }
+            if (!changed) break;
+        }
+    }
+    grid.extend();
+    return std::move(grid.labels());
+}
+
+}  // namespace stx::panorama
