@@ -1,0 +1,186 @@
+#include <gtest/gtest.h>
+
+#include "formats/images/images.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/metrics/compare.hpp"
+#include "lib/model/srgb8.hpp"
+#include "tests/shared_data.hpp"
+#include "tests/unit/panorama/turning_camera.hpp"
+
+namespace stx {
+namespace {
+
+constexpr double kDegree = M_PI / 180;
+
+const PanoramaImage& discs() {
+    static const PanoramaImage sphere{texturedSphere(2048)};
+    return sphere;
+}
+
+/// The largest angle between found and true rotations, degrees, once the world is turned as one.
+double rotationError(const TurningCamera& camera, const PanoramaAlignment& found) {
+    // The turn between the two worlds, by all pictures together.
+    glm::dquat sum(0, 0, 0, 0);
+    for (std::size_t k = 0; k < found.cameras.size(); ++k) {
+        if (!found.cameras[k].used) continue;
+        glm::dquat d = camera.worldFromCamera[k] * glm::inverse(found.cameras[k].worldFromCamera);
+        if (glm::dot(d, sum) < 0) d = -d;
+        sum = sum + d;
+    }
+    const glm::dquat turn = glm::normalize(sum);
+    double worst = 0;
+    for (std::size_t k = 0; k < found.cameras.size(); ++k)
+        if (found.cameras[k].used)
+            worst =
+                std::max(worst, panorama::angleBetween(camera.worldFromCamera[k],
+                                                       turn * found.cameras[k].worldFromCamera));
+    return worst / kDegree;
+}
+
+PanoramaAlignment mustAlign(TurningCamera& camera, PanoramaSettings settings = {}) {
+    Job job;
+    auto found = alignPanorama(camera, settings, job);
+    EXPECT_TRUE(found) << found.error().text();
+    return found ? std::move(*found) : PanoramaAlignment{};
+}
+
+/// Checks what was found against what is known.
+void expectFound(const TurningCamera& camera, const PanoramaAlignment& found) {
+    ASSERT_EQ(found.used(), camera.count());
+    EXPECT_LT(rotationError(camera, found), 0.02);
+    EXPECT_NEAR(found.focal / camera.lens.focal, 1, 1e-3);
+    EXPECT_LT(found.rms, 0.6);
+}
+
+/// PSNR over the directions that the panorama covers, with the world turned onto the true one.
+double psnrOfPanorama(const TurningCamera& camera, PanoramaAlignment found, int width) {
+    // Into the true world: pixels then lie where the original's do.
+    const std::size_t first = 0;
+    const glm::dquat turn =
+        camera.worldFromCamera[first] * glm::inverse(found.cameras[first].worldFromCamera);
+    for (auto& c : found.cameras) c.worldFromCamera = turn * c.worldFromCamera;
+    auto& source = const_cast<TurningCamera&>(camera);
+    Job job;
+    ComposeSettings settings;
+    settings.width = width;
+    const auto made = composePanorama(source, found, settings, job);
+    EXPECT_TRUE(made) << made.error().text();
+    if (!made) return 0;
+    double sum = 0;
+    std::size_t count = 0;
+    for (int y = 0; y < made->height(); ++y)
+        for (int x = 0; x < made->width(); ++x) {
+            const glm::u8vec4 p = made->pixels.at(x, y);
+            if (p.a < 255) continue;
+            const glm::vec3 truth =
+                255.0f * glm::vec3(camera.sphere->sample(
+                             PanoramaImage::direction({x + 0.5, y + 0.5}, made->width())));
+            const glm::vec3 d = truth - glm::vec3(p);
+            sum += glm::dot(d, d) / 3;
+            ++count;
+        }
+    EXPECT_GT(count, std::size_t{1000});
+    return 10 * std::log10(255 * 255 / (sum / static_cast<double>(count)));
+}
+
+TurningCamera partOfATurn() {
+    TurningCamera camera;
+    camera.sphere = &discs();
+    camera.lens = {1.6, 0.05 * 1.6 * 1.6};
+    for (int k = 0; k < 6; ++k)
+        camera.add(18 * kDegree * k, (k % 3 - 1) * 4 * kDegree, (k % 2) * 3 * kDegree);
+    return camera;
+}
+
+TEST(AlignPanorama, FindsRotationsFocalLengthAndDistortion) {
+    auto camera = partOfATurn();
+    const auto found = mustAlign(camera);
+    expectFound(camera, found);
+    EXPECT_NEAR(found.k1, camera.lens.k1, 0.01);
+    EXPECT_FALSE(found.closed);
+    EXPECT_GT(psnrOfPanorama(camera, found, 2048), 35);
+}
+
+TEST(AlignPanorama, ClosesATurnOfPortraits) {
+    TurningCamera camera;
+    camera.sphere = &discs();
+    camera.size = {240, 320};
+    camera.lens = {2.0, -0.04 * 4};
+    // In no order.
+    for (int k = 0; k < 16; ++k) camera.add(22.5 * kDegree * (k * 7 % 16), 3 * kDegree, 0);
+    const auto found = mustAlign(camera);
+    expectFound(camera, found);
+    EXPECT_TRUE(found.closed);
+    EXPECT_LT(found.gapAfter, 0.1 * kDegree);
+    // Level: all look up by as much.
+    for (const auto& c : found.cameras)
+        EXPECT_NEAR((c.worldFromCamera * glm::dvec3(0, 0, -1)).y, std::sin(3 * kDegree), 5e-4);
+    EXPECT_GT(psnrOfPanorama(camera, found, 2048), 35);
+}
+
+TEST(AlignPanorama, TakesCamerasThatAreRolled) {
+    TurningCamera camera;
+    camera.sphere = &discs();
+    const double rolls[] = {0, 90, 45, -45};
+    for (int k = 0; k < 4; ++k) camera.add(8 * kDegree * k, 2 * kDegree * k, rolls[k] * kDegree);
+    const auto found = mustAlign(camera);
+    ASSERT_EQ(found.used(), 4);
+    EXPECT_LT(rotationError(camera, found), 0.03);
+    EXPECT_NEAR(found.focal / camera.lens.focal, 1, 3e-3);
+}
+
+TEST(AlignPanorama, FindsGains) {
+    auto camera = partOfATurn();
+    camera.gains = {1, 0.7f, 0.8f, 0.6f, 1, 0.9f};
+    auto found = mustAlign(camera);
+    ASSERT_EQ(found.used(), 6);
+    EXPECT_LT(rotationError(camera, found), 0.02);
+    Job job;
+    ASSERT_TRUE(composePanorama(camera, found, {}, job));
+    for (std::size_t k = 1; k < 6; ++k)
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(found.cameras[k].gain[c] / found.cameras[0].gain[c],
+                        camera.gains[0] / camera.gains[k], 0.02);
+}
+
+TEST(AlignPanorama, IsTheSameOnAnyNumberOfThreads) {
+    auto camera = partOfATurn();
+    PanoramaAlignment first;
+    Rgba8Image picture;
+    for (const int threads : {1, 2, 5}) {
+        const ThreadLimit limit(threads);
+        auto found = mustAlign(camera);
+        Job job;
+        auto made = composePanorama(camera, found, {.width = 512}, job);
+        ASSERT_TRUE(made);
+        if (threads == 1) {
+            first = found;
+            picture = made->pixels;
+            continue;
+        }
+        EXPECT_EQ(found.focal, first.focal);
+        EXPECT_TRUE(made->pixels == picture);
+    }
+}
+
+TEST(AlignPanorama, BringsBackAnEquirectangularPicture) {
+    REQUIRE_SHARED(path, "data/panorama/boofcv-equirectangular/equirectangular_half_dome_01.jpg");
+    Job job;
+    const auto bytes = readFile(path, job.limits);
+    ASSERT_TRUE(bytes);
+    const auto decoded = decodeRgba8(*bytes, "half dome", job.limits);
+    ASSERT_TRUE(decoded);
+    const PanoramaImage sphere{*decoded};
+    TurningCamera camera;
+    camera.sphere = &sphere;
+    camera.size = {384, 512};
+    camera.lens = {1.3, -0.03};
+    for (int k = 0; k < 14; ++k) camera.add(360.0 / 14 * kDegree * k, -5 * kDegree, 0);
+    const auto found = mustAlign(camera);
+    expectFound(camera, found);
+    EXPECT_TRUE(found.closed);
+    EXPECT_GT(psnrOfPanorama(camera, found, 800), 35);
+}
+
+}  // namespace
+}  // namespace stx
