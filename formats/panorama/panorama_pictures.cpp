@@ -1,0 +1,111 @@
+#include <algorithm>
+#include <mutex>
+
+#include "formats/images/images.hpp"
+#include "formats/imagesets/messages.hpp"
+#include "formats/panorama/exif.hpp"
+#include "formats/panorama/panorama_files.hpp"
+#include "formats/video/numbered_pictures.hpp"
+
+namespace stx {
+namespace {
+
+namespace fs = std::filesystem;
+using imagesets::inQuotes;
+
+/// Half the diagonal of a picture of 36x24 mm.
+constexpr double kHalfDiagonal35 = 21.633;
+
+class PictureFiles final : public PictureSource {
+  public:
+    PictureFiles(std::vector<fs::path> files, Job& job)
+        : files_(std::move(files)),
+          job_(job),
+          kept_(files_.size()),
+          notes_(files_.size()),
+          room_(job.limits.maxMemoryBytes / 8) {}
+
+    /// What the cameras wrote down.
+    Result<void> open() {
+        for (std::size_t k = 0; k < files_.size(); ++k) {
+            STX_TRY(const auto bytes, readFile(files_[k], job_.limits));
+            notes_[k] = readExif(bytes);
+            if (const auto info = probeImage(bytes); info && info->bits > 8)
+                job_.note("pictures of 16 bits are rounded to 8");
+        }
+        return {};
+    }
+    [[nodiscard]] int count() const override { return static_cast<int>(files_.size()); }
+    [[nodiscard]] std::string name(int k) const override {
+        return files_[static_cast<std::size_t>(k)].filename().string();
+    }
+    [[nodiscard]] double focalHint(int k) const override {
+        return notes_[static_cast<std::size_t>(k)].focal35 / kHalfDiagonal35;
+    }
+    [[nodiscard]] Result<Rgba8Image> picture(int k) override {
+        const auto at = static_cast<std::size_t>(k);
+        {
+            const std::lock_guard lock(mutex_);
+            if (!kept_[at].empty()) return kept_[at];
+        }
+        STX_TRY(const auto bytes, readFile(files_[at], job_.limits));
+        STX_TRY(auto decoded,
+                imagesets::within(inQuotes(files_[at].string()),
+                                  decodeRgba8(bytes, files_[at].string(), job_.limits)));
+        Rgba8Image upright = turnedUpright(std::move(decoded), notes_[at].orientation);
+        constexpr int kLeastSide = 32;
+        if (std::min(upright.width(), upright.height()) < kLeastSide)
+            return failAt(inQuotes(files_[at].string()), ErrorCode::invalidInput,
+                          "it is {}x{}; a picture of a panorama has at least {} pixels a side",
+                          upright.width(), upright.height(), kLeastSide);
+        const std::lock_guard lock(mutex_);
+        const std::uint64_t size = upright.count() * sizeof(glm::u8vec4);
+        if (kept_[at].empty() && size <= room_) {
+            room_ -= size;
+            kept_[at] = upright;
+        }
+        return upright;
+    }
+
+  private:
+    std::vector<fs::path> files_;
+    Job& job_;
+    std::mutex mutex_;
+    std::vector<Rgba8Image> kept_;
+    std::vector<ExifNotes> notes_;
+    std::uint64_t room_;  ///< bytes of pictures that may still be kept
+};
+
+Result<std::vector<fs::path>> filesOf(Result<std::vector<NumberedPicture>> pictures) {
+    if (!pictures) return propagate(pictures);
+    std::vector<fs::path> files;
+    for (auto& picture : *pictures) files.push_back(std::move(picture.path));
+    return files;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<PictureSource>> openPanoramaPictures(const std::vector<fs::path>& inputs,
+                                                            Job& job) {
+    std::vector<fs::path> files = inputs;
+    // Numbers may be missing: that is no loss of a panorama's.
+    Job aside;
+    aside.limits = job.limits;
+    std::error_code ec;
+    if (inputs.size() == 1 && fs::is_directory(inputs[0], ec)) {
+        STX_TRY(files, filesOf(numberedPictures(inputs[0], aside)));
+    } else if (inputs.size() == 1 && !fs::exists(inputs[0], ec) && isSequencePattern(inputs[0])) {
+        STX_TRY(files, filesOf(picturesOfPattern(inputs[0], aside)));
+    }
+    for (const fs::path& file : files)
+        if (fs::is_directory(file, ec))
+            return fail(ErrorCode::usage,
+                        "'{}' is a folder; of several inputs each must be a picture (give it "
+                        "alone)",
+                        file.string());
+    auto source = std::make_unique<PictureFiles>(std::move(files), job);
+    STX_CHECK(source->open());
+    return source;
+}
+
+}  // namespace stx
