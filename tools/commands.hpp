@@ -11,6 +11,7 @@ void addSelect(CommandLine& line, Program& program);
 void addPack(CommandLine& line, Program& program);
 void addBake(CommandLine& line, Program& program);
 void addBackground(CommandLine& line, Program& program);
+void addPanorama(CommandLine& line, Program& program);
 void addRender(CommandLine& line, Program& program);
 void addInfo(CommandLine& line, Program& program);
 void addSheet(CommandLine& line, Program& program);

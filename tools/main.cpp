@@ -14,8 +14,9 @@ int mainProgram(int argc, char** argv) {
     CommandLine line;
     // In the order of the help.
     for (const auto add :
-         {addConvert, addSelect, addPack, addBake, addBackground, addRender, addInfo, addSheet,
-          addExtract, addValidate, addCompare, addBench, addReport, addDoctor, addCompletion})
+         {addConvert, addSelect, addPack, addBake, addBackground, addPanorama, addRender, addInfo,
+          addSheet, addExtract, addValidate, addCompare, addBench, addReport, addDoctor,
+          addCompletion})
         add(line, program);
     const auto request = line.parse(argc, argv);
     if (!request) {

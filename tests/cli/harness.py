@@ -127,7 +127,7 @@ def temporaries(folder):
 def commands_of(stx):
     """The commands that this program has."""
     listed = subprocess.run([stx, "--help"], capture_output=True, text=True, check=True).stdout.split()
-    known = ("convert", "select", "pack", "bake", "background", "render", "extract", "info", "validate",
+    known = ("convert", "select", "pack", "bake", "background", "panorama", "render", "extract", "info", "validate",
              "compare", "sheet", "report")
     return {c for c in known
             if c in listed}

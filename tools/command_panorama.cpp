@@ -1,0 +1,177 @@
+#include <chrono>
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/images/images.hpp"
+#include "formats/panorama/panorama_files.hpp"
+#include "lib/panorama/panorama.hpp"
+#include "tools/commands.hpp"
+
+namespace stx::tools {
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+struct PanoramaOptions {
+    std::vector<std::string> inputs;
+    std::string output, size;
+    int faces = 0;
+    bool noLoop = false;
+    PanoramaSettings settings;
+};
+
+nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignment& found,
+                                const PanoramaImage& panorama, const PictureSource& source,
+                                double seconds) {
+    auto pictures = nlohmann::ordered_json::array();
+    for (std::size_t k = 0; k < found.cameras.size(); ++k) {
+        const PanoramaCamera& c = found.cameras[k];
+        nlohmann::ordered_json picture{{"name", source.name(static_cast<int>(k))},
+                                       {"used", c.used},
+                                       {"width", c.size.x},
+                                       {"height", c.size.y}};
+        if (c.used) {
+            const glm::dvec3 ahead = c.worldFromCamera * glm::dvec3(0, 0, -1);
+            const auto& q = c.worldFromCamera;
+            picture["rotation"] = {q.w, q.x, q.y, q.z};
+            picture["yawDegrees"] = std::atan2(-ahead.x, -ahead.z) * kDegrees;
+            picture["pitchDegrees"] = std::asin(std::clamp(ahead.y, -1.0, 1.0)) * kDegrees;
+            picture["focalPixels"] = c.focal;
+            picture["gain"] = {c.gain.r, c.gain.g, c.gain.b};
+        }
+        pictures.push_back(std::move(picture));
+    }
+    auto pairs = nlohmann::ordered_json::array();
+    for (const PanoramaPair& p : found.pairs)
+        pairs.push_back({{"a", p.a},
+                         {"b", p.b},
+                         {"found", p.found},
+                         {"matches", p.matches},
+                         {"rmsPixels", p.rms},
+                         {"parallaxPixels", p.parallax}});
+    nlohmann::ordered_json report{{"$schema", "panorama-report.schema.json"},
+                                  {"inputs", o.inputs},
+                                  {"output", o.output},
+                                  {"width", panorama.width()},
+                                  {"height", panorama.height()},
+                                  {"pictures", pictures},
+                                  {"used", found.used()},
+                                  {"k1", found.k1},
+                                  {"rmsPixels", found.rms},
+                                  {"pairs", pairs},
+                                  {"closed", found.closed}};
+    if (found.closed) {
+        report["gapBeforeDegrees"] = found.gapBefore * kDegrees;
+        report["gapDegrees"] = found.gapAfter * kDegrees;
+    }
+    report["seconds"] = seconds;
+    return report;
+}
+
+Result<int> makePanorama(const PanoramaOptions& options, const Command& command, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    PanoramaOptions o = options;
+    STX_CHECK(checkPanoramaFormat(o.output));
+    const PanoramaFormat format = panoramaFormat(o.output);
+    if (format == PanoramaFormat::folder) {
+        STX_TRY(o.output, folderTarget(options.output, {}, "a folder, .png, .jpg or .exr"));
+    }
+    if (format == PanoramaFormat::png || format == PanoramaFormat::jpeg)
+        STX_CHECK(command.refuse({"--faces"},
+                                 "is of cubes: a folder or .exr; this output is equirectangular"));
+    ComposeSettings compose;
+    if (!o.size.empty()) {
+        STX_TRY(const auto size, parseSize(o.size, program.job.limits));
+        if (size.x != 2 * size.y)
+            return fail(ErrorCode::usage,
+                        "--size is {}x{}; a panorama is twice as wide as high, as 4096x2048",
+                        size.x, size.y);
+        compose.width = size.x;
+    } else if (o.faces > 0) {
+        // As dense in the middle of a face as the faces are: pi times as many pixels.
+        compose.width = std::min(4 * o.faces, 2 * (program.job.limits.maxImageSide / 2));
+    }
+    STX_CHECK(checkTarget(o.output, program));
+    const std::vector<std::filesystem::path> inputs(o.inputs.begin(), o.inputs.end());
+    preloadCodecs(inputs[0]);
+    STX_TRY(const auto source, openPanoramaPictures(inputs, program.job));
+    STX_TRY(auto found, alignPanorama(*source, o.settings, program.job));
+    STX_TRY(const auto panorama, composePanorama(*source, found, compose, program.job));
+    PanoramaWriteOptions write;
+    write.faceSize = o.faces;
+    write.noClobber = program.common.noClobber;
+    STX_CHECK(writePanorama(panorama, o.output, write, program.job));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    double across = 0;
+    for (const PanoramaCamera& c : found.cameras)
+        if (c.used && across == 0) across = 2 * std::atan(0.5 * c.size.x / c.focal) * kDegrees;
+    program.say(fmt::format(
+        "{} → {} ({}), {}x{} of {}, each {:.1f}° wide{}, within {:.2f} pixels, {}",
+        counted(source->count(), "picture"), std::filesystem::path(o.output).filename().string(),
+        humanBytes(bytesOf(o.output)), panorama.width(), panorama.height(), found.used(), across,
+        found.closed ? ", all around" : "", found.rms, humanSeconds(seconds)));
+    STX_CHECK(program.writeReport(reportOf(o, found, panorama, *source, seconds)));
+    return 0;
+}
+
+}  // namespace
+
+void addPanorama(CommandLine& line, Program& program) {
+    Command c = line.add(
+        "panorama",
+        "Pictures of a camera that only turned, in any order, as one picture of all that is around "
+        "it\n\n"
+        "  stx panorama IMG_*.jpg -o around.png                 equirectangular\n"
+        "  stx panorama pictures/ -o around.exr                 linear light, for OpenEXR's users\n"
+        "  stx panorama turn_%02d.jpg -o faces --faces 1024     the six faces of a cube\n"
+        "  stx panorama a.jpg b.jpg c.jpg -o wide.png --fov 65 --report cameras.json");
+    auto o = std::make_shared<PanoramaOptions>();
+    c.option(
+         "PICTURES", o->inputs,
+         "Pictures that overlap by a quarter or more, a folder of numbered ones, or their names "
+         "as name_%04d.jpg")
+        .required();
+    c.option("-o,--output", o->output,
+             "Equirectangular picture (.png, .jpg), environment map of OpenEXR (.exr), or a folder "
+             "for the six faces of a cube: front, back, left, right, top, bottom, as a Background "
+             "has them")
+        .required()
+        .takes("OUT");
+    c.option(
+         "--fov",
+         [o](const std::string& text) -> Result<void> {
+             if (text == "auto") return {};
+             STX_TRY(const auto degrees, parseNumbers(text, 1, "--fov"));
+             if (!(degrees[0] >= 1 && degrees[0] <= 150))
+                 return fail(ErrorCode::usage, "--fov is {}; auto, or 1 to 150 degrees is expected",
+                             text);
+             o->settings.fieldOfView = degrees[0] / kDegrees;
+             return {};
+         },
+         "Angle across the width of the first picture; auto finds it (default auto)")
+        .takes("DEG|auto");
+    c.flag("--no-loop", o->noLoop,
+           "The pictures do not go all around, though the last look as if they met the first");
+    c.choice("--up", o->settings.up, {{"level", PanoramaUp::level}, {"first", PanoramaUp::first}},
+             "level: the horizon of all together is level; first: the first picture is upright and "
+             "in the middle (default level)");
+    c.option("--size", o->size,
+             "Of the equirectangular picture (default: as dense as the pictures, at most "
+             "8192x4096)")
+        .takes("WxH");
+    c.option("--faces", o->faces,
+             "A cube with faces of N x N pixels, in a folder or .exr (default of a folder: a "
+             "quarter of the width of --size)")
+        .range(1, 16384)
+        .takes("N");
+    c.sharedOptions(program.common, kOutput);
+    c.runs([o, c](Program& p) -> Result<int> {
+        o->settings.closeLoop = !o->noLoop;
+        return makePanorama(*o, c, p);
+    });
+}
+
+}  // namespace stx::tools
