@@ -1,8 +1,15 @@
-# Turns shader files into one header: namespace stx::shaders { constexpr std::string_view id }.
-# A line #include "path", below this folder, becomes that file, the first time that a shader meets it.
-# Usage: cmake -DOUT=header.hpp "-DFILES=a.vert;b.frag" -P embed.cmake
+# Turns shader files, and others of text, into one header: namespace stx::shaders { constexpr
+# std::string_view id }. A line #include "path", below this folder, becomes that file, the first time that
+# a shader meets it. Usage: cmake -DOUT=header.hpp "-DFILES=a.vert;b.frag" [-DROOT=folder of paths]
+# [-DNAMESPACE=stx::other] -P embed.cmake
 cmake_minimum_required(VERSION 3.25)
-set(text "#pragma once\n#include <string_view>\n\nnamespace stx::shaders {\n")
+if(NOT ROOT)
+    set(ROOT ${CMAKE_CURRENT_LIST_DIR})
+endif()
+if(NOT NAMESPACE)
+    set(NAMESPACE stx::shaders)
+endif()
+set(text "#pragma once\n#include <string_view>\n\nnamespace ${NAMESPACE} {\n")
 foreach(file IN LISTS FILES)
     file(READ "${file}" body)
     set(included "")
@@ -11,7 +18,7 @@ foreach(file IN LISTS FILES)
         set(name "${CMAKE_MATCH_1}")
         set(part "")
         if(NOT name IN_LIST included)
-            file(READ "${CMAKE_CURRENT_LIST_DIR}/${name}" part)
+            file(READ "${ROOT}/${name}" part)
             list(APPEND included "${name}")
         endif()
         string(FIND "${body}" "${line}" from)
@@ -25,5 +32,5 @@ foreach(file IN LISTS FILES)
     string(MAKE_C_IDENTIFIER "${name}" id)
     string(APPEND text "inline constexpr std::string_view ${id} = R\"__glsl(${body})__glsl\";\n")
 endforeach()
-string(APPEND text "}  // namespace stx::shaders\n")
+string(APPEND text "}  // namespace ${NAMESPACE}\n")
 file(WRITE "${OUT}" "${text}")
