@@ -9,6 +9,7 @@
 #include "formats/sequences.hpp"
 #include "lib/base/parallel.hpp"
 #include "tools/commands.hpp"
+#include "tools/extract_shown.hpp"
 
 namespace stx::tools {
 namespace {
@@ -70,13 +71,18 @@ Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& 
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     ExtractOptions o = options;
-    STX_TRY(o.output, folderTarget(options.output, {".ply", ".drc"}, "a folder, .ply or .drc"));
+    STX_TRY(o.output, folderTarget(options.output, {".html", ".ply", ".drc"},
+                                   "a folder, .html, .ply or .drc"));
     const auto dotted = std::filesystem::path(o.output).extension();
     std::error_code ec;
-    const bool points = (dotted == ".ply" || dotted == ".drc") && o.output == options.output &&
-                        !std::filesystem::is_directory(o.output, ec);
+    const bool plain = o.output == options.output && !std::filesystem::is_directory(o.output, ec);
+    const bool shown = plain && isShown(dotted),
+               points = plain && (dotted == ".ply" || dotted == ".drc");
     const auto ending = points ? dotted : std::filesystem::path();
-    if (!ending.empty())
+    if (shown)
+        STX_CHECK(command.refuse({"--cameras", "--depth"},
+                                 fmt::format("is of a folder; -o {} is a file", o.output)));
+    if (points)
         STX_CHECK(
             command.refuse({"--cameras", "--depth"},
                            fmt::format("is of a folder; -o {} is a file of points", o.output)));
@@ -87,6 +93,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
+    if (shown) return extractShown(o.input, o.output, program);
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
     const Timeline timeline = frames->timeline();
     STX_TRY(const std::size_t moment, momentOf(o.time, timeline, points, o.input));
@@ -148,16 +155,23 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
 }  // namespace
 
 void addExtract(CommandLine& line, Program& program) {
-    Command c =
-        line.add("extract",
-                 "Images and cameras of a bundle as plain files, or its points as .ply or .drc\n\n"
-                 "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
-                 "  stx extract model.mp4 -o folder --cameras miv\n"
-                 "  stx extract film.mp4 -o folder            all frames, with their times\n"
-                 "  stx extract model.mp4 -o points.ply");
+    Command c = line.add(
+        "extract",
+        "Images and cameras of a bundle as plain files, its points as .ply or .drc, or a "
+        "page that draws it in any browser\n\n"
+        "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
+        "  stx extract model.mp4 -o folder --cameras miv\n"
+        "  stx extract film.mp4 -o folder            all frames, with their times\n"
+        "  stx extract model.mp4 -o points.ply\n"
+        "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n\n"
+        "The page is turned by dragging, by keys and by touch, under a light that moves, and "
+        "plays\nfilms. Its address takes a camera: "
+        "view.html#eye=0,1,3&target=0,0,0&fov=40.");
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
-    c.option("-o,--output", o->output, "Folder, points.ply or points.drc").required().takes("OUT");
+    c.option("-o,--output", o->output, "Folder, points.ply, points.drc or view.html")
+        .required()
+        .takes("OUT");
     c.option(
          "--cameras", o->cameras,
          "Camera file in the folder: transforms (nerfstudio), miv, or colmap (a dense workspace) "

@@ -28,7 +28,8 @@ RENDER = ["-o", "OUT/a.png", "--size", "24x24", "--backend", "cpu"]
 # What reads bundles and atlases, with every kind of output.
 OTHERS = [["extract", "IN", "-o", "OUT/set"], ["extract", "IN", "-o", "OUT/points.ply"],
           ["extract", "IN", "-o", "OUT/set", "--cameras", "miv", "--depth", "png"],
-          ["extract", "IN", "-o", "OUT/points.drc"], ["select", "IN", "-o", "OUT/a.exr", "--count", "1"],
+          ["extract", "IN", "-o", "OUT/points.drc"], ["extract", "IN", "-o", "OUT/view.html"],
+          ["select", "IN", "-o", "OUT/a.exr", "--count", "1"],
           ["bake", "IN", "-o", "OUT/a.mp4"], ["pack", "IN", "-o", "OUT/atlas"],
           ["convert", "IN", "-o", "OUT/o.mp4", "--octree-image", "4"],
           ["sheet", "IN", "-o", "OUT/a.png", "--size", "900x700"], ["info", "IN", "--cameras", "OUT/a.svg"]]

@@ -1,0 +1,176 @@
+#include "formats/viewer/page_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/atlas/atlas_textures.hpp"
+#include "formats/images/images.hpp"
+#include "formats/stx/mesh_views.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/packing/packing.hpp"
+#include "lib/render/splat/prepared.hpp"
+#include "lib/surface/normals.hpp"
+
+namespace stx {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Sides that textures may have: what every device with WebGL 2 takes that is in use, most others,
+/// and the largest.
+constexpr int kSides[] = {4096, 8192, 16384};
+/// Tangent of the steepest tilt that is coded (splat::Slope), and what stands for no tilt.
+constexpr float kSteepest = 8.0f;
+constexpr float kFlat = 128.0f, kSteps = 127.0f;
+
+std::vector<double> listOf(glm::dvec3 v) {
+    return {v.x, v.y, v.z};
+}
+
+Rgba8Image coded(const RgbaFloatImage& linear) {
+    Rgba8Image out(linear.width(), linear.height());
+    parallelFor(0, linear.height(), [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < linear.width(); ++x) {
+            const glm::vec4 c = linear.at(x, y);
+            const auto byte = [](float v) {
+                return static_cast<std::uint8_t>(std::lround(std::clamp(v, 0.0f, 1.0f) * 255.0f));
+            };
+            out.at(x, y) = {byte(srgbFromLinear(c.r)), byte(srgbFromLinear(c.g)),
+                            byte(srgbFromLinear(c.b)), byte(c.a)};
+        }
+    });
+    return out;
+}
+
+Result<Bytes> encodeRgb(glm::ivec2 size, const std::vector<glm::u8vec3>& values) {
+    return encodePng(size.x, size.y, 3, 8, values.data(), false);
+}
+
+/// Tilts by their angle, and sizes, out of splat axes.
+Result<std::vector<PageImages>> splatImages(const Atlas& atlas, Job& job) {
+    STX_TRY(const PageSet set, PageSet::of(atlas, job));
+    const splat::PreparedPages prepared = splat::preparePages(set, false);
+    std::vector<PageImages> out(atlas.pages.size());
+    for (std::size_t p = 0; p < atlas.pages.size(); ++p) {
+        const AtlasPage& page = atlas.pages[p];
+        const splat::PreparedPage& ready = prepared.pages[p];
+        if (ready.sizes.empty()) continue;
+        std::vector<glm::u8vec3> rgb(page.depth.count(), glm::u8vec3(0));
+        const auto angle = [](std::int16_t code) {
+            const float tilt = std::atan(code / splat::kSlopeScale) / std::atan(kSteepest);
+            return static_cast<std::uint8_t>(std::lround(kFlat + kSteps * tilt));
+        };
+        for (std::size_t i = 0; i < rgb.size(); ++i) {
+            if (!hasPoint(page.depth.data()[i]) || page.splatU.data()[i] == glm::vec3(0)) continue;
+            rgb[i] = {angle(ready.slopes[i].u), angle(ready.slopes[i].v), ready.sizes[i]};
+        }
+        STX_TRY(out[p]["splat"], encodeRgb(page.depth.size(), rgb));
+    }
+    return out;
+}
+
+Result<PageImages> imagesOf(const Atlas& atlas, std::size_t number) {
+    const AtlasPage& page = atlas.pages[number];
+    const glm::ivec2 size = page.depth.size();
+    PageImages out;
+    const auto* colour = page.texture.rgba8();
+    if (!colour)
+        return fail(ErrorCode::invalidInput, "the colour of a page must be 8-bit sRGB, not linear");
+    STX_TRY(out["colour"], encodePng(size.x, size.y, 4, 8, colour->data(), true));
+    const DepthCodes codes = depthCodes(atlas, static_cast<int>(number));
+    const bool small =
+        std::ranges::all_of(atlas.views, [](const ReferenceView& v) { return v.depthBits == 8; });
+    if (small) {
+        const std::vector<std::uint8_t> bytes(codes.codes.pixels().begin(),
+                                              codes.codes.pixels().end());
+        STX_TRY(out["depth"], encodePng(size.x, size.y, 1, 8, bytes.data(), false));
+    } else {
+        STX_TRY(out["depth"], encodePng(size.x, size.y, 1, 16, codes.codes.data(), false));
+    }
+    if (!page.normal.empty()) {
+        std::vector<glm::u8vec3> rgb(page.normal.count());
+        std::ranges::transform(page.normal.pixels(), rgb.begin(), rgbFromNormal);
+        STX_TRY(out["normal"], encodeRgb(size, rgb));
+    }
+    return out;
+}
+
+}  // namespace
+
+Json pageCamera(const Camera& c, const std::string& name) {
+    Json j;
+    j["name"] = name;
+    j["position"] = listOf(c.position);
+    j["orientation"] = {c.orientation.w, c.orientation.x, c.orientation.y, c.orientation.z};
+    j["orthographic"] = c.orthographic;
+    j["width"] = c.width;
+    j["height"] = c.height;
+    for (const auto& [key, value] :
+         {std::pair{"fx", c.fx}, std::pair{"fy", c.fy}, std::pair{"cx", c.cx}, {"cy", c.cy}})
+        j[key] = value;
+    return j;
+}
+
+void makeViewable(Bundle& bundle, Job& job) {
+    const bool linear = std::ranges::any_of(
+        bundle.views, [](const ReferenceView& v) { return v.texture.isLinear(); });
+    if (linear) job.note("colours of linear light become 8-bit sRGB in the page");
+    for (auto& view : bundle.views) {
+        if (const auto* floats = view.texture.rgbaFloat()) view.texture = coded(*floats);
+    }
+    const bool deep =
+        std::ranges::any_of(bundle.views, [](const ReferenceView& v) { return v.depthBits == 32; });
+    if (!deep) return;
+    setDepthBits(bundle, 16);
+    job.note("depth of 32 bits becomes 16 in the page");
+}
+
+Result<Atlas> packForPage(const Bundle& bundle, Job& job) {
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    Result<Atlas> packed = Atlas();
+    for (const int side : kSides) {
+        settings.maxSize = side;
+        packed = pack(bundle, settings, job);
+        if (packed || packed.error().code == ErrorCode::failed) break;
+    }
+    return packed;
+}
+
+Result<PageScene> pageScene(const Atlas& atlas, Job& job) {
+    STX_CHECK(atlas.check());
+    PageScene out;
+    Json& j = out.description;
+    j["padding"] = atlas.padding;
+    j["pruned"] = std::ranges::any_of(atlas.views, [](const ReferenceView& v) { return v.pruned; });
+    j["partial"] = atlas.keptPixels < atlas.sourcePixels;
+    j["views"] = Json::array();
+    for (const ReferenceView& view : atlas.views) {
+        if (view.depthBits == 32)
+            return fail(ErrorCode::invalidInput, "the depth of a page has 8 or 16 bits, not 32");
+        Json v = pageCamera(view.camera, view.name);
+        v["nearPlane"] = view.nearPlane;
+        v["farPlane"] = view.farPlane;
+        v["dmax"] = view.depthCode().dmax;
+        j["views"].push_back(std::move(v));
+    }
+    j["rectangles"] = Json::array();
+    for (const AtlasRectangle& r : atlas.rectangles)
+        j["rectangles"].push_back({r.view, r.page, r.viewX, r.viewY, r.atlasX, r.atlasY,
+                                   r.atlasWidth(), r.atlasHeight(), r.turned ? 1 : 0});
+    const bool splats = std::ranges::any_of(
+        atlas.pages, [](const AtlasPage& page) { return !page.splatU.empty(); });
+    out.pages.resize(atlas.pages.size());
+    if (splats) {
+        STX_TRY(out.pages, splatImages(atlas, job));
+    }
+    for (std::size_t i = 0; i < atlas.pages.size(); ++i) {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(auto images, imagesOf(atlas, i));
+        out.pages[i].merge(images);
+    }
+    return out;
+}
+
+}  // namespace stx

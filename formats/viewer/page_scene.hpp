@@ -1,0 +1,37 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/files/files.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/atlas.hpp"
+
+namespace stx {
+
+/// The textures of one page of an atlas as PNG files, by the names that the viewer has for them:
+/// "colour", "depth", "normal", "splat". See writeViewerPage() for what they hold.
+using PageImages = std::map<std::string, Bytes>;
+
+/// An atlas as the viewer reads it.
+struct PageScene {
+    nlohmann::ordered_json description;  ///< all but "pages", the numbers of the images
+    std::vector<PageImages> pages;
+};
+
+/// A bundle with 8-bit sRGB colour and depth of 8 or 16 bits, as the viewer's textures hold them.
+/// What is lossy is noted.
+void makeViewable(Bundle& bundle, Job& job);
+/// The views of a bundle, which makeViewable() has seen, in textures as small as hold them. Errors:
+/// those of pack().
+[[nodiscard]] Result<Atlas> packForPage(const Bundle& bundle, Job& job);
+/// Errors: an atlas that fails check(), linear colour or depth of 32 bits (invalidInput), memory.
+[[nodiscard]] Result<PageScene> pageScene(const Atlas& atlas, Job& job);
+
+/// A camera, as the viewer reads it, with its name.
+[[nodiscard]] nlohmann::ordered_json pageCamera(const Camera& camera, const std::string& name);
+
+}  // namespace stx

@@ -1,0 +1,226 @@
+// The merged textures of one moment on the device, and what is known of their points before any camera is.
+
+const kBlock = 16, kTableRows = 1024, kEntry = 8;
+
+// A texture of numbers that shaders read with texelFetch.
+function makeTexture(gl, target, internal, format, type, width, height, layers, data) {
+    const texture = gl.createTexture();
+    gl.bindTexture(target, texture);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    if (target === gl.TEXTURE_2D) gl.texImage2D(target, 0, internal, width, height, 0, format, type, data || null);
+    else gl.texImage3D(target, 0, internal, width, height, layers, 0, format, type, data || null);
+    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, name, gl.NEAREST);
+    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(target, name, gl.CLAMP_TO_EDGE);
+    return texture;
+}
+
+// Alpha of a view beside what is within two pixels: 0 = all of it is empty, 255 = all is full, 128 = neither is so.
+function withSurroundings(alpha, stride, width, height) {
+    const count = alpha.length, both = new Uint8Array(2 * count);
+    const full = new Uint8Array(count), some = new Uint8Array(count);  // within two pixels along the row
+    for (let y = 0; y < height; ++y) {
+        for (let x = 2; x + 2 < width; ++x) {
+            const i = y * stride + x;
+            const a = alpha[i - 2], b = alpha[i - 1], c = alpha[i], d = alpha[i + 1], e = alpha[i + 2];
+            full[i] = (a & b & c & d & e) === 255 ? 1 : 0;
+            some[i] = (a | b | c | d | e) === 0 ? 0 : 1;
+        }
+    }
+    for (let i = 0; i < count; ++i) both[2 * i] = alpha[i], both[2 * i + 1] = 128;
+    for (let y = 2; y + 2 < height; ++y) {
+        for (let x = 2; x + 2 < width; ++x) {
+            const i = y * stride + x, j = i - 2 * stride, k = i - stride, l = i + stride, m = i + 2 * stride;
+            if (full[i] & full[j] & full[k] & full[l] & full[m]) both[2 * i + 1] = 255;
+            else if (!(some[i] | some[j] | some[k] | some[l] | some[m])) both[2 * i + 1] = 0;
+        }
+    }
+    return both;
+}
+
+class Scene {
+    // `data` is what stx wrote: views, rectangles, and the number of each page's images; `image(number)`
+    // gives a decoded one.
+    static async load(gl, prepare, data, image) {
+        const scene = new Scene();
+        scene.gl = gl;
+        scene.pruned = data.pruned;
+        scene.views = data.views.map((v) => Object.assign({axes: axesOf(v.orientation)}, v));
+        scene.rectangles = data.rectangles.map(([view, page, viewX, viewY, x, y, width, height, turn]) =>
+            ({view, page, viewX, viewY, x, y, width, height, turned: turn === 1}));
+        for (const r of scene.rectangles) r.camera = windowOf(scene.views[r.view], r);
+        const pages = [];
+        for (const page of data.pages) {
+            const decoded = {};
+            for (const name of Object.keys(page)) decoded[name] = await image(page[name]);
+            pages.push(decoded);
+        }
+        scene.upload(pages);
+        scene.prepare(prepare, pages, data.padding);
+        scene.findBlocks(pages);
+        scene.makeCover(pages, data.partial);
+        return scene;
+    }
+
+    upload(pages) {
+        const gl = this.gl, array = gl.TEXTURE_2D_ARRAY;
+        this.width = pages[0].colour.width;
+        this.height = pages[0].colour.height;
+        const make = (internal, format, type) =>
+            makeTexture(gl, array, internal, format, type, this.width, this.height, pages.length);
+        this.colour = make(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE);
+        this.depth = make(gl.R16UI, gl.RED_INTEGER, gl.UNSIGNED_SHORT);
+        pages.forEach((page, layer) => {
+            const put = (texture, format, type, values) => {
+                gl.bindTexture(array, texture);
+                gl.texSubImage3D(array, 0, 0, 0, layer, this.width, this.height, 1, format, type, values);
+            };
+            put(this.colour, gl.RGBA, gl.UNSIGNED_BYTE, page.colour.values);
+            if (page.depth.values instanceof Uint8Array) page.depth.values = Uint16Array.from(page.depth.values);
+            put(this.depth, gl.RED_INTEGER, gl.UNSIGNED_SHORT, page.depth.values);
+        });
+        this.slope = make(gl.RGBA16I, gl.RGBA_INTEGER, gl.SHORT);
+        this.normal = make(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE);
+    }
+
+    // Tilts and normals, drawn rectangle by rectangle.
+    prepare(program, pages, padding) {
+        const gl = this.gl, frame = gl.createFramebuffer();
+        const given = ["normal", "splat"].map((name) => {
+            if (!pages[0][name]) return makeTexture(gl, gl.TEXTURE_2D, gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, 1, 1, 1);
+            return pages.map((p) => makeTexture(gl, gl.TEXTURE_2D, gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, this.width,
+                                                this.height, 1, p[name].values));
+        });
+        program.use({colourTexture: [this.colour, gl.TEXTURE_2D_ARRAY], depthTexture: [this.depth, gl.TEXTURE_2D_ARRAY],
+                     given: [pages[0].normal ? 1 : 0, pages[0].splat ? 1 : 0]});
+        gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+        gl.disable(gl.BLEND);
+        gl.disable(gl.DEPTH_TEST);
+        gl.enable(gl.SCISSOR_TEST);
+        gl.viewport(0, 0, this.width, this.height);
+        for (const r of this.rectangles) {
+            gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, this.slope, 0, r.page);
+            gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, this.normal, 0, r.page);
+            gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+            gl.scissor(r.x, r.y, r.width, r.height);
+            const view = this.views[r.view], c = r.camera;
+            const across = r.turned ? r.height : r.width, down = r.turned ? r.width : r.height;
+            const free = [r.viewX, r.viewY, view.width - r.viewX - across, view.height - r.viewY - down];
+            const around = (r.turned ? [free[3], free[0], free[1], free[2]] : free).map((n) => Math.min(n, padding, 2));
+            const one = (k) => [given[k] instanceof Array ? given[k][r.page] : given[k], gl.TEXTURE_2D];
+            program.use({givenNormals: one(0), givenSplats: one(1), area: [r.x, r.y, r.width, r.height], around,
+                         sourceLens: [c.fx, c.fy, c.cx, c.cy],
+                         planes: [c.nearPlane, c.farPlane, c.dmax, c.orthographic ? 1 : 0],
+                         worldFromSource: c.axes.flat(), layer: r.page});
+            gl.drawArrays(gl.TRIANGLES, 0, 3);
+        }
+        gl.disable(gl.SCISSOR_TEST);
+        gl.deleteFramebuffer(frame);
+        given.flat().forEach((t) => gl.deleteTexture(t));
+    }
+
+    // Blocks of 16x16 texels that hold points, and points to measure the footprint of a pixel with.
+    findBlocks(pages) {
+        this.blocks = [];
+        this.points = 0;
+        this.samples = [];
+        const kGrid = 24;
+        this.rectangles.forEach((r, number) => {
+            const c = r.camera, codes = pages[r.page].depth.values, rgba = pages[r.page].colour.values;
+            const distance = (code) => c.nearPlane + (1 - (code - 1) / (c.dmax - 1)) * (c.farPlane - c.nearPlane);
+            for (let v0 = 0; v0 < r.height; v0 += kBlock) {
+                for (let u0 = 0; u0 < r.width; u0 += kBlock) {
+                    const u1 = Math.min(u0 + kBlock, r.width), v1 = Math.min(v0 + kBlock, r.height);
+                    let least = 65536, most = 0;
+                    for (let v = v0; v < v1; ++v) {
+                        let i = (r.y + v) * this.width + r.x + u0;
+                        for (let u = u0; u < u1; ++u, ++i) {
+                            const code = codes[i];
+                            if (code === 0 || rgba[4 * i + 3] === 0) continue;
+                            ++this.points;
+                            least = Math.min(least, code);
+                            most = Math.max(most, code);
+                        }
+                    }
+                    if (most > 0) this.blocks.push({rectangle: number, u0, v0, u1, v1, near: distance(most), far: distance(least)});
+                }
+            }
+            const stepX = Math.max(1, Math.round(this.views[r.view].width / kGrid)), stepY = Math.max(1, Math.round(this.views[r.view].height / kGrid));
+            for (let y = stepY >> 1; y < r.height; y += stepY) {
+                for (let x = stepX >> 1; x < r.width; x += stepX) {
+                    const code = codes[(r.y + y) * this.width + r.x + x];
+                    if (code === 0) continue;
+                    const dist = distance(code), k = c.orthographic ? 1 : dist;
+                    this.samples.push({world: pointAt(c, x + 0.5, y + 0.5, dist), spacing: 0.5 * (k / c.fx + k / c.fy)});
+                }
+            }
+        });
+    }
+
+    // What each view saw of the object's outline: a layer of alpha for each.
+    makeCover(pages, partial) {
+        const gl = this.gl, views = this.views;
+        const width = Math.max(...views.map((v) => v.width)), height = Math.max(...views.map((v) => v.height));
+        const most = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(256e6 / (width * height)));
+        const covers = views.slice(0, most).map(() => new Uint8Array(width * height));
+        const eachTexel = (visit) => this.rectangles.forEach((r) => {
+            for (let j = 0; j < r.height; ++j) {
+                for (let i = 0; i < r.width; ++i) {
+                    const x = r.viewX + (r.turned ? j : i), y = r.viewY + (r.turned ? r.width - 1 - i : j);
+                    visit(r, x, y, (r.y + j) * this.width + r.x + i);
+                }
+            }
+        });
+        eachTexel((r, x, y, texel) => {
+            if (r.view < covers.length) covers[r.view][y * width + x] = pages[r.page].colour.values[4 * texel + 3];
+        });
+        // Pixels that were left out because other views show them are no background.
+        if (partial) {
+            eachTexel((r, x, y, texel) => {
+                const code = pages[r.page].depth.values[texel], from = views[r.view];
+                if (code === 0) return;
+                const dist = from.nearPlane + (1 - (code - 1) / (from.dmax - 1)) * (from.farPlane - from.nearPlane);
+                const point = pointAt(from, x + 0.5, y + 0.5, dist);
+                covers.forEach((cover, n) => {
+                    const v = views[n], q = into(v, minus(point, v.position)), k = v.orthographic ? 1 : -1 / q[2];
+                    if (n === r.view || !(q[2] < 0)) return;
+                    const px = Math.floor(v.cx + v.fx * q[0] * k), py = Math.floor(v.cy - v.fy * q[1] * k);
+                    for (let b = Math.max(0, py - 1); b <= Math.min(v.height - 1, py + 1); ++b)
+                        for (let a = Math.max(0, px - 1); a <= Math.min(v.width - 1, px + 1); ++a)
+                            if (cover[b * width + a] === 0) cover[b * width + a] = 255;
+                });
+            });
+        }
+        const used = covers.map((cover, n) => n).filter((n) => {
+            const v = views[n];
+            for (let y = 0; y < v.height; ++y)
+                for (let x = 0; x < v.width; ++x)
+                    if (covers[n][y * width + x] !== 255) return true;
+            return false;
+        });
+        this.covers = used.map((n, layer) => ({view: views[n], layer}));
+        const array = gl.TEXTURE_2D_ARRAY;
+        this.cover = makeTexture(gl, array, gl.RG8, gl.RG, gl.UNSIGNED_BYTE, width, height, Math.max(1, used.length));
+        used.forEach((n, layer) => gl.texSubImage3D(array, 0, 0, 0, layer, width, height, 1, gl.RG, gl.UNSIGNED_BYTE,
+                                                    withSurroundings(covers[n], width, views[n].width, views[n].height)));
+        gl.texParameteri(array, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+        gl.texParameteri(array, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    }
+
+    // The median of how many samples of the views go into one pixel of a camera, along a side.
+    samplesPerPixel(camera) {
+        const ratios = [];
+        for (const p of this.samples) {
+            const q = into(camera, minus(p.world, camera.position)), dist = -q[2];
+            const x = camera.cx + camera.fx * q[0] / dist, y = camera.cy + camera.fy * q[1] / dist;
+            if (!(dist > 0 && x >= 0 && y >= 0 && x < camera.width && y < camera.height)) continue;
+            ratios.push(0.5 * (dist / camera.fx + dist / camera.fy) / p.spacing);
+        }
+        if (ratios.length === 0) return 1;
+        ratios.sort((a, b) => a - b);
+        return ratios[ratios.length >> 1];
+    }
+
+    release() {
+        for (const t of [this.colour, this.depth, this.slope, this.normal, this.cover]) this.gl.deleteTexture(t);
+    }
+}

@@ -1,0 +1,101 @@
+// What is known of each pixel before any camera is, as lib/render/splat/prepared.cpp finds it: the tilt of
+// its surface, from the file's splats, else its normals, else the neighbours' depths; and its normal.
+#include "formats/viewer/shaders/scene.glsl"
+uniform sampler2D givenNormals;  // 0..1, zero = none
+uniform sampler2D givenSplats;   // tilt along u and v, size; zero = none
+uniform bvec2 given;                  // normals, splats
+uniform ivec4 area;                   // first texel, size
+uniform ivec4 around;                 // texels on the left, on top, right and below that show the view, too
+uniform vec4 sourceLens;              // fx, fy, cx, cy
+uniform vec4 planes;                  // near, far, dmax, 1 = orthographic
+uniform mat3 worldFromSource;
+uniform int layer;
+layout(location = 0) out ivec4 slopeOut;
+layout(location = 1) out vec4 normalOut;
+
+const float kSteepest = 8.0, kSteepestRim = 1.0, kCreaseFactor = 3.0, kCreaseMore = 0.5;
+const float kNone = 3.0e38;
+
+bool orthographic() { return planes.w != 0.0; }
+ivec3 texelAt(ivec2 at) { return ivec3(area.xy + at, layer); }
+bool shows(ivec2 at) {
+    return all(greaterThanEqual(at, -around.xy)) && all(lessThan(at, area.zw + around.zw));
+}
+float depthOf(ivec2 at) {
+    if (!shows(at)) return kNone;
+    uint code = texelFetch(depthTexture, texelAt(at), 0).r;
+    return code == 0u ? kNone : distanceOf(code, planes.x, planes.y, planes.z);
+}
+float alphaOf(ivec2 at) { return texelFetch(colourTexture, texelAt(at), 0).a; }
+
+vec3 rayOf(vec2 at) {
+    if (orthographic()) return vec3(0.0, 0.0, -1.0);
+    return vec3((at.x + 0.5 - sourceLens.z) / sourceLens.x, -(at.y + 0.5 - sourceLens.w) / sourceLens.y, -1.0);
+}
+vec2 slopeFromNormal(vec3 n, vec3 ray) {
+    float towards = dot(n, ray);
+    if (!(towards < -1e-3 * length(n))) return vec2(0.0);
+    return vec2(-n.x / towards, n.y / towards);
+}
+vec3 normalFromSlope(vec2 slope, vec3 ray) {
+    return normalize(cross(vec3(0.0, -1.0, 0.0) + slope.y * ray, vec3(1.0, 0.0, 0.0) + slope.x * ray));
+}
+float tangent(float change, float f, float other) { return other < kNone ? change * (orthographic() ? f : f / other) : kNone; }
+
+float slopeFromNeighbours(float before, float at, float after, float f) {
+    float a = tangent(at - before, f, before), b = tangent(after - at, f, after);
+    bool hasA = abs(a) <= kSteepest, hasB = abs(b) <= kSteepest;
+    if (hasA && hasB) {
+        if (abs(a) > kCreaseFactor * abs(b) + kCreaseMore) return b;
+        if (abs(b) > kCreaseFactor * abs(a) + kCreaseMore) return a;
+        return 0.5 * (a + b);
+    }
+    return hasA ? a : hasB ? b : 0.0;
+}
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy) - area.xy;
+    float z = depthOf(at);
+    slopeOut = ivec4(0, 0, 64, 0);
+    normalOut = vec4(0.5);
+    if (!(z < kNone)) return;
+    // Right, left, below, above.
+    vec4 other = vec4(depthOf(at + ivec2(1, 0)), depthOf(at - ivec2(1, 0)), depthOf(at + ivec2(0, 1)), depthOf(at - ivec2(0, 1)));
+    vec3 ray = rayOf(vec2(at));
+    vec3 given3 = texelFetch(givenNormals, texelAt(at).xy, 0).xyz;
+    bool hasNormal = given.x && given3 != vec3(0.0), hasSplat = false;
+    vec3 normal = normalize(given3 * 2.0 - 1.0);
+    vec2 slope;
+    if (given.y) {
+        vec3 code = texelFetch(givenSplats, texelAt(at).xy, 0).xyz * 255.0;
+        hasSplat = code.z > 0.0;
+        slope = tan((code.xy - 128.0) / 127.0 * atan(kSteepest));
+        if (hasSplat) slopeOut.z = int(code.z + 0.5);
+    }
+    if (!hasSplat && hasNormal)
+        slope = slopeFromNormal(transpose(worldFromSource) * normal, ray);
+    else if (!hasSplat)
+        slope = vec2(slopeFromNeighbours(other.y, z, other.x, sourceLens.x), slopeFromNeighbours(other.w, z, other.z, sourceLens.y));
+
+    bool linked = alphaOf(at) >= 1.0;
+    bvec4 behind;
+    for (int k = 0; k < 4; ++k) {
+        ivec2 beside = at + (k == 0 ? ivec2(1, 0) : k == 1 ? ivec2(-1, 0) : k == 2 ? ivec2(0, 1) : ivec2(0, -1));
+        behind[k] = false;
+        if (!shows(beside)) {
+            linked = false;
+            continue;
+        }
+        bool same = abs(tangent(other[k] - z, k < 2 ? sourceLens.x : sourceLens.y, other[k])) <= kSteepest;
+        if (!same || alphaOf(beside) < 1.0) linked = false;
+        behind[k] = !same && other[k] > z;
+    }
+    // What is one pixel thin has no rim: it would break into dots.
+    bool thin = (behind.x && behind.y) || (behind.z && behind.w);
+    bool rim = !thin && any(behind);
+    if (rim && !hasSplat) slope = clamp(slope, vec2(-kSteepestRim), vec2(kSteepestRim));
+    ivec2 coded = ivec2(round(clamp(slope, vec2(-kSteepest), vec2(kSteepest)) * kSlopeScale));
+    slopeOut.xy = (coded & ivec2(~1)) | ivec2(linked, rim);
+    if (!hasNormal) normal = worldFromSource * normalFromSlope(slope, ray);
+    normalOut = vec4(normal * 0.5 + 0.5, 1.0);
+}

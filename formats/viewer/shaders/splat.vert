@@ -1,0 +1,98 @@
+// A vertex is a pixel of a reference view, an instance a block of 16x16 of them. PASS 1 finds the front
+// of each pixel, PASS 2 adds the colours of what lies there.
+#include "formats/viewer/shaders/scene.glsl"
+uniform isampler2DArray slopeTexture;
+uniform sampler2DArray normalTexture;
+uniform vec4 lens;        // 1 / fx, 1 / fy, cx, cy: pixel centres at whole numbers
+uniform vec2 frameSize;
+uniform float splatSize;  // 1 = what the data says
+uniform float mostReach;  // the largest point that the device draws, halved
+
+layout(location = 0) in uvec3 block;  // u0 | v0 << 16, columns | rows << 16, rectangle
+
+flat out vec3 centre;  // pixel, distance
+flat out vec3 inverse;
+flat out vec4 shape;   // small, core2, slope
+#if PASS == 2
+flat out vec4 colour;
+flat out vec3 across, down, normal;
+flat out vec2 weighing;  // quality, tolerance
+#endif
+
+// How far behind the front a point still belongs to it; see lib/render/splat/plan.cpp for these.
+const float kTolerance = 0.01, kToleranceRough = 0.02;
+const float kLeastQuality = 0.01;
+
+// Views that look from about where the novel camera looks from count more.
+float qualityOf(int rectangle, Point p) {
+    vec4 eye = rectangleEntry(rectangle, 6), forward = rectangleEntry(rectangle, 7);
+    vec2 ray = (p.pixel - lens.zw) * lens.xy * vec2(1.0, -1.0);
+    vec3 point = vec3(ray * p.dist, -p.dist);
+    vec3 fromSource = p.view.a0.w != 0.0 ? forward.xyz : normalize(point - eye.xyz);
+    float angle = max(0.0, dot(fromSource, normalize(point)));
+    return kLeastQuality + angle * angle * angle * angle;
+}
+
+// Change of colour per novel pixel across and down, from the four neighbours.
+void colourGradient(ivec3 texel, vec4 steps, out vec3 toRight, out vec3 toBottom) {
+    toRight = toBottom = vec3(0.0);
+    if (steps.x == 0.0 && steps.w == 0.0) return;
+    vec3 u = texelFetch(colourTexture, texel + ivec3(1, 0, 0), 0).rgb - texelFetch(colourTexture, texel - ivec3(1, 0, 0), 0).rgb;
+    vec3 v = texelFetch(colourTexture, texel + ivec3(0, 1, 0), 0).rgb - texelFetch(colourTexture, texel - ivec3(0, 1, 0), 0).rgb;
+    toRight = steps.x * u + steps.y * v;
+    toBottom = steps.z * u + steps.w * v;
+}
+
+void main() {
+    gl_Position = vec4(0.0, 0.0, -2.0, 1.0);  // outside: not drawn
+    gl_PointSize = 1.0;
+    uint dx = uint(gl_VertexID) & 15u, dy = uint(gl_VertexID) >> 4u;
+    if (dx >= (block.y & 0xffffu) || dy >= (block.y >> 16u)) return;
+    int rectangle = int(block.z);
+    uint u = (block.x & 0xffffu) + dx, v = (block.x >> 16u) + dy;
+    vec4 place = rectangleEntry(rectangle, 6), placeY = rectangleEntry(rectangle, 7);
+    int atX = int(place.w);
+    ivec3 texel = ivec3((atX & 0xffff) + int(u), int(placeY.w) + int(v), atX >> 16);
+    uint code = texelFetch(depthTexture, texel, 0).r;
+    if (code == 0u) return;
+    vec4 rgba = texelFetch(colourTexture, texel, 0);
+    // Pixels less than half covered belong to the silhouette: they lend colour but hide nothing.
+    if (!(rgba.a > (PASS == 1 ? 0.5 : 0.0))) return;
+
+    Point p;
+    p.view.a0 = rectangleEntry(rectangle, 0);
+    p.view.au = rectangleEntry(rectangle, 1);
+    p.view.av = rectangleEntry(rectangle, 2);
+    p.view.b0 = rectangleEntry(rectangle, 3);
+    p.view.bu = rectangleEntry(rectangle, 4);
+    p.view.bv = rectangleEntry(rectangle, 5);
+    p.source = distanceOf(code, p.view.b0.w, p.view.bu.w, p.view.bv.w);
+    p.flatFrame = false;
+    if (!placePoint(p, float(u), float(v))) return;
+    p.task.quality = qualityOf(rectangle, p);
+    ivec4 coded = texelFetch(slopeTexture, texel, 0);
+    Splat splat;
+    if (!ownSplat(p, coded.x, coded.y, float(coded.z) / 64.0 * splatSize, false, splat)) return;
+
+    vec2 at = floor(p.pixel) + 1.0;  // a small splat: the corner that 2x2 pixels share
+    float side = 2.0;
+    if (!splat.small) {
+        // The point is held inside the frame, or a device would drop what reaches in from outside.
+        vec2 from = p.pixel + 0.5;
+        at = clamp(from, vec2(0.0), frameSize);
+        vec2 reach = min(splat.reach, vec2(mostReach)) + abs(from - at);
+        if (any(greaterThan(abs(from - at), splat.reach))) return;
+        side = min(2.0 * max(reach.x, reach.y) + 1.0, 2.0 * mostReach);
+    }
+    centre = vec3(p.pixel, p.dist);
+    inverse = splat.q;
+    shape = vec4(splat.small ? 1.0 : 0.0, splat.core2, splat.slope);
+#if PASS == 2
+    colour = rgba;
+    weighing = vec2(splat.quality, (coded.x & 1) != 0 ? kTolerance : kToleranceRough);
+    colourGradient(texel, splat.steps, across, down);
+    normal = texelFetch(normalTexture, texel, 0).xyz * 2.0 - 1.0;
+#endif
+    gl_Position = vec4(at / frameSize * 2.0 - 1.0, 0.0, 1.0);
+    gl_PointSize = side;
+}

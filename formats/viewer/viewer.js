@@ -1,0 +1,390 @@
+// The page: what stx wrote, the camera, light and time, and everything that people touch.
+
+class Viewer {
+    constructor() {
+        this.data = JSON.parse(document.getElementById("data").textContent);
+        this.canvas = document.getElementById("canvas");
+        this.scenes = new Map();  // number -> Scene, the last used at the end
+        this.shown = [];
+        this.frame = 0;
+        this.pointers = new Map();
+        this.quick = false;
+        this.slow = false;
+        this.drawn = new Promise((resolve) => (this.firstDrawn = resolve));
+    }
+
+    async start() {
+        this.painter = new Painter(this.canvas);
+        this.canvas.addEventListener("webglcontextlost", (event) => {
+            event.preventDefault();
+            this.say("The device lost the pictures. Load the page again.");
+        });
+        this.fillPanel();
+        this.reset();
+        this.readAddress();
+        this.connect();
+        await this.showFrame(this.frame);
+        this.say("");
+        this.draw();
+        this.firstDrawn();
+    }
+
+    say(text, failed) {
+        const message = document.getElementById("message");
+        message.textContent = text;
+        message.className = failed ? "failed" : "";
+    }
+
+    // ---- Time ----
+
+    async sceneOf(number) {
+        const known = this.scenes.get(number);
+        if (known) {
+            this.scenes.delete(number);
+            this.scenes.set(number, known);
+            return known;
+        }
+        const data = JSON.parse(document.getElementById("scene" + number).textContent);
+        const image = async (k) => decodePng(bytesOfUri(document.getElementById("image" + k).textContent));
+        const loading = Scene.load(this.painter.gl, this.painter.prepare, data, image);
+        this.scenes.set(number, loading);
+        const scene = await loading;
+        // About 20 bytes a pixel: half a gigabyte of moments.
+        const most = Math.max(4, Math.floor(25e6 / (scene.width * scene.height)));
+        for (const [old, kept] of this.scenes) {
+            if (this.scenes.size <= most) break;
+            if (this.shownNumbers && this.shownNumbers.includes(old) || old === number) continue;
+            this.scenes.delete(old);
+            Promise.resolve(kept).then((s) => s.release());
+        }
+        return scene;
+    }
+
+    async showFrame(frame) {
+        this.frame = frame;
+        const numbers = this.data.frames[frame];
+        const scenes = await Promise.all(numbers.map((n) => this.sceneOf(n)));
+        if (this.frame !== frame) return;
+        this.shownNumbers = numbers;
+        this.shown = scenes;
+        document.getElementById("time").value = frame;
+        const seconds = this.data.times[frame];
+        document.getElementById("time-text").textContent = `${Number(seconds.toFixed(3))} s`;
+        this.redraw();
+    }
+
+    frameAt(time) {
+        let frame = 0;
+        while (frame + 1 < this.data.times.length && this.data.times[frame + 1] <= time + 1e-9) ++frame;
+        return frame;
+    }
+
+    play(on) {
+        this.playing = on && this.data.frames.length > 1;
+        const button = document.getElementById("play");
+        button.textContent = this.playing ? "Stop" : "Play";
+        button.setAttribute("aria-pressed", String(this.playing));
+        if (!this.playing) return;
+        const begun = performance.now() - this.data.times[this.frame] * 1000;
+        const step = async () => {
+            if (!this.playing) return;
+            const wanted = this.frameAt((performance.now() - begun) / 1000 % this.data.duration);
+            if (wanted !== this.frame) await this.showFrame(wanted);
+            requestAnimationFrame(step);
+        };
+        requestAnimationFrame(step);
+    }
+
+    // ---- Camera ----
+
+    reset() {
+        const s = this.data.start, [width, height] = this.canvasSize();
+        this.camera = {eye: s.eye.slice(), target: s.target.slice(), up: s.up.slice(), fov: s.fov};
+        // An object fits into the narrower side.
+        if (s.around && width < height) this.zoom(height / width);
+    }
+
+    // How far a drag over the whole picture goes.
+    orbit(right, down) {
+        const c = this.camera, up = unit(c.up);
+        let arm = turned(minus(c.eye, c.target), up, -right);
+        const side = unit(cross(up, arm)), angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), up))));
+        arm = turned(arm, side, Math.max(0.01, Math.min(Math.PI - 0.01, angle - down)) - angle);
+        c.eye = plus(c.target, arm);
+    }
+    pan(right, down) {
+        const c = this.camera, view = lookAt(c, 1, 1), arm = lengthOf(minus(c.eye, c.target));
+        const scale = 2 * arm * Math.tan(c.fov * Math.PI / 360);
+        const shift = plus(times(view.axes[0], -right * scale), times(view.axes[1], down * scale));
+        c.eye = plus(c.eye, shift);
+        c.target = plus(c.target, shift);
+    }
+    zoom(factor) {
+        const c = this.camera;
+        c.eye = plus(c.target, times(minus(c.eye, c.target), factor));
+    }
+
+    // ---- Look ----
+
+    value(id) { return Number(document.getElementById(id).value); }
+
+    lightDirection() {
+        const up = unit(this.data.start.up), back = minus(this.data.start.eye, this.data.start.target);
+        const front = unit(minus(back, times(up, dot(back, up))));
+        const turn = this.value("light-turn") * Math.PI / 180, height = this.value("light-height") * Math.PI / 180;
+        const from = plus(times(turned(front, up, turn), Math.cos(height)), times(up, Math.sin(height)));
+        return times(from, -1);
+    }
+
+    look() {
+        const hex = this.background || document.getElementById("background").value;
+        return {
+            background: [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255),
+            splatSize: this.value("splat-size"),
+            light: {on: document.getElementById("light").checked, direction: this.lightDirection(), amount: 1,
+                    ambient: this.value("ambient"), specular: this.value("specular"), shininess: 32}};
+    }
+
+    canvasSize() {
+        if (this.size) return this.size;
+        const scale = Math.min(window.devicePixelRatio || 1, 2) * (this.quick && this.slow ? 0.5 : 1);
+        return [this.canvas.clientWidth, this.canvas.clientHeight].map((n) => Math.max(1, Math.round(n * scale)));
+    }
+
+    draw() {
+        const [width, height] = this.canvasSize(), begun = performance.now();
+        if (this.canvas.width !== width) this.canvas.width = width;
+        if (this.canvas.height !== height) this.canvas.height = height;
+        this.painter.draw(this.shown, lookAt(this.camera, width, height), this.look(), this.quick && this.slow);
+        // Only a pixel that is read tells when a device is done.
+        if (this.quick && !this.slow) {
+            this.painter.gl.readPixels(0, 0, 1, 1, this.painter.gl.RGBA, this.painter.gl.UNSIGNED_BYTE, new Uint8Array(4));
+            this.slow = performance.now() - begun > 60;
+        }
+    }
+
+    // Draws soon; what moves is drawn once more, in full, when it stands still.
+    redraw(moving) {
+        if (this.shown.length === 0) return;
+        this.quick = Boolean(moving);
+        if (!this.waiting) {
+            this.waiting = requestAnimationFrame(() => {
+                this.waiting = 0;
+                this.draw();
+            });
+        }
+        clearTimeout(this.rest);
+        if (moving) this.rest = setTimeout(() => (this.redraw(), this.writeAddress()), 250);
+    }
+    changed() {
+        document.getElementById("view").value = "";
+        this.redraw(true);
+    }
+
+    // ---- Address and command ----
+
+    world(v) { return plus(v, this.data.origin).map((x) => String(Number(x.toPrecision(9)))).join(","); }
+    plain(v) { return v.map((x) => String(Number(x.toPrecision(7)))).join(","); }
+
+    writeAddress() {
+        const c = this.camera, parts = [`eye=${this.world(c.eye)}`, `target=${this.world(c.target)}`];
+        if (this.plain(c.up) !== "0,1,0") parts.push(`up=${this.plain(c.up)}`);
+        parts.push(`fov=${Number(c.fov.toFixed(4))}`);
+        if (this.frame > 0) parts.push(`time=${this.data.times[this.frame]}`);
+        if (document.getElementById("light").checked) parts.push(`light=${this.plain(this.lightDirection())}`);
+        try {
+            history.replaceState(null, "", "#" + parts.join("&"));
+        } catch (error) {
+            // Some browsers keep the address of local files as it is.
+        }
+    }
+
+    readAddress() {
+        const fields = new Map(location.hash.slice(1).split("&").map((part) => part.split("=").map(decodeURIComponent)));
+        const numbers = (name, count) => {
+            const list = (fields.get(name) || "").split(",").map(Number);
+            return fields.has(name) && list.length === count && list.every(Number.isFinite) ? list : null;
+        };
+        const c = this.camera, eye = numbers("eye", 3), target = numbers("target", 3), up = numbers("up", 3), fov = numbers("fov", 1);
+        if (eye) c.eye = minus(eye, this.data.origin);
+        if (target) c.target = minus(target, this.data.origin);
+        if (up && lengthOf(up) > 0) c.up = up;
+        if (fov && fov[0] > 0 && fov[0] < 180) {
+            c.fov = fov[0];
+            document.getElementById("fov").value = c.fov;
+        }
+        const time = numbers("time", 1), light = numbers("light", 3), splat = numbers("splat", 1);
+        if (time) this.frame = this.frameAt(time[0]);
+        if (splat && splat[0] > 0) document.getElementById("splat-size").value = splat[0];
+        if (light && lengthOf(light) > 0) this.setLight(light);
+        for (const name of ["ambient", "specular"]) if (numbers(name, 1)) document.getElementById(name).value = numbers(name, 1)[0];
+        const size = (fields.get("size") || "").match(/^(\d{1,5})x(\d{1,5})$/);
+        this.size = size ? [Number(size[1]), Number(size[2])] : null;
+        if (size) Object.assign(this.canvas.style, {width: size[1] + "px", height: size[2] + "px"});
+        if (/^#[0-9a-f]{6}$/i.test(fields.get("background") || "")) this.background = fields.get("background");
+        if (fields.get("ui") === "off") document.getElementById("panel").hidden = true;
+    }
+
+    // The sliders for a light that travels in a direction.
+    setLight(direction) {
+        const up = unit(this.data.start.up), from = unit(times(direction, -1));
+        const back = minus(this.data.start.eye, this.data.start.target);
+        const front = unit(minus(back, times(up, dot(back, up)))), side = cross(up, front);
+        document.getElementById("light").checked = true;
+        document.getElementById("light-height").value = Math.asin(Math.max(-1, Math.min(1, dot(from, up)))) * 180 / Math.PI;
+        document.getElementById("light-turn").value = Math.atan2(dot(from, side), dot(from, front)) * 180 / Math.PI;
+    }
+
+    command() {
+        const quoted = (text) => /^[\w@%+=:,./-]+$/.test(text) ? text : "'" + text.replace(/'/g, "'\\''") + "'";
+        const c = this.camera, [width, height] = this.canvasSize(), look = this.look();
+        const words = ["stx render", quoted(this.data.input), "-o view.png --mode splat", `--eye=${this.world(c.eye)}`,
+                       `--target=${this.world(c.target)}`];
+        if (this.plain(c.up) !== "0,1,0") words.push(`--up=${this.plain(c.up)}`);
+        words.push(`--fov ${Number(c.fov.toFixed(4))}`, `--size ${width}x${height}`,
+                   `--background ${look.background.map((x) => Number(x.toFixed(4))).join(",")}`);
+        if (this.data.frames.length > 1) words.push(`--time ${this.data.times[this.frame]}`);
+        if (look.light.on)
+            words.push(`--light=dir:${this.plain(look.light.direction)}`, `--ambient ${look.light.ambient}`,
+                       `--specular ${look.light.specular}`, `--shininess ${look.light.shininess}`);
+        return words.join(" ");
+    }
+
+    showCommand() {
+        const text = document.getElementById("command-text");
+        document.getElementById("command-row").hidden = false;
+        text.value = this.command();
+        text.focus();
+        text.select();
+        if (navigator.clipboard) navigator.clipboard.writeText(text.value).catch(() => {});
+    }
+
+    // ---- What people touch ----
+
+    fillPanel() {
+        const time = document.getElementById("time");
+        document.getElementById("time-row").hidden = this.data.frames.length < 2;
+        time.max = this.data.frames.length - 1;
+        document.getElementById("fov").value = this.data.start.fov;
+        document.getElementById("facts").textContent = this.data.facts;
+        const views = document.getElementById("view");
+        this.data.cameras.forEach((camera, i) => views.add(new Option(`view ${i}: ${camera.name}`, String(i))));
+    }
+
+    connect() {
+        const on = (id, event, act) => document.getElementById(id).addEventListener(event, act);
+        const keep = () => (this.redraw(), this.writeAddress());
+        for (const id of ["light-turn", "light-height", "ambient", "specular"])
+            on(id, "input", () => {
+                document.getElementById("light").checked = true;
+                this.redraw(true);
+            });
+        on("light", "change", keep);
+        on("background", "change", () => (this.background = "", keep()));
+        on("light-moves", "change", () => this.moveLight());
+        on("splat-size", "input", () => {
+            document.getElementById("splat-text").textContent = document.getElementById("splat-size").value;
+            this.redraw(true);
+        });
+        on("fov", "input", () => (this.camera.fov = this.value("fov"), this.changed()));
+        on("time", "input", () => (this.play(false), this.showFrame(this.value("time"))));
+        on("play", "click", () => this.play(!this.playing));
+        on("reset", "click", () => (this.reset(), this.changed()));
+        on("command", "click", () => this.showCommand());
+        on("view", "change", () => this.fromView(document.getElementById("view").value));
+        on("panel", "submit", (event) => event.preventDefault());
+        window.addEventListener("hashchange", () => {
+            this.readAddress();
+            this.showFrame(this.frame);
+        });
+        window.addEventListener("resize", () => this.redraw());
+        window.addEventListener("keydown", (event) => this.key(event));
+        const canvas = this.canvas;
+        canvas.addEventListener("wheel", (event) => {
+            event.preventDefault();
+            this.zoom(Math.exp(Math.max(-100, Math.min(100, event.deltaY)) * 0.0015));
+            this.changed();
+        }, {passive: false});
+        canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+        canvas.addEventListener("pointerdown", (event) => {
+            canvas.setPointerCapture(event.pointerId);
+            this.pointers.set(event.pointerId, [event.clientX, event.clientY]);
+        });
+        for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.pointers.delete(event.pointerId));
+        canvas.addEventListener("pointermove", (event) => this.drag(event));
+    }
+
+    drag(event) {
+        const before = this.pointers.get(event.pointerId);
+        if (!before) return;
+        const now = [event.clientX, event.clientY], height = this.canvas.clientHeight;
+        const right = (now[0] - before[0]) / height, down = (now[1] - before[1]) / height;
+        this.pointers.set(event.pointerId, now);
+        if (this.pointers.size === 2) {
+            // Two fingers: their middle moves the object, their distance the camera.
+            const other = [...this.pointers.entries()].find(([id]) => id !== event.pointerId)[1];
+            const apart = (p) => Math.max(1, Math.hypot(p[0] - other[0], p[1] - other[1]));
+            this.zoom(apart(before) / apart(now));
+            this.pan(right / 2, down / 2);
+        } else if (event.buttons & 2 || event.shiftKey) this.pan(right, down);
+        else this.orbit(right * 4, down * 4);
+        this.changed();
+    }
+
+    key(event) {
+        if (/^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName) || event.ctrlKey || event.metaKey || event.altKey) return;
+        const step = 0.07, onButton = /^(BUTTON|SUMMARY)$/.test(event.target.tagName);
+        const move = (x, y) => (event.shiftKey ? this.pan(-x * step, -y * step) : this.orbit(-x * step, -y * step));
+        const acts = {
+            ArrowLeft: () => move(-1, 0), ArrowRight: () => move(1, 0), ArrowUp: () => move(0, -1), ArrowDown: () => move(0, 1),
+            "+": () => this.zoom(0.9), "=": () => this.zoom(0.9), "-": () => this.zoom(1 / 0.9),
+            r: () => this.reset(),
+            l: () => document.getElementById("light").click(),
+            h: () => (document.getElementById("panel").hidden = !document.getElementById("panel").hidden),
+            " ": onButton ? null : () => this.play(!this.playing)};
+        const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+        if (!act) return;
+        event.preventDefault();
+        act();
+        if (/^(Arrow|[-+=rR])/.test(event.key)) this.changed();
+    }
+
+    // The light goes around the object once in eight seconds.
+    moveLight() {
+        const moves = document.getElementById("light-moves"), slider = document.getElementById("light-turn");
+        document.getElementById("light").checked = moves.checked || document.getElementById("light").checked;
+        let last = performance.now();
+        const step = (now) => {
+            if (!moves.checked) return;
+            let angle = Number(slider.value) + (now - last) * 360 / 8000;
+            if (angle > 180) angle -= 360;
+            if (Math.abs(angle - Number(slider.value)) >= 1) {
+                slider.value = angle;
+                last = now;
+                this.redraw(true);
+            }
+            requestAnimationFrame(step);
+        };
+        requestAnimationFrame(step);
+    }
+
+    // The place of a reference view; its lens as far as one angle says it.
+    fromView(number) {
+        if (number === "") return;
+        const view = this.data.cameras[Number(number)], axes = axesOf(view.orientation);
+        const ahead = times(axes[2], -1), c = this.camera;
+        const reach = Math.max(1e-9, dot(minus(this.data.start.centre, view.position), ahead)) || this.data.start.radius;
+        Object.assign(c, {eye: view.position.slice(), target: plus(view.position, times(ahead, reach)), up: axes[1]});
+        if (view.fov > 0) c.fov = view.fov;
+        this.redraw();
+        this.writeAddress();
+    }
+}
+
+const viewer = new Viewer();
+viewer.start().catch((error) => {
+    const old = error.message === "no WebGL 2";
+    viewer.say(old ? "This page needs WebGL 2, which this browser does not have or has switched off. Current versions of " +
+        "Firefox, Chrome, Edge and Safari have it; look whether hardware acceleration is on."
+        : "The page cannot be drawn: " + error.message, true);
+});

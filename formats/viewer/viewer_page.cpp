@@ -1,0 +1,357 @@
+#include "formats/viewer/viewer_page.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "embedded_viewer.hpp"
+#include "formats/files/base64.hpp"
+#include "formats/files/deflate.hpp"
+#include "formats/stx/stx.hpp"
+#include "formats/viewer/page_scene.hpp"
+#include "lib/base/counted.hpp"
+#include "lib/geometry/view_layout.hpp"
+#include "lib/packing/packing.hpp"
+#include "lib/render/scene/page_set.hpp"
+
+namespace stx {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Browsers need several times the size of a page to hold it.
+constexpr std::uint64_t kHard = 256ull << 20;
+/// Views that all look within this angle of their mean look at a scene, not around an object.
+constexpr double kSameSideCosine = 0.5;
+constexpr double kStartFovDeg = 40.0, kStartElevationDeg = 15.0;
+/// Of zlib; the page's program is packed once.
+constexpr int kBestLevel = 12;
+
+/// JSON that may stand in a script element of HTML.
+std::string inScript(const Json& json) {
+    std::string out;
+    for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+        if (c == '<')
+            out += "\\u003c";
+        else
+            out += c;
+    }
+    return out;
+}
+
+std::string inHtml(std::string_view text) {
+    std::string out;
+    for (const char c : text) {
+        switch (c) {
+            case '&':
+                out += "&amp;";
+                break;
+            case '<':
+                out += "&lt;";
+                break;
+            case '>':
+                out += "&gt;";
+                break;
+            case '"':
+                out += "&quot;";
+                break;
+            default:
+                out += c;
+        }
+    }
+    // As JSON does it, what is not UTF-8 is replaced.
+    return Json::parse(Json(out).dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+/// Code without indentation and lines that are comments.
+std::string withoutComments(std::string_view code) {
+    std::string out;
+    while (!code.empty()) {
+        const std::size_t end = std::min(code.find('\n'), code.size() - 1) + 1;
+        std::string_view line = code.substr(0, end);
+        code.remove_prefix(end);
+        line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+        if (line != "\n" && !line.starts_with("//")) out += line;
+    }
+    return out;
+}
+
+/// The program of the page and its shaders, packed.
+std::string packedProgram() {
+    Json texts;
+    for (const auto& [name, text] : {std::pair{"screen.vert", viewer::screen_vert},
+                                     {"prepare.frag", viewer::prepare_frag},
+                                     {"splat.vert", viewer::splat_vert},
+                                     {"splat.frag", viewer::splat_frag},
+                                     {"resolve.frag", viewer::resolve_frag},
+                                     {"pinholes.frag", viewer::pinholes_frag},
+                                     {"silhouettes.frag", viewer::silhouettes_frag},
+                                     {"present.frag", viewer::present_frag}})
+        texts[name] = withoutComments(text);
+    std::string code = "\"use strict\";\nconst kShaders = " + texts.dump() + ";\n";
+    for (const auto part : {viewer::png_js, viewer::camera_js, viewer::scene_js, viewer::painter_js,
+                            viewer::viewer_js})
+        code += withoutComments(part);
+    Bytes packed(zlibBound(code.size()));
+    packed.resize(compressZlib(std::as_bytes(std::span(code)), kBestLevel, packed));
+    return encodeBase64(packed);
+}
+
+/// What a page writes as it goes.
+class PageWriter {
+  public:
+    PageWriter(OutputFile file, std::string shell) : file_(std::move(file)) {
+        const std::size_t at = shell.find("@DATA@");
+        end_ = shell.substr(at + 6);
+        shell.resize(at);
+        head_ = std::move(shell);
+    }
+
+    Result<void> begin() { return write(head_); }
+
+    /// The number of a scene; that of the frame before when it is the same.
+    Result<int> add(std::size_t slot, PageScene scene) {
+        Json pages = Json::array();
+        if (slots_.size() <= slot) slots_.resize(slot + 1);
+        Slot& before = slots_[slot];
+        before.pages.resize(scene.pages.size());
+        for (std::size_t i = 0; i < scene.pages.size(); ++i) {
+            Json numbers = Json::object();
+            for (auto& [name, bytes] : scene.pages[i]) {
+                Image& last = before.pages[i][name];
+                if (last.number < 0 || last.bytes != bytes) {
+                    last = {images_++, std::move(bytes)};
+                    report.imageBytes += last.bytes.size();
+                    STX_CHECK(element("text/plain", fmt::format("image{}", last.number),
+                                      "data:image/png;base64," + encodeBase64(last.bytes)));
+                }
+                numbers[name] = last.number;
+            }
+            pages.push_back(std::move(numbers));
+        }
+        scene.description["pages"] = std::move(pages);
+        std::string text = inScript(scene.description);
+        if (before.number >= 0 && before.text == text) return before.number;
+        before.text = std::move(text);
+        before.number = scenes_++;
+        STX_CHECK(element("application/json", fmt::format("scene{}", before.number), before.text));
+        return before.number;
+    }
+
+    Result<void> finish(const Json& data) {
+        STX_CHECK(element("application/json", "data", inScript(data)));
+        STX_CHECK(element("text/plain", "code", packedProgram()));
+        STX_CHECK(write(end_));
+        return file_.commit();
+    }
+
+    PageReport report;
+
+  private:
+    struct Image {
+        int number = -1;
+        Bytes bytes;
+    };
+    struct Slot {
+        std::vector<std::map<std::string, Image>> pages;
+        int number = -1;
+        std::string text;
+    };
+
+    Result<void> write(std::string_view text) {
+        report.bytes += text.size();
+        return file_.write(text);
+    }
+    Result<void> element(std::string_view type, std::string_view id, std::string_view text) {
+        STX_CHECK(write(fmt::format("<script type=\"{}\" id=\"{}\">", type, id)));
+        STX_CHECK(write(text));
+        return write("</script>\n");
+    }
+
+    OutputFile file_;
+    std::string head_, end_;
+    std::vector<Slot> slots_;
+    int images_ = 0, scenes_ = 0;
+};
+
+std::string titleOf(const PageOptions& options, const std::string& bundle) {
+    if (!options.title.empty()) return options.title;
+    return bundle.empty() ? std::filesystem::path(options.input).filename().string() : bundle;
+}
+
+Result<PageWriter> startPage(const std::filesystem::path& path, const PageOptions& options,
+                             const std::string& title) {
+    std::string shell(viewer::viewer_html);
+    const std::string name = inHtml(titleOf(options, title));
+    for (std::size_t at = 0; (at = shell.find("@TITLE@", at)) != std::string::npos;)
+        shell.replace(at, 7, name), at += name.size();
+    STX_TRY(auto file, OutputFile::create(path, options.output));
+    PageWriter writer(std::move(file), std::move(shell));
+    STX_CHECK(writer.begin());
+    return writer;
+}
+
+std::vector<double> listOf(glm::dvec3 v) {
+    return {v.x, v.y, v.z};
+}
+
+/// Where the page begins: in front of an object, or, where all views look from one side, where the
+/// one in their middle is.
+Result<Json> startOf(const std::vector<Camera>& cameras, const Bounds& bounds) {
+    const glm::dvec3 centre = bounds.empty() ? glm::dvec3(0) : bounds.centre();
+    const double radius = bounds.empty() ? 1.0 : std::max(bounds.radius(), 1e-9);
+    glm::dvec3 mean(0), middle(0);
+    for (const Camera& c : cameras) {
+        mean += c.forward();
+        middle += c.position / static_cast<double>(cameras.size());
+    }
+    const bool oneSide = std::ranges::all_of(cameras, [&](const Camera& c) {
+        return !c.orthographic && glm::length(mean) > 0 &&
+               glm::dot(c.forward(), glm::normalize(mean)) > kSameSideCosine;
+    });
+    Json j;
+    CameraSettings lens;
+    lens.fovRad = glm::radians(kStartFovDeg);
+    lens.up = upOfCameras(cameras);
+    if (oneSide) {
+        const Camera& c = *std::ranges::min_element(cameras, {}, [&](const Camera& camera) {
+            return glm::length(camera.position - middle);
+        });
+        const double reach = glm::dot(centre - c.position, c.forward());
+        j["eye"] = listOf(c.position);
+        j["target"] = listOf(c.position + c.forward() * (reach > 0 ? reach : radius));
+        lens.fovRad = 2 * std::atan(0.5 * c.height / c.fy);
+    } else {
+        OrbitSettings orbit;
+        orbit.elevationRad = glm::radians(kStartElevationDeg);
+        STX_TRY(const auto front, orbitCameras(centre, radius, orbit, lens));
+        j["eye"] = listOf(front[0].position);
+        j["target"] = listOf(centre);
+    }
+    j["up"] = listOf(lens.up);
+    j["fov"] = glm::degrees(lens.fovRad);
+    j["centre"] = listOf(centre);
+    j["radius"] = radius;
+    j["around"] = !oneSide;
+    return j;
+}
+
+/// What the page knows beside its scenes.
+Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bounds,
+                    glm::dvec3 origin, const Timeline& line, const PageOptions& options,
+                    const PageReport& report) {
+    std::vector<Camera> cameras;
+    Json listed = Json::array();
+    for (const ReferenceView& view : views) {
+        if (view.background) continue;
+        cameras.push_back(view.camera);
+        Json j = pageCamera(view.camera, view.name);
+        const Camera& c = view.camera;
+        j["fov"] = c.orthographic ? 0.0 : glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
+        listed.push_back(std::move(j));
+    }
+    if (cameras.empty()) {
+        for (const ReferenceView& view : views) cameras.push_back(view.camera);
+    }
+    Json j;
+    j["version"] = 1;
+    j["input"] = options.input;
+    j["facts"] = fmt::format("{}, {}", counted(views.size(), "view"),
+                             counted(static_cast<std::size_t>(report.points), "point"));
+    j["origin"] = listOf(origin);
+    STX_TRY(j["start"], startOf(cameras, bounds));
+    j["cameras"] = std::move(listed);
+    j["times"] = line.times;
+    j["duration"] = line.duration;
+    return j;
+}
+
+Bundle part(const Bundle& bundle, bool background) {
+    Bundle out;
+    out.title = bundle.title;
+    out.origin = bundle.origin;
+    for (const ReferenceView& view : bundle.views) {
+        if (view.background == background) out.views.push_back(view);
+    }
+    return out;
+}
+
+void noteSize(const PageReport& report, Job& job) {
+    if (report.bytes > kHard)
+        job.note(fmt::format(
+            "the page has {} MiB, which phones and small computers may not be able to open; "
+            "smaller or fewer views, or fewer frames, make it smaller",
+            report.bytes >> 20));
+}
+
+}  // namespace
+
+Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path& path,
+                                   const PageOptions& options, Job& job) {
+    const Timeline& line = frames.timeline();
+    std::optional<PageWriter> writer;
+    Json scenes = Json::array(), data;
+    for (std::size_t i = 0; i < line.count(); ++i) {
+        job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(line.count()),
+                     "writing frames");
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(Bundle bundle, frames.frame(i, job));
+        makeViewable(bundle, job);
+        if (!writer) {
+            STX_TRY(writer, startPage(path, options, bundle.title));
+            writer->report.views = bundle.views.size();
+            writer->report.points = bundle.pointCount();
+            writer->report.frames = line.count();
+            STX_TRY(data,
+                    dataOf(bundle.views, bundle.bounds ? *bundle.bounds : bundle.computeBounds(),
+                           bundle.origin, line, options, writer->report));
+        }
+        // What is there now first, then what is behind it; a set of background alone is drawn as
+        // any.
+        Json numbers = Json::array();
+        std::vector<Bundle> parts;
+        parts.push_back(part(bundle, false));
+        parts.push_back(part(bundle, true));
+        std::erase_if(parts, [](const Bundle& b) { return b.views.empty(); });
+        for (std::size_t k = 0; k < parts.size(); ++k) {
+            STX_TRY(const Atlas atlas, packForPage(parts[k], job));
+            STX_TRY(auto scene, pageScene(atlas, job));
+            STX_TRY(const int number, writer->add(k, std::move(scene)));
+            numbers.push_back(number);
+        }
+        scenes.push_back(std::move(numbers));
+    }
+    data["frames"] = std::move(scenes);
+    STX_CHECK(writer->finish(data));
+    noteSize(writer->report, job);
+    return writer->report;
+}
+
+Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::path& path,
+                                   const PageOptions& options, Job& job) {
+    STX_CHECK(atlas.check());
+    const bool asItIs =
+        atlas.paddingHolds(PageSet::kPadding) && !atlas.pages[0].texture.isLinear() &&
+        std::ranges::none_of(
+            atlas.views, [](const ReferenceView& v) { return v.depthBits == 32 || v.background; });
+    if (!asItIs) {
+        STX_TRY(auto bundle, unpack(atlas, job));
+        const auto still = sequenceOf(std::move(bundle));
+        return writeViewerPage(*still, path, options, job);
+    }
+    STX_TRY(auto writer, startPage(path, options, atlas.title));
+    writer.report.views = atlas.views.size();
+    writer.report.points = atlas.pointCount();
+    writer.report.frames = 1;
+    STX_TRY(const PageSet set, PageSet::of(atlas, job));
+    STX_TRY(Json data,
+            dataOf(atlas.views, set.bounds(), atlas.origin, Timeline(), options, writer.report));
+    STX_TRY(auto scene, pageScene(atlas, job));
+    STX_TRY(const int number, writer.add(0, std::move(scene)));
+    data["frames"] = {{number}};
+    STX_CHECK(writer.finish(data));
+    noteSize(writer.report, job);
+    return writer.report;
+}
+
+}  // namespace stx

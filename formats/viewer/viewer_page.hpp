@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "formats/files/files.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/atlas.hpp"
+#include "lib/model/sequence.hpp"
+
+namespace stx {
+
+/// How a page is written.
+struct PageOptions {
+    /// The input as `stx render` is given it, for the command that the page shows.
+    std::string input;
+    /// What browsers show as its name; empty: the bundle's title, else the input's name.
+    std::string title;
+    OutputFile::Options output = {};
+};
+
+/// What a page holds.
+struct PageReport {
+    std::size_t views = 0;
+    std::int64_t points = 0;  ///< of the first frame
+    std::size_t frames = 0;
+    std::uint64_t imageBytes = 0;  ///< of its PNG files
+    std::uint64_t bytes = 0;       ///< of the page
+};
+
+/// Writes one HTML file, whole or not at all, that draws a bundle in any browser with WebGL 2 and
+/// needs nothing else: Lee & Park's path with stx's splats (formats/viewer). The views of each
+/// frame are merged into at most four textures (pack(), tight), each a PNG: colour in 8 bits with
+/// alpha, depth as DepthImage codes of 8 or 16 bits, normals in 8 bits, tilts and sizes of splats
+/// in 8 bits. Background views have textures of their own. Images that are the same as those of the
+/// frame before are written once. The page takes the images as base64, and 25 kB.
+///
+/// Notes: colours of linear light become 8-bit sRGB, depth of 32 bits becomes 16; a page that
+/// browsers find hard to hold. Errors: those of the sequence and of pack(); files; cancelled.
+[[nodiscard]] Result<PageReport> writeViewerPage(Sequence& frames,
+                                                 const std::filesystem::path& path,
+                                                 const PageOptions& options, Job& job);
+/// The same with an atlas' own textures, where their padding allows that.
+[[nodiscard]] Result<PageReport> writeViewerPage(const Atlas& atlas,
+                                                 const std::filesystem::path& path,
+                                                 const PageOptions& options, Job& job);
+
+}  // namespace stx

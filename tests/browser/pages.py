@@ -1,0 +1,28 @@
+"""Pages of the viewer in a browser, for tests."""
+import json
+import os
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../cli"))
+
+from harness import must, run  # noqa: E402,F401
+
+READY = "typeof viewer === 'object' && document.getElementById('message').textContent === ''"
+
+
+def show(browser, path, fragment):
+    """Opens a page with a camera, and waits until it is drawn."""
+    browser.open(f"file://{path}#{fragment}")
+    browser.until(READY)
+
+
+def drawn(browser):
+    """Waits for what was asked to be drawn, at rest."""
+    browser.until("!viewer.waiting && !viewer.quick")
+
+
+def psnr(stx, a, b, folder):
+    """dB; what is the same to the bit has 99."""
+    done = run([stx, "compare", a, b, "--format", "json"], folder)
+    value = json.loads(done.out)["psnr"]["rgb"]
+    return 99.0 if value is None else value

@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""`stx extract -o view.html` in a real Chromium: its pictures against `stx render --mode splat`, what people
+touch, and what is said where WebGL 2 is missing."""
+import os
+import shlex
+import sys
+import tempfile
+
+import chromium
+from pages import READY, drawn, must, psnr, show
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../cli"))
+from harness import arguments  # noqa: E402
+
+LEAST = 32.0  # dB against stx's own splats
+SIZE = "360x300"
+MODELS = {"spot": "spot_triangulated.obj", "fox": "Fox.gltf", "truck": "CesiumMilkTruck.gltf"}
+
+
+def find_model(shared, name):
+    """A model by its file's name, wherever it lies below the shared meshes, and not packed by Draco."""
+    for root, _, names in sorted(os.walk(os.path.join(shared, "data/meshes"))):
+        if name in names and "raco" not in root[len(shared):].replace("draco-repo", ""):
+            return os.path.join(root, name)
+    return None
+
+
+class Test:
+    def __init__(self, args, folder):
+        self.stx, self.folder, self.failed = args.stx, folder, 0
+
+    def check(self, holds, text):
+        print(("ok: " if holds else "FAILED: ") + text, flush=True)
+        self.failed += not holds
+
+    def stx_run(self, *words):
+        return must([self.stx, *words], self.folder, timeout=300)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def compare(self, browser, name, page, source, eye, target, light=False):
+        """A picture of the page against stx's own."""
+        width, height = SIZE.split("x")
+        fragment = f"eye={eye}&target={target}&fov=40&size={SIZE}&ui=off&background=%23000000"
+        words = ["--light=dir:-1,-1,-0.5", "--ambient", "0.25"] if light else []
+        show(browser, self.path(page), fragment + ("&light=-1,-1,-0.5&ambient=0.25" if light else ""))
+        browser.picture(self.path("shot.png"), int(width), int(height))
+        self.stx_run("render", source, "-o", "wanted.png", "--mode", "splat", f"--eye={eye}", f"--target={target}", "--fov", "40",
+                     "--size", SIZE, "--background", "black", "--backend", "cpu", *words)
+        found = psnr(self.stx, "shot.png", "wanted.png", self.folder)
+        self.check(found >= LEAST, f"{name}: {found:.1f} dB")
+
+
+def models(test, browser, args):
+    """Four kinds of content: as captured, baked and lit, pruned in an atlas, and a scene of its own."""
+    sources = {"amphora": args.model}
+    for name, path in MODELS.items():
+        found = find_model(args.shared, path)
+        if found:
+            sources[name] = found
+    for name, path in sources.items():
+        texture = os.path.join(os.path.dirname(path), f"{name}_texture.png")
+        more = ["--texture", texture] if os.path.isfile(texture) else []
+        test.stx_run("convert", path, "-o", f"{name}.mp4", "--views", "sphere:16", "--size", "256x256", *more)
+        test.stx_run("extract", f"{name}.mp4", "-o", f"{name}.html")
+        bounds = bounds_of(test, f"{name}.mp4")
+        centre = [(a + b) / 2 for a, b in zip(*bounds)]
+        reach = 1.3 * sum((b - a) ** 2 for a, b in zip(*bounds)) ** 0.5
+        place = lambda v: ",".join(f"{c + reach * d:.6g}" for c, d in zip(centre, v))
+        test.compare(browser, name, f"{name}.html", f"{name}.mp4", place((0.45, 0.35, 0.82)), place((0, 0, 0)))
+    test.stx_run("bake", "amphora.mp4", "-o", "baked.mp4")
+    test.stx_run("extract", "baked.mp4", "-o", "baked.html")
+    test.compare(browser, "amphora, baked, under a light", "baked.html", "baked.mp4", "1.5,1.2,2.5", "0,0.5,0", light=True)
+    test.stx_run("pack", "amphora.mp4", "-o", "atlas", "--prune", "--layout", "tight")
+    test.stx_run("extract", "atlas", "-o", "atlas.html")
+    test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
+    test.compare(browser, "amphora, from afar", "amphora.html", "amphora.mp4", "4,3,9", "0,0.5,0")
+    test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
+
+
+def bounds_of(test, name):
+    import json
+    done = test.stx_run("info", name, "--format", "json", "--bounds")
+    bounds = json.loads(done.out)["bounds"]
+    return bounds["min"], bounds["max"]
+
+
+def touched(test, browser):
+    """Mouse, wheel, keys, touch, the command and the address."""
+    show(browser, test.path("amphora.html"), "eye=1.5,1.2,2.5&target=0,0.5,0&fov=40")
+    camera = lambda: browser.ask("JSON.stringify(viewer.camera)")
+    for name, act in [
+            ("a drag", lambda: browser.drag((400, 150), (460, 170))),
+            ("a drag with the right button", lambda: browser.drag((400, 150), (430, 160), "right")),
+            ("the wheel", lambda: browser.wheel((400, 150), 120)),
+            ("an arrow key", lambda: browser.key("ArrowLeft")),
+            ("plus", lambda: browser.key("+")),
+            ("Shift and an arrow", lambda: browser.key("ArrowUp", 8)),
+            ("the start key", lambda: browser.key("r"))]:
+        before = camera()
+        act()
+        test.check(camera() != before, f"{name} moves the camera")
+    browser.key("l")
+    test.check(browser.ask("viewer.look().light.on"), "a key switches the light on")
+    drawn(browser)
+    browser.until("location.hash.includes('light=')")
+    kept = browser.ask("location.hash")
+    test.check("eye=" in kept and "target=" in kept and "fov=" in kept, f"the address has the camera: {kept}")
+    # The command draws what the page shows.
+    browser.ask("document.getElementById('command').click()")
+    command = browser.ask("document.getElementById('command-text').value")
+    browser.ask("document.getElementById('panel').hidden = true")
+    browser.ask("document.activeElement.blur()")  # or its ring would be in the picture
+    browser.ask("viewer.draw()")
+    browser.picture(test.path("shot.png"))
+    words = shlex.split(command)
+    test.check(words[:2] == ["stx", "render"], command)
+    test.stx_run(*words[1:], "--backend", "cpu")
+    found = psnr(test.stx, "shot.png", "view.png", test.folder)
+    test.check(found >= LEAST, f"the command's picture: {found:.1f} dB")
+
+
+def phone(test, browser):
+    browser.size(360, 640, phone=True)
+    show(browser, test.path("amphora.html"), "")
+    test.check(browser.ask("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than a phone's screen")
+    before = browser.ask("JSON.stringify(viewer.camera)")
+    browser.touch("touchStart", (180, 200))
+    browser.touch("touchMove", (220, 210))
+    browser.touch("touchEnd")
+    turned = browser.ask("JSON.stringify(viewer.camera)")
+    test.check(turned != before, "a finger turns the object")
+    browser.touch("touchStart", (150, 200), (210, 200))
+    browser.touch("touchMove", (120, 200), (240, 200))
+    browser.touch("touchEnd")
+    nearer = "Math.hypot(...viewer.camera.eye.map((v, i) => v - viewer.camera.target[i]))"
+    test.check(browser.ask("JSON.stringify(viewer.camera)") != turned, f"two fingers move it: {browser.ask(nearer):.2f}")
+    unlabelled = browser.ask("[...document.querySelectorAll('input,select,textarea')].filter(e => !e.labels.length).length")
+    test.check(unlabelled == 0, "every field has a label")
+
+
+def main():
+    args = arguments(__doc__)
+    if not chromium.find():
+        print("SKIP: chromium is not installed (Debian's package chromium)")
+        return 77
+    with tempfile.TemporaryDirectory(prefix="stx-page-") as folder:
+        test = Test(args, folder)
+        with chromium.Browser() as browser:
+            browser.size(640, 400)
+            models(test, browser, args)
+            touched(test, browser)
+            phone(test, browser)
+            test.check(not browser.faults, f"no fault is logged: {browser.faults[:3]}")
+            outside = [r for r in browser.requests if not r.startswith(("file:", "about:", "blob:", "data:"))]
+            test.check(not outside, f"nothing is asked of the network: {outside[:3]}")
+        with chromium.Browser(["--disable-3d-apis"]) as browser:
+            browser.open("file://" + test.path("amphora.html"))
+            browser.until("document.getElementById('message').className === 'failed'")
+            said = browser.ask("document.getElementById('message').textContent")
+            test.check("needs WebGL 2" in said, f"without WebGL 2: {said}")
+        return 1 if test.failed else 0
+
+
+if __name__ == "__main__":
+    assert READY
+    sys.exit(main())

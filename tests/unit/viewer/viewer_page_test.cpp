@@ -1,0 +1,206 @@
+#include "formats/viewer/viewer_page.hpp"
+
+#include <regex>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "formats/files/base64.hpp"
+#include "formats/images/images.hpp"
+#include "formats/viewer/page_scene.hpp"
+#include "lib/packing/packing.hpp"
+#include "tests/small_bundle.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/torus_bundle.hpp"
+
+namespace {
+
+using namespace stx;
+using Json = nlohmann::json;
+
+/// A page as a browser finds it.
+struct ReadPage {
+    std::string text;
+    std::map<std::string, std::string> scripts;  ///< by id
+
+    [[nodiscard]] Json json(const std::string& id) const { return Json::parse(scripts.at(id)); }
+    [[nodiscard]] DecodedImage image(int number) const {
+        const std::string& uri = scripts.at(fmt::format("image{}", number));
+        const std::string kind = "data:image/png;base64,";
+        EXPECT_TRUE(uri.starts_with(kind));
+        const auto bytes = decodeBase64(uri.substr(kind.size()));
+        EXPECT_TRUE(bytes);
+        auto image = decodeImage(*bytes, "page", Limits());
+        EXPECT_TRUE(image);
+        return std::move(*image);
+    }
+    [[nodiscard]] int count(const std::string& name) const {
+        int n = 0;
+        while (scripts.contains(fmt::format("{}{}", name, n))) ++n;
+        return n;
+    }
+};
+
+ReadPage readPage(const std::filesystem::path& path) {
+    const auto bytes = readFile(path, Limits());
+    EXPECT_TRUE(bytes);
+    ReadPage page;
+    page.text.assign(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    const std::string begin = "<script type=\"", id = "\" id=\"", end = "</script>";
+    for (std::size_t at = 0; (at = page.text.find(begin, at)) != std::string::npos;) {
+        const std::size_t name = page.text.find(id, at) + id.size();
+        const std::size_t close = page.text.find("\">", name);
+        const std::size_t last = page.text.find(end, close);
+        page.scripts[page.text.substr(name, close - name)] =
+            page.text.substr(close + 2, last - close - 2);
+        at = last;
+    }
+    return page;
+}
+
+Result<PageReport> write(Bundle bundle, const std::filesystem::path& path, Job& job,
+                         const PageOptions& options = {"bundle.mp4", {}, {}}) {
+    const auto still = sequenceOf(std::move(bundle));
+    return writeViewerPage(*still, path, options, job);
+}
+
+TEST(ViewerPage, TakesAtMostFourTenthsMoreThanItsImages) {
+    const TemporaryFolder folder;
+    Job job;
+    const auto report = write(torusViews(256), folder.path() / "a.html", job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_EQ(report->bytes, std::filesystem::file_size(folder.path() / "a.html"));
+    // What the page is beside its images does not grow with them.
+    EXPECT_LT(
+        static_cast<double>(report->bytes) - 4.0 / 3.0 * static_cast<double>(report->imageBytes),
+        60000.0);
+    EXPECT_LT(static_cast<double>(report->bytes), 1.4 * static_cast<double>(report->imageBytes));
+}
+
+TEST(ViewerPage, HoldsTheTexturesOfATightAtlas) {
+    const TemporaryFolder folder;
+    Job job;
+    const Bundle bundle = smallBundle(5, 16, false, false);
+    const auto report = write(bundle, folder.path() / "a.html", job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_EQ(report->views, 5u);
+    EXPECT_EQ(report->points, bundle.pointCount());
+    const ReadPage page = readPage(folder.path() / "a.html");
+    const Json scene = page.json("scene0");
+    EXPECT_EQ(page.count("image"), 2);
+    const auto colour = page.image(scene["pages"][0]["colour"]);
+    const auto depth = page.image(scene["pages"][0]["depth"]);
+    ASSERT_EQ(colour.channels, 4);
+    ASSERT_EQ(depth.bits(), 16);
+    // Every point is there, with its colour and the code of its distance.
+    const auto& rgba = std::get<std::vector<std::uint8_t>>(colour.values);
+    const auto& codes = std::get<std::vector<std::uint16_t>>(depth.values);
+    std::int64_t found = 0;
+    for (const Json& r : scene["rectangles"]) {
+        const ReferenceView& view = bundle.views[r[0].get<std::size_t>()];
+        const int width = r[6], height = r[7];
+        const bool turned = r[8] == 1;
+        for (int j = 0; j < height; ++j) {
+            for (int i = 0; i < width; ++i) {
+                const int x = r[2].get<int>() + (turned ? j : i);
+                const int y = r[3].get<int>() + (turned ? width - 1 - i : j);
+                const std::size_t texel =
+                    static_cast<std::size_t>(r[5].get<int>() + j) * colour.width +
+                    static_cast<std::size_t>(r[4].get<int>() + i);
+                EXPECT_EQ(codes[texel], view.depthCode().encode(view.depth.at(x, y)));
+                if (!hasPoint(view.depth.at(x, y))) continue;
+                ++found;
+                const glm::u8vec4 c = view.texture.rgba8()->at(x, y);
+                EXPECT_EQ(rgba[4 * texel], c.r);
+                EXPECT_EQ(rgba[4 * texel + 3], c.a);
+            }
+        }
+    }
+    EXPECT_EQ(found, bundle.pointCount());
+}
+
+TEST(ViewerPage, HoldsNormalsAndSplatsInFourTextures) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(write(smallBundle(3, 8, true, false), folder.path() / "a.html", job));
+    const ReadPage page = readPage(folder.path() / "a.html");
+    const Json images = page.json("scene0")["pages"][0];
+    EXPECT_EQ(images.size(), 4u);
+    EXPECT_EQ(page.image(images["depth"]).bits(), 8);
+    EXPECT_EQ(page.image(images["normal"]).channels, 3);
+    EXPECT_EQ(page.image(images["splat"]).bits(), 8);
+}
+
+TEST(ViewerPage, SaysWhatItRounds) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(write(smallBundle(2, 32, false, true), folder.path() / "a.html", job));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 2u);
+    EXPECT_NE(notes[0].find("8-bit sRGB"), std::string::npos);
+    EXPECT_NE(notes[1].find("becomes 16"), std::string::npos);
+}
+
+TEST(ViewerPage, TitlesAndNamesCannotLeaveTheirPlace) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = smallBundle(1, 16, false, false);
+    bundle.title = "</title><script>alert(1)</script>@DATA@ & \"\xff";
+    bundle.views[0].name = "</script><script>alert(2)</script>";
+    ASSERT_TRUE(write(bundle, folder.path() / "a.html", job, {"</script>.mp4", {}, {}}));
+    const ReadPage page = readPage(folder.path() / "a.html");
+    EXPECT_EQ(page.text.find("<script>alert"), std::string::npos);
+    EXPECT_NE(page.text.find("&lt;script&gt;alert(1)"), std::string::npos);
+    EXPECT_EQ(page.json("data")["input"], "</script>.mp4");
+    EXPECT_EQ(page.json("data")["cameras"][0]["name"], bundle.views[0].name);
+    EXPECT_EQ(page.count("image"), 2);
+}
+
+/// Two frames of which one view's pictures stay.
+class HalfStill : public Sequence {
+  public:
+    HalfStill() { timeline_ = steadyTimeline(3, 10); }
+    Result<Bundle> frame(std::size_t index, Job&) override {
+        Bundle bundle = smallBundle(2, 16, false, false);
+        bundle.views[1].background = true;
+        if (index == 2) bundle.views[0].texture.rgba8()->at(5, 5) = {1, 2, 3, 255};
+        bundle.time = timeline_.times[index];
+        return bundle;
+    }
+};
+
+TEST(ViewerPage, WritesWhatStaysOfAFilmOnce) {
+    const TemporaryFolder folder;
+    Job job;
+    HalfStill film;
+    const auto report = writeViewerPage(film, folder.path() / "a.html", {"film.mp4", {}, {}}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    const ReadPage page = readPage(folder.path() / "a.html");
+    EXPECT_EQ(page.json("data")["frames"], Json::parse("[[0,1],[0,1],[2,1]]"));
+    // Colour and depth of both, and the colour that changed.
+    EXPECT_EQ(page.count("image"), 5);
+    EXPECT_EQ(page.json("data")["times"].size(), 3u);
+}
+
+TEST(ViewerPage, TakesAnAtlasAsItIs) {
+    const TemporaryFolder folder;
+    Job job;
+    const Bundle bundle = smallBundle(4, 16, false, false);
+    const auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas);
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "a.html", {"atlas", {}, {}}, job));
+    const ReadPage page = readPage(folder.path() / "a.html");
+    const auto colour = page.image(page.json("scene0")["pages"][0]["colour"]);
+    EXPECT_EQ(colour.width, atlas->width());
+    EXPECT_EQ(colour.height, atlas->height());
+}
+
+TEST(ViewerPage, LeavesNothingWhenItFails) {
+    const TemporaryFolder folder;
+    Job job;
+    job.cancelled = true;
+    EXPECT_FALSE(write(smallBundle(2, 16, false, false), folder.path() / "a.html", job));
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+}  // namespace

@@ -1,0 +1,68 @@
+#include "tools/extract_shown.hpp"
+
+#include <chrono>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/atlas/atlas_files.hpp"
+#include "formats/open.hpp"
+#include "formats/sequences.hpp"
+#include "formats/viewer/viewer_page.hpp"
+
+namespace stx::tools {
+namespace {
+
+/// What was written, for the last line and the report.
+struct Shown {
+    std::string what;
+    std::size_t views = 0;
+    std::int64_t points = 0;
+};
+
+/// A page for browsers, of an atlas' own textures where it is one.
+Result<Shown> writePage(const std::string& input, const std::string& output, Program& program) {
+    PageOptions write;
+    write.input = input;
+    write.output = program.outputOptions();
+    STX_TRY(const auto kind, recognise(input));
+    Result<PageReport> page = PageReport();
+    if (kind == FileKind::atlas) {
+        STX_TRY(const auto atlas, readAtlas(input, program.job));
+        page = writeViewerPage(atlas, output, write, program.job);
+    } else {
+        STX_TRY(const auto frames, openSequence(input, {}, program.job));
+        page = writeViewerPage(*frames, output, write, program.job);
+    }
+    if (!page) return propagate(page);
+    return Shown{page->frames > 1 ? fmt::format("{} of {}", counted(page->frames, "frame"),
+                                                counted(page->views, "view"))
+                                  : counted(page->views, "view"),
+                 page->views, page->points};
+}
+
+}  // namespace
+
+bool isShown(const std::string& ending) {
+    return ending == ".html";
+}
+
+Result<int> extractShown(const std::string& input, const std::string& output, Program& program) {
+    const auto start = std::chrono::steady_clock::now();
+    STX_TRY(const Shown done, writePage(input, output, program));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    program.sayNotes();
+    program.say(fmt::format("{} ({}) → {} ({}), {}, {}",
+                            std::filesystem::path(input).filename().string(),
+                            humanBytes(bytesOf(input)), output, humanBytes(bytesOf(output)),
+                            done.what, humanSeconds(seconds)));
+    STX_CHECK(program.writeReport({{"$schema", "extract-report.schema.json"},
+                                   {"input", input},
+                                   {"output", output},
+                                   {"views", done.views},
+                                   {"points", done.points},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+}  // namespace stx::tools

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "tools/program.hpp"
+
+namespace stx::tools {
+
+/// Whether a file that ends so is one that others show as it is: ".html", a page for browsers.
+[[nodiscard]] bool isShown(const std::string& ending);
+/// `stx extract` into such a file: says what was written and reports it. Errors: those of the input
+/// and of writing.
+[[nodiscard]] Result<int> extractShown(const std::string& input, const std::string& output,
+                                       Program& program);
+
+}  // namespace stx::tools
