@@ -71,8 +71,8 @@ Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& 
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     ExtractOptions o = options;
-    STX_TRY(o.output, folderTarget(options.output, {".html", ".ply", ".drc"},
-                                   "a folder, .html, .ply or .drc"));
+    STX_TRY(o.output, folderTarget(options.output, {".glb", ".html", ".ply", ".drc"},
+                                   "a folder, .glb, .html, .ply or .drc"));
     const auto dotted = std::filesystem::path(o.output).extension();
     std::error_code ec;
     const bool plain = o.output == options.output && !std::filesystem::is_directory(o.output, ec);
@@ -157,19 +157,20 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
 void addExtract(CommandLine& line, Program& program) {
     Command c = line.add(
         "extract",
-        "Images and cameras of a bundle as plain files, its points as .ply or .drc, or a "
-        "page that draws it in any browser\n\n"
+        "Images and cameras of a bundle as plain files, its points as .ply or .drc, a "
+        "model of surfaces, or a page that draws it in any browser\n\n"
         "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
         "  stx extract model.mp4 -o folder --cameras miv\n"
         "  stx extract film.mp4 -o folder            all frames, with their times\n"
         "  stx extract model.mp4 -o points.ply\n"
+        "  stx extract model.mp4 -o model.glb        surfaces with textures, for any glTF viewer\n"
         "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n\n"
         "The page is turned by dragging, by keys and by touch, under a light that moves, and "
         "plays\nfilms. Its address takes a camera: "
         "view.html#eye=0,1,3&target=0,0,0&fov=40.");
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
-    c.option("-o,--output", o->output, "Folder, points.ply, points.drc or view.html")
+    c.option("-o,--output", o->output, "Folder, points.ply, points.drc, model.glb or view.html")
         .required()
         .takes("OUT");
     c.option(

@@ -7,6 +7,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/open.hpp"
 #include "formats/sequences.hpp"
+#include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 
 namespace stx::tools {
@@ -40,15 +41,34 @@ Result<Shown> writePage(const std::string& input, const std::string& output, Pro
                  page->views, page->points};
 }
 
+/// A model of the first frame.
+Result<Shown> writeModel(const std::string& input, const std::string& output, Program& program) {
+    STX_TRY(const auto frames, openSequence(input, {}, program.job));
+    if (frames->timeline().count() > 1)
+        program.job.note(fmt::format("'{}' has {} frames; the model is of the first", input,
+                                     frames->timeline().count()));
+    STX_TRY(auto bundle, frames->frame(0, program.job));
+    Shown out{"", bundle.views.size(), bundle.pointCount()};
+    STX_TRY(const auto report,
+            writeSurfaces(output, std::move(bundle), program.outputOptions(), program.job));
+    out.what = counted(report.views, "view") + ", " +
+               counted(static_cast<std::size_t>(report.triangles), "triangle");
+    if (report.points > 0)
+        out.what += ", " + counted(static_cast<std::size_t>(report.points), "point");
+    return out;
+}
+
 }  // namespace
 
 bool isShown(const std::string& ending) {
-    return ending == ".html";
+    return ending == ".html" || ending == ".glb";
 }
 
 Result<int> extractShown(const std::string& input, const std::string& output, Program& program) {
     const auto start = std::chrono::steady_clock::now();
-    STX_TRY(const Shown done, writePage(input, output, program));
+    STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
+                                  ? writeModel(input, output, program)
+                                  : writePage(input, output, program));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();

@@ -6,7 +6,8 @@
 
 namespace stx::tools {
 
-/// Whether a file that ends so is one that others show as it is: ".html", a page for browsers.
+/// Whether a file that ends so is one that others show as it is: ".html", a page for browsers,
+/// and ".glb", a model for any viewer.
 [[nodiscard]] bool isShown(const std::string& ending);
 /// `stx extract` into such a file: says what was written and reports it. Errors: those of the input
 /// and of writing.

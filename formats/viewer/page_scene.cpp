@@ -112,13 +112,17 @@ Json pageCamera(const Camera& c, const std::string& name) {
     return j;
 }
 
-void makeViewable(Bundle& bundle, Job& job) {
+void codeColours(Bundle& bundle, std::string_view what, Job& job) {
     const bool linear = std::ranges::any_of(
         bundle.views, [](const ReferenceView& v) { return v.texture.isLinear(); });
-    if (linear) job.note("colours of linear light become 8-bit sRGB in the page");
+    if (linear) job.note(fmt::format("colours of linear light become 8-bit sRGB in {}", what));
     for (auto& view : bundle.views) {
         if (const auto* floats = view.texture.rgbaFloat()) view.texture = coded(*floats);
     }
+}
+
+void makeViewable(Bundle& bundle, Job& job) {
+    codeColours(bundle, "the page", job);
     const bool deep =
         std::ranges::any_of(bundle.views, [](const ReferenceView& v) { return v.depthBits == 32; });
     if (!deep) return;

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -22,6 +23,8 @@ struct PageScene {
     std::vector<PageImages> pages;
 };
 
+/// A bundle with 8-bit sRGB colour, which `what` ("the page") has. What is lossy is noted.
+void codeColours(Bundle& bundle, std::string_view what, Job& job);
 /// A bundle with 8-bit sRGB colour and depth of 8 or 16 bits, as the viewer's textures hold them.
 /// What is lossy is noted.
 void makeViewable(Bundle& bundle, Job& job);

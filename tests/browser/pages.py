@@ -7,6 +7,8 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../
 
 from harness import must, run  # noqa: E402,F401
 
+# Where `npm ci` in this folder puts what package.json names.
+NODE_MODULES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "node_modules")
 READY = "typeof viewer === 'object' && document.getElementById('message').textContent === ''"
 
 

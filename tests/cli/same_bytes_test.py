@@ -65,6 +65,7 @@ def main():
                              "--backend", "cpu", "--eye=0.25,0.5,3.5"],
             "render mesh": ["render", args.model, "-o", "OUT/a.exr", "--size", "120x90"],
             "extract": ["extract", "IN/in.exr", "-o", "OUT/images"],
+            "extract glb": ["extract", "IN/in.exr", "-o", "OUT/model.glb"],
             "extract html": ["extract", "IN/baked.mp4", "-o", "OUT/view.html"],
             "sheet": ["sheet", "IN/baked.mp4", "-o", "OUT/a.png"],
             "sheet of two": ["sheet", "IN/in.exr", "IN/baked.mp4", "-o", "OUT/a.png"],

@@ -1,0 +1,282 @@
+#include "formats/viewer/surfaces_glb.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/images/images.hpp"
+#include "formats/viewer/page_scene.hpp"
+#include "lib/base/counted.hpp"
+#include "lib/render/surface/view_surfaces.hpp"
+
+namespace stx {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Numbers of glTF 2.0.
+constexpr int kUnsignedByte = 5121, kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126;
+constexpr int kVertices = 34962, kIndices = 34963;
+constexpr int kLinear = 9729, kLinearMipmaps = 9987, kClamp = 33071;
+constexpr std::uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
+/// Indices up to this are of 16 bits; the value above it would restart a strip.
+constexpr std::size_t kMostOf16Bits = 65535;
+
+template <class T>
+ByteSpan bytesOfList(const std::vector<T>& list) {
+    return std::as_bytes(std::span(list));
+}
+
+/// The file as it grows.
+class Model {
+  public:
+    Model() {
+        root_["asset"] = {{"version", "2.0"}, {"generator", "stx"}};
+        root_["scene"] = 0;
+        root_["scenes"] = Json::array({Json::object()});
+        for (const char* name : {"nodes", "meshes", "materials", "textures", "images", "samplers",
+                                 "accessors", "bufferViews"})
+            root_[name] = Json::array();
+    }
+
+    Json& root() { return root_; }
+    std::size_t add(const char* list, Json entry) {
+        root_[list].push_back(std::move(entry));
+        return root_[list].size() - 1;
+    }
+
+    /// Bytes at a multiple of four, as a new buffer view. `target` 0: of an image.
+    std::size_t addBytes(ByteSpan bytes, int target) {
+        binary_.resize((binary_.size() + 3) / 4 * 4);
+        Json view{{"buffer", 0}, {"byteOffset", binary_.size()}, {"byteLength", bytes.size()}};
+        if (target != 0) view["target"] = target;
+        binary_.insert(binary_.end(), bytes.begin(), bytes.end());
+        return add("bufferViews", std::move(view));
+    }
+    std::size_t addNumbers(ByteSpan bytes, std::size_t count, const char* type, int component,
+                           int target) {
+        const std::size_t view = addBytes(bytes, target);
+        return add(
+            "accessors",
+            {{"bufferView", view}, {"componentType", component}, {"count", count}, {"type", type}});
+    }
+    std::size_t addPositions(const std::vector<glm::vec3>& positions) {
+        const std::size_t number =
+            addNumbers(bytesOfList(positions), positions.size(), "VEC3", kFloat, kVertices);
+        glm::vec3 low = positions[0], high = positions[0];
+        for (const glm::vec3& p : positions) low = glm::min(low, p), high = glm::max(high, p);
+        root_["accessors"][number]["min"] = {low.x, low.y, low.z};
+        root_["accessors"][number]["max"] = {high.x, high.y, high.z};
+        return number;
+    }
+    std::size_t addIndices(const std::vector<std::uint32_t>& indices, std::size_t vertices) {
+        if (vertices > kMostOf16Bits)
+            return addNumbers(bytesOfList(indices), indices.size(), "SCALAR", kUnsignedInt,
+                              kIndices);
+        const std::vector<std::uint16_t> shorts(indices.begin(), indices.end());
+        return addNumbers(bytesOfList(shorts), shorts.size(), "SCALAR", kUnsignedShort, kIndices);
+    }
+
+    /// The bytes of a normalised list of N numbers of 16 bits in each entry.
+    std::size_t addUnits(const std::vector<std::uint16_t>& values, std::size_t each,
+                         const char* type) {
+        const std::size_t number =
+            addNumbers(bytesOfList(values), values.size() / each, type, kUnsignedShort, kVertices);
+        root_["accessors"][number]["normalized"] = true;
+        return number;
+    }
+
+    void addNode(std::string name, Json primitives) {
+        const std::size_t mesh =
+            add("meshes", {{"name", name}, {"primitives", std::move(primitives)}});
+        const std::size_t node = add("nodes", {{"name", std::move(name)}, {"mesh", mesh}});
+        root_["scenes"][0]["nodes"].push_back(node);
+    }
+
+    Result<void> write(const std::filesystem::path& path, OutputFile::Options options) {
+        binary_.resize((binary_.size() + 3) / 4 * 4);
+        root_["buffers"] = Json::array({{{"byteLength", binary_.size()}}});
+        // Lists that glTF does not take empty.
+        for (const char* name : {"textures", "images", "samplers", "materials"})
+            if (root_[name].empty()) root_.erase(name);
+        std::string text = root_.dump(-1, ' ', false, Json::error_handler_t::replace);
+        text.resize((text.size() + 3) / 4 * 4, ' ');
+        const std::uint64_t size = 28ull + text.size() + binary_.size();
+        if (size > std::numeric_limits<std::uint32_t>::max())
+            return fail(ErrorCode::failed,
+                        "the model has {} bytes; a GLB file holds less than 2^32 (smaller or fewer "
+                        "views make it smaller)",
+                        size);
+        STX_TRY(auto file, OutputFile::create(path, options));
+        const auto words = [&](std::initializer_list<std::uint64_t> list) {
+            std::vector<std::uint32_t> out;
+            for (const std::uint64_t w : list) out.push_back(static_cast<std::uint32_t>(w));
+            return out;
+        };
+        STX_CHECK(file.write(bytesOfList(words({kMagic, 2, size, text.size(), kJsonChunk}))));
+        STX_CHECK(file.write(text));
+        STX_CHECK(file.write(bytesOfList(words({binary_.size(), kBinaryChunk}))));
+        STX_CHECK(file.write(bytesOfList(binary_)));
+        return file.commit();
+    }
+
+  private:
+    Json root_;
+    Bytes binary_;
+};
+
+/// A colour's part of 8 bits as 16 bits of linear light, as COLOR_0 has it.
+std::uint16_t linearShort(std::uint8_t coded) {
+    return static_cast<std::uint16_t>(
+        std::lround(linearFromSrgb(static_cast<float>(coded) / 255.0f) * 65535.0f));
+}
+
+glm::vec3 unitOr(glm::vec3 normal, glm::vec3 other) {
+    const float length = glm::length(normal);
+    return length > 0 ? normal / length : other;
+}
+
+class Writer {
+  public:
+    Writer(const Bundle& bundle, Job& job) : bundle_(bundle), job_(job) {
+        lit_ = std::ranges::all_of(bundle.views,
+                                   [](const ReferenceView& v) { return v.hasNormals(); });
+    }
+
+    Result<void> add(const ReferenceView& view, const ViewSurface& surface) {
+        if (!surface.triangles.empty()) {
+            STX_CHECK(addSurface(view, surface));
+        }
+        for (std::size_t i = 0; i < surface.lonePixels.size(); ++i) {
+            const glm::u16vec2 at = surface.lonePixels[i];
+            const glm::u8vec4 c = view.texture.rgba8()->at(at.x, at.y);
+            positions_.push_back(surface.lonePositions[i]);
+            for (const std::uint8_t part : {c.r, c.g, c.b}) colours_.push_back(linearShort(part));
+            colours_.push_back(65535);
+            if (lit_) normals_.push_back(normalAt(view, at));
+        }
+        report.triangles += static_cast<std::int64_t>(surface.triangles.size() / 3);
+        report.points += static_cast<std::int64_t>(surface.lonePixels.size());
+        return {};
+    }
+
+    Result<SurfacesReport> write(const std::filesystem::path& path, OutputFile::Options options) {
+        if (!positions_.empty()) addPoints();
+        if (report.triangles + report.points == 0)
+            return fail(ErrorCode::invalidInput, "the bundle has no points to make a model of");
+        Json& root = model_.root();
+        if (!bundle_.title.empty()) root["scenes"][0]["name"] = bundle_.title;
+        if (bundle_.origin != glm::dvec3(0.0)) {
+            const glm::dvec3 o = bundle_.origin;
+            root["asset"]["extras"]["origin"] = {o.x, o.y, o.z};
+            job_.note(fmt::format(
+                "the model stays at the origin, since glTF has floats only; add ({}, {}, {}) to "
+                "its coordinates",
+                o.x, o.y, o.z));
+        }
+        if (!lit_) root["extensionsUsed"] = {"KHR_materials_unlit"};
+        STX_CHECK(model_.write(path, options));
+        return report;
+    }
+
+    SurfacesReport report;
+
+  private:
+    static glm::vec3 normalAt(const ReferenceView& view, glm::u16vec2 at) {
+        return unitOr(view.normal.at(at.x, at.y),
+                      -glm::vec3(view.camera.viewDirection(at.x + 0.5, at.y + 0.5)));
+    }
+
+    std::size_t addMaterial(Json look, const std::string& name) {
+        look["metallicFactor"] = 0.0;
+        look["roughnessFactor"] = 1.0;
+        Json material{
+            {"name", name}, {"pbrMetallicRoughness", std::move(look)}, {"doubleSided", true}};
+        if (!lit_) material["extensions"]["KHR_materials_unlit"] = Json::object();
+        return model_.add("materials", std::move(material));
+    }
+
+    Result<void> addSurface(const ReferenceView& view, const ViewSurface& surface) {
+        const Rgba8Image& colour = *view.texture.rgba8();
+        std::vector<glm::u8vec3> rgb(colour.count());
+        std::ranges::transform(colour.pixels(), rgb.begin(),
+                               [](glm::u8vec4 c) { return glm::u8vec3(c); });
+        STX_TRY(const Bytes png,
+                encodePng(colour.width(), colour.height(), 3, 8, rgb.data(), true));
+        if (model_.root()["samplers"].empty())
+            model_.add("samplers", {{"magFilter", kLinear},
+                                    {"minFilter", kLinearMipmaps},
+                                    {"wrapS", kClamp},
+                                    {"wrapT", kClamp}});
+        const std::size_t image = model_.add("images", {{"name", view.name},
+                                                        {"mimeType", "image/png"},
+                                                        {"bufferView", model_.addBytes(png, 0)}});
+        const std::size_t texture = model_.add("textures", {{"sampler", 0}, {"source", image}});
+        const std::size_t material =
+            addMaterial({{"baseColorTexture", {{"index", texture}}}}, view.name);
+        Json attributes{{"POSITION", model_.addPositions(surface.positions)}};
+        if (lit_) {
+            std::vector<glm::vec3> normals;
+            normals.reserve(surface.pixels.size());
+            for (const glm::u16vec2 at : surface.pixels) normals.push_back(normalAt(view, at));
+            attributes["NORMAL"] =
+                model_.addNumbers(bytesOfList(normals), normals.size(), "VEC3", kFloat, kVertices);
+        }
+        std::vector<std::uint16_t> places;
+        places.reserve(2 * surface.pixels.size());
+        for (const glm::u16vec2 at : surface.pixels) {
+            const glm::dvec2 share = (glm::dvec2(at) + 0.5) / glm::dvec2(colour.size());
+            for (const int k : {0, 1})
+                places.push_back(static_cast<std::uint16_t>(std::lround(share[k] * 65535.0)));
+        }
+        attributes["TEXCOORD_0"] = model_.addUnits(places, 2, "VEC2");
+        const std::size_t indices = model_.addIndices(surface.triangles, surface.positions.size());
+        model_.addNode(view.name, Json::array({{{"attributes", std::move(attributes)},
+                                                {"indices", indices},
+                                                {"material", material}}}));
+        return {};
+    }
+
+    void addPoints() {
+        const std::size_t material = addMaterial(Json::object(), "points");
+        Json attributes{{"POSITION", model_.addPositions(positions_)}};
+        if (lit_)
+            attributes["NORMAL"] = model_.addNumbers(bytesOfList(normals_), normals_.size(), "VEC3",
+                                                     kFloat, kVertices);
+        attributes["COLOR_0"] = model_.addUnits(colours_, 4, "VEC4");
+        model_.addNode(
+            "points",
+            Json::array(
+                {{{"attributes", std::move(attributes)}, {"mode", 0}, {"material", material}}}));
+    }
+
+    const Bundle& bundle_;
+    Job& job_;
+    bool lit_ = false;
+    Model model_;
+    std::vector<glm::vec3> positions_, normals_;
+    std::vector<std::uint16_t> colours_;
+};
+
+}  // namespace
+
+Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
+                                     OutputFile::Options options, Job& job) {
+    codeColours(bundle, "the model", job);
+    STX_TRY(auto surfaces, viewSurfaces(bundle, job));
+    Writer writer(bundle, job);
+    writer.report.views = bundle.views.size();
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+        job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(surfaces.size()),
+                     "writing views");
+        STX_CHECK(job.checkCancelled());
+        STX_CHECK(writer.add(bundle.views[i], surfaces[i]));
+        surfaces[i] = {};
+    }
+    return writer.write(path, options);
+}
+
+}  // namespace stx

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+
+#include "formats/files/files.hpp"
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+
+namespace stx {
+
+/// What a model of surfaces holds.
+struct SurfacesReport {
+    std::size_t views = 0;
+    std::int64_t triangles = 0;
+    std::int64_t points = 0;  ///< that are on no triangle
+};
+
+/// Writes a bundle as binary glTF 2.0, whole or not at all: for each view a mesh (viewSurfaces())
+/// with the view's colour as texture, and one of points for what is on no surface. Bundles with
+/// normals (SimpleTextureV2) have them in the model and take the viewer's light; others show their
+/// colours as they are (KHR_materials_unlit). The coordinates are the bundle's; one with an origin
+/// stays at it, and the origin is in `asset.extras.origin`.
+///
+/// Notes: an origin, colours of linear light. Errors: a bundle that fails check(), no surface and
+/// no point, more than GLB's 4 GiB, memory over the limit, files, cancelled.
+[[nodiscard]] Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
+                                                   OutputFile::Options options, Job& job);
+
+}  // namespace stx

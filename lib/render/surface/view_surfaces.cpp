@@ -1,0 +1,285 @@
+#include "lib/render/surface/view_surfaces.hpp"
+
+#include <array>
+#include <bit>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/surface/cells.hpp"
+
+namespace stx {
+namespace {
+
+using namespace surface;
+
+/// Another view shows a place better when its samples are denser by this factor; below one tenth
+/// more, both are kept and overlap, so that no gap opens between what is of one and of the other.
+constexpr double kDenser = 1.1;
+/// What a background view's samples count.
+constexpr double kBehind = 0.25;
+/// Depths are of one surface within this share, as in splat mode, and steps of their code.
+constexpr double kSameDepth = 0.01, kSameSteps = 2.0;
+/// Pixels from an edge within which samples mix what is on both sides of it.
+constexpr int kMixed = 2;
+constexpr float kLeastAlpha = 0.5f;
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+/// Its corners are pixels of a view, counted row by row.
+struct Triangle {
+    std::array<std::uint32_t, 3> corners;
+};
+
+class Maker {
+  public:
+    explicit Maker(const SurfaceScene& scene)
+        : scene_(scene), triangles_(scene.sources.size()), used_(scene.sources.size()) {}
+
+    /// Before surfaceOf() of any: all triangles of a view.
+    void prepare(std::size_t number) {
+        const Source& s = scene_.sources[number];
+        triangles_[number] = trianglesOf(s);
+        used_[number].resize(static_cast<std::size_t>(s.width) * s.height);
+        for (const Triangle& t : triangles_[number])
+            for (const std::uint32_t corner : t.corners) used_[number][corner] = true;
+    }
+
+    /// All triangles of a view, without a choice among views.
+    [[nodiscard]] std::vector<Triangle> trianglesOf(const Source& s) const {
+        std::vector<Triangle> out;
+        const auto add = [&](int ax, int ay, int bx, int by, int cx, int cy) {
+            const Triangle t{{index(s, ax, ay), index(s, bx, by), index(s, cx, cy)}};
+            for (const std::uint32_t corner : t.corners)
+                if (!shows(s, corner)) return;
+            out.push_back(t);
+        };
+        BlockBuffer buffer;
+        for (int by = 0; by < s.blocksY; ++by) {
+            for (int bx = 0; bx < s.blocksX; ++bx) {
+                const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
+                const int x0 = bx * kBlock, y0 = by * kBlock;
+                for (std::uint32_t l = block.leafBegin; l < block.leafEnd; ++l)
+                    addLeaf(s.leaves[l], add);
+                if (!block.anyCell) continue;
+                const BlockTexels texels = blockTexels(s, x0, y0, buffer);
+                for (int j = 0; j < kBlock; ++j) {
+                    for (std::uint32_t left = block.cells[static_cast<std::size_t>(j)]; left;
+                         left &= left - 1) {
+                        const int i = std::countr_zero(left);
+                        addCell(cellShape(s, texels, i, j), x0 + i, y0 + j, add);
+                    }
+                }
+            }
+        }
+        return out;
+    }
+
+    /// How densely a view samples a surface at a point, per area; 0 where it does not see it.
+    [[nodiscard]] double density(const Source& s, glm::dvec3 world, glm::dvec3 normal) const {
+        const Camera& c = s.view->camera;
+        const glm::dvec3 inCamera = glm::conjugate(c.orientation) * (world - c.position);
+        if (!c.orthographic && !(inCamera.z < 0)) return 0;
+        const glm::dvec3 at = c.project(inCamera);
+        const int x = static_cast<int>(std::floor(at.x)), y = static_cast<int>(std::floor(at.y));
+        if (!(at.x >= 1 && at.y >= 1 && at.x < s.width - 1 && at.y < s.height - 1)) return 0;
+        // Not only the pixel, but all that is around the place must be there.
+        const int i = static_cast<int>(std::floor(at.x - 0.5)),
+                  j = static_cast<int>(std::floor(at.y - 0.5));
+        if (!joined(s, i, j)) return 0;
+        const std::uint32_t pixel = index(s, x, y);
+        if (!sameDepth(s, pixel, at.z)) return 0;
+        return densityAt(s, world, normal, at.z, edgeDistance(s, pixel));
+    }
+
+    [[nodiscard]] double densityAt(const Source& s, glm::dvec3 world, glm::dvec3 normal,
+                                   double dist, int fromEdge) const {
+        const Camera& c = s.view->camera;
+        const glm::dvec3 ray = c.orthographic ? c.forward() : glm::normalize(world - c.position);
+        const double area = c.orthographic ? 1.0 : dist * dist;
+        double out = c.fx * c.fy / area * std::abs(glm::dot(normal, ray));
+        if (s.view->background) out *= kBehind;
+        return fromEdge < kMixed ? 0.5 * out : out;
+    }
+
+    [[nodiscard]] glm::dvec3 worldOf(const Source& s, std::uint32_t pixel) const {
+        const Camera& c = s.view->camera;
+        const int x = static_cast<int>(pixel) % s.width, y = static_cast<int>(pixel) / s.width;
+        const double dist = s.space.axis.dist(s.whole->q.data()[pixel]);
+        return c.position + c.orientation * c.unproject(x + 0.5, y + 0.5, dist);
+    }
+
+    [[nodiscard]] ViewSurface surfaceOf(std::size_t source) const {
+        const Source& s = scene_.sources[source];
+        const std::vector<bool>& used = used_[source];
+        const std::size_t count = used.size();
+        std::vector<std::uint32_t> numbers(count, kNone);
+        ViewSurface out;
+        for (const Triangle& t : triangles_[source]) {
+            if (shownBetter(s, t)) continue;
+            for (const std::uint32_t corner : t.corners) {
+                std::uint32_t& number = numbers[corner];
+                if (number == kNone) {
+                    number = static_cast<std::uint32_t>(out.pixels.size());
+                    out.pixels.emplace_back(corner % s.width, corner / s.width);
+                    out.positions.emplace_back(worldOf(s, corner));
+                }
+                out.triangles.push_back(number);
+            }
+        }
+        for (std::uint32_t pixel = 0; pixel < count; ++pixel) {
+            // Corners of leaves' insides are on no triangle, but on the leaf.
+            if (used[pixel] || !shows(s, pixel) || edgeDistance(s, pixel) > 0) continue;
+            const glm::dvec3 world = worldOf(s, pixel);
+            if (onSurfaceOfAnother(s, world)) continue;
+            out.lonePixels.emplace_back(pixel % s.width, pixel / s.width);
+            out.lonePositions.emplace_back(world);
+        }
+        return out;
+    }
+
+  private:
+    [[nodiscard]] static std::uint32_t index(const Source& s, int x, int y) {
+        return static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(s.width) +
+               static_cast<std::uint32_t>(x);
+    }
+    [[nodiscard]] static int edgeDistance(const Source& s, std::uint32_t pixel) {
+        return s.whole->info.data()[pixel] >> 4;
+    }
+    [[nodiscard]] static bool shows(const Source& s, std::uint32_t pixel) {
+        return s.whole->q.data()[pixel] > 0 &&
+               PageSet::alphaOf(*s.whole->texture, pixel) >= kLeastAlpha;
+    }
+    [[nodiscard]] static bool sameDepth(const Source& s, std::uint32_t pixel, double dist) {
+        const double there = s.space.axis.dist(s.whole->q.data()[pixel]);
+        return std::abs(there - dist) <= kSameDepth * std::abs(dist) + kSameSteps * s.step;
+    }
+    /// The cell of four pixels has no edge in it.
+    [[nodiscard]] static bool joined(const Source& s, int i, int j) {
+        const std::uint8_t* info = s.whole->info.data() + index(s, i, j);
+        const std::uint8_t both = Info::kLinkRight | Info::kLinkDown;
+        if ((*info & both) != both || !(info[1] & Info::kLinkDown) ||
+            !(info[s.width] & Info::kLinkRight))
+            return false;
+        return shows(s, index(s, i, j)) && shows(s, index(s, i + 1, j)) &&
+               shows(s, index(s, i, j + 1)) && shows(s, index(s, i + 1, j + 1));
+    }
+
+    /// A fan around the middle, with every pixel of the border.
+    template <class Add>
+    static void addLeaf(const Leaf& leaf, const Add& add) {
+        const int n = leaf.size, cx = leaf.x + n / 2, cy = leaf.y + n / 2;
+        const auto border = [&](int k) {
+            const int side = k / n % 4, along = k % n;
+            return side == 0   ? glm::ivec2(leaf.x, leaf.y + along)
+                   : side == 1 ? glm::ivec2(leaf.x + along, leaf.y + n)
+                   : side == 2 ? glm::ivec2(leaf.x + n, leaf.y + n - along)
+                               : glm::ivec2(leaf.x + n - along, leaf.y);
+        };
+        for (int k = 0; k < 4 * n; ++k) {
+            const glm::ivec2 a = border(k), b = border(k + 1);
+            add(cx, cy, a.x, a.y, b.x, b.y);
+        }
+    }
+
+    template <class Add>
+    static void addCell(std::uint32_t shape, int x, int y, const Add& add) {
+        const int r = x + 1, b = y + 1;
+        switch (shape) {
+            case kQuadCell:
+            case kFallingSplit:
+                add(x, y, x, b, r, b);
+                add(x, y, r, b, r, y);
+                break;
+            case kRisingSplit:
+                add(x, y, x, b, r, y);
+                add(r, y, x, b, r, b);
+                break;
+            case kUpperLeft:
+                add(x, y, x, b, r, y);
+                break;
+            case kUpperRight:
+                add(x, y, r, b, r, y);
+                break;
+            case kLowerRight:
+                add(r, y, x, b, r, b);
+                break;
+            case kLowerLeft:
+                add(x, y, x, b, r, b);
+                break;
+            default:
+                break;
+        }
+    }
+
+    [[nodiscard]] bool shownBetter(const Source& s, const Triangle& t) const {
+        std::array<glm::dvec3, 3> p;
+        int fromEdge = kFarFromEdge;
+        for (std::size_t k = 0; k < 3; ++k) {
+            p[k] = worldOf(s, t.corners[k]);
+            fromEdge = std::min(fromEdge, edgeDistance(s, t.corners[k]));
+        }
+        const glm::dvec3 across = glm::cross(p[1] - p[0], p[2] - p[0]);
+        const double area = glm::length(across);
+        if (!(area > 0)) return true;
+        const glm::dvec3 middle = (p[0] + p[1] + p[2]) / 3.0, normal = across / area;
+        const double dist =
+            -(glm::conjugate(s.view->camera.orientation) * (middle - s.view->camera.position)).z;
+        return anotherShows(s, middle, normal, densityAt(s, middle, normal, dist, fromEdge));
+    }
+
+    /// Some other view sees the place from the same side, more densely by kDenser.
+    [[nodiscard]] bool anotherShows(const Source& s, glm::dvec3 world, glm::dvec3 normal,
+                                    double here) const {
+        for (const Source& other : scene_.sources) {
+            if (&other == &s) continue;
+            const Camera& c = other.view->camera;
+            const glm::dvec3 ray = c.orthographic ? c.forward() : world - c.position;
+            if (!(glm::dot(ray, normal) < 0)) continue;
+            if (density(other, world, normal) > kDenser * here) return true;
+        }
+        return false;
+    }
+
+    /// The place is on a triangle of some other view, or next to one.
+    [[nodiscard]] bool onSurfaceOfAnother(const Source& s, glm::dvec3 world) const {
+        for (std::size_t k = 0; k < scene_.sources.size(); ++k) {
+            const Source& other = scene_.sources[k];
+            if (&other == &s) continue;
+            const Camera& c = other.view->camera;
+            const glm::dvec3 inCamera = glm::conjugate(c.orientation) * (world - c.position);
+            if (!c.orthographic && !(inCamera.z < 0)) continue;
+            const glm::dvec3 at = c.project(inCamera);
+            if (!(at.x >= 0 && at.y >= 0 && at.x < other.width && at.y < other.height)) continue;
+            const std::uint32_t pixel =
+                index(other, static_cast<int>(at.x), static_cast<int>(at.y));
+            if (used_[k][pixel] && sameDepth(other, pixel, at.z)) return true;
+        }
+        return false;
+    }
+
+    const SurfaceScene& scene_;
+    std::vector<std::vector<Triangle>> triangles_;  ///< of each source
+    std::vector<std::vector<bool>> used_;           ///< pixels that are corners
+};
+
+}  // namespace
+
+Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
+    STX_CHECK(bundle.check());
+    std::uint64_t pixels = 0;
+    for (const ReferenceView& view : bundle.views) pixels += view.depth.count();
+    // What surface mode keeps of a pixel, two triangles and a corner.
+    STX_CHECK(job.limits.checkAllocation(pixels, 80, "the surfaces"));
+    const SurfaceScene scene{PageSet(bundle)};
+    STX_CHECK(job.checkCancelled());
+    Maker maker(scene);
+    std::vector<ViewSurface> out(bundle.views.size());
+    const auto count = static_cast<std::int64_t>(out.size());
+    parallelFor(0, count, [&](std::int64_t i) { maker.prepare(static_cast<std::size_t>(i)); });
+    parallelFor(0, count, [&](std::int64_t i) {
+        if (job.cancelled) return;
+        out[static_cast<std::size_t>(i)] = maker.surfaceOf(static_cast<std::size_t>(i));
+    });
+    STX_CHECK(job.checkCancelled());
+    return out;
+}
+
+}  // namespace stx

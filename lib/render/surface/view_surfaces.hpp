@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+
+namespace stx {
+
+/// The depth image of a view as triangles, for programs that know no depth images.
+struct ViewSurface {
+    /// Pixels that are corners, and where they are in the world. The texture's coordinates of a
+    /// corner are its pixel's centre.
+    std::vector<glm::u16vec2> pixels;
+    std::vector<glm::vec3> positions;  ///< as long as `pixels`
+    /// Three corners each, counter-clockwise seen from the view.
+    std::vector<std::uint32_t> triangles;
+    /// Points of the view that are on no triangle: what is one pixel thin, or far from all others.
+    std::vector<glm::u16vec2> lonePixels;
+    std::vector<glm::vec3> lonePositions;  ///< as long as `lonePixels`
+};
+
+/// Each view of a bundle as a surface, in their order: pixels that surface mode takes as neighbours
+/// on one surface are joined, and nothing is joined across an edge; flat parts take fewer
+/// triangles, but keep all pixels of their border, so that no gaps open. Pixels that are covered by
+/// less than a half are left out. A place that several views show is kept of those that sample it
+/// most densely, within a tenth: what a view sees at a grazing angle does not hide what another
+/// sees in full. Background views come last in that choice.
+///
+/// Errors: a bundle that fails check(), memory over the limit, cancelled.
+[[nodiscard]] Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job);
+
+}  // namespace stx

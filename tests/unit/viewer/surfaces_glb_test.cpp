@@ -1,0 +1,116 @@
+#include "formats/viewer/surfaces_glb.hpp"
+
+#include <gtest/gtest.h>
+
+#include "formats/meshes/meshes.hpp"
+#include "lib/render/surface/view_surfaces.hpp"
+#include "tests/small_bundle.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/torus_bundle.hpp"
+
+namespace surfaces_glb_test {
+
+using namespace stx;
+
+/// How far a point is from the torus of torusViews() (radii 0.75 and 0.3, around Y).
+double fromTorus(glm::dvec3 p) {
+    const double around = std::hypot(p.x, p.z) - 0.75;
+    return std::abs(std::hypot(around, p.y) - 0.3);
+}
+
+TEST(ViewSurfaces, LieOnWhatTheViewsShow) {
+    Job job;
+    const Bundle bundle = torusViews(96);
+    const auto surfaces = viewSurfaces(bundle, job);
+    ASSERT_TRUE(surfaces) << surfaces.error().text();
+    ASSERT_EQ(surfaces->size(), bundle.views.size());
+    for (std::size_t k = 0; k < surfaces->size(); ++k) {
+        const ViewSurface& s = (*surfaces)[k];
+        ASSERT_EQ(s.pixels.size(), s.positions.size());
+        for (std::size_t i = 0; i < s.pixels.size(); ++i)
+            EXPECT_LT(glm::length(glm::dvec3(s.positions[i]) -
+                                  bundle.views[k].worldPoint(s.pixels[i].x, s.pixels[i].y)),
+                      1e-3);
+        for (std::size_t t = 0; t < s.triangles.size(); t += 3) {
+            const glm::dvec3 a = s.positions[s.triangles[t]], b = s.positions[s.triangles[t + 1]],
+                             c = s.positions[s.triangles[t + 2]];
+            // The middle is on the surface, too: nothing bridges the hole of the torus.
+            EXPECT_LT(fromTorus((a + b + c) / 3.0), 0.01);
+            // Seen from the view.
+            EXPECT_GT(glm::dot(glm::cross(b - a, c - a), bundle.views[k].camera.position - a), 0);
+        }
+    }
+}
+
+TEST(ViewSurfaces, KeepEveryPlaceOfSomeView) {
+    Job job;
+    const Bundle bundle = torusViews(96);
+    const auto surfaces = viewSurfaces(bundle, job);
+    ASSERT_TRUE(surfaces);
+    std::vector<glm::vec3> kept;
+    std::size_t points = 0;
+    for (const ViewSurface& s : *surfaces)
+        kept.insert(kept.end(), s.positions.begin(), s.positions.end());
+    for (const ReferenceView& view : bundle.views) points += view.pointCount();
+    // What several views show is kept of few.
+    EXPECT_LT(kept.size(), points / 2);
+    for (const ReferenceView& view : bundle.views) {
+        for (int y = 2; y + 2 < view.camera.height; y += 5) {
+            for (int x = 2; x + 2 < view.camera.width; x += 5) {
+                if (!hasPoint(view.depth.at(x, y))) continue;
+                const glm::vec3 p(view.worldPoint(x, y));
+                float nearest = 1e9f;
+                for (const glm::vec3& q : kept) nearest = std::min(nearest, glm::length(q - p));
+                EXPECT_LT(nearest, 0.15f);
+            }
+        }
+    }
+}
+
+TEST(SurfacesGlb, IsReadBackAsTheSameSurfaces) {
+    const TemporaryFolder folder;
+    Job job;
+    const Bundle bundle = torusViews(96);
+    const auto report = writeSurfaces(folder.path() / "a.glb", bundle, {}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_TRUE(job.takeNotes().empty());
+    const auto mesh = readMesh(folder.path() / "a.glb", job);
+    ASSERT_TRUE(mesh) << mesh.error().text();
+    EXPECT_EQ(static_cast<std::int64_t>(mesh->triangles.size()), report->triangles);
+    EXPECT_EQ(mesh->textures.size(), bundle.views.size());
+    for (const glm::vec3& p : mesh->positions) EXPECT_LT(fromTorus(p), 0.01);
+}
+
+TEST(SurfacesGlb, HasNormalsWhereTheBundleDoes) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", smallBundle(2, 16, true, false), {}, job));
+    const auto with = readMesh(folder.path() / "a.glb", job);
+    ASSERT_TRUE(with) << with.error().text();
+    EXPECT_FALSE(with->normals.empty());
+}
+
+TEST(SurfacesGlb, SaysWhatItRounds) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = smallBundle(2, 16, false, true);
+    bundle.origin = {500000, 5600000, 0};
+    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {}, job));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 2u);
+    EXPECT_NE(notes[0].find("8-bit sRGB in the model"), std::string::npos);
+    EXPECT_NE(notes[1].find("stays at the origin"), std::string::npos);
+}
+
+TEST(SurfacesGlb, LeavesNothingWhenItFails) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle empty = smallBundle(1, 16, false, false);
+    for (float& d : empty.views[0].depth.pixels()) d = kNoDepth;
+    EXPECT_FALSE(writeSurfaces(folder.path() / "a.glb", empty, {}, job));
+    job.cancelled = true;
+    EXPECT_FALSE(writeSurfaces(folder.path() / "a.glb", smallBundle(1, 16, false, false), {}, job));
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+}  // namespace surfaces_glb_test
