@@ -1,6 +1,5 @@
 #include "formats/parts.hpp"
 
-#include <dlfcn.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,7 +9,9 @@
 
 #include <fmt/format.h>
 
+#include "formats/files/module.hpp"
 #include "formats/images/codec_module.hpp"
+#include "formats/video/video_module.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/render/cpu_device.hpp"
@@ -50,17 +51,12 @@ Found findImageCodecs(PartCheck check, Job&) {
 }
 
 Found findVideo(PartCheck check, Job&) {
-    auto found = findModule("STX_VIDEO", "stx_video.so");
-    if (check == PartCheck::whole && found.state == PartState::here) {
-        // Whether its libraries are here is known when it is opened.
-        void* module = ::dlopen(found.detail.c_str(), RTLD_NOW | RTLD_LOCAL);
-        if (!module) {
-            const char* why = ::dlerror();
-            return {PartState::missing, why ? why : "it cannot be loaded"};
-        }
-        ::dlclose(module);
-    }
-    return found;
+    const auto found = findModule("STX_VIDEO", "stx_video.so");
+    if (check == PartCheck::quick || found.state != PartState::here) return found;
+    // Whether its libraries are here is known when it is opened.
+    const auto module = videoModule();
+    if (!module.present) return {PartState::missing, module.reason};
+    return {PartState::here, fmt::format("{} ({})", found.detail, module.libraries)};
 }
 
 #ifdef STX_WITH_GPU

@@ -56,18 +56,6 @@ Points pointsOf(const Bundle& bundle) {
     return out;
 }
 
-/// The frame that is meant: points are of one moment.
-Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
-                             bool points, const std::string& input) {
-    if (time && !(*time >= 0 && std::isfinite(*time)))
-        return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *time);
-    if (points && !time && timeline.moves())
-        return fail(ErrorCode::usage,
-                    "'{}' has {} frames, and points are of one moment; give --time T, in seconds",
-                    input, timeline.count());
-    return timeline.frameAt(time.value_or(0));
-}
-
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     ExtractOptions o = options;
@@ -82,6 +70,8 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     if (shown)
         STX_CHECK(command.refuse({"--cameras", "--depth"},
                                  fmt::format("is of a folder; -o {} is a file", o.output)));
+    if (shown && dotted == ".html")
+        STX_CHECK(command.refuse({"--time"}, "is of what shows one moment; a page plays the film"));
     if (points)
         STX_CHECK(
             command.refuse({"--cameras", "--depth"},
@@ -93,10 +83,11 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
-    if (shown) return extractShown(o.input, o.output, program);
+    if (shown) return extractShown(o.input, o.output, o.time, program);
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
     const Timeline timeline = frames->timeline();
-    STX_TRY(const std::size_t moment, momentOf(o.time, timeline, points, o.input));
+    STX_TRY(const std::size_t moment,
+            momentOf(o.time, timeline, points ? "points are" : nullptr, o.input));
     std::string what;
     std::size_t views = 0;
     std::int64_t pointCount = 0;

@@ -1,6 +1,7 @@
 #include "tools/extract_shown.hpp"
 
 #include <chrono>
+#include <cmath>
 
 #include <nlohmann/json.hpp>
 
@@ -41,13 +42,12 @@ Result<Shown> writePage(const std::string& input, const std::string& output, Pro
                  page->views, page->points};
 }
 
-/// A model of the first frame.
-Result<Shown> writeModel(const std::string& input, const std::string& output, Program& program) {
+/// A model of one moment.
+Result<Shown> writeModel(const std::string& input, const std::string& output,
+                         const std::optional<double>& time, Program& program) {
     STX_TRY(const auto frames, openSequence(input, {}, program.job));
-    if (frames->timeline().count() > 1)
-        program.job.note(fmt::format("'{}' has {} frames; the model is of the first", input,
-                                     frames->timeline().count()));
-    STX_TRY(auto bundle, frames->frame(0, program.job));
+    STX_TRY(const auto moment, momentOf(time, frames->timeline(), "a model is", input));
+    STX_TRY(auto bundle, frames->frame(moment, program.job));
     Shown out{"", bundle.views.size(), bundle.pointCount()};
     STX_TRY(const auto report,
             writeSurfaces(output, std::move(bundle), program.outputOptions(), program.job));
@@ -64,10 +64,22 @@ bool isShown(const std::string& ending) {
     return ending == ".html" || ending == ".glb";
 }
 
-Result<int> extractShown(const std::string& input, const std::string& output, Program& program) {
+Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
+                             const char* whatIs, const std::string& input) {
+    if (time && !(*time >= 0 && std::isfinite(*time)))
+        return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *time);
+    if (whatIs && !time && timeline.moves())
+        return fail(ErrorCode::usage,
+                    "'{}' has {} frames, and {} of one moment; give --time T, in seconds", input,
+                    timeline.count(), whatIs);
+    return timeline.frameAt(time.value_or(0));
+}
+
+Result<int> extractShown(const std::string& input, const std::string& output,
+                         const std::optional<double>& time, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
-                                  ? writeModel(input, output, program)
+                                  ? writeModel(input, output, time, program)
                                   : writePage(input, output, program));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -20,7 +20,6 @@ using namespace imagesets;
 using Json = OutputJson;
 using std::filesystem::path;
 
-constexpr const char* kEnvironmentFile = "environment.exr";
 constexpr double kDegree = 180.0 / glm::pi<double>();
 
 /// yaw, pitch, roll in degrees: R = Ry(yaw) Rx(-pitch) Rz(-roll) in our axes.

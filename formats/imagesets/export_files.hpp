@@ -14,6 +14,9 @@ namespace stx::imagesets {
 
 using OutputJson = nlohmann::ordered_json;
 
+/// Where a set keeps the bundle's environment, named as stx:environment.
+inline constexpr const char* kEnvironmentFile = "environment.exr";
+
 /// Names of the views that are safe in any file system, each once.
 [[nodiscard]] std::vector<std::string> fileNames(const Bundle& bundle);
 

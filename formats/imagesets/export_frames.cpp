@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "formats/exr/environment_exr.hpp"
 #include "formats/files/files.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/export_files.hpp"
@@ -22,8 +23,8 @@ class FrameExporter {
     Result<void> write(const fs::path& folder) {
         STX_CHECK(frames_.timeline().check());
         const std::size_t count = frames_.timeline().count();
-        STX_TRY(auto output,
-                OutputFolder::create(folder, {options_.noClobber}, {"transforms.json"}));
+        STX_TRY(auto output, OutputFolder::create(folder, {options_.noClobber},
+                                                  {"transforms.json", kEnvironmentFile}));
         root_ = output.temporaryPath();
         std::error_code ec;
         for (const char* sub : {"images", "depth"}) {
@@ -65,7 +66,7 @@ class FrameExporter {
         STX_TRY(auto bundle, frames_.frame(index, index == 0 ? job_ : quiet));
         STX_CHECK(bundle.check());
         if (index == 0)
-            begin(bundle);
+            STX_CHECK(begin(bundle));
         else
             STX_CHECK(checkSameViews(first_, bundle));
         const char* ending = options_.floatDepth ? ".exr" : ".png";
@@ -85,7 +86,7 @@ class FrameExporter {
         return {};
     }
 
-    void begin(const Bundle& bundle) {
+    Result<void> begin(const Bundle& bundle) {
         json_["stx:title"] = bundle.title;
         const glm::dvec3& o = bundle.origin;
         if (o != glm::dvec3(0.0)) json_["stx:origin"] = {o.x, o.y, o.z};
@@ -107,6 +108,9 @@ class FrameExporter {
         }
         tracks_.resize(bundle.views.size());
         names_ = fileNames(bundle);
+        if (!bundle.environment) return {};
+        json_["stx:environment"] = kEnvironmentFile;
+        return writeEnvironmentExr(*bundle.environment, root_ / kEnvironmentFile, job_);
     }
 
     /// Nothing when it is what it was.

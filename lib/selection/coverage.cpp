@@ -72,7 +72,7 @@ std::vector<SurfaceSample> sampleMesh(const Mesh& mesh, int count) {
     return samples;
 }
 
-Sighting sight(const CandidateView& view, const SurfaceSample& sample) {
+Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample) {
     Sighting s;
     const Camera& camera = view.depthCamera;
     const glm::dvec3 inCamera =
@@ -130,7 +130,7 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
                                                               surface.gradient.at(x, y));
                 double density = 0;  // samples of all views per unit of area
                 for (std::size_t k = 0; k < views.size(); ++k) {
-                    const Sighting by = sight(views[k], s);
+                    const Sighting by = sightingOf(views[k], s);
                     const double own = static_cast<std::size_t>(i) == k ? 1.0 : 0.0;
                     if (by.visible || own > 0)
                         density += std::max(by.cosine, 0.05) *
@@ -159,7 +159,7 @@ CoverProblem coverProblem(const std::vector<SurfaceSample>& samples,
     std::vector<std::vector<Seen>> seen(candidates.size());
     parallelFor(0, static_cast<std::int64_t>(candidates.size()), [&](std::int64_t v) {
         for (std::size_t i = 0; i < samples.size(); ++i) {
-            const Sighting s = sight(candidates[v], samples[i]);
+            const Sighting s = sightingOf(candidates[v], samples[i]);
             if (s.visible)
                 seen[v].push_back({static_cast<std::uint32_t>(i), static_cast<float>(s.cosine),
                                    static_cast<float>(s.density)});

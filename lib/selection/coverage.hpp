@@ -39,7 +39,7 @@ struct Sighting {
     double cosine = 0;   ///< of the angle between normal and line of sight
     double density = 0;  ///< samples per scene unit on a surface that faces the camera
 };
-[[nodiscard]] Sighting sight(const CandidateView& view, const SurfaceSample& sample);
+[[nodiscard]] Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample);
 
 /// The problem of choosing among candidates. How finely a view samples a piece of surface is
 /// s = visible * cosine * min(1, density / target), and its quality 0.9 * min(1, s / 0.4) + 0.1 *

@@ -13,6 +13,7 @@
 #include <glm/glm.hpp>
 
 #define CONSTANT static constexpr
+#define INLINE inline
 #define OUT(T) T&
 #define INOUT(T) T&
 #define OUT_ARRAY(T, name, size) T(&name)[size]

@@ -1,5 +1,5 @@
 // What a pixel shows: the surfaces of the sources fused, and checked against what others see.
-// Needs surface_votes.glsl. From outside: TileEntry tile; Axis frameAxis(); S and SIDE, samples
+// Needs surface_votes.glsl and surface_slope.glsl. From outside: TileEntry tile; Axis frameAxis(); S and SIDE, samples
 // along a side of a pixel and of a tile; SAMPLES, at least S * S;
 //   uint sampleOf(k, i, j)  bits of the q of source k of the tile at sample (i, j), flags in the
 //                           lowest two; 0 = nothing there
@@ -19,16 +19,6 @@ float sameWithin(float q) {
 // Samples of a pixel are one piece while they differ by no more than this.
 float oneWithin(float q) {
     return kJump * relativeScale(frameAxis(), q) + tile.step * qPerUnit(frameAxis(), q);
-}
-
-// The slope out of the differences to both sides, where there are any.
-float chooseSlope(bool hasA, float a, bool hasB, float b) {
-    if (hasA && hasB) {
-        if (abs(a) < 0.5f * abs(b)) return a;
-        if (abs(b) < 0.5f * abs(a)) return b;
-        return 0.5f * (a + b);
-    }
-    return hasA ? a : hasB ? b : 0.0f;
 }
 
 // dq/dx, dq/dy per pixel of a source's surface at a sample.

@@ -12,6 +12,7 @@ uint sampleOf(int k, int i, int j) {
     return slot == kNoSlot ? 0u : samples[slot * uint(SIDE * SIDE) + uint(j * SIDE + i)];
 }
 #include "shared/surface_votes.glsl"
+#include "shared/surface_slope.glsl"
 #include "shared/surface_fuse.glsl"
 
 // The samples of source k in a pixel: the least, the greatest, flags of any, and flags of all that

@@ -19,14 +19,15 @@ struct InterfaceType {
     FieldType type;
 };
 inline constexpr InterfaceType kInterfaceTypes[] = {
-    {0, FieldType::SFBool},   {1, FieldType::SFFloat},   {2, FieldType::SFTime},
-    {3, FieldType::SFInt32},  {4, FieldType::SFString},  {5, FieldType::SFVec3f},
-    {6, FieldType::SFVec2f},  {7, FieldType::SFColor},   {8, FieldType::SFRotation},
-    {9, FieldType::SFImage},  {10, FieldType::SFNode},   {11, FieldType::SFVec4f},
-    {12, FieldType::SFURL},   {33, FieldType::MFFloat},  {34, FieldType::MFTime},
-    {35, FieldType::MFInt32}, {36, FieldType::MFString}, {37, FieldType::MFVec3f},
-    {38, FieldType::MFVec2f}, {39, FieldType::MFColor},  {40, FieldType::MFRotation},
-    {42, FieldType::MFNode},  {43, FieldType::MFVec4f},  {47, FieldType::MFURL},
+    {0, FieldType::SFBool},      {1, FieldType::SFFloat},  {2, FieldType::SFTime},
+    {3, FieldType::SFInt32},     {4, FieldType::SFString}, {5, FieldType::SFVec3f},
+    {6, FieldType::SFVec2f},     {7, FieldType::SFColor},  {8, FieldType::SFRotation},
+    {9, FieldType::SFImage},     {10, FieldType::SFNode},  {11, FieldType::SFVec4f},
+    {12, FieldType::SFURL},      {32, FieldType::MFBool},  {33, FieldType::MFFloat},
+    {34, FieldType::MFTime},     {35, FieldType::MFInt32}, {36, FieldType::MFString},
+    {37, FieldType::MFVec3f},    {38, FieldType::MFVec2f}, {39, FieldType::MFColor},
+    {40, FieldType::MFRotation}, {41, FieldType::MFImage}, {42, FieldType::MFNode},
+    {43, FieldType::MFVec4f},    {47, FieldType::MFURL},
 };
 
 [[nodiscard]] inline Result<int> interfaceCode(FieldType type) {

@@ -12,12 +12,12 @@
 namespace stx::mpeg4 {
 namespace {
 
-constexpr std::array<std::string_view, 29> kTypeNames = {
-    "SFBool",     "SFInt32",  "SFFloat",         "SFTime",     "SFString", "SFURL",
-    "SFVec2f",    "SFVec3f",  "SFColor",         "SFRotation", "SFImage",  "SFNode",
-    "SFVec4f",    "SFScript", "SFCommandBuffer", "SFAttrRef",  "MFInt32",  "MFFloat",
-    "MFTime",     "MFString", "MFURL",           "MFVec2f",    "MFVec3f",  "MFColor",
-    "MFRotation", "MFNode",   "MFVec4f",         "MFScript",   "MFAttrRef"};
+constexpr std::array<std::string_view, 31> kTypeNames = {
+    "SFBool",          "SFInt32",   "SFFloat",    "SFTime",     "SFString", "SFURL",    "SFVec2f",
+    "SFVec3f",         "SFColor",   "SFRotation", "SFImage",    "SFNode",   "SFVec4f",  "SFScript",
+    "SFCommandBuffer", "SFAttrRef", "MFInt32",    "MFFloat",    "MFTime",   "MFString", "MFURL",
+    "MFVec2f",         "MFVec3f",   "MFColor",    "MFRotation", "MFNode",   "MFVec4f",  "MFScript",
+    "MFAttrRef",       "MFBool",    "MFImage"};
 constexpr std::array<std::string_view, 4> kKindNames = {"field", "exposedField", "eventIn",
                                                         "eventOut"};
 constexpr std::array<std::string_view, 16> kQuantisationNames = {
@@ -221,6 +221,10 @@ FieldType itemType(FieldType type) {
             return SFScript;
         case MFAttrRef:
             return SFAttrRef;
+        case MFBool:
+            return SFBool;
+        case MFImage:
+            return SFImage;
         default:
             return type;
     }

@@ -46,6 +46,8 @@ enum class FieldType : std::uint8_t {
     MFVec4f,
     MFScript,
     MFAttrRef,
+    MFBool,   ///< of Scripts and PROTOs only, as MFImage
+    MFImage,
 };
 
 /// "SFVec3f", and back.

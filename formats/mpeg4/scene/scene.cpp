@@ -81,7 +81,11 @@ FieldValue parseDefault(const FieldInfo& info) {
     std::visit(
         [&](auto& v) {
             if constexpr (kIsList<std::decay_t<decltype(v)>>) {
-                while (!reader.atEnd()) reader.read(v.emplace_back());
+                while (!reader.atEnd()) {
+                    typename std::decay_t<decltype(v)>::value_type item{};
+                    reader.read(item);
+                    v.push_back(std::move(item));
+                }
             } else {
                 reader.read(v);
             }

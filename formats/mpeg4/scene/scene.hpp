@@ -103,7 +103,7 @@ using FieldValue =
                  std::vector<double>, std::vector<std::string>, std::vector<Url>,
                  std::vector<glm::vec2>, std::vector<glm::vec3>, std::vector<Color>,
                  std::vector<Rotation>, NodeList, std::vector<glm::vec4>, std::vector<ScriptText>,
-                 std::vector<AttributeReference>>;
+                 std::vector<AttributeReference>, std::vector<bool>, std::vector<PixelImage>>;
 
 /// Whether T is the C++ type of an MF value.
 template <class T>

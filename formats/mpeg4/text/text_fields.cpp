@@ -131,6 +131,14 @@ class ItemReader {
         return {};
     }
     Result<void> read(NodePtr&) { return unexpected("a value without nodes"); }
+    /// One more item of a list; that of vector<bool> has no address.
+    template <class T>
+    Result<void> readItem(std::vector<T>& items) {
+        T item{};
+        STX_CHECK(read(item));
+        items.push_back(std::move(item));
+        return {};
+    }
 
   private:
     template <class... T>
@@ -226,7 +234,7 @@ Result<FieldValue> readFieldValue(BtLexer& lexer, FieldType type, bool wholeText
                 if (auto taken = lexer.take(); !taken) return propagate(taken);
             }
             if (!brackets && !wholeText) {
-                if (auto ok = reader.read(v.emplace_back()); !ok) return ok;
+                STX_CHECK(reader.readItem(v));
                 return {};
             }
             for (;;) {
@@ -239,13 +247,12 @@ Result<FieldValue> readFieldValue(BtLexer& lexer, FieldType type, bool wholeText
                     if (!brackets) return {};
                     return reader.unexpected("']' behind the items");
                 }
-                if (auto ok = reader.read(v.emplace_back()); !ok) return ok;
+                STX_CHECK(reader.readItem(v));
             }
         } else {
             return reader.read(v);
         }
     };
-    // Items are read into a variable of their type; vector<bool> does not occur.
     if (auto ok = std::visit(readValue, value); !ok) return propagate(ok);
     return value;
 }

@@ -25,6 +25,7 @@ inline constexpr XmtType kXmtTypes[] = {
     {"Vector2Array", FieldType::MFVec2f}, {"Vector3Array", FieldType::MFVec3f},
     {"Vector4Array", FieldType::MFVec4f}, {"Colors", FieldType::MFColor},
     {"Rotations", FieldType::MFRotation}, {"Nodes", FieldType::MFNode},
+    {"Booleans", FieldType::MFBool},      {"Images", FieldType::MFImage},
 };
 
 /// By that name, or by the one that BT has.

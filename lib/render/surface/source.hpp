@@ -196,16 +196,11 @@ struct Source {
     [[nodiscard]] TapPlace tapsInRectangles(int x, int y) const;
 };
 
-/// The slope out of the differences to both sides, where there are any: the smaller when it is
-/// under half of the other, which then crosses a crease, else their mean.
-[[nodiscard]] inline float chooseSlope(bool hasA, float a, bool hasB, float b) {
-    if (hasA && hasB) {
-        if (std::abs(a) < 0.5f * std::abs(b)) return a;
-        if (std::abs(b) < 0.5f * std::abs(a)) return b;
-        return 0.5f * (a + b);
-    }
-    return hasA ? a : hasB ? b : 0.0f;
-}
+namespace slopes {
+using namespace glsl;
+#include "shaders/shared/surface_slope.glsl"
+}  // namespace slopes
+using slopes::chooseSlope;
 
 /// The gradient from q and info of a pixel and its neighbours: `q` and `info` point at the pixel.
 [[nodiscard]] inline glm::vec2 gradientFrom(const float* q, const std::uint8_t* info,

@@ -142,6 +142,8 @@ constexpr const char* kScript = R"(Group { children [
     field MFString names ["a" "b"]
     field SFNode target USE T
     field MFNode all [ USE T WorldInfo { title "x" } ]
+    field MFBool marks [TRUE FALSE TRUE]
+    field MFImage tiles [1 1 1 0xFF 2 1 3 0x102030 0x405060]
     directOutput TRUE
     url "javascript: function start(value) { count++; moved = new SFVec3f(count, 0, 0); }"
   }
@@ -159,10 +161,13 @@ TEST(Script, FieldsAndProgramAreKeptInEveryForm) {
     ASSERT_EQ(document.frames.size(), 1u);
     const auto& scene = std::get<ReplaceScene>(document.frames[0].commands.at(0));
     const NodePtr script = scene.root->get<NodeList>("children").at(1);
-    ASSERT_EQ(ownFieldCount(*script), 6);
+    ASSERT_EQ(ownFieldCount(*script), 8);
     EXPECT_EQ(script->get<std::int32_t>("count"), 3);
     EXPECT_EQ(script->get<NodePtr>("target"), scene.root->get<NodeList>("children").at(0));
     EXPECT_TRUE(script->get<bool>("directOutput"));
+    EXPECT_EQ(script->get<std::vector<bool>>("marks"), (std::vector<bool>{true, false, true}));
+    ASSERT_EQ(script->get<std::vector<PixelImage>>("tiles").size(), 2u);
+    EXPECT_EQ(script->get<std::vector<PixelImage>>("tiles")[1].pixels.at(3), 0x40);
     EXPECT_EQ(script->get<std::vector<ScriptText>>("url").at(0).text,
               "javascript:\nfunction start(value) {\n count++;\n moved = new SFVec3f(count, 0, "
               "0);\n}\n");
@@ -196,6 +201,8 @@ PROTO View [
   field SFNode picture NULL
   eventIn SFBool touched
   field MFNode more []
+  field MFBool flags [FALSE TRUE]
+  exposedField MFImage tiles []
 ] {
   PROTO Inner [ field SFNode content NULL ] { Group { children [ Inner2 { } ] } }
   DEF T Transform {
@@ -211,7 +218,7 @@ PROTO View [
 }
 Group { children [
   DEF A View { place 1 2 3 picture ImageTexture { url [od:10] } }
-  View { shift 5 0 0 picture ImageTexture { url [od:10] } more [ WorldInfo { title "more" } ] }
+  View { shift 5 0 0 flags [TRUE] tiles [2 2 1 1 2 3 4 1 1 4 0x11223344] picture ImageTexture { url [od:10] } more [ WorldInfo { title "more" } ] }
   Far { c 0 1 0 }
   USE A
 ] }
