@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <bit>
 #include <fstream>
-#include <numeric>
 
 #include "formats/video/video_module.hpp"
 
@@ -162,28 +161,34 @@ Result<void> Film::select(int track) {
         return failAt(where(), ErrorCode::invalidInput, "it has no track of video");
     video::Packer request;
     request.put(static_cast<std::int32_t>(track));
-    STX_TRY(const auto answer, ask(video::Tag::selectTrack, request, video::Tag::index));
-    video::Unpacker in(answer);
-    const auto numerator = in.get<std::int32_t>();
-    const auto denominator = in.get<std::int32_t>();
-    const auto count = in.get<std::uint64_t>();
+    STX_TRY(const auto chosen, ask(video::Tag::selectTrack, request, video::Tag::done));
     units_.clear();
     coded_.clear();
+    shown_.clear();
     std::vector<std::int64_t> durations;
-    for (std::uint64_t i = 0; i < count && in.ok(); ++i) {
-        Unit unit;
-        unit.pts = in.get<std::int64_t>();
-        unit.dts = in.get<std::int64_t>();
-        durations.push_back(in.get<std::int64_t>());
-        units_.push_back(unit);
-        coded_.push_back({unit.pts, in.get<std::uint8_t>() != 0});
+    std::int32_t numerator = 0, denominator = 0;
+    for (bool last = false; !last;) {
+        STX_TRY(const auto answer, ask(video::Tag::readOn, {}, video::Tag::index));
+        video::Unpacker in(answer);
+        numerator = in.get<std::int32_t>();
+        denominator = in.get<std::int32_t>();
+        last = in.get<std::uint8_t>() != 0;
+        const auto count = in.get<std::uint64_t>();
+        for (std::uint64_t i = 0; i < count && in.ok(); ++i) {
+            Unit unit;
+            unit.pts = in.get<std::int64_t>();
+            unit.dts = in.get<std::int64_t>();
+            durations.push_back(in.get<std::int64_t>());
+            coded_.push_back({unit.pts, in.get<std::uint8_t>() != 0});
+            if (in.get<std::uint8_t>() == 0) shown_.push_back(units_.size());
+            units_.push_back(unit);
+        }
+        if (!in.ok() || numerator < 1 || denominator < 1 || (count == 0 && !last))
+            return failAt(where(), ErrorCode::failed, "the times of its pictures make no sense");
+        STX_CHECK(limits_.checkAllocation(units_.size(), 64, "the index of the film"));
     }
-    if (!in.ok() || numerator < 1 || denominator < 1)
-        return failAt(where(), ErrorCode::failed, "the times of its pictures make no sense");
-    if (units_.empty())
+    if (shown_.empty())
         return failAt(where(), ErrorCode::invalidInput, "its track of video has no picture");
-    shown_.resize(units_.size());
-    std::iota(shown_.begin(), shown_.end(), std::size_t{0});
     const auto timeOf = [&](std::size_t unit) { return units_[unit].pts; };
     std::ranges::stable_sort(shown_, {}, timeOf);
     const auto again = std::ranges::unique(shown_, {}, timeOf);

@@ -21,7 +21,8 @@ namespace stx::video {
 enum class Tag : std::uint32_t {
     // Requests.
     openFilm = 1,   ///< text: name of the container's reader
-    selectTrack,    ///< int32: a track of the film; reads through it once
+    selectTrack,    ///< int32: a track of the film
+    readOn,         ///< reads the next part of the track, for where its pictures are
     seek,           ///< int64, int64: where to read on, in the track's ticks: seconds by dts, pts
     step,           ///< int64: feed the next access unit of the track; the time that is wanted
     openStream,     ///< int32 objectTypeIndication; bytes: the decoder's configuration
@@ -34,7 +35,8 @@ enum class Tag : std::uint32_t {
     finishEncoder,  ///< int32 encoder
     // Answers.
     film = 100,  ///< tracks, attachments
-    index,       ///< of a track
+    index,       ///< of a part of a track: whether it is the last, access units (pts, dts,
+                 ///< duration, whether decoding can begin there, whether it is hidden)
     done,
     ready,    ///< uint8: the track has ended; then the times of pictures that can be taken
     picture,  ///< PictureHeader, then its samples

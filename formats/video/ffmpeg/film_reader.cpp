@@ -9,6 +9,9 @@ constexpr int kBufferBytes = 1 << 16;
 /// More access units are refused as damage: a day at 120 a second is ten million.
 constexpr std::size_t kMostUnits = 1u << 24;
 constexpr std::uint64_t kLargestAttachment = 1u << 20;
+/// Of a part of a track: read from a slow disk in seconds.
+constexpr std::int64_t kPartBytes = 64 << 20;
+constexpr std::uint64_t kPartUnits = 1u << 16;
 
 std::string tagOf(const AVDictionary* tags, const char* key) {
     const AVDictionaryEntry* entry = av_dict_get(tags, key, nullptr, 0);
@@ -96,36 +99,49 @@ std::vector<std::byte> FilmReader::describe() const {
     return std::move(out.bytes);
 }
 
-std::vector<std::byte> FilmReader::select(int track) {
+void FilmReader::select(int track) {
     if (track < 0 || track >= static_cast<int>(film_->nb_streams))
         refuse(ErrorCode::invalidInput, "there is no track {}", track);
     track_ = track;
     for (unsigned i = 0; i < film_->nb_streams; ++i)
         film_->streams[i]->discard =
             static_cast<int>(i) == track ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
-    const AVStream& stream = *film_->streams[track];
-    decoder_.emplace(*stream.codecpar);
+    decoder_.emplace(*film_->streams[track]->codecpar);
+    units_ = 0;
     rewind();
+}
+
+std::vector<std::byte> FilmReader::readOn() {
+    if (track_ < 0) refuse(ErrorCode::failed, "no track is chosen");
+    const AVStream& stream = *film_->streams[track_];
     Packer units;
     std::uint64_t count = 0;
-    while (const AVPacket* packet = next()) {
-        if (++count > kMostUnits)
+    std::int64_t bytes = 0;
+    const AVPacket* packet = nullptr;
+    while (bytes < kPartBytes && count < kPartUnits && (packet = next())) {
+        ++count;
+        bytes += packet->size;
+        if (++units_ > kMostUnits)
             refuse(ErrorCode::invalidInput, "it has more than {} pictures", kMostUnits);
         if (packet->pts == AV_NOPTS_VALUE)
             refuse(ErrorCode::unsupported,
                    "picture {} has no time of its own, as in .avi; put the track into another "
                    "file: ffmpeg -i IN -c copy OUT.mkv",
-                   count - 1);
+                   units_ - 1);
         units.put(static_cast<std::int64_t>(packet->pts));
         units.put(
             static_cast<std::int64_t>(packet->dts == AV_NOPTS_VALUE ? packet->pts : packet->dts));
         units.put(static_cast<std::int64_t>(packet->duration));
         units.put(static_cast<std::uint8_t>((packet->flags & AV_PKT_FLAG_KEY) != 0));
+        // Edit lists hide pictures that others need.
+        units.put(static_cast<std::uint8_t>((packet->flags & AV_PKT_FLAG_DISCARD) != 0));
     }
-    rewind();
+    const bool last = packet == nullptr;
+    if (last) rewind();
     Packer out;
     out.put(static_cast<std::int32_t>(stream.time_base.num));
     out.put(static_cast<std::int32_t>(stream.time_base.den));
+    out.put(static_cast<std::uint8_t>(last));
     out.put(count);
     out.add(units.bytes.data(), units.bytes.size());
     return std::move(out.bytes);
@@ -141,7 +157,7 @@ const AVPacket* FilmReader::next() {
         const int got = av_read_frame(film_, packet_.get());
         if (got == AVERROR_EOF) return nullptr;
         if (got < 0) refuse(ErrorCode::invalidInput, "the film is cut off: {}", wordsOf(got));
-        if (packet_->stream_index != track_ || (packet_->flags & AV_PKT_FLAG_DISCARD)) continue;
+        if (packet_->stream_index != track_) continue;
         // Containers without composition times hold one picture after the other.
         if (packet_->pts == AV_NOPTS_VALUE && film_->streams[track_]->codecpar->video_delay == 0)
             packet_->pts = packet_->dts;

@@ -18,8 +18,11 @@ class FilmReader {
 
     /// Tracks and attachments, packed.
     [[nodiscard]] std::vector<std::byte> describe() const;
-    /// Reads through the track once. Its access units, packed.
-    [[nodiscard]] std::vector<std::byte> select(int track);
+    /// Chooses a track, which is then read through once with readOn().
+    void select(int track);
+    /// The access units of the next part of the track, packed; after the last part the track is at
+    /// its beginning again.
+    [[nodiscard]] std::vector<std::byte> readOn();
     /// The next access unit that is fed is the one of these times, or the track's first.
     void seek(std::int64_t dts, std::int64_t pts);
     /// Feeds the next one; false at the end.
@@ -39,7 +42,8 @@ class FilmReader {
     PacketPtr packet_;
     std::optional<Decoder> decoder_;
     int track_ = -1;
-    bool held_ = false;  ///< packet_ is still to be fed
+    std::uint64_t units_ = 0;  ///< that readOn() has told
+    bool held_ = false;        ///< packet_ is still to be fed
     bool ended_ = false;
 };
 

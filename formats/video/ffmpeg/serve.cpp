@@ -29,7 +29,10 @@ class Server {
                 film_ = std::make_unique<FilmReader>(file_, in.getText());
                 return {Tag::film, film_->describe()};
             case Tag::selectTrack:
-                return {Tag::index, film().select(in.get<std::int32_t>())};
+                film().select(in.get<std::int32_t>());
+                return {};
+            case Tag::readOn:
+                return {Tag::index, film().readOn()};
             case Tag::seek: {
                 const auto dts = in.get<std::int64_t>();
                 film().seek(dts, in.get<std::int64_t>());
