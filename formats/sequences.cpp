@@ -1,5 +1,6 @@
 #include "formats/sequences.hpp"
 
+#include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
@@ -20,36 +21,50 @@ bool isNumberedExr(const fs::path& path) {
     return one && fs::path(*one).extension() == ".exr";
 }
 
-/// One OpenEXR bundle for each frame.
-class ExrSequence : public Sequence {
+/// One OpenEXR bundle, or one atlas, for each frame.
+class NumberedSequence : public Sequence {
   public:
-    ExrSequence(std::vector<NumberedFile> files, Timeline timeline) : files_(std::move(files)) {
+    NumberedSequence(std::vector<NumberedFile> files, bool atlases, Timeline timeline)
+        : files_(std::move(files)), atlases_(atlases) {
         timeline_ = std::move(timeline);
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
-        STX_TRY(auto bundle, readExrBundle(files_[index].path, job));
+        const auto& path = files_[index].path;
+        STX_TRY(auto bundle, atlases_ ? openBundle(path, {}, job) : readExrBundle(path, job));
         bundle.time = timeline_.times[index];
         return bundle;
     }
 
   private:
     std::vector<NumberedFile> files_;
+    bool atlases_;
 };
 
-Result<std::unique_ptr<Sequence>> openExrFiles(const fs::path& pattern, Job& job) {
-    STX_TRY(auto files, numberedFiles(pattern.string()));
+Result<std::optional<double>> timeOf(const fs::path& path, bool atlas, const Limits& limits) {
+    if (!atlas) {
+        STX_TRY(const auto header, readExrBundleHeader(path, limits));
+        return header.time;
+    }
+    STX_TRY(const auto header, readAtlasHeader(path, limits));
+    return header.atlas.time;
+}
+
+Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> files,
+                                               const fs::path& pattern, Job& job) {
+    STX_TRY(const auto kind, recognise(files.front().path));
+    const bool atlases = kind == FileKind::atlas;
     Timeline line;
     line.times.clear();
     std::vector<double> told;
     for (const NumberedFile& file : files) {
         STX_CHECK(job.checkCancelled());
-        STX_TRY(const auto header, readExrBundleHeader(file.path, job.limits));
-        if (!header.time) break;
-        if (!told.empty() && !(*header.time > told.back()))
+        STX_TRY(const auto time, timeOf(file.path, atlases, job.limits));
+        if (!time) break;
+        if (!told.empty() && !(*time > told.back()))
             return failAt(fmt::format("'{}'", file.path.string()), ErrorCode::invalidInput,
-                          "its time is {:g} s, but the file before it is of {:g} s", *header.time,
+                          "its time is {:g} s, but the file before it is of {:g} s", *time,
                           told.back());
-        told.push_back(*header.time);
+        told.push_back(*time);
     }
     if (told.size() == files.size()) {
         for (const double time : told) line.times.push_back(time - told.front());
@@ -64,7 +79,7 @@ Result<std::unique_ptr<Sequence>> openExrFiles(const fs::path& pattern, Job& job
     // Times far apart or near each other may not be so when they are counted from the first.
     if (const auto sound = line.check(); !sound)
         return tl::unexpected(sound.error().at(fmt::format("'{}'", pattern.string())));
-    return std::make_unique<ExrSequence>(std::move(files), std::move(line));
+    return std::make_unique<NumberedSequence>(std::move(files), atlases, std::move(line));
 }
 
 }  // namespace
@@ -72,7 +87,13 @@ Result<std::unique_ptr<Sequence>> openExrFiles(const fs::path& pattern, Job& job
 Result<std::unique_ptr<Sequence>> openSequence(const fs::path& path, const OpenOptions& options,
                                                Job& job) {
     std::error_code ec;
-    if (isNumberedExr(path) && !fs::exists(path, ec)) return openExrFiles(path, job);
+    if (frameName(path.filename().string(), 0) && !fs::exists(path, ec)) {
+        auto files = numberedFiles(path.string());
+        if (isNumberedExr(path) || (files && isAtlasFolder(files->front().path))) {
+            if (!files) return propagate(files);
+            return openNumbered(std::move(*files), path, job);
+        }
+    }
     STX_TRY(const auto kind, recognise(path));
     if (kind == FileKind::imageSet || !options.set.from.empty())
         return openImageSet(path, options.set, job);

@@ -2,7 +2,7 @@
 # A film with depth, what it hides, and a walk through it: MODEL (samples/amphora.obj) turns and walks
 # before another one and a wall, seen by one camera that stands still. The film becomes MPEG-4, gets the
 # background that the walker uncovers, and is drawn from cameras that move sideways, beside the same
-# without the background. usage: moving_job.sh MODEL FOLDER
+# without the background, and out of atlases. usage: moving_job.sh MODEL FOLDER
 set -eu
 model=$1 out=$2 frames=24
 folder=$(dirname "$model") name=$(basename "$model" .obj)
@@ -67,6 +67,10 @@ stx background "$out/film.mp4" -o "$out/film_bg.mp4" --quiet
 for film in film film_bg; do
     stx render "$out/$film.mp4" -o "$out/${film}_%04d.png" --cameras "$out/walk.json" --times all --quiet
 done
+# Packed: an atlas for each frame, the rectangles of all alike; drawn from, it is the same film.
+stx pack "$out/film_bg.mp4" -o "$out/atlas_%04d" --layout tight --quiet
+stx render "$out/atlas_%04d" -o "$out/packed_%04d.png" --cameras "$out/walk.json" --times all --quiet
+stx compare "$out/packed_0011.png" "$out/film_bg_0011.png" --min-psnr 40
 if command -v ffmpeg > /dev/null; then
     ffmpeg -loglevel error -y -framerate 25 -i "$out/film_bg_%04d.png" -pix_fmt yuv420p "$out/walk.mp4"
     echo "the walk: $out/walk.mp4"

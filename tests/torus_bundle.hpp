@@ -5,8 +5,9 @@
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
 
-/// A torus from 14 sides, its colour changing from place to place.
-inline stx::Bundle torusViews(int side = 192) {
+/// A torus from 14 sides, its colour changing from place to place; `shift` moves it, not the
+/// cameras.
+inline stx::Bundle torusViews(int side = 192, glm::dvec3 shift = glm::dvec3(0.0)) {
     using namespace stx;
     Mesh mesh;
     mesh.materials.emplace_back();
@@ -29,6 +30,7 @@ inline stx::Bundle torusViews(int side = 192) {
     Job job;
     const auto cameras = layoutCameras({ViewLayout::Kind::sphere, 14, 0}, framing, mesh.positions);
     EXPECT_TRUE(cameras);
+    for (auto& position : mesh.positions) position += shift;
     auto bundle = captureBundle(mesh, *cameras, {}, job);
     EXPECT_TRUE(bundle);
     return std::move(*bundle);

@@ -8,6 +8,7 @@
 #include "formats/images/images.hpp"
 #include "formats/sequences.hpp"
 #include "lib/packing/packing.hpp"
+#include "lib/packing/period.hpp"
 #include "lib/quality/prune_quality.hpp"
 #include "tools/commands.hpp"
 
@@ -22,6 +23,7 @@ struct PackOptions {
     PruneSettings pruning;
     double minPsnr = 0;
     std::optional<double> time;
+    int period = 25;  ///< as the groups of pictures of video
     std::string colour = "png";
     std::optional<int> quality;
 };
@@ -58,26 +60,39 @@ Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std
     return smaller;
 }
 
-/// One bundle into one atlas.
-Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, Program& program) {
+bool prunes(const PackOptions& o) {
+    return o.prune || o.pruning.budget > 0 || o.minPsnr > 0;
+}
+
+Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, Job& job) {
+    auto report = o.minPsnr > 0 ? pruneToQuality(bundle, o.pruning, o.minPsnr, job)
+                                : prune(bundle, o.pruning, job);
+    if (!report) return tl::unexpected(report.error().at(fmt::format("'{}'", o.input)));
+    return report;
+}
+
+/// One bundle into one atlas; of a film like the others of its period.
+Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPeriod* period,
+                       Program& program) {
     const auto start = std::chrono::steady_clock::now();
-    PruneSettings pruning = o.pruning;
-    if (!o.budget.empty()) {
-        STX_TRY(pruning.budget, parsePixels(o.budget));
-    }
     if (!opened) return propagate(opened);
     Bundle bundle = std::move(*opened);
     PackSettings settings = o.settings;
+    Bundle content;
+    if (period) {
+        content = period->content();
+        settings.contentOf = &content;
+    }
     std::string pruned;
-    if (o.prune || pruning.budget > 0 || o.minPsnr > 0) {
-        auto report = o.minPsnr > 0 ? pruneToQuality(bundle, pruning, o.minPsnr, program.job)
-                                    : prune(bundle, pruning, program.job);
-        if (!report) return tl::unexpected(report.error().at(fmt::format("'{}'", o.input)));
+    if (prunes(o)) {
+        auto report =
+            period ? Result<PruneReport>(period->prune(bundle)) : pruneOne(bundle, o, program.job);
+        if (!report) return propagate(report);
         settings.sourcePixels = report->sourcePixels;
         pruned = fmt::format(", {:.1f} % of the object's pixels kept",
                              100.0 * static_cast<double>(report->keptPixels) /
                                  static_cast<double>(report->sourcePixels));
-        if (o.minPsnr > 0 && std::isfinite(report->psnr))
+        if (o.minPsnr > 0 && !period && std::isfinite(report->psnr))
             pruned += fmt::format(", {:.1f} dB measured", report->psnr);
     }
     AtlasSaveOptions save;
@@ -110,6 +125,41 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, Program& pro
     return 0;
 }
 
+/// Frames from `begin` to before `end`, an atlas each, all with the same rectangles.
+Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begin, std::size_t end,
+                        Program& program) {
+    const auto targetOf = [&](std::size_t i) { return *frameName(o.output, static_cast<int>(i)); };
+    std::optional<PackPeriod> period;
+    // Equal cells in the order of the views are the same without a look at the frames.
+    if (prunes(o) || o.settings.layout == PackSettings::Layout::tight) {
+        period.emplace();
+        for (std::size_t i = begin; i < end; ++i) {
+            STX_CHECK(program.job.checkCancelled());
+            STX_CHECK(checkTarget(targetOf(i), program));
+            // Notes are those of the second time.
+            Job quiet;
+            quiet.limits = program.job.limits;
+            STX_TRY(const auto whole, frames.frame(i, quiet));
+            Bundle pruned = whole;
+            if (prunes(o)) {
+                STX_CHECK(pruneOne(pruned, o, program.job));
+            }
+            if (auto added = period->add(whole, pruned); !added)
+                return tl::unexpected(added.error().at(fmt::format("'{}': frame {}", o.input, i)));
+        }
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+        STX_CHECK(program.job.checkCancelled());
+        PackOptions one = o;
+        one.output = targetOf(i);
+        STX_CHECK(checkTarget(one.output, program));
+        STX_TRY(const int done, packBundle(one, frames.frame(i, program.job),
+                                           period ? &*period : nullptr, program));
+        if (done != 0) return fail(ErrorCode::failed, "'{}' was not packed", one.output);
+    }
+    return {};
+}
+
 /// An atlas holds one moment: that of --time, or one atlas for each frame.
 Result<int> packInput(const PackOptions& options, Program& program) {
     PackOptions o = options;
@@ -119,6 +169,9 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     if (o.time && !(*o.time >= 0 && std::isfinite(*o.time)))
         return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *o.time);
     STX_CHECK(checkTarget(o.output, program));
+    if (!o.budget.empty()) {
+        STX_TRY(o.pruning.budget, parsePixels(o.budget));
+    }
     preloadCodecs(o.input);
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
     const Timeline timeline = frames->timeline();
@@ -131,20 +184,18 @@ Result<int> packInput(const PackOptions& options, Program& program) {
                         "a numbered name for one atlas each, as in -o 'atlas_%04d'",
                         o.input, count);
         return packBundle(o, frames->frame(timeline.frameAt(o.time.value_or(0)), program.job),
-                          program);
+                          nullptr, program);
     }
     if (!program.common.report.empty() && count > 1)
         return fail(ErrorCode::usage,
                     "--report is of one atlas, and {} are made; give --time T for one", count);
-    // By default equal cells in the order of the views: the same places in all atlases.
-    for (std::size_t i = 0; i < count; ++i) {
-        STX_CHECK(program.job.checkCancelled());
-        PackOptions one = o;
-        one.output = *frameName(o.output, static_cast<int>(i));
-        STX_CHECK(checkTarget(one.output, program));
-        STX_TRY(const int done, packBundle(one, frames->frame(i, program.job), program));
-        if (done != 0) return done;
-    }
+    if (!o.budget.empty() || o.minPsnr > 0)
+        program.job.note(fmt::format("{} is met by each frame; what one of {} keeps, all keep",
+                                     o.budget.empty() ? "--min-psnr" : "--budget",
+                                     counted(o.period, "frame")));
+    const auto length = static_cast<std::size_t>(o.period);
+    for (std::size_t i = 0; i < count; i += length)
+        STX_CHECK(packPeriod(o, *frames, i, std::min(count, i + length), program));
     return 0;
 }
 
@@ -164,6 +215,11 @@ void addPack(CommandLine& line, Program& program) {
         .takes("ATLAS");
     c.option("--time", o->time, "Of a film: the moment to pack, in seconds from its start")
         .takes("T");
+    c.option("--period", o->period,
+             "Of a film: so many frames have the same rectangles, and what pruning keeps in one of "
+             "them it keeps in all (default 25)")
+        .range(1, 1000)
+        .takes("N");
     c.choice<PackSettings::Layout>(
         "--layout", o->settings.layout,
         {{"grid", PackSettings::Layout::grid}, {"tight", PackSettings::Layout::tight}},

@@ -315,6 +315,7 @@ std::string atlasJson(const AtlasHeader& header) {
         top["bounds"] = {{"min", arrayOf(atlas.bounds->min)}, {"max", arrayOf(atlas.bounds->max)}};
     if (atlas.origin != glm::dvec3(0.0)) top["origin"] = arrayOf(atlas.origin);
     if (!header.environmentFile.empty()) top["environment"] = header.environmentFile;
+    if (atlas.time) top["time"] = *atlas.time;
     top["pixels"] = {{"source", atlas.sourcePixels}, {"kept", atlas.keptPixels}};
     std::string text = "{\n";
     for (const auto& [key, value] : top.items())
@@ -366,6 +367,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     }
     if (json.contains("environment"))
         STX_CHECK(top.text("environment", header.environmentFile, false));
+    if (top.has("time")) STX_CHECK(top.finite("time", atlas.time.emplace()));
     if (const auto pixels = top.object("pixels")) {
         STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));
         STX_CHECK(pixels->number("kept", atlas.keptPixels, 0, 1e15));

@@ -78,8 +78,8 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
                                 const SaveOptions& options, Job& job);
 
 /// Opens what holds views in time: an .mp4, .xmt or .bt with pictures that move, an image set with
-/// time, `name_%04d.exr`, Azure Kinect's .mkv; whatever stands still is one frame. No picture is
-/// read before a frame is asked for: timeline() tells when they are shown,
+/// time, `name_%04d.exr`, `atlas_%04d`, Azure Kinect's .mkv; whatever stands still is one frame. No
+/// picture is read before a frame is asked for: timeline() tells when they are shown,
 /// timeline().frameAt(seconds) which is shown then, frame(number, job) gives it as a bundle.
 /// Errors: as open().
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openSequence(const std::filesystem::path& path,

@@ -149,10 +149,18 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
         return fail(ErrorCode::usage, "the largest texture size is {}; 1 to 65535 is possible",
                     settings.maxSize);
     STX_CHECK(bundle.check());
+    const Bundle& content = settings.contentOf ? *settings.contentOf : bundle;
+    bool alike = content.views.size() == bundle.views.size();
+    for (std::size_t i = 0; alike && i < content.views.size(); ++i)
+        alike = content.views[i].depth.size() == bundle.views[i].depth.size();
+    if (!alike)
+        return fail(ErrorCode::usage,
+                    "the {} views are not those of the frames that they are packed like",
+                    bundle.views.size());
     const Contents contents = contentsOf(bundle);
     const int maxPages = 4 / contents.texturesPerPage();
     const bool tight = settings.layout == PackSettings::Layout::tight;
-    STX_TRY(AtlasLayout layout, tight ? tightLayout(bundle, settings, maxPages)
+    STX_TRY(AtlasLayout layout, tight ? tightLayout(content, settings, maxPages)
                                       : gridLayout(bundle, settings, maxPages));
     if (layout.rectangles.empty())
         return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack",
@@ -168,6 +176,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     atlas.origin = bundle.origin;
     atlas.environment = bundle.environment;
     atlas.title = bundle.title;
+    atlas.time = bundle.time;
     const std::vector<int> source = keptViews(bundle, tight, layout.rectangles, job);
     for (const int i : source) atlas.views.push_back(withoutImages(bundle.views[i]));
     atlas.rectangles = std::move(layout.rectangles);
@@ -257,6 +266,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     bundle.bounds = atlas.bounds;
     bundle.origin = atlas.origin;
     bundle.environment = atlas.environment;
+    bundle.time = atlas.time;
     bundle.views.resize(atlas.views.size());
     std::vector<Image<std::uint8_t>> givenOf(atlas.views.size());
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {

@@ -28,6 +28,9 @@ struct PackSettings {
     /// Object pixels before pruning (PruneReport::sourcePixels), for Atlas::sourcePixels; 0 = the
     /// points and the pixels of full alpha without a depth.
     std::int64_t sourcePixels = 0;
+    /// Of frames that are packed alike (PackPeriod::content()): the tight layout goes by these
+    /// views, in number and size those of the bundle; null = by the bundle itself.
+    const Bundle* contentOf = nullptr;
 };
 
 /// Merges the views of a bundle into one atlas of at most four textures: one page, or two when
@@ -35,8 +38,9 @@ struct PackSettings {
 /// rectangle in its view, and the view's edge beyond that, so that filters see the neighbours that
 /// they would see in the view.
 ///
-/// Errors: settings out of range; a bundle that fails check(); views that cannot fit, with the size
-/// that would be needed and what to change; cancelled; memory over the limit.
+/// Errors: settings out of range; a bundle that fails check(), or other views than contentOf; views
+/// that cannot fit, with the size that would be needed and what to change; cancelled; memory over
+/// the limit.
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
 
 /// A bit for each pixel of a view, row by row: set where points of other views fall, a little

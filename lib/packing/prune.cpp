@@ -181,8 +181,26 @@ void smoothFarColours(const Image<std::uint8_t>& state, Image<Colour>& colour) {
     }
 }
 
-/// Takes the pixels that are not kept out of a view.
-void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
+Result<void> checkSettings(const PruneSettings& s) {
+    if (s.budget < 0)
+        return fail(ErrorCode::usage, "a budget of {} pixels cannot be kept", s.budget);
+    if (!(s.minPsnr >= 0) || std::isinf(s.minPsnr))
+        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be 0 or more", s.minPsnr);
+    if (s.overlap < 0 || s.overlap > 16)
+        return fail(ErrorCode::usage, "the overlap is {} pixels; 0 to 16 is possible", s.overlap);
+    if (!(s.rateTolerance >= 1) || !(s.depthTolerance > 0 && s.depthTolerance <= 0.1) ||
+        !(s.colourTolerance >= 0 && s.colourTolerance <= 1))
+        return fail(
+            ErrorCode::usage,
+            "pruning tolerances out of range: rate {:g} (at least 1), depth {:g} (over 0, at "
+            "most 0.1), colour {:g} (0 to 1)",
+            s.rateTolerance, s.depthTolerance, s.colourTolerance);
+    return {};
+}
+
+}  // namespace
+
+void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
     const int width = kept.width(), height = kept.height();
     Image<std::uint8_t> state(width, height, 0), gone = state;
     bool any = false;
@@ -251,25 +269,6 @@ void takeAway(const Image<std::uint8_t>& kept, ReferenceView& view) {
     if (auto* c = view.texture.rgbaFloat()) smoothFarColours(state, *c);
 }
 
-Result<void> checkSettings(const PruneSettings& s) {
-    if (s.budget < 0)
-        return fail(ErrorCode::usage, "a budget of {} pixels cannot be kept", s.budget);
-    if (!(s.minPsnr >= 0) || std::isinf(s.minPsnr))
-        return fail(ErrorCode::usage, "the least PSNR is {:g} dB; it must be 0 or more", s.minPsnr);
-    if (s.overlap < 0 || s.overlap > 16)
-        return fail(ErrorCode::usage, "the overlap is {} pixels; 0 to 16 is possible", s.overlap);
-    if (!(s.rateTolerance >= 1) || !(s.depthTolerance > 0 && s.depthTolerance <= 0.1) ||
-        !(s.colourTolerance >= 0 && s.colourTolerance <= 1))
-        return fail(
-            ErrorCode::usage,
-            "pruning tolerances out of range: rate {:g} (at least 1), depth {:g} (over 0, at "
-            "most 0.1), colour {:g} (0 to 1)",
-            s.rateTolerance, s.depthTolerance, s.colourTolerance);
-    return {};
-}
-
-}  // namespace
-
 Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job) {
     STX_CHECK(checkSettings(settings));
     STX_CHECK(bundle.check());
@@ -328,7 +327,7 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
     const double error = lostError(views) / all;
     report.psnr = error > 0 ? -10 * std::log10(error) : std::numeric_limits<double>::infinity();
     parallelFor(0, static_cast<std::int64_t>(views.size()),
-                [&](std::int64_t i) { takeAway(views[i].kept, bundle.views[i]); });
+                [&](std::int64_t i) { keepOnly(views[i].kept, bundle.views[i]); });
     for (const auto& v : bundle.views) report.emptiedViews += v.pointCount() == 0 ? 1 : 0;
     return report;
 }

@@ -52,4 +52,8 @@ struct PruneReport {
 /// of threads.
 [[nodiscard]] Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& job);
 
+/// Takes the points that are not in `kept` (1 = stays; as large as the view) out of a view, as
+/// prune() does.
+void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view);
+
 }  // namespace stx

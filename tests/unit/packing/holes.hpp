@@ -1,8 +1,17 @@
 #pragma once
 
-#include "lib/render/frame.hpp"
+#include <gtest/gtest.h>
+
+#include "lib/render/surface/cpu/cpu_surface.hpp"
 
 namespace stx {
+
+inline Frame draw(const Bundle& bundle, const Camera& camera) {
+    Job job;
+    auto frame = makeCpuSurfaceRenderer(bundle, {}, job)->render(camera);
+    EXPECT_TRUE(frame);
+    return std::move(*frame);
+}
 
 /// Pixels inside the object that pruning opened: those that `before` shows opaque, as the eight
 /// around, and `truth` (when given) as well, and that `after` shows less than half.

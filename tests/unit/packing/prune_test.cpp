@@ -7,7 +7,6 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/packing/packing.hpp"
-#include "lib/render/surface/cpu/cpu_surface.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/spheres_miv.hpp"
 #include "tests/torus_bundle.hpp"
@@ -16,13 +15,6 @@
 
 namespace stx {
 namespace {
-
-Frame draw(const Bundle& bundle, const Camera& camera) {
-    Job job;
-    auto frame = makeCpuSurfaceRenderer(bundle, {}, job)->render(camera);
-    EXPECT_TRUE(frame);
-    return std::move(*frame);
-}
 
 TEST(Prune, LeavesNoHoleAndHardlyADifference) {
     const Bundle before = torusViews();
