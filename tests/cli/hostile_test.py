@@ -111,6 +111,39 @@ def videos(folder):
     return [copy_into(os.path.join(seeds, name), folder) for name in ("420jpeg.y4m", "420p10.y4m")]
 
 
+def damaged_films(args, folder):
+    """Compressed video of several containers and codings, made by ffmpeg where it is; that of others and ours."""
+    os.makedirs(folder, exist_ok=True)
+    lines = {}
+    if shutil.which("ffmpeg"):
+        def film(name, *options):
+            must(["ffmpeg", "-nostdin", "-v", "error", "-y", "-f", "lavfi", "-i", "testsrc=size=48x32:rate=10:duration=1",
+                  *options, name], folder)
+            return os.path.join(folder, name)
+        colour = film("colour.mp4", "-pix_fmt", "yuv420p", "-g", "4", "-bf", "2")
+        depth = film("depth.mkv", "-c:v", "ffv1", "-slicecrc", "1", "-pix_fmt", "gray16le")
+        camera = os.path.join(folder, "camera.json")
+        write(camera, b'{"w":48,"h":32,"fl_x":50,"frames":[{"transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}')
+        pair = ["convert", camera, "--depth-unit", "0.001", "-o", "OUT/a.mp4"]
+        background = ["background", "IN", "-o", "OUT/a.png"]
+        lines[colour] = [background, pair + ["--texture", "IN", "--depth", depth]]
+        lines[depth] = [background, pair + ["--texture", colour, "--depth", "IN"]]
+        for name, options in (("a.avi", ["-c:v", "mjpeg"]), ("a.webm", ["-c:v", "libvpx"]), ("a.mov", ["-c:v", "mpeg4"])):
+            lines[film(name, *options)] = [background]
+        ours = os.path.join(folder, "ours.mp4")
+        made = run([args.stx, "convert", camera, "--depth-unit", "0.001", "--texture", colour, "--depth", depth,
+                    "--video", "h264", "-o", ours], folder)
+        if made.code == 0:
+            lines[ours] = [["render", "IN", "--time", "0.9", "--view", "0", "-o", "OUT/a.png"], ["validate", "IN"]]
+    recording = os.path.join(args.shared, "data/motion/azure-kinect/recording.mkv")
+    if os.path.exists(recording):
+        lines[recording] = [["convert", "IN", "-o", "OUT/a.mp4"]]
+    for path, commands in lines.items():
+        for i, content in enumerate(damages(path, args.samples if path != recording else args.samples // 3, args.seed)):
+            yield Case(f"{os.path.basename(path)} damaged {i}", commands[i // 2 % len(commands)], content=content,
+                       source=path)
+
+
 def models(folder):
     """Models whose readers are not ours, from the seeds of fuzzing (their first byte says what they are)."""
     seeds = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../fuzz/corpus/meshes")
@@ -123,14 +156,14 @@ def models(folder):
 
 
 def references(shared):
-    for kind in ("mp4", "bt", "xmt"):
+    for kind in ("mp4", "bt", "xmt", "motion"):
         folder = os.path.join(shared, "reference", kind)
         if not os.path.isdir(folder):
             continue
         for root, _, names in sorted(os.walk(folder)):
             for name in sorted(names):
                 path = os.path.join(root, name)
-                if name.endswith("." + kind) and os.path.getsize(path) < 1 << 20:
+                if name.endswith((".mp4", ".bt") if kind == "motion" else "." + kind) and os.path.getsize(path) < 1 << 20:
                     yield path
 
 
@@ -251,12 +284,13 @@ def main():
     have = commands_of(args.stx)
     with tempfile.TemporaryDirectory(prefix="stx-hostile-own-") as folder:
         groups = {"over malformed files": list(malformed(args.shared, have, folder)), "over damaged ones of ours": [],
-                  "over damaged references": [], "over damaged image sets": []}
+                  "over damaged references": [], "over damaged image sets": [], "over damaged films": []}
         for path in own_files(args, folder):
             groups["over damaged ones of ours"] += damaged(path, have, args.samples, args.seed)
         for path in references(args.shared):
             groups["over damaged references"] += damaged(path, have, max(2, args.samples // 6), args.seed)
         groups["over damaged image sets"] += damaged_sets(args, os.path.join(folder, "sets"))
+        groups["over damaged films"] += damaged_films(args, os.path.join(folder, "films"))
         groups = {name: cases[::args.every] for name, cases in groups.items()}
         cases = [case for group in groups.values() for case in group]
         codes, failed, slowest, peak = collections.Counter(), 0, 0.0, 0

@@ -21,6 +21,23 @@ T valueOf(stx::Result<T> result) {
     if constexpr (!std::is_void_v<T>) return std::move(*result);
 }
 
+/// A bundle whose first camera moves.
+class Moving : public stx::Sequence {
+  public:
+    explicit Moving(stx::Bundle bundle) : bundle_(std::move(bundle)) {
+        timeline_ = stx::steadyTimeline(3, 25);
+    }
+    stx::Result<stx::Bundle> frame(std::size_t index, stx::Job&) override {
+        auto out = bundle_;
+        out.views[0].camera.position.x += 0.1 * static_cast<double>(index);
+        out.time = timeline_.times[index];
+        return out;
+    }
+
+  private:
+    stx::Bundle bundle_;
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -72,6 +89,20 @@ int main(int argc, char** argv) {
     const auto renderer = valueOf(stx::rendererOf(opened, {}, job, stx::Backend::cpu));
     for (const auto& c : orbit)
         require(valueOf(renderer->render(c)).colour.width() == 160, "a picture of another size");
+
+    // Three frames, of which each has the camera a little farther on.
+    auto film = stx::someFrames(stx::changed(std::make_unique<Moving>(bundle),
+                                             [](stx::Bundle& frame, stx::Job&) {
+                                                 frame.title = "a film";
+                                                 return stx::Result<void>();
+                                             }),
+                                {0, 1, 2});
+    valueOf(stx::save(*valueOf(std::move(film)), "library.mp4", {}, job));
+    const auto again = valueOf(stx::openSequence("library.mp4", {}, job));
+    require(again->timeline().count() == 3, "a film of another length");
+    const auto late = valueOf(again->frame(again->timeline().frameAt(0.9), job));
+    require(late.views[0].camera.position.x > bundle.views[0].camera.position.x + 0.19,
+            "the film's camera stands still");
 
     require(stx::open("missing.obj", {}, job).error().code == stx::ErrorCode::io,
             "a missing file is not an io error");

@@ -1,5 +1,6 @@
 // Films of MPEG-4 whose pictures are video: other software's are read, ours are written and read.
 
+#include <algorithm>
 #include <set>
 
 #include "formats/files/files.hpp"
@@ -91,11 +92,24 @@ TEST(VideoFilms, ReadInAnyOrderIsTheSame) {
     }
 }
 
-/// Frames of MovingViews, saved with H.264 and opened again.
+/// MovingViews with a depth that moves by more than a step of 10 bits.
+class FarMovingViews : public MovingViews {
+  public:
+    using MovingViews::MovingViews;
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        auto bundle = MovingViews::frame(index, job);
+        ReferenceView& view = bundle->views[0];
+        view.depth.at(1, 0) =
+            static_cast<float>(view.depthCode().decode(20000 + 640 * static_cast<unsigned>(index)));
+        return bundle;
+    }
+};
+
+/// Such frames, saved with H.264 and opened again.
 struct Written {
     TemporaryFolder folder{"video"};
     std::filesystem::path path = folder / "a.mp4";
-    MovingViews frames;
+    FarMovingViews frames;
     std::vector<std::string> notes;
 
     explicit Written(int count, int crf = 6) : frames(count) {
