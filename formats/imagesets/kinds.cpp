@@ -98,12 +98,15 @@ std::string firstThere(const path& folder, const std::vector<std::string>& names
 }
 
 std::string withImageEnding(const path& folder, const std::string& name) {
+    constexpr const char* kEndings[] = {".png",  ".jpg", ".jpeg", ".exr", ".webp", ".tif",
+                                        ".tiff", ".PNG", ".JPG",  ".bmp", ".ppm"};
+    // Sets of thousands of pictures name them whole: without a look at each.
+    for (const char* ending : kEndings)
+        if (name.ends_with(ending)) return name;
     std::error_code ec;
     if (!name.empty() && std::filesystem::is_regular_file(folder / name, ec)) return name;
     std::vector<std::string> names;
-    for (const char* ending : {".png", ".jpg", ".jpeg", ".exr", ".webp", ".tif", ".tiff", ".PNG",
-                               ".JPG", ".bmp", ".ppm"})
-        names.push_back(name + ending);
+    for (const char* ending : kEndings) names.push_back(name + ending);
     const std::string found = firstThere(folder, names);
     return found.empty() ? name : found;
 }

@@ -230,10 +230,12 @@ class Reader {
             if (od_ == nullptr && isOd(track) && &track != scene_) od_ = &track;
         }
         if (scene_ == nullptr)
-            return failAt("moov", ErrorCode::invalidInput,
-                          "the file has no MPEG-4 scene: none of its {} tracks is a BIFS stream "
-                          "(handler 'sdsm')",
-                          tracks_.size());
+            return failAt(
+                "moov", ErrorCode::invalidInput,
+                "the file has no MPEG-4 scene: none of its {} tracks is a BIFS stream "
+                "(handler 'sdsm'); plain video is taken by stx background, and with a "
+                "film of depth by stx convert CAMERAS.json --texture COLOUR --depth DEPTH",
+                tracks_.size());
         document_.sceneStream = scene_->stream;
         if (od_ != nullptr)
             document_.odStream = od_->stream;
