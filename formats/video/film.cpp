@@ -159,6 +159,12 @@ Result<void> Film::select(int track) {
     if (track < 0 || track >= static_cast<int>(tracks_.size()) ||
         !tracks_[static_cast<std::size_t>(track)].video)
         return failAt(where(), ErrorCode::invalidInput, "it has no track of video");
+    const Track& chosenTrack = tracks_[static_cast<std::size_t>(track)];
+    if (chosenTrack.width < 1 || chosenTrack.height < 1 ||
+        chosenTrack.width > limits_.maxImageSide || chosenTrack.height > limits_.maxImageSide)
+        return failAt(where(), ErrorCode::invalidInput,
+                      "its pictures are {}x{} pixels; each side must be 1 to {}", chosenTrack.width,
+                      chosenTrack.height, limits_.maxImageSide);
     video::Packer request;
     request.put(static_cast<std::int32_t>(track));
     STX_TRY(const auto chosen, ask(video::Tag::selectTrack, request, video::Tag::done));

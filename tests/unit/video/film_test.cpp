@@ -208,6 +208,32 @@ TEST(Films, DamageIsOneSentence) {
     }
 }
 
+// Neither the sample entry nor the track tells a size.
+TEST(Films, SizesOfNothingAreAnError) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), 2, kWide, kHigh);
+    films::ffmpeg(folder.path(), "-i c%d.png -c:v mjpeg -pix_fmt yuvj420p f.mov");
+    Bytes bytes = *readFile(folder / "f.mov", {});
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    for (const char* name : {"jpeg", "tkhd"}) {
+        const auto at = text.find(name);
+        ASSERT_NE(at, std::string_view::npos);
+        const std::size_t size = at + (name[0] == 'j' ? 28 : 80);
+        for (std::size_t i = 0; i < (name[0] == 'j' ? 4u : 8u); ++i) bytes[size + i] = std::byte{0};
+    }
+    ASSERT_TRUE(writeFile(folder / "f.mov", bytes));
+    Job job;
+    const auto frames = openVideoFrames({folder / "f.mov"}, job);
+    if (frames) {
+        EXPECT_GT((*frames)->size().x, 0);
+        EXPECT_GT((*frames)->size().y, 0);
+    } else {
+        EXPECT_NE(frames.error().text().find("each side must be 1 to"), std::string::npos)
+            << frames.error().text();
+    }
+}
+
 TEST(Films, ListsAndAddressesAreNoFilms) {
     const TemporaryFolder folder;
     for (const std::string_view text :
