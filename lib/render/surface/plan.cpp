@@ -1,6 +1,7 @@
 #include "lib/render/surface/plan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -12,6 +13,8 @@ namespace {
 /// What a block may reach out of its range by, relative to SourceBlock::reach, and the share of q
 /// that rounding may add.
 constexpr float kBlockMargin = 1.05f, kBlockRounding = 1e-5f;
+/// Where some of a block is behind the camera, it counts from this share of its largest w.
+constexpr float kNearestShare = 1e-4f;
 
 void addBounds(const Source& s, Bounds& bounds) {
     for (int by = 0; by < s.blocksY; ++by) {
@@ -51,31 +54,38 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
         const float margin =
             kBlockMargin * block.reach + kBlockRounding * s.space.axis.relativeScale(block.qMax);
         float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
-        bool front = false, behind = false;
+        const auto add = [&](glm::vec4 h) {
+            x0 = std::min(x0, h.x / h.w);
+            x1 = std::max(x1, h.x / h.w);
+            y0 = std::min(y0, h.y / h.w);
+            y1 = std::max(y1, h.y / h.w);
+        };
+        std::array<glm::vec4, 8> corners;
+        float most = 0, least = std::numeric_limits<float>::max();
         for (int corner = 0; corner < 8; ++corner) {
             const float x = (corner & 1) ? bx + kBlock + 1.5f : bx - 0.5f;
             const float y = (corner & 2) ? by + kBlock + 1.5f : by - 0.5f;
             const float q = (corner & 4) ? block.qMax + margin
                                          : std::max(block.qMin - margin, 0.5f * block.qMin);
-            const glm::vec4 h = warp.homogeneous(x, y, q);
-            if (!(h.w > 0)) {
-                behind = true;
-                continue;
-            }
-            front = true;
-            x0 = std::min(x0, h.x / h.w);
-            x1 = std::max(x1, h.x / h.w);
-            y0 = std::min(y0, h.y / h.w);
-            y1 = std::max(y1, h.y / h.w);
+            const glm::vec4 h = corners[static_cast<std::size_t>(corner)] =
+                warp.homogeneous(x, y, q);
+            most = std::max(most, h.w);
+            least = std::min(least, h.w);
+            if (h.w > 0) add(h);
         }
-        if (!front) continue;
+        if (!(most > 0)) continue;
+        const bool behind = !(least > 0);
+        // Cut off what is behind, and what is next to nothing before the camera.
+        const float cut = kNearestShare * most;
+        for (std::size_t corner = 0; behind && corner < 8; ++corner) {
+            for (const std::size_t bit : {1u, 2u, 4u}) {
+                const glm::vec4 from = corners[corner], to = corners[corner ^ bit];
+                if (from.w > cut && to.w < cut)
+                    add(from + (to - from) * ((from.w - cut) / (from.w - to.w)));
+            }
+        }
         const auto limitX = static_cast<float>(space.camera.width),
                    limitY = static_cast<float>(space.camera.height);
-        if (behind) {
-            x0 = y0 = 0;
-            x1 = limitX;
-            y1 = limitY;
-        }
         x0 = std::max(x0 - 0.5f, 0.0f);
         y0 = std::max(y0 - 0.5f, 0.0f);
         x1 = std::min(x1 + 0.5f, limitX - 0.5f);
@@ -88,7 +98,7 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
                       static_cast<int>(y0) / kTile,
                       static_cast<int>(x1) / kTile,
                       static_cast<int>(y1) / kTile,
-                      h.w > 0 ? h.z / h.w : 0.0};
+                      h.w > 0 ? (behind ? -h.z : h.z) / h.w : 0.0};
         ranges.push_back(r);
         for (int ty = r.y0; ty <= r.y1; ++ty)
             for (int tx = r.x0; tx <= r.x1; ++tx)
@@ -167,12 +177,16 @@ std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
     // A point of the scene in the middle of the tile: where the blocks that fall in it are.
     double q = 0;
     int blocks = 0;
-    for (const FrameSource& f : sources) {
-        for (const double middle : f.middlesOf(tile)) {
-            if (!(middle > 0)) continue;
-            q += middle;
-            ++blocks;
+    // Where some of a block is behind the camera, its middle may be anywhere: only without others.
+    for (const double sign : {1.0, -1.0}) {
+        for (const FrameSource& f : sources) {
+            for (const double middle : f.middlesOf(tile)) {
+                if (!(sign * middle > 0)) continue;
+                q += sign * middle;
+                ++blocks;
+            }
         }
+        if (blocks) break;
     }
     if (!blocks) return chosen;
     const glm::dvec4 h =
@@ -183,10 +197,18 @@ std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
         return c.orthographic ? c.forward() : glm::normalize(point - c.position);
     };
     const glm::dvec3 look = towards(space.camera);
+    // A camera may stand right where the view is drawn from and look elsewhere.
+    const auto inPicture = [&](const Source& s) {
+        const glm::dvec4 at = s.space.pixelFromWorld * glm::dvec4(point, 1.0);
+        return at.w > 0 && at.x >= 0 && at.y >= 0 && at.x <= at.w * s.width &&
+               at.y <= at.w * s.height;
+    };
     std::vector<std::pair<double, int>> ranked;
     for (int i = 0; i < count; ++i) {
         const FrameSource& f = sources[static_cast<std::size_t>(i)];
-        const double idle = effort.preferShown && f.blocksOf(tile).empty() ? 2.0 : 0.0;
+        const bool shows =
+            inPicture(*f.source) && !(effort.preferShown && f.blocksOf(tile).empty());
+        const double idle = shows ? 0.0 : 2.0;
         ranked.emplace_back(idle - glm::dot(look, towards(f.source->space.camera)), i);
     }
     std::nth_element(ranked.begin(), ranked.begin() + effort.mostGeometry - 1, ranked.end());
@@ -216,11 +238,15 @@ void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted) {
         for (std::size_t t = 0; t < wanted.size(); ++t) {
             const std::uint32_t end = f.tileBegin[t + 1];
             if (wanted[t])
-                for (std::uint32_t b = begin; b < end; ++b) f.blocks[kept++] = f.blocks[b];
+                for (std::uint32_t b = begin; b < end; ++b, ++kept) {
+                    f.blocks[kept] = f.blocks[b];
+                    f.middles[kept] = f.middles[b];
+                }
             begin = end;
             f.tileBegin[t + 1] = kept;
         }
         f.blocks.resize(kept);
+        f.middles.resize(kept);
     }
 }
 

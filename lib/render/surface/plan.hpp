@@ -45,7 +45,9 @@ struct FrameSource {
     Ray fromEye{};
     std::vector<std::uint32_t> tileBegin;  ///< tile t has blocks[tileBegin[t] .. tileBegin[t + 1])
     std::vector<std::uint32_t> blocks;
-    std::vector<double> middles;  ///< of each of them: q in the frame of its middle, 0 = behind
+    /// Of each of them: q in the frame of its middle, 0 = behind; negative where some of the block
+    /// is behind.
+    std::vector<double> middles;
 
     [[nodiscard]] std::span<const std::uint32_t> blocksOf(int tile) const {
         const auto t = static_cast<std::size_t>(tile);

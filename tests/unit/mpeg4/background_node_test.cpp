@@ -93,7 +93,7 @@ TEST(BackgroundNode, ComesBackFromEveryContainer) {
     e.pictures[4].rgba8()->at(3, 3) = {9, 8, 7, 100};
     e.skyColours = {{0.25, 0.5, 1}};
     const Bundle bundle = viewWith(e);
-    const TemporaryFolder folder;
+    const TemporaryFolder folder, again;
     for (const char* name : {"a.mp4", "a.bt", "a.xmt"}) {
         SCOPED_TRACE(name);
         Job job;
@@ -107,9 +107,8 @@ TEST(BackgroundNode, ComesBackFromEveryContainer) {
         EXPECT_EQ(back->environment->skyColours, e.skyColours);
         EXPECT_LT(std::abs(1 - glm::dot(back->environment->orientation, e.orientation)), 1e-12);
         // Written again, it has the same bytes.
-        ASSERT_TRUE(writeMpeg4Bundle(*back, folder / ("b" + std::string(name).substr(1)), job));
-        EXPECT_EQ(*readFile(folder / name, {}),
-                  *readFile(folder / ("b" + std::string(name).substr(1)), {}));
+        ASSERT_TRUE(writeMpeg4Bundle(*back, again / name, job));
+        EXPECT_TRUE(*readFile(folder / name, {}) == *readFile(again / name, {}));
     }
     // A file beside a text is named after what it is for.
     EXPECT_TRUE(std::filesystem::exists(folder / "a_images/environment_top.png"));
