@@ -21,9 +21,13 @@ using Compressor = std::unique_ptr<libdeflate_compressor, FreeCompressor>;
 #ifdef STX_WITH_ISAL
 std::size_t compressFast(std::span<const std::byte> from, std::span<std::byte> to) {
     constexpr std::size_t kBuffer = ISAL_DEF_LVL1_DEFAULT;
-    const auto buffer = std::make_unique_for_overwrite<std::uint8_t[]>(kBuffer);
-    isal_zstream stream;
+    // Zeros: isal_deflate_stateless_init() of version 2.30 leaves hist_bits as it is, and what the
+    // stack held there would choose how far matches look back, and so the bytes.
+    const auto buffer = std::make_unique<std::uint8_t[]>(kBuffer);
+    const auto zeros = std::make_unique<isal_zstream>();
+    isal_zstream& stream = *zeros;
     isal_deflate_stateless_init(&stream);
+    stream.hist_bits = 0;
     stream.level = 1;
     stream.level_buf = buffer.get();
     stream.level_buf_size = kBuffer;
