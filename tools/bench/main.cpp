@@ -7,6 +7,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/bench.hpp"
 #include "lib/render/renderer.hpp"
+#include "tools/bench/check.hpp"
 
 namespace {
 
@@ -34,7 +35,7 @@ int main(int argc, char** argv) {
     std::string format = "text", svg;
     int table = 0, threads = 0;
     std::string splat = "data";
-    bool devices = false;
+    bool devices = false, check = false;
     app.set_version_flag("--version", STX_VERSION);
     app.add_option("--format", format, "text (default) or json")
         ->check(CLI::IsMember({"text", "json"}));
@@ -51,6 +52,9 @@ int main(int argc, char** argv) {
         ->check(CLI::Range(0, 1023));
     app.add_option("--threads", threads, "0 = all processors")->check(CLI::Range(0, 4096));
     app.add_option("--svg", svg, "writes a plot there, too");
+    app.add_flag("--check", check,
+                 "draws by every mode and pipeline on every GPU and compares with the processor's "
+                 "pictures; 7 when one is unlike it");
     app.add_flag("--list-devices", devices, "lists the GPUs and ends");
     try {
         app.parse(argc, argv);
@@ -70,6 +74,18 @@ int main(int argc, char** argv) {
                        d.platform, d.software ? "  software" : "", d.maxTextureSize);
         for (const auto& note : job.takeNotes()) fmt::print(stderr, "stx-bench: {}\n", note);
         return 0;
+    }
+    if (check) {
+        const auto print = [](std::string_view text) {
+            fmt::print("{}", text);
+            std::fflush(stdout);
+        };
+        const auto checked = stx::checkGpus({settings.device, print}, job);
+        for (const auto& note : job.takeNotes()) fmt::print(stderr, "stx-bench: {}\n", note);
+        if (!checked) return report(checked.error());
+        fmt::print("{} pictures compared, {} unlike the processor's, {} ways not here\n",
+                   checked->drawn, checked->wrong, checked->refused);
+        return checked->wrong == 0 ? 0 : static_cast<int>(stx::ErrorCode::difference);
     }
     settings.splat = splat == "paper" ? stx::SplatRule::paper : stx::SplatRule::data;
     settings.table1 = table != 2;

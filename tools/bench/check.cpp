@@ -1,0 +1,166 @@
+#include "tools/bench/check.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "lib/metrics/compare.hpp"
+#include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/frame_picture.hpp"
+#include "lib/render/renderer.hpp"
+#include "lib/surface/normals.hpp"
+
+namespace stx {
+namespace {
+
+/// The conventional path draws squares and blends nothing, so that it is like the others from
+/// afar only: 25.6 dB with llvmpipe.
+constexpr double kSquaresDb = 20.0;
+
+/// One way to draw.
+struct Way {
+    const char* name;
+    Backend backend;
+    RenderMode mode;
+    Quality quality;
+    SplatRule splat;
+    GpuPipeline pipeline;
+    bool lit;
+    double leastDb = kAlikeDb;
+};
+
+constexpr auto kNormal = Quality::normal;
+constexpr auto kByDevice = GpuPipeline::automatic;
+
+constexpr Way kWays[] = {
+    {"surface, draft", Backend::gpu, RenderMode::surface, Quality::draft, SplatRule::data,
+     kByDevice, false},
+    {"surface, normal", Backend::gpu, RenderMode::surface, kNormal, SplatRule::data, kByDevice,
+     false},
+    {"surface, best", Backend::gpu, RenderMode::surface, Quality::best, SplatRule::data, kByDevice,
+     false},
+    {"surface, normal, lit", Backend::gpu, RenderMode::surface, kNormal, SplatRule::data, kByDevice,
+     true},
+    {"splat data, compute", Backend::gpu, RenderMode::splat, kNormal, SplatRule::data,
+     GpuPipeline::compute, false},
+    {"splat paper, compute", Backend::gpu, RenderMode::splat, kNormal, SplatRule::paper,
+     GpuPipeline::compute, false},
+    {"splat point, compute", Backend::gpu, RenderMode::splat, kNormal, SplatRule::point,
+     GpuPipeline::compute, false},
+    {"splat data, compute, lit", Backend::gpu, RenderMode::splat, kNormal, SplatRule::data,
+     GpuPipeline::compute, true},
+    {"splat data, raster", Backend::gpu, RenderMode::splat, kNormal, SplatRule::data,
+     GpuPipeline::raster, false},
+    {"splat paper, raster", Backend::gpu, RenderMode::splat, kNormal, SplatRule::paper,
+     GpuPipeline::raster, false},
+    {"splat point, raster", Backend::gpu, RenderMode::splat, kNormal, SplatRule::point,
+     GpuPipeline::raster, false},
+    {"splat data, raster, lit", Backend::gpu, RenderMode::splat, kNormal, SplatRule::data,
+     GpuPipeline::raster, true},
+    {"splat paper, conventional GL", Backend::gl, RenderMode::splat, kNormal, SplatRule::paper,
+     kByDevice, false, kSquaresDb},
+};
+
+RenderSettings settingsOf(const Way& way) {
+    RenderSettings s;
+    s.mode = way.mode;
+    s.quality = way.quality;
+    s.splat = way.splat;
+    s.pipeline = way.pipeline;
+    if (way.lit) {
+        Light light;
+        light.kind = Light::Kind::directional;
+        light.vector = {-0.5f, -1.0f, -0.6f};
+        s.lighting.lights.push_back(light);
+    }
+    return s;
+}
+
+/// Of the pictures: small, so that devices of software have done in a minute or two.
+constexpr int kWidth = 256;
+
+struct Drawn {
+    Rgba8Image picture;
+    double milliseconds = 0;  ///< of the second frame: the first warms caches up
+};
+
+Result<Drawn> draw(Backend backend, const Bundle& bundle, const Camera& camera, const Way& way,
+                   int device, Job& job) {
+    STX_TRY(const auto renderer, makeRenderer(backend, bundle, settingsOf(way), device, job));
+    STX_TRY(auto frame, renderer->render(camera));
+    const auto start = std::chrono::steady_clock::now();
+    STX_TRY(frame, renderer->render(camera));
+    Drawn drawn;
+    drawn.milliseconds =
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    drawn.picture = rgba8From(frame);
+    return drawn;
+}
+
+struct CheckScene {
+    const char* name;
+    Bundle bundle;
+    Camera camera;
+};
+
+}  // namespace
+
+Result<GpuCheckReport> checkGpus(const GpuCheckSettings& settings, Job& job) {
+    std::vector<Device> devices = listDevices(job);
+    if (settings.device >= 0)
+        std::erase_if(devices, [&](const Device& d) { return d.index != settings.device; });
+    if (devices.empty()) {
+        const auto tried = job.takeNotes();
+        return fail(ErrorCode::unsupported, "no OpenGL device answers: {}",
+                    tried.empty() ? "none is listed" : fmt::format("{}", fmt::join(tried, "; ")));
+    }
+    std::vector<CheckScene> scenes;
+    for (const auto& [kind, name, views, index] :
+         {std::tuple{AnalyticScene::object, "object", 9, 0.5},
+          std::tuple{AnalyticScene::room, "room", 2, 0.5}}) {
+        const Camera camera = analyticCamera(kind, index, views);
+        scenes.push_back({name, analyticBundle(kind, views),
+                          camera.resized(kWidth, kWidth * camera.height / camera.width)});
+        // Light needs normals; splats get their axes.
+        STX_CHECK(bake(scenes.back().bundle, {}, job));
+    }
+    GpuCheckReport report;
+    // The processor's pictures are the same for every device.
+    std::map<std::pair<const Way*, const CheckScene*>, Drawn> truths;
+    for (const Device& device : devices) {
+        settings.print(fmt::format(
+            "device {}: {}, OpenGL {}, {}\n{:<30}{:<8}{:>10}{:>8}{:>10}{:>10}\n", device.index,
+            device.name, device.version, device.software ? "software" : "hardware", "", "scene",
+            "dB", "worst", "ms", "cpu ms"));
+        for (const Way& way : kWays) {
+            for (const CheckScene& scene : scenes) {
+                STX_CHECK(job.checkCancelled());
+                settings.print(fmt::format("{:<30}{:<8}", way.name, scene.name));
+                auto drawn = draw(way.backend, scene.bundle, scene.camera, way, device.index, job);
+                if (!drawn) {
+                    ++report.refused;
+                    settings.print("  not here: " + drawn.error().message + "\n");
+                    continue;
+                }
+                auto& truth = truths[{&way, &scene}];
+                if (truth.picture.empty()) {
+                    STX_TRY(truth, draw(Backend::cpu, scene.bundle, scene.camera, way, -1, job));
+                }
+                STX_TRY(const auto found, compare(drawn->picture, truth.picture));
+                ++report.drawn;
+                const bool alike = found.identical() || *found.psnrRgb >= way.leastDb;
+                report.wrong += alike ? 0 : 1;
+                settings.print(
+                    fmt::format("{:>10}{:>8.0f}{:>10.2f}{:>10.2f}{}\n",
+                                found.identical() ? "same" : fmt::format("{:.1f}", *found.psnrRgb),
+                                found.worst.difference, drawn->milliseconds, truth.milliseconds,
+                                alike ? "" : "  UNLIKE THE PROCESSOR'S"));
+            }
+        }
+    }
+    return report;
+}
+
+}  // namespace stx
