@@ -39,7 +39,7 @@ struct Beginnings {
     const char* words;
 };
 constexpr Beginnings kBeginnings[] = {
-    {"--views", "cube ring: sphere: octahedral: auto:"},
+    {"--views", "cube ring: sphere: octahedral: hemi-octahedral: auto:"},
     {"--light", "dir: point:"},
 };
 

@@ -74,9 +74,9 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
     const char* group = MeshViewOptions::kHeading;
     command
         .option("--views", o->views,
-                "cube, ring:N, sphere:N, octahedral:N, auto:N (the N best), auto:DBdB (the "
-                "fewest that reach "
-                "this PSNR) or a camera file (default sphere:16)")
+                "cube, ring:N, sphere:N, octahedral:N, hemi-octahedral:N (grids of N x N), auto:N "
+                "(the N best), auto:DBdB (the fewest that reach this PSNR) or a camera file "
+                "(default sphere:16)")
         .group(group);
     command
         .option("--size", o->size,

@@ -99,7 +99,8 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 
 /// How a model becomes reference views. What is said of views applies to meshes.
 struct ConvertSettings {
-    /// `cube` (6), `ring:N`, `sphere:N`, `octahedral:N` (N x N), `auto:N` (the N best), N from 1,
+    /// `cube` (6), `ring:N`, `sphere:N`, `octahedral:N` (N x N),
+    /// `hemi-octahedral:N` (N x N, from above), `auto:N` (the N best), N from 1,
     /// or `auto:DBdB` (the fewest that reach this PSNR, as in auto:38dB).
     std::string views = "sphere:16";
     /// The views themselves, in the model's coordinates (see originOf()), when there are any: then

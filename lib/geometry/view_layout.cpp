@@ -7,6 +7,14 @@
 #include "lib/base/parallel.hpp"
 
 namespace stx {
+namespace {
+
+/// Layouts of N x N views, of which all have the same window.
+bool isGrid(ViewLayout::Kind kind) {
+    return kind == ViewLayout::Kind::octahedral || kind == ViewLayout::Kind::hemiOctahedral;
+}
+
+}  // namespace
 
 Result<ViewLayout> parseViewLayout(std::string_view text) {
     ViewLayout layout;
@@ -23,11 +31,13 @@ Result<ViewLayout> parseViewLayout(std::string_view text) {
         layout.kind = ViewLayout::Kind::sphere;
     else if (word == "octahedral")
         layout.kind = ViewLayout::Kind::octahedral;
+    else if (word == "hemi-octahedral")
+        layout.kind = ViewLayout::Kind::hemiOctahedral;
     else
-        return fail(
-            ErrorCode::usage,
-            "'{}' is no view layout; use cube, ring:N, sphere:N, octahedral:N or a camera file",
-            text);
+        return fail(ErrorCode::usage,
+                    "'{}' is no view layout; use cube, ring:N, sphere:N, octahedral:N, "
+                    "hemi-octahedral:N or a camera file",
+                    text);
     const auto digits =
         colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
     const auto parsed = std::from_chars(digits.data(), digits.data() + digits.size(), layout.count);
@@ -35,8 +45,8 @@ Result<ViewLayout> parseViewLayout(std::string_view text) {
     if (digits.empty() || (parsed.ec != std::errc() && !large) ||
         parsed.ptr != digits.data() + digits.size())
         return fail(ErrorCode::usage, "'{}' needs a number of views, as in {}:16", text, word);
-    const int most = layout.kind == ViewLayout::Kind::octahedral ? 64 : 4096;
-    const int least = layout.kind == ViewLayout::Kind::octahedral ? 2 : 1;
+    const int most = isGrid(layout.kind) ? 64 : 4096;
+    const int least = isGrid(layout.kind) ? 2 : 1;
     if (large || layout.count < least || layout.count > most)
         return fail(ErrorCode::usage, "'{}' asks for {} views; {} to {} are possible", text, digits,
                     least, most);
@@ -53,6 +63,12 @@ glm::dvec3 octahedralDirection(int i, int j, int n) {
         z = fz;
     }
     return glm::normalize(glm::dvec3(x, y, z));
+}
+
+glm::dvec3 hemiOctahedralDirection(int i, int j, int n) {
+    const double px = 2.0 * i / (n - 1) - 1.0, py = 2.0 * j / (n - 1) - 1.0;
+    const double x = 0.5 * (px + py), z = 0.5 * (px - py);
+    return glm::normalize(glm::dvec3(x, 1.0 - std::abs(x) - std::abs(z), z));
 }
 
 glm::dquat rotationToUp(glm::dvec3 up) {
@@ -107,6 +123,11 @@ std::vector<glm::dvec3> layoutDirections(const ViewLayout& layout) {
         case ViewLayout::Kind::octahedral:
             for (int j = 0; j < n; ++j) {
                 for (int i = 0; i < n; ++i) out.push_back(octahedralDirection(i, j, n));
+            }
+            break;
+        case ViewLayout::Kind::hemiOctahedral:
+            for (int j = 0; j < n; ++j) {
+                for (int i = 0; i < n; ++i) out.push_back(hemiOctahedralDirection(i, j, n));
             }
             break;
     }
@@ -173,7 +194,7 @@ Result<std::vector<Camera>> layoutCameras(const ViewLayout& layout, const ViewFr
         const glm::dquat toUp = rotationToUp(framing.up);
         for (auto& d : directions) d = toUp * d;
     }
-    const bool tight = layout.kind != ViewLayout::Kind::octahedral;
+    const bool tight = !isGrid(layout.kind);
     std::vector<Camera> cameras(directions.size());
     std::vector<Result<Camera>> results(directions.size(), Camera());
     parallelFor(0, static_cast<std::int64_t>(directions.size()), [&](std::int64_t i) {

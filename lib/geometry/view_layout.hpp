@@ -17,7 +17,8 @@ struct ViewLayout {
         ring,    ///< `count` around +Y at one elevation, the first on +Z, counter-clockwise from
                  ///< above
         sphere,  ///< `count` on a Fibonacci sphere: even in all directions
-        octahedral,  ///< `count` x `count`, octahedral map row by row: the impostor grid
+        octahedral,      ///< `count` x `count`, octahedral map row by row: the impostor grid
+        hemiOctahedral,  ///< the same of the upper half, for what stands on the ground
     };
     Kind kind = Kind::sphere;
     int count = 16;
@@ -35,7 +36,8 @@ struct ViewFraming {
     glm::dvec3 up{0, 1, 0};
 };
 
-/// Parses `cube`, `ring:N`, `sphere:N`, `octahedral:N`. Errors (usage) name the possible forms.
+/// Parses `cube`, `ring:N`, `sphere:N`, `octahedral:N`, `hemi-octahedral:N`. Errors (usage) name
+/// the possible forms.
 [[nodiscard]] Result<ViewLayout> parseViewLayout(std::string_view text);
 
 /// The shortest rotation that takes +Y to `up` (which need not be unit). So the front, +Z, of an
@@ -53,6 +55,10 @@ struct ViewFraming {
 /// grid are the lower pole's. As in impostor shaders: p = 2 (i, j)/(n-1) - 1, folded where
 /// |p.x| + |p.y| > 1; +Y is the pole in the middle.
 [[nodiscard]] glm::dvec3 octahedralDirection(int i, int j, int n);
+
+/// The same of an N x N hemi-octahedral map: with p as above, x = (p.x + p.y) / 2,
+/// z = (p.x - p.y) / 2, y = 1 - |x| - |z|. The edges of the grid are the horizon.
+[[nodiscard]] glm::dvec3 hemiOctahedralDirection(int i, int j, int n);
 
 /// Cameras of a layout around points (the object's vertices, or the corners of its box). Each looks
 /// at the centre of the bounds. The frame is drawn in until the object fills it, with

@@ -219,9 +219,26 @@ TEST(ViewLayout, ParsesAndRefuses) {
         EXPECT_FALSE(parseViewLayout(bad)) << bad;
 }
 
+TEST(ViewLayout, HemiOctahedralGridsLookFromTheHorizonUp) {
+    const auto directions = layoutDirections(*parseViewLayout("hemi-octahedral:5"));
+    ASSERT_EQ(directions.size(), 25u);
+    for (std::size_t k = 0; k < directions.size(); ++k) {
+        const glm::dvec3 d = directions[k];
+        const bool rim = k % 5 == 0 || k % 5 == 4 || k < 5 || k >= 20;
+        EXPECT_NEAR(glm::length(d), 1, 1e-12);
+        if (rim)
+            EXPECT_NEAR(d.y, 0, 1e-12) << k;
+        else
+            EXPECT_GT(d.y, 0.3) << k;
+        // No direction twice.
+        for (std::size_t l = 0; l < k; ++l) EXPECT_LT(glm::dot(d, directions[l]), 0.99);
+    }
+    EXPECT_NEAR(directions[12].y, 1, 1e-12);
+}
+
 TEST(ViewLayout, EveryLayoutSeesTheWholeObjectInsideTheFrame) {
     const auto mesh = sphereMesh(12, {5, -3, 2}, 0.7f);
-    for (const char* text : {"cube", "ring:5", "sphere:9", "octahedral:3"}) {
+    for (const char* text : {"cube", "ring:5", "sphere:9", "octahedral:3", "hemi-octahedral:3"}) {
         for (const bool orthographic : {false, true}) {
             ViewFraming framing;
             framing.orthographic = orthographic;
