@@ -17,11 +17,34 @@ struct PanoramaOptions {
     std::vector<std::string> inputs;
     std::string output, size;
     int faces = 0;
-    bool noLoop = false;
+    bool noLoop = false, leaveOneOut = false;
     PanoramaSettings settings;
 };
 
+/// What is written: the equirectangular picture, or faces.
+std::string shapeOf(const PanoramaOptions& o, const PanoramaImage& panorama) {
+    const PanoramaFormat format = panoramaFormat(o.output);
+    if (format == PanoramaFormat::folder || (format == PanoramaFormat::exr && o.faces > 0)) {
+        const int size = o.faces > 0 ? o.faces : panorama.width() / 4;
+        return fmt::format("6 faces {}x{}", size, size);
+    }
+    return fmt::format("{}x{}", panorama.width(), panorama.height());
+}
+
+/// Mean of those that others show at least a tenth of, dB; 0 = none.
+double meanPsnr(const std::vector<LeftOutPicture>& leftOut) {
+    double sum = 0;
+    int count = 0;
+    for (const LeftOutPicture& one : leftOut) {
+        if (one.covered < 0.1) continue;
+        sum += one.psnr;
+        ++count;
+    }
+    return count > 0 ? sum / count : 0;
+}
+
 nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignment& found,
+                                const std::vector<LeftOutPicture>& leftOut,
                                 const PanoramaImage& panorama, const PictureSource& source,
                                 double seconds) {
     auto pictures = nlohmann::ordered_json::array();
@@ -39,6 +62,8 @@ nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignmen
             picture["pitchDegrees"] = std::asin(std::clamp(ahead.y, -1.0, 1.0)) * kDegrees;
             picture["focalPixels"] = c.focal;
             picture["gain"] = {c.gain.r, c.gain.g, c.gain.b};
+            if (!leftOut.empty())
+                picture["leftOut"] = {{"covered", leftOut[k].covered}, {"psnr", leftOut[k].psnr}};
         }
         pictures.push_back(std::move(picture));
     }
@@ -65,6 +90,7 @@ nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignmen
         report["gapBeforeDegrees"] = found.gapBefore * kDegrees;
         report["gapDegrees"] = found.gapAfter * kDegrees;
     }
+    if (!leftOut.empty()) report["leftOutPsnr"] = meanPsnr(leftOut);
     report["seconds"] = seconds;
     return report;
 }
@@ -75,9 +101,10 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     STX_CHECK(checkPanoramaFormat(o.output));
     const PanoramaFormat format = panoramaFormat(o.output);
     if (format == PanoramaFormat::folder) {
-        STX_TRY(o.output, folderTarget(options.output, {}, "a folder, .png, .jpg or .exr"));
+        STX_TRY(o.output,
+                folderTarget(options.output, {}, "a folder, .png, .jpg, .tif, .webp or .exr"));
     }
-    if (format == PanoramaFormat::png || format == PanoramaFormat::jpeg)
+    if (format == PanoramaFormat::picture)
         STX_CHECK(command.refuse({"--faces"},
                                  "is of cubes: a folder or .exr; this output is equirectangular"));
     ComposeSettings compose;
@@ -98,6 +125,10 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     STX_TRY(const auto source, openPanoramaPictures(inputs, program.job));
     STX_TRY(auto found, alignPanorama(*source, o.settings, program.job));
     STX_TRY(const auto panorama, composePanorama(*source, found, compose, program.job));
+    std::vector<LeftOutPicture> leftOut;
+    if (o.leaveOneOut) {
+        STX_TRY(leftOut, leaveEachOut(*source, found, compose, program.job));
+    }
     PanoramaWriteOptions write;
     write.faceSize = o.faces;
     write.noClobber = program.common.noClobber;
@@ -109,11 +140,13 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     for (const PanoramaCamera& c : found.cameras)
         if (c.used && across == 0) across = 2 * std::atan(0.5 * c.size.x / c.focal) * kDegrees;
     program.say(fmt::format(
-        "{} → {} ({}), {}x{} of {}, each {:.1f}° wide{}, within {:.2f} pixels, {}",
+        "{} → {} ({}), {} of {}, each {:.1f}° wide{}, within {:.2f} pixels{}, {}",
         counted(source->count(), "picture"), std::filesystem::path(o.output).filename().string(),
-        humanBytes(bytesOf(o.output)), panorama.width(), panorama.height(), found.used(), across,
-        found.closed ? ", all around" : "", found.rms, humanSeconds(seconds)));
-    STX_CHECK(program.writeReport(reportOf(o, found, panorama, *source, seconds)));
+        humanBytes(bytesOf(o.output)), shapeOf(o, panorama), found.used(), across,
+        found.closed ? ", all around" : "", found.rms,
+        leftOut.empty() ? "" : fmt::format(", left out {:.1f} dB", meanPsnr(leftOut)),
+        humanSeconds(seconds)));
+    STX_CHECK(program.writeReport(reportOf(o, found, leftOut, panorama, *source, seconds)));
     return 0;
 }
 
@@ -135,7 +168,8 @@ void addPanorama(CommandLine& line, Program& program) {
          "as name_%04d.jpg")
         .required();
     c.option("-o,--output", o->output,
-             "Equirectangular picture (.png, .jpg), environment map of OpenEXR (.exr), or a folder "
+             "Equirectangular picture (.png, .jpg, .tif, .webp), environment map of OpenEXR "
+             "(.exr), or a folder "
              "for the six faces of a cube: front, back, left, right, top, bottom, as a Background "
              "has them")
         .required()
@@ -167,6 +201,9 @@ void addPanorama(CommandLine& line, Program& program) {
              "quarter of the width of --size)")
         .range(1, 16384)
         .takes("N");
+    c.flag("--leave-one-out", o->leaveOneOut,
+           "Draws each picture again out of a panorama of the others: how near they come (dB) is "
+           "told, and in the report of each");
     c.sharedOptions(program.common, kOutput);
     c.runs([o, c](Program& p) -> Result<int> {
         o->settings.closeLoop = !o->noLoop;

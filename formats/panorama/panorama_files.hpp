@@ -19,11 +19,10 @@ namespace stx {
 
 /// What a panorama can be written as.
 enum class PanoramaFormat {
-    png,     ///< equirectangular, 8-bit sRGB, alpha where no picture looked
-    jpeg,    ///< equirectangular, black where no picture looked
-    exr,     ///< linear half floats with the attribute `envmap`: latlong, or cube with a face size
-    folder,  ///< front.png, back.png, left.png, right.png, top.png, bottom.png
-    scene,   ///< a Background node (.mp4, .bt, .xmt)
+    picture,  ///< equirectangular, 8-bit sRGB (.png, .jpg, .tif, .webp), see PanoramaImage
+    exr,      ///< linear half floats with the attribute `envmap`: latlong, or cube with a face size
+    folder,   ///< front.png, back.png, left.png, right.png, top.png, bottom.png
+    scene,    ///< a Background node (.mp4, .bt, .xmt)
 };
 
 /// By the ending; any other name is a folder's.
@@ -37,6 +36,12 @@ struct PanoramaWriteOptions {
     int jpegQuality = 92;
     bool noClobber = false;
 };
+
+/// Writes a scene that has a Background of these faces and nothing else (.mp4, .bt, .xmt). Error
+/// for now: unsupported.
+[[nodiscard]] Result<void> writePanoramaScene(const PanoramaFaces& faces,
+                                              const std::filesystem::path& path,
+                                              const PanoramaWriteOptions& options, Job& job);
 
 /// Writes it whole or not at all. Cube faces are VRML97's (faceDirection()); OpenEXR's maps have
 /// its own axes, in which the panorama's middle is +Z (ours turned by half a turn about Y), and

@@ -49,9 +49,7 @@ class PictureFiles final : public PictureSource {
             if (!kept_[at].empty()) return kept_[at];
         }
         STX_TRY(const auto bytes, readFile(files_[at], job_.limits));
-        STX_TRY(auto decoded,
-                imagesets::within(inQuotes(files_[at].string()),
-                                  decodeRgba8(bytes, files_[at].string(), job_.limits)));
+        STX_TRY(auto decoded, decodeRgba8(bytes, files_[at].string(), job_.limits));
         Rgba8Image upright = turnedUpright(std::move(decoded), notes_[at].orientation);
         constexpr int kLeastSide = 32;
         if (std::min(upright.width(), upright.height()) < kLeastSide)

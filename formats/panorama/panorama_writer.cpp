@@ -80,10 +80,14 @@ Result<void> writeEnvmap(const PanoramaImage& panorama, const fs::path& path,
     return file.commit();
 }
 
+int faceSizeOf(const PanoramaImage& panorama, const PanoramaWriteOptions& options) {
+    return options.faceSize > 0 ? options.faceSize : std::max(1, panorama.width() / 4);
+}
+
 Result<void> writeFaces(const PanoramaImage& panorama, const fs::path& path,
                         const PanoramaWriteOptions& options, Job& job) {
-    const int size = options.faceSize > 0 ? options.faceSize : std::max(1, panorama.width() / 4);
-    const auto faces = panoramaFaces(panorama, size);
+    const int size = faceSizeOf(panorama, options);
+    const auto faces = panoramaFaces(panorama, size).pictures;
     std::vector<std::string> names;
     for (const char* face : kPanoramaFaceNames) names.push_back(std::string(face) + ".png");
     STX_TRY(auto folder, OutputFolder::create(path, {.noClobber = options.noClobber}, names));
@@ -102,10 +106,13 @@ PanoramaFormat panoramaFormat(const fs::path& path) {
     std::string ending = path.extension().string();
     for (char& c : ending)
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    if (path == "-" || ending == ".png") return PanoramaFormat::png;
-    if (ending == ".jpg" || ending == ".jpeg") return PanoramaFormat::jpeg;
+    const auto is = [&](std::initializer_list<const char*> endings) {
+        return std::find(endings.begin(), endings.end(), ending) != endings.end();
+    };
+    if (path == "-" || is({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"}))
+        return PanoramaFormat::picture;
     if (ending == ".exr") return PanoramaFormat::exr;
-    if (ending == ".mp4" || ending == ".bt" || ending == ".xmt") return PanoramaFormat::scene;
+    if (is({".mp4", ".bt", ".xmt"})) return PanoramaFormat::scene;
     return PanoramaFormat::folder;
 }
 
@@ -113,8 +120,8 @@ Result<void> checkPanoramaFormat(const fs::path& path) {
     if (panoramaFormat(path) != PanoramaFormat::scene) return {};
     return fail(
         ErrorCode::unsupported,
-        "a panorama is not yet written as a scene's Background ('{}'); .png, .jpg, .exr and "
-        "folders are possible",
+        "a panorama is not yet written as a scene's Background ('{}'); .png, .jpg, .tif, .exr "
+        "and folders are possible",
         path.string());
 }
 
@@ -126,16 +133,17 @@ Result<void> writePanorama(const PanoramaImage& panorama, const fs::path& path,
         case PanoramaFormat::folder:
             return writeFaces(panorama, path, options, job);
         case PanoramaFormat::scene:
-            return checkPanoramaFormat(path);
-        case PanoramaFormat::png:
-        case PanoramaFormat::jpeg:
+            return writePanoramaScene(panoramaFaces(panorama, faceSizeOf(panorama, options)), path,
+                                      options, job);
+        case PanoramaFormat::picture:
             break;
     }
     FrameOptions frame;
     frame.noClobber = options.noClobber;
     frame.jpegQuality = options.jpegQuality;
     frame.pngLevel = kPngLevel;
-    if (panoramaFormat(path) == PanoramaFormat::png)
+    const std::string ending = path.extension().string();
+    if (ending.size() < 2 || (ending[1] != 'j' && ending[1] != 'J'))
         return writePicture(panorama.pixels, path, frame);
     // JPEG has no alpha: black where no picture looked.
     Rgba8Image opaque = panorama.pixels;

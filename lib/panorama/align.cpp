@@ -17,7 +17,8 @@ using namespace panorama;
 namespace {
 
 constexpr int kMostPictures = 500;
-constexpr int kFeatures = 900;  ///< of a picture
+/// Features of a picture: one for so many pixels of its copy, at least and at most.
+constexpr std::size_t kPixelsOfFeature = 350, kFewestFeatures = 450, kMostFeatures = 900;
 /// A pair whose matches differ by more than this once all is adjusted is a mistake, work pixels.
 constexpr double kWrongPairPixels = 8;
 /// Focal length of most cameras, halves of the diagonal: 29 mm for 36x24 mm.
@@ -232,7 +233,7 @@ std::string listOf(const std::vector<std::string>& names) {
 
 /// Says how large the parallax is, where it is.
 void tellParallax(const std::vector<PanoramaPair>& pairs, PictureSource& source, double pixels,
-                  Job& job) {
+                  bool focalGiven, Job& job) {
     const PanoramaPair* worst = nullptr;
     int some = 0;
     for (const auto& pair : pairs) {
@@ -241,13 +242,13 @@ void tellParallax(const std::vector<PanoramaPair>& pairs, PictureSource& source,
         if (!worst || pair.parallax > worst->parallax) worst = &pair;
     }
     if (!worst) return;
-    job.note(
-        fmt::format("parallax: {} by more than {:.1f} pixels that no rotation explains, '{}' and "
-                    "'{}' by {:.1f}; "
-                    "the camera moved, or what it saw did",
-                    some == 1 ? std::string("1 pair of pictures differs")
-                              : fmt::format("{} pairs of pictures differ", some),
-                    pixels, source.name(worst->a), source.name(worst->b), worst->parallax));
+    job.note(fmt::format(
+        "parallax: {} by more than {:.1f} pixels that no rotation explains, '{}' and '{}' by "
+        "{:.1f}; the camera moved, {}what it saw did",
+        some == 1 ? std::string("1 pair of pictures differs")
+                  : fmt::format("{} pairs of pictures differ", some),
+        pixels, source.name(worst->a), source.name(worst->b), worst->parallax,
+        focalGiven ? "its field of view is another one, or " : "or "));
 }
 
 }  // namespace
@@ -286,7 +287,9 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
     parallelFor(0, count, [&](std::int64_t i) {
         if (job.cancelled) return;
         const auto k = static_cast<std::size_t>(i);
-        if (twins[k] < 0) s.features[k] = findFeatures(s.copies[k], kFeatures);
+        const std::size_t most =
+            std::clamp(s.copies[k].grey.count() / kPixelsOfFeature, kFewestFeatures, kMostFeatures);
+        if (twins[k] < 0) s.features[k] = findFeatures(s.copies[k], static_cast<int>(most));
         job.progress(++done, count, "looking for features");
     });
     STX_CHECK(job.checkCancelled());
@@ -400,7 +403,7 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
         out.cameras.push_back(camera);
     }
     // A thousandth of the diagonal, two pixels at least.
-    tellParallax(out.pairs, source, std::max(2.0, 2e-3 * largest), job);
+    tellParallax(out.pairs, source, std::max(2.0, 2e-3 * largest), given, job);
     return out;
 }
 

@@ -129,27 +129,32 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
             const int ys[2] = {std::clamp(gy, 0, labels.height() - 1),
                                std::clamp(gy + 1, 0, labels.height() - 1)};
             for (int x = left; x < right; ++x) {
-                const auto cx = static_cast<float>((x + 0.5) * cells - 0.5);
-                const int gx = static_cast<int>(std::floor(cx));
-                const float tx = cx - static_cast<float>(gx);
-                // How far the cells around are this picture's; and its correction there.
+                const double cx = (x + 0.5) * cells - 0.5;
+                const int whole = static_cast<int>(std::floor(cx));
+                const auto tx = static_cast<float>(cx - whole);
+                const int gx = (whole % labels.width() + labels.width()) % labels.width();
+                // How far the cells around are this picture's.
+                std::array<float, 4> shares;
+                std::array<int, 4> columns;
                 float weight = 0;
-                glm::vec4 log(0);
-                for (int c = 0; c < 4; ++c) {
-                    const float share = ((c & 1) ? tx : 1 - tx) * ((c >> 1) ? ty : 1 - ty);
-                    const int column =
-                        ((gx + (c & 1)) % labels.width() + labels.width()) % labels.width();
-                    const int row = ys[c >> 1];
-                    if (labels.at(column, row) == index) weight += share;
-                    const int own = print.column(column, labels.width());
-                    const int ownRow = row - print.box.y;
-                    if (own >= 0 && ownRow >= 0 && ownRow < print.box.height)
-                        log += share * glm::vec4(correction.at(own, ownRow), 1);
+                for (std::size_t c = 0; c < 4; ++c) {
+                    shares[c] = ((c & 1) ? tx : 1 - tx) * ((c >> 1) ? ty : 1 - ty);
+                    int column = gx + static_cast<int>(c & 1);
+                    column -= column >= labels.width() ? labels.width() : 0;
+                    columns[c] = column < 0 ? column + labels.width() : column;
+                    if (labels.at(columns[c], ys[c >> 1]) == index) weight += shares[c];
                 }
                 if (weight <= 0) continue;
                 const glm::dvec2 turn = turns[static_cast<std::size_t>(x - left)];
                 glm::vec4 colour = picture.at({-level * turn.x, sine, -level * turn.y});
                 if (colour.a <= 0) continue;
+                glm::vec4 log(0);
+                for (std::size_t c = 0; c < 4; ++c) {
+                    const int own = print.column(columns[c], labels.width());
+                    const int ownRow = ys[c >> 1] - print.box.y;
+                    if (own >= 0 && ownRow >= 0 && ownRow < print.box.height)
+                        log += shares[c] * glm::vec4(correction.at(own, ownRow), 1);
+                }
                 const glm::vec3 light = withGain({linearByTable(colour.r), linearByTable(colour.g),
                                                   linearByTable(colour.b)},
                                                  gain) *

@@ -17,32 +17,29 @@ Image<float> floatOf(const Image<std::uint8_t>& grey) {
     return out;
 }
 
-/// 1 4 6 4 1 in both directions.
-Image<float> blurred(const Image<float>& image) {
+/// 1 4 6 4 1 in both directions, into an image of the same size.
+void blur(const Image<float>& image, Image<float>& out) {
     const int w = image.width(), h = image.height();
-    Image<float> rows(w, h), out(w, h);
     const auto line = [&](int y) { return image.row(std::clamp(y, 0, h - 1)).data(); };
+    std::vector<float> between(static_cast<std::size_t>(w) + 4);
+    float* from = between.data() + 2;
     for (int y = 0; y < h; ++y) {
         const float *a = line(y - 2), *b = line(y - 1), *c = line(y), *d = line(y + 1),
                     *e = line(y + 2);
-        float* to = rows.row(y).data();
         for (int x = 0; x < w; ++x)
-            to[x] = 0.0625f * (a[x] + e[x]) + 0.25f * (b[x] + d[x]) + 0.375f * c[x];
-    }
-    for (int y = 0; y < h; ++y) {
-        const float* from = rows.row(y).data();
+            from[x] = 0.0625f * (a[x] + e[x]) + 0.25f * (b[x] + d[x]) + 0.375f * c[x];
+        from[-1] = from[-2] = from[0];
+        from[w] = from[w + 1] = from[w - 1];
         float* to = out.row(y).data();
-        const auto at = [&](int x) { return from[std::clamp(x, 0, w - 1)]; };
-        const auto slow = [&](int x) {
-            to[x] = 0.0625f * (at(x - 2) + at(x + 2)) + 0.25f * (at(x - 1) + at(x + 1)) +
-                    0.375f * at(x);
-        };
-        for (int x = 0; x < std::min(2, w); ++x) slow(x);
-        for (int x = 2; x < w - 2; ++x)
+        for (int x = 0; x < w; ++x)
             to[x] = 0.0625f * (from[x - 2] + from[x + 2]) + 0.25f * (from[x - 1] + from[x + 1]) +
                     0.375f * from[x];
-        for (int x = std::max(2, w - 2); x < w; ++x) slow(x);
     }
+}
+
+Image<float> blurred(const Image<float>& image) {
+    Image<float> out(image.width(), image.height());
+    blur(image, out);
     return out;
 }
 
@@ -88,9 +85,11 @@ Image<float> cornerStrength(const Gradients& g) {
         xy.pixels()[i] = gx * gy;
         yy.pixels()[i] = gy * gy;
     }
-    xx = blurred(blurred(xx));
-    xy = blurred(blurred(xy));
-    yy = blurred(blurred(yy));
+    Image<float> once(w, h);
+    for (Image<float>* image : {&xx, &xy, &yy}) {
+        blur(*image, once);
+        blur(once, *image);
+    }
     for (std::size_t i = 0; i < xx.count(); ++i) {
         const float a = xx.pixels()[i], b = xy.pixels()[i], c = yy.pixels()[i];
         xx.pixels()[i] = (a * c - b * b) / (a + c + 1e-3f);
@@ -157,6 +156,17 @@ glm::vec2 gradientAt(const Gradients& g, glm::vec2 pixel) {
     return {mix(g.x), mix(g.y)};
 }
 
+/// The angle of a vector as a share of a turn, 0..1, to 1e-5: arc tangents by a polynomial.
+float turnOf(glm::vec2 v) {
+    const float x = std::abs(v.x), y = std::abs(v.y);
+    const float a = std::min(x, y) / std::max(std::max(x, y), 1e-20f), s = a * a;
+    float angle = ((-0.0464964749f * s + 0.15931422f) * s - 0.327622764f) * s * a + a;
+    angle *= 0.5f / static_cast<float>(M_PI);
+    if (y > x) angle = 0.25f - angle;
+    if (v.x < 0) angle = 0.5f - angle;
+    return v.y < 0 ? 1 - angle : angle;
+}
+
 /// The directions that gradients around a corner have most: the first, and others nearly as strong.
 std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
     constexpr int kBins = 36;
@@ -166,7 +176,7 @@ std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
             const float r2 = static_cast<float>(dx * dx + dy * dy);
             if (r2 > 64) continue;
             const glm::vec2 v = gradientAt(g, pixel + glm::vec2(dx, dy));
-            const float turn = (std::atan2(v.y, v.x) / (2 * static_cast<float>(M_PI)) + 1) * kBins;
+            const float turn = turnOf(v) * kBins;
             const float weight = glm::length(v) * std::exp(-r2 / 32);
             const auto bin = static_cast<int>(turn);
             const float t = turn - static_cast<float>(bin);
@@ -207,8 +217,7 @@ Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
             const float r = glm::length(offset) / (8 * kSpacing);
             const float weight = glm::length(v) * std::exp(-0.5f * r * r);
             if (weight <= 0) continue;
-            const float d =
-                (std::atan2(turned.y, turned.x) / (2 * static_cast<float>(M_PI)) + 1) * 8;
+            const float d = turnOf(turned) * 8;
             // Shared among the two nearest cells in x and y and the two nearest directions.
             const float cx = (static_cast<float>(i) + 0.5f) / 4 - 0.5f;
             const float cy = (static_cast<float>(j) + 0.5f) / 4 - 0.5f;

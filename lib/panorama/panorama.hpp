@@ -101,6 +101,19 @@ inline constexpr int kMaxPanoramaWidth = 8192;
                                                     PanoramaAlignment& alignment,
                                                     const ComposeSettings& settings, Job& job);
 
+/// How well the others show what one picture shows.
+struct LeftOutPicture {
+    double covered = 0;  ///< share of it that they show
+    double psnr = 0;     ///< dB, over that share, after one gain for each channel; 0 = nothing
+};
+
+/// Draws each used picture again out of a panorama of all others (at most 4096 pixels wide). Takes
+/// as long as composePanorama() for each of them. Errors: those of composePanorama().
+[[nodiscard]] Result<std::vector<LeftOutPicture>> leaveEachOut(PictureSource& source,
+                                                               const PanoramaAlignment& alignment,
+                                                               const ComposeSettings& settings,
+                                                               Job& job);
+
 /// Faces of a cube around the viewpoint.
 enum class PanoramaFace { front, back, left, right, top, bottom };
 inline constexpr std::array<const char*, 6> kPanoramaFaceNames = {"front", "back", "left",
@@ -110,7 +123,11 @@ inline constexpr std::array<const char*, 6> kPanoramaFaceNames = {"front", "back
 /// Background has it (ISO/IEC 14772-1, 6.5): front, back, left and right are upright, seen from
 /// the inside; top has +Z up, bottom -Z.
 [[nodiscard]] glm::dvec3 panoramaFaceDirection(PanoramaFace face, glm::dvec2 position);
-/// The six faces, size x size pixels each, by PanoramaFace; alpha straight.
-[[nodiscard]] std::array<Rgba8Image, 6> panoramaFaces(const PanoramaImage& panorama, int size);
+/// Pictures of a cube's faces, by PanoramaFace; 8-bit sRGB, straight alpha.
+struct PanoramaFaces {
+    std::array<Rgba8Image, 6> pictures;
+};
+/// The six faces, size x size pixels each.
+[[nodiscard]] PanoramaFaces panoramaFaces(const PanoramaImage& panorama, int size);
 
 }  // namespace stx

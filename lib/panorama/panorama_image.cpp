@@ -72,8 +72,9 @@ glm::dvec3 panoramaFaceDirection(PanoramaFace face, glm::dvec2 p) {
     return {0, 0, -1};
 }
 
-std::array<Rgba8Image, 6> panoramaFaces(const PanoramaImage& panorama, int size) {
-    std::array<Rgba8Image, 6> faces;
+PanoramaFaces panoramaFaces(const PanoramaImage& panorama, int size) {
+    PanoramaFaces out;
+    auto& faces = out.pictures;
     // Where a face has fewer pixels than the panorama, each is the mean of several places.
     const int steps =
         std::clamp(static_cast<int>(std::lround(panorama.width() / (3.2 * size))), 1, 8);
@@ -96,7 +97,7 @@ std::array<Rgba8Image, 6> panoramaFaces(const PanoramaImage& panorama, int size)
                 }
         });
     }
-    return faces;
+    return out;
 }
 
 }  // namespace stx

@@ -29,7 +29,7 @@ constexpr float kMoverDifference = 25;
 constexpr float kWeakMover = 250;
 /// Cells around a mover that belong to it.
 constexpr int kMoverMargin = 2;
-constexpr int kRounds = 3;
+constexpr int kRounds = 2;
 
 /// Something that one picture shows and others do not.
 struct Mover {

@@ -1,7 +1,9 @@
 """What the Python tests of the program share: running it, small inputs, looking for leftovers."""
 import argparse
 import json
+import math
 import os
+import random
 import resource
 import shutil
 import subprocess
@@ -140,6 +142,41 @@ def copy_into(source, folder):
     else:
         shutil.copyfile(source, target)
     return target
+
+
+def turn_set(folder, count=3, width=160, height=120):
+    """Makes `folder` with pictures (.pgm) of a camera that turned to the left by 12 degrees between them: soft
+    noise all around it. The folder's name."""
+    os.makedirs(folder)
+    cells = {}
+    rng = random.Random(5)
+
+    def noise(p):
+        i = [math.floor(c) for c in p]
+        t = [c - f for c, f in zip(p, i)]
+        t = [u * u * (3 - 2 * u) for u in t]
+        total = 0.0
+        for corner in range(8):
+            at = tuple(f + (corner >> axis & 1) for axis, f in enumerate(i))
+            if at not in cells:
+                cells[at] = rng.random()
+            weight = 1.0
+            for axis in range(3):
+                weight *= t[axis] if corner >> axis & 1 else 1 - t[axis]
+            total += weight * cells[at]
+        return total
+
+    for k in range(count):
+        c, s = math.cos(math.radians(12 * k)), math.sin(math.radians(12 * k))
+        values = bytearray()
+        for row in range(height):
+            for column in range(width):
+                x, y = (column + 0.5 - width / 2) / width, (height / 2 - row - 0.5) / width
+                ray = (c * x - s, y, -s * x - c)
+                length = math.sqrt(sum(v * v for v in ray))
+                values.append(int(255 * noise([v * 12 / length for v in ray]) + 0.5))
+        write(os.path.join(folder, f"t_{k}.pgm"), b"P5 %d %d 255\n" % (width, height) + bytes(values))
+    return folder
 
 
 def film_set(stx, bundle, folder):

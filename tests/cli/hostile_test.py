@@ -77,6 +77,8 @@ def malformed(shared, have, folder):
                 lines.append(["compare", "IN", "IN"])
             if "background" in have:
                 lines.append(["background", "IN", "IN", "-o", "OUT/a.png"])
+            if "panorama" in have:
+                lines.append(["panorama", "IN", "IN", "-o", "OUT/a.png"])
             if name.endswith(".exr"):
                 lines += commands_for(name, have)
             for line in lines:

@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 
-from harness import PREFIX, arguments, film_set, must, quad, run, temporaries, tree, write
+from harness import PREFIX, arguments, film_set, must, quad, run, temporaries, tree, turn_set, write
 
 FAILED = []
 
@@ -56,6 +56,8 @@ def commands(inputs):
                                       "200x200"], [f"t_{i:04d}.png" for i in range(6)])
     yield Command("background", ["background", inputs["frames"], "-o", "t.png"], ["t.png"], ["--method", "n2pg"])
     yield Command("sheet", ["sheet", bundle, "-o", "t.png"], ["t.png"], ["--size", "500x500"])
+    yield Command("panorama", ["panorama", inputs["turn"], "-o", "t.png"], ["t.png"], ["--size", "64x32"])
+    yield Command("panorama faces", ["panorama", inputs["turn"], "-o", "t"], ["t"], ["--faces", "16"])
     yield Command("convert film", ["convert", inputs["film"], "-o", "t.mp4"], ["t.mp4"], ["--every", "2"])
     yield Command("bake film", ["bake", inputs["film"], "-o", "t.mp4"], ["t.mp4"], ["--method", "paper"])
 
@@ -300,6 +302,7 @@ def main():
         os.makedirs(inputs["frames"])
         must([args.stx, "render", "in.mp4", "-o", "frames/f_%04d.png", "--orbit", "8", "--backend", "cpu", "--size",
               "200x200", "--background", "white"], folder)
+        inputs["turn"] = turn_set(os.path.join(folder, "turn"))
         inputs["other"] = os.path.join(folder, "other.mp4")
         must([args.stx, "convert", inputs["mesh"], "-o", "other.mp4", "--views", "ring:2", "--size", "20x20"], folder)
         inputs["film"] = os.path.join(folder, "film")

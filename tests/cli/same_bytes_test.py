@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 
-from harness import arguments, commands_of, film_set, must, quad, run, tree
+from harness import arguments, commands_of, film_set, must, quad, run, tree, turn_set
 
 
 def german(folder):
@@ -44,6 +44,7 @@ def main():
         os.mkdir(os.path.join(top, "frames"))
         must([args.stx, "render", "in.exr", "-o", "frames/f_%04d.png", "--orbit", "24", "--size", "90x70", "--backend", "cpu",
               "--background", "white"], top)
+        turn_set(os.path.join(top, "turn"))
         views = ["--views", "sphere:5", "--size", "96x80"]
         jobs = {
             "convert mp4": ["convert", args.model, "-o", "OUT/a.mp4"] + views,
@@ -73,6 +74,9 @@ def main():
             "background": ["background", "IN/frames", "-o", "OUT/a.png", "--confidence", "OUT/c.png", "--mask-of", "all",
                            "--mask-output", "OUT/m_%04d.png"],
             "background in bands": ["background", "IN/frames/f_%04d.png", "-o", "OUT/a.png", "--drift", "--max-memory", "1"],
+            "panorama": ["panorama", "IN/turn", "-o", "OUT/a.png", "--size", "600x300"],
+            "panorama envmap": ["panorama", "IN/turn", "-o", "OUT/a.exr", "--faces", "40"],
+            "panorama faces": ["panorama", "IN/turn", "-o", "OUT/faces", "--faces", "40"],
             "convert film": ["convert", "IN/film", "-o", "OUT/a.mp4"],
             "render film": ["render", "IN/film.mp4", "-o", "OUT/a_%02d.png", "--orbit", "1", "--times", "all", "--size", "90x70",
                             "--backend", "cpu"],
