@@ -8,6 +8,7 @@
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/open.hpp"
+#include "lib/base/counted.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/packing/packing.hpp"
 
@@ -416,7 +417,9 @@ std::string describeAsText(const Json& info) {
         if (e.contains("faces")) out += fmt::format(", {} faces", e["faces"].size());
         for (const auto& [key, what] :
              {std::pair{"skyColours", "sky"}, {"groundColours", "ground"}})
-            if (e[key] > 0) out += fmt::format(", {} of {} colour(s)", what, text(e[key]));
+            if (e[key] > 0)
+                out +=
+                    fmt::format(", {} of {}", what, counted(e[key].get<std::size_t>(), "colour"));
         if (e["orientation"][3] != 0.0)
             out += fmt::format(", turned by {}", text(e["orientation"]));
         out += "\n";

@@ -5,6 +5,7 @@
 
 #include "formats/images/images.hpp"
 #include "formats/panorama/panorama_files.hpp"
+#include "formats/save.hpp"
 #include "lib/panorama/panorama.hpp"
 #include "tools/commands.hpp"
 
@@ -15,20 +16,17 @@ constexpr double kDegrees = 180 / std::numbers::pi;
 
 struct PanoramaOptions {
     std::vector<std::string> inputs;
-    std::string output, size;
+    std::string output, size, into;
     int faces = 0;
     bool noLoop = false, leaveOneOut = false;
     PanoramaSettings settings;
 };
 
 /// What is written: the equirectangular picture, or faces.
-std::string shapeOf(const PanoramaOptions& o, const PanoramaImage& panorama) {
-    const PanoramaFormat format = panoramaFormat(o.output);
-    if (format == PanoramaFormat::folder || (format == PanoramaFormat::exr && o.faces > 0)) {
-        const int size = o.faces > 0 ? o.faces : panorama.width() / 4;
-        return fmt::format("6 faces {}x{}", size, size);
-    }
-    return fmt::format("{}x{}", panorama.width(), panorama.height());
+std::string shapeOf(const PanoramaOptions& o, int width) {
+    const int face = o.into.empty() ? panoramaFaceSize(o.output, width, o.faces) : o.faces;
+    if (face > 0) return fmt::format("6 faces {}x{}", face, face);
+    return fmt::format("{}x{}", width, width / 2);
 }
 
 /// Mean of those that others show at least a tenth of, dB; 0 = none.
@@ -44,9 +42,8 @@ double meanPsnr(const std::vector<LeftOutPicture>& leftOut) {
 }
 
 nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignment& found,
-                                const std::vector<LeftOutPicture>& leftOut,
-                                const PanoramaImage& panorama, const PictureSource& source,
-                                double seconds) {
+                                const std::vector<LeftOutPicture>& leftOut, glm::ivec2 size,
+                                const PictureSource& source, double seconds) {
     auto pictures = nlohmann::ordered_json::array();
     for (std::size_t k = 0; k < found.cameras.size(); ++k) {
         const PanoramaCamera& c = found.cameras[k];
@@ -78,8 +75,8 @@ nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignmen
     nlohmann::ordered_json report{{"$schema", "panorama-report.schema.json"},
                                   {"inputs", o.inputs},
                                   {"output", o.output},
-                                  {"width", panorama.width()},
-                                  {"height", panorama.height()},
+                                  {"width", size.x},
+                                  {"height", size.y},
                                   {"pictures", pictures},
                                   {"used", found.used()},
                                   {"k1", found.k1},
@@ -98,15 +95,18 @@ nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignmen
 Result<int> makePanorama(const PanoramaOptions& options, const Command& command, Program& program) {
     const auto start = std::chrono::steady_clock::now();
     PanoramaOptions o = options;
-    STX_CHECK(checkPanoramaFormat(o.output));
     const PanoramaFormat format = panoramaFormat(o.output);
-    if (format == PanoramaFormat::folder) {
+    if (!o.into.empty()) {
+        STX_CHECK(containerOf(o.output));
+    } else if (format == PanoramaFormat::folder) {
         STX_TRY(o.output,
-                folderTarget(options.output, {}, "a folder, .png, .jpg, .tif, .webp or .exr"));
+                folderTarget(options.output, {},
+                             "a folder, .png, .jpg, .tif, .webp, .exr, .mp4, .bt or .xmt"));
     }
     if (format == PanoramaFormat::picture)
         STX_CHECK(command.refuse({"--faces"},
-                                 "is of cubes: a folder or .exr; this output is equirectangular"));
+                                 "is of cubes: a folder, a scene or .exr; this output is "
+                                 "equirectangular"));
     ComposeSettings compose;
     if (!o.size.empty()) {
         STX_TRY(const auto size, parseSize(o.size, program.job.limits));
@@ -124,7 +124,7 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     preloadCodecs(inputs[0]);
     STX_TRY(const auto source, openPanoramaPictures(inputs, program.job));
     STX_TRY(auto found, alignPanorama(*source, o.settings, program.job));
-    STX_TRY(const auto panorama, composePanorama(*source, found, compose, program.job));
+    STX_TRY(auto panorama, composePanorama(*source, found, compose, program.job));
     std::vector<LeftOutPicture> leftOut;
     if (o.leaveOneOut) {
         STX_TRY(leftOut, leaveEachOut(*source, found, compose, program.job));
@@ -132,7 +132,12 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     PanoramaWriteOptions write;
     write.faceSize = o.faces;
     write.noClobber = program.common.noClobber;
-    STX_CHECK(writePanorama(panorama, o.output, write, program.job));
+    const std::string shape = shapeOf(o, panorama.width());
+    const glm::ivec2 size(panorama.width(), panorama.height());
+    if (o.into.empty())
+        STX_CHECK(writePanorama(std::move(panorama), o.output, write, program.job));
+    else
+        STX_CHECK(writePanoramaInto(std::move(panorama), o.into, o.output, write, program.job));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
@@ -142,11 +147,11 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
     program.say(fmt::format(
         "{} → {} ({}), {} of {}, each {:.1f}° wide{}, within {:.2f} pixels{}, {}",
         counted(source->count(), "picture"), std::filesystem::path(o.output).filename().string(),
-        humanBytes(bytesOf(o.output)), shapeOf(o, panorama), found.used(), across,
+        humanBytes(bytesOf(o.output)), shape, found.used(), across,
         found.closed ? ", all around" : "", found.rms,
         leftOut.empty() ? "" : fmt::format(", left out {:.1f} dB", meanPsnr(leftOut)),
         humanSeconds(seconds)));
-    STX_CHECK(program.writeReport(reportOf(o, found, leftOut, panorama, *source, seconds)));
+    STX_CHECK(program.writeReport(reportOf(o, found, leftOut, size, *source, seconds)));
     return 0;
 }
 
@@ -160,6 +165,8 @@ void addPanorama(CommandLine& line, Program& program) {
         "  stx panorama IMG_*.jpg -o around.png                 equirectangular\n"
         "  stx panorama pictures/ -o around.exr                 linear light, for OpenEXR's users\n"
         "  stx panorama turn_%02d.jpg -o faces --faces 1024     the six faces of a cube\n"
+        "  stx panorama IMG_*.jpg -o place.mp4                  a scene with a Background\n"
+        "  stx panorama IMG_*.jpg --into vase.mp4 -o there.mp4  the same around an object\n"
         "  stx panorama a.jpg b.jpg c.jpg -o wide.png --fov 65 --report cameras.json");
     auto o = std::make_shared<PanoramaOptions>();
     c.option(
@@ -169,9 +176,8 @@ void addPanorama(CommandLine& line, Program& program) {
         .required();
     c.option("-o,--output", o->output,
              "Equirectangular picture (.png, .jpg, .tif, .webp), environment map of OpenEXR "
-             "(.exr), or a folder "
-             "for the six faces of a cube: front, back, left, right, top, bottom, as a Background "
-             "has them")
+             "(.exr), MPEG-4 scene with a Background (.mp4, .bt, .xmt), or a folder for the six "
+             "faces of a cube: front, back, left, right, top, bottom, as a Background has them")
         .required()
         .takes("OUT");
     c.option(
@@ -197,10 +203,15 @@ void addPanorama(CommandLine& line, Program& program) {
              "8192x4096)")
         .takes("WxH");
     c.option("--faces", o->faces,
-             "A cube with faces of N x N pixels, in a folder or .exr (default of a folder: a "
-             "quarter of the width of --size)")
+             "A cube with faces of N x N pixels (default of folders and scenes: a quarter of the "
+             "width of --size)")
         .range(1, 16384)
         .takes("N");
+    c.option(
+         "--into", o->into,
+         "Bundle or film that OUT is to be, with the panorama as its environment; BUNDLE itself "
+         "stays as it is")
+        .takes("BUNDLE");
     c.flag("--leave-one-out", o->leaveOneOut,
            "Draws each picture again out of a panorama of the others: how near they come (dB) is "
            "told, and in the report of each");

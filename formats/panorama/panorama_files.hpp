@@ -28,26 +28,25 @@ enum class PanoramaFormat {
 /// By the ending; any other name is a folder's.
 [[nodiscard]] PanoramaFormat panoramaFormat(const std::filesystem::path& path);
 
-/// Error (unsupported) when panoramas are not written as that.
-[[nodiscard]] Result<void> checkPanoramaFormat(const std::filesystem::path& path);
-
 struct PanoramaWriteOptions {
-    int faceSize = 0;  ///< of a cube; 0 = a quarter of the panorama's width. .exr: 0 = latlong
+    int faceSize = 0;  ///< of a cube, pixels; 0 = see panoramaFaceSize()
     int jpegQuality = 92;
     bool noClobber = false;
 };
 
-/// Writes a scene that has a Background of these faces and nothing else (.mp4, .bt, .xmt). Error
-/// for now: unsupported.
-[[nodiscard]] Result<void> writePanoramaScene(const PanoramaFaces& faces,
-                                              const std::filesystem::path& path,
-                                              const PanoramaWriteOptions& options, Job& job);
+/// The faces that a panorama of a width is written with; 0 = equirectangular: `faceSize`, else a
+/// quarter of the width in folders and scenes.
+[[nodiscard]] int panoramaFaceSize(const std::filesystem::path& path, int width, int faceSize);
 
-/// Writes it whole or not at all. Cube faces are VRML97's (faceDirection()); OpenEXR's maps have
-/// its own axes, in which the panorama's middle is +Z (ours turned by half a turn about Y), and
-/// pixels on the very edges. Errors: io; unsupported: a scene.
-[[nodiscard]] Result<void> writePanorama(const PanoramaImage& panorama,
-                                         const std::filesystem::path& path,
+/// Writes it whole or not at all, as an environment (saveEnvironment()): cube faces are VRML97's
+/// (faceDirection()), and the panorama's middle is -Z. Errors: those of saveEnvironment(), io.
+[[nodiscard]] Result<void> writePanorama(PanoramaImage panorama, const std::filesystem::path& path,
                                          const PanoramaWriteOptions& options, Job& job);
+/// Writes a bundle or film again with the panorama as its environment. Errors: those of
+/// openSequence() and saveSequence().
+[[nodiscard]] Result<void> writePanoramaInto(PanoramaImage panorama,
+                                             const std::filesystem::path& bundle,
+                                             const std::filesystem::path& path,
+                                             const PanoramaWriteOptions& options, Job& job);
 
 }  // namespace stx

@@ -114,20 +114,4 @@ struct LeftOutPicture {
                                                                const ComposeSettings& settings,
                                                                Job& job);
 
-/// Faces of a cube around the viewpoint.
-enum class PanoramaFace { front, back, left, right, top, bottom };
-inline constexpr std::array<const char*, 6> kPanoramaFaceNames = {"front", "back", "left",
-                                                                  "right", "top",  "bottom"};
-
-/// The direction (not unit) of a position (0..1, 0..1, from the upper left) on a face, as VRML97's
-/// Background has it (ISO/IEC 14772-1, 6.5): front, back, left and right are upright, seen from
-/// the inside; top has +Z up, bottom -Z.
-[[nodiscard]] glm::dvec3 panoramaFaceDirection(PanoramaFace face, glm::dvec2 position);
-/// Pictures of a cube's faces, by PanoramaFace; 8-bit sRGB, straight alpha.
-struct PanoramaFaces {
-    std::array<Rgba8Image, 6> pictures;
-};
-/// The six faces, size x size pixels each.
-[[nodiscard]] PanoramaFaces panoramaFaces(const PanoramaImage& panorama, int size);
-
 }  // namespace stx
