@@ -14,6 +14,7 @@
 #include "tools/commands.hpp"
 #include "tools/environment_options.hpp"
 #include "tools/frame_writer.hpp"
+#include "tools/light_options.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/shard.hpp"
 
@@ -64,46 +65,6 @@ Result<std::pair<int, int>> parseRate(const std::string& text) {
     }
     if (!(numerator / denominator >= 0.001 && numerator / denominator <= 1000)) return wrong();
     return std::pair(static_cast<int>(numerator), static_cast<int>(denominator));
-}
-
-/// "0.2" or "r,g,b".
-Result<glm::vec3> parseGreyOrRgb(const std::string& text, const char* option) {
-    if (text.find(',') != std::string::npos) {
-        STX_TRY(const auto v, parseVec3(text, option));
-        return glm::vec3(v);
-    }
-    STX_TRY(const auto v, parseNumbers(text, 1, option));
-    return glm::vec3(static_cast<float>(v[0]));
-}
-
-/// dir:X,Y,Z[,r,g,b] or point:X,Y,Z[,r,g,b], with a trailing @camera for camera space. A point in
-/// the world comes back counted from `origin`.
-Result<Light> parseLight(const std::string& text, glm::dvec3 origin) {
-    Light light;
-    std::string body = text;
-    if (const auto at = body.rfind("@camera"); at != std::string::npos && at + 7 == body.size()) {
-        light.inCameraSpace = true;
-        body.resize(at);
-    }
-    if (body.rfind("dir:", 0) == 0)
-        light.kind = Light::Kind::directional;
-    else if (body.rfind("point:", 0) == 0)
-        light.kind = Light::Kind::point;
-    else
-        return fail(
-            ErrorCode::usage,
-            "--light is '{}'; dir:X,Y,Z[,r,g,b], point:X,Y,Z[,r,g,b] or environment is expected",
-            text);
-    body = body.substr(body.find(':') + 1);
-    const auto commas = std::count(body.begin(), body.end(), ',');
-    STX_TRY(const auto v, parseNumbers(body, commas >= 3 ? 6 : 3, "--light"));
-    const glm::dvec3 vector(v[0], v[1], v[2]);
-    const bool inWorld = light.kind == Light::Kind::point && !light.inCameraSpace;
-    light.vector = glm::vec3(inWorld ? vector - origin : vector);
-    if (v.size() == 6) light.colour = glm::vec3(v[3], v[4], v[5]);
-    if (light.kind == Light::Kind::directional && light.vector == glm::vec3(0.0f))
-        return fail(ErrorCode::usage, "--light '{}' has no direction", text);
-    return light;
 }
 
 /// The word for --light that is no Light.
