@@ -80,10 +80,20 @@ def main():
             "convert film": ["convert", "IN/film", "-o", "OUT/a.mp4"],
             "render film": ["render", "IN/film.mp4", "-o", "OUT/a_%02d.png", "--orbit", "1", "--times", "all", "--size", "90x70",
                             "--backend", "cpu"],
+            "extract film": ["extract", "IN/film.mp4", "-o", "OUT/images"],
+            "select film": ["select", "IN/film.mp4", "-o", "OUT/a.mp4", "--count", "2"],
+            "pack film": ["pack", "IN/film.mp4", "-o", "OUT/a_%02d", "--layout", "tight", "--prune"],
             "background n2pg": ["background", "IN/frames", "-o", "OUT/a.exr", "--method", "n2pg"],
             "batch": ["convert", "IN/quad.obj", "IN/in.exr", "-o", "OUT/{stem}.mp4", "--jobs", "2", "--views", "ring:2",
                       "--size", "40x40"],
         }
+        video = run([args.stx, "convert", "film.mp4", "-o", "video.mp4", "--video", "h264"], top)
+        if video.code == 5:
+            print("the module of video is not here; that part is not run")
+        else:
+            jobs["convert film as video"] = ["convert", "IN/film.mp4", "-o", "OUT/a.mp4", "--video", "h264"]
+            jobs["render video"] = ["render", "IN/video.mp4", "-o", "OUT/a_%02d.png", "--view", "0", "--times", "all",
+                                    "--backend", "cpu"]
         elsewhere = os.path.join(top, "elsewhere")
         os.mkdir(elsewhere)
         locale = german(elsewhere)
