@@ -25,11 +25,10 @@ std::string lower(std::string text) {
 
 Result<Texture> readPicture(const fs::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
-    auto image = decodeImage(bytes, path.string(), job.limits);
-    if (!image) return tl::unexpected(image.error().at(fmt::format("'{}'", path.string())));
-    if (image->bits() == 16) job.note("16-bit colour is read as 8 bits");
-    if (image->linear) return Texture(rgbaFloatFrom(*image));
-    return Texture(rgba8From(*image));
+    STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
+    if (decoded.bits() == 16) job.note("16-bit colour is read as 8 bits");
+    if (decoded.linear) return Texture(rgbaFloatFrom(decoded));
+    return Texture(rgba8From(decoded));
 }
 
 /// The file of each face in a folder; empty where there is none.
@@ -89,6 +88,17 @@ Result<std::shared_ptr<const Environment>> openFolder(const fs::path& folder, Jo
     if (!missing.empty())
         job.note(fmt::format("{}: faces without a picture show nothing: {}", where, missing));
     if (auto ok = environment->check(); !ok) return tl::unexpected(ok.error().at(where));
+    int least = job.limits.maxImageSide, most = 0;
+    for (const Texture& picture : environment->pictures) {
+        if (picture.empty()) continue;
+        least = std::min(least, picture.width());
+        most = std::max(most, picture.width());
+    }
+    if (least < most)
+        job.note(
+            fmt::format("{}: its faces differ in size, from {} to {} pixels; each is kept as "
+                        "it is",
+                        where, least, most));
     return std::shared_ptr<const Environment>(std::move(environment));
 }
 

@@ -33,6 +33,7 @@
 #include <variant>
 #include <vector>
 
+#include "formats/environment/environment_files.hpp"
 #include "formats/stx/options.hpp"
 #include "formats/validate/validate.hpp"
 #include "lib/base/job.hpp"
@@ -93,6 +94,8 @@ using Model = std::variant<Mesh, Bundle, Atlas>;
 
 // sequenceOf(Bundle), someFrames(frames, numbers), changed(frames, change), and
 // validateFile(path, ValidateOptions, Job&)   every rule that a bundle or an atlas breaks
+// openEnvironment(path, Job&)                 what is far behind a bundle (Bundle::environment);
+//                                             saveEnvironment() writes it alone
 // are declared in the headers above.
 
 // ---- Bundles ----

@@ -45,6 +45,8 @@ def main():
         must([args.stx, "render", "in.exr", "-o", "frames/f_%04d.png", "--orbit", "24", "--size", "90x70", "--backend", "cpu",
               "--background", "white"], top)
         turn_set(os.path.join(top, "turn"))
+        must([args.stx, "render", "in.exr", "-o", "around.png", "--eye", "0.1,0.2,1.5", "--target", "0,0,0", "--size", "160x80",
+              "--projection", "equirectangular", "--background", "grey"], top)
         views = ["--views", "sphere:5", "--size", "96x80"]
         jobs = {
             "convert mp4": ["convert", args.model, "-o", "OUT/a.mp4"] + views,
@@ -53,6 +55,7 @@ def main():
             "convert xmt": ["convert", "IN/in.exr", "-o", "OUT/a.xmt"],
             "convert bt": ["convert", "IN/in.exr", "-o", "OUT/a.bt", "--point-texture"],
             "convert octree": ["convert", "IN/in.exr", "-o", "OUT/o.mp4", "--octree-image", "6"],
+            "convert environment": ["convert", "IN/in.exr", "-o", "OUT/a.mp4", "--environment", "IN/around.png"],
             "bake": ["bake", "IN/in.exr", "-o", "OUT/a.mp4"],
             "bake exr": ["bake", "IN/in.exr", "-o", "OUT/a.exr"],
             "pack": ["pack", "IN/baked.mp4", "-o", "OUT/a"],
@@ -64,6 +67,10 @@ def main():
                             "--quality", "best", "--backend", "cpu", "--light", "dir:0.5,-1.5,-1"],
             "render splat": ["render", "IN/baked.mp4", "-o", "OUT/a.png", "--mode", "splat", "--size", "120x90",
                              "--backend", "cpu", "--eye=0.25,0.5,3.5"],
+            "render environment": ["render", "IN/baked.mp4", "-o", "OUT/a.png", "--size", "80x60", "--backend", "cpu",
+                                   "--environment", "IN/around.png", "--light", "environment", "--specular", "0.3"],
+            "render around": ["render", "IN/in.exr", "-o", "OUT/a.exr", "--eye", "0.1,0.2,1.5", "--target", "0,0,0", "--size",
+                              "96x48", "--projection", "equirectangular", "--backend", "cpu"],
             "render mesh": ["render", args.model, "-o", "OUT/a.exr", "--size", "120x90"],
             "extract": ["extract", "IN/in.exr", "-o", "OUT/images"],
             "extract glb": ["extract", "IN/in.exr", "-o", "OUT/model.glb"],

@@ -140,8 +140,45 @@ TEST(Around, IsReadBackAsAPanorama) {
     EXPECT_LT(depth / count, 0.002);
 }
 
+TEST(Around, ThePictureOfTheLeftEyeIsReadOfAPair) {
+    // Both eyes' pictures in one, the left one above.
+    const TemporaryFolder folder("pair");
+    Frame frame;
+    frame.linear = true;
+    frame.colour = Image<glm::vec4>(64, 64, glm::vec4(1, 0, 0, 1));
+    frame.depth = Image<float>(64, 64, 2.0f);
+    for (int y = 32; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+            frame.colour.at(x, y) = glm::vec4(0, 0, 1, 1);
+            frame.depth.at(x, y) = 3.0f;
+        }
+    }
+    FrameOptions file;
+    file.around = true;
+    ASSERT_TRUE(writeFrame(frame, folder / "pair.exr", file));
+    Job job;
+    OpenOptions open;
+    open.set.from = "panorama";
+    open.set.depthBits = 32;
+    const auto bundle = openBundle(folder / "pair.exr", open, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    ASSERT_EQ(bundle->views.size(), 6u);
+    for (const ReferenceView& view : bundle->views) {
+        const Camera& c = view.camera;
+        for (const glm::ivec2 at : {glm::ivec2(c.width / 2, c.height / 2), {3, 3}}) {
+            EXPECT_LT(glm::distance(view.texture.at(at.x, at.y), glm::vec4(1, 0, 0, 1)), 0.01);
+            const glm::dvec3 d = c.viewDirection(at.x + 0.5, at.y + 0.5);
+            EXPECT_NEAR(view.depth.at(at.x, at.y), 2 * glm::dot(glm::normalize(d), c.forward()),
+                        0.01);
+        }
+    }
+    const auto notes = job.takeNotes();
+    ASSERT_FALSE(notes.empty());
+    EXPECT_NE(notes[0].find("the upper one (left) is read"), std::string::npos) << notes[0];
+}
+
 TEST(CubeFromInside, MergesViewsOfATurningSensor) {
-    // 26 pictures of 60 x 45 degrees in three rings.
+    // 30 pictures of 60 x 45 degrees in three rings.
     Bundle bundle;
     for (int ring = -1; ring <= 1; ++ring) {
         for (int i = 0; i < 10; ++i) {

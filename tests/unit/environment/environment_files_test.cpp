@@ -159,6 +159,24 @@ TEST(EnvironmentFiles, SayWhatIsWrong) {
               std::string::npos);
     ASSERT_TRUE(writeFile(folder / "empty/front.png", *png));
     EXPECT_NE(errorOf("empty").find("a face of an environment is square"), std::string::npos);
+    // A picture that is cut off is named once.
+    ASSERT_TRUE(writeFile(folder / "half.png", ByteSpan(*png).first(40)));
+    const std::string half = errorOf("half.png");
+    EXPECT_NE(half.find("cut off"), std::string::npos) << half;
+    EXPECT_EQ(half.find("half.png"), half.rfind("half.png")) << half;
+    // Faces of two sizes are a note.
+    std::filesystem::create_directory(folder / "mixed");
+    for (const auto& [name, size] : {std::pair{"front.png", 30}, {"back.png", 20}}) {
+        const auto face = encodePng(size, size, 1, 8, grey.data(), true);
+        ASSERT_TRUE(face);
+        ASSERT_TRUE(writeFile(folder / "mixed" / name, *face));
+    }
+    job.takeNotes();
+    EXPECT_EQ(errorOf("mixed"), "");
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 2u);
+    EXPECT_NE(notes[0].find("left, right, top, bottom"), std::string::npos) << notes[0];
+    EXPECT_NE(notes[1].find("from 20 to 30 pixels"), std::string::npos) << notes[1];
     const auto unknown = saveEnvironment(paintedCube(4), folder / "a.gif", {}, job);
     ASSERT_FALSE(unknown);
     EXPECT_EQ(unknown.error().code, ErrorCode::usage);
