@@ -51,7 +51,10 @@ void putBehind(Frame& frame, const Camera& camera, const EnvironmentMap& environ
                 forward - up * static_cast<float>((y + 0.5 - camera.cy) / camera.fy);
             for (int x = 0; x < width; ++x) {
                 glm::vec4& colour = row[static_cast<std::size_t>(x)];
-                if (colour.a >= kCoveredInFull) continue;
+                if (colour.a >= kCoveredInFull) {
+                    colour /= colour.a;
+                    continue;
+                }
                 const glm::vec4 behind =
                     camera.orthographic
                         ? all
@@ -59,6 +62,7 @@ void putBehind(Frame& frame, const Camera& camera, const EnvironmentMap& environ
                               begin + right * static_cast<float>((x + 0.5 - camera.cx) / camera.fx),
                               spacing, linear);
                 colour += behind * (1.0f - std::max(colour.a, 0.0f));
+                if (behind.a >= 1.0f) colour.a = 1.0f;  // but for rounding
             }
         }
     });
