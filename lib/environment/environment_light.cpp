@@ -12,10 +12,10 @@ namespace stx {
 namespace {
 
 /// Texels a side of the faces that light is added up over.
-constexpr int kCoarse = 32;
+constexpr int kCoarse = EnvironmentLight::kGlossSide;
 /// Above this exponent a lobe is narrower than those: it is averaged by the environment's own
 /// footprint.
-constexpr float kNarrow = 128.0f;
+constexpr float kNarrow = EnvironmentLight::kMostTableShininess;
 /// What weighs less than this share of a lobe's middle is left out.
 constexpr float kLeastWeight = 1e-3f;
 
@@ -111,6 +111,20 @@ Environment lobesOf(const std::vector<Piece>& pieces, float shininess) {
     return lobes;
 }
 
+/// EnvironmentLight::glossTable() of faces that have its size.
+std::vector<glm::vec3> tableOf(const EnvironmentMap& lobes) {
+    std::vector<glm::vec3> table;
+    table.reserve(6 * (kCoarse + 2) * (kCoarse + 2));
+    for (int f = 0; f < 6; ++f)
+        for (int y = -1; y <= kCoarse; ++y)
+            for (int x = -1; x <= kCoarse; ++x)
+                table.emplace_back(lobes.sample(
+                    glm::vec3(faceDirection(static_cast<CubeFace>(f),
+                                            {(x + 0.5) / kCoarse, (y + 0.5) / kCoarse})),
+                    0, true));
+    return table;
+}
+
 struct Harmonics {
     const std::array<glm::vec3, 9>& values;
     using vec3 = glsl::vec3;
@@ -131,6 +145,7 @@ Result<std::shared_ptr<const EnvironmentLight>> EnvironmentLight::make(
         light->lobeRad_ = 2.0f * std::acos(std::pow(0.5f, 1.0f / shininess));
     } else if (shininess > 0) {
         STX_TRY(light->gloss_, EnvironmentMap::make(lobesOf(pieces, shininess), limits));
+        light->glossTable_ = tableOf(*light->gloss_);
     }
     return std::shared_ptr<const EnvironmentLight>(std::move(light));
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <vector>
 
 #include <glm/glm.hpp>
 
@@ -27,11 +28,19 @@ class EnvironmentLight {
     /// was prepared.
     [[nodiscard]] glm::vec3 glossy(glm::vec3 direction) const;
 
+    /// glossy() as a table for shaders: the six faces, each kGlossSide texels a side and one more
+    /// around from across its edges, row by row. Empty where no gloss was prepared, and where lobes
+    /// are narrower than texels (shininess above kMostTableShininess).
+    [[nodiscard]] const std::vector<glm::vec3>& glossTable() const { return glossTable_; }
+    static constexpr int kGlossSide = 32;
+    static constexpr float kMostTableShininess = 128.0f;
+
   private:
     std::array<glm::vec3, 9> harmonics_{};
     /// Weighed already, or the environment itself for lobes that are narrow.
     std::shared_ptr<const EnvironmentMap> gloss_;
     float lobeRad_ = 0;  ///< footprint of the latter
+    std::vector<glm::vec3> glossTable_;
 };
 
 }  // namespace stx

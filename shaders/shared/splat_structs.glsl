@@ -10,7 +10,7 @@ struct FrameUniforms {
     vec4 novelAxisZ;     // world
     vec4 novelPosition;  // world; w = diameter of the paper's splat in pixels times distance
     vec4 scales;         // weight, colour, nearest and farthest distance (raster depth)
-    vec4 ambient;        // rgb
+    vec4 ambient;        // rgb; w: 1 an environment lights, 2 with gloss, too
     vec4 specular;       // rgb; w = shininess
 };
 

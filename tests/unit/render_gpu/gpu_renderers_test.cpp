@@ -4,6 +4,7 @@
 
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
+#include "tests/painted_environment.hpp"
 #include "tests/torus_bundle.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 #include "tests/unit/surface/analytic.hpp"
@@ -159,6 +160,29 @@ TEST_P(GpuRenderers, LightAsTheCpuDoes) {
         }
     }
     EXPECT_GT(looked, 50);
+}
+
+TEST_P(GpuRenderers, AreLitByAnEnvironmentAsOnTheCpu) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
+    const auto map = EnvironmentMap::make(paintedCube(32), Limits());
+    ASSERT_TRUE(map);
+    RenderSettings s = settings();
+    s.lighting.ambient = glm::vec3(0.0f);
+    s.lighting.shininess = 20;
+    const auto light = EnvironmentLight::make(*map, s.lighting.shininess, Limits());
+    ASSERT_TRUE(light);
+    s.lighting.environment = *light;
+    const Camera camera = analyticCamera(AnalyticScene::object, 0.5, 4);
+    std::vector<Frame> frames;
+    for (const float specular : {0.0f, 0.4f}) {
+        s.lighting.specular = glm::vec3(specular);
+        auto frame = draw(bundle, s, camera);
+        ASSERT_TRUE(frame) << frame.error().text();
+        EXPECT_GT(psnr(frame->colour, drawOnCpu(bundle, s, camera).colour), 45.0);
+        frames.push_back(std::move(*frame));
+    }
+    // And the gloss does something.
+    EXPECT_LT(psnr(frames[0].colour, frames[1].colour), 35.0);
 }
 
 TEST_P(GpuRenderers, GiveNormalsWithoutLightToo) {

@@ -213,10 +213,13 @@ PipelineChoice choosePipeline(const Device& device, const ContextAbilities& abil
 Result<std::unique_ptr<Renderer>> makeGpuSplatRenderer(const PageSet& set,
                                                        const RenderSettings& settings, int device,
                                                        Job& job) {
-    if (settings.lighting.environment && settings.lighting.specular != glm::vec3(0.0f))
+    const Lighting& lighting = settings.lighting;
+    if (lighting.environment && lighting.specular != glm::vec3(0.0f) &&
+        lighting.environment->glossTable().empty())
         return fail(ErrorCode::unsupported,
-                    "splats on a GPU have no gloss of an environment; use --backend cpu, --mode "
-                    "surface, or --specular 0");
+                    "splats on a GPU have gloss of an environment up to --shininess {}, not {}; "
+                    "use --backend cpu or --mode surface",
+                    EnvironmentLight::kMostTableShininess, lighting.shininess);
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::core));
     auto renderer =
         std::make_unique<GpuSplatRenderer>(std::move(context), set, settings, job.limits);

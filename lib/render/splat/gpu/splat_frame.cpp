@@ -40,7 +40,9 @@ FrameUniforms uniformsOf(const GpuScene& scene, const RenderSettings& settings, 
                                    ? paperCoefficient(scene.rectangles, settings, novel)
                                    : 0.0;
     u.novelPosition = glm::vec4(novel.position, coefficient);
-    u.ambient = glm::vec4(settings.lighting.ambient, settings.lighting.environment ? 1.0f : 0.0f);
+    const Lighting& lighting = settings.lighting;
+    const bool gloss = lighting.specular != glm::vec3(0.0f);
+    u.ambient = glm::vec4(lighting.ambient, !lighting.environment ? 0.0f : gloss ? 2.0f : 1.0f);
     u.specular = glm::vec4(settings.lighting.specular, settings.lighting.shininess);
     return u;
 }
@@ -129,9 +131,14 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
             {glm::vec4(light.vector, light.kind == Light::Kind::point ? 1.0f : 0.0f),
              glm::vec4(light.colour, 0.0f)});
     frame.uniforms.counts.w = static_cast<int>(frame.lights.size());
-    if (lighting.environment)
-        for (const glm::vec3& harmonic : lighting.environment->harmonics())
-            frame.lights.push_back({glm::vec4(0.0f), glm::vec4(harmonic, 0.0f)});
+    if (lighting.environment) {
+        const auto add = [&](const glm::vec3& light) {
+            frame.lights.push_back({glm::vec4(0.0f), glm::vec4(light, 0.0f)});
+        };
+        std::ranges::for_each(lighting.environment->harmonics(), add);
+        if (lighting.specular != glm::vec3(0.0f))
+            std::ranges::for_each(lighting.environment->glossTable(), add);
+    }
     return frame;
 }
 
