@@ -24,7 +24,9 @@ struct Shown {
 /// A page for browsers, of an atlas' own textures where it is one.
 Result<Shown> writePage(const std::string& input, const std::string& output, Program& program) {
     PageOptions write;
-    write.input = input;
+    // Without its folder: pages of the same input are the same wherever it lies.
+    const std::filesystem::path path(input);
+    write.input = (path.has_filename() ? path : path.parent_path()).filename().string();
     write.output = program.outputOptions();
     STX_TRY(const auto kind, recognise(input));
     Result<PageReport> page = PageReport();

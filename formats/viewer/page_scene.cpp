@@ -23,10 +23,6 @@ constexpr int kSides[] = {4096, 8192, 16384};
 constexpr float kSteepest = 8.0f;
 constexpr float kFlat = 128.0f, kSteps = 127.0f;
 
-std::vector<double> listOf(glm::dvec3 v) {
-    return {v.x, v.y, v.z};
-}
-
 Rgba8Image coded(const RgbaFloatImage& linear) {
     Rgba8Image out(linear.width(), linear.height());
     parallelFor(0, linear.height(), [&](std::int64_t row) {
@@ -97,6 +93,10 @@ Result<PageImages> imagesOf(const Atlas& atlas, std::size_t number) {
 }
 
 }  // namespace
+
+std::vector<double> listOf(glm::dvec3 v) {
+    return {v.x, v.y, v.z};
+}
 
 Json pageCamera(const Camera& c, const std::string& name) {
     Json j;

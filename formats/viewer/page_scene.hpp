@@ -34,6 +34,8 @@ void makeViewable(Bundle& bundle, Job& job);
 /// Errors: an atlas that fails check(), linear colour or depth of 32 bits (invalidInput), memory.
 [[nodiscard]] Result<PageScene> pageScene(const Atlas& atlas, Job& job);
 
+/// A vector, as JSON has it.
+[[nodiscard]] std::vector<double> listOf(glm::dvec3 v);
 /// A camera, as the viewer reads it, with its name.
 [[nodiscard]] nlohmann::ordered_json pageCamera(const Camera& camera, const std::string& name);
 

@@ -191,10 +191,6 @@ Result<PageWriter> startPage(const std::filesystem::path& path, const PageOption
     return writer;
 }
 
-std::vector<double> listOf(glm::dvec3 v) {
-    return {v.x, v.y, v.z};
-}
-
 /// Where the page begins: in front of an object, or, where all views look from one side, where the
 /// one in their middle is.
 Result<Json> startOf(const std::vector<Camera>& cameras, const Bounds& bounds) {

@@ -13,7 +13,7 @@ namespace stx {
 
 /// How a page is written.
 struct PageOptions {
-    /// The input as `stx render` is given it, for the command that the page shows.
+    /// The input's name as `stx render` is given it, for the command that the page shows.
     std::string input;
     /// What browsers show as its name; empty: the bundle's title, else the input's name.
     std::string title;
