@@ -139,6 +139,17 @@ glm::vec3 unitOr(glm::vec3 normal, glm::vec3 other) {
     return length > 0 ? normal / length : other;
 }
 
+/// Errors where a place does not fit into glTF's floats.
+Result<void> checkPlaces(const ReferenceView& view, const std::vector<glm::vec3>& places) {
+    for (const glm::vec3& p : places) {
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            return fail(ErrorCode::invalidInput,
+                        "view '{}' has a point that is farther than glTF's floats reach (3.4e38)",
+                        view.name);
+    }
+    return {};
+}
+
 class Writer {
   public:
     Writer(const Bundle& bundle, Job& job) : bundle_(bundle), job_(job) {
@@ -147,6 +158,8 @@ class Writer {
     }
 
     Result<void> add(const ReferenceView& view, const ViewSurface& surface) {
+        STX_CHECK(checkPlaces(view, surface.positions));
+        STX_CHECK(checkPlaces(view, surface.lonePositions));
         if (!surface.triangles.empty()) {
             STX_CHECK(addSurface(view, surface));
         }

@@ -22,7 +22,7 @@ struct SurfacesReport {
 /// stays at it, and the origin is in `asset.extras.origin`.
 ///
 /// Notes: an origin, colours of linear light. Errors: a bundle that fails check(), no surface and
-/// no point, more than GLB's 4 GiB, memory over the limit, files, cancelled.
+/// no point, points beyond floats, more than GLB's 4 GiB, memory over the limit, files, cancelled.
 [[nodiscard]] Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
                                                    OutputFile::Options options, Job& job);
 

@@ -78,13 +78,12 @@ class Maker {
         const glm::dvec3 inCamera = glm::conjugate(c.orientation) * (world - c.position);
         if (!c.orthographic && !(inCamera.z < 0)) return 0;
         const glm::dvec3 at = c.project(inCamera);
-        const int x = static_cast<int>(std::floor(at.x)), y = static_cast<int>(std::floor(at.y));
         if (!(at.x >= 1 && at.y >= 1 && at.x < s.width - 1 && at.y < s.height - 1)) return 0;
         // Not only the pixel, but all that is around the place must be there.
         const int i = static_cast<int>(std::floor(at.x - 0.5)),
                   j = static_cast<int>(std::floor(at.y - 0.5));
         if (!joined(s, i, j)) return 0;
-        const std::uint32_t pixel = index(s, x, y);
+        const std::uint32_t pixel = index(s, static_cast<int>(at.x), static_cast<int>(at.y));
         if (!sameDepth(s, pixel, at.z)) return 0;
         return densityAt(s, world, normal, at.z, edgeDistance(s, pixel));
     }
