@@ -163,6 +163,94 @@ TEST(AlignPanorama, IsTheSameOnAnyNumberOfThreads) {
     }
 }
 
+/// Pictures in which a disc of one colour is somewhere else each time.
+class WithMover final : public PictureSource {
+  public:
+    explicit WithMover(TurningCamera& camera) : camera_(camera) {}
+    [[nodiscard]] int count() const override { return camera_.count(); }
+    [[nodiscard]] std::string name(int k) const override { return camera_.name(k); }
+    [[nodiscard]] double focalHint(int) const override { return 0; }
+    [[nodiscard]] Result<Rgba8Image> picture(int k) override {
+        STX_TRY(auto picture, camera_.picture(k));
+        const glm::dmat3 world =
+            glm::mat3_cast(camera_.worldFromCamera[static_cast<std::size_t>(k)]);
+        // Goes to the left, slower than the camera turns: neighbours see it at two places.
+        const glm::dvec3 middle =
+            glm::angleAxis((20 + 9 * k) * kDegree, glm::dvec3(0, 1, 0)) * glm::dvec3(0, 0, -1);
+        const double half = 0.5 * glm::length(glm::dvec2(camera_.size));
+        for (int y = 0; y < picture.height(); ++y)
+            for (int x = 0; x < picture.width(); ++x) {
+                const glm::dvec2 p =
+                    glm::dvec2(x + 0.5 - 0.5 * camera_.size.x, 0.5 * camera_.size.y - y - 0.5) /
+                    half;
+                if (glm::dot(world * camera_.lens.ray(p), middle) > std::cos(2.5 * kDegree))
+                    picture.at(x, y) = {255, 0, 255, 255};
+            }
+        return picture;
+    }
+
+  private:
+    TurningCamera& camera_;
+};
+
+/// Connected parts of the mover's colour that are larger than a few pixels.
+int moversIn(Rgba8Image picture) {
+    int movers = 0;
+    const auto is = [&](int x, int y) {
+        const glm::u8vec4 p = picture.at(x, y);
+        return p.r > 225 && p.g < 40 && p.b > 225 && p.a == 255;
+    };
+    for (int y = 0; y < picture.height(); ++y)
+        for (int x = 0; x < picture.width(); ++x) {
+            if (!is(x, y)) continue;
+            int pixels = 0;
+            std::vector<glm::ivec2> open = {{x, y}};
+            while (!open.empty()) {
+                const glm::ivec2 p = open.back();
+                open.pop_back();
+                if (!picture.contains(p.x, p.y) || !is(p.x, p.y)) continue;
+                picture.at(p.x, p.y) = {};
+                ++pixels;
+                for (const glm::ivec2 d : {glm::ivec2(1, 0), {-1, 0}, {0, 1}, {0, -1}})
+                    open.push_back(p + d);
+            }
+            movers += pixels > 25;
+        }
+    return movers;
+}
+
+TEST(AlignPanorama, DrawsAMoverOnce) {
+    TurningCamera camera;
+    camera.sphere = &discs();
+    for (int k = 0; k < 4; ++k) camera.add(16 * kDegree * k, 0, 0);
+    WithMover source(camera);
+    Job job;
+    auto found = alignPanorama(source, {}, job);
+    ASSERT_TRUE(found) << found.error().text();
+    ASSERT_EQ(found->used(), 4);
+    EXPECT_LT(rotationError(camera, *found), 0.05);  // the mover has its share
+    const auto once = composePanorama(source, *found, {.width = 1024}, job);
+    ASSERT_TRUE(once);
+    EXPECT_EQ(moversIn(once->pixels), 1);
+    const auto often = composePanorama(source, *found, {.width = 1024, .hideSeams = false}, job);
+    ASSERT_TRUE(often);
+    EXPECT_GT(moversIn(often->pixels), 1);  // it would be there more than once
+}
+
+TEST(AlignPanorama, ComesNearToPicturesThatAreLeftOut) {
+    auto camera = partOfATurn();
+    const auto found = mustAlign(camera);
+    Job job;
+    const auto leftOut = leaveEachOut(camera, found, {.width = 1024}, job);
+    ASSERT_TRUE(leftOut);
+    ASSERT_EQ(leftOut->size(), 6u);
+    for (const LeftOutPicture& one : *leftOut) {
+        EXPECT_GT(one.covered, 0.4);
+        EXPECT_LE(one.covered, 1.0);
+        EXPECT_GT(one.psnr, 28);
+    }
+}
+
 TEST(AlignPanorama, BringsBackAnEquirectangularPicture) {
     REQUIRE_SHARED(path, "data/panorama/boofcv-equirectangular/equirectangular_half_dome_01.jpg");
     Job job;

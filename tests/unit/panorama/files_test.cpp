@@ -1,0 +1,190 @@
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "formats/exr/exr_file.hpp"
+#include "formats/images/images.hpp"
+#include "formats/panorama/exif.hpp"
+#include "formats/panorama/panorama_files.hpp"
+#include "lib/model/srgb8.hpp"
+#include "tests/temporary_folder.hpp"
+
+namespace stx {
+namespace {
+
+/// A panorama whose colours tell directions.
+PanoramaImage paintedDirections(int width) {
+    PanoramaImage out{Rgba8Image(width, width / 2)};
+    for (int y = 0; y < width / 2; ++y)
+        for (int x = 0; x < width; ++x)
+            out.pixels.at(x, y) = glm::u8vec4(
+                127.5 * (PanoramaImage::direction({x + 0.5, y + 0.5}, width) + 1.0) + 0.5, 255);
+    return out;
+}
+
+/// The direction that a colour (0..255) tells.
+glm::dvec3 directionOf(glm::dvec3 colour) {
+    return glm::normalize(colour / 127.5 - 1.0);
+}
+
+glm::dvec3 directionOfLight(const float* rgb) {
+    return directionOf(255.0 *
+                       glm::dvec3(srgbByTable(rgb[0]), srgbByTable(rgb[1]), srgbByTable(rgb[2])));
+}
+
+TEST(PanoramaFiles, FacesAreThoseOfVrml97) {
+    // ISO/IEC 14772-1, 6.5: front, back, left, right upright; top has +Z up, bottom -Z.
+    const auto expectAt = [](PanoramaFace face, glm::dvec2 at, glm::dvec3 direction) {
+        EXPECT_LT(glm::distance(panoramaFaceDirection(face, at), direction), 1e-12);
+    };
+    expectAt(PanoramaFace::front, {0.5, 0.5}, {0, 0, -1});
+    expectAt(PanoramaFace::front, {1, 0}, {1, 1, -1});
+    expectAt(PanoramaFace::back, {1, 0}, {-1, 1, 1});
+    expectAt(PanoramaFace::left, {1, 0}, {-1, 1, -1});
+    expectAt(PanoramaFace::right, {1, 0}, {1, 1, 1});
+    expectAt(PanoramaFace::top, {0.5, 0}, {0, 1, 1});
+    expectAt(PanoramaFace::top, {1, 0.5}, {1, 1, 0});
+    expectAt(PanoramaFace::bottom, {0.5, 0}, {0, -1, -1});
+    expectAt(PanoramaFace::bottom, {1, 0.5}, {1, -1, 0});
+    const auto faces = panoramaFaces(paintedDirections(512), 64);
+    for (std::size_t f = 0; f < 6; ++f)
+        for (const glm::ivec2 at : {glm::ivec2(3, 5), {60, 8}, {31, 33}, {20, 63}}) {
+            const glm::dvec3 wanted =
+                panoramaFaceDirection(static_cast<PanoramaFace>(f), (glm::dvec2(at) + 0.5) / 64.0);
+            const glm::dvec3 seen(faces.pictures[f].at(at.x, at.y));
+            EXPECT_LT(glm::distance(directionOf(seen), glm::normalize(wanted)), 0.02) << f;
+        }
+}
+
+TEST(PanoramaFiles, EnvironmentMapsAreOpenExrs) {
+    const TemporaryFolder folder;
+    const auto panorama = paintedDirections(256);
+    Job job;
+    for (const int faceSize : {0, 33}) {
+        const auto path = folder.path() / "map.exr";
+        PanoramaWriteOptions options;
+        options.faceSize = faceSize;
+        ASSERT_TRUE(writePanorama(panorama, path, options, job));
+        const auto reader = ExrReader::open(path, job.limits);
+        ASSERT_TRUE(reader);
+        const ExrPart& part = reader->parts()[0];
+        const auto* kind = part.attribute<std::int64_t>("envmap");
+        ASSERT_NE(kind, nullptr);
+        EXPECT_EQ(*kind, faceSize > 0 ? 1 : 0);
+        EXPECT_EQ(part.width, faceSize > 0 ? 33 : 256);
+        EXPECT_EQ(part.height, faceSize > 0 ? 198 : 128);
+        std::vector<float> rgb(static_cast<std::size_t>(part.width * part.height) * 3);
+        ASSERT_TRUE(reader->readPart(
+            0, {{"R", rgb.data(), 3}, {"G", rgb.data() + 1, 3}, {"B", rgb.data() + 2, 3}}));
+        // What Imf::LatLongMap and Imf::CubeMap say of these pixels, turned by half a turn about Y.
+        struct Place {
+            int x, y;
+            glm::dvec3 direction;
+        };
+        const std::vector<Place> latlong = {{0, 0, {0, 1, 0}},
+                                            {127, 127, {0, -1, 0}},
+                                            {0, 63, {0, 0.012, 1}},
+                                            {128, 63, {0.012, 0.012, -1}},
+                                            {64, 63, {-1, 0.012, 0.0}}};
+        const std::vector<Place> cube = {
+            {16, 16, {-1, 0, 0}},  {16, 49, {1, 0, 0}},  {16, 82, {0, 1, 0}}, {16, 115, {0, -1, 0}},
+            {16, 148, {0, 0, -1}}, {16, 181, {0, 0, 1}}, {0, 0, {-1, 1, 1}},  {32, 66, {-1, 1, -1}},
+            {32, 99, {-1, -1, 1}}, {32, 132, {1, 1, -1}}};
+        for (const Place& p : faceSize > 0 ? cube : latlong) {
+            const auto seen =
+                directionOfLight(rgb.data() + static_cast<std::size_t>(p.y * part.width + p.x) * 3);
+            EXPECT_LT(glm::distance(seen, glm::normalize(p.direction)), 0.03)
+                << p.x << " " << p.y << ": " << seen.x << " " << seen.y << " " << seen.z;
+        }
+    }
+}
+
+TEST(PanoramaFiles, EveryEndingIsWritten) {
+    const TemporaryFolder folder;
+    const auto panorama = paintedDirections(64);
+    Job job;
+    for (const char* name : {"a.png", "a.jpg", "a.tif", "a.webp"}) {
+        const auto path = folder.path() / name;
+        ASSERT_TRUE(writePanorama(panorama, path, {}, job)) << name;
+        const auto bytes = readFile(path, job.limits);
+        ASSERT_TRUE(bytes);
+        const auto back = decodeRgba8(*bytes, name, job.limits);
+        ASSERT_TRUE(back) << name;
+        EXPECT_EQ(back->size(), panorama.pixels.size());
+        EXPECT_LT(glm::distance(directionOf(glm::dvec3(back->at(40, 20))),
+                                PanoramaImage::direction({40.5, 20.5}, 64)),
+                  0.06)
+            << name;
+    }
+    ASSERT_TRUE(writePanorama(panorama, folder.path() / "faces", {}, job));
+    for (const char* face : kPanoramaFaceNames)
+        EXPECT_TRUE(
+            std::filesystem::exists(folder.path() / "faces" / (std::string(face) + ".png")));
+    const auto scene = writePanorama(panorama, folder.path() / "a.mp4", {}, job);
+    ASSERT_FALSE(scene);
+    EXPECT_EQ(scene.error().code, ErrorCode::unsupported);
+}
+
+Bytes jpegWithExif(bool little, int orientation, int focal35) {
+    std::string tiff;
+    const auto number = [&](unsigned value, int size) {
+        for (int i = 0; i < size; ++i)
+            tiff += static_cast<char>(value >> 8 * (little ? i : size - 1 - i) & 255);
+    };
+    const auto entry = [&](unsigned tag, unsigned type, unsigned value) {
+        number(tag, 2);
+        number(type, 2);
+        number(1, 4);
+        number(value, type == 3 ? 2 : 4);
+        if (type == 3) number(0, 2);
+    };
+    tiff += little ? "II" : "MM";
+    number(42, 2);
+    number(8, 4);
+    number(2, 2);
+    entry(0x112, 3, static_cast<unsigned>(orientation));
+    entry(0x8769, 4, 38);
+    number(0, 4);
+    number(1, 2);
+    entry(0xa405, 3, static_cast<unsigned>(focal35));
+    number(0, 4);
+    std::string file("\xff\xd8\xff\xe1", 4);
+    const std::size_t size = tiff.size() + 8;
+    file += static_cast<char>(size >> 8);
+    file += static_cast<char>(size & 255);
+    file += std::string("Exif\0\0", 6) + tiff + "\xff\xd9";
+    const auto* bytes = reinterpret_cast<const std::byte*>(file.data());
+    return Bytes(bytes, bytes + file.size());
+}
+
+TEST(PanoramaFiles, ExifTellsOrientationAndFocalLength) {
+    for (const bool little : {true, false}) {
+        const Bytes file = jpegWithExif(little, 6, 28);
+        EXPECT_EQ(readExif(file).orientation, 6);
+        EXPECT_EQ(readExif(file).focal35, 28);
+        // Cut off anywhere: what can be read, or nothing.
+        for (std::size_t n = 0; n < file.size(); ++n) {
+            const ExifNotes notes = readExif(ByteSpan(file).first(n));
+            EXPECT_TRUE(notes.orientation == 1 || notes.orientation == 6);
+        }
+    }
+    EXPECT_EQ(readExif(jpegWithExif(true, 9, 28)).orientation, 1);
+}
+
+TEST(PanoramaFiles, PicturesAreTurnedUpright) {
+    // Upright it is a b c / d e f; where its first pixel is, for each orientation (EXIF 2.3).
+    Rgba8Image upright(3, 2);
+    for (int i = 0; i < 6; ++i)
+        upright.pixels()[static_cast<std::size_t>(i)] = glm::u8vec4(i, 0, 0, 255);
+    const char* stored[] = {"abcdef", "cbafed", "fedcba", "defabc",
+                            "adbecf", "cfbead", "fcebda", "daebfc"};
+    for (int o = 1; o <= 8; ++o) {
+        Rgba8Image picture(o < 5 ? 3 : 2, o < 5 ? 2 : 3);
+        for (std::size_t i = 0; i < 6; ++i)
+            picture.pixels()[i] = glm::u8vec4(stored[o - 1][i] - 'a', 0, 0, 255);
+        EXPECT_TRUE(turnedUpright(picture, o) == upright) << o;
+    }
+}
+
+}  // namespace
+}  // namespace stx
