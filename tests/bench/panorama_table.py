@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """How exact panoramas are, and OpenCV's Stitcher and Hugin beside them.
 
-  tests/bench/panorama_table.py build/release/bin/stx SHARED/data/panorama [--peers] [--only NAME] [--keep FOLDER]
+  tests/bench/panorama_table.py build/release/bin/stx SHARED/data/panorama [--peers] [--left-out] [--only NAME] [--keep FOLDER]
 
 Series that are cut out of known spheres (panorama_series.py) tell the error of rotations (the largest, after
 all were turned as one), focal length, and what comes back of the original (PSNR, after a gain). Real series
-tell residuals and, where EXIF has it, how far the focal length is from it. "left out": each picture drawn again
+tell residuals and, where EXIF has it, how far the focal length is from it. --left-out: each picture drawn again
 out of the others. Seconds are the processor's, of all its cores together. With --peers, OpenCV's
 Stitcher and Hugin's command line (pto_gen, cpfind, cpclean, autooptimiser, nona, enblend) run on the same.
 Needs python3-opencv; the peers need hugin-tools and enblend. Exit code 1 when a figure misses what is promised.
@@ -88,7 +88,7 @@ def sphere_rays(width):
 
 def series(shared, folder, only):
     """Name, pictures, sphere (or nothing), focal length in pixels (0: not known)."""
-    painted = painted_sphere(4096)
+    painted = []  # made when it is asked for
     even = lambda n, span=360.0, pitch=0.0, roll=0.0: [(span * k / n, pitch, roll) for k in range(n)]
     made = {
         "turn of 18 portraits": (painted, (384, 512), 480, -0.05, even(18), True),
@@ -106,6 +106,8 @@ def series(shared, folder, only):
     for name, (sphere, size, focal, k1, turns, gains) in made.items():
         if only and only not in name:
             continue
+        if sphere is painted:
+            sphere = painted_sphere(4096)
         out = os.path.join(folder, name.replace(" ", "_").replace(",", ""))
         light = [1 - 0.4 * (k * 5 % 7) / 7 for k in range(len(turns))] if gains else None
         write_series(out, sphere, size, focal, k1, turns, light, shuffle=True)
@@ -121,7 +123,7 @@ def series(shared, folder, only):
         yield name, files, None, focal35 / 21.633 * math.hypot(width, height) / 2
 
 
-def measure_stx(stx, files, sphere, focal, folder, keep):
+def measure_stx(stx, files, sphere, focal, folder, keep, left_out):
     """A row's cells, and what misses the promises."""
     out, report = os.path.join(folder, "stx.png"), os.path.join(folder, "stx.json")
     code, said, seconds = timed([stx, "panorama", *files, "-o", out, "--report", report], folder)
@@ -155,7 +157,7 @@ def measure_stx(stx, files, sphere, focal, folder, keep):
         os.replace(out, os.path.join(keep, os.path.basename(os.path.dirname(files[0])) + "_" +
                                      os.path.splitext(os.path.basename(files[0]))[0] + ".png"))
     left = None
-    if len(files) <= 20:
+    if left_out and len(files) <= 20:
         _, said, _ = timed([stx, "panorama", *files, "-o", out, "--size", "1024x512", "--leave-one-out"], folder)
         left = re.search(r"left out ([0-9.]+) dB", said)
     show = lambda value, text: "-" if value is None else format(value, text)
@@ -199,6 +201,7 @@ def main():
     parser.add_argument("stx")
     parser.add_argument("shared")
     parser.add_argument("--peers", action="store_true")
+    parser.add_argument("--left-out", action="store_true", help="takes as long as all the rest")
     parser.add_argument("--only", help="series whose name has this in it")
     parser.add_argument("--keep", help="folder that keeps the panoramas")
     o = parser.parse_args()
@@ -213,7 +216,7 @@ def main():
             if o.only and o.only not in name:
                 continue
             with tempfile.TemporaryDirectory(dir=folder) as work:
-                cells, missed = measure_stx(o.stx, files, sphere, focal, work, o.keep)
+                cells, missed = measure_stx(o.stx, files, sphere, focal, work, o.keep, o.left_out)
                 if o.peers:
                     cells += measure_opencv(files, work) + measure_hugin(files, focal, work)
             print("| " + " | ".join([name] + cells) + " |", flush=True)
