@@ -67,11 +67,14 @@ def turn_between(truth, found):
 
 def psnr_back(sphere, panorama, turn):
     """PSNR of the original against the panorama, turned onto it, where it is covered; after a gain."""
-    width = min(sphere.shape[1], panorama.shape[1] // 2)
-    rays = np.stack(np.broadcast_arrays(*sphere_rays(2 * width)), -1)
-    back = seen_in(panorama, rays @ turn)
-    back = cv2.resize(back, (width, width // 2), interpolation=cv2.INTER_AREA).astype(np.float64)
-    truth = cv2.resize(sphere, (width, width // 2), interpolation=cv2.INTER_AREA).astype(np.float64)
+    if panorama.shape[1] >= 2 * sphere.shape[1]:  # all that the original has is between its pixels
+        back = seen_in(panorama, np.stack(np.broadcast_arrays(*sphere_rays(sphere.shape[1])), -1) @ turn).astype(np.float64)
+        truth = sphere.astype(np.float64)
+    else:
+        width = panorama.shape[1] // 4 * 2
+        back = seen_in(panorama, np.stack(np.broadcast_arrays(*sphere_rays(2 * width)), -1) @ turn)
+        back = cv2.resize(back, (width, width // 2), interpolation=cv2.INTER_AREA).astype(np.float64)
+        truth = cv2.resize(sphere, (width, width // 2), interpolation=cv2.INTER_AREA).astype(np.float64)
     covered = back[..., 3] >= 254.5
     a, b = (back[covered][:, :3] / 255) ** 2.2, (truth[covered] / 255) ** 2.2
     gain = (a * b).sum(0) / (a * a).sum(0)

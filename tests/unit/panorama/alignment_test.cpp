@@ -127,6 +127,10 @@ TEST(AlignPanorama, TakesCamerasThatAreRolled) {
     ASSERT_EQ(found.used(), 4);
     EXPECT_LT(rotationError(camera, found), 0.03);
     EXPECT_NEAR(found.focal / camera.lens.focal, 1, 3e-3);
+    // The axis around which a camera only rolled is not up: the first one's top is.
+    EXPECT_GT((found.cameras[0].worldFromCamera * glm::dvec3(0, 1, 0)).y, 0.995);
+    for (const auto& c : found.cameras)
+        EXPECT_LT(std::abs((c.worldFromCamera * glm::dvec3(0, 0, -1)).y), 0.2);
 }
 
 TEST(AlignPanorama, FindsGains) {
