@@ -46,7 +46,7 @@ enum class FieldType : std::uint8_t {
     MFVec4f,
     MFScript,
     MFAttrRef,
-    MFBool,   ///< of Scripts and PROTOs only, as MFImage
+    MFBool,  ///< of Scripts and PROTOs only, as MFImage
     MFImage,
 };
 
