@@ -74,7 +74,7 @@ class PictureFiles final : public PictureSource {
     std::uint64_t room_;  ///< bytes of pictures that may still be kept
 };
 
-Result<std::vector<fs::path>> filesOf(Result<std::vector<NumberedPicture>> pictures) {
+Result<std::vector<fs::path>> filesOf(Result<std::vector<NumberedFile>> pictures) {
     if (!pictures) return propagate(pictures);
     std::vector<fs::path> files;
     for (auto& picture : *pictures) files.push_back(std::move(picture.path));

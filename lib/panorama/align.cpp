@@ -166,10 +166,11 @@ double noiseOf(const Series& s) {
                       0.01, 20.0);
 }
 
-/// The largest of the angles by which pairs that close a turn disagree with `model`.
+/// By which angle pairs that close a turn disagree with `model`: the strongest pair, or the mean by
+/// matches.
 double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
              const std::vector<int>& closing, bool strongest) {
-    double gap = 0;
+    double gap = 0, sum = 0, all = 0;
     std::size_t most = 0;
     for (const int p : closing) {
         const Pair& pair = pairs[static_cast<std::size_t>(p)];
@@ -177,15 +178,14 @@ double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
         const auto& b = model.worldFromCamera[static_cast<std::size_t>(pair.b)];
         const double off =
             angleBetween(turnOf(pair.matches, model.lens, pair.bFromA), glm::inverse(b) * a);
-        if (strongest) {
-            if (pair.matches.size() <= most) continue;
-            most = pair.matches.size();
-            gap = off;
-        } else {
-            gap = std::max(gap, off);
-        }
+        const auto weight = static_cast<double>(pair.matches.size());
+        sum += weight * off;
+        all += weight;
+        if (pair.matches.size() <= most) continue;
+        most = pair.matches.size();
+        gap = off;
     }
-    return gap;
+    return strongest ? gap : sum / std::max(all, 1.0);
 }
 
 /// What pairs have in common, from the matches that fit and those that were found `before`.
@@ -354,7 +354,7 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
             adjust(s.model, s.pairs, s.adjusting);
         }
     }
-    for (const double most : {3.0, 2.0, 1.3, 0.85}) {
+    for (const double most : {3.0, 2.0, 1.3, 0.75}) {
         keepWhatFits(s, most);
         s.adjusting.huberPixels = 0.5;
         adjust(s.model, s.pairs, s.adjusting);

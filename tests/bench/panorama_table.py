@@ -110,7 +110,7 @@ def series(shared, folder, only):
         if only and only not in name:
             continue
         if sphere is painted:
-            sphere = painted_sphere(4096)
+            sphere = painted_sphere(4096 if focal > 320 else 2048)  # not much finer than the pictures
         out = os.path.join(folder, name.replace(" ", "_").replace(",", ""))
         light = [1 - 0.4 * (k * 5 % 7) / 7 for k in range(len(turns))] if gains else None
         write_series(out, sphere, size, focal, k1, turns, light, shuffle=True)
