@@ -580,6 +580,11 @@ Result<void> readAtlasTexture(const fs::path& path, const AtlasHeader& header,
     return readImage(file, header, texture, page, coverage, limits);
 }
 
+bool isAtlasFolder(const fs::path& path) {
+    std::error_code ec;
+    return fs::is_regular_file(setFolderOf(path) / kIndexFile, ec) && isFolderPath(path);
+}
+
 bool isExrAtlas(const ExrReader& reader) {
     const auto* kind = reader.parts()[0].attribute<std::string>("stx:kind");
     return kind && *kind == "atlas";

@@ -100,6 +100,8 @@ struct AtlasSaveOptions {
                                             const AtlasHeader& header, const AtlasTexture& texture,
                                             AtlasPage& page, const Limits& limits);
 
+/// The path is a folder that holds an atlas.json, or that file itself.
+[[nodiscard]] bool isAtlasFolder(const std::filesystem::path& path);
 /// An OpenEXR file that holds an atlas and no bundle.
 [[nodiscard]] bool isExrAtlas(const ExrReader& reader);
 

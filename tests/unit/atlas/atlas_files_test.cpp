@@ -267,6 +267,10 @@ TEST(AtlasHeaderOf, TellsAllWithoutPixels) {
         EXPECT_EQ(header->textures[0].attribute, "colour");
         EXPECT_GT(header->textures[0].bytes, 100u);
     }
+    EXPECT_TRUE(isAtlasFolder(folder / "set"));
+    EXPECT_TRUE(isAtlasFolder(folder / "set/atlas.json"));
+    EXPECT_FALSE(isAtlasFolder(folder / "a.exr"));
+    EXPECT_FALSE(isAtlasFolder(folder.path()));
     EXPECT_TRUE(isExrAtlas(*ExrReader::open(folder / "a.exr", Limits())));
     EXPECT_TRUE(readAtlasHeader(folder / "set/atlas.json", Limits()));
 }
