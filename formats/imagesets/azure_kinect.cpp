@@ -15,7 +15,6 @@
 namespace stx::imagesets {
 namespace {
 
-constexpr double kMillimetre = 0.001;
 /// Colour is taken of the surface in front, when it is nearer by more than this share of the
 /// distance: what noise and slanted surfaces do not reach.
 constexpr float kInFront = 0.03f;
@@ -111,7 +110,7 @@ Result<DeviceCamera> cameraOf(const Json& calibration, const std::string& purpos
 }
 
 /// The device, and where each depth pixel looks: found once for all frames.
-class Device {
+class KinectDevice {
   public:
     DeviceCamera depth, colour;
 
@@ -170,7 +169,7 @@ glm::u8vec4 colourAt(const Rgba8Image& image, glm::dvec2 at) {
 }
 
 /// The colour that the other camera has of each depth pixel; alpha 0 where it does not see it.
-Rgba8Image colourOfDepth(Device& device, const Image<float>& millimetres,
+Rgba8Image colourOfDepth(KinectDevice& device, const Image<float>& millimetres,
                          const Rgba8Image& colour) {
     const Image<glm::vec2>& rays = device.rays();
     const DeviceCamera& to = device.colour;
@@ -255,7 +254,7 @@ Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOpti
     if (dt.pixels != "gray16be" && dt.pixels != "gray16le")
         return failAt(where, ErrorCode::invalidInput, "its depth is {}; 16-bit grey is expected",
                       dt.pixels);
-    const auto device = std::make_shared<Device>();
+    const auto device = std::make_shared<KinectDevice>();
     STX_TRY(const OnSensor depthOn, depthOnSensor(dt.width, dt.height, where));
     STX_TRY(device->depth, cameraOf(calibration, "Depth", dt.width, dt.height, depthOn, where));
     STX_TRY(device->colour, cameraOf(calibration, "PhotoVideo", ct.width, ct.height,

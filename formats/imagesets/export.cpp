@@ -16,8 +16,17 @@
 namespace stx {
 namespace {
 
-using namespace imagesets;
-using Json = OutputJson;
+using imagesets::addOwnKeys;
+using imagesets::colourEnding;
+using imagesets::fileNames;
+using imagesets::inQuotes;
+using imagesets::kEnvironmentFile;
+using imagesets::OutputJson;
+using imagesets::transformsFrame;
+using imagesets::writeColour;
+using imagesets::writeFloatDepth;
+using imagesets::writeIntegerDepth;
+
 using std::filesystem::path;
 
 constexpr double kDegree = 180.0 / glm::pi<double>();
@@ -64,9 +73,10 @@ Result<MivRange> mivRange(const ReferenceView& view) {
     return range;
 }
 
-Result<Json> mivCamera(const ReferenceView& view, const std::string& name, glm::dvec3 origin) {
+Result<OutputJson> mivCamera(const ReferenceView& view, const std::string& name,
+                             glm::dvec3 origin) {
     const Camera& c = view.camera;
-    Json camera;
+    OutputJson camera;
     camera["Name"] = name;
     const glm::dvec3 world = c.position + origin;
     camera["Position"] = {-world.z, -world.x, world.y};
@@ -112,7 +122,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     if (options.kind == ExportOptions::Kind::colmap)
         return imagesets::exportColmap(bundle, folder, names, options, job);
 
-    Json json;
+    OutputJson json;
     double unit = 0.001;
     double farthest = 0;
     for (const ReferenceView& view : bundle.views) farthest = std::max(farthest, view.farPlane);

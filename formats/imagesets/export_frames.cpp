@@ -11,7 +11,15 @@
 namespace stx {
 namespace {
 
-using namespace imagesets;
+using imagesets::fileNames;
+using imagesets::inQuotes;
+using imagesets::kEnvironmentFile;
+using imagesets::OutputJson;
+using imagesets::transformsFrame;
+using imagesets::writeColour;
+using imagesets::writeFloatDepth;
+using imagesets::writeIntegerDepth;
+
 namespace fs = std::filesystem;
 
 /// A folder of transforms.json, images/ and depth/ that fills frame by frame.

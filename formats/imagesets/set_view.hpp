@@ -20,6 +20,9 @@ class Film;
 /// What the readers of the kinds hand to the common way from files to reference views.
 namespace stx::imagesets {
 
+/// What most depth is counted in, metres.
+inline constexpr double kMillimetre = 0.001;
+
 /// Where an image's values lie.
 struct PictureSource {
     std::filesystem::path path;

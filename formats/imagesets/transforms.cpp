@@ -10,8 +10,6 @@
 namespace stx::imagesets {
 namespace {
 
-constexpr double kMillimetre = 0.001;
-
 /// The key of a frame, else of the file.
 Result<std::optional<double>> find(const Json& file, const Json& frame, const char* key,
                                    const std::string& where) {

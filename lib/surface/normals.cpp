@@ -64,4 +64,16 @@ Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job) {
     return {};
 }
 
+glm::u8vec3 rgbFromNormal(glm::vec3 normal) {
+    if (normal == glm::vec3(0)) return glm::u8vec3(0);
+    return glm::u8vec3(glm::round((glm::clamp(normal, -1.0f, 1.0f) + 1.0f) * 127.5f));
+}
+
+glm::vec3 normalFromRgb(glm::u8vec3 rgb) {
+    if (rgb == glm::u8vec3(0)) return glm::vec3(0);
+    const glm::vec3 n = glm::vec3(rgb) * (2.0f / 255.0f) - 1.0f;
+    const float length = glm::length(n);
+    return length > 0 ? n / length : glm::vec3(0);
+}
+
 }  // namespace stx

@@ -36,4 +36,8 @@ struct BakeSettings {
 /// See bake(): an axis six times as long is that of a surface tilted by about 80 degrees.
 inline constexpr double kMaxSplatTilt = 6.0;
 
+/// Normal <-> RGB: n = 2 * c / max - 1 per component, made unit again; (0,0,0) is "no normal".
+[[nodiscard]] glm::u8vec3 rgbFromNormal(glm::vec3 normal);
+[[nodiscard]] glm::vec3 normalFromRgb(glm::u8vec3 rgb);
+
 }  // namespace stx

@@ -43,7 +43,7 @@ std::vector<ByteSpan> unitsOf(ByteSpan stream) {
     return units;
 }
 
-int typeOf(ByteSpan unit) {
+int nalTypeOf(ByteSpan unit) {
     return unit.empty() ? 0 : std::to_integer<int>(unit[0]) & 31;
 }
 
@@ -141,8 +141,8 @@ Result<Bytes> avcConfiguration(ByteSpan byteStream, bool grey, int bits) {
     constexpr int kSequence = 7, kPicture = 8;
     ByteSpan sequence, picture;
     for (const ByteSpan unit : unitsOf(byteStream)) {
-        if (typeOf(unit) == kSequence) sequence = unit;
-        if (typeOf(unit) == kPicture) picture = unit;
+        if (nalTypeOf(unit) == kSequence) sequence = unit;
+        if (nalTypeOf(unit) == kPicture) picture = unit;
     }
     if (sequence.size() < 4 || picture.empty())
         return fail(ErrorCode::failed, "the encoder gives no parameters of its stream");

@@ -140,6 +140,20 @@ TEST(Splats, AreTangentAndCloseTheLattice) {
     }
 }
 
+TEST(Normals, RgbRoundTrip) {
+    EXPECT_EQ(rgbFromNormal(glm::vec3(0)), glm::u8vec3(0));
+    EXPECT_EQ(normalFromRgb(glm::u8vec3(0)), glm::vec3(0));
+    EXPECT_EQ(rgbFromNormal({0, 0, 1}), glm::u8vec3(128, 128, 255));
+    EXPECT_EQ(rgbFromNormal({-1, 0, 0}).x, 0);
+    for (int i = 0; i < 1000; ++i) {
+        const double z = -1 + 2 * (i + 0.5) / 1000, a = i * 2.399963;
+        const double r = std::sqrt(1 - z * z);
+        const glm::vec3 n(r * std::cos(a), r * std::sin(a), z);
+        EXPECT_NE(rgbFromNormal(n), glm::u8vec3(0));
+        EXPECT_GT(glm::dot(n, normalFromRgb(rgbFromNormal(n))), std::cos(glm::radians(0.4)));
+    }
+}
+
 TEST(Normals, SameOnAnyNumberOfThreads) {
     Bundle one, many;
     one.views.push_back(analytic::capture(analytic::bumpy, analytic::lookingAt({1, 1, 3}, 128), 8));
