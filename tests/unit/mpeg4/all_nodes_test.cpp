@@ -30,8 +30,11 @@ FieldValue someValue(FieldType type) {
     };
     std::visit(
         [&](auto& v) {
-            if constexpr (kIsList<std::decay_t<decltype(v)>>) {
-                for (int i = 0; i < 3; ++i) fill(v.emplace_back());
+            using T = std::decay_t<decltype(v)>;
+            if constexpr (kIsList<T>) {
+                typename T::value_type item{};
+                fill(item);
+                v.assign(3, item);
             } else {
                 fill(v);
             }
