@@ -49,7 +49,8 @@ class GpuSurface : public testing::Test {
 TEST_F(GpuSurface, AgreesWithTheCpuOnTheObject) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 8, 2);
     for (const auto& [quality, name] : kQualities)
-        agree(bundle, surfaceSettings(quality), analyticCamera(AnalyticScene::object, 0.4, 8),
+        agree(bundle, surfaceSettings(quality),
+              test::small(analyticCamera(AnalyticScene::object, 0.4, 8), 160),
               fmt::format("object_{}", name));
 }
 
@@ -57,7 +58,7 @@ TEST_F(GpuSurface, AgreesWithTheCpuInTheRoom) {
     const Bundle bundle = test::smallRoom(3);
     for (const auto& [quality, name] : kQualities)
         agree(bundle, surfaceSettings(quality),
-              test::small(analyticCamera(AnalyticScene::room, 0.6, 3), 256),
+              test::small(analyticCamera(AnalyticScene::room, 0.6, 3), 160),
               fmt::format("room_{}", name));
 }
 
