@@ -15,7 +15,10 @@ READY = "typeof viewer === 'object' && document.getElementById('message').textCo
 def show(browser, path, fragment):
     """Opens a page with a camera, and waits until it is drawn."""
     browser.open(f"file://{path}#{fragment}")
-    browser.until(READY)
+    said = "(document.getElementById('message') || {textContent: ''}).textContent"
+    browser.until(f"({READY}) || {said}.startsWith('The page cannot')")
+    if not browser.ask(READY):
+        raise RuntimeError(browser.ask(said))
 
 
 def drawn(browser):

@@ -12,6 +12,9 @@ uniform vec4 lightAmounts;    // light, ambient, specular, shininess
 out vec4 picture;             // premultiplied
 
 vec3 ambientLight() { return vec3(lightAmounts.y); }
+// Pages have no environment.
+vec3 environmentDiffuse(vec3 n) { return vec3(0.0); }
+vec3 environmentGloss(vec3 d) { return vec3(0.0); }
 vec3 specularLight() { return vec3(lightAmounts.z); }
 float shininess() { return lightAmounts.w; }
 int lightCount() { return 1; }
