@@ -15,6 +15,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/pipes.hpp"
 #include "formats/files/temporaries.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
@@ -63,28 +64,6 @@ bool namesEach(const std::string& pattern) {
            pattern.find("{parent}") != std::string::npos;
 }
 
-bool sendAll(int fd, const void* from, std::size_t size) {
-    for (const char* at = static_cast<const char*>(from); size > 0;) {
-        const auto n = ::write(fd, at, size);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return false;
-        at += n;
-        size -= static_cast<std::size_t>(n);
-    }
-    return true;
-}
-
-bool receiveAll(int fd, void* to, std::size_t size) {
-    for (char* at = static_cast<char*>(to); size > 0;) {
-        const auto n = ::read(fd, at, size);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return false;
-        at += n;
-        size -= static_cast<std::size_t>(n);
-    }
-    return true;
-}
-
 Json entryOf(const BatchItem& item, const char* status) {
     return {{"input", item.input}, {"output", item.output}, {"status", status}, {"exitCode", 0}};
 }
@@ -122,7 +101,7 @@ Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
     program.progress.leaveToParent(!program.common.quiet && ::isatty(STDERR_FILENO) != 0);
     const ThreadLimit limit(threads);
     std::uint32_t index = 0;
-    while (receiveAll(in, &index, sizeof(index)) && index < items.size()) {
+    while (receiveAll(in, &index, sizeof(index), -1) && index < items.size()) {
         const auto start = Clock::now();
         program.subject = items[index].input;
         auto entry = doItem(items[index], work, program);
@@ -231,10 +210,10 @@ void BatchRun::finish(std::size_t item, Json entry) {
 void BatchRun::takeReport(Worker& worker) {
     std::uint32_t size = 0;
     std::string text;
-    bool good = worker.item && receiveAll(worker.out.get(), &size, sizeof(size));
+    bool good = worker.item && receiveAll(worker.out.get(), &size, sizeof(size), -1);
     if (good) {
         text.resize(size);
-        good = receiveAll(worker.out.get(), text.data(), size);
+        good = receiveAll(worker.out.get(), text.data(), size, -1);
     }
     if (good) {
         auto entry = Json::parse(text, nullptr, false);

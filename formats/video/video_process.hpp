@@ -1,11 +1,9 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <memory>
 
+#include "formats/files/child_process.hpp"
 #include "formats/files/files.hpp"
-#include "formats/files/temporaries.hpp"
 #include "formats/video/wire.hpp"
 
 namespace stx {
@@ -19,9 +17,6 @@ class VideoProcess {
     /// module is not here; (failed) no process.
     [[nodiscard]] static Result<std::unique_ptr<VideoProcess>> start(const Limits& limits,
                                                                      Descriptor file = {});
-    ~VideoProcess();
-    VideoProcess(const VideoProcess&) = delete;
-    VideoProcess& operator=(const VideoProcess&) = delete;
 
     /// Asks, and waits for the answer. Errors: those of the libraries, in a sentence;
     /// (invalidInput) the process died, or kept busy for half a minute.
@@ -30,8 +25,7 @@ class VideoProcess {
   private:
     VideoProcess() = default;
 
-    pid_t pid_ = -1;
-    Descriptor socket_;
+    std::unique_ptr<ChildProcess> child_;
     std::uint64_t most_ = 0;  ///< bytes of an answer
     bool broken_ = false;
 };

@@ -1,10 +1,5 @@
 #pragma once
 
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -13,6 +8,8 @@
 #include <string_view>
 #include <type_traits>
 #include <vector>
+
+#include "formats/files/pipes.hpp"
 
 /// What is said between this process and the one that decodes video: a request and its answer, one
 /// after the other. Both ends are of one build and one machine, so values go as they are in memory.
@@ -126,35 +123,6 @@ class Unpacker {
     std::span<const std::byte> bytes_;
     bool ok_ = true;
 };
-
-inline bool sendAll(int fd, const void* bytes, std::size_t size) {
-    const auto* from = static_cast<const char*>(bytes);
-    while (size > 0) {
-        const auto n = ::send(fd, from, size, MSG_NOSIGNAL);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return false;
-        from += n;
-        size -= static_cast<std::size_t>(n);
-    }
-    return true;
-}
-
-/// False at the end, an error, or when nothing comes for so many milliseconds (-1: waits on).
-inline bool receiveAll(int fd, void* bytes, std::size_t size, int patienceMs) {
-    auto* to = static_cast<char*>(bytes);
-    while (size > 0) {
-        pollfd ready = {fd, POLLIN, 0};
-        const int polled = ::poll(&ready, 1, patienceMs);
-        if (polled < 0 && errno == EINTR) continue;
-        if (polled <= 0) return false;
-        const auto n = ::read(fd, to, size);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return false;
-        to += n;
-        size -= static_cast<std::size_t>(n);
-    }
-    return true;
-}
 
 struct MessageHead {
     Tag tag{};
