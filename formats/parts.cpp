@@ -60,20 +60,31 @@ Found findVideo(PartCheck check, Job&) {
 }
 
 #ifdef STX_WITH_GPU
-std::string joined(const std::vector<std::string>& notes) {
-    return fmt::format("{}", fmt::join(notes, "; "));
+struct DevicesFound {
+    std::vector<Device> all;
+    std::string why;  ///< when there are none
+};
+/// Asked once, since drivers take their time to answer.
+const DevicesFound& devicesHere(const Limits& limits) {
+    static const DevicesFound found = [&] {
+        Job asked;
+        asked.limits = limits;
+        DevicesFound out;
+        out.all = listDevices(asked);
+        out.why = fmt::format("{}", fmt::join(asked.takeNotes(), "; "));
+        return out;
+    }();
+    return found;
 }
 #endif
 
 Found findOpenGl(PartCheck check, Job& job) {
 #ifdef STX_WITH_GPU
     if (check == PartCheck::quick) return {PartState::here, "built in"};
-    Job asked;
-    asked.limits = job.limits;
-    const auto devices = listDevices(asked);
-    if (devices.empty()) return {PartState::missing, joined(asked.takeNotes())};
+    const DevicesFound& devices = devicesHere(job.limits);
+    if (devices.all.empty()) return {PartState::missing, devices.why};
     std::string names;
-    for (const auto& d : devices)
+    for (const auto& d : devices.all)
         names += fmt::format("{}{} ({})", names.empty() ? "" : "; ", d.name, d.version);
     return {PartState::here, names};
 #else
@@ -86,9 +97,7 @@ Found findOpenGl(PartCheck check, Job& job) {
 Found findGpu(PartCheck check, Job& job) {
 #ifdef STX_WITH_GPU
     if (check == PartCheck::quick) return {PartState::here, "not looked for"};
-    Job asked;
-    asked.limits = job.limits;
-    for (const auto& d : listDevices(asked))
+    for (const auto& d : devicesHere(job.limits).all)
         if (!d.software) return {PartState::here, d.name};
     return {PartState::missing, "no hardware answers; pictures are drawn on the processor"};
 #else

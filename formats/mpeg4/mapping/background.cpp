@@ -5,6 +5,7 @@
 
 #include <glm/gtc/constants.hpp>
 
+#include "formats/mpeg4/mapping/new_document.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "lib/environment/environment_map.hpp"
 
@@ -131,27 +132,6 @@ Result<std::shared_ptr<const Environment>> boundEnvironment(
     return std::make_shared<const Environment>(std::move(environment));
 }
 
-Url addPictureStream(UpdateObjectDescriptors& update, std::string fileName, Bytes bytes) {
-    const int id = kFirstImageOd + static_cast<int>(update.descriptors.size());
-    const bool png = bytes.size() > 1 && bytes[0] == std::byte{0x89};
-    ElementaryStream stream;
-    stream.esId = static_cast<std::uint32_t>(id + 1);
-    stream.objectTypeIndication = png ? oti::kPng : oti::kJpeg;
-    stream.streamType = StreamType::visual;
-    stream.fileName = std::move(fileName) + (png ? ".png" : ".jpg");
-    Sample sample;
-    sample.duration = stream.timescale;
-    sample.data = ByteRange::of(std::move(bytes));
-    stream.samples.push_back(std::move(sample));
-    ObjectDescriptor od;
-    od.id = id;
-    od.streams.push_back(std::move(stream));
-    update.descriptors.push_back(std::move(od));
-    Url url;
-    url.objectDescriptorId = id;
-    return url;
-}
-
 Result<NodePtr> backgroundFromEnvironment(const Environment& environment,
                                           const SceneWriteOptions& options,
                                           UpdateObjectDescriptors& update, Job& job) {
@@ -227,28 +207,7 @@ Result<Document> sceneFromEnvironment(const Environment& environment,
     navigation->set("type", std::vector<std::string>{"EXAMINE", "ANY"});
     NodePtr root = makeNode("Group");
     root->set("children", NodeList{worldInfo, background, navigation});
-    Document document;
-    document.sceneStream.esId = 1;
-    document.sceneStream.streamType = StreamType::sceneDescription;
-    document.sceneStream.objectTypeIndication = oti::kSystemsV1;
-    document.bifsConfig.hasSize = true;
-    document.bifsConfig.pixelWidth = 512;
-    document.bifsConfig.pixelHeight = 512;
-    ReplaceScene scene;
-    scene.useNames = true;
-    scene.root = root;
-    CommandFrame frame;
-    frame.commands.emplace_back(std::move(scene));
-    document.frames.push_back(std::move(frame));
-    if (!update.descriptors.empty()) {
-        document.odStream.esId = 2;
-        document.odStream.streamType = StreamType::objectDescriptor;
-        document.odStream.objectTypeIndication = oti::kSystemsV1;
-        OdFrame odFrame;
-        odFrame.commands.emplace_back(std::move(update));
-        document.odFrames.push_back(std::move(odFrame));
-    }
-    return document;
+    return newDocument(std::move(root), std::move(update), {512, 512});
 }
 
 Result<std::shared_ptr<const Environment>> environmentFromScene(const Document& document,

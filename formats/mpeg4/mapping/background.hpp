@@ -24,15 +24,6 @@ namespace stx::mpeg4 {
     const std::vector<ShownBackground>& backgrounds, const StreamImages& images,
     const ImageDecoder& decode, Job& job);
 
-/// Object descriptors take ids from here on: 1 is that of the presentation.
-inline constexpr int kFirstImageOd = 2;
-/// 1023 is forbidden.
-inline constexpr int kLastImageOd = 1022;
-
-/// A PNG or JPEG as a stream of its own behind a new object descriptor. The ids must not run out.
-[[nodiscard]] Url addPictureStream(UpdateObjectDescriptors& update, std::string fileName,
-                                   Bytes bytes);
-
 /// A Background, under a Transform where the environment is turned, with a stream for each face. A
 /// picture all around becomes six faces; linear light becomes 8-bit sRGB; where pictures let
 /// nothing through but there is no sky, the mean colours around the poles stand behind (a

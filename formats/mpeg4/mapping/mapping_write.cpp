@@ -3,6 +3,7 @@
 
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/mapping.hpp"
+#include "formats/mpeg4/mapping/new_document.hpp"
 #include "formats/mpeg4/mapping/octree_write.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
@@ -39,28 +40,9 @@ class SceneWriter {
         }
         addNavigation(*root);
 
-        Document document;
-        document.sceneStream.esId = 1;
-        document.sceneStream.streamType = StreamType::sceneDescription;
-        document.sceneStream.objectTypeIndication = oti::kSystemsV1;
-        document.bifsConfig.hasSize = true;
-        document.bifsConfig.pixelWidth = std::min(bundle_.views[0].camera.width, 65535);
-        document.bifsConfig.pixelHeight = std::min(bundle_.views[0].camera.height, 65535);
-        ReplaceScene scene;
-        scene.useNames = true;
-        scene.root = root;
-        CommandFrame frame;
-        frame.commands.emplace_back(std::move(scene));
-        document.frames.push_back(std::move(frame));
-        if (!update_.descriptors.empty()) {
-            document.odStream.esId = 2;
-            document.odStream.streamType = StreamType::objectDescriptor;
-            document.odStream.objectTypeIndication = oti::kSystemsV1;
-            OdFrame odFrame;
-            odFrame.commands.emplace_back(std::move(update_));
-            document.odFrames.push_back(std::move(odFrame));
-        }
-        return document;
+        const Camera& first = bundle_.views[0].camera;
+        return newDocument(std::move(root), std::move(update_),
+                           {std::min(first.width, 65535), std::min(first.height, 65535)});
     }
 
   private:
