@@ -10,6 +10,7 @@
 #include "lib/base/parallel.hpp"
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
+#include "tools/picture_times.hpp"
 
 namespace stx::tools {
 namespace {

@@ -11,6 +11,7 @@
 #include "lib/packing/period.hpp"
 #include "lib/quality/prune_quality.hpp"
 #include "tools/commands.hpp"
+#include "tools/picture_times.hpp"
 
 namespace stx::tools {
 namespace {
@@ -166,8 +167,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
-    if (o.time && !(*o.time >= 0 && std::isfinite(*o.time)))
-        return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *o.time);
+    STX_CHECK(checkTime(o.time));
     STX_CHECK(checkTarget(o.output, program));
     if (!o.budget.empty()) {
         STX_TRY(o.pruning.budget, parsePixels(o.budget));

@@ -1,7 +1,6 @@
 #include "tools/extract_shown.hpp"
 
 #include <chrono>
-#include <cmath>
 
 #include <nlohmann/json.hpp>
 
@@ -10,6 +9,7 @@
 #include "formats/sequences.hpp"
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
+#include "tools/picture_times.hpp"
 
 namespace stx::tools {
 namespace {
@@ -64,17 +64,6 @@ Result<Shown> writeModel(const std::string& input, const std::string& output,
 
 bool isShown(const std::string& ending) {
     return ending == ".html" || ending == ".glb";
-}
-
-Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
-                             const char* whatIs, const std::string& input) {
-    if (time && !(*time >= 0 && std::isfinite(*time)))
-        return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *time);
-    if (whatIs && !time && timeline.moves())
-        return fail(ErrorCode::usage,
-                    "'{}' has {} frames, and {} of one moment; give --time T, in seconds", input,
-                    timeline.count(), whatIs);
-    return timeline.frameAt(time.value_or(0));
 }
 
 Result<int> extractShown(const std::string& input, const std::string& output,

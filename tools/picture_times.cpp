@@ -32,10 +32,24 @@ Result<std::vector<double>> parseTimes(const std::string& text) {
 
 }  // namespace
 
+Result<void> checkTime(const std::optional<double>& time) {
+    if (!time || (*time >= 0 && std::isfinite(*time))) return {};
+    return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *time);
+}
+
+Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
+                             const char* whatIs, const std::string& input) {
+    STX_CHECK(checkTime(time));
+    if (whatIs && !time && timeline.moves())
+        return fail(ErrorCode::usage,
+                    "'{}' has {} frames, and {} of one moment; give --time T, in seconds", input,
+                    timeline.count(), whatIs);
+    return timeline.frameAt(time.value_or(0));
+}
+
 Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeline) {
     if (o.time) {
-        if (!(*o.time >= 0) || !std::isfinite(*o.time))
-            return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *o.time);
+        STX_CHECK(checkTime(o.time));
         return std::vector<double>{*o.time};
     }
     if (o.times.empty() || o.times == "all" || o.times == "cameras") return timeline.times;

@@ -19,6 +19,14 @@ struct TimeOptions {
     [[nodiscard]] bool any() const { return time.has_value() || !times.empty(); }
 };
 
+/// Errors (usage): a time before the start, or none at all (NaN).
+[[nodiscard]] Result<void> checkTime(const std::optional<double>& time);
+/// The frame of --time, the first where it is not given. Errors (usage): a time before the start;
+/// none of a film for what is of one moment only: `whatIs`, as in "points are", else null.
+[[nodiscard]] Result<std::size_t> momentOf(const std::optional<double>& time,
+                                           const Timeline& timeline, const char* whatIs,
+                                           const std::string& input);
+
 /// The times that are asked for, ascending; at least one. `all` (and `cameras`, whose
 /// times are elsewhere): every frame; A:B without STEP:
 /// every frame from A to B; with it: A, A + STEP, … up to B. Errors (usage): a text of another
