@@ -115,7 +115,7 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
     const std::string& input = o.inputs[0];
     STX_TRY(const bool picture, isPicture(input, job.limits));
     if (picture)
-        return fail(ErrorCode::usage,
+        return fail(ErrorCode::invalidInput,
                     "'{}' is one picture; a sheet shows a bundle, an atlas or an image set, or "
                     "compares two pictures",
                     input);
