@@ -44,7 +44,7 @@ bool isExrBundleFile(const fs::path& path) {
 
 Error notThere(const fs::path& path) {
     return {ErrorCode::io,
-            fmt::format("cannot read '{}': there is no such file or folder", path.string()),
+            fmt::format("cannot read '{}': the file or folder does not exist", path.string()),
             {}};
 }
 

@@ -82,7 +82,7 @@ const CLI::App& chosen(const CLI::App& app) {
     return *where;
 }
 
-/// Refuses numbers that are `bad`, as they were written. What is no number is CLI11's to refuse.
+/// Refuses numbers that are `bad`, as they were written. What is not a number is CLI11's to refuse.
 CLI::Validator numberThat(const std::function<bool(double)>& bad, const std::string& expected,
                           const std::string& description) {
     return CLI::Validator(
@@ -114,14 +114,14 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, ch
             known.push_back(sub->get_name());
         if (argc > 1 && argv[1][0] != '-') unknown = argv[1];
         if (!unknown.empty() && std::find(known.begin(), known.end(), unknown) == known.end())
-            message = fmt::format("there is no command '{}'", unknown);
+            message = fmt::format("unknown command '{}'", unknown);
     } else if (const auto rest = where.remaining(); !rest.empty()) {
         unknown = rest[0].substr(0, rest[0].find('='));
         for (const auto* option : where.get_options()) {
             for (const auto& name : option->get_lnames()) known.push_back("--" + name);
         }
         if (unknown.rfind("--", 0) == 0)
-            message = fmt::format("there is no option '{}'", unknown);
+            message = fmt::format("unknown option '{}'", unknown);
         else
             message = fmt::format("unexpected argument '{}'", unknown);
     }

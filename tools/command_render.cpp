@@ -67,7 +67,7 @@ Result<std::pair<int, int>> parseRate(const std::string& text) {
     return std::pair(static_cast<int>(numerator), static_cast<int>(denominator));
 }
 
-/// The word for --light that is no Light.
+/// The word for --light that is not a Light.
 constexpr const char* kEnvironmentLight = "environment";
 bool lightsByEnvironment(const RenderOptions& o) {
     return std::ranges::find(o.lights, kEnvironmentLight) != o.lights.end();

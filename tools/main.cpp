@@ -24,7 +24,7 @@ int mainProgram(int argc, char** argv) {
         program.command = failed.command;
         program.common = {};
         program.common.noClobber = failed.noClobber;
-        // The mistake is told even where its report has no place.
+        // The mistake is reported even where its report has no place.
         if (!failed.report.empty() && checkTarget(failed.report, program))
             program.common.report = failed.report;
         return program.run([&]() -> Result<int> { return tl::unexpected(request.error()); });

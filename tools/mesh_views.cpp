@@ -138,8 +138,8 @@ Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& comma
                               "does not go with a camera file, whose cameras have their own");
     // A word without a dot or a slash is meant as a layout.
     if (o.views.find_first_of("./") == std::string::npos) return tl::unexpected(layout.error());
-    return fail(ErrorCode::io, "cannot read the camera file '{}' of --views: there is no such file",
-                o.views);
+    return fail(ErrorCode::io,
+                "cannot read the camera file '{}' of --views: the file does not exist", o.views);
 }
 
 Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& program,

@@ -50,7 +50,7 @@ void Program::complain(std::string_view line) {
 
 namespace {
 
-/// More notes alike than this are told as a number.
+/// More notes alike than this are given as a number.
 constexpr std::size_t kNotesAlike = 3;
 
 /// What a note says without its names in quotes and its numbers.
@@ -125,7 +125,8 @@ Result<void> checkFolderOf(const std::filesystem::path& target) {
     const auto folder =
         target.parent_path().empty() ? std::filesystem::path(".") : target.parent_path();
     if (!std::filesystem::is_directory(folder, ec))
-        return fail(ErrorCode::io, "cannot write '{}': there is no folder '{}'; create it first",
+        return fail(ErrorCode::io,
+                    "cannot write '{}': the folder '{}' does not exist; create it first",
                     target.string(), folder.string());
     if (access(folder.c_str(), W_OK) != 0)
         return fail(ErrorCode::io, "cannot write '{}': the folder '{}' is not writable",

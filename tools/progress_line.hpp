@@ -12,7 +12,7 @@ namespace stx::tools {
 /// itself, and gone before anything else is said. Safe to use from several threads.
 class ProgressLine {
   public:
-    /// "rendering 40/120, 12 s left", a few times a second. The time left is told from the second
+    /// "rendering 40/120, 12 s left", a few times a second. The time left is shown from the second
     /// second on, by the speed so far.
     void show(std::int64_t done, std::int64_t total, std::string_view what);
     /// Takes the line away, when there is one.

@@ -69,9 +69,9 @@ Result<void> MergedReport::addPictures(Json report) {
     STX_TRY(const auto total, wholeOf(*shard, "total"));
     STX_CHECK(expect(Kind::pictures, total));
     auto views = std::move(report["views"]);
-    if (!views.is_array()) return fail(ErrorCode::invalidInput, "'views' is no list");
+    if (!views.is_array()) return fail(ErrorCode::invalidInput, "'views' is not a list");
     for (auto& view : views) {
-        if (!view.is_object()) return fail(ErrorCode::invalidInput, "a view is no object");
+        if (!view.is_object()) return fail(ErrorCode::invalidInput, "a view is not an object");
         STX_CHECK(addEntry(std::move(view), total));
     }
     report.erase("views");
@@ -90,7 +90,7 @@ Result<void> MergedReport::add(std::string_view text) {
             // Frames of one set, by `--frames`.
             auto entries = std::move(whole["conversions"]);
             if (!entries.is_array())
-                return fail(ErrorCode::invalidInput, "'conversions' is no list");
+                return fail(ErrorCode::invalidInput, "'conversions' is not a list");
             std::string lines;
             for (const auto& entry : entries)
                 lines += entry.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
@@ -106,7 +106,7 @@ Result<void> MergedReport::add(std::string_view text) {
             auto entry = Json::parse(line, nullptr, false);
             if (!entry.is_object())
                 return failAt(fmt::format("line {}", number), ErrorCode::invalidInput,
-                              "it is no report of stx convert or stx render");
+                              "it is not a report of stx convert or stx render");
             // A run that was refused or stopped has one line that says so.
             if (entry.contains("command") && !entry.contains("input")) {
                 failedRuns_.push_back(entry.value("message", "it failed"));
@@ -125,7 +125,7 @@ Result<void> MergedReport::add(std::string_view text) {
         }
     } catch (const Json::exception& e) {
         // A value of another type than its key says.
-        return fail(ErrorCode::invalidInput, "it is no report of stx: {}", e.what());
+        return fail(ErrorCode::invalidInput, "it is not a report of stx: {}", e.what());
     }
     return {};
 }

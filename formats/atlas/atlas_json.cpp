@@ -126,7 +126,7 @@ class Reader {
         if (it == json_.end() || !it->is_array() || it->size() != N)
             return wrong(name, fmt::format("must be a list of {} numbers", N));
         for (std::size_t i = 0; i < N; ++i) {
-            if (!(*it)[i].is_number()) return wrong(name, "holds something that is no number");
+            if (!(*it)[i].is_number()) return wrong(name, "holds something that is not a number");
             to[i] = (*it)[i].get<double>();
             if (!std::isfinite(to[i])) return wrong(name, "holds a number that is not finite");
         }
@@ -291,9 +291,9 @@ Result<Json> parse(std::string_view text, const std::string& where) {
     try {
         return Json::parse(text);
     } catch (const Json::parse_error& e) {
-        return failAt(where, ErrorCode::invalidInput, "it is no valid JSON at byte {}", e.byte);
+        return failAt(where, ErrorCode::invalidInput, "it is not valid JSON at byte {}", e.byte);
     } catch (const std::exception& e) {
-        return failAt(where, ErrorCode::invalidInput, "it is no valid JSON: {}", e.what());
+        return failAt(where, ErrorCode::invalidInput, "it is not valid JSON: {}", e.what());
     }
 }
 
@@ -335,7 +335,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     STX_CHECK(checkNesting(text, where, std::min(limits.maxNesting, 16)));
     STX_TRY(const Json json, parse(text, where));
     if (!json.is_object())
-        return failAt(where, ErrorCode::invalidInput, "it is no JSON object, so no atlas");
+        return failAt(where, ErrorCode::invalidInput, "it is not a JSON object, so not an atlas");
     const Reader top(json, "", where, checks);
     AtlasHeader header;
     Atlas& atlas = header.atlas;

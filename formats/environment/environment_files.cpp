@@ -169,7 +169,7 @@ Result<std::shared_ptr<const Environment>> openEnvironment(const fs::path& path,
     std::error_code ec;
     const std::string where = fmt::format("'{}'", path.string());
     if (!fs::exists(path, ec))
-        return failAt(where, ErrorCode::io, "there is no such file or folder");
+        return failAt(where, ErrorCode::io, "the file or folder does not exist");
     if (fs::is_directory(path, ec)) return openFolder(path, job);
     STX_TRY(auto source, mpeg4::ByteSource::open(path));
     Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));

@@ -39,7 +39,7 @@ struct ExrEnvironmentHeader {
 
 /// The first part that we wrote as an environment, or that has `envmap`; -1: none.
 [[nodiscard]] int environmentPartOf(const ExrReader& reader);
-/// Errors (invalidInput): a size that is no environment's.
+/// Errors (invalidInput): a size that an environment cannot have.
 [[nodiscard]] Result<ExrEnvironmentHeader> environmentHeader(const ExrPart& part);
 /// The environment of a part: one of environmentPartOf(), or any whose picture is twice as wide as
 /// high, taken as latlong. Errors: environmentHeader(), files, memory.

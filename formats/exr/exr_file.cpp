@@ -176,7 +176,7 @@ Result<void> ExrReader::Impl::readHeaders(const Limits& limits) {
     return adapt(ErrorCode::invalidInput, where, [&]() -> Result<void> {
         char head[8] = {};
         if (!readAt(0, head, 8) || std::memcmp(head, "\x76\x2f\x31\x01", 4) != 0)
-            return failAt(where, ErrorCode::invalidInput, "it is no OpenEXR file");
+            return failAt(where, ErrorCode::invalidInput, "it is not an OpenEXR file");
         if (auto ok =
                 checkExrHeaders([this](std::uint64_t offset, void* to,
                                        std::size_t count) { return readAt(offset, to, count); },
@@ -222,7 +222,7 @@ Result<ExrReader> ExrReader::open(const std::filesystem::path& path, const Limit
         return fail(ErrorCode::io, "cannot open {}: {}", impl->where,
                     std::generic_category().message(errno));
     if (!S_ISREG(info.st_mode))
-        return fail(ErrorCode::io, "cannot read {}: it is no file", impl->where);
+        return fail(ErrorCode::io, "cannot read {}: it is not a file", impl->where);
     impl->size = static_cast<std::uint64_t>(info.st_size);
     impl->stream =
         std::make_unique<exr::FileStream>(impl->fd.get(), impl->size, impl->where.c_str());

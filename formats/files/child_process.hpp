@@ -19,7 +19,8 @@ class ChildProcess {
     static constexpr int kPatienceMs = 30000;
 
     /// `work` runs in the child with its end of a socket and must end by _exit(). No child
-    /// holds another's end of its socket, so that the death of each is seen. Error (failed): no socket, no process.
+    /// holds another's end of its socket, so that the death of each is seen. Error (failed): no
+    /// socket, no process.
     [[nodiscard]] static Result<std::unique_ptr<ChildProcess>> start(
         const std::function<void(int socket)>& work);
     ~ChildProcess();

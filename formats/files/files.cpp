@@ -483,7 +483,7 @@ Result<fs::path> resolveInside(const fs::path& folder, std::string_view name,
     if (ec) return failIo("open", joined, ec.value());
     if (!limits.allowOutside && !isInside(real, realBase))
         return refuse("leads out of its folder by a link");
-    if (!fs::is_regular_file(real, ec)) return refuse("is no regular file");
+    if (!fs::is_regular_file(real, ec)) return refuse("is not a regular file");
     return joined;
 }
 

@@ -8,8 +8,8 @@ namespace stx {
 
 /// The moment that outputs may be stamped with: the seconds since 1970 in the environment variable
 /// SOURCE_DATE_EPOCH (reproducible-builds.org/specs/source-date-epoch). Nothing without it, when it
-/// is no whole number, or behind the year 9999: then outputs carry no time, so that the same input
-/// gives the same bytes.
+/// is not a whole number, or behind the year 9999: then outputs carry no time, so that the same
+/// input gives the same bytes.
 [[nodiscard]] std::optional<std::uint64_t> sourceDate();
 
 /// Seconds since 1970 as OpenEXR's capDate has them, in UTC: "1970:01:02 03:04:05".

@@ -105,7 +105,7 @@ Result<DeviceCamera> cameraOf(const Json& calibration, const std::string& purpos
             out.turn[column][row] = turn[static_cast<std::size_t>(3 * row + column)];
     out.shift = {shift[0], shift[1], shift[2]};
     if (std::abs(glm::determinant(out.turn) - 1) > 1e-2)
-        return failAt(place, ErrorCode::invalidInput, "its rotation is none");
+        return failAt(place, ErrorCode::invalidInput, "its rotation is not a rotation matrix");
     return out;
 }
 
@@ -235,10 +235,11 @@ Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOpti
     });
     const int colourTrack = trackNamed(*colour, "COLOR"), depthTrack = trackNamed(*colour, "DEPTH");
     if (attachment == tracks.end() || depthTrack < 0)
-        return failAt(where, ErrorCode::invalidInput,
-                      "it is no recording of an Azure Kinect: a track DEPTH and calibration.json "
-                      "attached are expected; other films come in pairs: stx convert CAMERAS.json "
-                      "--texture colour.mp4 --depth depth.mkv -o OUT");
+        return failAt(
+            where, ErrorCode::invalidInput,
+            "it is not a recording of an Azure Kinect: a track DEPTH and calibration.json "
+            "attached are expected; other films come in pairs: stx convert CAMERAS.json "
+            "--texture colour.mp4 --depth depth.mkv -o OUT");
     if (colourTrack < 0)
         return failAt(where, ErrorCode::invalidInput,
                       "it was recorded without colour; a track COLOR is expected");

@@ -112,7 +112,7 @@ Result<ColmapCameras> camerasFromText(std::string_view text, const Limits& limit
         const auto words = line.words();
         STX_TRY(const auto id, numbersOf(words, 0, 1, line.where()));
         if (!(id[0] >= 0 && id[0] < 4294967296.0))
-            return failAt(line.where(), ErrorCode::invalidInput, "{:g} is no camera's number",
+            return failAt(line.where(), ErrorCode::invalidInput, "{:g} is not a camera's number",
                           id[0]);
         if (words.size() < 2)
             return failAt(line.where(), ErrorCode::invalidInput,
@@ -182,7 +182,7 @@ Result<std::vector<ColmapImage>> imagesFromText(std::string_view text, const Lim
                           "the image's name is missing; 'IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID "
                           "NAME' is expected");
         if (!(n[8] >= 0 && n[8] < 4294967296.0))
-            return failAt(line.where(), ErrorCode::invalidInput, "{:g} is no camera's number",
+            return failAt(line.where(), ErrorCode::invalidInput, "{:g} is not a camera's number",
                           n[8]);
         ColmapImage image;
         image.rotation = {n[2], n[3], n[4], n[1]};

@@ -163,7 +163,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     try {
         text = json.dump(1) + "\n";
     } catch (const std::exception&) {
-        return fail(ErrorCode::invalidInput, "the title or a view's name is no valid UTF-8");
+        return fail(ErrorCode::invalidInput, "the title or a view's name is not valid UTF-8");
     }
 
     std::vector<std::string> own;

@@ -25,7 +25,8 @@ inline constexpr const char* kEnvironmentFile = "environment.exr";
                                        const std::filesystem::path& withoutEnding);
 [[nodiscard]] const char* colourEnding(const ReferenceView& view);
 
-/// Depth as OpenEXR floats, or as 16-bit PNG of code(distance), rounded to 1..65535; 0 is no point.
+/// Depth as OpenEXR floats, or as 16-bit PNG of code(distance), rounded to 1..65535; 0 is not a
+/// point.
 [[nodiscard]] Result<void> writeFloatDepth(const ReferenceView& view,
                                            const std::filesystem::path& file);
 [[nodiscard]] Result<void> writeIntegerDepth(const ReferenceView& view,

@@ -53,7 +53,7 @@ class FrameExporter {
         try {
             text = json_.dump(1) + "\n";
         } catch (const std::exception&) {
-            return fail(ErrorCode::invalidInput, "the title or a view's name is no valid UTF-8");
+            return fail(ErrorCode::invalidInput, "the title or a view's name is not valid UTF-8");
         }
         STX_CHECK(writeFile(root_ / "transforms.json",
                             std::as_bytes(std::span(text.data(), text.size()))));

@@ -58,8 +58,8 @@ Result<std::shared_ptr<Film>> openNamed(const path& folder, const std::string& p
                       "may",
                       words.name);
     if (!std::filesystem::exists(file, ec))
-        return failAt(inQuotes(name), ErrorCode::io,
-                      "there is no such film in '{}' or where stx runs", folder.string());
+        return failAt(inQuotes(name), ErrorCode::io, "it exists neither in '{}' nor where stx runs",
+                      folder.string());
     STX_TRY(auto film, Film::open(file, job.limits));
     STX_CHECK(film->select(film->firstVideo()));
     return std::shared_ptr<Film>(std::move(film));

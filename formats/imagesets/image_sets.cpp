@@ -23,14 +23,14 @@ Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
     }
     std::error_code ec;
     if (!std::filesystem::exists(path, ec))
-        return failAt(inQuotes(path.string()), ErrorCode::io, "there is no such file or folder");
+        return failAt(inQuotes(path.string()), ErrorCode::io, "the file or folder does not exist");
     if (namesFilms(options)) return describeFilms(path, options, job);
     const KindEntry* entry = kindNamed(kind);
     if (!entry) {
         std::string known;
         for (const ImageSetKind& k : imageSetKinds())
             known += fmt::format("{}{}", known.empty() ? "" : ", ", k.name);
-        return fail(ErrorCode::usage, "'{}' is no kind of image set; known are {}", kind, known);
+        return fail(ErrorCode::usage, "'{}' is not a kind of image set; known are {}", kind, known);
     }
     return entry->describe(path, options, job);
 }

@@ -48,9 +48,9 @@ Result<Json> parseJson(ByteSpan bytes) {
         const std::size_t at = std::min(e.byte, bytes.size());
         const auto line = 1 + std::count(text, text + at, '\n');
         return failAt(fmt::format("line {}", line), ErrorCode::invalidInput,
-                      "this is no valid JSON");
+                      "this is not valid JSON");
     } catch (const std::exception&) {
-        return fail(ErrorCode::invalidInput, "this is no valid JSON");
+        return fail(ErrorCode::invalidInput, "this is not valid JSON");
     }
 }
 

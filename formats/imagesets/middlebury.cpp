@@ -150,7 +150,8 @@ Result<MiddleburyCalibration> parseMiddlebury(std::string_view text, const Limit
             const int i = key == "cam1";
             if (!(n[0] > 0) || std::abs(n[0] - n[4]) > 1e-6 * n[0] || n[1] != 0 || n[3] != 0)
                 return failAt(line.where(), ErrorCode::invalidInput,
-                              "{} is no matrix of rows f 0 cx; 0 f cy; 0 0 1 with f above 0", key);
+                              "{} is not a matrix of rows f 0 cx; 0 f cy; 0 0 1 with f above 0",
+                              key);
             if (camera[1 - i] && c.f != n[0])
                 return failAt(line.where(), ErrorCode::invalidInput,
                               "the focal lengths of cam0 and cam1 differ ({:g}, {:g}); the set is "

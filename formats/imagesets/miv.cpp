@@ -59,7 +59,7 @@ Result<void> setProjection(const Json& c, const std::string& where, SetView& vie
         if (!(focal[0] > 0 && focal[1] > 0))
             return failAt(where, ErrorCode::invalidInput,
                           "'Focal' is {:g}, {:g}; both must be above 0", focal[0], focal[1]);
-        // MPEG's own spelling, and the one of those who mend it.
+        // MPEG's own spelling, and the one of those who correct it.
         STX_TRY(auto principal, findNumbers(c, "Principle_point", 2, where));
         if (!principal) {
             STX_TRY(principal, findNumbers(c, "Principal_point", 2, where));

@@ -246,8 +246,9 @@ Result<glm::ivec2> imageSizeOf(const PictureSource& source, Job& job) {
 Result<Image<float>> parsePfm(ByteSpan bytes, std::string_view name, const Limits& limits) {
     const std::string_view text = textOf(bytes).substr(0, 200);
     const auto complain = [&] {
-        return failAt(inQuotes(name), ErrorCode::invalidInput,
-                      "the header is no PFM's: 'Pf', width, height and scale are expected");
+        return failAt(
+            inQuotes(name), ErrorCode::invalidInput,
+            "the header is not that of a PFM: 'Pf', width, height and scale are expected");
     };
     if (!text.starts_with("Pf") && !text.starts_with("PF")) return complain();
     const int channels = text[1] == 'F' ? 3 : 1;

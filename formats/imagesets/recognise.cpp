@@ -118,7 +118,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     std::error_code ec;
     const std::string where = inQuotes(path.string());
     if (!fs::exists(path, ec))
-        return failAt(where, ErrorCode::io, "there is no such file or folder");
+        return failAt(where, ErrorCode::io, "the file or folder does not exist");
     if (!fs::is_directory(path, ec)) {
         if (path.extension() == ".json") {
             STX_TRY(const std::string kind, kindOfJson(path));
@@ -136,7 +136,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
         if (filmFormatOf(path) == "matroska") return std::string("azure-kinect");
         return failAt(
             where, ErrorCode::invalidInput,
-            "this is no image set: a .json with cameras, calib.txt, calibParams-*.txt, an "
+            "this is not an image set: a .json with cameras, calib.txt, calibParams-*.txt, an "
             ".exr with Z, or a folder is expected");
     }
     if (fs::is_regular_file(path / "transforms.json", ec)) return std::string("transforms");

@@ -32,8 +32,8 @@ struct ImageSetSummary {
     bool camerasKnown = true;
 };
 
-/// Reads cameras and looks for the files that a set names. Errors: (io) there is no such file or
-/// folder; (invalidInput) it is no image set, or its cameras cannot be read.
+/// Reads cameras and looks for the files that a set names. Errors: (io) the file or
+/// folder does not exist; (invalidInput) it is not an image set, or its cameras cannot be read.
 [[nodiscard]] Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path,
                                                         Job& job);
 

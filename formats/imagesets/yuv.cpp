@@ -97,10 +97,11 @@ Result<int> yuvFrameCount(const std::filesystem::path& path, const YuvFormat& f)
         return failAt(inQuotes(path.string()), ErrorCode::io, "cannot be read: {}", ec.message());
     const std::uint64_t frame = f.frameBytes();
     if (size == 0 || size % frame != 0 || size / frame > 1u << 30)
-        return failAt(inQuotes(path.string()), ErrorCode::invalidInput,
-                      "the file has {} bytes, which is no whole number of frames of {}x{} with {} "
-                      "bits ({} bytes each)",
-                      size, f.width, f.height, f.bits, frame);
+        return failAt(
+            inQuotes(path.string()), ErrorCode::invalidInput,
+            "the file has {} bytes, which is not a whole number of frames of {}x{} with {} "
+            "bits ({} bytes each)",
+            size, f.width, f.height, f.bits, frame);
     return static_cast<int>(size / frame);
 }
 

@@ -192,7 +192,8 @@ class SceneConverter {
                                 SamplerState state) {
         if (inside.mHeight != 0) {
             files_.job().note(fmt::format(
-                "texture '{}' inside the model is no PNG or JPEG; the plain colour is used", name));
+                "texture '{}' inside the model is not a PNG or JPEG; the plain colour is used",
+                name));
             return -1;
         }
         const auto* first = reinterpret_cast<const std::byte*>(inside.pcData);

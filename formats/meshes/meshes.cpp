@@ -152,9 +152,10 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
         case Format::none:
             break;
     }
-    return fail(ErrorCode::invalidInput,
-                "the file is no model that is known here: glTF, GLB, OBJ, PLY, STL, OFF, COLLADA "
-                "(.dae), FBX or Draco (.drc)");
+    return fail(
+        ErrorCode::invalidInput,
+        "the file is not a model that is known here: glTF, GLB, OBJ, PLY, STL, OFF, COLLADA "
+        "(.dae), FBX or Draco (.drc)");
 }
 
 }  // namespace

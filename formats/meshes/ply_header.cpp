@@ -143,7 +143,7 @@ Result<PlyHeader> readPlyHeader(ByteSpan file) {
             const auto [stop, error] =
                 std::from_chars(count.data(), count.data() + count.size(), element.count);
             if (error != std::errc() || stop != count.data() + count.size())
-                return fail(ErrorCode::invalidInput, "line {}: '{}' is no number of {} elements",
+                return fail(ErrorCode::invalidInput, "line {}: '{}' is not a number of {} elements",
                             number, count.substr(0, 40), element.name);
             header.elements.push_back(std::move(element));
         } else if (key == "property") {

@@ -11,7 +11,7 @@
 namespace stx {
 namespace {
 
-/// A line of the keyword: its place in the world, and what stands behind the coordinates.
+/// A line of the keyword: its place in the world, and what follows the coordinates.
 struct CoordinateLine {
     glm::dvec3 position{0.0};
     std::string_view rest;

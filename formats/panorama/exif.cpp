@@ -37,7 +37,7 @@ class TiffBytes {
         }
         return std::nullopt;
     }
-    /// A SHORT or LONG that stands in its entry.
+    /// A SHORT or LONG in its entry.
     [[nodiscard]] std::optional<std::uint32_t> value(std::uint64_t directory,
                                                      std::uint32_t tag) const {
         const auto at = entry(directory, tag);

@@ -11,7 +11,7 @@ namespace stx {
 
 /// Opens what `inputs` name as the pictures of a turning camera: files in any order, or one folder
 /// or pattern (`name_%04d.jpg`) of numbered ones. Turned upright by their EXIF orientation; focal
-/// lengths of EXIF are told. Some stay decoded, as far as a small part of the memory goes. Errors:
+/// lengths of EXIF are given. Some stay decoded, as far as a small part of the memory goes. Errors:
 /// io, invalidInput, of decoding only when a picture is asked for. A note when colours are rounded
 /// to 8 bits. `job` must outlive it.
 [[nodiscard]] Result<std::unique_ptr<PictureSource>> openPanoramaPictures(

@@ -86,7 +86,7 @@ Result<std::vector<fs::path>> filesOf(Result<std::vector<NumberedFile>> pictures
 Result<std::unique_ptr<PictureSource>> openPanoramaPictures(const std::vector<fs::path>& inputs,
                                                             Job& job) {
     std::vector<fs::path> files = inputs;
-    // Numbers may be missing: that is no loss of a panorama's.
+    // Numbers may be missing: that is not a loss of a panorama's.
     Job aside;
     aside.limits = job.limits;
     std::error_code ec;

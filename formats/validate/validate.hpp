@@ -18,7 +18,7 @@ struct ValidateOptions {
 /// Every rule that a file breaks, in its order; empty when it breaks none. For .mp4, .bt, .xmt,
 /// bundles and atlases in OpenEXR, atlas folders, image sets; of a mesh, whether it can be read.
 /// Reading goes on behind a broken rule as far as it can; what cannot be read at all breaks rule
-/// 1001. Errors: (io) there is no such file or it cannot be opened; (invalidInput) it is a picture;
+/// 1001. Errors: (io) the file does not exist or cannot be opened; (invalidInput) it is a picture;
 /// (usage) an image set of a kind that needs options; (failed) stopped.
 [[nodiscard]] Result<std::vector<Finding>> validateFile(const std::filesystem::path& path,
                                                         const ValidateOptions& options, Job& job);

@@ -21,7 +21,7 @@ struct PresentationImages {
                                             const PresentationImages& images, Job& job);
 
 /// Reads the presentation first: one that cannot be read breaks rule 1001, a wrong ending 1002.
-/// Errors (io): there is no such file, or it cannot be opened.
+/// Errors (io): the file does not exist or cannot be opened.
 [[nodiscard]] Result<std::vector<Finding>> validateMpeg4File(const std::filesystem::path& path,
                                                              const ValidateOptions& options,
                                                              Job& job);

@@ -118,7 +118,7 @@ Result<std::unique_ptr<Film>> Film::open(const fs::path& path, const Limits& lim
     const std::string_view format = filmFormatOf(path);
     if (format.empty())
         return failAt(film->where(), ErrorCode::unsupported,
-                      "it is no .mp4, .mov, .mkv, .webm or .avi, which are read; put its tracks "
+                      "it is not a .mp4, .mov, .mkv, .webm or .avi, which are read; put its tracks "
                       "into one: ffmpeg -i IN -c copy OUT.mkv");
     Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (file.get() < 0) return failAt(film->where(), ErrorCode::io, "cannot be read");

@@ -17,7 +17,7 @@ namespace stx {
 /// What libavformat calls the container that first bytes (16 will do) begin: "matroska", "mov" or
 /// "avi"; empty for others.
 [[nodiscard]] std::string_view filmFormatOf(ByteSpan head);
-/// The same of a file; empty for what is no regular file, too.
+/// The same of a file; empty for what is not a regular file, too.
 [[nodiscard]] std::string_view filmFormatOf(const std::filesystem::path& path);
 
 /// A file of compressed video, any picture of one of its tracks at random, in the memory of a few

@@ -186,7 +186,7 @@ Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>
                 return openSequence(picturesOfPattern(input, job), input, job);
         }
         if (!there)
-            return fail(ErrorCode::io, "cannot read '{}': there is no such file or folder",
+            return fail(ErrorCode::io, "cannot read '{}': the file or folder does not exist",
                         input.string());
         const bool regular = fs::is_regular_file(input, ec);
         const std::string head = regular ? headOfFile(input) : std::string();

@@ -27,7 +27,7 @@ constexpr double kStartFovDeg = 40.0, kStartElevationDeg = 15.0;
 /// Of zlib; the page's program is packed once.
 constexpr int kBestLevel = 12;
 
-/// JSON that may stand in a script element of HTML.
+/// JSON that may be in a script element of HTML.
 std::string inScript(const Json& json) {
     std::string out;
     for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {

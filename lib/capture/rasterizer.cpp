@@ -353,10 +353,10 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                 const auto sample = static_cast<std::size_t>(sy) * side + sx;
                 const double x = tileX * kTile + (sx + 0.5) * step;
                 const double y = tileY * kTile + (sy + 0.5) * step;
-                const auto add = [&](const SetUp& s, glm::vec3 colour, float share) {
-                    sum += glm::vec4(colour, 1.0f) * share;
+                const auto add = [&](const SetUp& s, glm::vec3 colour, float part) {
+                    sum += glm::vec4(colour, 1.0f) * part;
                     if (settings.lighting.on())
-                        litSum += glm::vec4(lit(settings.lighting, s, colour, x, y), 1.0f) * share;
+                        litSum += glm::vec4(lit(settings.lighting, s, colour, x, y), 1.0f) * part;
                 };
                 float through = 1.0f;
                 for (const auto& layer : tile.layers.at(sample)) {

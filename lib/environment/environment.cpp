@@ -87,7 +87,7 @@ Result<void> Environment::check() const {
                           orientation.y * orientation.y + orientation.z * orientation.z;
     if (!(std::abs(length - 1.0) < 1e-4))
         return fail(ErrorCode::invalidInput,
-                    "the orientation of an environment is no rotation: its quaternion has the "
+                    "the orientation of an environment is not a rotation: its quaternion has the "
                     "length {:g}",
                     std::sqrt(length));
     for (const auto& [what, colours, angles] :

@@ -62,7 +62,7 @@ struct Environment {
     /// Faces or the equirectangular picture that are there.
     [[nodiscard]] int pictureCount() const;
     /// Errors (invalidInput): no picture, sky or ground at all, another number of pictures than the
-    /// layout has, colours of both kinds, an orientation that is no rotation, angles that do not
+    /// layout has, colours of both kinds, an orientation that is not a rotation, angles that do not
     /// rise or are not one less than their colours.
     [[nodiscard]] Result<void> check() const;
     bool operator==(const Environment&) const = default;

@@ -35,7 +35,7 @@ Result<ViewLayout> parseViewLayout(std::string_view text) {
         layout.kind = ViewLayout::Kind::hemiOctahedral;
     else
         return fail(ErrorCode::usage,
-                    "'{}' is no view layout; use cube, ring:N, sphere:N, octahedral:N, "
+                    "'{}' is not a view layout; use cube, ring:N, sphere:N, octahedral:N, "
                     "hemi-octahedral:N or a camera file",
                     text);
     const auto digits =

@@ -32,7 +32,7 @@ struct ReferenceView {
     /// Pixels of full alpha without a depth were pruned: the object is there, other views give its
     /// distance. In other views they are what a sensor missed.
     bool pruned = false;
-    /// What stands behind everything that moves, remembered from other times (TemporalBackground).
+    /// What is behind everything that moves, remembered from other times (TemporalBackground).
     /// Renderers use it only where no other view shows a surface.
     bool background = false;
 

@@ -50,7 +50,7 @@ std::vector<double> focalsToTry(double hint) {
     return focals;
 }
 
-/// Rotations, focal length and distortion of all that hang together, from coarse to fine.
+/// Rotations, focal length and distortion of all that belong together, from coarse to fine.
 void adjustCoarseToFine(Series& s, bool fixDistortion) {
     for (const double pixels : {60.0, 15.0, 4.0, 2.0}) {
         s.adjusting.huberPixels = pixels;

@@ -6,7 +6,7 @@
 namespace stx::panorama {
 
 /// The least cut of a graph between a source and a sink (Boykov and Kolmogorov 2004: two trees that
-/// grow towards each other and are mended after each path). Deterministic.
+/// grow towards each other and are repaired after each path). Deterministic.
 class MaxFlow {
   public:
     explicit MaxFlow(int nodes);

@@ -6,7 +6,7 @@
 
 namespace stx::panorama {
 
-/// How pictures hang together: a tree of the best pairs.
+/// How pictures belong together: a tree of the best pairs.
 struct PictureTree {
     std::vector<int> order;    ///< pictures of the largest connected part, parents first
     std::vector<int> parent;   ///< of each picture; -1 = the root, or not in the part

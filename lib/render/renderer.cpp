@@ -146,7 +146,7 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
                                            int device, Job& job) {
     STX_TRY(const auto environment, environmentOf(wanted, own, job));
     RenderSettings settings = wanted;
-    // Alpha inside of the object is no outline for surfaces to end at.
+    // Alpha inside of the object is not an outline for surfaces to end at.
     bool translucent = false;
     const auto solid = [&](const PageSet& views) {
         if (settings.mode != RenderMode::surface) return views;

@@ -5,7 +5,7 @@
     tests/bench/speed.py build/release --only convert --json > new.json
     tests/bench/speed.py build/release --against old.json       # what became slower; exit code 1 then
 
-A machine's speed is told by the yardstick: one thread projects points and keeps the nearest of each
+A machine's speed is measured by the yardstick: one thread projects points and keeps the nearest of each
 pixel (yardstick.hpp). It is measured beside each row, and a row's figure is a ratio, so that tables of
 different machines can be compared:
 
@@ -15,7 +15,7 @@ different machines can be compared:
     memory   MB of the process at its largest                                      (less is better)
 
 Times are those of the fastest of a few runs. Rows whose inputs are not in STX_SHARED_DIR are left out,
-and so are rows of benchmarks that were not built; what is left out is told.
+and so are rows of benchmarks that were not built; what is left out is listed.
 """
 
 import argparse

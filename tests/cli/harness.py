@@ -113,7 +113,7 @@ def tree(folder):
             path = os.path.join(root, name)
             key = os.path.relpath(path, folder)
             if os.path.islink(path) or not os.path.isfile(path):
-                found[key] = b"(no regular file)"
+                found[key] = b"(not a regular file)"
                 continue
             with open(path, "rb") as file:
                 found[key] = file.read()

@@ -145,7 +145,7 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     }
     if (format.empty())
         throw Failed{ErrorCode::invalidInput,
-                     "it is no image of a known kind (PNG, JPEG, TIFF, BMP, "
+                     "it is not an image of a known kind (PNG, JPEG, TIFF, BMP, "
                      "TGA, HDR, WebP, GIF, PSD, PNM, DDS, JPEG 2000, SGI)"};
 
     OIIO::ImageSpec config;
@@ -155,7 +155,7 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     if (!input) {
         (void)OIIO::geterror();
         throw Failed{ErrorCode::invalidInput,
-                     fmt::format("it is no image of a known kind ('{}')", format)};
+                     fmt::format("it is not an image of a known kind ('{}')", format)};
     }
     OIIO::Filesystem::IOMemReader reader(const_cast<void*>(request.bytes), request.size);
     std::unique_ptr<MemoryFile> file;

@@ -91,7 +91,7 @@ Result<GltfFile> GltfFile::open(ByteSpan bytes, ModelFiles& files, MeshBuilder& 
                 model.binaryChunk_ = content;
                 model.hasBinaryChunk_ = true;
             } else if (chunk == 0) {
-                return fail(ErrorCode::invalidInput, "the first GLB chunk is no JSON");
+                return fail(ErrorCode::invalidInput, "the first GLB chunk is not JSON");
             }
             at += size;
         }
@@ -124,7 +124,7 @@ Result<void> GltfFile::parse(ByteSpan bytes) {
         std::replace_if(
             line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 32; },
             ' ');
-        return fail(ErrorCode::invalidInput, "the glTF text is no JSON: {}", line);
+        return fail(ErrorCode::invalidInput, "the glTF text is not JSON: {}", line);
     }
     if (!root_.is_object())
         return fail(ErrorCode::invalidInput, "the glTF text is a JSON {}, expected an object",
@@ -136,7 +136,7 @@ Result<void> GltfFile::checkAsset() {
     STX_TRY(const Json* asset, getObject(root_, "asset", ""));
     if (!asset)
         return fail(ErrorCode::invalidInput,
-                    "the JSON has no \"asset\" object, so it is no glTF 2.0 file");
+                    "the JSON has no \"asset\" object, so it is not a glTF 2.0 file");
     STX_TRY(const auto version, getString(*asset, "version", "asset"));
     if (!version)
         return fail(ErrorCode::invalidInput, "asset.version is missing; expected \"2.0\"");
@@ -174,7 +174,7 @@ Result<Bytes> GltfFile::uri(const std::string& uri, const std::string& user) {
         if (header.ends_with(";base64")) {
             auto bytes = decodeBase64(data);
             if (!bytes)
-                return fail(ErrorCode::invalidInput, "{}: the data URI is no valid base64 text",
+                return fail(ErrorCode::invalidInput, "{}: the data URI is not valid base64 text",
                             user);
             return std::move(*bytes);
         }

@@ -94,7 +94,7 @@ Result<std::vector<std::uint64_t>> getIndices(const Json& object, const char* ke
     for (std::size_t i = 0; i < array->size(); ++i) {
         const auto& v = (*array)[i];
         if (!v.is_number_unsigned())
-            return fail(ErrorCode::invalidInput, "{}.{}[{}] is no index", where, key, i);
+            return fail(ErrorCode::invalidInput, "{}.{}[{}] is not an index", where, key, i);
         indices.push_back(v.get<std::uint64_t>());
     }
     return indices;

@@ -24,7 +24,7 @@ Result<void> checkPacked(const Packed& p, const std::string& where) {
                     attributes ? "a multiple of 4 up to 256" : "2 or 4");
     if (triangles && p.count % 3 != 0)
         return fail(ErrorCode::invalidInput,
-                    "{}.count is {}, which is no whole number of triangles", where, p.count);
+                    "{}.count is {}, which is not a whole number of triangles", where, p.count);
     const bool filterFits =
         p.filter == "NONE" ||
         (attributes && p.filter == "OCTAHEDRAL" && (p.stride == 4 || p.stride == 8)) ||

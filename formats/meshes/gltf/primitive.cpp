@@ -148,7 +148,8 @@ Result<void> applyMorph(GltfFile& model, const Json& primitive, const std::strin
     for (std::size_t t = 0; t < weights.size(); ++t) {
         if (weights[t] == 0) continue;
         const auto at = fmt::format("{}.targets[{}]", where, t);
-        if (!(*targets)[t].is_object()) return fail(ErrorCode::invalidInput, "{} is no object", at);
+        if (!(*targets)[t].is_object())
+            return fail(ErrorCode::invalidInput, "{} is not an object", at);
         const auto add = [&](const char* name, auto& values) -> Result<void> {
             STX_TRY(const auto index, getUint((*targets)[t], name, at));
             if (!index || values.empty()) return {};

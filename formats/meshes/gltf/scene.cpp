@@ -373,7 +373,7 @@ class SceneReader {
             for (std::size_t p = 0; list && p < list->size(); ++p) {
                 const auto at = fmt::format("{}.primitives[{}]", where, p);
                 if (!(*list)[p].is_object())
-                    return fail(ErrorCode::invalidInput, "{} is no object", at);
+                    return fail(ErrorCode::invalidInput, "{} is not an object", at);
                 STX_TRY(auto primitive, readPrimitive(model_, builder_, materials_, (*list)[p], at,
                                                       weights, dropped_));
                 if (primitive.drawn) fresh.push_back(std::move(primitive));

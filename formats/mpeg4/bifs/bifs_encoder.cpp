@@ -86,7 +86,7 @@ struct BifsEncoder::Impl : BifsNodeWriter {
         writePosition(c.position, 16);
         const FieldInfo& field = c.target->info->fields[static_cast<std::size_t>(c.field)];
         if (!isMultiple(field.type))
-            return error("{}.{} is no list", c.target->info->name, field.name);
+            return error("{}.{} is not a list", c.target->info->name, field.name);
         if constexpr (requires { c.value; }) {
             if (typeOf(c.value) != itemType(field.type))
                 return error("an item of {}.{} is {}, but its value is {}", c.target->info->name,

@@ -151,7 +151,7 @@ Result<std::string> BifsNodeReader::readScriptField(Node& script, int depth) {
                      "supported",
                      code);
     if (!isFieldName(fieldName))
-        return error(ErrorCode::invalidInput, "a field of a Script has a name that is none");
+        return error(ErrorCode::invalidInput, "a field of a Script has an invalid name");
     FieldInfo field;
     field.kind = kKinds[kind];
     field.name = fieldName;

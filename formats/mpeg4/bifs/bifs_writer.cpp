@@ -339,7 +339,7 @@ Result<void> BifsNodeWriter::writeProto(const Proto& declared, int depth) {
         out.write(static_cast<std::uint32_t>(type), 6);
         if (useNames) STX_CHECK(writeName(field.name));
         if (!field.hasValue()) continue;
-        // The quantisation of a field is told behind the body only.
+        // The quantisation of a field comes after the body only.
         FieldInfo plain = field;
         plain.quantisation = Quantisation::none;
         STX_CHECK(writeField(plain, defaultValue(declared.type, field.index), depth));

@@ -72,7 +72,7 @@ inline constexpr Operator kOperators[] = {
     {">", 10}, {">=", 10}, {"+", 12},  {"-", 12},   {"*", 13},  {"/", 13},  {"%", 13},   {"&&", 5},
     {"||", 4}, {"&", 8},   {"|", 6},   {"^", 7},    {"<<", 11}, {">>", 11}, {">>>", 11},
 };
-inline constexpr int kAssignment = 2;  ///< bindings of what is no operator of the table
+inline constexpr int kAssignment = 2;  ///< bindings of what is not an operator of the table
 inline constexpr int kConditional = 3;
 inline constexpr int kUnary = 14;
 inline constexpr int kPostfix = 15;

@@ -77,7 +77,7 @@ class ScriptReader {
             return check();
         }
         STX_TRY(const std::string name, characters());
-        if (!isScriptName(name)) return error("the program of a Script has a name that is none");
+        if (!isScriptName(name)) return error("the program of a Script has an invalid name");
         names_.push_back(name);
         out_ += name;
         return check();
@@ -360,7 +360,7 @@ class ScriptReader {
         }
         STX_CHECK(check());
         if (digits.empty() || scriptNumberLength(digits) != digits.size())
-            return error("the program of a Script has a number that is none");
+            return error("the program of a Script has an invalid number");
         out_ += digits;
         return check();
     }

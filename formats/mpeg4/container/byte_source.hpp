@@ -16,7 +16,7 @@ class ByteSource {
     ByteSource() = default;  ///< no bytes
 
     /// Opens a regular file for reading at offsets; nothing is read yet. Errors (io) when it is
-    /// missing, no regular file, or unreadable.
+    /// missing, not a regular file, or unreadable.
     [[nodiscard]] static Result<ByteSource> open(const std::filesystem::path& path);
     [[nodiscard]] static ByteSource fromBytes(Bytes bytes);
     [[nodiscard]] static ByteSource fromShared(std::shared_ptr<const Bytes> bytes);

@@ -99,7 +99,8 @@ class Reader {
             if (number == 0 && type != "ftyp" && type != "moov" && type != "mdat" &&
                 type != "free" && type != "skip" && type != "wide" && type != "pdin")
                 return failAt(place(), ErrorCode::invalidInput,
-                              "this is no MP4 file: it starts with a box '{}'", printable(type));
+                              "this is not an MP4 file: it starts with a box '{}'",
+                              printable(type));
             if (in.failed() || boxSize < header || boxSize > size - at)
                 return failAt(place(), ErrorCode::invalidInput,
                               "the box '{}' claims {} bytes; {} are left in the file",

@@ -10,7 +10,7 @@
 namespace stx::mpeg4 {
 namespace {
 
-/// What most files have. Where a delay or an edit is no number of such ticks, they are finer.
+/// What most files have. Where a delay or an edit is not a number of such ticks, they are finer.
 constexpr std::uint32_t kMovieTimescale = 600;
 constexpr std::uint64_t kFinestTimescale = 1'000'000'000;
 

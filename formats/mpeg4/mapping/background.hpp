@@ -26,7 +26,7 @@ namespace stx::mpeg4 {
 
 /// A Background, under a Transform where the environment is turned, with a stream for each face. A
 /// picture all around becomes six faces; linear light becomes 8-bit sRGB; where pictures let
-/// nothing through but there is no sky, the mean colours around the poles stand behind (a
+/// nothing through but there is no sky, the mean colours around the poles are behind (a
 /// Background is opaque); all with notes. Errors: Environment::check(), the image writers,
 /// (unsupported) more pictures than there are object descriptors.
 [[nodiscard]] Result<NodePtr> backgroundFromEnvironment(const Environment& environment,

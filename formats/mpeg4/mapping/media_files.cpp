@@ -125,7 +125,7 @@ class MediaLoader {
                              stream.fileName.substr(hash + 1));
         const auto names = sampleFileNames(stream);
         if (names.empty() || names.size() != stream.samples.size())
-            return fail(ErrorCode::invalidInput, "'{}' is no name of {} file(s)",
+            return fail(ErrorCode::invalidInput, "'{}' is not a name of {} file(s)",
                         excerpt(stream.fileName), stream.samples.size());
         for (std::size_t i = 0; i < names.size(); ++i) {
             STX_TRY(const auto path, find(names[i]));

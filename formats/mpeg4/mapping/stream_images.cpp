@@ -102,7 +102,7 @@ Result<Bytes> StreamImages::load(const Node& texture, const Limits& limits) cons
         if (url.objectDescriptorId == 0) {
             if (folder_.empty()) {
                 last = {ErrorCode::invalidInput,
-                        fmt::format("the url '{}' is no object descriptor", excerpt(url.text)),
+                        fmt::format("the url '{}' is not an object descriptor", excerpt(url.text)),
                         {}};
                 continue;
             }

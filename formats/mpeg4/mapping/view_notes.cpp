@@ -138,7 +138,7 @@ Result<std::string> prunedMask(const Rgba8Image& texture, const Image<float>& de
 
 Result<void> applyPrunedMask(ReferenceView& view, const std::string& mask, const Limits& limits) {
     const auto png = decodeBase64(mask);
-    if (!png) return fail(ErrorCode::invalidInput, "the mask of its pruned pixels is no base64");
+    if (!png) return fail(ErrorCode::invalidInput, "the mask of its pruned pixels is not base64");
     STX_TRY(const auto header, probeImage(*png));
     if (header.format != "png" || header.channels != 1 || header.bits != 8 ||
         header.width != view.depth.width() || header.height != view.depth.height())

@@ -57,7 +57,7 @@ inline constexpr const char* kPrunedInAlpha = "alpha";
 /// The pixels of full alpha without a depth, as a note's text: a PNG of grey in base64.
 [[nodiscard]] Result<std::string> prunedMask(const Rgba8Image& texture, const Image<float>& depth);
 /// Marks a view of 8-bit colour as pruned and gives it the alpha that a mask says. Errors: the mask
-/// is no such PNG, or has another size than the view.
+/// is not such a PNG, or has another size than the view.
 [[nodiscard]] Result<void> applyPrunedMask(ReferenceView& view, const std::string& mask,
                                            const Limits& limits);
 

@@ -109,8 +109,8 @@ struct ElementaryStream {
     std::vector<Sample> samples;
     /// What a delay cannot say: a delay alone is in the times of the samples.
     EditList edits;
-    /// Of a track that is no image and no MPEG-4 Systems stream (AVC, HEVC, audio, ...): its whole
-    /// sample entry and its handler, which writers of .mp4 write as they are.
+    /// Of a track that is neither an image nor an MPEG-4 Systems stream (AVC, HEVC, audio, ...):
+    /// its whole sample entry and its handler, which writers of .mp4 write as they are.
     Bytes sampleEntry;
     std::string handler;  ///< four characters; empty: by streamType
     /// How an .mp4 presents the track to players that know no scenes (ISO/IEC 14496-12, 8.3.2):

@@ -193,7 +193,7 @@ struct Node : std::enable_shared_from_this<Node> {
 [[nodiscard]] NodePtr makeNode(const NodeInfo& type);
 
 /// Adds a field to those that a Script has of its own, with its value where it has one. Field,
-/// eventIn or eventOut. False, changing nothing, when the node is no Script or has such a field.
+/// eventIn or eventOut. False, changing nothing, when the node is not a Script or has such a field.
 [[nodiscard]] bool addScriptField(Node& script, FieldInfo field, std::optional<FieldValue> value);
 /// How many of its fields are a Script's own: the last ones.
 [[nodiscard]] int ownFieldCount(const Node& script);

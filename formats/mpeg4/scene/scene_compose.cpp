@@ -143,7 +143,7 @@ class Composer {
                                 "the node that replaces {} '{}' contains its parent",
                                 target->info->name, target->defName);
                 else if (!mayStandIn(replacement.get(), info.nodeType))
-                    fits = fail(ErrorCode::invalidInput, "{} may not stand in {}.{}",
+                    fits = fail(ErrorCode::invalidInput, "{} is not allowed in {}.{}",
                                 replacement->info->name, node->info->name, info.name);
             }
         });
@@ -245,7 +245,7 @@ class Composer {
                         target->info->name, info.name, name(info.type));
         if (const NodePtr* node = std::get_if<NodePtr>(&item);
             node && !mayStandIn(node->get(), info.nodeType))
-            return fail(ErrorCode::invalidInput, "{} may not stand in {}.{}", (*node)->info->name,
+            return fail(ErrorCode::invalidInput, "{} is not allowed in {}.{}", (*node)->info->name,
                         target->info->name, info.name);
         return std::visit(
             [&](auto& list) -> Result<void> {

@@ -64,7 +64,7 @@ Result<int> fieldOfCommand(const Node& node, std::string_view fieldName, FieldUs
 Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view owner,
                             std::string_view fieldName, const std::string& where) {
     if (mayStandIn(child, expected)) return {};
-    return failAt(where, ErrorCode::invalidInput, "{} may not stand in {}.{}, which takes {}",
+    return failAt(where, ErrorCode::invalidInput, "{} is not allowed in {}.{}, which takes {}",
                   child->info->name, owner, fieldName, name(expected));
 }
 

@@ -155,7 +155,7 @@ Result<void> readMux(const TextDescriptor& d, ElementaryStream& stream) {
         if (durationMs < 0 || !(frames >= 1 && frames <= kMaxSamples))
             return failAt(
                 d.where, ErrorCode::invalidInput,
-                "'{}' at {:g} images a second lasts {:g} ms, which is no number of images "
+                "'{}' at {:g} images a second lasts {:g} ms, which is not a number of images "
                 "from 1 to {}",
                 excerpt(stream.fileName), frameRate, durationMs, kMaxSamples);
         count = static_cast<std::int64_t>(frames);

@@ -350,7 +350,7 @@ Result<NodePtr> NodeNames::use(const std::string& name, int depth, const std::st
     const auto known = heightOfNamed(*found->node);
     if (!known)
         return failAt(where, ErrorCode::invalidInput,
-                      "USE '{}' stands inside the node of that name, which would hold itself",
+                      "USE '{}' is inside the node of that name, which would hold itself",
                       excerpt(name));
     height = *known;
     if (depth + height > limits_->maxNesting)
@@ -422,7 +422,7 @@ Result<void> NodeNames::resolve() {
         const FieldInfo& field = p.owner->info->fields[p.field];
         if (!mayStandIn(node->get(), field.nodeType)) {
             result = failAt(p.where, ErrorCode::invalidInput,
-                            "{} '{}' may not stand in {}.{}, which takes {}", (*node)->info->name,
+                            "{} '{}' is not allowed in {}.{}, which takes {}", (*node)->info->name,
                             excerpt(p.name), p.owner->info->name, field.name, name(field.nodeType));
             break;
         }

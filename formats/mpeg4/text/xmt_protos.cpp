@@ -20,7 +20,7 @@ Result<FieldInfo> XmtReader::readDeclaration(xml_node element) const {
                       excerpt(element.attribute("vrml97Hint").value()));
     if (!isScriptName(field.name))
         return failAt(where(element), ErrorCode::invalidInput,
-                      "'{}' is no name of a field: letters, digits and _", excerpt(field.name));
+                      "'{}' is not a name of a field: letters, digits and _", excerpt(field.name));
     field.type = *type;
     field.kind = *kind;
     if (itemType(*type) == FieldType::SFNode) field.nodeType = Ndt::SFWorldNode;

@@ -36,7 +36,7 @@ class XmtReader : private TextReader {
                              pugi::encoding_utf8);
         if (!parsed)
             return failAt(lines_.at(fileName_, parsed.offset), ErrorCode::invalidInput,
-                          "no well-formed XML: {}", parsed.description());
+                          "not well-formed XML: {}", parsed.description());
         const xml_node root = xml_.document_element();
         if (localName(root) != "XMT-A")
             return failAt(where(root), ErrorCode::invalidInput,

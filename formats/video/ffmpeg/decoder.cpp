@@ -81,7 +81,7 @@ void Decoder::open(AVCodecID id, const AVCodecParameters* track,
         codec_->extradata_size = static_cast<int>(configuration.size());
     }
     codec_->thread_count = 1;
-    // Damage is told, not painted over.
+    // Damage is an error, not painted over.
     codec_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
     codec_->error_concealment = 0;
     if (const int error = avcodec_open2(codec_.get(), codec, nullptr); error < 0)

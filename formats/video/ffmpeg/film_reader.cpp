@@ -63,7 +63,7 @@ FilmReader::FilmReader(int file, const std::string& format) {
     const int error = avformat_open_input(&film_, nullptr, reader, &options);
     av_dict_free(&options);
     if (error < 0)
-        refuse(ErrorCode::invalidInput, "it is no whole {} file: {}", reader->long_name,
+        refuse(ErrorCode::invalidInput, "it is not a whole {} file: {}", reader->long_name,
                wordsOf(error));
     if (const int found = avformat_find_stream_info(film_, nullptr); found < 0)
         refuse(ErrorCode::invalidInput, "its tracks cannot be read: {}", wordsOf(found));
@@ -101,7 +101,7 @@ std::vector<std::byte> FilmReader::describe() const {
 
 void FilmReader::select(int track) {
     if (track < 0 || track >= static_cast<int>(film_->nb_streams))
-        refuse(ErrorCode::invalidInput, "there is no track {}", track);
+        refuse(ErrorCode::invalidInput, "the film has no track {}", track);
     track_ = track;
     for (unsigned i = 0; i < film_->nb_streams; ++i)
         film_->streams[i]->discard =

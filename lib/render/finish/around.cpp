@@ -158,7 +158,7 @@ namespace {
 
 /// Cameras further apart than this share of the distance of what they see have no common place.
 constexpr double kNoCommonPlace = 0.05;
-/// Above this share, what is seen from one place is told to be a little off.
+/// Above this share, what is seen from one place is reported to be a little off.
 constexpr double kParallax = 0.005;
 
 /// What the views see is this far away: the median over them of the middle of their range.

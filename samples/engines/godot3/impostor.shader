@@ -41,7 +41,7 @@ vec2 texelOf(int view, vec3 point) {
     return at.xy + inView;
 }
 
-// Distance that the view's depth image has at a texel (ISO/IEC 14496-16: code 0 is no point, the largest the
+// Distance that the view's depth image has at a texel (ISO/IEC 14496-16: code 0 is not a point, the largest the
 // near plane).
 float depthAt(int view, vec2 texel) {
     if (texel.x < 0.0) return 1000000000.0;

@@ -359,7 +359,7 @@ TEST(AtlasFiles, ErrorsNameThePlaceInTheDocument) {
     EXPECT_EQ(errorOf("\"pages\": 1", "\"pages\": 3"), "'a': pages is 3; 1 to 2 is possible");
     EXPECT_EQ(errorOf("\"version\": 2", "\"version\": 3"),
               "'a': it was written by a newer stx (version 3; this one knows 1 to 2)");
-    EXPECT_EQ(errorOf("{", "{,"), "'a': it is no valid JSON at byte 2");
+    EXPECT_EQ(errorOf("{", "{,"), "'a': it is not valid JSON at byte 2");
     EXPECT_EQ(atlasFromJson(std::string(100000, '['), "'a'", Limits()).error().text(),
               "'a': the JSON is nested more than 16 deep at byte 16");
     EXPECT_FALSE(atlasFromJson("[]", "'a'", Limits()));

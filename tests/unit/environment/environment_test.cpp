@@ -229,7 +229,7 @@ TEST(Environment, RefusesWhatMakesNoSense) {
               std::string::npos);
     EXPECT_NE(errorOf([](Environment& e) { e.pictures.clear(); }).find("no picture"),
               std::string::npos);
-    EXPECT_NE(errorOf([](Environment& e) { e.orientation *= 2.0; }).find("no rotation"),
+    EXPECT_NE(errorOf([](Environment& e) { e.orientation *= 2.0; }).find("not a rotation"),
               std::string::npos);
     EXPECT_NE(errorOf([](Environment& e) { e.skyAngles = {1.0}; }).find("angle"),
               std::string::npos);

@@ -273,7 +273,7 @@ TEST(BundleExr, ErrorsNameTheFile) {
     Job job;
     const auto nothing = readExrBundle(ByteSpan(), "b.exr", job);
     ASSERT_FALSE(nothing);
-    EXPECT_EQ(nothing.error().text(), "'b.exr': it is no OpenEXR file");
+    EXPECT_EQ(nothing.error().text(), "'b.exr': it is not an OpenEXR file");
     const auto unwritable =
         writeExrBundle(smallBundle(1, 8, false, false), folder / "no/a.exr", job);
     ASSERT_FALSE(unwritable);

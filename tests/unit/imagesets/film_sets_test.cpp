@@ -127,7 +127,7 @@ TEST(FilmPairs, WhatIsMissingIsSaid) {
     EXPECT_NE(errorOf(pose(0), options).find("films come in pairs"), std::string::npos);
     options.depthPattern = "gone.mkv";
     options.depthUnit = 1;
-    EXPECT_NE(errorOf(pose(0), options).find("'gone.mkv': there is no such film"),
+    EXPECT_NE(errorOf(pose(0), options).find("'gone.mkv': it exists neither in"),
               std::string::npos);
 }
 

@@ -57,7 +57,7 @@ TEST(Miv, PerspectiveIsExactAndCodeZeroIsFarUnlessInvalid) {
                 "," + mivCamera("viewport", w, h, projection) + "]}");
         const auto read = readSet(folder.path());
         ASSERT_TRUE(read) << read.error().text();
-        ASSERT_EQ(read->views.size(), 1u);  // the one without images is no source
+        ASSERT_EQ(read->views.size(), 1u);  // the one without images is not a source
         const auto& view = read->views[0];
         EXPECT_EQ(hasPoint(view.depth.at(0, 0)), !invalid);
         for (int y = 0; y < h; ++y)

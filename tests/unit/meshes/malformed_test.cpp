@@ -90,7 +90,7 @@ TEST(Malformed, MissingFilesAndFolders) {
     const auto folder = readMesh(std::filesystem::temp_directory_path(), job);
     ASSERT_FALSE(folder);
     EXPECT_EQ(folder.error().code, ErrorCode::io);
-    expectError(readBadText("hello", "a.txt"), ErrorCode::invalidInput, "no model");
+    expectError(readBadText("hello", "a.txt"), ErrorCode::invalidInput, "not a model");
     expectError(readBadText("\x89PNG\r\n\x1a\n....", "a.glb"), ErrorCode::invalidInput, "'glTF'");
     expectError(readBadText("\x89PNG\r\n\x1a\n....", "a.ply"), ErrorCode::invalidInput, "'ply'");
     expectError(readBadText("\x89PNG\r\n\x1a\n....", "a.drc"), ErrorCode::invalidInput, "Draco");

@@ -42,7 +42,7 @@ TEST(Steadiness, OnlyPixelsOfTheMaskCountAndAlphaIsLaidOverTheBackground) {
     changed.at(1, 1) = glm::u8vec4(30, 30, 30, 255);
     s.add(changed, grey(0), settings);
     EXPECT_DOUBLE_EQ(s.mean(), 30.0);
-    // What nobody sees is no change.
+    // What nobody sees is not a change.
     s.add(changed, grey(200, 0), settings);
     EXPECT_DOUBLE_EQ(s.mean(), 15.0);
 }

@@ -343,7 +343,7 @@ TEST(IsobmffFile, DamageIsToldWithItsPlace) {
     // A sample description of a scene with a code that no version has.
     EXPECT_NE(errorOf(Bytes(good.begin(), good.begin() + 100)).find("byte 28"), std::string::npos);
     EXPECT_NE(errorOf({}).find("no 'moov'"), std::string::npos);
-    EXPECT_NE(errorOf(unhex("ffd8ffe000104a46494600")).find("no MP4 file"), std::string::npos);
+    EXPECT_NE(errorOf(unhex("ffd8ffe000104a46494600")).find("not an MP4 file"), std::string::npos);
     Bytes cut = good;
     cut.resize(good.size() - 1);
     EXPECT_NE(errorOf(cut).find("'mdat' claims"), std::string::npos) << errorOf(cut);

@@ -243,7 +243,7 @@ TEST(Mpeg4Files, WritingTwiceReplacesTextAndImages) {
     mustWrite(writeMpeg4Bundle(bundle, folder / "a.bt", job));
     EXPECT_FALSE(fs::exists(folder / "a_images" / "view2_texture.png"));
     EXPECT_TRUE(fs::exists(folder / "a_images" / "other_texture.png"));
-    // A stranger's file in that folder is no image of ours.
+    // A stranger's file in that folder is not an image of ours.
     std::ofstream(folder / "a_images" / "letter.txt") << "dear";
     const auto refused = writeMpeg4Bundle(bundle, folder / "a.bt", job);
     ASSERT_FALSE(refused);
@@ -295,7 +295,7 @@ TEST_P(ReferenceMp4, IsTheSceneOfItsBtAndSurvivesTheTexts) {
     REQUIRE_SHARED(reference, "reference");
     const std::string name = GetParam();
     Job job;
-    job.limits.allowOutside = true;  // its images stand in ../images
+    job.limits.allowOutside = true;  // its images are in ../images
     const auto mp4 = readMpeg4(reference / "mp4" / (name + ".mp4"), job);
     ASSERT_TRUE(mp4) << mp4.error().text();
     const auto bt = readMpeg4(name == "xmt_01_depthimage_simpletexture"

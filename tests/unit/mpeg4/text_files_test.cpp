@@ -178,7 +178,7 @@ Group { children [   # another { [ "
     const NodePtr b = child(root, 2);
     EXPECT_EQ(child(child(root, 1), 0), b) << "USE before its DEF";
     EXPECT_EQ(child(b, 0), a);
-    EXPECT_EQ(b->get<NodeList>("children").size(), 1u) << "NULL is no item of a list";
+    EXPECT_EQ(b->get<NodeList>("children").size(), 1u) << "NULL is not an item of a list";
     const auto urls = child(root, 4)
                           ->get<NodePtr>("appearance")
                           ->get<NodePtr>("texture")
@@ -199,7 +199,7 @@ TEST(Bt, ErrorsSayWhereWhatAndWhatWasExpected) {
               "'test.bt':1:33: DepthImage has no field 'colour'");
     EXPECT_EQ(
         btErrorOf("Group { children [ SimpleTexture { } ] }"),
-        "'test.bt':1:20: SimpleTexture may not stand in Group.children, which takes SF3DNode");
+        "'test.bt':1:20: SimpleTexture is not allowed in Group.children, which takes SF3DNode");
     EXPECT_EQ(btErrorOf("Group { children [ DEF A Group { } DEF A Group { } ] }"),
               "'test.bt':1:36: DEF 'A' names a second node; the first stands at 'test.bt':1:20");
     EXPECT_EQ(btErrorOf("Group { children [ USE A ] }"),
@@ -303,7 +303,7 @@ TEST(Bt, AMissingBraceBetweenBlocksIsMendedAndSaid) {
 }
 
 TEST(Xmt, RefusesWhatIsNoXmt) {
-    EXPECT_NE(xmtErrorOf("<XMT-A><Body>").find("no well-formed XML"), std::string::npos);
+    EXPECT_NE(xmtErrorOf("<XMT-A><Body>").find("not well-formed XML"), std::string::npos);
     EXPECT_NE(xmtErrorOf("<svg/>").find("expected <XMT-A>"), std::string::npos);
     EXPECT_NE(xmtErrorOf("<XMT-A><Body/></XMT-A>").find("no scene"), std::string::npos);
     const auto body = [](const std::string& nodes) {
@@ -407,7 +407,7 @@ TEST_P(ReferenceBt, ReadsAndComesBackThroughBothForms) {
     const fs::path path = folder / (std::string(GetParam()) + ".bt");
     const std::string text = textOfFile(path);
     if (std::string(GetParam()) == "13_transform_root") {
-        // A Transform is no top node: another implementation refuses this scene, too.
+        // A Transform is not a top node: another implementation refuses this scene, too.
         EXPECT_NE(btErrorOf(text).find("SFTopNode"), std::string::npos);
         return;
     }

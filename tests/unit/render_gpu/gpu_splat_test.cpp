@@ -89,7 +89,7 @@ TEST_P(GpuSplat, DrawsFramesLargerThanOnePiece) {
     const auto frame = draw(bundle, splatSettings(), camera);
     ASSERT_TRUE(frame) << frame.error().text();
     for (const float d : frame->depth.pixels()) ASSERT_TRUE(hasPoint(d));
-    // The seam between pieces is no edge.
+    // The seam between pieces is not an edge.
     for (int y = 0; y < camera.height; ++y)
         EXPECT_LT(glm::length(frame->colour.at(4095, y) - frame->colour.at(4096, y)), 0.1f);
 }

@@ -130,7 +130,7 @@ TEST(Pruned, ADamagedMaskIsANote) {
     ASSERT_TRUE(back) << back.error().text();
     const auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
-    EXPECT_NE(notes[0].find("no base64"), std::string::npos) << notes[0];
+    EXPECT_NE(notes[0].find("not base64"), std::string::npos) << notes[0];
 }
 
 /// Whatever is in the mask, the file is read; what is marked has no depth.

@@ -218,10 +218,10 @@ TEST_F(Origin, ExportsAreInTheWorldAndComeBackToTheBit) {
         ASSERT_TRUE(exportImages(*bundle, folder, {.kind = kind}, job_));
         const auto back = open(folder, {}, job_);
         ASSERT_TRUE(back) << back.error().text();
-        const auto& views = std::get<Bundle>(*back).views;
+        const auto& read = std::get<Bundle>(*back).views;
         EXPECT_EQ(originOf(*back), kUtm);
-        for (std::size_t i = 0; i < views.size(); ++i)
-            EXPECT_EQ(views[i].camera, bundle->views[i].camera) << i;
+        for (std::size_t i = 0; i < read.size(); ++i)
+            EXPECT_EQ(read[i].camera, bundle->views[i].camera) << i;
         const auto cameras =
             readCameraFile(folder / (miv ? "cameras.json" : "transforms.json"), job_);
         ASSERT_TRUE(cameras) << cameras.error().text();

@@ -243,7 +243,7 @@ TEST(Films, ListsAndAddressesAreNoFilms) {
         const auto film = Film::open(folder / "list.mp4", {});
         ASSERT_FALSE(film);
         EXPECT_EQ(film.error().code, ErrorCode::unsupported);
-        EXPECT_NE(film.error().text().find("no .mp4, .mov, .mkv"), std::string::npos);
+        EXPECT_NE(film.error().text().find("not a .mp4, .mov, .mkv"), std::string::npos);
     }
 }
 

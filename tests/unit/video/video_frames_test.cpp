@@ -126,9 +126,10 @@ TEST(VideoFrames, WhatIsNoFrameSaysWhatToDo) {
     writeText(folder / "clip.bin", std::string_view("\0\0\0\x18"
                                                     "ftypmp42",
                                                     12));
-    if (videoModule().present)
+    if (videoModule().present) {
         EXPECT_TRUE(has(errorOf({folder / "clip.bin"}, ErrorCode::invalidInput),
                         "clip.bin': it is cut off: it should have 24 bytes, and has 12"));
+    }
     writeText(folder / "clip.AVI", "anything");
     const auto avi = errorOf({folder / "clip.AVI"}, ErrorCode::unsupported);
     EXPECT_TRUE(has(avi, "ffmpeg -i") && has(avi, "frame_%04d.png")) << avi;
