@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/images/images.hpp"
+#include "formats/open.hpp"
 #include "formats/panorama/panorama_files.hpp"
 #include "formats/save.hpp"
 #include "lib/panorama/panorama.hpp"
@@ -102,7 +103,15 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
         STX_TRY(o.output,
                 folderTarget(options.output, {},
                              "a folder, .png, .jpg, .tif, .webp, .exr, .mp4, .bt or .xmt"));
+        // Now, not when minutes of work are done.
+        if (const auto ending = std::filesystem::path(o.output).extension().string();
+            !ending.empty())
+            return fail(ErrorCode::usage,
+                        "'{}' ends in '{}'; a panorama is written as .png, .jpg, .tif, .webp, "
+                        ".exr, .mp4, .bt, .xmt, or into a folder (no ending)",
+                        o.output, ending);
     }
+    if (!o.into.empty()) STX_CHECK(recognise(o.into));
     if (format == PanoramaFormat::picture)
         STX_CHECK(command.refuse({"--faces"},
                                  "is of cubes: a folder, a scene or .exr; this output is "

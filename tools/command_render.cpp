@@ -322,7 +322,9 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     STX_CHECK(checkTarget(o.output, program));
     STX_TRY(const int wanted, checkCameraOptions(o.camera, command, program));
     if (wanted > 1 && !frameName(o.output, 0) && o.output != "-")
-        return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
+        return fail(ErrorCode::usage,
+                    "{} pictures need a numbered name, as in -o 'name_%04d.png' (a film: -o - "
+                    "--file-format y4m)",
                     wanted);
     STX_CHECK(checkFrames(o, wanted, program));
     FrameWriter::Settings writing;
@@ -352,7 +354,9 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     STX_TRY(const auto pictures, picturesOf(o, scene, program));
     const auto count = static_cast<int>(pictures.size());
     if (count > 1 && !frameName(o.output, 0) && o.output != "-")
-        return fail(ErrorCode::usage, "{} pictures need a numbered name, as in -o 'name_%04d.png'",
+        return fail(ErrorCode::usage,
+                    "{} pictures need a numbered name, as in -o 'name_%04d.png' (a film: -o - "
+                    "--file-format y4m)",
                     count);
     STX_CHECK(checkFrames(o, count, program));
     for (std::size_t i = 0; i < pictures.size(); ++i) {

@@ -365,9 +365,10 @@ Result<std::string> folderTarget(const std::string& target, const std::vector<st
                                  std::string_view expected) {
     // What people give to other programs; a folder's name may have any other dot in it.
     static const std::vector<std::string> kFiles = {
-        ".png", ".jpg",  ".jpeg", ".tif", ".tiff", ".webp", ".exr", ".hdr", ".svg", ".mp4",  ".bt",
-        ".xmt", ".json", ".txt",  ".obj", ".glb",  ".gltf", ".stl", ".ply", ".drc", ".html", ".off",
-        ".dae", ".fbx",  ".zip",  ".tar", ".gz",   ".yuv",  ".y4m", ".pfm", ".bin"};
+        ".png",  ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr",  ".hdr", ".svg", ".mp4",
+        ".bt",   ".xmt", ".json", ".txt", ".obj",  ".glb",  ".gltf", ".stl", ".ply", ".drc",
+        ".html", ".off", ".dae",  ".fbx", ".zip",  ".tar",  ".gz",   ".yuv", ".y4m", ".pfm",
+        ".bin",  ".tga", ".bmp",  ".gif", ".psd",  ".mkv",  ".mov",  ".avi", ".webm"};
     std::string path = target;
     while (path.size() > 1 && path.back() == '/') path.pop_back();
     std::error_code ec;
