@@ -148,17 +148,18 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
                 const glm::dvec2 turn = turns[static_cast<std::size_t>(x - left)];
                 glm::vec4 colour = picture.at({-level * turn.x, sine, -level * turn.y});
                 if (colour.a <= 0) continue;
-                glm::vec4 log(0);
+                glm::vec4 factor(0);
                 for (std::size_t c = 0; c < 4; ++c) {
                     const int own = print.column(columns[c], labels.width());
                     const int ownRow = ys[c >> 1] - print.box.y;
                     if (own >= 0 && ownRow >= 0 && ownRow < print.box.height)
-                        log += shares[c] * glm::vec4(correction.at(own, ownRow), 1);
+                        factor += shares[c] * glm::vec4(correction.at(own, ownRow), 1);
                 }
-                const glm::vec3 light = withGain({linearByTable(colour.r), linearByTable(colour.g),
-                                                  linearByTable(colour.b)},
-                                                 gain) *
-                                        glm::exp(log.a > 0 ? glm::vec3(log) / log.a : glm::vec3(0));
+                const glm::vec3 light =
+                    withGain(
+                        {linearByTable(colour.r), linearByTable(colour.g), linearByTable(colour.b)},
+                        gain) *
+                    (factor.a > 0 ? glm::vec3(factor) / factor.a : glm::vec3(1));
                 const float w = weight * colour.a;
                 sums.at((x % width + width) % width, y - top) += w * glm::vec4(light, 1);
             }
@@ -199,10 +200,19 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     const auto rowBytes = static_cast<std::uint64_t>(width) * sizeof(glm::vec4);
     const int band = static_cast<int>(std::clamp<std::uint64_t>(
         job.limits.maxMemoryBytes / 4 / rowBytes, 1, static_cast<std::uint64_t>(height)));
-    const std::int64_t bands = (height + band - 1) / band;
+    // Rows that some picture reaches.
+    const double cells = static_cast<double>(gridWidth) / width;
+    int first = height, last = 0;
+    for (const Footprint& f : prints) {
+        first = std::min(first, static_cast<int>((f.box.y - 3) / cells));
+        last = std::max(last, static_cast<int>((f.box.y + f.box.height + 3) / cells) + 1);
+    }
+    first = std::max(first, 0);
+    last = std::min(last, height);
+    const std::int64_t bands = std::max(1, (last - first + band - 1) / band);
     std::int64_t done = 0;
-    for (int top = 0; top < height; top += band) {
-        Image<glm::vec4> sums(width, std::min(band, height - top), glm::vec4(0));
+    for (int top = first; top < last; top += band) {
+        Image<glm::vec4> sums(width, std::min(band, last - top), glm::vec4(0));
         const double from = static_cast<double>(top) * gridWidth / width - 3;
         const double to = static_cast<double>(top + sums.height()) * gridWidth / width + 3;
         for (std::size_t k = 0; k < prints.size(); ++k) {

@@ -167,17 +167,26 @@ float turnOf(glm::vec2 v) {
     return v.y < 0 ? 1 - angle : angle;
 }
 
+/// exp(-x) of x = 0, step, 2 step...
+template <std::size_t Count>
+std::array<float, Count> bell(float step) {
+    std::array<float, Count> out;
+    for (std::size_t i = 0; i < Count; ++i) out[i] = std::exp(-static_cast<float>(i) * step);
+    return out;
+}
+
 /// The directions that gradients around a corner have most: the first, and others nearly as strong.
 std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
     constexpr int kBins = 36;
+    static const auto weights = bell<65>(1.0f / 32);  // by the square of the distance
     std::array<float, kBins> bins{}, smooth{};
     for (int dy = -8; dy <= 8; ++dy) {
         for (int dx = -8; dx <= 8; ++dx) {
-            const float r2 = static_cast<float>(dx * dx + dy * dy);
+            const int r2 = dx * dx + dy * dy;
             if (r2 > 64) continue;
             const glm::vec2 v = gradientAt(g, pixel + glm::vec2(dx, dy));
             const float turn = turnOf(v) * kBins;
-            const float weight = glm::length(v) * std::exp(-r2 / 32);
+            const float weight = glm::length(v) * weights[static_cast<std::size_t>(r2)];
             const auto bin = static_cast<int>(turn);
             const float t = turn - static_cast<float>(bin);
             bins[static_cast<std::size_t>(bin % kBins)] += weight * (1 - t);
@@ -207,6 +216,8 @@ std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
 
 Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
     const glm::vec2 right(std::cos(direction), std::sin(direction)), down(-right.y, right.x);
+    // By half the square of the distance in halves of the spacing: at 8 spacings exp(-1/2).
+    static const auto weights = bell<226>(1.0f / 256);
     std::array<float, 128> bins{};
     for (int j = 0; j < 16; ++j) {
         for (int i = 0; i < 16; ++i) {
@@ -214,8 +225,9 @@ Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
                                    (static_cast<float>(j) - 7.5f) * kSpacing);
             const glm::vec2 v = gradientAt(g, pixel + offset.x * right + offset.y * down);
             const glm::vec2 turned(glm::dot(v, right), glm::dot(v, down));
-            const float r = glm::length(offset) / (8 * kSpacing);
-            const float weight = glm::length(v) * std::exp(-0.5f * r * r);
+            const int dx = 2 * i - 15, dy = 2 * j - 15;
+            const float weight =
+                glm::length(v) * weights[static_cast<std::size_t>((dx * dx + dy * dy) / 2)];
             if (weight <= 0) continue;
             const float d = turnOf(turned) * 8;
             // Shared among the two nearest cells in x and y and the two nearest directions.

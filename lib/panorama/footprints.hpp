@@ -54,8 +54,8 @@ struct Footprint {
     return light * glm::mix(gain, glm::max(gain, glm::vec3(1)), t * t * (3 - 2 * t));
 }
 
-/// What is left of differences in light, smooth over each picture: by how much (logarithm) its
-/// light is to be multiplied, so that pictures melt into each other. Of each footprint, on its box.
+/// What is left of differences in light, smooth over each picture: by how much its light
+/// is to be multiplied, so that pictures melt into each other. Of each footprint, on its box.
 [[nodiscard]] std::vector<Image<glm::vec3>> findCorrections(
     const std::vector<Footprint>& footprints, const std::vector<glm::dvec3>& gains, int gridWidth);
 

@@ -141,10 +141,10 @@ std::vector<Image<glm::vec3>> findCorrections(const std::vector<Footprint>& prin
             }
         // A sixteenth of the picture is smooth enough to leave its details alone.
         smooth(logs, std::max(2, std::min(f.box.width, f.box.height) / 16));
-        out[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(0));
+        out[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(1));
         for (std::size_t p = 0; p < logs.count(); ++p) {
             const glm::vec4 l = logs.pixels()[p];
-            if (l.a > 1e-3f) out[k].pixels()[p] = glm::vec3(l) / l.a;
+            if (l.a > 1e-3f) out[k].pixels()[p] = glm::exp(glm::vec3(l) / l.a);
         }
     });
     return out;

@@ -35,9 +35,19 @@ glm::dquat turnOfTwo(glm::dvec3 a1, glm::dvec3 a2, glm::dvec3 b1, glm::dvec3 b2)
     return glm::normalize(glm::quat_cast(frame(b1, b2) * glm::transpose(frame(a1, a2))));
 }
 
+/// Matches of so many tried ones that must agree.
+double fewestOf(std::size_t tried) {
+    return std::max(static_cast<double>(kFewest), 5 + 0.12 * static_cast<double>(tried));
+}
+
 bool enough(const Pair& pair, std::size_t tried) {
-    return pair.matches.size() >= kFewest &&
-           static_cast<double>(pair.matches.size()) >= 5 + 0.12 * static_cast<double>(tried);
+    return static_cast<double>(pair.matches.size()) >= fewestOf(tried);
+}
+
+/// Pairs of matches to try so that one of two right ones is among them when this share is right:
+/// 99.99 %, and four times as many since matches are not exact.
+int triesFor(double share) {
+    return static_cast<int>(std::min(1500.0, 4 * 9.2 / (share * share) + 20));
 }
 
 }  // namespace
@@ -50,25 +60,31 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
         int at = -1, distance = kFar, next = kFar;
     };
     std::vector<Best> best(a.points.size());
-    for (std::size_t i = 0; i < a.points.size(); ++i) {
-        Best& mine = best[i];
-        for (std::size_t j = 0; j < b.points.size(); ++j) {
-            const int d = distance(a.descriptors[i], b.descriptors[j]);
-            if (d < distanceOfB[j]) {
-                distanceOfB[j] = d;
-                nearestOfB[j] = static_cast<int>(i);
-            }
-            if (d >= mine.next) continue;
-            // The same corner on another level, or turned, is no other corner.
-            const bool same =
-                mine.at >= 0 && glm::distance(b.points[static_cast<std::size_t>(mine.at)].pixel,
-                                              b.points[j].pixel) < 4.0f;
-            if (d < mine.distance) {
-                if (!same) mine.next = mine.distance;
-                mine.distance = d;
-                mine.at = static_cast<int>(j);
-            } else if (!same) {
-                mine.next = d;
+    // In blocks of descriptors that stay in the first cache.
+    constexpr std::size_t kBlock = 128;
+    for (std::size_t block = 0; block < b.points.size(); block += kBlock) {
+        const std::size_t end = std::min(block + kBlock, b.points.size());
+        for (std::size_t i = 0; i < a.points.size(); ++i) {
+            Best& mine = best[i];
+            const Descriptor own = a.descriptors[i];  // a copy stays in registers
+            for (std::size_t j = block; j < end; ++j) {
+                const int d = distance(own, b.descriptors[j]);
+                if (d < distanceOfB[j]) {
+                    distanceOfB[j] = d;
+                    nearestOfB[j] = static_cast<int>(i);
+                }
+                if (d >= mine.next) continue;
+                // The same corner on another level, or turned, is no other corner.
+                const bool same =
+                    mine.at >= 0 && glm::distance(b.points[static_cast<std::size_t>(mine.at)].pixel,
+                                                  b.points[j].pixel) < 4.0f;
+                if (d < mine.distance) {
+                    if (!same) mine.next = mine.distance;
+                    mine.distance = d;
+                    mine.at = static_cast<int>(j);
+                } else if (!same) {
+                    mine.next = d;
+                }
             }
         }
     }
@@ -131,9 +147,9 @@ Pair agreeingMatches(const std::vector<Match>& matches, const TurnLens& lens, do
     std::size_t most = 1;
     // Angles on rays as far apart as the tolerance in the picture.
     const double angle = 1.5 * tolerance / lens.focal;
-    // A share of 10 % in 200 matches is found with 99 % in 460 tries; pairs that already disagree
-    // about their angle cost next to nothing. A larger share, once found, needs fewer.
-    int tries = 1500;
+    const auto all = static_cast<double>(matches.size());
+    // What is too little to count needs not be found; a larger share, once found, needs fewer.
+    int tries = triesFor(std::min(1.0, fewestOf(matches.size()) / all));
     for (int t = 0; t < tries; ++t) {
         const std::size_t i = random() % matches.size(), j = random() % matches.size();
         if (i == j || glm::distance(a[i], a[j]) < 8 * tolerance) continue;
@@ -141,7 +157,7 @@ Pair agreeingMatches(const std::vector<Match>& matches, const TurnLens& lens, do
         const glm::dquat turn = turnOfTwo(a[i], a[j], b[i], b[j]);
         const glm::dmat3 matrix = glm::mat3_cast(turn);
         std::size_t count = 0;
-        for (std::size_t k = 0; k < matches.size(); ++k) {
+        for (std::size_t k = 0; k < matches.size() && count + matches.size() - k > most; ++k) {
             const glm::dvec3 r = matrix * a[k];
             if (r.z > -0.02) continue;
             const glm::dvec2 p = glm::dvec2(r) * (lens.focal / -r.z) - matches[k].b;
@@ -150,10 +166,7 @@ Pair agreeingMatches(const std::vector<Match>& matches, const TurnLens& lens, do
         if (count > most) {
             most = count;
             best.bFromA = turn;
-            const double share = static_cast<double>(most) / static_cast<double>(matches.size());
-            // 99.99 %, and four times as many since matches are not exact.
-            const double needed = 4 * 9.2 / (share * share);
-            tries = std::min(tries, static_cast<int>(needed) + 20);
+            tries = std::min(tries, triesFor(static_cast<double>(most) / all));
         }
     }
     if (most < 3) return best;

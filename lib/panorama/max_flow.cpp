@@ -6,7 +6,9 @@
 
 namespace stx::panorama {
 
-MaxFlow::MaxFlow(int nodes) : nodes_(static_cast<std::size_t>(nodes)) {}
+MaxFlow::MaxFlow(int nodes) : nodes_(static_cast<std::size_t>(nodes)) {
+    arcs_.reserve(4 * nodes_.size());  // of a grid
+}
 
 void MaxFlow::addTerminal(int n, float fromSource, float toSink) {
     node(n).rest += fromSource - toSink;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
@@ -83,8 +84,8 @@ class SeamGrid {
                     found.clear();
                     for (std::size_t other = 0; other < prints_.size(); ++other) {
                         if (other == k || !sees(other, p)) continue;
-                        const float own = newIn(k, other, p);
-                        found.push_back(own > kMoverDifference ? own - newIn(other, k, p) : 0);
+                        const float own = newIn(k, other, p, kMoverDifference);
+                        found.push_back(own > kMoverDifference ? own - newIn(other, k, p, 0) : 0);
                     }
                     if (found.empty()) continue;
                     // Half of the others must be without it.
@@ -96,45 +97,88 @@ class SeamGrid {
         drawOnce(moversIn(movers));
     }
 
+    /// Pictures in groups: those of one group have no cells next to each other, so that they may
+    /// take cells at the same time and nobody sees in which order.
+    [[nodiscard]] std::vector<std::vector<std::size_t>> groups() const {
+        std::vector<std::vector<std::size_t>> out;
+        for (std::size_t k = 0; k < prints_.size(); ++k) {
+            const auto free = std::find_if(out.begin(), out.end(), [&](const auto& group) {
+                return std::none_of(group.begin(), group.end(),
+                                    [&](std::size_t other) { return near(k, other); });
+            });
+            if (free == out.end())
+                out.push_back({k});
+            else
+                free->push_back(k);
+        }
+        return out;
+    }
+
+    /// Whether cells of two pictures' boxes are the same or next to each other.
+    [[nodiscard]] bool near(std::size_t a, std::size_t b) const {
+        const GridBox &boxA = prints_[a].box, &boxB = prints_[b].box;
+        if (boxA.y > boxB.y + boxB.height || boxB.y > boxA.y + boxA.height) return false;
+        // How far to the right of one the other begins.
+        const int right = ((boxB.x - boxA.x) % width_ + width_) % width_;
+        return right <= boxA.width || width_ - right <= boxB.width;
+    }
+
     /// Lets one picture take cells from others where that makes the whole better; true when it
     /// took some.
     bool expand(std::size_t k) {
         const Footprint& f = prints_[k];
+        const auto own = static_cast<int>(k);
         Image<int> nodeOf(f.box.width, f.box.height, -1);
+        // How far each cell is from what is shown there now.
+        Image<float> change(f.box.width, f.box.height, kEndOfPicture);
         std::vector<glm::ivec2> cells;
         for (int y = 0; y < f.box.height; ++y)
-            for (int x = 0; x < f.box.width; ++x)
-                if (f.whole.at(x, y)) {
-                    nodeOf.at(x, y) = static_cast<int>(cells.size());
-                    cells.emplace_back(x, y);
-                }
-        const auto own = static_cast<int>(k);
+            for (int x = 0; x < f.box.width; ++x) {
+                const glm::ivec2 p = wrapped({f.box.x + x, f.box.y + y});
+                const int old = labels_.at(p.x, p.y);
+                if (old >= 0 && old != own) change.at(x, y) = difference(own, old, p);
+                if (!f.whole.at(x, y)) continue;
+                nodeOf.at(x, y) = static_cast<int>(cells.size());
+                cells.emplace_back(x, y);
+            }
         MaxFlow flow(static_cast<int>(cells.size()));
         // A cell on the sink's side is taken; it then pays what comes from the source.
         for (std::size_t i = 0; i < cells.size(); ++i) {
             const auto n = static_cast<int>(i);
-            const glm::ivec2 p = wrapped({f.box.x + cells[i].x, f.box.y + cells[i].y});
+            const glm::ivec2 cell = cells[i];
+            const glm::ivec2 p = wrapped({f.box.x + cell.x, f.box.y + cell.y});
             const int old = labels_.at(p.x, p.y);
-            flow.addTerminal(n, cost_[k].at(cells[i].x, cells[i].y), dataCost(old, p));
+            flow.addTerminal(n, cost_[k].at(cell.x, cell.y), dataCost(old, p));
             for (const glm::ivec2 d :
                  {glm::ivec2(1, 0), glm::ivec2(0, 1), glm::ivec2(-1, 0), glm::ivec2(0, -1)}) {
                 if (p.y + d.y < 0 || p.y + d.y >= height_) continue;
                 const glm::ivec2 q = wrapped(p + d);
                 const int other = labels_.at(q.x, q.y);
-                if (other < 0) continue;
-                const glm::ivec2 c = cellOf(k, q);
+                if (other < 0 || (old == own && other == own)) continue;
+                const glm::ivec2 c = neighbour(f.box, cell + d);
                 const int m = c.x >= 0 ? nodeOf.at(c.x, c.y) : -1;
-                const float both = seamCost(old, other, p, q);    // none is taken
-                const float theirs = seamCost(own, other, p, q);  // p is
+                const float atP = change.at(cell.x, cell.y);
+                const float atQ = c.x >= 0 ? change.at(c.x, c.y) : kEndOfPicture;
+                // None is taken; p is.
+                const float both = seamCost(old, other, p, q);
+                const float theirs =
+                    other == own
+                        ? 0
+                        : kSeamLength + (other == old ? atP : difference(own, other, p)) + atQ;
                 if (m < 0) {
                     flow.addTerminal(n, theirs, both);
                     continue;
                 }
-                if (d.x < 0 || d.y < 0) continue;             // each two once
-                const float mine = seamCost(old, own, p, q);  // q is
+                if (d.x < 0 || d.y < 0) continue;  // each two once
+                // q is.
+                const float mine =
+                    old == own ? 0
+                    : old < 0  ? kEndOfPicture
+                               : kSeamLength + atP + (other == old ? atQ : difference(old, own, q));
                 flow.addTerminal(n, theirs - both, 0);
                 flow.addTerminal(m, -theirs, 0);
-                flow.addEdge(n, m, std::max(0.0f, mine + theirs - both), 0);
+                if (const float capacity = mine + theirs - both; capacity > 0)
+                    flow.addEdge(n, m, capacity, 0);
             }
         }
         flow.solve();
@@ -170,8 +214,15 @@ class SeamGrid {
     }
 
   private:
+    /// Of columns that are at most a whole turn away.
     [[nodiscard]] glm::ivec2 wrapped(glm::ivec2 p) const {
-        return {(p.x % width_ + width_) % width_, p.y};
+        return {p.x < 0 ? p.x + width_ : p.x >= width_ ? p.x - width_ : p.x, p.y};
+    }
+    /// A cell beside one of a box's; x is -1 outside of it.
+    [[nodiscard]] glm::ivec2 neighbour(const GridBox& box, glm::ivec2 c) const {
+        if (box.width >= width_) c.x = wrapped(c).x;
+        if (c.x < 0 || c.x >= box.width || c.y < 0 || c.y >= box.height) return {-1, -1};
+        return c;
     }
     /// The cell of a picture's box; x is -1 outside of it.
     [[nodiscard]] glm::ivec2 cellOf(std::size_t k, glm::ivec2 p) const {
@@ -254,19 +305,26 @@ class SeamGrid {
         const glm::ivec2 c = cellOf(k, p);
         return c.x >= 0 && prints_[k].inside.at(c.x, c.y) > 0;
     }
-    /// How far a cell's colour in one picture is from all that another one shows around it.
-    [[nodiscard]] float newIn(std::size_t k, std::size_t other, glm::ivec2 p) const {
+    /// How far a cell's colour in one picture is from all that another one shows around it; some
+    /// number below `enough` when it is nearer than that.
+    [[nodiscard]] float newIn(std::size_t k, std::size_t other, glm::ivec2 p, float enough) const {
         const glm::ivec2 own = cellOf(k, p), there = cellOf(other, p);
         const Footprint& f = prints_[other];
         const glm::vec3 colour = coded_[k].at(own.x, own.y);
         float least = 1e9f;
-        for (int dy = -kMoverReach; dy <= kMoverReach; ++dy)
-            for (int dx = -kMoverReach; dx <= kMoverReach; ++dx) {
-                const glm::ivec2 c = there + glm::ivec2(dx, dy);
-                if (!f.inside.contains(c.x, c.y) || f.inside.at(c.x, c.y) <= 0) continue;
-                const glm::vec3 d = colour - coded_[other].at(c.x, c.y);
-                least = std::min(least, glm::dot(d, d));
-            }
+        const auto look = [&](glm::ivec2 c) {
+            if (f.inside.at(c.x, c.y) <= 0) return;
+            const glm::vec3 d = colour - coded_[other].at(c.x, c.y);
+            least = std::min(least, glm::dot(d, d));
+        };
+        // What is like it is mostly where it should be.
+        look(there);
+        const int top = std::max(0, there.y - kMoverReach);
+        const int bottom = std::min(f.box.height - 1, there.y + kMoverReach);
+        const int left = std::max(0, there.x - kMoverReach);
+        const int right = std::min(f.box.width - 1, there.x + kMoverReach);
+        for (int y = top; y <= bottom && least > enough * enough; ++y)
+            for (int x = left; x <= right; ++x) look({x, y});
         return std::sqrt(least);
     }
     [[nodiscard]] float dataCost(int label, glm::ivec2 p) const {
@@ -323,17 +381,24 @@ Result<Image<int>> findSeams(const std::vector<Footprint>& prints,
     SeamGrid grid(prints, gains, gridWidth);
     if (hideSeams) {
         grid.avoidMovers();
-        std::int64_t done = 0;
+        const auto groups = grid.groups();
+        // Who has nothing new in or beside its cells has nothing to take.
+        std::vector<std::uint8_t> open(prints.size(), 1), changed(prints.size(), 0);
+        std::atomic<std::int64_t> done = 0;
         const auto total = static_cast<std::int64_t>(prints.size()) * kRounds;
-        for (int round = 0; round < kRounds; ++round) {
-            bool changed = false;
-            for (std::size_t k = 0; k < prints.size(); ++k) {
+        for (int round = 0; round < kRounds; ++round)
+            for (const auto& group : groups) {
+                parallelFor(0, static_cast<std::int64_t>(group.size()), [&](std::int64_t i) {
+                    const std::size_t k = group[static_cast<std::size_t>(i)];
+                    changed[k] = !job.cancelled && open[k] && grid.expand(k);
+                    job.progress(++done, total, "finding seams");
+                });
                 STX_CHECK(job.checkCancelled());
-                if (grid.expand(k)) changed = true;
-                job.progress(++done, total, "finding seams");
+                for (const std::size_t k : group) open[k] = 0;
+                for (const std::size_t k : group)
+                    for (std::size_t other = 0; other < prints.size() && changed[k]; ++other)
+                        if (other != k && grid.near(k, other)) open[other] = 1;
             }
-            if (!changed) break;
-        }
     }
     grid.extend();
     return std::move(grid.labels());
