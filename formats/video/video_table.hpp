@@ -6,7 +6,7 @@
 /// Both sides come from one build.
 namespace stx::video {
 
-inline constexpr std::uint32_t kTableVersion = 1;
+inline constexpr std::uint32_t kTableVersion = 2;
 /// The one symbol of the module: `const Table* stxVideo();`
 inline constexpr const char* kTableSymbol = "stxVideo";
 

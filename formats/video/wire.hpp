@@ -55,8 +55,9 @@ struct PictureHeader {
 
 struct EncoderRequest {
     std::int32_t width = 0, height = 0;
-    std::int32_t bits = 8;        ///< 8 or 10
-    std::int32_t grey = 0;        ///< 1: luma alone; 0: 4:2:0
+    std::int32_t bits = 8;  ///< 8 or 10
+    /// H.264's chroma_format_idc: 0 is luma alone, 1 4:2:0, 3 4:4:4.
+    std::int32_t chromaFormat = 1;
     std::int32_t crf = -1;        ///< 0..51; -1: lossless
     std::uint32_t timescale = 0;  ///< ticks a second
     double rate = 25;             ///< pictures a second, on average

@@ -339,17 +339,24 @@ class SequenceWriter {
 
     /// What H.264 loses.
     void noteVideo() {
-        bool colour = false, depth = false;
+        bool half = false, whole = false, depth = false;
         for (const ViewTrack& track : tracks_) {
-            colour = colour || track.video[0] >= 0;
             depth = depth || track.video[1] >= 0;
+            if (track.video[0] < 0) continue;
+            const ElementaryStream& colour = *track.streams[0];
+            (chromaFormatOf(colour.width, colour.height) == 1 ? half : whole) = true;
         }
-        if (colour)
+        if (half)
             job_.note(
                 fmt::format("colour is H.264 of quality {} with half of its chroma, which is "
                             "lossy",
                             options_.h264));
-        if (colour && coverageLost_)
+        if (whole)
+            job_.note(
+                fmt::format("colour with an odd side is H.264 (4:4:4) of quality {}, which is "
+                            "lossy",
+                            options_.h264));
+        if ((half || whole) && coverageLost_)
             job_.note("H.264 has no alpha: soft edges of the coverage are lost");
         if (depth)
             job_.note(

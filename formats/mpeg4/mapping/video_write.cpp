@@ -87,7 +87,9 @@ Bytes yuvPlanes(const Rgba8Image& picture) {
         return static_cast<std::byte>(
             static_cast<std::uint8_t>(std::clamp(std::floor(v + 0.5), 0.0, 255.0)));
     };
-    Bytes out(static_cast<std::size_t>(w) * h * 3 / 2);
+    const bool whole = chromaFormatOf(w, h) == 3;
+    const std::size_t pixels = static_cast<std::size_t>(w) * h;
+    Bytes out(whole ? pixels * 3 : pixels * 3 / 2);
     Image<glm::vec2> chroma(w, h);
     for (int y = 0; y < h; ++y) {
         for (int x = 0; x < w; ++x) {
@@ -97,8 +99,15 @@ Bytes yuvPlanes(const Rgba8Image& picture) {
             chroma.at(x, y) = {(c.b - luma) / (2 * (1 - kB)), (c.r - luma) / (2 * (1 - kR))};
         }
     }
-    std::byte* cb = out.data() + static_cast<std::size_t>(w) * h;
-    std::byte* cr = cb + static_cast<std::size_t>(w) * h / 4;
+    std::byte* cb = out.data() + pixels;
+    std::byte* cr = cb + (whole ? pixels : pixels / 4);
+    if (whole) {
+        for (const glm::vec2 c : chroma.pixels()) {
+            *cb++ = byte(c.x + 128);
+            *cr++ = byte(c.y + 128);
+        }
+        return out;
+    }
     for (int y = 0; y < h / 2; ++y) {
         for (int x = 0; x < w / 2; ++x) {
             glm::vec2 sum(0);
@@ -137,7 +146,7 @@ Result<Bytes> depthPlane(const Image<float>& depth, const DepthCode& code, const
     return out;
 }
 
-Result<Bytes> avcConfiguration(ByteSpan byteStream, bool grey, int bits) {
+Result<Bytes> avcConfiguration(ByteSpan byteStream, int chromaFormat, int bits) {
     constexpr int kSequence = 7, kPicture = 8;
     ByteSpan sequence, picture;
     for (const ByteSpan unit : unitsOf(byteStream)) {
@@ -157,7 +166,7 @@ Result<Bytes> avcConfiguration(ByteSpan byteStream, bool grey, int bits) {
     const auto profile = std::to_integer<int>(sequence[1]);
     if (profile == 100 || profile == 110 || profile == 122 || profile == 244) {
         const unsigned more = static_cast<unsigned>(bits - 8);
-        put(out, {grey ? 0xFCu : 0xFDu, 0xF8u | more, 0xF8u | more, 0});
+        put(out, {0xFCu | static_cast<unsigned>(chromaFormat), 0xF8u | more, 0xF8u | more, 0});
     }
     return out;
 }
@@ -173,11 +182,6 @@ Bytes withLengths(ByteSpan byteStream) {
 
 Result<int> VideoStreams::begin(ElementaryStream& stream, int width, int height, bool grey,
                                 int bits) {
-    if (width % 2 != 0 || height % 2 != 0)
-        return fail(ErrorCode::unsupported,
-                    "its pictures are {}x{} (with padding), and H.264 needs even sides; leave out "
-                    "--video, or choose another size",
-                    width, height);
     if (!process_) {
         STX_TRY(process_, VideoProcess::start(limits_));
     }
@@ -185,7 +189,7 @@ Result<int> VideoStreams::begin(ElementaryStream& stream, int width, int height,
     request.width = width;
     request.height = height;
     request.bits = bits;
-    request.grey = grey;
+    request.chromaFormat = grey ? 0 : chromaFormatOf(width, height);
     request.crf = grey ? -1 : crf_;
     request.timescale = stream.timescale;
     request.rate = rate_;
@@ -194,7 +198,8 @@ Result<int> VideoStreams::begin(ElementaryStream& stream, int width, int height,
     STX_TRY(const auto answer,
             process_->ask(video::Tag::openEncoder, bytes.bytes, video::Tag::encoder));
     video::Unpacker in(answer);
-    STX_TRY(stream.decoderSpecificInfo, avcConfiguration(in.getBytes(), grey, bits));
+    STX_TRY(stream.decoderSpecificInfo,
+            avcConfiguration(in.getBytes(), request.chromaFormat, bits));
     stream.sampleEntry = sampleEntryOf(width, height, grey, stream.decoderSpecificInfo);
     stream.objectTypeIndication = oti::kAvc;
     stream.width = width;

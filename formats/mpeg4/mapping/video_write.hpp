@@ -16,8 +16,14 @@ namespace stx::mpeg4 {
     return depthBits == 8 ? 8 : 10;
 }
 
-/// Planes of a picture as the encoder takes them: 4:2:0 of full range by BT.709, chroma on the left
-/// column of its pixels. Width and height must be even.
+/// How much chroma colour of this size has, H.264's chroma_format_idc (ISO/IEC 14496-10, 6.2): 1 is
+/// 4:2:0, which has even sides only (the cropping rectangle counts in its chroma); else 3, 4:4:4.
+[[nodiscard]] inline int chromaFormatOf(int width, int height) {
+    return width % 2 == 0 && height % 2 == 0 ? 1 : 3;
+}
+
+/// Planes of a picture as the encoder takes them, of full range by BT.709, with the chroma of
+/// chromaFormatOf(); that of 4:2:0 on the left column of its pixels.
 [[nodiscard]] Bytes yuvPlanes(const Rgba8Image& picture);
 /// The plane of depth codes, padded with 0. `worst` becomes the largest difference between a
 /// distance and its code's, scene units. Error: a depth that is NaN or below 0.
@@ -25,8 +31,8 @@ namespace stx::mpeg4 {
                                        const Padding& padding, double& worst);
 
 /// An AVCDecoderConfigurationRecord (ISO/IEC 14496-15, 5.3.3.1) of the parameter sets in a byte
-/// stream (Annex B). Error (failed): none in it.
-[[nodiscard]] Result<Bytes> avcConfiguration(ByteSpan byteStream, bool grey, int bits);
+/// stream (Annex B). `chromaFormat` is its chroma_format_idc. Error (failed): none in it.
+[[nodiscard]] Result<Bytes> avcConfiguration(ByteSpan byteStream, int chromaFormat, int bits);
 /// The access unit with lengths of four bytes in place of start codes.
 [[nodiscard]] Bytes withLengths(ByteSpan byteStream);
 
@@ -41,7 +47,7 @@ class VideoStreams {
         : crf_(crf), rate_(rate), limits_(limits), keep_(std::move(keep)) {}
 
     /// Makes an H.264 stream, without samples, of one that held images of this size. `bits`: 8 or
-    /// 10. Errors: (unsupported) no module of video, sides that are odd.
+    /// 10. Error (unsupported): no module of video.
     [[nodiscard]] Result<int> begin(ElementaryStream& stream, int width, int height, bool grey,
                                     int bits);
     /// Adds a picture to stream `number`; `time` in its ticks, ascending.

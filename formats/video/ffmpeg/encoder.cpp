@@ -19,11 +19,15 @@ Encoder::Encoder(const EncoderRequest& request) : request_(request) {
     codec_->height = request.height;
     codec_->time_base = {1, static_cast<int>(request.timescale)};
     codec_->framerate = av_d2q(request.rate, 1001000);
-    codec_->pix_fmt = request.grey       ? request.bits > 8 ? AV_PIX_FMT_GRAY10 : AV_PIX_FMT_GRAY8
-                      : request.bits > 8 ? AV_PIX_FMT_YUV420P10
-                                         : AV_PIX_FMT_YUV420P;
+    const bool grey = request.chromaFormat == 0, fine = request.bits > 8;
+    if (grey)
+        codec_->pix_fmt = fine ? AV_PIX_FMT_GRAY10 : AV_PIX_FMT_GRAY8;
+    else if (request.chromaFormat == 3)
+        codec_->pix_fmt = fine ? AV_PIX_FMT_YUV444P10 : AV_PIX_FMT_YUV444P;
+    else
+        codec_->pix_fmt = fine ? AV_PIX_FMT_YUV420P10 : AV_PIX_FMT_YUV420P;
     codec_->color_range = AVCOL_RANGE_JPEG;
-    if (!request.grey) {
+    if (!grey) {
         codec_->colorspace = AVCOL_SPC_BT709;
         codec_->color_primaries = AVCOL_PRI_BT709;
         codec_->color_trc = AVCOL_TRC_IEC61966_2_1;
@@ -41,8 +45,7 @@ Encoder::Encoder(const EncoderRequest& request) : request_(request) {
     av_opt_set(codec_->priv_data, "x264-params", "rc-lookahead=0:sync-lookahead=0:mbtree=0", 0);
     if (const int error = avcodec_open2(codec_.get(), codec, nullptr); error < 0)
         refuse(ErrorCode::unsupported, "H.264 cannot be written for {}x{} of {} bits{}: {}",
-               request.width, request.height, request.bits, request.grey ? ", grey" : "",
-               wordsOf(error));
+               request.width, request.height, request.bits, grey ? ", grey" : "", wordsOf(error));
 }
 
 std::span<const std::byte> Encoder::configuration() const {
@@ -61,9 +64,10 @@ void Encoder::encode(std::int64_t time, std::span<const std::byte> planes, Packe
     frame->pts = time;
     if (av_frame_get_buffer(frame.get(), 0) < 0) throw std::bad_alloc();
     const int bytes = request_.bits > 8 ? 2 : 1;
-    for (int plane = 0; plane < (request_.grey ? 1 : 3); ++plane) {
-        const int width = plane == 0 ? frame->width : AV_CEIL_RSHIFT(frame->width, 1);
-        const int height = plane == 0 ? frame->height : AV_CEIL_RSHIFT(frame->height, 1);
+    for (int plane = 0; plane < (request_.chromaFormat == 0 ? 1 : 3); ++plane) {
+        const int shift = plane > 0 && request_.chromaFormat == 1 ? 1 : 0;
+        const int width = AV_CEIL_RSHIFT(frame->width, shift);
+        const int height = AV_CEIL_RSHIFT(frame->height, shift);
         const std::size_t row = static_cast<std::size_t>(width) * bytes;
         if (planes.size() < row * static_cast<std::size_t>(height))
             refuse(ErrorCode::failed, "a picture to be coded is too small");
