@@ -62,18 +62,20 @@ class Rasterizer {
     bool setUp(std::uint32_t triangle, int samples, SetUp& out) const;
     /// What is seen at the samples of a tile.
     struct Tile {
+        /// Of the triangles that may show in it; slots are their numbers here. Those of all tiles
+        /// at once would be several times the mesh.
+        std::vector<SetUp> setUps;
         std::vector<float> depth;        ///< nearness of the opaque surface
         std::vector<std::uint32_t> ids;  ///< its slot, or kNone
         Layers layers;                   ///< translucent surfaces in front of it
     };
     /// Shrinks [from, to] to the samples of a line that are inside; false when none is.
     static bool clipSpan(const SetUp& s, double y, double step, double origin, int& from, int& to);
-    void drawSpan(const SetUp& s, double y, int from, int to, double step, double origin,
-                  float* depth, std::uint32_t* ids) const;
-    void drawLayerSpan(const SetUp& s, double y, int from, int to, double step, double origin,
+    void drawSpan(std::uint32_t slot, double y, int from, int to, double step, double origin,
+                  std::size_t line, Tile& tile) const;
+    void drawLayerSpan(std::uint32_t slot, double y, int from, int to, double step, double origin,
                        std::size_t line, Tile& tile) const;
-    void drawTile(const std::vector<std::uint32_t>& list, int tileX, int tileY, int samples,
-                  Tile& tile) const;
+    void drawTile(int tileX, int tileY, int samples, Tile& tile) const;
     void shadeTile(int tileX, int tileY, const RasterSettings& settings, const Tile& tile,
                    RasterImage& out) const;
     [[nodiscard]] glm::vec4 shadeUniform(const SetUp& s, int px, int py, int samples) const;
@@ -92,7 +94,6 @@ class Rasterizer {
     const Camera& camera_;
     const glm::dmat4 cameraFromWorld_;
     MaterialSampler sampler_;
-    std::vector<SetUp> setUps_;
 };
 
 bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
@@ -150,10 +151,11 @@ bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, 
     // A few samples are asked one by one.
     constexpr int kFew = 4;
     if (to - from < kFew) {
+        const auto& [p, q, r] = s.edge;
+        const double atP = p.b * y + p.c, atQ = q.b * y + q.c, atR = r.b * y + r.c;
         const auto inside = [&](int i) {
             const double x = origin + i * step;
-            return std::all_of(std::begin(s.edge), std::end(s.edge),
-                               [&](const Affine& e) { return e.a * x + (e.b * y + e.c) >= 0; });
+            return p.a * x + atP >= 0 && q.a * x + atQ >= 0 && r.a * x + atR >= 0;
         };
         while (from <= to && !inside(from)) ++from;
         while (from <= to && !inside(to)) --to;
@@ -187,13 +189,15 @@ bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, 
     return true;
 }
 
-void Rasterizer::drawSpan(const SetUp& s, double y, int from, int to, double step, double origin,
-                          float* depth, std::uint32_t* ids) const {
+void Rasterizer::drawSpan(std::uint32_t slot, double y, int from, int to, double step,
+                          double origin, std::size_t line, Tile& tile) const {
+    const SetUp& s = tile.setUps[slot];
     if (!clipSpan(s, y, step, origin, from, to)) return;
     const double base = s.nearness.b * y + s.nearness.c;
     const bool perspective = !camera_.orthographic;
-    const auto slot = static_cast<std::uint32_t>(&s - setUps_.data());
     const bool holes = sampler_.seeThrough(s.triangle);
+    float* const depth = tile.depth.data() + line;
+    std::uint32_t* const ids = tile.ids.data() + line;
     for (int i = from; i <= to; ++i) {
         const double x = origin + i * step;
         const auto nearness = static_cast<float>(s.nearness.a * x + base);
@@ -205,12 +209,12 @@ void Rasterizer::drawSpan(const SetUp& s, double y, int from, int to, double ste
     }
 }
 
-void Rasterizer::drawLayerSpan(const SetUp& s, double y, int from, int to, double step,
+void Rasterizer::drawLayerSpan(std::uint32_t slot, double y, int from, int to, double step,
                                double origin, std::size_t line, Tile& tile) const {
+    const SetUp& s = tile.setUps[slot];
     if (!clipSpan(s, y, step, origin, from, to)) return;
     const double base = s.nearness.b * y + s.nearness.c;
     const bool perspective = !camera_.orthographic;
-    const auto slot = static_cast<std::uint32_t>(&s - setUps_.data());
     for (int i = from; i <= to; ++i) {
         const double x = origin + i * step;
         const auto nearness = static_cast<float>(s.nearness.a * x + base);
@@ -224,8 +228,7 @@ void Rasterizer::drawLayerSpan(const SetUp& s, double y, int from, int to, doubl
     }
 }
 
-void Rasterizer::drawTile(const std::vector<std::uint32_t>& list, int tileX, int tileY, int samples,
-                          Tile& tile) const {
+void Rasterizer::drawTile(int tileX, int tileY, int samples, Tile& tile) const {
     const int side = kTile * samples;
     auto& depth = tile.depth;
     auto& ids = tile.ids;
@@ -246,23 +249,24 @@ void Rasterizer::drawTile(const std::vector<std::uint32_t>& list, int tileX, int
             drawLine(originY + row * step, from, to, static_cast<std::size_t>(row) * side);
     };
     bool translucent = false;
-    for (const auto index : list) {
-        const auto& s = setUps_[index];
+    const auto count = static_cast<std::uint32_t>(tile.setUps.size());
+    for (std::uint32_t slot = 0; slot < count; ++slot) {
+        const auto& s = tile.setUps[slot];
         if (sampler_.translucent(s.triangle)) {
             translucent = true;
             continue;
         }
         drawLines(s, [&](double y, int from, int to, std::size_t line) {
-            drawSpan(s, y, from, to, step, originX, depth.data() + line, ids.data() + line);
+            drawSpan(slot, y, from, to, step, originX, line, tile);
         });
     }
     if (!translucent) return;
     layers.reset(depth.size());
-    for (const auto index : list) {
-        const auto& s = setUps_[index];
+    for (std::uint32_t slot = 0; slot < count; ++slot) {
+        const auto& s = tile.setUps[slot];
         if (!sampler_.translucent(s.triangle)) continue;
         drawLines(s, [&](double y, int from, int to, std::size_t line) {
-            drawLayerSpan(s, y, from, to, step, originX, line, tile);
+            drawLayerSpan(slot, y, from, to, step, originX, line, tile);
         });
     }
 }
@@ -344,8 +348,8 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                 ids.data() + static_cast<std::size_t>(py * samples) * side + px * samples;
             if (plain && uniform(corner, samples, side)) {
                 if (*corner == kNone) continue;
-                out.colour.at(tileX * kTile + px, tileY * kTile + py) =
-                    shadeUniform(setUps_[*corner], tileX * kTile + px, tileY * kTile + py, samples);
+                out.colour.at(tileX * kTile + px, tileY * kTile + py) = shadeUniform(
+                    tile.setUps[*corner], tileX * kTile + px, tileY * kTile + py, samples);
                 continue;
             }
             for (int k = 0; k < samples * samples; ++k) {
@@ -360,11 +364,11 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                 };
                 float through = 1.0f;
                 for (const auto& layer : tile.layers.at(sample)) {
-                    add(setUps_[layer.slot], layer.colour, layer.alpha * through);
+                    add(tile.setUps[layer.slot], layer.colour, layer.alpha * through);
                     through *= 1.0f - layer.alpha;
                 }
                 if (ids[sample] == kNone) continue;
-                const auto& s = setUps_[ids[sample]];
+                const auto& s = tile.setUps[ids[sample]];
                 add(s, glm::vec3(sampler_.colour(s.triangle, barycentric(s, x, y))), through);
             }
             const int x = tileX * kTile + px, y = tileY * kTile + py;
@@ -397,7 +401,7 @@ void Rasterizer::resolveCentres(int tileX, int tileY, const Tile& tile, RasterIm
             const auto id = mainSurface(tile, static_cast<std::size_t>(py) * kTile + px);
             if (id == kNone) continue;
             const int x = tileX * kTile + px, y = tileY * kTile + py;
-            const auto& s = setUps_[id];
+            const auto& s = tile.setUps[id];
             const double nearness = s.nearness.at(x + 0.5, y + 0.5);
             out.depth.at(x, y) =
                 static_cast<float>(camera_.orthographic ? -nearness : 1.0 / nearness);
@@ -425,20 +429,16 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     if (settings.lighting.on()) out.lit = out.colour;
     if (settings.normals) out.normal = Image<glm::vec3>(w, h, glm::vec3(0.0f));
 
-    setUps_.reserve(mesh_.triangles.size());
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-        SetUp s;
-        if (setUp(t, settings.supersampling, s)) setUps_.push_back(s);
-    }
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
-    for (std::uint32_t i = 0; i < setUps_.size(); ++i) {
-        const auto& s = setUps_[i];
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+        SetUp s;
+        if (!setUp(t, settings.supersampling, s)) continue;
         const glm::ivec2 first = glm::ivec2(s.low) / kTile,
                          last = glm::min(glm::ivec2(s.high), glm::ivec2(w, h) - 1) / kTile;
         for (int ty = first.y; ty <= last.y; ++ty) {
             for (int tx = first.x; tx <= last.x; ++tx)
-                bins[static_cast<std::size_t>(ty) * tilesX + tx].push_back(i);
+                bins[static_cast<std::size_t>(ty) * tilesX + tx].push_back(t);
         }
     }
     std::atomic<bool> stopped = false;
@@ -452,9 +452,13 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
                     return;
                 }
                 const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
-                drawTile(bins[i], tx, ty, settings.supersampling, tile);
+                // Once more: to keep them takes more memory, and as long.
+                tile.setUps.resize(bins[i].size());
+                for (std::size_t k = 0; k < bins[i].size(); ++k)
+                    (void)setUp(bins[i][k], settings.supersampling, tile.setUps[k]);
+                drawTile(tx, ty, settings.supersampling, tile);
                 shadeTile(tx, ty, settings, tile, out);
-                if (settings.supersampling > 1) drawTile(bins[i], tx, ty, 1, tile);
+                if (settings.supersampling > 1) drawTile(tx, ty, 1, tile);
                 resolveCentres(tx, ty, tile, out);
             }
         });
