@@ -53,8 +53,10 @@ struct Draft {
     [[nodiscard]] bool pruned(int x, int y) const { return q.at(x, y) < 0.0f; }
 };
 
+/// Of orthographic views; 0 for others, whose depth axis does not need it.
 double farthestPoint(const PageSet& set, std::size_t view) {
     double farthest = 0.0;
+    if (!set.views()[view].camera.orthographic) return farthest;
     for (const PageRectangle& r : set.rectanglesOf(view)) {
         const Image<float>& depth = *set.pages()[static_cast<std::size_t>(r.page)].depth;
         for (int y = r.pageY; y < r.pageY + r.height; ++y)
@@ -100,12 +102,14 @@ Draft draftOf(const Source& s) {
     }
     for (const PageRectangle& r : rectangles) {
         const Texture& texture = *s.pages[r.page].texture;
-        const Image<float>& depth = *s.set->pages()[static_cast<std::size_t>(r.page)].depth;
+        const auto* bytes = texture.rgba8();
+        const float* depth = s.set->pages()[static_cast<std::size_t>(r.page)].depth->data();
+        const DepthAxis axis = s.space.axis;
         forEachPixel(s, r, 0, [&](int x, int y, std::size_t texel) {
-            mark(x, y, PageSet::alphaOf(texture, texel) >= 1.0f);
-            const float dist = depth.data()[texel];
-            if (hasPoint(dist) && dist > 0.0f)
-                d.q.at(x, y) = static_cast<float>(s.space.axis.q(dist));
+            mark(x, y,
+                 bytes ? bytes->data()[texel].a == 255 : PageSet::alphaOf(texture, texel) >= 1.0f);
+            const float dist = depth[texel];
+            if (hasPoint(dist) && dist > 0.0f) d.q.at(x, y) = static_cast<float>(axis.q(dist));
         });
     }
     return d;
@@ -130,25 +134,34 @@ void keep(Source& s, Draft&& d, std::vector<PreparedPage>& pages) {
 
 void findLinks(const Source& s, Draft& d) {
     const DepthAxis axis = s.space.axis;
-    parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
+    const int width = s.width, height = s.height;
+    parallelForBlocks(0, height, 32, [&](std::int64_t from, std::int64_t to) {
+        // Beyond the picture lies nothing, which is not the same as background.
+        const std::vector<float> nothing(static_cast<std::size_t>(width), 0.0f);
+        const auto rowOf = [&](int y) {
+            return y >= 0 && y < height ? d.q.row(y).data() : nothing.data();
+        };
         for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < s.width; ++x) {
+            const float *above = rowOf(y - 1), *here = rowOf(y), *below = rowOf(y + 1),
+                        *second = rowOf(y + 2);
+            const bool first = y == 0, last = y + 1 == height;
+            std::uint8_t* const info = d.info.row(y).data();
+            for (int x = 0; x < width; ++x) {
+                const float q = here[x];
+                if (!(q > 0.0f)) {
+                    info[x] = 0;
+                    continue;
+                }
+                const float left = x > 0 ? here[x - 1] : -1.0f;
+                const float right = x + 1 < width ? here[x + 1] : -1.0f;
                 std::uint8_t bits = 0;
-                const auto at = [&](int nx, int ny) {
-                    return d.q.contains(nx, ny) ? d.q.at(nx, ny) : 0.0f;
-                };
-                const float q = d.q.at(x, y);
-                if (linked(axis, s.step, at(x - 1, y), q, at(x + 1, y), at(x + 2, y)))
+                if (linked(axis, s.step, left, q, right, x + 2 < width ? here[x + 2] : 0.0f))
                     bits |= Info::kLinkRight;
-                if (linked(axis, s.step, at(x, y - 1), q, at(x, y + 1), at(x, y + 2)))
-                    bits |= Info::kLinkDown;
-                const auto empty = [&](int nx, int ny) {
-                    return d.q.contains(nx, ny) && d.q.at(nx, ny) == 0.0f;
-                };
-                if (d.q.at(x, y) > 0.0f &&
-                    (empty(x - 1, y) || empty(x + 1, y) || empty(x, y - 1) || empty(x, y + 1)))
+                if (linked(axis, s.step, above[x], q, below[x], second[x])) bits |= Info::kLinkDown;
+                if (left == 0.0f || right == 0.0f || (!first && above[x] == 0.0f) ||
+                    (!last && below[x] == 0.0f))
                     bits |= Info::kBesideBackground;
-                d.info.at(x, y) = bits;
+                info[x] = bits;
             }
         }
     });
@@ -161,20 +174,23 @@ void findEdges(Source& s, Draft& d) {
         for (int y = static_cast<int>(from) * kBlock; y < std::min<int>(to * kBlock, s.height);
              ++y) {
             for (int x = 0; x < s.width; ++x) {
-                const bool point = d.q.at(x, y) > 0.0f;
-                const bool all = point && d.linkRight(x, y) && d.linkDown(x, y) && x > 0 && y > 0 &&
+                const float q = d.q.at(x, y);
+                if (!(q > 0.0f)) {
+                    if (!(q < 0.0f)) distance.at(x, y) = 0;
+                    continue;
+                }
+                const bool all = d.linkRight(x, y) && d.linkDown(x, y) && x > 0 && y > 0 &&
                                  d.linkRight(x - 1, y) && d.linkDown(x, y - 1);
                 if (all && (!s.hasAlpha || d.covered.at(x, y))) continue;
                 // Where pruning took the neighbour away the surface goes on: that is the border of
                 // what has depth, but no edge.
-                const bool goesOn = point && x > 0 && y > 0 && x + 1 < s.width &&
-                                    y + 1 < s.height && (d.linkRight(x, y) || d.pruned(x + 1, y)) &&
+                const bool goesOn = x > 0 && y > 0 && x + 1 < s.width && y + 1 < s.height &&
+                                    (d.linkRight(x, y) || d.pruned(x + 1, y)) &&
                                     (d.linkDown(x, y) || d.pruned(x, y + 1)) &&
                                     (d.linkRight(x - 1, y) || d.pruned(x - 1, y)) &&
                                     (d.linkDown(x, y - 1) || d.pruned(x, y - 1));
-                if (!d.pruned(x, y) && !(goesOn && (!s.hasAlpha || d.covered.at(x, y))))
-                    distance.at(x, y) = 0;
-                if (!point || all) continue;
+                if (!(goesOn && (!s.hasAlpha || d.covered.at(x, y)))) distance.at(x, y) = 0;
+                if (all) continue;
                 auto& block =
                     s.blocks[static_cast<std::size_t>(y / kBlock) * s.blocksX + x / kBlock];
                 block.edges[y % kBlock] |= static_cast<std::uint16_t>(1u << (x % kBlock));
@@ -186,22 +202,28 @@ void findEdges(Source& s, Draft& d) {
     for (int round = 1; round < kFarFromEdge; ++round) {
         parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
             for (int y = static_cast<int>(from); y < to; ++y) {
-                const auto in = distance.row(y);
-                const auto out = rows.row(y);
-                for (int x = 0; x < s.width; ++x)
-                    out[x] =
-                        std::min({in[std::max(x - 1, 0)], in[x], in[std::min(x + 1, s.width - 1)]});
+                // Plain loops, of which compilers make vectors.
+                const std::uint8_t* in = distance.row(y).data();
+                std::uint8_t* out = rows.row(y).data();
+                const int last = s.width - 1;
+                out[0] = std::min(in[0], in[std::min(1, last)]);
+                for (int x = 1; x < last; ++x) {
+                    const std::uint8_t beside = std::min(in[x - 1], in[x + 1]);
+                    out[x] = std::min(beside, in[x]);
+                }
+                if (last > 0) out[last] = std::min(in[last - 1], in[last]);
             }
         });
         parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
             for (int y = static_cast<int>(from); y < to; ++y) {
-                const auto above = rows.row(std::max(y - 1, 0));
-                const auto here = rows.row(y);
-                const auto below = rows.row(std::min(y + 1, s.height - 1));
-                const auto out = distance.row(y);
+                const std::uint8_t* above = rows.row(std::max(y - 1, 0)).data();
+                const std::uint8_t* here = rows.row(y).data();
+                const std::uint8_t* below = rows.row(std::min(y + 1, s.height - 1)).data();
+                std::uint8_t* out = distance.row(y).data();
                 for (int x = 0; x < s.width; ++x) {
-                    const std::uint8_t nearest = std::min({above[x], here[x], below[x]});
-                    out[x] = std::min<std::uint8_t>(out[x], static_cast<std::uint8_t>(nearest + 1));
+                    const std::uint8_t beside = std::min(above[x], below[x]);
+                    const auto next = static_cast<std::uint8_t>(std::min(beside, here[x]) + 1);
+                    out[x] = std::min(out[x], next);
                 }
             }
         });
