@@ -59,7 +59,8 @@ class Rasterizer {
 
   private:
     /// False for what no sample of `samples` a pixel and side, and no pixel's centre, can see.
-    bool setUp(std::uint32_t triangle, int samples, SetUp& out) const;
+    /// `boxOnly`: the edges and the nearness are left as they are.
+    bool setUp(std::uint32_t triangle, int samples, SetUp& out, bool boxOnly) const;
     /// What is seen at the samples of a tile.
     struct Tile {
         /// Of the triangles that may show in it; slots are their numbers here. Those of all tiles
@@ -96,7 +97,7 @@ class Rasterizer {
     MaterialSampler sampler_;
 };
 
-bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
+bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out, bool boxOnly) const {
     const auto& t = mesh_.triangles[triangle];
     glm::dvec3 v[3];  // (x * w, y * w, w) in pixels
     double dist[3];
@@ -110,18 +111,11 @@ bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
     }
     if (!anyInFront) return false;
 
-    glm::dvec3 e[3] = {glm::cross(v[1], v[2]), glm::cross(v[2], v[0]), glm::cross(v[0], v[1])};
-    const double det = glm::dot(v[0], e[0]);
+    const glm::dvec3 first = glm::cross(v[1], v[2]);
+    const double det = glm::dot(v[0], first);
     if (!(det != 0) || !std::isfinite(det)) return false;
     // In pixels y runs down, so counter-clockwise front faces have a negative determinant.
     if (det > 0 && !mesh_.materials[mesh_.triangleMaterial[triangle]].doubleSided) return false;
-    const double sign = det > 0 ? 1.0 : -1.0;
-    for (int k = 0; k < 3; ++k) out.edge[k] = {sign * e[k].x, sign * e[k].y, sign * e[k].z};
-    const double inverse = 1.0 / std::abs(det);
-    glm::dvec3 n(0.0);
-    for (int k = 0; k < 3; ++k)
-        n += sign * e[k] * ((camera_.orthographic ? -dist[k] : 1.0) * inverse);
-    out.nearness = {n.x, n.y, n.z};
     out.triangle = triangle;
 
     const glm::dvec2 size(camera_.width, camera_.height);
@@ -143,6 +137,16 @@ bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
         // Most of the triangles of a dense mesh lie between the samples.
         if (!holdsSample(out, samples) && !holdsSample(out, 1)) return false;
     }
+    if (boxOnly) return true;
+
+    const glm::dvec3 e[3] = {first, glm::cross(v[2], v[0]), glm::cross(v[0], v[1])};
+    const double sign = det > 0 ? 1.0 : -1.0;
+    for (int k = 0; k < 3; ++k) out.edge[k] = {sign * e[k].x, sign * e[k].y, sign * e[k].z};
+    const double inverse = 1.0 / std::abs(det);
+    glm::dvec3 n(0.0);
+    for (int k = 0; k < 3; ++k)
+        n += sign * e[k] * ((camera_.orthographic ? -dist[k] : 1.0) * inverse);
+    out.nearness = {n.x, n.y, n.z};
     return true;
 }
 
@@ -433,7 +437,7 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
         SetUp s;
-        if (!setUp(t, settings.supersampling, s)) continue;
+        if (!setUp(t, settings.supersampling, s, true)) continue;
         const glm::ivec2 first = glm::ivec2(s.low) / kTile,
                          last = glm::min(glm::ivec2(s.high), glm::ivec2(w, h) - 1) / kTile;
         for (int ty = first.y; ty <= last.y; ++ty) {
@@ -452,10 +456,10 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
                     return;
                 }
                 const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
-                // Once more: to keep them takes more memory, and as long.
+                // Once more: to keep those of all tiles takes several times the mesh.
                 tile.setUps.resize(bins[i].size());
                 for (std::size_t k = 0; k < bins[i].size(); ++k)
-                    (void)setUp(bins[i][k], settings.supersampling, tile.setUps[k]);
+                    (void)setUp(bins[i][k], settings.supersampling, tile.setUps[k], false);
                 drawTile(tx, ty, settings.supersampling, tile);
                 shadeTile(tx, ty, settings, tile, out);
                 if (settings.supersampling > 1) drawTile(tx, ty, 1, tile);
