@@ -19,11 +19,16 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <memory>
 #include <stdexcept>
 #include <system_error>
 
 #include "formats/exr/exr_adapt.hpp"
 #include "formats/exr/exr_streams.hpp"
+#include "formats/exr/exr_zip.hpp"
+#include "lib/base/parallel.hpp"
 
 namespace stx {
 
@@ -148,8 +153,15 @@ struct ExrReader::Impl {
     std::unique_ptr<Imf::IStream> stream;
     std::unique_ptr<Imf::MultiPartInputFile> file;
     std::vector<ExrPart> parts;
+    std::vector<ExrChunks> chunks;  ///< of each part; empty when they were not found
 
     Result<void> readHeaders(const Limits& limits);
+    /// The pixels of a part of scan lines and zip compression, without the library, whose zlib
+    /// would take most of the time. False, and anything in `pixels`, for other parts and for
+    /// whatever is wrong with this one: the library says what.
+    bool readZipped(int index, const std::vector<ExrPixels>& pixels) const;
+    bool readZippedChunk(int index, std::size_t chunk, int lines,
+                         const std::vector<ExrPixels>& pixels) const;
     bool readAt(std::uint64_t offset, void* to, std::size_t count) const {
         if (offset > size || count > size - offset) return false;
         if (!stream->isMemoryMapped())
@@ -159,6 +171,85 @@ struct ExrReader::Impl {
         return true;
     }
 };
+
+bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, int lines,
+                                      const std::vector<ExrPixels>& pixels) const {
+    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const auto width = static_cast<std::size_t>(part.width);
+    const int top = static_cast<int>(chunk) * lines;
+    const int rows = std::min(lines, part.height - top);
+    std::size_t rowBytes = 0;
+    for (const auto& c : part.channels)
+        rowBytes += width * (c.type == ExrChannel::Type::half ? 2 : 4);
+    // Of several parts each chunk says whose it is; then its first line, its size.
+    std::int32_t head[3] = {};
+    const std::size_t numbers = parts.size() > 1 ? 3 : 2;
+    const std::uint64_t at = chunks[static_cast<std::size_t>(index)].offsets[chunk];
+    if (!readAt(at, head, 4 * numbers)) return false;
+    if (numbers == 3 && head[0] != index) return false;
+    const int first = file->header(index).dataWindow().min.y + top;
+    const std::int32_t stored = head[numbers - 1];
+    if (head[numbers - 2] != first || stored < 1) return false;
+    // Deflate gives at most 1032 bytes for one; memory is taken for no more.
+    const std::size_t rawBytes = rowBytes * static_cast<std::size_t>(rows);
+    if (static_cast<std::size_t>(stored) > rawBytes ||
+        rawBytes / 1032 > static_cast<std::size_t>(stored))
+        return false;
+    std::vector<std::uint16_t> raw(rawBytes / 2);
+    const auto packed =
+        std::make_unique_for_overwrite<std::byte[]>(static_cast<std::size_t>(stored));
+    if (!readAt(at + 4 * numbers, packed.get(), static_cast<std::size_t>(stored)) ||
+        !exr::unzipChunk({packed.get(), static_cast<std::size_t>(stored)},
+                         {reinterpret_cast<std::uint8_t*>(raw.data()), rawBytes}))
+        return false;
+    for (const auto& p : pixels) {
+        std::size_t before = 0;  // 16-bit words of a row
+        const ExrChannel* channel = nullptr;
+        for (const auto& c : part.channels) {
+            if (c.name == p.channel) {
+                channel = &c;
+                break;
+            }
+            before += width * (c.type == ExrChannel::Type::half ? 1 : 2);
+        }
+        if (!channel) continue;
+        for (int y = 0; y < rows; ++y) {
+            const std::uint16_t* from =
+                raw.data() + static_cast<std::size_t>(y) * rowBytes / 2 + before;
+            float* to = p.values + static_cast<std::size_t>(top + y) * width * p.stride;
+            if (channel->type == ExrChannel::Type::half)
+                exr::floatsFrom({from, width}, to, p.stride);
+            else
+                for (std::size_t x = 0; x < width; ++x)
+                    std::memcpy(to + x * p.stride, from + 2 * x, sizeof(float));
+        }
+    }
+    return true;
+}
+
+bool ExrReader::Impl::readZipped(int index, const std::vector<ExrPixels>& pixels) const {
+    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const Imf::Header& header = file->header(index);
+    if (header.hasTileDescription() || (header.hasType() && header.type() != Imf::SCANLINEIMAGE) ||
+        (part.compression != "zip" && part.compression != "zips"))
+        return false;
+    const int lines = part.compression == "zip" ? exr::kZipRows : 1;
+    const auto count = static_cast<std::size_t>((part.height + lines - 1) / lines);
+    if (static_cast<std::size_t>(index) >= chunks.size() ||
+        chunks[static_cast<std::size_t>(index)].offsets.size() != count)
+        return false;
+    for (const auto& c : part.channels) {
+        if (c.xSampling != 1 || c.ySampling != 1 || c.type == ExrChannel::Type::uint32)
+            return false;
+    }
+    // Of a file that is damaged most chunks are not worth the work.
+    std::atomic<bool> whole = true;
+    parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t i) {
+        if (whole && !readZippedChunk(index, static_cast<std::size_t>(i), lines, pixels))
+            whole = false;
+    });
+    return whole;
+}
 
 ExrReader::ExrReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 ExrReader::ExrReader(ExrReader&&) noexcept = default;
@@ -193,12 +284,11 @@ Result<void> ExrReader::Impl::readHeaders(const Limits& limits) {
                 return tl::unexpected(ok.error().at(where));
             parts.push_back(partFrom(file->header(i)));
         }
-        const auto bytesPerPart =
-            exrBytesPerPart([this](std::uint64_t offset, void* to,
-                                   std::size_t count) { return readAt(offset, to, count); },
-                            size);
-        for (std::size_t i = 0; i < std::min(parts.size(), bytesPerPart.size()); ++i)
-            parts[i].bytes = bytesPerPart[i];
+        chunks = exrChunksOfParts([this](std::uint64_t offset, void* to,
+                                         std::size_t count) { return readAt(offset, to, count); },
+                                  size);
+        for (std::size_t i = 0; i < std::min(parts.size(), chunks.size()); ++i)
+            parts[i].bytes = chunks[i].bytes;
         return {};
     });
 }
@@ -267,7 +357,7 @@ Result<void> ExrReader::readPart(int index, const std::vector<ExrPixels>& pixels
                           Imf::Slice::Make(Imf::FLOAT, p.values, window, p.stride * sizeof(float),
                                            p.stride * sizeof(float) * part.width));
         }
-        if (buffer.begin() == buffer.end()) return {};
+        if (buffer.begin() == buffer.end() || impl_->readZipped(index, pixels)) return {};
         in.setFrameBuffer(buffer);
         in.readPixels(window.min.y, window.max.y);
         return {};

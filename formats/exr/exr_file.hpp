@@ -145,9 +145,15 @@ class ExrWriter {
     const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
     std::uint64_t fileSize);
 
-/// Bytes of the pixels of each part, by the tables of offsets; empty when they cannot be found.
-/// Part of ExrReader, by itself because it needs no library.
-[[nodiscard]] std::vector<std::uint64_t> exrBytesPerPart(
+/// The chunks of one part, by the table of offsets.
+struct ExrChunks {
+    std::vector<std::uint64_t> offsets;  ///< in the file, each below its size
+    std::uint64_t bytes = 0;             ///< of all of them
+};
+
+/// The chunks of each part; empty when they cannot be found. Part of ExrReader, by itself because
+/// it needs no library.
+[[nodiscard]] std::vector<ExrChunks> exrChunksOfParts(
     const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
     std::uint64_t fileSize);
 

@@ -176,7 +176,7 @@ Result<void> checkExrHeaders(
     }
 }
 
-std::vector<std::uint64_t> exrBytesPerPart(
+std::vector<ExrChunks> exrChunksOfParts(
     const std::function<bool(std::uint64_t offset, void* to, std::size_t size)>& readAt,
     std::uint64_t fileSize) {
     Cursor cursor(readAt, fileSize);
@@ -216,21 +216,22 @@ std::vector<std::uint64_t> exrBytesPerPart(
     }
     // A chunk ends where the next one begins, whichever part that belongs to.
     std::vector<std::pair<std::uint64_t, std::size_t>> starts;
+    std::vector<ExrChunks> parts(chunks.size());
     for (std::size_t part = 0; part < chunks.size(); ++part) {
         for (std::uint64_t i = 0; i < chunks[part]; ++i) {
             std::uint64_t offset = 0;
             if (!cursor.readOffset(offset)) return {};
             if (offset == 0 || offset > fileSize) return {};
             starts.emplace_back(offset, part);
+            parts[part].offsets.push_back(offset);
         }
     }
     std::sort(starts.begin(), starts.end());
-    std::vector<std::uint64_t> bytes(chunks.size(), 0);
     for (std::size_t i = 0; i < starts.size(); ++i) {
         const std::uint64_t end = i + 1 < starts.size() ? starts[i + 1].first : fileSize;
-        bytes[starts[i].second] += end - starts[i].first;
+        parts[starts[i].second].bytes += end - starts[i].first;
     }
-    return bytes;
+    return parts;
 }
 
 }  // namespace stx

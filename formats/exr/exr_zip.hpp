@@ -20,4 +20,11 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 /// when that does not make it smaller, as OpenEXR wants it. Throws std::bad_alloc.
 [[nodiscard]] Bytes zipChunk(std::span<const std::uint8_t> raw, int level);
 
+/// The inverse of halvesFrom(), exact: writes every `stride`-th of `to`.
+void floatsFrom(std::span<const std::uint16_t> halves, float* to, std::size_t stride);
+
+/// The inverse of zipChunk(): fills `raw`. False, and anything in `raw`, when the bytes are damaged
+/// or hold another number of bytes. Throws std::bad_alloc.
+[[nodiscard]] bool unzipChunk(ByteSpan stored, std::span<std::uint8_t> raw);
+
 }  // namespace stx::exr

@@ -17,6 +17,10 @@ struct FreeCompressor {
     void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
 };
 using Compressor = std::unique_ptr<libdeflate_compressor, FreeCompressor>;
+struct FreeDecompressor {
+    void operator()(libdeflate_decompressor* d) const { libdeflate_free_decompressor(d); }
+};
+using Decompressor = std::unique_ptr<libdeflate_decompressor, FreeDecompressor>;
 
 #ifdef STX_WITH_ISAL
 std::size_t compressFast(std::span<const std::byte> from, std::span<std::byte> to) {
@@ -57,6 +61,13 @@ std::size_t compressZlib(std::span<const std::byte> from, int level, std::span<s
     if (!compressor) throw std::bad_alloc();
     return libdeflate_zlib_compress(compressor.get(), from.data(), from.size(), to.data(),
                                     to.size());
+}
+
+bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to) {
+    const Decompressor decompressor(libdeflate_alloc_decompressor());
+    if (!decompressor) throw std::bad_alloc();
+    return libdeflate_zlib_decompress(decompressor.get(), from.data(), from.size(), to.data(),
+                                      to.size(), nullptr) == LIBDEFLATE_SUCCESS;
 }
 
 }  // namespace stx

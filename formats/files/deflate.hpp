@@ -15,4 +15,8 @@ namespace stx {
 [[nodiscard]] std::size_t compressZlib(std::span<const std::byte> from, int level,
                                        std::span<std::byte> to);
 
+/// The inverse: fills all of `to` with what a zlib stream holds, by libdeflate. False, and anything
+/// in `to`, when the stream is damaged or holds another number of bytes. Throws std::bad_alloc.
+[[nodiscard]] bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to);
+
 }  // namespace stx
