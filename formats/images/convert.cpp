@@ -67,7 +67,12 @@ Image<glm::u8vec4> rgba8From(const DecodedImage& image) {
             return glm::u8vec4(colour(red), colour(green), colour(blue), to8(cover));
         });
     };
-    if (const auto* v8 = std::get_if<0>(&image.values)) {
+    if (const auto* v8 = std::get_if<0>(&image.values); v8 && !premultiplied) {
+        // What most pictures are: nothing to compute.
+        pixel(v8->data(), [](auto red, auto green, auto blue, const auto* alpha) {
+            return glm::u8vec4(red, green, blue, alpha ? *alpha : 255);
+        });
+    } else if (v8) {
         integers(v8->data(), 255);
     } else if (const auto* v16 = std::get_if<1>(&image.values)) {
         integers(v16->data(), 65535);

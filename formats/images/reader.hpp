@@ -27,9 +27,9 @@ class ImageReader {
     ImageInfo info_;
 };
 
-/// Readers of bytes that begin as a PNG (libspng) or JPEG (libjpeg-turbo); `bytes` must outlive
-/// them. No memory is taken for pixels before read(). Errors: invalidInput; unsupported for kinds
-/// of pixels that the library cannot decode.
+/// Readers of bytes that begin as a PNG (libdeflate, else libspng) or JPEG (libjpeg-turbo); `bytes`
+/// must outlive them. No memory is taken for pixels before read(). Errors: invalidInput;
+/// unsupported for kinds of pixels that the library cannot decode.
 [[nodiscard]] Result<std::unique_ptr<ImageReader>> openPng(ByteSpan bytes);
 [[nodiscard]] Result<std::unique_ptr<ImageReader>> openJpeg(ByteSpan bytes, const Limits& limits);
 
