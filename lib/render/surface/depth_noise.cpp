@@ -26,8 +26,6 @@ constexpr float kAim = 0.001f;
 constexpr float kAgree = 2.0f;
 /// Points further from the plane than so many standard deviations are on another surface.
 constexpr float kFirstBand = 4.0f, kBand = 2.5f;
-/// What is left counts as so many of its standard deviations.
-constexpr float kDoubt = 2.0f;
 /// Neighbours that must be on one surface around a pinhole, within this share of q and kBand
 /// standard deviations. (Between leaves fewer are not a surface.)
 constexpr int kLeastNeighbours = 8;
@@ -117,9 +115,10 @@ float depthNoise(const Image<float>& q, const DepthAxis& axis) {
     return *middle / kSmallestOfFour;
 }
 
-float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise) {
+float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm::vec3>* surface) {
     if (noise < kLeastNoise) return 0.0f;
     const Image<float> from = q;
+    if (surface) *surface = Image<glm::vec3>(q.width(), q.height(), glm::vec3(0.0f));
     std::vector<double> left(static_cast<std::size_t>(q.height()), 0.0);
     std::vector<std::int64_t> points(left.size(), 0);
     parallelForBlocks(0, q.height(), 8, [&](std::int64_t first, std::int64_t last) {
@@ -131,6 +130,7 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise) {
                 LocalPlane plane{here};
                 float value = here, least = here - kAgree * sigma, most = here + kAgree * sigma;
                 float doubt = sigma;
+                glm::vec2 slope(0.0f);
                 for (const int radius : kRadii) {
                     plane = fitAround(from, x, y, radius, plane,
                                       (radius == kRadii[0] ? kFirstBand : kBand) * sigma);
@@ -139,10 +139,12 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise) {
                     most = std::min(most, plane.q0 + kAgree * deviation);
                     if (least > most) break;  // the surface bends
                     value = plane.q0;
+                    slope = {plane.gx, plane.gy};
                     doubt = deviation;
                     if (deviation < kAim * axis.relativeScale(here)) break;
                 }
                 if (value > 0.0f) q.at(x, y) = value;
+                if (surface) surface->at(x, y) = glm::vec3(slope, doubt);
                 left[static_cast<std::size_t>(y)] += doubt / axis.relativeScale(here);
                 ++points[static_cast<std::size_t>(y)];
             }

@@ -7,6 +7,9 @@
 
 namespace stx::surface {
 
+/// What smoothing leaves counts as so many of its standard deviations.
+inline constexpr float kDoubt = 2.0f;
+
 /// How noisy the depth of a view is: the standard deviation of what each pixel has of its own, as a
 /// share of q; 0 when nothing can be told. `q` is as in PreparedPage. From second differences along
 /// four directions: at edges and creases one of them runs along the edge, noise is in all.
@@ -17,8 +20,9 @@ namespace stx::surface {
 /// point grows until its estimates disagree (Goldenshluger & Nemirovski 1997: intersection of
 /// confidence intervals), so that creases and leaves stay. `noise` is depthNoise(). Gives how far
 /// off points may be then, a share of q; 0 when nothing was done. The same on any number of
-/// threads.
-float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise);
+/// threads. `surface`, if any, gets NoisyView::surface when something was done.
+float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise,
+                  Image<glm::vec3>* surface = nullptr);
 
 /// Gives single pixels that a sensor missed (full cover, no depth) the depth of the surface around
 /// them, when all of their neighbours are on one. `covered`: 1 = full alpha.

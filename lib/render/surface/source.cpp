@@ -6,6 +6,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/surface/depth_noise.hpp"
+#include "lib/render/surface/noisy_views.hpp"
 
 namespace stx::surface {
 namespace {
@@ -24,8 +25,6 @@ constexpr double kPlanarNoise = 1.5;
 constexpr float kPlanarMost = 3.0f;
 /// Depth noisier than this share of q counts as this noisy.
 constexpr float kMostNoise = 0.01f;
-/// Of orthographic cameras: depth range in parts of the window's larger side.
-constexpr double kOrthographicRange = 1.2;
 
 /// Whether neighbours b and c lie on one surface, given the pixels before and after them (0 =
 /// none). Small steps always do; larger ones when the surface goes on with the same slope.
@@ -397,7 +396,9 @@ float typicalDist(const Source& s, const Draft& d) {
     return 1.0f / *middle;
 }
 
-void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
+/// The first half of preparing a source: its points. Those of a noisy view may be improved before
+/// finishSource().
+Draft beginSource(Source& s, NoisyView& noisy) {
     const Camera& camera = s.view->camera;
     s.width = camera.width;
     s.height = camera.height;
@@ -413,8 +414,13 @@ void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
     s.validShare = validShareOf(d);
     const float noise = depthNoise(d.q, s.space.axis);
     closePinholes(d.q, d.covered, s.space.axis, noise);
+    noisy.left = smoothDepth(d.q, s.space.axis, noise, &noisy.surface);
+    noisy.space = &s.space;
+    return d;
+}
+
+void finishSource(Source& s, Draft&& d, float left, std::vector<PreparedPage>& pages) {
     // What smoothing leaves is like the step of a coarser depth code.
-    const float left = smoothDepth(d.q, s.space.axis, noise);
     if (left > 0) s.step = std::max(s.step, left * typicalDist(s, d));
     findLinks(s, d);
     findEdges(s, d);
@@ -423,50 +429,6 @@ void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
 }
 
 }  // namespace
-
-PixelSpace::PixelSpace(const Camera& c, double farthest) : camera(c) {
-    axis.inverse = !c.orthographic;
-    if (c.orthographic) {
-        // A depth range as wide as the window makes shares of it mean what they do in perspective.
-        axis.unit = kOrthographicRange * std::max(c.width / c.fx, c.height / c.fy);
-        axis.origin = farthest + axis.unit;
-    }
-    // Columns of camera points (X, Y, Z, 1) up to scale over (x, y, q, 1), and back.
-    glm::dmat4 cameraFromPixel(0.0), pixelFromCamera(0.0);
-    cameraFromPixel[0][0] = 1.0 / c.fx;
-    cameraFromPixel[3][0] = -c.cx / c.fx;
-    cameraFromPixel[1][1] = -1.0 / c.fy;
-    cameraFromPixel[3][1] = c.cy / c.fy;
-    pixelFromCamera[0][0] = c.fx;
-    pixelFromCamera[1][1] = -c.fy;
-    if (axis.inverse) {
-        cameraFromPixel[3][2] = -1.0;
-        cameraFromPixel[2][3] = 1.0;
-        pixelFromCamera[2][0] = -c.cx;
-        pixelFromCamera[2][1] = -c.cy;
-        pixelFromCamera[3][2] = 1.0;
-        pixelFromCamera[2][3] = -1.0;
-    } else {
-        cameraFromPixel[2][2] = axis.unit;
-        cameraFromPixel[3][2] = -axis.origin;
-        cameraFromPixel[3][3] = 1.0;
-        pixelFromCamera[3][0] = c.cx;
-        pixelFromCamera[3][1] = c.cy;
-        pixelFromCamera[2][2] = 1.0 / axis.unit;
-        pixelFromCamera[3][2] = axis.origin / axis.unit;
-        pixelFromCamera[3][3] = 1.0;
-    }
-    pixelFromWorld = pixelFromCamera * c.cameraFromWorld();
-    worldFromPixel = c.worldFromCamera() * cameraFromPixel;
-}
-
-Warp warpFrom(const glm::dmat4& m) {
-    Warp w;
-    for (int row = 0; row < 4; ++row)
-        for (int column = 0; column < 4; ++column)
-            w.m[static_cast<std::size_t>(row * 4 + column)] = static_cast<float>(m[column][row]);
-    return w;
-}
 
 Place Source::placeAmongRectangles(int x, int y) const {
     const int x0 = std::max(x, 0), y0 = std::max(y, 0);
@@ -537,6 +499,31 @@ std::vector<std::int32_t> placesOfBlocks(const Source& s) {
     return places;
 }
 
+/// Views that fill their pages, side by side. Those with noisy depth wait for each other.
+void prepareWhole(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
+    std::vector<Draft> drafts(sources.size());
+    std::vector<NoisyView> views(sources.size());
+    parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        drafts[k] = beginSource(sources[k], views[k]);
+        if (!(views[k].left > 0)) finishSource(sources[k], std::move(drafts[k]), 0.0f, pages);
+    });
+    std::vector<std::size_t> waiting;
+    std::vector<NoisyView> noisy;
+    for (std::size_t k = 0; k < sources.size(); ++k) {
+        if (!(views[k].left > 0)) continue;
+        waiting.push_back(k);
+        noisy.push_back(std::move(views[k]));
+        noisy.back().q = &drafts[k].q;
+    }
+    agreeOnDepth(noisy);
+    parallelFor(0, static_cast<std::int64_t>(waiting.size()), [&](std::int64_t i) {
+        const auto n = static_cast<std::size_t>(i);
+        const std::size_t k = waiting[n];
+        finishSource(sources[k], std::move(drafts[k]), noisy[n].left, pages);
+    });
+}
+
 }  // namespace
 
 SurfaceScene::SurfaceScene(const PageSet& pageSet) : set(pageSet) {
@@ -556,9 +543,7 @@ SurfaceScene::SurfaceScene(const PageSet& pageSet) : set(pageSet) {
             whole = false;
     }
     if (whole) {
-        parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
-            prepareSource(sources[static_cast<std::size_t>(i)], pages);
-        });
+        prepareWhole(sources, pages);
         return;
     }
     for (std::size_t i = 0; i < pages.size(); ++i) {
@@ -568,7 +553,9 @@ SurfaceScene::SurfaceScene(const PageSet& pageSet) : set(pageSet) {
     }
     // One after the other: a draft takes the memory of a whole view.
     for (Source& s : sources) {
-        prepareSource(s, pages);
+        NoisyView noisy;
+        Draft d = beginSource(s, noisy);
+        finishSource(s, std::move(d), noisy.left, pages);
         if (!s.whole) s.placeOfBlock = placesOfBlocks(s);
     }
 }

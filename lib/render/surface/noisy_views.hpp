@@ -1,0 +1,28 @@
+#pragma once
+
+#include <span>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/image.hpp"
+#include "lib/render/surface/source.hpp"
+
+namespace stx::surface {
+
+/// A view whose depth was noisy, after smoothDepth().
+struct NoisyView {
+    const PixelSpace* space = nullptr;
+    Image<float>* q = nullptr;  ///< as in PreparedPage
+    /// Of each point: dq/dx and dq/dy of its surface, and how far off q may be (one standard
+    /// deviation, in q).
+    Image<glm::vec3> surface;
+    float left = 0.0f;  ///< how far off points may be, a share of q; see smoothDepth()
+};
+
+/// Moves the points of each view along their rays to where the views around it show the same
+/// surface: the mean of all that agree within their noise, each weighted by one over the variance
+/// that it has along the ray. Surfaces seen from behind do not count. What is left of the noise
+/// becomes less by that. The same on any number of threads.
+void agreeOnDepth(std::span<NoisyView> views);
+
+}  // namespace stx::surface

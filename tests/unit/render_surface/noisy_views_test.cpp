@@ -1,0 +1,105 @@
+#include "lib/render/surface/noisy_views.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lib/render/surface/depth_noise.hpp"
+#include "tests/noisy_depth.hpp"
+
+namespace stx::surface {
+namespace {
+
+constexpr int kPictureSide = 64;
+constexpr double kSheetDist = 10.0, kSheetNoise = 0.004;
+
+/// A camera that looks at the middle of the plane z = 0 from an angle around the y axis.
+PixelSpace spaceAt(double angle) {
+    Camera camera;
+    camera.position = {kSheetDist * std::sin(angle), 0, kSheetDist * std::cos(angle)};
+    camera.orientation = *lookAt(camera.position, {0, 0, 0});
+    camera.width = camera.height = kPictureSide;
+    camera.fx = camera.fy = 100;
+    camera.cx = camera.cy = 0.5 * kPictureSide;
+    return PixelSpace(camera, 2 * kSheetDist);
+}
+
+/// Views of that plane as prepareSource() has them before they are compared.
+struct Sheet {
+    std::vector<PixelSpace> spaces;
+    std::vector<Image<float>> exact, q;
+    std::vector<NoisyView> views;
+
+    /// `behind`: how far behind the plane the last view has it, scene units.
+    explicit Sheet(const std::vector<double>& angles, double behind = 0) {
+        for (const double angle : angles) spaces.push_back(spaceAt(angle));
+        for (std::size_t i = 0; i < angles.size(); ++i) {
+            Image<float> image(kPictureSide, kPictureSide);
+            const Camera& camera = spaces[i].camera;
+            const double z = i + 1 == angles.size() ? -behind : 0;
+            for (int y = 0; y < kPictureSide; ++y) {
+                for (int x = 0; x < kPictureSide; ++x) {
+                    const glm::dvec3 ray =
+                        camera.orientation * camera.unproject(x + 0.5, y + 0.5, 1.0);
+                    image.at(x, y) = static_cast<float>(ray.z / (z - camera.position.z));
+                }
+            }
+            exact.push_back(image);
+            for (std::size_t k = 0; k < image.count(); ++k)
+                image.data()[k] *= static_cast<float>(1 + kSheetNoise * noisy::normal(i, k));
+            q.push_back(image);
+        }
+        views.resize(angles.size());
+        for (std::size_t i = 0; i < angles.size(); ++i) {
+            views[i].left = smoothDepth(q[i], {}, kSheetNoise, &views[i].surface);
+            views[i].space = &spaces[i];
+            views[i].q = &q[i];
+        }
+    }
+
+    /// Root of the mean square of what a view is off by, a share of q.
+    [[nodiscard]] double off(std::size_t view) const {
+        double sum = 0;
+        for (std::size_t k = 0; k < q[view].count(); ++k) {
+            const double d = q[view].data()[k] / exact[view].data()[k] - 1;
+            sum += d * d;
+        }
+        return std::sqrt(sum / static_cast<double>(q[view].count()));
+    }
+};
+
+TEST(NoisyViews, AreLessNoisyTogether) {
+    Sheet sheet({-0.3, -0.1, 0.1, 0.3});
+    const double before = sheet.off(1);
+    const float left = sheet.views[1].left;
+    agreeOnDepth(sheet.views);
+    EXPECT_LT(sheet.off(1), 0.75 * before);
+    EXPECT_LT(sheet.views[1].left, 0.75f * left);
+    EXPECT_GT(sheet.views[1].left, sheet.off(1));
+}
+
+TEST(NoisyViews, OtherSurfacesAndTheirBacksDoNotCount) {
+    // Seen from behind, and a surface that lies 3 % of the distance farther away.
+    for (Sheet sheet : {Sheet({0.1, 3.1}), Sheet({0.1, -0.1}, 0.3)}) {
+        for (std::size_t i = 0; i < 2; ++i) sheet.views[i].q = &sheet.q[i];
+        for (std::size_t i = 0; i < 2; ++i) sheet.views[i].space = &sheet.spaces[i];
+        const Image<float> before = sheet.q[0];
+        agreeOnDepth(sheet.views);
+        for (std::size_t k = 0; k < before.count(); ++k)
+            ASSERT_EQ(sheet.q[0].data()[k], before.data()[k]) << k;
+    }
+}
+
+TEST(NoisyViews, OneAloneStaysAsItIs) {
+    Sheet sheet({0.2});
+    const Image<float> before = sheet.q[0];
+    const float left = sheet.views[0].left;
+    agreeOnDepth(sheet.views);
+    EXPECT_EQ(sheet.views[0].left, left);
+    for (std::size_t k = 0; k < before.count(); ++k)
+        ASSERT_EQ(sheet.q[0].data()[k], before.data()[k]);
+}
+
+}  // namespace
+}  // namespace stx::surface
