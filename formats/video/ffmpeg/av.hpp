@@ -44,8 +44,19 @@ struct FreePacket {
 struct FreeCodec {
     void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
 };
+struct FreeFilm {
+    void operator()(AVFormatContext* film) const { avformat_close_input(&film); }
+};
+struct FreeIo {
+    void operator()(AVIOContext* io) const {
+        av_freep(&io->buffer);
+        avio_context_free(&io);
+    }
+};
 using FramePtr = std::unique_ptr<AVFrame, FreeFrame>;
 using PacketPtr = std::unique_ptr<AVPacket, FreePacket>;
 using CodecPtr = std::unique_ptr<AVCodecContext, FreeCodec>;
+using FilmPtr = std::unique_ptr<AVFormatContext, FreeFilm>;
+using IoPtr = std::unique_ptr<AVIOContext, FreeIo>;
 
 }  // namespace stx::video

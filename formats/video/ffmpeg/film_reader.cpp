@@ -27,11 +27,11 @@ FilmReader::FilmReader(int file, const std::string& format) {
     source_.size = facts.st_size;
     const AVInputFormat* reader = av_find_input_format(format.c_str());
     if (!reader) refuse(ErrorCode::unsupported, "libavformat has no reader of {}", format);
-    film_ = avformat_alloc_context();
+    film_.reset(avformat_alloc_context());
     auto* buffer = static_cast<unsigned char*>(av_malloc(kBufferBytes));
     packet_.reset(av_packet_alloc());
     if (!film_ || !buffer || !packet_) throw std::bad_alloc();
-    film_->pb = avio_alloc_context(
+    io_.reset(avio_alloc_context(
         buffer, kBufferBytes, 0, &source_,
         [](void* context, std::uint8_t* to, int count) {
             auto& source = *static_cast<Source*>(context);
@@ -49,8 +49,9 @@ FilmReader::FilmReader(int file, const std::string& format) {
             if (whence == SEEK_END) offset += source.size;
             if (offset < 0) return AVERROR(EINVAL);
             return source.at = offset;
-        });
-    if (!film_->pb) throw std::bad_alloc();
+        }));
+    if (!io_) throw std::bad_alloc();
+    film_->pb = io_.get();
     film_->flags |= AVFMT_FLAG_CUSTOM_IO;
     // Films name other films, lists and addresses; none is opened.
     film_->io_open = [](AVFormatContext*, AVIOContext**, const char*, int, AVDictionary**) {
@@ -60,18 +61,15 @@ FilmReader::FilmReader(int file, const std::string& format) {
     av_dict_set(&options, "protocol_whitelist", "none", 0);
     // Looking at the tracks decodes their first pictures.
     av_dict_set(&options, "codec_whitelist", allowedDecoders().c_str(), 0);
-    const int error = avformat_open_input(&film_, nullptr, reader, &options);
+    AVFormatContext* opening = film_.release();  // freed there when it fails
+    const int error = avformat_open_input(&opening, nullptr, reader, &options);
+    film_.reset(opening);
     av_dict_free(&options);
     if (error < 0)
         refuse(ErrorCode::invalidInput, "it is not a whole {} file: {}", reader->long_name,
                wordsOf(error));
-    if (const int found = avformat_find_stream_info(film_, nullptr); found < 0)
+    if (const int found = avformat_find_stream_info(film_.get(), nullptr); found < 0)
         refuse(ErrorCode::invalidInput, "its tracks cannot be read: {}", wordsOf(found));
-}
-
-FilmReader::~FilmReader() {
-    // The process ends soon; only its parent counts.
-    avformat_close_input(&film_);
 }
 
 std::vector<std::byte> FilmReader::describe() const {
@@ -154,7 +152,7 @@ const AVPacket* FilmReader::next() {
     }
     for (;;) {
         av_packet_unref(packet_.get());
-        const int got = av_read_frame(film_, packet_.get());
+        const int got = av_read_frame(film_.get(), packet_.get());
         if (got == AVERROR_EOF) return nullptr;
         if (got < 0) refuse(ErrorCode::invalidInput, "the film is cut off: {}", wordsOf(got));
         if (packet_->stream_index != track_) continue;
@@ -167,8 +165,8 @@ const AVPacket* FilmReader::next() {
 
 void FilmReader::rewind() {
     held_ = ended_ = false;
-    const int error = avformat_seek_file(film_, -1, INT64_MIN, INT64_MIN, INT64_MAX, 0);
-    if (error < 0 && av_seek_frame(film_, -1, 0, AVSEEK_FLAG_BACKWARD) < 0)
+    const int error = avformat_seek_file(film_.get(), -1, INT64_MIN, INT64_MIN, INT64_MAX, 0);
+    if (error < 0 && av_seek_frame(film_.get(), -1, 0, AVSEEK_FLAG_BACKWARD) < 0)
         refuse(ErrorCode::invalidInput, "its beginning cannot be found again: {}", wordsOf(error));
 }
 
@@ -176,7 +174,7 @@ void FilmReader::seek(std::int64_t dts, std::int64_t pts) {
     decoder().flush();
     held_ = ended_ = false;
     const bool matroska = std::string_view(film_->iformat->name).starts_with("matroska");
-    if (av_seek_frame(film_, track_, matroska ? pts : dts, AVSEEK_FLAG_BACKWARD) >= 0) {
+    if (av_seek_frame(film_.get(), track_, matroska ? pts : dts, AVSEEK_FLAG_BACKWARD) >= 0) {
         // At most a few: the place is that of a key picture at or before it.
         while (const AVPacket* packet = next()) {
             if (packet->pts > pts && packet->dts > dts) break;

@@ -12,7 +12,6 @@ class FilmReader {
   public:
     /// `format`: libavformat's name of the only reader that is tried.
     FilmReader(int file, const std::string& format);
-    ~FilmReader();
     FilmReader(const FilmReader&) = delete;
     FilmReader& operator=(const FilmReader&) = delete;
 
@@ -38,7 +37,8 @@ class FilmReader {
         int file = -1;
         std::int64_t at = 0, size = 0;
     } source_;
-    AVFormatContext* film_ = nullptr;
+    IoPtr io_;  ///< after film_, which reads through it, it is closed
+    FilmPtr film_;
     PacketPtr packet_;
     std::optional<Decoder> decoder_;
     int track_ = -1;
