@@ -14,11 +14,11 @@ namespace {
 // Chosen by trial on the sets of tests/bench/README.md with noise added.
 
 /// The second time the points of all views are nearer to each other, and more of them agree.
-constexpr int kRounds = 2;
+constexpr int kAgreementRounds = 2;
 /// Views that a view is compared with: those that look from about the same side.
 constexpr std::size_t kPartners = 8;
 /// Surfaces further apart than so many standard deviations are not the same.
-constexpr float kBand = 3.0f;
+constexpr float kAgreementBand = 3.0f;
 /// A view that sees the surface from behind or along it says nothing: the least share of what a
 /// surface across its rays would change by.
 constexpr float kFacing = 0.2f;
@@ -124,7 +124,7 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
                                                       static_cast<float>(y) + 0.5f, q);
                     if (!(opinion.variance > 0.0f) ||
                         opinion.move * opinion.move >
-                            kBand * kBand * (own * own + opinion.variance))
+                            kAgreementBand * kAgreementBand * (own * own + opinion.variance))
                         continue;
                     sum += opinion.move / opinion.variance;
                     weight += 1.0f / opinion.variance;
@@ -152,7 +152,7 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
 
 void agreeOnDepth(std::span<NoisyView> views) {
     if (views.size() < 2) return;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kAgreementRounds; ++round) {
         std::vector<std::pair<Image<float>, float>> results;
         for (std::size_t i = 0; i < views.size(); ++i) results.push_back(moved(views, i));
         for (std::size_t i = 0; i < views.size(); ++i) {

@@ -26,13 +26,13 @@ PixelSpace spaceAt(double angle) {
 }
 
 /// Views of that plane as prepareSource() has them before they are compared.
-struct Sheet {
+struct NoisySheet {
     std::vector<PixelSpace> spaces;
     std::vector<Image<float>> exact, q;
     std::vector<NoisyView> views;
 
     /// `behind`: how far behind the plane the last view has it, scene units.
-    explicit Sheet(const std::vector<double>& angles, double behind = 0) {
+    explicit NoisySheet(const std::vector<double>& angles, double behind = 0) {
         for (const double angle : angles) spaces.push_back(spaceAt(angle));
         for (std::size_t i = 0; i < angles.size(); ++i) {
             Image<float> image(kPictureSide, kPictureSide);
@@ -70,7 +70,7 @@ struct Sheet {
 };
 
 TEST(NoisyViews, AreLessNoisyTogether) {
-    Sheet sheet({-0.3, -0.1, 0.1, 0.3});
+    NoisySheet sheet({-0.3, -0.1, 0.1, 0.3});
     const double before = sheet.off(1);
     const float left = sheet.views[1].left;
     agreeOnDepth(sheet.views);
@@ -81,7 +81,7 @@ TEST(NoisyViews, AreLessNoisyTogether) {
 
 TEST(NoisyViews, OtherSurfacesAndTheirBacksDoNotCount) {
     // Seen from behind, and a surface that lies 3 % of the distance farther away.
-    for (Sheet sheet : {Sheet({0.1, 3.1}), Sheet({0.1, -0.1}, 0.3)}) {
+    for (NoisySheet sheet : {NoisySheet({0.1, 3.1}), NoisySheet({0.1, -0.1}, 0.3)}) {
         for (std::size_t i = 0; i < 2; ++i) sheet.views[i].q = &sheet.q[i];
         for (std::size_t i = 0; i < 2; ++i) sheet.views[i].space = &sheet.spaces[i];
         const Image<float> before = sheet.q[0];
@@ -92,7 +92,7 @@ TEST(NoisyViews, OtherSurfacesAndTheirBacksDoNotCount) {
 }
 
 TEST(NoisyViews, OneAloneStaysAsItIs) {
-    Sheet sheet({0.2});
+    NoisySheet sheet({0.2});
     const Image<float> before = sheet.q[0];
     const float left = sheet.views[0].left;
     agreeOnDepth(sheet.views);
