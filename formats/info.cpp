@@ -141,6 +141,8 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
         points = v.points < 0 || points < 0 ? -1 : points + v.points;
         j["normals"] = v.normals;
         j["splats"] = v.splats;
+        if (v.metallicRoughness) j["metallicRoughness"] = true;
+        if (v.emissive) j["emissive"] = true;
         j["bytes"] = v.bytes;
         views.push_back(std::move(j));
         streams.push_back({{"name", v.view.name}, {"kind", "part"}, {"bytes", v.bytes}});
@@ -452,13 +454,14 @@ std::string describeAsText(const Json& info) {
             }
             out += fmt::format(
                 "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, at {:.10g} {:.10g} "
-                "{:.10g}{}{}{}\n",
+                "{:.10g}{}{}{}{}{}\n",
                 i++, text(v["name"]), text(v["width"]), text(v["height"]), text(v["depthBits"]),
                 v["nearPlane"].get<double>(), v["farPlane"].get<double>(), lensText(v),
                 v["position"][0].get<double>(), v["position"][1].get<double>(),
                 v["position"][2].get<double>(),
                 v.contains("points") ? fmt::format(", {} points", text(v["points"])) : "",
-                v.contains("pruned") ? ", pruned" : "",
+                v.contains("metallicRoughness") ? ", metallic-roughness" : "",
+                v.contains("emissive") ? ", emissive" : "", v.contains("pruned") ? ", pruned" : "",
                 v.contains("background") ? ", background" : "");
         }
     }

@@ -113,7 +113,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
     Result<Bundle> bundle = Bundle();
     switch (kind) {
         case FileKind::mesh: {
-            STX_TRY(auto mesh, readMesh(path, job, {options.texture}));
+            STX_TRY(auto mesh, readMesh(path, job, {options.texture, options.materials}));
             return Opened(std::move(mesh));
         }
         case FileKind::exr:

@@ -92,6 +92,7 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
     OpenOptions open = o.open;
     open.set.texturePattern = open.texture;
     open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
+    open.materials = o.mesh->materials;
     STX_TRY(auto opened, openRenderable(input, open, program.job));
     noteUnused(input, std::holds_alternative<Mesh>(opened), o, program);
     if (auto* mesh = std::get_if<Mesh>(&opened)) {

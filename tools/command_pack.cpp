@@ -106,18 +106,19 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPe
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
-    program.say(fmt::format("{} ({}) → {} ({}), {} in {} {}x{}, {:.1f} % used{}, {}",
-                            std::filesystem::path(o.input).filename().string(),
-                            humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
-                            counted(atlas->views.size(), "view"),
-                            counted(atlas->textureCount(), "texture"), atlas->width(),
-                            atlas->height(), atlas->used() * 100, pruned, humanSeconds(seconds)));
+    program.say(fmt::format(
+        "{} ({}) → {} ({}), {} in {} {}x{}, {:.1f} % used{}, {}",
+        std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)), o.output,
+        humanBytes(bytesOf(o.output)), counted(atlas->views.size(), "view"),
+        counted(atlas->textureCount() + atlas->materialTextureCount(), "texture"), atlas->width(),
+        atlas->height(), atlas->used() * 100, pruned, humanSeconds(seconds)));
     STX_CHECK(program.writeReport(
         {{"$schema", "pack-report.schema.json"},
          {"input", o.input},
          {"output", o.output},
          {"views", atlas->views.size()},
          {"textures", atlas->textureCount()},
+         {"materialTextures", atlas->materialTextureCount()},
          {"width", atlas->width()},
          {"height", atlas->height()},
          {"used", atlas->used()},
@@ -204,7 +205,8 @@ Result<int> packInput(const PackOptions& options, Program& program) {
 void addPack(CommandLine& line, Program& program) {
     Command c = line.add(
         "pack",
-        "Merge the reference views into at most 4 textures: colour, depth, normal, splat\n\n"
+        "Merge the reference views into at most 4 textures: colour, depth, normal, splat; and, of "
+        "views that have them, metallic-roughness and emissive\n\n"
         "  stx pack model.exr -o atlas           a folder: atlas.json and images\n"
         "  stx pack film.mp4 -o 'atlas_%04d'     an atlas for each frame\n"
         "  stx pack model.exr -o atlas.exr --layout tight");

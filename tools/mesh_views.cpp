@@ -29,6 +29,7 @@ Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
     s.supersampling = o.supersampling;
     s.depthBits = o.depthBits;
     s.meshNormals = o.normals == "mesh";
+    s.materials = o.materials;
     return s;
 }
 
@@ -114,6 +115,11 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
         .option("--normals", o->normals,
                 "mesh: keep the model's own normals (SimpleTextureV2); or none (default none)")
         .oneOf({"mesh", "none"})
+        .group(group);
+    command
+        .flag("--materials", o->materials,
+              "Keep metallic-roughness (glTF) and the light that is given off as images of their "
+              "own, for engines (.exr; from there atlases); colour is then without that light")
         .group(group);
     command.option("--plot", o->plot, "With auto: draw quality against the number of views")
         .takes("FILE.svg")

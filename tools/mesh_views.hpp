@@ -20,6 +20,7 @@ struct MeshViewOptions {
     std::optional<int> depthBits;  ///< nothing: 16, or what an image set has
     int supersampling = 4;
     std::string normals = "none";
+    bool materials = false;
     std::string up = "Y";
     std::string plot;  ///< SVG of quality against the number of views, of --views auto
     /// Heading of the help that they are under.

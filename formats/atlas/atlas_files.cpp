@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "formats/atlas/atlas_floats.hpp"
 #include "formats/atlas/atlas_json.hpp"
 #include "formats/atlas/atlas_textures.hpp"
 #include "formats/exr/environment_exr.hpp"
@@ -16,8 +17,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Type = ExrChannel::Type;
-
 constexpr const char* kIndexFile = "atlas.json";
 constexpr const char* kEnvironmentFile = "environment.exr";
 constexpr const char* kOpaque = "sRGB8-opaque";
@@ -30,7 +29,8 @@ bool isExrName(const fs::path& path) {
 /// All that a folder of ours may hold, for the replacing of one. Digits stand for any number.
 std::vector<std::string> ownNames() {
     std::vector<std::string> names = {kIndexFile, kEnvironmentFile};
-    for (const char* attribute : {"colour", "depth", "normal", "splat"}) {
+    for (const char* attribute :
+         {"colour", "depth", "normal", "splat", "metallic_roughness", "emissive"}) {
         for (const char* ending : {".png", "_1.png", ".exr", "_1.exr"})
             names.push_back(std::string(attribute) + ending);
     }
@@ -86,59 +86,18 @@ AtlasHeader headerOf(const Atlas& atlas, bool inOneExr, bool jpeg = false) {
         if (!page.normal.empty()) add("normal", floats ? "float" : "snorm16");
         if (!page.splatU.empty()) {
             AtlasTexture& t = add("splat", floats ? "float" : "snorm16");
-            if (floats) continue;
-            t.scale = std::max(largestComponent(page.splatU), largestComponent(page.splatV));
-            t.addSecond();
+            if (!floats) {
+                t.scale = std::max(largestComponent(page.splatU), largestComponent(page.splatV));
+                t.addSecond();
+            }
+        }
+        if (!page.metallicRoughness.empty()) add("metallic_roughness", floats ? "float" : "unorm8");
+        if (!page.emissive.empty()) {
+            AtlasTexture& t = add("emissive", floats ? "float" : "sRGB8-emissive");
+            if (!floats) t.scale = emissiveScale(page.emissive);
         }
     }
     return header;
-}
-
-template <class Pixels, class Pointer>
-void addVectors(std::vector<Pixels>& pixels, const std::string& name, Pointer first) {
-    pixels.push_back({name + ".X", first, 3});
-    pixels.push_back({name + ".Y", first + 1, 3});
-    pixels.push_back({name + ".Z", first + 2, 3});
-}
-
-/// The channels of one attribute of a page.
-void addAttribute(const AtlasPage& page, const std::string& attribute,
-                  const Image<glm::vec4>& colour, std::vector<ExrConstPixels>& pixels) {
-    if (attribute == "colour") {
-        const float* rgba = &colour.data()->x;
-        pixels.insert(pixels.end(),
-                      {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}, {"A", rgba + 3, 4}});
-    }
-    if (attribute == "depth") pixels.push_back({"Z", page.depth.data(), 1});
-    if (attribute == "normal") addVectors(pixels, "N", &page.normal.data()->x);
-    if (attribute == "splat") {
-        addVectors(pixels, "splatU", &page.splatU.data()->x);
-        addVectors(pixels, "splatV", &page.splatV.data()->x);
-    }
-}
-
-ExrPart exrPartOf(const AtlasHeader& header, const std::vector<ExrConstPixels>& pixels) {
-    ExrPart part;
-    part.width = part.displayWidth = header.pageWidth;
-    part.height = part.displayHeight = header.pageHeight;
-    for (const auto& p : pixels) {
-        const bool colour = p.channel.size() == 1 && p.channel != "Z";
-        part.channels.push_back({p.channel, colour && !header.linear ? Type::half : Type::float32});
-    }
-    return part;
-}
-
-Result<void> writeFloatImage(const AtlasHeader& header, const AtlasPage& page,
-                             const AtlasTexture& t, const fs::path& path) {
-    Image<glm::vec4> colour;
-    if (t.attribute == "colour") colour = premultipliedLinear(page.texture);
-    std::vector<ExrConstPixels> pixels;
-    addAttribute(page, t.attribute, colour, pixels);
-    STX_TRY(auto file, OutputFile::create(path));
-    STX_TRY(auto writer, ExrWriter::create(file, {exrPartOf(header, pixels)}));
-    STX_CHECK(writer.writePart(0, pixels));
-    STX_CHECK(writer.finish());
-    return file.commit();
 }
 
 Result<Bytes> encodeDepth(const Image<std::uint16_t>& codes, const AtlasTexture& t,
@@ -165,6 +124,10 @@ Result<Bytes> encodeImage(const Atlas& atlas, const AtlasTexture& t, int jpegQua
             job.note("depth beyond nearPlane or farPlane was clamped to them in the atlas");
         return encodeDepth(coded.codes, t, page.texture);
     }
+    if (t.attribute == "metallic_roughness")
+        return encodePng(t.width, t.height, 3, 8, bytesOf(page.metallicRoughness).data(), false);
+    if (t.attribute == "emissive")
+        return encodePng(t.width, t.height, 3, 8, bytesOf(page.emissive, t.scale).data(), true);
     std::vector<std::uint16_t> rgb(static_cast<std::size_t>(t.width) * t.height * 3);
     if (t.attribute == "normal") {
         codeVectors(page.normal, t.scale, 0, 0, t.width, rgb);
@@ -254,47 +217,6 @@ Result<void> writeExr(const Atlas& atlas, const fs::path& path, Job& job,
     return file.commit();
 }
 
-/// Reads the channels of one attribute from a part into a page.
-Result<void> readFloats(const ExrReader& reader, int part,
-                        const std::vector<std::string>& attributes, bool linear, AtlasPage& page) {
-    const ExrPart& header = reader.parts()[part];
-    const int width = header.width, height = header.height;
-    std::vector<ExrPixels> pixels;
-    Image<glm::vec4> colour;
-    const auto vectors = [&](const char* name, Image<glm::vec3>& image) {
-        image = Image<glm::vec3>(width, height);
-        addVectors(pixels, name, &image.data()->x);
-    };
-    for (const auto& attribute : attributes) {
-        if (attribute == "colour") {
-            colour = Image<glm::vec4>(width, height);
-            float* rgba = &colour.data()->x;
-            pixels.insert(
-                pixels.end(),
-                {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}, {"A", rgba + 3, 4}});
-        }
-        if (attribute == "depth") {
-            page.depth = Image<float>(width, height);
-            pixels.push_back({"Z", page.depth.data(), 1});
-        }
-        if (attribute == "normal") vectors("N", page.normal);
-        if (attribute == "splat") {
-            vectors("splatU", page.splatU);
-            vectors("splatV", page.splatV);
-        }
-    }
-    for (const auto& p : pixels) {
-        if (!header.channel(p.channel))
-            return failAt(reader.where(), ErrorCode::invalidInput, "part {} lacks the channel '{}'",
-                          part, p.channel);
-    }
-    STX_CHECK(reader.readPart(part, pixels));
-    if (!colour.empty())
-        page.texture =
-            linear ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
-    return {};
-}
-
 Result<void> checkPartSize(const ExrReader& reader, int part, const AtlasHeader& header) {
     const ExrPart& p = reader.parts()[part];
     if (p.width == header.pageWidth && p.height == header.pageHeight) return {};
@@ -324,7 +246,8 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
     STX_TRY(const auto bytes, readFile(file, limits));
     STX_TRY(auto image, decodeImage(bytes, file.string(), limits));
     const int channels = t.attribute == "depth" ? 1 : t.coding == "sRGB8" ? 4 : 3;
-    const int bits = t.attribute == "colour" || t.coding == "code8" ? 8 : 16;
+    const bool material = t.attribute == "metallic_roughness" || t.attribute == "emissive";
+    const int bits = t.attribute == "colour" || t.coding == "code8" || material ? 8 : 16;
     if (image.width != t.width || image.height != t.height || image.channels != channels ||
         image.bits() != bits)
         return failAt(where, ErrorCode::invalidInput,
@@ -350,6 +273,15 @@ Result<void> readImage(const fs::path& file, const AtlasHeader& header, const At
         auto depth = depthFromCodes(header.atlas, t.page, codes);
         if (!depth) return tl::unexpected(depth.error().at(where));
         page.depth = std::move(*depth);
+        return {};
+    }
+    if (material) {
+        const auto& bytes8 = std::get<0>(image.values);
+        const glm::ivec2 size(t.width, t.height);
+        if (t.attribute == "emissive")
+            page.emissive = emissiveFrom(bytes8, t.scale, size);
+        else
+            page.metallicRoughness = metallicRoughnessFrom(bytes8, size);
         return {};
     }
     const auto& rgb = std::get<1>(image.values);
@@ -381,10 +313,10 @@ Result<void> checkMemory(const AtlasHeader& header, const std::string& where,
                          const Limits& limits) {
     std::uint64_t each = 0;
     for (const auto& t : header.textures)
-        each += t.attribute == "colour"   ? (header.linear ? 16 : 4)
-                : t.attribute == "depth"  ? 4
-                : t.attribute == "normal" ? 12
-                                          : 24;
+        each += t.attribute == "colour"  ? (header.linear ? 16 : 4)
+                : t.attribute == "depth" ? 4
+                : t.attribute == "splat" ? 24
+                                         : 12;
     const auto pixels = static_cast<std::uint64_t>(header.pageWidth) * header.pageHeight;
     if (auto ok = limits.checkAllocation(pixels, each, "the atlas"); !ok)
         return tl::unexpected(ok.error().at(where));

@@ -14,17 +14,20 @@ namespace stx {
 
 /// One image of an atlas set.
 struct AtlasTexture {
-    std::string
-        attribute;  ///< "colour", "depth", "normal" or "splat" (splatU and splatV share one)
+    std::string attribute;  ///< "colour", "depth", "normal", "splat" (splatU and splatV share one),
+                            ///< "metallic_roughness" or "emissive"
     int page = 0;
     std::string file;  ///< name in the folder; empty in an OpenEXR atlas
     /// "sRGB8": 8-bit sRGB, straight alpha · "sRGB8-opaque": the same without alpha, which is then
     /// in the depth texture (JPEG) · "code8", "code16": the DepthImage codes of each rectangle's
     /// view (its nearPlane, farPlane, depthBits) · "snorm16": 32768 + 32767 * v / scale of each
-    /// component · "float": OpenEXR, as in bundles.
+    /// component · "unorm8": 8-bit RGB of glTF, G = 255 * roughness, B = 255 * metallic, R = 255
+    /// where one of them is not 0 · "sRGB8-emissive": 8-bit sRGB of light / scale, no alpha ·
+    /// "float": OpenEXR, as in bundles.
     std::string coding;
     int width = 0, height = 0;  ///< pixels of the image, which may hold two pictures of the page
-    double scale = 1.0;         ///< snorm16: the value of code 65535
+    /// snorm16: the value of code 65535; sRGB8-emissive: the light of code 255, 1 or more
+    double scale = 1.0;
     /// Where pixel (0, 0) of the second picture lies, beside or below the first, which starts at
     /// (0, 0); both 0 = there is none. snorm16 splats: splatU, then splatV; depth: the codes, then
     /// the colour's alpha where it is "sRGB8-opaque" (in 16 bits 257 times the alpha).
@@ -42,7 +45,7 @@ struct AtlasHeader {
     int pageWidth = 0, pageHeight = 0;
     int pages = 0;
     bool linear = false;
-    std::vector<AtlasTexture> textures;  ///< at most 4
+    std::vector<AtlasTexture> textures;  ///< at most 4, and those of materials
     std::string environmentFile;         ///< of a folder: its environment; empty: none
 
     /// Share of the page area that rectangles cover, 0..1.
@@ -65,7 +68,8 @@ struct AtlasSaveOptions {
 
 /// Writes an atlas: one multi-part OpenEXR file (a part for each page) when the name ends in .exr,
 /// else a folder of atlas.json (formats/atlas/atlas.schema.json) and at most four images:
-/// colour.png, depth.png, normal.png, splat.png, those of page k > 0 as colour_k.png and so on.
+/// colour.png, depth.png, normal.png, splat.png (and, where the views have them,
+/// metallic_roughness.png and emissive.png), those of page k > 0 as colour_k.png and so on.
 /// The environment is environment.exr, or a part of its own (environment_exr.hpp).
 /// 8- and 16-bit depth comes back to the code and normals to 1/32767; an atlas with a view of 32
 /// depth bits gets .exr images, and everything comes back to the bit. Linear colour is colour.exr.

@@ -63,7 +63,7 @@ Json jsonOf(const AtlasTexture& t) {
     j["coding"] = t.coding;
     j["width"] = t.width;
     j["height"] = t.height;
-    if (t.coding == "snorm16") j["scale"] = t.scale;
+    if (t.coding == "snorm16" || t.coding == "sRGB8-emissive") j["scale"] = t.scale;
     if (t.hasSecond()) j[secondName(t)] = Json::array({t.secondX, t.secondY});
     return j;
 }
@@ -205,8 +205,11 @@ Result<void> readTexture(const Reader& r, const Limits& limits, const AtlasHeade
                          AtlasTexture& t) {
     STX_CHECK(r.text("attribute", t.attribute));
     const bool known = t.attribute == "colour" || t.attribute == "depth" ||
-                       t.attribute == "normal" || t.attribute == "splat";
-    if (!known) return r.wrong("attribute", "must be colour, depth, normal or splat");
+                       t.attribute == "normal" || t.attribute == "splat" ||
+                       t.attribute == "metallic_roughness" || t.attribute == "emissive";
+    if (!known)
+        return r.wrong("attribute",
+                       "must be colour, depth, normal, splat, metallic_roughness or emissive");
     STX_CHECK(r.number("page", t.page, 0, header.pages - 1));
     STX_CHECK(r.text("file", t.file, false));
     STX_CHECK(r.text("coding", t.coding));
@@ -218,10 +221,13 @@ Result<void> readTexture(const Reader& r, const Limits& limits, const AtlasHeade
     };
     const bool fits =
         t.coding == "float" || (t.attribute == "colour" && is({"sRGB8", "sRGB8-opaque"})) ||
-        (t.attribute == "depth" && is({"code8", "code16"})) || (vectors && t.coding == "snorm16");
+        (t.attribute == "depth" && is({"code8", "code16"})) || (vectors && t.coding == "snorm16") ||
+        (t.attribute == "metallic_roughness" && t.coding == "unorm8") ||
+        (t.attribute == "emissive" && t.coding == "sRGB8-emissive");
     if (!fits) return r.wrong("coding", fmt::format("is unknown for the {} texture", t.attribute));
     int width = header.pageWidth, height = header.pageHeight;
-    if (t.coding == "snorm16") STX_CHECK(r.number("scale", t.scale, 0, 1e30));
+    if (t.coding == "snorm16" || t.coding == "sRGB8-emissive")
+        STX_CHECK(r.number("scale", t.scale, 0, 1e30));
     const char* second = secondName(t);
     const bool codes = t.coding == "code8" || t.coding == "code16";
     if ((t.coding == "snorm16" && t.attribute == "splat") || (codes && r.has(second))) {
@@ -372,9 +378,10 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
         STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));
         STX_CHECK(pixels->number("kept", atlas.keptPixels, 0, 1e15));
     }
-    STX_CHECK(top.list("textures", top.checksRules() ? 4 : 256, [&](const Reader& r) {
-        return readTexture(r, limits, header, header.textures.emplace_back());
-    }));
+    STX_CHECK(
+        top.list("textures", top.checksRules() ? 4 + 2 * header.pages : 256, [&](const Reader& r) {
+            return readTexture(r, limits, header, header.textures.emplace_back());
+        }));
     STX_CHECK(checkTextures(top, header));
     STX_CHECK(top.list("views", static_cast<std::size_t>(limits.maxViews), [&](const Reader& r) {
         return readView(r, limits, version, atlas.keptPixels < atlas.sourcePixels,

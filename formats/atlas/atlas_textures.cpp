@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/srgb8.hpp"
 
 namespace stx {
 
@@ -149,6 +150,60 @@ Image<glm::vec3> vectorsFromCodes(const std::vector<std::uint16_t>& rgb, double 
         }
     });
     return vectors;
+}
+
+double emissiveScale(const Image<glm::vec3>& emissive) {
+    float largest = 1.0f;
+    for (const auto& v : emissive.pixels()) {
+        for (int c = 0; c < 3; ++c) {
+            if (std::isfinite(v[c])) largest = std::max(largest, v[c]);
+        }
+    }
+    return largest;
+}
+
+std::vector<std::uint8_t> bytesOf(const Image<glm::vec2>& metallicRoughness) {
+    // NaN is 0.
+    const auto code = [](float v) {
+        return v > 0.0f ? static_cast<std::uint8_t>(std::lround(255.0f * std::min(v, 1.0f))) : 0;
+    };
+    std::vector<std::uint8_t> rgb;
+    rgb.reserve(metallicRoughness.count() * 3);
+    for (const auto& v : metallicRoughness.pixels()) {
+        const std::uint8_t metallic = code(v.x), roughness = code(v.y);
+        const std::uint8_t any = metallic > 0 || roughness > 0 ? 255 : 0;
+        rgb.insert(rgb.end(), {any, roughness, metallic});
+    }
+    return rgb;
+}
+
+std::vector<std::uint8_t> bytesOf(const Image<glm::vec3>& emissive, double scale) {
+    std::vector<std::uint8_t> rgb;
+    rgb.reserve(emissive.count() * 3);
+    for (const auto& v : emissive.pixels()) {
+        for (int c = 0; c < 3; ++c)
+            rgb.push_back(srgb8FromLinear(static_cast<float>(v[c] / scale)));
+    }
+    return rgb;
+}
+
+Image<glm::vec2> metallicRoughnessFrom(const std::vector<std::uint8_t>& rgb, glm::ivec2 size) {
+    Image<glm::vec2> image(size.x, size.y);
+    const auto* from = rgb.data();
+    for (auto& v : image.pixels()) {
+        v = glm::vec2(from[2], from[1]) * (1.0f / 255.0f);
+        from += 3;
+    }
+    return image;
+}
+
+Image<glm::vec3> emissiveFrom(const std::vector<std::uint8_t>& rgb, double scale, glm::ivec2 size) {
+    Image<glm::vec3> image(size.x, size.y);
+    const auto* from = rgb.data();
+    for (auto& v : image.pixels()) {
+        for (int c = 0; c < 3; ++c) v[c] = static_cast<float>(scale * linearFromSrgb8(*from++));
+    }
+    return image;
 }
 
 }  // namespace stx

@@ -41,4 +41,17 @@ void codeVectors(const Image<glm::vec3>& vectors, double scale, int x0, int y0, 
 [[nodiscard]] Image<glm::vec3> vectorsFromCodes(const std::vector<std::uint16_t>& rgb, double scale,
                                                 int x0, int y0, int width, glm::ivec2 size);
 
+/// The light that code 255 stands for: the largest component, 1 at least.
+[[nodiscard]] double emissiveScale(const Image<glm::vec3>& emissive);
+/// Interleaved RGB of glTF's metallicRoughnessTexture: G = roughness, B = metallic, and R = 255,
+/// "not occluded" where an engine takes it for that, wherever one of the two is not 0.
+[[nodiscard]] std::vector<std::uint8_t> bytesOf(const Image<glm::vec2>& metallicRoughness);
+/// Interleaved sRGB of light / scale.
+[[nodiscard]] std::vector<std::uint8_t> bytesOf(const Image<glm::vec3>& emissive, double scale);
+/// The inverses, of images of `size` pixels; codes come back as the same codes.
+[[nodiscard]] Image<glm::vec2> metallicRoughnessFrom(const std::vector<std::uint8_t>& rgb,
+                                                     glm::ivec2 size);
+[[nodiscard]] Image<glm::vec3> emissiveFrom(const std::vector<std::uint8_t>& rgb, double scale,
+                                            glm::ivec2 size);
+
 }  // namespace stx

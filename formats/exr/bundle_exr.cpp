@@ -1,6 +1,7 @@
 #include "formats/exr/bundle_exr.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -18,6 +19,7 @@
 //              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d) · stx:origin (v3d; where it
 //              is not 0: added to positions and bounds, gives the world's) · stx:time (double,
 //              seconds; of a frame of a sequence)
+//   A view's further channels: surface.metallic, surface.roughness; emissive.R to emissive.B
 //   the last:  the environment, where there is one: environment_exr.hpp
 namespace stx {
 
@@ -26,6 +28,23 @@ namespace {
 constexpr std::int64_t kVersion = 1;
 
 using Type = ExrChannel::Type;
+
+/// Channels of what engines need; null ends a shorter list.
+using Names = std::array<const char*, 3>;
+constexpr Names kSurface = {"surface.metallic", "surface.roughness", nullptr};
+constexpr Names kEmissive = {"emissive.R", "emissive.G", "emissive.B"};
+
+bool hasAll(const ExrPart& part, const Names& names) {
+    return std::all_of(names.begin(), names.end(),
+                       [&](const char* name) { return !name || part.channel(name); });
+}
+
+/// `first` is of interleaved values, as many as names.
+template <class Pixels, class Pointer>
+void addNamedPixels(std::vector<Pixels>& pixels, const Names& names, Pointer first) {
+    const std::size_t count = names[2] ? 3 : 2;
+    for (std::size_t i = 0; i < count; ++i) pixels.push_back({names[i], first + i, count});
+}
 
 void addVectorChannels(std::vector<ExrChannel>& channels, const std::string& name) {
     for (const char* axis : {".X", ".Y", ".Z"}) channels.push_back({name + axis, Type::float32});
@@ -88,6 +107,13 @@ Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
         if (!view.normal.empty()) addVectorChannels(part.channels, "N");
         if (!view.splatU.empty()) addVectorChannels(part.channels, "splatU");
         if (!view.splatV.empty()) addVectorChannels(part.channels, "splatV");
+        for (const auto& [name, there] : {std::pair{kSurface, !view.metallicRoughness.empty()},
+                                          std::pair{kEmissive, !view.emissive.empty()}}) {
+            if (!there) continue;
+            for (const char* channel : name) {
+                if (channel) part.channels.push_back({channel, Type::float32});
+            }
+        }
         parts.push_back(std::move(part));
     }
     auto& first = parts[0].attributes;
@@ -168,6 +194,8 @@ std::uint64_t exrViewBytes(const ExrReader& reader, const ExrPart& part) {
     for (const char* name : {"N", "splatU", "splatV"}) {
         if (hasVectors(part, name)) each += 12;
     }
+    if (hasAll(part, kSurface)) each += 8;
+    if (hasAll(part, kEmissive)) each += 12;
     return each * static_cast<std::uint64_t>(part.width) * part.height;
 }
 
@@ -190,6 +218,14 @@ Result<void> readExrView(const ExrReader& reader, int index, const ExrPart& part
     addVectors("N", view.normal);
     addVectors("splatU", view.splatU);
     addVectors("splatV", view.splatV);
+    if (hasAll(part, kSurface)) {
+        view.metallicRoughness = Image<glm::vec2>(part.width, part.height);
+        addNamedPixels(pixels, kSurface, &view.metallicRoughness.data()->x);
+    }
+    if (hasAll(part, kEmissive)) {
+        view.emissive = Image<glm::vec3>(part.width, part.height);
+        addNamedPixels(pixels, kEmissive, &view.emissive.data()->x);
+    }
     STX_CHECK(reader.readPart(index, pixels));
     if (!part.channel("A")) {
         for (auto& p : colour.pixels()) p.a = 1.0f;
@@ -239,6 +275,10 @@ Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
             add("N", view.normal);
             add("splatU", view.splatU);
             add("splatV", view.splatV);
+            if (!view.metallicRoughness.empty())
+                addNamedPixels(pixels, kSurface, &view.metallicRoughness.row(y).data()->x);
+            if (!view.emissive.empty())
+                addNamedPixels(pixels, kEmissive, &view.emissive.row(y).data()->x);
             return pixels;
         }));
         job.progress(i + 1, count, "writing views");
@@ -280,6 +320,8 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
                 ok.error().at(fmt::format("{}: part '{}'", reader.where(), part.name)));
         entry.normals = hasVectors(part, "N");
         entry.splats = hasVectors(part, "splatU") && hasVectors(part, "splatV");
+        entry.metallicRoughness = hasAll(part, kSurface);
+        entry.emissive = hasAll(part, kEmissive);
         if (const auto* points = part.attribute<double>("stx:points");
             points && *points >= 0 && *points <= 1e15)
             entry.points = static_cast<std::int64_t>(*points);

@@ -19,6 +19,7 @@ namespace stx {
 struct ExrViewHeader {
     ReferenceView view;  ///< its images are empty
     bool normals = false, splats = false;
+    bool metallicRoughness = false, emissive = false;
     std::int64_t points = -1;  ///< -1 = the file does not say
     std::uint64_t bytes = 0;   ///< of the pixels in the file, compressed
 };
@@ -43,6 +44,8 @@ struct ExrBundleHeader {
 ///  - Z: planar distance, float32 exactly, +inf where there is no point. That is what OpenEXR's
 ///    documentation asks for; Blender writes 1e10 instead, Nuke 1/z with 0.
 ///  - N.X N.Y N.Z and splatU.X .. splatV.Z: world vectors, float32 exactly, where the view has them.
+///  - surface.metallic, surface.roughness (0..1), emissive.R emissive.G emissive.B (linear light
+///    that R G B do not hold): float32 exactly, where the view has them.
 ///
 /// Cameras are in the standard attributes worldToCamera, worldToNDC, screenWindowCenter and
 /// screenWindowWidth (float, for other programs) and exactly in `stx:` ones (see bundle_exr.cpp).

@@ -116,6 +116,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     for (const ReferenceView& view : bundle.views)
         if (view.hasNormals() || view.hasSplats())
             job.note("normals and splats have no place in an image set and are left out");
+    bundle.noteMaterialLeftOut(job);
 
     if (options.kind == ExportOptions::Kind::colmap && bundle.environment)
         job.note("COLMAP's workspace has no place for the environment: it is left out");

@@ -98,6 +98,7 @@ class FrameExporter {
         json_["stx:title"] = bundle.title;
         const glm::dvec3& o = bundle.origin;
         if (o != glm::dvec3(0.0)) json_["stx:origin"] = {o.x, o.y, o.z};
+        bundle.noteMaterialLeftOut(job_);
         double farthest = 0;
         for (const ReferenceView& view : bundle.views) {
             farthest = std::max(farthest, view.farPlane);

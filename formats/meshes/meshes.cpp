@@ -122,10 +122,10 @@ void giveGrey(Mesh& mesh, Job& job) {
 }
 
 Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::path& path, Job& job,
-                        bool replacesColour) {
+                        const MeshOptions& options) {
     const auto folder =
         path.parent_path().empty() || path == "-" ? std::filesystem::path(".") : path.parent_path();
-    ModelFiles files(folder, job, replacesColour);
+    ModelFiles files(folder, job, !options.texture.empty(), options.materials);
     const auto name = path.filename().string();
     if (format == Format::glb && !textOf(bytes).starts_with("glTF"))
         return fail(
@@ -180,7 +180,7 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
     }
     const auto format =
         formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
-    auto mesh = readFormat(format, bytes, path, job, !options.texture.empty());
+    auto mesh = readFormat(format, bytes, path, job, options);
     if (!mesh) return tl::unexpected(mesh.error().at(where));
 
     if (!options.texture.empty()) {

@@ -16,6 +16,8 @@ struct MeshOptions {
     /// Base colour texture of all materials, in place of those that the model names (`--texture
     /// FILE`); empty = none. Opened as it is given: the caller named it, not the model.
     std::filesystem::path texture;
+    /// glTF's metallic-roughness is read, too; without this its maps are dropped with a note.
+    bool materials = false;
 };
 
 /// True when the file looks like a model that readMesh() takes: by its first bytes (GLB, glTF, PLY,

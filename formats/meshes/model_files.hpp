@@ -22,9 +22,14 @@ struct SamplerState {
 /// Opens what a model's file names, inside the model's folder only.
 class ModelFiles {
   public:
-    /// `replacesColour`: the caller has a texture that wins over the model's.
-    ModelFiles(std::filesystem::path folder, Job& job, bool replacesColour = false)
-        : folder_(std::move(folder)), job_(job), replacesColour_(replacesColour) {}
+    /// `replacesColour`: the caller has a texture that wins over the model's. `materials`: it wants
+    /// metallic-roughness.
+    ModelFiles(std::filesystem::path folder, Job& job, bool replacesColour = false,
+               bool materials = false)
+        : folder_(std::move(folder)),
+          job_(job),
+          replacesColour_(replacesColour),
+          materials_(materials) {}
 
     /// The bytes of a file that the model names. Backslashes are tried as separators when the name
     /// as it is does not exist. Errors as resolveInside() and readFile().
@@ -39,6 +44,9 @@ class ModelFiles {
 
     /// Base colour textures of materials need not be opened: another one is put on all of them.
     [[nodiscard]] bool replacesColour() const { return replacesColour_; }
+
+    /// Metallic-roughness is asked for.
+    [[nodiscard]] bool materials() const { return materials_; }
 
     /// Index into `textures` of the image file `name`, looked for as find() does, or -1, with a
     /// note, when it is missing, outside of the folder or cannot be decoded. Errors only when
@@ -62,7 +70,7 @@ class ModelFiles {
 
     std::filesystem::path folder_;
     Job& job_;
-    bool replacesColour_ = false;
+    bool replacesColour_ = false, materials_ = false;
     mutable std::set<std::string, std::less<>> told_;  ///< names that were found elsewhere
     std::map<Key, int> textures_;
     std::map<std::string, int, std::less<>> first_;  ///< by name alone

@@ -19,6 +19,7 @@ CaptureSettings captureSettings(const ConvertSettings& s) {
     capture.supersampling = s.supersampling;
     capture.depthBits = s.depthBits.value_or(16);
     capture.meshNormals = s.meshNormals;
+    capture.materials = s.materials;
     return capture;
 }
 

@@ -7,8 +7,9 @@
 namespace stx {
 
 struct OpenOptions {
-    std::string texture;  ///< texture of a mesh, in place of those that it names; empty = none
-    ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
+    std::string texture;     ///< texture of a mesh, in place of those that it names; empty = none
+    bool materials = false;  ///< of a mesh: its metallic-roughness is read, too
+    ImageSetOptions set;     ///< of image sets; with set.from whatever is given is read as one
 };
 
 struct SaveOptions {

@@ -115,7 +115,10 @@ struct ConvertSettings {
     double elevationRad = glm::radians(15.0);  ///< of a ring above the horizon
     int supersampling = 4;                     ///< colour samples per pixel and axis, 1..8
     bool meshNormals = false;                  ///< keeps the mesh's own normals (SimpleTextureV2)
-    std::string title{};                       ///< of the bundle
+    /// Keeps metallic-roughness, of a model that was opened with OpenOptions::materials, and
+    /// emissive as images of the views; colour is then without the light that is given off.
+    bool materials = false;
+    std::string title{};  ///< of the bundle
     /// 8, 16 or 32 (float distances, only .exr holds them). Without a value meshes get 16 and
     /// bundles keep theirs.
     std::optional<int> depthBits{};

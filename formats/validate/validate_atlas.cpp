@@ -144,7 +144,8 @@ std::vector<Finding> validate(const Atlas& atlas) {
             return image.width() == 0 || glm::ivec2(image.width(), image.height()) == size;
         };
         if (page.depth.size() != size || !fits(page.texture) || !fits(page.normal) ||
-            !fits(page.splatU) || !fits(page.splatV))
+            !fits(page.splatU) || !fits(page.splatV) || !fits(page.metallicRoughness) ||
+            !fits(page.emissive))
             findings.add(5004, fmt::format("page {}", p), "textures of several sizes",
                          sizeText(size.x, size.y));
     }
@@ -164,8 +165,11 @@ Result<std::vector<Finding>> validateAtlasFile(const std::filesystem::path& path
     if (!header) return unreadable(header.error());
     Findings findings;
     checkViewHeaders(header->atlas.views, findings);
-    if (header->textures.size() > 4)
-        findings.add(5003, "", fmt::format("{} textures", header->textures.size()), "at most 4");
+    const auto textures =
+        std::count_if(header->textures.begin(), header->textures.end(), [](const AtlasTexture& t) {
+            return t.attribute != "metallic_roughness" && t.attribute != "emissive";
+        });
+    if (textures > 4) findings.add(5003, "", fmt::format("{} textures", textures), "at most 4");
     checkRectangles(header->atlas.views, header->pages, {header->pageWidth, header->pageHeight},
                     header->atlas.rectangles, findings);
     checkTextures(path, *header, options, job, findings);

@@ -278,6 +278,7 @@ class Writer {
 
 Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
                                      OutputFile::Options options, Job& job) {
+    bundle.noteMaterialLeftOut(job);
     codeColours(bundle, "the model", job);
     STX_TRY(auto surfaces, viewSurfaces(bundle, job));
     Writer writer(bundle, job);

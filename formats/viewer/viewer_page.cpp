@@ -294,6 +294,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         STX_TRY(Bundle bundle, frames.frame(i, job));
         makeViewable(bundle, job);
         if (!writer) {
+            bundle.noteMaterialLeftOut(job);
             STX_TRY(writer, startPage(path, options, bundle.title));
             writer->report.views = bundle.views.size();
             writer->report.points = bundle.pointCount();

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/capture/material_sampler.hpp"
 #include "lib/model/strays.hpp"
 
 namespace stx {
@@ -74,6 +75,7 @@ Result<ReferenceView> captureView(const Mesh& mesh, const Camera& camera, std::s
     RasterSettings raster;
     raster.supersampling = settings.supersampling;
     raster.normals = settings.meshNormals;
+    raster.materials = settings.materials;
     STX_TRY(auto image, rasterise(mesh, camera, raster, job));
     ReferenceView view;
     view.name = std::move(name);
@@ -82,6 +84,8 @@ Result<ReferenceView> captureView(const Mesh& mesh, const Camera& camera, std::s
     view.texture = straightTexture(image.colour);
     view.depth = std::move(image.depth);
     view.normal = std::move(image.normal);
+    view.metallicRoughness = std::move(image.metallicRoughness);
+    view.emissive = std::move(image.emissive);
     fitDepthRange(view);
     return view;
 }
@@ -103,8 +107,19 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
         STX_CHECK(c.check());
         pixels += static_cast<std::uint64_t>(c.width) * c.height;
     }
-    STX_CHECK(
-        job.limits.checkAllocation(pixels, settings.meshNormals ? 20 : 8, "the reference views"));
+    const bool surface = settings.materials && hasMetallicRoughness(mesh);
+    const bool glow = settings.materials && emits(mesh);
+    STX_CHECK(job.limits.checkAllocation(
+        pixels, 8 + (settings.meshNormals ? 12 : 0) + (surface ? 8 : 0) + (glow ? 12 : 0),
+        "the reference views"));
+    if (settings.materials && !surface && !glow)
+        job.note(
+            "the model tells neither metallic and roughness nor light that it gives off; "
+            "--materials has nothing to keep");
+    if (glow)
+        job.note(
+            "what gives off light has it in the emissive images alone, for engines; pictures by "
+            "stx render are without it");
 
     const auto n = static_cast<std::int64_t>(cameras.size());
     std::vector<Result<ReferenceView>> views(n, ReferenceView());

@@ -14,6 +14,8 @@ struct CaptureSettings {
     int supersampling = 4;     ///< colour and coverage samples per pixel and axis
     int depthBits = 16;        ///< 8, 16 or 32 (float, only .exr holds it)
     bool meshNormals = false;  ///< the mesh's own normals become the view's (SimpleTextureV2)
+    /// Metallic-roughness and emissive become images of the view; its colour is without emission.
+    bool materials = false;
 };
 
 /// One reference view of a mesh: colour and coverage supersampled, depth at the pixel centres,

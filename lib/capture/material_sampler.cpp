@@ -1,5 +1,6 @@
 #include "lib/capture/material_sampler.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -73,15 +74,25 @@ glm::vec4 sampleTexture(const MeshTexture& texture, glm::vec2 uv) {
     return {mean[0], mean[1], mean[2], mean[3]};
 }
 
-MaterialSampler::MaterialSampler(const Mesh& mesh) : mesh_(mesh) {
+bool hasMetallicRoughness(const Mesh& mesh) {
+    return std::any_of(mesh.materials.begin(), mesh.materials.end(),
+                       [](const Material& m) { return m.hasMetallicRoughness; });
+}
+
+bool emits(const Mesh& mesh) {
+    return std::any_of(mesh.materials.begin(), mesh.materials.end(),
+                       [](const Material& m) { return m.emissive != glm::vec3(0.0f); });
+}
+
+MaterialSampler::MaterialSampler(const Mesh& mesh, Glow glow) : mesh_(mesh), glow_(glow) {
     for (const auto& m : mesh.materials) {
         seeThrough_.push_back(m.alpha == Material::Alpha::mask);
         translucent_.push_back(m.alpha == Material::Alpha::blend);
-        const bool shines = m.emissive != glm::vec3(0.0f);
+        const bool shines = glow == Glow::inColour && m.emissive != glm::vec3(0.0f);
         plainTexture_.push_back(mesh.colours.empty() && m.baseColour == glm::vec4(1.0f) && !shines);
         constant_.push_back(mesh.colours.empty() && m.baseColourTexture < 0 &&
                             (!shines || m.emissiveTexture < 0));
-        const auto light = glm::vec3(m.baseColour) + m.emissive;
+        const auto light = glm::vec3(m.baseColour) + (shines ? m.emissive : glm::vec3(0.0f));
         constantColour_.emplace_back(srgbByTable(light.x), srgbByTable(light.y),
                                      srgbByTable(light.z));
     }
@@ -97,18 +108,36 @@ glm::vec4 MaterialSampler::colour(std::uint32_t triangle, glm::vec3 b) const {
     if (plainTexture_[material]) return texel;
     glm::vec4 factor = m.baseColour;
     if (!mesh_.colours.empty()) factor *= mix3(mesh_.colours, t, b);
-    glm::vec3 emissive = m.emissive;
-    if (m.emissiveTexture >= 0 && emissive != glm::vec3(0.0f)) {
-        const auto glow = sampleTexture(mesh_.textures[m.emissiveTexture], mix3(mesh_.uvs, t, b));
-        for (int k = 0; k < 3; ++k) emissive[k] *= linearByTable(glow[k]);
-    }
+    const glm::vec3 glow = glow_ == Glow::inColour ? emissive(triangle, b) : glm::vec3(0.0f);
     glm::vec4 out;
     for (int k = 0; k < 3; ++k) {
         const float light = (m.baseColourTexture >= 0 ? linearByTable(texel[k]) : 1.0f) * factor[k];
-        out[k] = srgbByTable(light + emissive[k]);
+        out[k] = srgbByTable(light + glow[k]);
     }
     out.w = texel.w * factor.w;
     return out;
+}
+
+glm::vec3 MaterialSampler::emissive(std::uint32_t triangle, glm::vec3 b) const {
+    const auto& m = mesh_.materials[mesh_.triangleMaterial[triangle]];
+    glm::vec3 emissive = m.emissive;
+    if (m.emissiveTexture >= 0 && emissive != glm::vec3(0.0f)) {
+        const auto glow = sampleTexture(mesh_.textures[m.emissiveTexture],
+                                        mix3(mesh_.uvs, mesh_.triangles[triangle], b));
+        for (int k = 0; k < 3; ++k) emissive[k] *= linearByTable(glow[k]);
+    }
+    return emissive;
+}
+
+glm::vec2 MaterialSampler::metallicRoughness(std::uint32_t triangle, glm::vec3 b) const {
+    const auto& m = mesh_.materials[mesh_.triangleMaterial[triangle]];
+    glm::vec2 value(m.metallic, m.roughness);
+    if (m.metallicRoughnessTexture >= 0) {
+        const auto texel = sampleTexture(mesh_.textures[m.metallicRoughnessTexture],
+                                         mix3(mesh_.uvs, mesh_.triangles[triangle], b));
+        value *= glm::vec2(texel.b, texel.g);
+    }
+    return value;
 }
 
 bool MaterialSampler::opaqueAt(std::uint32_t triangle, glm::vec3 b) const {

@@ -8,14 +8,26 @@
 
 namespace stx {
 
-/// Evaluates a mesh's base colour and normal at points of its triangles.
+/// Some material says metallic and roughness.
+[[nodiscard]] bool hasMetallicRoughness(const Mesh& mesh);
+/// Some material gives off light.
+[[nodiscard]] bool emits(const Mesh& mesh);
+
+/// Where the light goes that a material gives off.
+enum class Glow { inColour, apart };
+
+/// Evaluates a mesh's materials and normals at points of its triangles.
 class MaterialSampler {
   public:
     /// The mesh must pass check() and outlive the sampler.
-    explicit MaterialSampler(const Mesh& mesh);
+    explicit MaterialSampler(const Mesh& mesh, Glow glow = Glow::inColour);
 
     /// Straight sRGB-coded RGBA, 0..1, at barycentric coordinates of a triangle.
     [[nodiscard]] glm::vec4 colour(std::uint32_t triangle, glm::vec3 barycentric) const;
+    /// Metallic and roughness, 0..1; 0 and 1 where the material does not say them.
+    [[nodiscard]] glm::vec2 metallicRoughness(std::uint32_t triangle, glm::vec3 barycentric) const;
+    /// Linear light that it gives off, 0 or more.
+    [[nodiscard]] glm::vec3 emissive(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// Whether the surface is there at all (alpha mask).
     [[nodiscard]] bool opaqueAt(std::uint32_t triangle, glm::vec3 barycentric) const;
     /// This triangle can have see-through points, so opaqueAt() must be asked.
@@ -48,6 +60,7 @@ class MaterialSampler {
 
   private:
     const Mesh& mesh_;
+    Glow glow_;
     std::vector<bool> seeThrough_;    ///< per material
     std::vector<bool> translucent_;   ///< per material
     std::vector<bool> plainTexture_;  ///< per material: the texture alone decides, no conversion

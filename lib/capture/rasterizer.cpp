@@ -49,11 +49,11 @@ bool holdsSample(const SetUp& s, int n) {
 
 class Rasterizer {
   public:
-    Rasterizer(const Mesh& mesh, const Camera& camera)
+    Rasterizer(const Mesh& mesh, const Camera& camera, const RasterSettings& settings)
         : mesh_(mesh),
           camera_(camera),
           cameraFromWorld_(camera.cameraFromWorld()),
-          sampler_(mesh) {}
+          sampler_(mesh, settings.materials ? Glow::apart : Glow::inColour) {}
 
     Result<RasterImage> run(const RasterSettings& settings, Job& job);
 
@@ -417,6 +417,9 @@ void Rasterizer::resolveCentres(int tileX, int tileY, const Tile& tile, RasterIm
                     glm::vec4(glm::vec3(sampler_.colour(s.triangle, b)), 1.0f) * (1.0f / 16.0f);
                 if (!out.lit.empty()) out.lit.at(x, y) = colour;
             }
+            if (!out.metallicRoughness.empty())
+                out.metallicRoughness.at(x, y) = sampler_.metallicRoughness(s.triangle, b);
+            if (!out.emissive.empty()) out.emissive.at(x, y) = sampler_.emissive(s.triangle, b);
             if (out.normal.empty()) continue;
             glm::vec3 n = sampler_.normal(s.triangle, b);
             const glm::vec3 view(camera_.viewDirection(x + 0.5, y + 0.5));
@@ -432,6 +435,9 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
     out.depth = Image<float>(w, h, kNoDepth);
     if (settings.lighting.on()) out.lit = out.colour;
     if (settings.normals) out.normal = Image<glm::vec3>(w, h, glm::vec3(0.0f));
+    if (settings.materials && hasMetallicRoughness(mesh_))
+        out.metallicRoughness = Image<glm::vec2>(w, h, glm::vec2(0.0f));
+    if (settings.materials && emits(mesh_)) out.emissive = Image<glm::vec3>(w, h, glm::vec3(0.0f));
 
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
@@ -483,9 +489,9 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
     STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
     if (!mesh.points.empty()) {
         const Mesh discs = pointsAsDiscs(mesh, camera, pointRadius(mesh));
-        return Rasterizer(discs, camera).run(settings, job);
+        return Rasterizer(discs, camera, settings).run(settings, job);
     }
-    return Rasterizer(mesh, camera).run(settings, job);
+    return Rasterizer(mesh, camera, settings).run(settings, job);
 }
 
 }  // namespace stx

@@ -12,7 +12,9 @@ struct RasterSettings {
     /// Colour and coverage samples per pixel and axis, 1..8; samples form a regular grid.
     int supersampling = 4;
     bool normals = false;  ///< also the surface normals at the pixel centres
-    Lighting lighting;     ///< in the world; when on, RasterImage::lit is made as well
+    /// Also metallic-roughness and emissive at the pixel centres; colour is then without emission.
+    bool materials = false;
+    Lighting lighting;  ///< in the world; when on, RasterImage::lit is made as well
 };
 
 /// A mesh seen by a camera. Depth and normal belong to the pixel's centre exactly; colour and
@@ -22,6 +24,9 @@ struct RasterImage {
     Image<glm::vec4> lit;     ///< the same under RasterSettings::lighting; empty when that is off
     Image<float> depth;       ///< planar distance; kNoDepth where the centre misses
     Image<glm::vec3> normal;  ///< unit, world, towards the camera; zero where none; may be empty
+    /// As in ReferenceView; empty unless asked for, and where no material of the mesh has them.
+    Image<glm::vec2> metallicRoughness;
+    Image<glm::vec3> emissive;
 };
 
 /// Rasterises a mesh (which must pass check()) exactly: no cracks along shared edges, no clipping

@@ -109,6 +109,13 @@ int Atlas::textureCount() const {
     return count;
 }
 
+int Atlas::materialTextureCount() const {
+    int count = 0;
+    for (const auto& p : pages)
+        count += (p.metallicRoughness.empty() ? 0 : 1) + (p.emissive.empty() ? 0 : 1);
+    return count;
+}
+
 double Atlas::used() const {
     double covered = 0;
     for (const auto& r : rectangles) covered += static_cast<double>(r.width) * r.height;
@@ -148,7 +155,11 @@ Result<void> Atlas::check() const {
         if (p.depth.empty() || !same(p.depth) || !same(p.texture) ||
             (!p.normal.empty() && !same(p.normal)) || (!p.splatU.empty() && !same(p.splatU)) ||
             p.splatU.size() != p.splatV.size() || p.normal.empty() != pages[0].normal.empty() ||
-            p.splatU.empty() != pages[0].splatU.empty())
+            p.splatU.empty() != pages[0].splatU.empty() ||
+            (!p.metallicRoughness.empty() && !same(p.metallicRoughness)) ||
+            (!p.emissive.empty() && !same(p.emissive)) ||
+            p.metallicRoughness.empty() != pages[0].metallicRoughness.empty() ||
+            p.emissive.empty() != pages[0].emissive.empty())
             return fail(ErrorCode::invalidInput,
                         "page {}: its textures must all be there and {}x{} like page 0's depth", i,
                         width(), height());

@@ -47,11 +47,14 @@ struct AtlasPage {
     Image<glm::vec3> normal;  ///< empty when absent
     Image<glm::vec3> splatU;  ///< empty when absent
     Image<glm::vec3> splatV;
+    Image<glm::vec2> metallicRoughness;  ///< as in views; empty when absent
+    Image<glm::vec3> emissive;           ///< as in views; empty when absent
 };
 
 /// The reference views of a bundle merged into at most four textures: colour, depth, normal and
 /// splat (Lee & Park, section 3.1). A page of an atlas has up to four textures; an atlas with
-/// several pages keeps pages x textures-per-page at most four.
+/// several pages keeps pages x textures-per-page at most four. What an engine needs beside them,
+/// metallic-roughness and emissive, are further textures with the same rectangles.
 struct Atlas {
     /// Cameras, planes and names of the views; their images are empty.
     std::vector<ReferenceView> views;
@@ -72,8 +75,10 @@ struct Atlas {
     [[nodiscard]] int height() const { return pages.empty() ? 0 : pages[0].depth.height(); }
     /// Pixels of rectangles that are points of the object.
     [[nodiscard]] std::int64_t pointCount() const;
-    /// Textures in all pages together, at most 4.
+    /// Textures of a SimpleTexture in all pages together, at most 4: without those of materials.
     [[nodiscard]] int textureCount() const;
+    /// Metallic-roughness and emissive textures in all pages together.
+    [[nodiscard]] int materialTextureCount() const;
     /// Share of the page area that rectangles cover, without padding, 0..1.
     [[nodiscard]] double used() const;
     /// Each rectangle has this many texels of padding on each side to itself, or as many as its

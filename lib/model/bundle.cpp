@@ -38,6 +38,11 @@ Result<void> ReferenceView::checkHeader() const {
         return fail(ErrorCode::invalidInput,
                     "normal is {}, splatU {} and splatV {} but depth is {}; all must match",
                     sizeOf(normal), sizeOf(splatU), sizeOf(splatV), sizeOf(depth));
+    if ((!metallicRoughness.empty() && !fits(metallicRoughness)) ||
+        (!emissive.empty() && !fits(emissive)))
+        return fail(ErrorCode::invalidInput,
+                    "metallicRoughness is {} and emissive {} but depth is {}; all must match",
+                    sizeOf(metallicRoughness), sizeOf(emissive), sizeOf(depth));
     if (!std::isfinite(nearPlane) || !std::isfinite(farPlane) || nearPlane < 0 ||
         !(nearPlane < farPlane))
         return fail(ErrorCode::invalidInput,
@@ -64,6 +69,18 @@ const char* Bundle::nodeKind() const {
 
 bool Bundle::pruned() const {
     return std::any_of(views.begin(), views.end(), [](const ReferenceView& v) { return v.pruned; });
+}
+
+bool Bundle::hasMaterial() const {
+    return std::any_of(views.begin(), views.end(),
+                       [](const ReferenceView& v) { return v.hasMaterial(); });
+}
+
+void Bundle::noteMaterialLeftOut(Job& job) const {
+    if (hasMaterial())
+        job.note(
+            "metallic-roughness and emissive are left out: .exr bundles and atlases alone hold "
+            "them");
 }
 
 std::int64_t Bundle::pointCount() const {

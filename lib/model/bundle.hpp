@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "lib/base/job.hpp"
 #include "lib/environment/environment.hpp"
 #include "lib/model/reference_view.hpp"
 
@@ -28,6 +29,10 @@ struct Bundle {
     [[nodiscard]] std::int64_t pointCount() const;
     /// Some view was pruned.
     [[nodiscard]] bool pruned() const;
+    /// Some view has metallic-roughness or emissive images.
+    [[nodiscard]] bool hasMaterial() const;
+    /// Notes, where there are some, that they are left out of what is written.
+    void noteMaterialLeftOut(Job& job) const;
     /// The bounds of all points, computed from the pixels.
     [[nodiscard]] Bounds computeBounds() const;
     /// Each view's check(), with its index; at least one view; one colour space in all views.

@@ -47,10 +47,12 @@ Result<void> Mesh::check() const {
     const auto textureExists = [&](int t) { return t < static_cast<int>(textures.size()); };
     for (const auto& m : materials) {
         if (!textureExists(m.baseColourTexture) || !textureExists(m.normalTexture) ||
-            !textureExists(m.emissiveTexture))
+            !textureExists(m.emissiveTexture) || !textureExists(m.metallicRoughnessTexture))
             return fail(ErrorCode::invalidInput, "material '{}' uses a texture that does not exist",
                         m.name);
-        if ((m.baseColourTexture >= 0 || m.emissiveTexture >= 0) && uvs.empty())
+        if ((m.baseColourTexture >= 0 || m.emissiveTexture >= 0 ||
+             m.metallicRoughnessTexture >= 0) &&
+            uvs.empty())
             return fail(ErrorCode::invalidInput,
                         "material '{}' has a texture but the mesh has no uvs", m.name);
     }

@@ -21,7 +21,8 @@ struct MeshTexture {
     bool nearest = false;  ///< magnification without interpolation
 };
 
-/// How a triangle looks, unlit (glTF 2.0 metallic-roughness: base colour only).
+/// How a triangle looks (glTF 2.0 metallic-roughness). Pictures show its base colour and emission;
+/// metallic and roughness are for engines (CaptureSettings::materials).
 struct Material {
     enum class Alpha { opaque, mask, blend };
     std::string name;
@@ -29,7 +30,11 @@ struct Material {
     int baseColourTexture = -1;  ///< index into Mesh::textures, -1 = none; sRGB-coded
     glm::vec3 emissive{0.0f};    ///< linear, added to the base colour; may exceed 1
     int emissiveTexture = -1;    ///< multiplies `emissive`, -1 = none; sRGB-coded, at Mesh::uvs
-    int normalTexture = -1;      ///< tangent-space normal map, -1 = none; linear
+    float metallic = 0.0f;       ///< 0..1, where hasMetallicRoughness
+    float roughness = 1.0f;      ///< 0..1
+    int metallicRoughnessTexture = -1;  ///< G multiplies roughness, B metallic; at Mesh::uvs
+    bool hasMetallicRoughness = false;  ///< the file says the two
+    int normalTexture = -1;             ///< tangent-space normal map, -1 = none; linear
     float normalScale = 1.0f;
     Alpha alpha = Alpha::opaque;
     float alphaCutoff = 0.5f;  ///< for Alpha::mask

@@ -44,6 +44,14 @@ struct ReferenceView {
     Image<glm::vec3> splatU;  ///< tangent vectors in the world, scene units: half axes of the splat
     Image<glm::vec3> splatV;
 
+    /// How the surface answers to light (glTF 2.0, 3.9.2 and 3.9.3), for engines: nothing here
+    /// draws it. Empty when absent; else one value per pixel, zero where there is no point.
+    Image<glm::vec2> metallicRoughness;  ///< metallic, roughness, 0..1
+    Image<glm::vec3> emissive;  ///< linear light that `texture` does not hold; may exceed 1
+
+    [[nodiscard]] bool hasMaterial() const {
+        return !metallicRoughness.empty() || !emissive.empty();
+    }
     [[nodiscard]] bool hasNormals() const { return !normal.empty(); }
     [[nodiscard]] bool hasSplats() const { return !splatU.empty() && !splatV.empty(); }
 

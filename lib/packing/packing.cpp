@@ -10,10 +10,13 @@ namespace {
 
 struct Contents {
     bool linear = false, normals = false, splats = false;
+    bool metallicRoughness = false, emissive = false;
 
+    /// Those of a SimpleTexture, which the limit of four is about.
     [[nodiscard]] int texturesPerPage() const { return 2 + (normals ? 1 : 0) + (splats ? 1 : 0); }
     [[nodiscard]] std::uint64_t bytesPerPixel() const {
-        return (linear ? 16 : 4) + 4 + (normals ? 12 : 0) + (splats ? 24 : 0);
+        return (linear ? 16 : 4) + 4 + (normals ? 12 : 0) + (splats ? 24 : 0) +
+               (metallicRoughness ? 8 : 0) + (emissive ? 12 : 0);
     }
 };
 
@@ -23,6 +26,8 @@ Contents contentsOf(const Bundle& bundle) {
     for (const auto& v : bundle.views) {
         c.normals = c.normals || v.hasNormals();
         c.splats = c.splats || v.hasSplats();
+        c.metallicRoughness = c.metallicRoughness || !v.metallicRoughness.empty();
+        c.emissive = c.emissive || !v.emissive.empty();
     }
     return c;
 }
@@ -57,6 +62,22 @@ void fillPage(const ReferenceView& view, const AtlasRectangle& r, int padding, A
         copy(view.splatU, page.splatU);
         copy(view.splatV, page.splatV);
     }
+    if (!view.metallicRoughness.empty()) copy(view.metallicRoughness, page.metallicRoughness);
+    if (!view.emissive.empty()) copy(view.emissive, page.emissive);
+}
+
+/// Images, zero everywhere, of all that the views have beside colour and depth; `to` is a page or
+/// a view.
+template <class To>
+void makeFurther(const Contents& contents, int width, int height, To& to) {
+    if (contents.normals) to.normal = Image<glm::vec3>(width, height, glm::vec3(0));
+    if (contents.splats) {
+        to.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
+        to.splatV = to.splatU;
+    }
+    if (contents.metallicRoughness)
+        to.metallicRoughness = Image<glm::vec2>(width, height, glm::vec2(0));
+    if (contents.emissive) to.emissive = Image<glm::vec3>(width, height, glm::vec3(0));
 }
 
 /// A view without its images: what an atlas keeps of it.
@@ -184,12 +205,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
         AtlasPage page;
         page.texture = emptyTexture(layout.width, layout.height, contents.linear);
         page.depth = Image<float>(layout.width, layout.height, kNoDepth);
-        if (contents.normals)
-            page.normal = Image<glm::vec3>(layout.width, layout.height, glm::vec3(0));
-        if (contents.splats) {
-            page.splatU = Image<glm::vec3>(layout.width, layout.height, glm::vec3(0));
-            page.splatV = page.splatU;
-        }
+        makeFurther(contents, layout.width, layout.height, page);
         atlas.pages.push_back(std::move(page));
     }
     STX_CHECK(job.checkCancelled());
@@ -250,7 +266,8 @@ std::vector<std::uint64_t> shownByOthers(const Atlas& atlas, std::size_t of) {
 Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     STX_CHECK(atlas.check());
     const AtlasPage& first = atlas.pages[0];
-    const Contents contents{first.texture.isLinear(), !first.normal.empty(), !first.splatU.empty()};
+    const Contents contents{first.texture.isLinear(), !first.normal.empty(), !first.splatU.empty(),
+                            !first.metallicRoughness.empty(), !first.emissive.empty()};
     std::uint64_t pixels = 0;
     for (const auto& view : atlas.views)
         pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
@@ -275,11 +292,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         const int width = view.camera.width, height = view.camera.height;
         view.texture = emptyTexture(width, height, contents.linear);
         view.depth = Image<float>(width, height, kNoDepth);
-        if (contents.normals) view.normal = Image<glm::vec3>(width, height, glm::vec3(0));
-        if (contents.splats) {
-            view.splatU = Image<glm::vec3>(width, height, glm::vec3(0));
-            view.splatV = view.splatU;
-        }
+        makeFurther(contents, width, height, view);
         Image<std::uint8_t>& given = givenOf[i];  // 1 = by padding, 2 = by a rectangle
         given = Image<std::uint8_t>(width, height, 0);
         if (partial) {
@@ -302,6 +315,8 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
                 copy(page.splatU, view.splatU);
                 copy(page.splatV, view.splatV);
             }
+            if (contents.metallicRoughness) copy(page.metallicRoughness, view.metallicRoughness);
+            if (contents.emissive) copy(page.emissive, view.emissive);
             forEachPixel(*r, view.depth.size(), 0, [&](glm::ivec2, glm::ivec2 v) {
                 covered += given.at(v.x, v.y) == 2 ? 0 : 1;
                 given.at(v.x, v.y) = 2;
@@ -313,6 +328,8 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
         dropIfZero(view.normal);
         dropIfZero(view.splatU);
         dropIfZero(view.splatV);
+        dropIfZero(view.metallicRoughness);
+        dropIfZero(view.emissive);
     });
     STX_CHECK(job.checkCancelled());
     if (partial) {

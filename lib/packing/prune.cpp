@@ -238,6 +238,8 @@ void keepOnly(const Image<std::uint8_t>& kept, ReferenceView& view) {
             if (auto* c = view.texture.rgbaFloat()) c->at(x, y).a = 1.0f;
             if (view.hasNormals()) view.normal.at(x, y) = glm::vec3(0);
             if (view.hasSplats()) view.splatU.at(x, y) = view.splatV.at(x, y) = glm::vec3(0);
+            if (!view.metallicRoughness.empty()) view.metallicRoughness.at(x, y) = glm::vec2(0);
+            if (!view.emissive.empty()) view.emissive.at(x, y) = glm::vec3(0);
         }
     }
     // A silhouette whose points are gone says nothing any more: points of other views that lie on

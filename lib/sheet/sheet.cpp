@@ -93,14 +93,16 @@ Tile withRectangles(Tile tile, const Atlas& atlas, int page) {
 
 Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& job) {
     STX_CHECK(bundle.check());
-    bool normals = false, splats = false;
+    bool normals = false, splats = false, surface = false, glow = false;
     for (const auto& v : bundle.views) {
+        surface = surface || !v.metallicRoughness.empty();
+        glow = glow || !v.emissive.empty();
         normals = normals || v.hasNormals();
         splats = splats || v.hasSplats();
     }
     SheetContent content;
     content.groups = static_cast<int>(bundle.views.size());
-    content.tiles = 2 + (normals ? 1 : 0) + (splats ? 1 : 0);
+    content.tiles = 2 + (normals ? 1 : 0) + (splats ? 1 : 0) + (surface ? 1 : 0) + (glow ? 1 : 0);
     content.lines = kViewLines;
     content.headerLines = 2;
     content.largest = largestOf(bundle.views);
@@ -115,6 +117,9 @@ Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& 
         group.tiles.push_back(depthTile(view.depth, plan.cell));
         if (view.hasNormals()) group.tiles.push_back(normalTile(view.normal, plan.cell));
         if (view.hasSplats()) group.tiles.push_back(splatTile(view.splatU, view.splatV, plan.cell));
+        if (!view.metallicRoughness.empty())
+            group.tiles.push_back(metallicRoughnessTile(view.metallicRoughness, plan.cell));
+        if (!view.emissive.empty()) group.tiles.push_back(emissiveTile(view.emissive, plan.cell));
         groups.push_back(std::move(group));
         job.progress(i + 1, plan.shown, "views");
     }
@@ -138,6 +143,8 @@ Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& jo
         textures.push_back({"depth", page});
         if (!p.normal.empty()) textures.push_back({"normal", page});
         if (!p.splatU.empty()) textures.push_back({"splat", page});
+        if (!p.metallicRoughness.empty()) textures.push_back({"metallic_roughness", page});
+        if (!p.emissive.empty()) textures.push_back({"emissive", page});
     }
     SheetContent content;
     content.groups = static_cast<int>(textures.size());
@@ -151,10 +158,12 @@ Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& jo
         const Kind& kind = textures[static_cast<std::size_t>(plan.groupAt(i))];
         const AtlasPage& page = atlas.pages[static_cast<std::size_t>(kind.page)];
         const std::string_view name = kind.name;
-        Tile tile = name == "colour"   ? colourTile(page.texture, plan.cell)
-                    : name == "depth"  ? depthTile(page.depth, plan.cell)
-                    : name == "normal" ? normalTile(page.normal, plan.cell)
-                                       : splatTile(page.splatU, page.splatV, plan.cell);
+        Tile tile = name == "colour"     ? colourTile(page.texture, plan.cell)
+                    : name == "depth"    ? depthTile(page.depth, plan.cell)
+                    : name == "normal"   ? normalTile(page.normal, plan.cell)
+                    : name == "splat"    ? splatTile(page.splatU, page.splatV, plan.cell)
+                    : name == "emissive" ? emissiveTile(page.emissive, plan.cell)
+                                         : metallicRoughnessTile(page.metallicRoughness, plan.cell);
         groups.push_back(
             {{fmt::format("{}, page {}, {}x{}", name, kind.page, atlas.width(), atlas.height())},
              {}});

@@ -133,6 +133,29 @@ Tile normalTile(const Image<glm::vec3>& normal, glm::ivec2 cell) {
             "normals"};
 }
 
+Tile metallicRoughnessTile(const Image<glm::vec2>& values, glm::ivec2 cell) {
+    return {meanOf(values.size(), cell,
+                   [&](int x, int y) {
+                       const glm::vec2 v = values.at(x, y);
+                       if (v == glm::vec2(0.0f)) return linearOf(kEmptyColour);
+                       return linearOf(glm::u8vec3(
+                           glm::clamp(glm::vec3(0, v.y, v.x) * 255.0f + 0.5f, 0.0f, 255.0f)));
+                   }),
+            "G rough, B metal"};
+}
+
+Tile emissiveTile(const Image<glm::vec3>& emissive, glm::ivec2 cell) {
+    float most = 1.0f;
+    for (const auto& v : emissive.pixels()) {
+        for (int c = 0; c < 3; ++c) {
+            if (std::isfinite(v[c])) most = std::max(most, v[c]);
+        }
+    }
+    return {meanOf(emissive.size(), cell,
+                   [&](int x, int y) { return glm::clamp(emissive.at(x, y) / most, 0.0f, 1.0f); }),
+            most > 1.0f ? fmt::format("emissive, up to {:.4g}", most) : "emissive"};
+}
+
 Tile splatTile(const Image<glm::vec3>& splatU, const Image<glm::vec3>& splatV, glm::ivec2 cell) {
     Image<float> longer(splatU.width(), splatU.height(), kNoDepth);
     for (std::size_t i = 0; i < longer.count(); ++i) {

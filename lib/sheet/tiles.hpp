@@ -40,6 +40,10 @@ inline constexpr glm::u8vec3 kEmptyColour{216, 216, 220};
 [[nodiscard]] Tile depthTile(const Image<float>& depth, glm::ivec2 cell);
 /// World directions as colours, n / 2 + 1/2 of each axis.
 [[nodiscard]] Tile normalTile(const Image<glm::vec3>& normal, glm::ivec2 cell);
+/// As an engine sees the map: G = roughness, B = metallic.
+[[nodiscard]] Tile metallicRoughnessTile(const Image<glm::vec2>& values, glm::ivec2 cell);
+/// The light that is given off; where it exceeds 1, so much darker that its most is 1.
+[[nodiscard]] Tile emissiveTile(const Image<glm::vec3>& emissive, glm::ivec2 cell);
 /// The longer of the two half axes in false colour.
 [[nodiscard]] Tile splatTile(const Image<glm::vec3>& splatU, const Image<glm::vec3>& splatV,
                              glm::ivec2 cell);

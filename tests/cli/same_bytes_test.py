@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 
+import material_model
 from harness import arguments, commands_of, film_set, must, quad, run, tree, turn_set
 
 
@@ -41,6 +42,8 @@ def main():
         must([args.stx, "convert", "quad.obj", "-o", "quad.mp4", "--views", "cube", "--size", "40x40"], top)
         film_set(args.stx, os.path.join(top, "in.exr"), os.path.join(top, "film"))
         must([args.stx, "convert", "film", "-o", "film.mp4"], top)
+        material_model.make(os.path.join(top, "metal.gltf"))
+        must([args.stx, "convert", "metal.gltf", "-o", "metal.exr", "--materials", "--views", "sphere:5", "--size", "96x80"], top)
         os.mkdir(os.path.join(top, "frames"))
         must([args.stx, "render", "in.exr", "-o", "frames/f_%04d.png", "--orbit", "24", "--size", "90x70", "--backend", "cpu",
               "--background", "white"], top)
@@ -52,6 +55,8 @@ def main():
             "convert mp4": ["convert", args.model, "-o", "OUT/a.mp4"] + views,
             "convert jpeg": ["convert", args.model, "-o", "OUT/a.mp4", "--colour", "jpeg"] + views,
             "convert exr": ["convert", args.model, "-o", "OUT/a.exr", "--depth-bits", "32"] + views,
+            "convert materials": ["convert", "IN/metal.gltf", "-o", "OUT/a.exr", "--materials"] + views,
+            "pack materials": ["pack", "IN/metal.exr", "-o", "OUT/a", "--layout", "tight"],
             "convert xmt": ["convert", "IN/in.exr", "-o", "OUT/a.xmt"],
             "convert bt": ["convert", "IN/in.exr", "-o", "OUT/a.bt", "--point-texture"],
             "convert octree": ["convert", "IN/in.exr", "-o", "OUT/o.mp4", "--octree-image", "6"],

@@ -22,6 +22,10 @@ Result<MaterialUse> Materials::use(std::optional<std::uint64_t> index, const std
         result.index = static_cast<std::uint32_t>(builder_.materials().size());
         builder_.materials().push_back(
             {.name = "default", .doubleSided = false, .hasColour = false});
+        if (model_.files().materials()) {
+            builder_.materials().back().metallic = 1.0f;
+            builder_.materials().back().hasMetallicRoughness = true;
+        }
     }
     known_.emplace(key, result);
     return result;
@@ -39,6 +43,7 @@ MaterialUse Materials::withoutTextures(const MaterialUse& use, bool keepBase, bo
             // A map of what shines, which is dark for the most part.
             if (material.emissiveTexture >= 0) material.emissive = glm::vec3(0.0f);
             material.emissiveTexture = -1;
+            material.metallicRoughnessTexture = -1;
         }
         if (!keepNormal) material.normalTexture = -1;
         it->second = static_cast<std::uint32_t>(builder_.materials().size());
@@ -164,6 +169,43 @@ Result<void> Materials::readEmissive(const Json& object, const std::string& wher
     return {};
 }
 
+Result<void> Materials::readMetallicRoughness(const Json* base, bool glossy,
+                                              const std::string& where, Material& m,
+                                              MaterialUse& use) {
+    if (base && base->contains("specularGlossinessTexture")) ++dropped["specular-glossiness maps"];
+    if (!model_.files().materials()) {
+        if (base && base->contains("metallicRoughnessTexture"))
+            ++dropped["metallic-roughness maps"];
+        return {};
+    }
+    m.hasMetallicRoughness = true;
+    const auto factor = [&](const char* name) -> Result<float> {
+        if (!base) return 1.0f;
+        STX_TRY(const auto value, getNumber(*base, name, where));
+        return static_cast<float>(std::clamp(value.value_or(1.0), 0.0, 1.0));
+    };
+    if (glossy) {
+        // The nearest that metallic-roughness has to a specular colour of its own.
+        STX_TRY(const float gloss, factor("glossinessFactor"));
+        m.roughness = 1.0f - gloss;
+        return {};
+    }
+    STX_TRY(m.metallic, factor("metallicFactor"));
+    STX_TRY(m.roughness, factor("roughnessFactor"));
+    if (!base) return {};
+    STX_TRY(const Json* info, getObject(*base, "metallicRoughnessTexture", where));
+    if (!info) return {};
+    UvSource uv;
+    STX_TRY(const int map, texture(*info, where + ".metallicRoughnessTexture", uv));
+    if (map < 0) return {};
+    if (!use.baseColour.used) use.baseColour = uv;
+    if (uv == use.baseColour)
+        m.metallicRoughnessTexture = map;
+    else
+        ++dropped["metallic-roughness maps with texture coordinates of their own"];
+    return {};
+}
+
 Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user) {
     STX_TRY(const Json* object, element(model_.root(), "materials", index, user));
     const auto where = fmt::format("materials[{}]", index);
@@ -189,9 +231,8 @@ Result<MaterialUse> Materials::read(std::uint64_t index, const std::string& user
         if (info && !model_.files().replacesColour()) {
             STX_TRY(m.baseColourTexture, texture(*info, baseWhere + "." + key, use.baseColour));
         }
-        if (base->contains("metallicRoughnessTexture")) ++dropped["metallic-roughness maps"];
-        if (base->contains("specularGlossinessTexture")) ++dropped["specular-glossiness maps"];
     }
+    STX_CHECK(readMetallicRoughness(base, glossy != nullptr, baseWhere, m, use));
     STX_TRY(const Json* normal, getObject(*object, "normalTexture", where));
     if (normal) {
         STX_TRY(m.normalTexture, texture(*normal, where + ".normalTexture", use.normal));

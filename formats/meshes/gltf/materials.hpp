@@ -44,6 +44,9 @@ class Materials {
     [[nodiscard]] Result<MaterialUse> read(std::uint64_t index, const std::string& user);
     [[nodiscard]] Result<void> readEmissive(const Json& object, const std::string& where,
                                             Material& m, MaterialUse& use);
+    [[nodiscard]] Result<void> readMetallicRoughness(const Json* base, bool glossy,
+                                                     const std::string& where, Material& m,
+                                                     MaterialUse& use);
     [[nodiscard]] Result<int> texture(const Json& info, const std::string& where, UvSource& uv);
 
     GltfFile& model_;

@@ -377,6 +377,7 @@ class SceneWriter {
 }  // namespace
 
 Result<Document> sceneFromBundle(const Bundle& bundle, const SceneWriteOptions& options, Job& job) {
+    bundle.noteMaterialLeftOut(job);
     return SceneWriter(bundle, options, job).write();
 }
 

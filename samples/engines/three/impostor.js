@@ -47,6 +47,14 @@ export async function loadImpostor(folder) {
             depthTexture: {value: await texture(`${folder}/depth.png`, THREE.NoColorSpace, THREE.NearestFilter)},
             viewTable: {value: viewTable}, side: {value: side}, hemi: {value: lowest > -0.1}, centre: {value: centre},
             radius: {value: size.length() / 2}, eye: {value: new THREE.Vector3()}}});
+    // What gives off light has it in a texture of its own (stx convert --materials).
+    const glow = atlas.textures.find((t) => t.attribute === "emissive" && t.coding === "sRGB8-emissive");
+    if (glow) {
+        material.defines = {EMISSIVE: true};
+        material.uniforms.emissiveScale = {value: glow.scale};
+        material.uniforms.emissiveTexture =
+            {value: await texture(`${folder}/${glow.file}`, THREE.SRGBColorSpace, THREE.LinearFilter)};
+    }
     const box = new THREE.BoxGeometry(size.x, size.y, size.z).translate(...low.clone().add(high).multiplyScalar(0.5).toArray());
     const mesh = new THREE.Mesh(box, material);
     const inverse = new THREE.Matrix4();

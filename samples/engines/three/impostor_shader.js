@@ -13,6 +13,10 @@ void main() {
 export const fragmentShader = /* glsl */ `
 precision highp float;
 uniform sampler2D colourTexture, depthTexture, viewTable;
+#ifdef EMISSIVE
+uniform sampler2D emissiveTexture;
+uniform float emissiveScale;
+#endif
 uniform int side;           // views along a side of the grid
 uniform bool hemi;          // hemi-octahedral, else octahedral
 uniform vec3 centre;        // what all views look at
@@ -115,6 +119,9 @@ void main() {
         if (along[k] < 0.0) continue;
         vec2 texel = texelOf(views[k], eye + ray * along[k]);
         vec4 colour = textureLod(colourTexture, texel / vec2(textureSize(colourTexture, 0)), 0.0);
+        #ifdef EMISSIVE
+        colour.rgb += emissiveScale * textureLod(emissiveTexture, texel / vec2(textureSize(emissiveTexture, 0)), 0.0).rgb;
+        #endif
         sum += vec4(colour.rgb * colour.a, colour.a) * weights[k];
     }
     if (sum.a < 0.4 * seen || sum.a <= 0.0) discard;

@@ -262,6 +262,45 @@ TEST(Gltf, SpecularGlossinessGivesItsDiffuseColour) {
     EXPECT_EQ(mesh.materials[0].baseColourTexture, 0);
 }
 
+/// A textured quad whose metallic-roughness map is at `uv` of it.
+GltfText metallicQuad(nlohmann::json uv = nlohmann::json::object()) {
+    auto gltf = texturedQuad();
+    uv["index"] = 0;
+    auto& pbr = gltf.root["materials"][0]["pbrMetallicRoughness"];
+    pbr["metallicRoughnessTexture"] = std::move(uv);
+    pbr["metallicFactor"] = 0.25;
+    return gltf;
+}
+
+TEST(Gltf, MetallicRoughnessIsReadWhereItIsAskedFor) {
+    const auto read = [](const GltfText& gltf, bool materials) {
+        TemporaryFolder folder;
+        std::ofstream(folder / "a.gltf") << gltf.text();
+        MeshOptions options;
+        options.materials = materials;
+        return readGood(folder / "a.gltf", options);
+    };
+    const auto asked = read(metallicQuad(), true);
+    const Material& m = asked.mesh.materials.at(0);
+    EXPECT_TRUE(m.hasMetallicRoughness);
+    EXPECT_FLOAT_EQ(m.metallic, 0.25f);
+    EXPECT_FLOAT_EQ(m.roughness, 1.0f);
+    EXPECT_EQ(m.metallicRoughnessTexture, 0);
+    EXPECT_TRUE(asked.notes.empty());
+
+    const auto plain = read(metallicQuad(), false);
+    EXPECT_FALSE(plain.mesh.materials.at(0).hasMetallicRoughness);
+    EXPECT_EQ(plain.mesh.materials.at(0).metallicRoughnessTexture, -1);
+    EXPECT_TRUE(plain.hasNote("dropped: metallic-roughness maps (1)"));
+
+    // A map elsewhere than the colour would need coordinates of its own.
+    const auto apart = read(
+        metallicQuad({{"extensions", {{"KHR_texture_transform", {{"offset", {0.5, 0}}}}}}}), true);
+    EXPECT_EQ(apart.mesh.materials.at(0).metallicRoughnessTexture, -1);
+    EXPECT_FLOAT_EQ(apart.mesh.materials.at(0).metallic, 0.25f);
+    EXPECT_TRUE(apart.hasNote("metallic-roughness maps with texture coordinates of their own"));
+}
+
 TEST(Gltf, WhatIsDroppedIsSaidInOneLine) {
     auto gltf = texturedQuad();
     gltf.root["animations"] = {{{"channels", json::array()}, {"samplers", json::array()}}};

@@ -1,0 +1,161 @@
+#include <gtest/gtest.h>
+
+#include "lib/capture/capture.hpp"
+#include "lib/model/srgb8.hpp"
+#include "lib/packing/packing.hpp"
+#include "lib/packing/prune.hpp"
+
+namespace stx {
+namespace {
+
+/// A square of 2 x 2 around the origin that faces +Z, of one material, with texture coordinates
+/// from (0, 0) at its top left to (1, 1).
+Mesh square(Material material, std::vector<MeshTexture> textures) {
+    Mesh mesh;
+    mesh.positions = {{-1, 1, 0}, {1, 1, 0}, {1, -1, 0}, {-1, -1, 0}};
+    mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+    mesh.triangleMaterial = {0, 0};
+    mesh.materials = {std::move(material)};
+    mesh.textures = std::move(textures);
+    return mesh;
+}
+
+/// Left half `left`, right half `right`, without interpolation.
+MeshTexture halves(glm::u8vec4 left, glm::u8vec4 right) {
+    MeshTexture texture;
+    texture.pixels = Rgba8Image(2, 1, left);
+    texture.pixels.at(1, 0) = right;
+    texture.nearest = true;
+    return texture;
+}
+
+/// Looks at the square from +Z; it fills the picture but for a border.
+Camera before(double x = 0.0) {
+    Camera camera;
+    camera.width = camera.height = 16;
+    camera.position = {x, 0, 4};
+    camera.orthographic = true;
+    camera.fx = camera.fy = 6;
+    camera.cx = camera.cy = 8;
+    return camera;
+}
+
+Material glowing() {
+    Material m;
+    m.baseColour = {0.25f, 0.25f, 0.25f, 1};
+    m.metallic = 0.5f;
+    m.roughness = 0.8f;
+    m.metallicRoughnessTexture = 0;
+    m.hasMetallicRoughness = true;
+    m.emissive = {2, 1, 0};
+    m.emissiveTexture = 1;
+    return m;
+}
+
+std::vector<MeshTexture> maps() {
+    // Red and alpha must not count; green is roughness, blue metallic (glTF 2.0, 3.9.2).
+    return {halves({7, 255, 51, 9}, {200, 102, 255, 3}),
+            halves({255, 255, 255, 255}, {0, 0, 0, 1})};
+}
+
+CaptureSettings withMaterials() {
+    CaptureSettings settings;
+    settings.materials = true;
+    return settings;
+}
+
+Bundle captured(const CaptureSettings& settings, std::vector<Camera> cameras = {before()}) {
+    Job job;
+    auto bundle = captureBundle(square(glowing(), maps()), cameras, settings, job);
+    EXPECT_TRUE(bundle) << bundle.error().text();
+    return bundle ? std::move(*bundle) : Bundle();
+}
+
+TEST(CapturedMaterials, FactorsMultiplyTheMaps) {
+    const Bundle bundle = captured(withMaterials());
+    const ReferenceView& view = bundle.views.at(0);
+    ASSERT_EQ(view.metallicRoughness.size(), view.depth.size());
+    ASSERT_EQ(view.emissive.size(), view.depth.size());
+    const glm::vec2 left = view.metallicRoughness.at(4, 8),
+                    right = view.metallicRoughness.at(11, 8);
+    EXPECT_NEAR(left.x, 0.5 * 51 / 255, 1e-6);
+    EXPECT_NEAR(left.y, 0.8, 1e-6);
+    EXPECT_NEAR(right.x, 0.5, 1e-6);
+    EXPECT_NEAR(right.y, 0.8 * 102 / 255, 1e-6);
+    EXPECT_LT(glm::length(view.emissive.at(4, 8) - glm::vec3(2, 1, 0)), 1e-5f);
+    EXPECT_EQ(view.emissive.at(11, 8), glm::vec3(0));
+    // Where there is no point there is no material.
+    ASSERT_FALSE(hasPoint(view.depth.at(0, 0)));
+    EXPECT_EQ(view.metallicRoughness.at(0, 0), glm::vec2(0));
+    EXPECT_EQ(view.emissive.at(0, 0), glm::vec3(0));
+}
+
+TEST(CapturedMaterials, LightIsInTheColourOrApart) {
+    const std::uint8_t base = srgb8FromLinear(0.25f);
+    const auto apart = captured(withMaterials()).views.at(0).texture.rgba8()->at(4, 8);
+    EXPECT_NEAR(apart.r, base, 1);
+    EXPECT_NEAR(apart.b, base, 1);
+    const Bundle plain = captured({});
+    EXPECT_FALSE(plain.hasMaterial());
+    const auto together = plain.views.at(0).texture.rgba8()->at(4, 8);
+    EXPECT_EQ(together.r, 255);
+    EXPECT_NEAR(together.b, base, 1);
+}
+
+TEST(CapturedMaterials, AModelWithoutThemIsSaidToHaveNone) {
+    Job job;
+    const auto bundle = captureBundle(square(Material(), {}), {before()}, withMaterials(), job);
+    ASSERT_TRUE(bundle);
+    EXPECT_FALSE(bundle->hasMaterial());
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("has nothing to keep"), std::string::npos);
+}
+
+TEST(CapturedMaterials, TravelThroughAnAtlas) {
+    const Bundle bundle = captured(withMaterials(), {before(), before(0.1)});
+    for (const auto layout : {PackSettings::Layout::grid, PackSettings::Layout::tight}) {
+        Job job;
+        PackSettings settings;
+        settings.layout = layout;
+        const auto atlas = pack(bundle, settings, job);
+        ASSERT_TRUE(atlas) << atlas.error().text();
+        EXPECT_EQ(atlas->textureCount(), 2);
+        EXPECT_EQ(atlas->materialTextureCount(), 2);
+        const auto back = unpack(*atlas, job);
+        ASSERT_TRUE(back) << back.error().text();
+        for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+            EXPECT_EQ(back->views[i].metallicRoughness, bundle.views[i].metallicRoughness);
+            EXPECT_EQ(back->views[i].emissive, bundle.views[i].emissive);
+        }
+    }
+}
+
+TEST(CapturedMaterials, PrunedPixelsLoseThem) {
+    Bundle bundle = captured(withMaterials(), {before(), before(0.1)});
+    Job job;
+    const auto report = prune(bundle, {}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    std::int64_t without = 0;
+    for (const auto& view : bundle.views) {
+        for (std::size_t i = 0; i < view.depth.count(); ++i) {
+            const bool point = hasPoint(view.depth.pixels()[i]);
+            EXPECT_EQ(view.metallicRoughness.pixels()[i] != glm::vec2(0), point);
+            if (!point) EXPECT_EQ(view.emissive.pixels()[i], glm::vec3(0));
+            without += !point && view.texture.rgba8()->pixels()[i].a == 255 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(without, 0) << "nothing was pruned";
+}
+
+TEST(CapturedMaterials, AnotherSizeIsRefused) {
+    Bundle bundle = captured(withMaterials());
+    bundle.views[0].emissive = Image<glm::vec3>(3, 3);
+    const auto ok = bundle.check();
+    ASSERT_FALSE(ok);
+    EXPECT_NE(ok.error().text().find("emissive 3x3"), std::string::npos) << ok.error().text();
+}
+
+}  // namespace
+}  // namespace stx
