@@ -158,6 +158,7 @@ class BatchRun {
     std::vector<Json> entries_;
     std::vector<Worker> workers_;
     std::size_t next_ = 0, done_ = 0, skipped_ = 0, failed_ = 0;
+    std::size_t told_ = 0;  ///< entries that onEntry got
 };
 
 Result<Worker> BatchRun::startWorker() {
@@ -203,6 +204,8 @@ void BatchRun::finish(std::size_t item, Json entry) {
         entry["shard"] = shardJson(options_.shard, options_.total);
     }
     entries_[item] = std::move(entry);
+    while (options_.onEntry && told_ < entries_.size() && entries_[told_].is_object())
+        options_.onEntry(entries_[told_++]);
     program_.job.progress(static_cast<std::int64_t>(done_),
                           static_cast<std::int64_t>(items_.size()), "inputs");
 }

@@ -21,6 +21,9 @@ struct BatchOptions {
     bool skipExisting = false;  ///< an input whose output exists is done already
     Shard shard;                ///< entries of reports get the shard and their index
     std::size_t total = 0;      ///< inputs of all shards
+    /// Gets each entry before it goes into the report, in the order of the inputs, as soon as it
+    /// and all before it are there; may change it. Empty: nothing is done.
+    std::function<void(nlohmann::ordered_json&)> onEntry;
 };
 
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to

@@ -2,15 +2,19 @@
 
 #include "formats/validate/validate.hpp"
 #include "lib/base/printable.hpp"
+#include "tools/batch.hpp"
 #include "tools/commands.hpp"
 
 namespace stx::tools {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 struct ValidateCommandOptions {
-    std::string input;
+    std::vector<std::string> inputs;
     bool noPixels = false;
     bool rules = false;
+    BatchOptions batch;
 };
 
 const char* wordOf(Rule::Severity severity) {
@@ -24,13 +28,12 @@ Result<int> printRules(Program& program) {
     return 0;
 }
 
-Result<int> run(const ValidateCommandOptions& o, Program& program) {
-    if (o.rules) return printRules(program);
-    if (o.input.empty())
-        return fail(ErrorCode::usage, "FILE is required. See 'stx validate --help'");
-    STX_TRY(const auto findings, validateFile(o.input, {!o.noPixels}, program.job));
+/// The entry of a file's report. A file that breaks rules was validated, so its status is ok.
+Result<Json> validateOne(const std::string& input, const ValidateCommandOptions& o,
+                         Program& program) {
+    STX_TRY(const auto findings, validateFile(input, {!o.noPixels}, program.job));
     bool valid = true;
-    auto list = nlohmann::ordered_json::array();
+    auto list = Json::array();
     for (const auto& f : findings) {
         valid = valid && f.rule->severity != Rule::Severity::error;
         list.push_back({{"rule", f.rule->number},
@@ -39,31 +42,101 @@ Result<int> run(const ValidateCommandOptions& o, Program& program) {
                         {"where", f.where},
                         {"message", f.rule->summary},
                         {"found", f.found},
-                        {"expected", f.expected}});
-        if (program.common.format != "json") program.print(printable(f.text()) + "\n");
+                        {"expected", f.expected},
+                        {"text", f.text()}});
     }
-    if (program.common.format == "json") {
-        program.printJson({{"$schema", "validate.schema.json"},
-                           {"file", o.input},
-                           {"valid", valid},
-                           {"findings", list}});
+    const int code = findings.empty() ? 0 : static_cast<int>(ErrorCode::difference);
+    return Json{{"input", input},
+                {"status", "ok"},
+                {"exitCode", code},
+                {"valid", valid},
+                {"findings", std::move(list)}};
+}
+
+/// What is printed of one entry; `named`: with the file's name, since there are several.
+void printEntry(const Json& entry, bool named, Program& program) {
+    const std::string input = entry.value("input", "");
+    const bool failed = entry.value("status", "") == "error";
+    Json findings = entry.value("findings", Json::array());
+    if (program.common.format != "json") {
+        for (const auto& f : findings)
+            program.print(printable((named ? input + ": " : "") + f.value("text", "")) + "\n");
+        return;
     }
-    return findings.empty() ? 0 : static_cast<int>(ErrorCode::difference);
+    for (auto& f : findings) f.erase("text");
+    Json document = {{"$schema", "validate.schema.json"},
+                     {"file", input},
+                     {"valid", entry.value("valid", false)},
+                     {"findings", std::move(findings)}};
+    if (failed) document["error"] = entry.value("message", "");
+    // Of several files a line each, that other programs can take one after the other.
+    if (named)
+        program.print(document.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+    else
+        program.printJson(document);
+}
+
+Result<int> run(const ValidateCommandOptions& options, Program& program) {
+    ValidateCommandOptions o = options;
+    if (o.rules) return printRules(program);
+    if (o.inputs.empty())
+        return fail(ErrorCode::usage, "FILE is required. See 'stx validate --help'");
+    STX_TRY(const auto inputs, expandInputs(o.inputs, program.job.limits));
+    if (inputs.size() == 1 && o.inputs[0][0] != '@' && !o.batch.shard.given) {
+        STX_TRY(auto entry, validateOne(inputs[0], o, program));
+        printEntry(entry, false, program);
+        for (auto& f : entry["findings"]) f.erase("text");
+        STX_CHECK(program.writeReportText(
+            entry.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"));
+        return entry["exitCode"].get<int>();
+    }
+    std::vector<BatchItem> items;
+    for (const auto& input : inputs) items.push_back({input, "", items.size()});
+    o.batch.total = items.size();
+    // A file that cannot be read says nothing about the others.
+    o.batch.keepGoing = true;
+    int worst = 0;
+    o.batch.onEntry = [&](Json& entry) {
+        printEntry(entry, true, program);
+        worst = std::max(worst, entry.value("exitCode", 0));
+        entry.erase("output");
+        if (entry.contains("findings"))
+            for (auto& f : entry["findings"]) f.erase("text");
+    };
+    const BatchWork work = [&](const BatchItem& item, Program& p) {
+        return validateOne(item.input, o, p);
+    };
+    STX_TRY(const int done, runBatch(itemsOf(items, o.batch.shard), o.batch, work, program));
+    return std::max(done, worst);
 }
 
 }  // namespace
 
 void addValidate(CommandLine& line, Program& program) {
     Command c = line.add("validate",
-                         "Every rule that a file breaks, by number; silent, with exit code "
-                         "0, when it breaks none\n\n"
+                         "Every rule that files break, by number; silent, with exit code 0, when "
+                         "they break none\n\n"
                          "  stx validate model.mp4\n"
-                         "  stx validate --rules");
+                         "  stx validate out/*.mp4 --format json --jobs 4\n"
+                         "  stx validate @list.txt --report found.jsonl --shard 2/8\n"
+                         "  stx validate --rules\n\n"
+                         "Of several files each is looked at, whatever the others are, and lines "
+                         "begin with its name.\nThe exit code is 7 where one breaks a rule, and "
+                         "that of the first that cannot be read at all.");
     auto o = std::make_shared<ValidateCommandOptions>();
-    c.option("FILE", o->input, "Bundle, atlas, image set or mesh");
+    c.option("FILE", o->inputs,
+             "Bundles, atlases, image sets or meshes; @FILE: those named in its lines, # begins a "
+             "comment");
     c.flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
     c.flag("--rules", o->rules, "Print the catalogue of rules and stop");
-    c.sharedOptions(program.common, kFormat | kOutside);
+    const char* many = "Many inputs";
+    c.option("--jobs,-j", o->batch.jobs,
+             "Inputs at a time, each in a process of its own (default 1)")
+        .range(1, 1024)
+        .takes("N")
+        .group(many);
+    addShardOption(c, o->batch.shard, "inputs", many);
+    c.sharedOptions(program.common, kOutput | kFormat | kOutside);
     c.runs([o](Program& p) { return run(*o, p); });
 }
 

@@ -160,9 +160,12 @@ std::map<std::size_t, std::string> MergedReport::failed() const {
 
 std::vector<std::string> MergedReport::outputs() const {
     std::vector<std::string> out;
-    for (const auto& [index, entry] : entries_)
-        if (entry.status != Status::error)
-            out.push_back(Json::parse(entry.line, nullptr, false).value("output", ""));
+    for (const auto& [index, entry] : entries_) {
+        if (entry.status == Status::error) continue;
+        // What was validated has none.
+        auto output = Json::parse(entry.line, nullptr, false).value("output", "");
+        if (!output.empty()) out.push_back(std::move(output));
+    }
     return out;
 }
 

@@ -12,9 +12,9 @@
 
 namespace stx::tools {
 
-/// Reports of shards (`--shard K/N --report`), joined: lines of `stx convert`, or reports of `stx
-/// render`. Of an input or picture that several runs report, as when one was stopped and started
-/// again, the best is taken: ok, then skipped, then error; of equals the later.
+/// Reports of shards (`--shard K/N --report`), joined: lines of `stx convert` or `stx validate`, or
+/// reports of `stx render`. Of an input or picture that several runs report, as when one was
+/// stopped and started again, the best is taken: ok, then skipped, then error; of equals the later.
 class MergedReport {
   public:
     /// Adds the text of one report. Errors (invalidInput): neither of the two, no shard's, another
