@@ -15,9 +15,10 @@
 namespace stx {
 namespace {
 
-/// The conventional path draws squares and blends nothing, so that it is like the others from
-/// afar only: 25.6 dB with llvmpipe.
-constexpr double kSquaresDb = 20.0;
+/// The conventional path draws squares of whole pixels and blends nothing, so that no number of the
+/// others is its measure. What it may be off by is known beforehand: a pixel. Its limit is what the
+/// processor's own picture has when it is moved by one pixel (movedDb()).
+constexpr double kByOnePixel = -1.0;
 
 /// One way to draw.
 struct Way {
@@ -60,7 +61,7 @@ constexpr Way kWays[] = {
     {"splat data, raster, lit", Backend::gpu, RenderMode::splat, kNormal, SplatRule::data,
      GpuPipeline::raster, true},
     {"splat paper, conventional GL", Backend::gl, RenderMode::splat, kNormal, SplatRule::paper,
-     kByDevice, false, kSquaresDb},
+     kByDevice, false, kByOnePixel},
 };
 
 RenderSettings settingsOf(const Way& way) {
@@ -99,6 +100,17 @@ Result<Drawn> draw(Backend backend, const Bundle& bundle, const Camera& camera, 
     return drawn;
 }
 
+/// PSNR of a picture against itself, one pixel further right and down.
+Result<double> movedDb(const Rgba8Image& picture) {
+    Rgba8Image moved(picture.width(), picture.height());
+    for (int y = 0; y < picture.height(); ++y) {
+        for (int x = 0; x < picture.width(); ++x)
+            moved.at(x, y) = picture.at(std::max(x - 1, 0), std::max(y - 1, 0));
+    }
+    STX_TRY(const auto found, compare(moved, picture));
+    return found.psnrRgb.value_or(kAlikeDb);
+}
+
 struct CheckScene {
     const char* name;
     Bundle bundle;
@@ -131,9 +143,9 @@ Result<GpuCheckReport> checkGpus(const GpuCheckSettings& settings, Job& job) {
     std::map<std::pair<const Way*, const CheckScene*>, Drawn> truths;
     for (const Device& device : devices) {
         settings.print(fmt::format(
-            "device {}: {}, OpenGL {}, {}\n{:<30}{:<8}{:>10}{:>8}{:>10}{:>10}\n", device.index,
+            "device {}: {}, OpenGL {}, {}\n{:<30}{:<8}{:>10}{:>8}{:>8}{:>10}{:>10}\n", device.index,
             device.name, device.version, device.software ? "software" : "hardware", "", "scene",
-            "dB", "worst", "ms", "cpu ms"));
+            "dB", "limit", "worst", "ms", "cpu ms"));
         for (const Way& way : kWays) {
             for (const CheckScene& scene : scenes) {
                 STX_CHECK(job.checkCancelled());
@@ -150,13 +162,17 @@ Result<GpuCheckReport> checkGpus(const GpuCheckSettings& settings, Job& job) {
                 }
                 STX_TRY(const auto found, compare(drawn->picture, truth.picture));
                 ++report.drawn;
-                const bool alike = found.identical() || *found.psnrRgb >= way.leastDb;
+                double least = way.leastDb;
+                if (least == kByOnePixel) {
+                    STX_TRY(least, movedDb(truth.picture));
+                }
+                const bool alike = found.identical() || *found.psnrRgb >= least;
                 report.wrong += alike ? 0 : 1;
                 settings.print(
-                    fmt::format("{:>10}{:>8.0f}{:>10.2f}{:>10.2f}{}\n",
+                    fmt::format("{:>10}{:>8.1f}{:>8.0f}{:>10.2f}{:>10.2f}{}\n",
                                 found.identical() ? "same" : fmt::format("{:.1f}", *found.psnrRgb),
-                                found.worst.difference, drawn->milliseconds, truth.milliseconds,
-                                alike ? "" : "  UNLIKE THE PROCESSOR'S"));
+                                least, found.worst.difference, drawn->milliseconds,
+                                truth.milliseconds, alike ? "" : "  UNLIKE THE PROCESSOR'S"));
             }
         }
     }
