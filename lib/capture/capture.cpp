@@ -114,7 +114,7 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
         "the reference views"));
     if (settings.materials && !surface && !glow)
         job.note(
-            "the model tells neither metallic and roughness nor light that it gives off; "
+            "the model has neither metallic-roughness nor emissive materials; "
             "--materials has nothing to keep");
     if (glow)
         job.note(

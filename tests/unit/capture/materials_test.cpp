@@ -142,7 +142,9 @@ TEST(CapturedMaterials, PrunedPixelsLoseThem) {
         for (std::size_t i = 0; i < view.depth.count(); ++i) {
             const bool point = hasPoint(view.depth.pixels()[i]);
             EXPECT_EQ(view.metallicRoughness.pixels()[i] != glm::vec2(0), point);
-            if (!point) EXPECT_EQ(view.emissive.pixels()[i], glm::vec3(0));
+            if (!point) {
+                EXPECT_EQ(view.emissive.pixels()[i], glm::vec3(0));
+            }
             without += !point && view.texture.rgba8()->pixels()[i].a == 255 ? 1 : 0;
         }
     }

@@ -51,11 +51,11 @@ TEST(FillBackground, FarFromSurfaceItIsSmooth) {
 }
 
 TEST(FillBackground, AGapTakesTheColourAndTheDepthOfTheFartherSide) {
-    constexpr int kSide = 64;
-    Picture p(kSide, kSide);
-    for (int y = 0; y < kSide; ++y) {
+    constexpr int kWide = 64;
+    Picture p(kWide, kWide);
+    for (int y = 0; y < kWide; ++y) {
         for (int x = 0; x < 24; ++x) p.close(x, y, {1, 0, 0}, 1.0f);
-        for (int x = 40; x < kSide; ++x) p.close(x, y, {0, 0, 1}, 0.1f);
+        for (int x = 40; x < kWide; ++x) p.close(x, y, {0, 0, 1}, 0.1f);
     }
     p.fill();
     EXPECT_EQ(p.openPixels(), 0);
