@@ -1,6 +1,6 @@
 // Runs a fuzz target over files without libFuzzer: each file as it is, cut at every length, and
 // with single bytes changed; those that a fuzzer has grown (grown_*) at a few lengths and with few
-// changes. The same runs each time.
+// changes. The same runs each time. `--every N` takes each N-th length and change only.
 
 #include <algorithm>
 #include <cstdint>
@@ -24,7 +24,7 @@ constexpr int kFlips = 300;
 /// As many cuts and changes of a grown file: it is one of many changes already.
 constexpr int kOfGrown = 16;
 
-std::size_t runs = 0;
+std::size_t runs = 0, every = 1;
 
 void run(const std::uint8_t* data, std::size_t size) {
     // A copy of exactly that size, so that a sanitizer sees reads past its end.
@@ -38,7 +38,7 @@ void replay(const std::filesystem::path& path) {
     Input bytes{std::istreambuf_iterator<char>(in), {}};
     run(bytes.data(), bytes.size());
     const bool grown = path.filename().string().starts_with("grown_");
-    const std::size_t step = bytes.size() / (grown ? kOfGrown : kCuts) + 1;
+    const std::size_t step = (bytes.size() / (grown ? kOfGrown : kCuts) + 1) * every;
     for (std::size_t length = 0; length < bytes.size(); length += step) run(bytes.data(), length);
     if (bytes.empty()) return;
     std::mt19937 random(static_cast<std::uint32_t>(bytes.size()));
@@ -50,7 +50,7 @@ void replay(const std::filesystem::path& path) {
             changed[at] = i % 2 == 0 ? static_cast<std::uint8_t>(changed[at] ^ (1u << random() % 8))
                                      : static_cast<std::uint8_t>(random());
         }
-        run(changed.data(), changed.size());
+        if (static_cast<std::size_t>(i) % every == 0) run(changed.data(), changed.size());
     }
 }
 
@@ -59,6 +59,10 @@ void replay(const std::filesystem::path& path) {
 int main(int argc, char** argv) {
     std::vector<std::filesystem::path> files;
     for (int i = 1; i < argc; ++i) {
+        if (std::string(argv[i]) == "--every" && i + 1 < argc) {
+            every = std::max(1ul, std::stoul(argv[++i]));
+            continue;
+        }
         const std::filesystem::path path(argv[i]);
         std::error_code ignored;
         if (std::filesystem::is_directory(path, ignored)) {
