@@ -347,6 +347,15 @@ Result<void> BatchRun::writeLines() const {
 
 }  // namespace
 
+void addJobsOption(Command command, BatchOptions& options, const char* heading) {
+    command
+        .option("--jobs,-j", options.jobs,
+                "Inputs at a time, each in a process of its own (default 1)")
+        .range(1, 1024)
+        .takes("N")
+        .group(heading);
+}
+
 Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
                                               const Limits& limits) {
     std::vector<std::string> names;

@@ -26,6 +26,9 @@ struct BatchOptions {
     std::function<void(nlohmann::ordered_json&)> onEntry;
 };
 
+/// Adds --jobs, under a heading of the help.
+void addJobsOption(Command command, BatchOptions& options, const char* heading);
+
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
 /// the current folder; empty lines and those that begin with # are passed over. Errors: io;
 /// (invalidInput) a list without a name; (usage) no input at all.

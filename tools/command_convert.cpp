@@ -416,11 +416,7 @@ void addConvert(CommandLine& line, Program& program) {
         "file with envmap, a folder of six faces, or a scene with a Background; none: takes it "
         "away");
     const char* many = "Many inputs";
-    c.option("--jobs,-j", o->batch.jobs,
-             "Inputs at a time, each in a process of its own (default 1)")
-        .range(1, 1024)
-        .takes("N")
-        .group(many);
+    addJobsOption(c, o->batch, many);
     c.flag("--keep-going,-k", o->batch.keepGoing, "Go on with the others when an input fails")
         .group(many);
     c.flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")

@@ -130,11 +130,7 @@ void addValidate(CommandLine& line, Program& program) {
     c.flag("--no-pixels", o->noPixels, "Look at headers only, decode no image");
     c.flag("--rules", o->rules, "Print the catalogue of rules and stop");
     const char* many = "Many inputs";
-    c.option("--jobs,-j", o->batch.jobs,
-             "Inputs at a time, each in a process of its own (default 1)")
-        .range(1, 1024)
-        .takes("N")
-        .group(many);
+    addJobsOption(c, o->batch, many);
     addShardOption(c, o->batch.shard, "inputs", many);
     c.sharedOptions(program.common, kOutput | kFormat | kOutside);
     c.runs([o](Program& p) { return run(*o, p); });

@@ -41,7 +41,7 @@ void codeVectors(const Image<glm::vec3>& vectors, double scale, int x0, int y0, 
 [[nodiscard]] Image<glm::vec3> vectorsFromCodes(const std::vector<std::uint16_t>& rgb, double scale,
                                                 int x0, int y0, int width, glm::ivec2 size);
 
-/// The light that code 255 stands for: the largest component, 1 at least.
+/// The linear light of code 255: the largest component, at least 1.
 [[nodiscard]] double emissiveScale(const Image<glm::vec3>& emissive);
 /// Interleaved RGB of glTF's metallicRoughnessTexture: G = roughness, B = metallic, and R = 255,
 /// "not occluded" where an engine takes it for that, wherever one of the two is not 0.

@@ -45,7 +45,7 @@ struct ReferenceView {
     Image<glm::vec3> splatV;
 
     /// How the surface answers to light (glTF 2.0, 3.9.2 and 3.9.3), for engines: nothing here
-    /// draws it. Empty when absent; else one value per pixel, zero where there is no point.
+    /// draws it. Empty when absent; else one value per pixel, zero for pixels without a point.
     Image<glm::vec2> metallicRoughness;  ///< metallic, roughness, 0..1
     Image<glm::vec3> emissive;  ///< linear light that `texture` does not hold; may exceed 1
 

@@ -74,7 +74,7 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
                     nearestOfB[j] = static_cast<int>(i);
                 }
                 if (d >= mine.next) continue;
-                // The same corner on another level, or turned, is no other corner.
+                // The same corner on another level, or turned, is not another corner.
                 const bool same =
                     mine.at >= 0 && glm::distance(b.points[static_cast<std::size_t>(mine.at)].pixel,
                                                   b.points[j].pixel) < 4.0f;

@@ -25,8 +25,8 @@ namespace stx::mpeg4 {
     const ImageDecoder& decode, Job& job);
 
 /// A Background, under a Transform where the environment is turned, with a stream for each face. A
-/// picture all around becomes six faces; linear light becomes 8-bit sRGB; where pictures let
-/// nothing through but there is no sky, the mean colours around the poles are behind (a
+/// picture all around becomes six faces; linear light becomes 8-bit sRGB; where pictures are
+/// transparent and the environment has no sky, the mean colours around the poles are added (a
 /// Background is opaque); all with notes. Errors: Environment::check(), the image writers,
 /// (unsupported) more pictures than there are object descriptors.
 [[nodiscard]] Result<NodePtr> backgroundFromEnvironment(const Environment& environment,

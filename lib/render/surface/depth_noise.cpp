@@ -94,6 +94,18 @@ LocalPlane fitAround(const Image<float>& q, int x, int y, int radius, const Loca
 
 }  // namespace
 
+std::optional<double> meanOfRows(const std::vector<double>& sums,
+                                 const std::vector<std::int64_t>& counts) {
+    double sum = 0;
+    std::int64_t count = 0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        sum += sums[i];
+        count += counts[i];
+    }
+    if (count == 0) return std::nullopt;
+    return sum / static_cast<double>(count);
+}
+
 float depthNoise(const Image<float>& q, const DepthAxis& axis) {
     std::vector<float> values;
     const int step = std::max(1, q.height() / 64);
@@ -150,13 +162,7 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
             }
         }
     });
-    double sum = 0;
-    std::int64_t count = 0;
-    for (std::size_t i = 0; i < left.size(); ++i) {
-        sum += left[i];
-        count += points[i];
-    }
-    return count > 0 ? kDoubt * static_cast<float>(sum / static_cast<double>(count)) : 0.0f;
+    return kDoubt * static_cast<float>(meanOfRows(left, points).value_or(0));
 }
 
 void closePinholes(Image<float>& q, const Image<std::uint8_t>& covered, const DepthAxis& axis,

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <vector>
 
 #include "lib/base/image.hpp"
 #include "lib/render/surface/source.hpp"
@@ -9,6 +11,11 @@ namespace stx::surface {
 
 /// What smoothing leaves counts as so many of its standard deviations.
 inline constexpr float kDoubt = 2.0f;
+
+/// The mean of values that were summed row by row, so that it is the same on any number of threads:
+/// a sum and a number of values for each row. Nothing when there are no values.
+[[nodiscard]] std::optional<double> meanOfRows(const std::vector<double>& sums,
+                                               const std::vector<std::int64_t>& counts);
 
 /// How noisy the depth of a view is: the standard deviation of what each pixel has of its own, as a
 /// share of q; 0 when nothing can be told. `q` is as in PreparedPage. From second differences along

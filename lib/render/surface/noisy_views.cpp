@@ -137,15 +137,8 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
             }
         }
     });
-    double sum = 0;
-    std::int64_t count = 0;
-    for (std::size_t i = 0; i < left.size(); ++i) {
-        sum += left[i];
-        count += points[i];
-    }
-    return {std::move(out),
-            count > 0 ? kDoubt * static_cast<float>(std::sqrt(sum / static_cast<double>(count)))
-                      : view.left};
+    const auto mean = meanOfRows(left, points);
+    return {std::move(out), mean ? kDoubt * static_cast<float>(std::sqrt(*mean)) : view.left};
 }
 
 }  // namespace

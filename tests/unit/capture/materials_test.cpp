@@ -85,7 +85,7 @@ TEST(CapturedMaterials, FactorsMultiplyTheMaps) {
     EXPECT_NEAR(right.y, 0.8 * 102 / 255, 1e-6);
     EXPECT_LT(glm::length(view.emissive.at(4, 8) - glm::vec3(2, 1, 0)), 1e-5f);
     EXPECT_EQ(view.emissive.at(11, 8), glm::vec3(0));
-    // Where there is no point there is no material.
+    // Pixels without a point have no material.
     ASSERT_FALSE(hasPoint(view.depth.at(0, 0)));
     EXPECT_EQ(view.metallicRoughness.at(0, 0), glm::vec2(0));
     EXPECT_EQ(view.emissive.at(0, 0), glm::vec3(0));
