@@ -44,8 +44,10 @@ bool unfilterRow(int filter, std::uint8_t* row, const std::uint8_t* above, std::
         case 0:
             return true;
         case 1:
-            for (std::size_t i = 0; i < size; i += kStep)
-                putLanes<kStep>(left = left + lanesOf<kStep>(row + i), row + i);
+            for (std::size_t i = 0; i < size; i += kStep) {
+                left = (left + lanesOf<kStep>(row + i)) & 0xff;
+                putLanes<kStep>(left, row + i);
+            }
             return true;
         case 2:
             for (std::size_t i = 0; i < size; ++i)
