@@ -1,12 +1,9 @@
 #!/usr/bin/env python3
 """The impostors of samples/engines: three.js in a real Chromium, and Godot 3, against `stx render` of the same atlas."""
-import base64
 import functools
 import http.server
-import json
 import os
 import shutil
-import struct
 import subprocess
 import sys
 import tempfile
@@ -17,6 +14,7 @@ from pages import NODE_MODULES, psnr
 from viewer_test import Test
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../cli"))
+import material_model  # noqa: E402
 from harness import arguments  # noqa: E402
 
 ENGINES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../samples/engines")
@@ -64,25 +62,6 @@ def godot(test, grid, eye, target):
         test.check(False, f"Godot, {grid}: {(done.stdout + done.stderr)[-2000:]}")
 
 
-def glowing(path):
-    """A glTF pyramid that has a colour and gives off light."""
-    corners = [(-0.5, 0, -0.5), (0.5, 0, -0.5), (0.5, 0, 0.5), (-0.5, 0, 0.5), (0, 0.9, 0)]
-    triangles = [(0, 1, 2), (0, 2, 3), (1, 0, 4), (2, 1, 4), (3, 2, 4), (0, 3, 4)]
-    data = b"".join(struct.pack("<3f", *c) for c in corners) + b"".join(struct.pack("<3H", *t) for t in triangles)
-    model = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
-        "materials": [{"doubleSided": True, "emissiveFactor": [0.02, 0.4, 0.1],
-                       "pbrMetallicRoughness": {"baseColorFactor": [0.3, 0.05, 0.02, 1], "metallicFactor": 0}}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 5, "type": "VEC3",
-                       "min": [-0.5, 0, -0.5], "max": [0.5, 0.9, 0.5]},
-                      {"bufferView": 1, "componentType": 5123, "count": 18, "type": "SCALAR"}],
-        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 60}, {"buffer": 0, "byteOffset": 60, "byteLength": 36}],
-        "buffers": [{"byteLength": 96, "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}]}
-    with open(path, "w", encoding="utf-8") as file:
-        json.dump(model, file)
-
-
 def compare(test, name, grid):
     found = psnr(test.stx, "shot.png", f"{grid}.png", test.folder)
     test.check(found >= LEAST[grid], f"{name}, {grid}: {found:.1f} dB")
@@ -117,8 +96,8 @@ def main():
                     three(test, browser, server.server_port, grid, eye, target)
                     compare(test, "three.js", grid)
                 # Light in a texture of its own; in the truth it is in the colour.
-                eye, target = cameras["octahedral"]
-                glowing(test.path("glowing.gltf"))
+                eye, target = "3.9,3.1,6.5", "0,0,0"
+                material_model.make(test.path("glowing.gltf"))
                 for name, options in (("glowing", ["--materials"]), ("whole", [])):
                     test.stx_run("convert", "glowing.gltf", "-o", f"{name}.exr", "--views", "octahedral:8", "--size", "256x256",
                                  "--projection", "orthographic", "--depth-bits", "8", *options)
