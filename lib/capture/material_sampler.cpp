@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "lib/base/rounding.hpp"
 #include "lib/model/srgb8.hpp"
 
 namespace stx {
@@ -36,12 +37,6 @@ float reduced(float v, MeshTexture::Wrap wrap) {
     if (!std::isfinite(v)) return 0.0f;
     if (wrap == MeshTexture::Wrap::clamp) return std::clamp(v, 0.0f, 1.0f);
     return v - 2.0f * std::floor(v * 0.5f);
-}
-
-/// std::floor() of what an int holds; without SSE 4.1 that is a call.
-int floorToInt(float v) {
-    const int i = static_cast<int>(v);
-    return i - (v < static_cast<float>(i));
 }
 
 /// Four channels at once. GCC and clang make vector instructions of it on every processor.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "lib/base/parallel.hpp"
+#include "lib/base/rounding.hpp"
 #include "lib/capture/layers.hpp"
 #include "lib/capture/material_sampler.hpp"
 #include "lib/geometry/depth_code.hpp"
@@ -24,6 +25,24 @@ struct Affine {
     [[nodiscard]] double at(double x, double y) const { return a * x + (b * y + c); }
 };
 
+/// Samples of n a pixel, the first at 0.5 / n, from a place on, up to another.
+int firstSample(double from, int n) {
+    return ceilToInt(from * n - 0.5);
+}
+int lastSample(double to, int n) {
+    return floorToInt(to * n - 0.5);
+}
+
+/// A part of the picture, pixels; a little larger than what it is of.
+struct Box {
+    glm::vec2 low{0.0f}, high{0.0f};
+
+    [[nodiscard]] bool holdsSample(int n) const {
+        return firstSample(low.x, n) <= lastSample(high.x, n) &&
+               firstSample(low.y, n) <= lastSample(high.y, n);
+    }
+};
+
 /// A triangle set up for one camera, by 2D homogeneous coordinates (Olano & Greer 1997): edge
 /// functions need no division by depth, so triangles that reach behind the viewpoint need no
 /// clipping. Shared edges get exactly opposite functions in both triangles (a cross product with
@@ -32,20 +51,8 @@ struct SetUp {
     Affine edge[3];   ///< >= 0 inside; proportional to the perspective-correct barycentrics
     Affine nearness;  ///< perspective: 1/dist; orthographic: -dist
     std::uint32_t triangle = 0;
-    glm::vec2 low{0.0f}, high{0.0f};  ///< its box in the picture, pixels, a little too large
+    Box box;
 };
-
-/// Samples of n a pixel, the first at 0.5 / n, from a place on, up to another.
-int firstSample(double from, int n) {
-    return static_cast<int>(std::ceil(from * n - 0.5));
-}
-int lastSample(double to, int n) {
-    return static_cast<int>(std::floor(to * n - 0.5));
-}
-bool holdsSample(const SetUp& s, int n) {
-    return firstSample(s.low.x, n) <= lastSample(s.high.x, n) &&
-           firstSample(s.low.y, n) <= lastSample(s.high.y, n);
-}
 
 class Rasterizer {
   public:
@@ -58,9 +65,12 @@ class Rasterizer {
     Result<RasterImage> run(const RasterSettings& settings, Job& job);
 
   private:
+    /// Where the vertices are in the picture: pixels_.
+    void project();
     /// False for what no sample of `samples` a pixel and side, and no pixel's centre, can see.
-    /// `boxOnly`: the edges and the nearness are left as they are.
-    bool setUp(std::uint32_t triangle, int samples, SetUp& out, bool boxOnly) const;
+    bool boxOf(std::uint32_t triangle, int samples, Box& out) const;
+    /// The same, without what shows its back only, or has no area.
+    bool setUp(std::uint32_t triangle, int samples, SetUp& out) const;
     /// What is seen at the samples of a tile.
     struct Tile {
         /// Of the triangles that may show in it; slots are their numbers here. Those of all tiles
@@ -95,49 +105,62 @@ class Rasterizer {
     const Camera& camera_;
     const glm::dmat4 cameraFromWorld_;
     MaterialSampler sampler_;
+    std::vector<glm::vec2> pixels_;  ///< of each vertex; NaN behind the viewpoint
 };
 
-bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out, bool boxOnly) const {
+void Rasterizer::project() {
+    pixels_.resize(mesh_.positions.size());
+    // What a float holds well, and far outside of any picture.
+    constexpr double kFar = 1e9;
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+        const glm::dvec3 p(cameraFromWorld_ * glm::dvec4(glm::dvec3(mesh_.positions[i]), 1.0));
+        if (!(p.z < 0)) {
+            pixels_[i] = glm::vec2(std::numeric_limits<float>::quiet_NaN());
+            continue;
+        }
+        const double scale = camera_.orthographic ? 1.0 : -1.0 / p.z;
+        pixels_[i] = glm::clamp(glm::dvec2(camera_.fx * p.x * scale + camera_.cx,
+                                           -camera_.fy * p.y * scale + camera_.cy),
+                                -kFar, kFar);
+    }
+}
+
+bool Rasterizer::boxOf(std::uint32_t triangle, int samples, Box& out) const {
+    const auto& t = mesh_.triangles[triangle];
+    const glm::vec2 a = pixels_[t[0]], b = pixels_[t[1]], c = pixels_[t[2]];
+    const glm::vec2 size(camera_.width, camera_.height);
+    const int behind = std::isnan(a.x) + std::isnan(b.x) + std::isnan(c.x);
+    if (behind == 3) return false;
+    if (behind > 0) {
+        out = {glm::vec2(0.0f), size};
+        return true;
+    }
+    const glm::vec2 low = glm::min(glm::min(a, b), c), high = glm::max(glm::max(a, b), c);
+    if (!(high.x >= 0 && high.y >= 0 && low.x < size.x && low.y < size.y)) return false;
+    // More than rounding takes, of floats too; the edges decide.
+    const float margin = 0.001f + 1e-6f * std::max(size.x, size.y);
+    out = {glm::max(low - margin, 0.0f), glm::min(high + margin, size)};
+    // Most of the triangles of a dense mesh lie between the samples.
+    return out.holdsSample(samples) || out.holdsSample(1);
+}
+
+bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
+    if (!boxOf(triangle, samples, out.box)) return false;
     const auto& t = mesh_.triangles[triangle];
     glm::dvec3 v[3];  // (x * w, y * w, w) in pixels
     double dist[3];
-    bool allInFront = true, anyInFront = false;
     for (int k = 0; k < 3; ++k) {
         const glm::dvec3 p(cameraFromWorld_ * glm::dvec4(glm::dvec3(mesh_.positions[t[k]]), 1.0));
         dist[k] = -p.z;
         const double w = camera_.orthographic ? 1.0 : dist[k];
         v[k] = {camera_.fx * p.x + camera_.cx * w, -camera_.fy * p.y + camera_.cy * w, w};
-        (dist[k] > 0 ? anyInFront : allInFront) = dist[k] > 0;
     }
-    if (!anyInFront) return false;
-
     const glm::dvec3 first = glm::cross(v[1], v[2]);
     const double det = glm::dot(v[0], first);
     if (!(det != 0) || !std::isfinite(det)) return false;
     // In pixels y runs down, so counter-clockwise front faces have a negative determinant.
     if (det > 0 && !mesh_.materials[mesh_.triangleMaterial[triangle]].doubleSided) return false;
     out.triangle = triangle;
-
-    const glm::dvec2 size(camera_.width, camera_.height);
-    out.low = glm::vec2(0.0f);
-    out.high = size;
-    if (allInFront) {
-        glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-low);
-        for (int k = 0; k < 3; ++k) {
-            const glm::dvec2 p(v[k].x / v[k].z, v[k].y / v[k].z);
-            low = glm::min(low, p);
-            high = glm::max(high, p);
-        }
-        if (!(high.x >= 0 && high.y >= 0 && low.x < camera_.width && low.y < camera_.height))
-            return false;
-        // More than rounding takes, to floats too; the edges decide.
-        const double margin = 0.001 + 1e-6 * std::max(size.x, size.y);
-        out.low = glm::max(low - margin, 0.0);
-        out.high = glm::min(high + margin, size);
-        // Most of the triangles of a dense mesh lie between the samples.
-        if (!holdsSample(out, samples) && !holdsSample(out, 1)) return false;
-    }
-    if (boxOnly) return true;
 
     const glm::dvec3 e[3] = {first, glm::cross(v[2], v[0]), glm::cross(v[0], v[1])};
     const double sign = det > 0 ? 1.0 : -1.0;
@@ -176,13 +199,13 @@ bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, 
         }
         const double zero = (-rest / e.a - origin) / step;
         if (e.a > 0) {
-            int i = static_cast<int>(std::clamp(std::ceil(zero), from - 1.0, to + 2.0));
+            int i = ceilToInt(std::clamp(zero, from - 1.0, to + 2.0));
             i = std::max(i, from);
             while (i > from && inside(i - 1)) --i;
             while (i <= to && !inside(i)) ++i;
             from = i;
         } else {
-            int i = static_cast<int>(std::clamp(std::floor(zero), from - 2.0, to + 1.0));
+            int i = floorToInt(std::clamp(zero, from - 2.0, to + 1.0));
             i = std::min(i, to);
             while (i < to && inside(i + 1)) ++i;
             while (i >= from && !inside(i)) --i;
@@ -244,7 +267,8 @@ void Rasterizer::drawTile(int tileX, int tileY, int samples, Tile& tile) const {
     const double originX = tileX * kTile + 0.5 * step, originY = tileY * kTile + 0.5 * step;
     const auto drawLines = [&](const SetUp& s, const auto& drawLine) {
         const glm::dvec2 corner(tileX * kTile, tileY * kTile);
-        const glm::dvec2 low = glm::dvec2(s.low) - corner, high = glm::dvec2(s.high) - corner;
+        const glm::dvec2 low = glm::dvec2(s.box.low) - corner,
+                         high = glm::dvec2(s.box.high) - corner;
         const int from = std::max(firstSample(low.x, samples), 0),
                   to = std::min(lastSample(high.x, samples), side - 1);
         if (from > to) return;
@@ -439,13 +463,14 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
         out.metallicRoughness = Image<glm::vec2>(w, h, glm::vec2(0.0f));
     if (settings.materials && emits(mesh_)) out.emissive = Image<glm::vec3>(w, h, glm::vec3(0.0f));
 
+    project();
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     std::vector<std::vector<std::uint32_t>> bins(static_cast<std::size_t>(tilesX) * tilesY);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-        SetUp s;
-        if (!setUp(t, settings.supersampling, s, true)) continue;
-        const glm::ivec2 first = glm::ivec2(s.low) / kTile,
-                         last = glm::min(glm::ivec2(s.high), glm::ivec2(w, h) - 1) / kTile;
+        Box box;
+        if (!boxOf(t, settings.supersampling, box)) continue;
+        const glm::ivec2 first = glm::ivec2(box.low) / kTile,
+                         last = glm::min(glm::ivec2(box.high), glm::ivec2(w, h) - 1) / kTile;
         for (int ty = first.y; ty <= last.y; ++ty) {
             for (int tx = first.x; tx <= last.x; ++tx)
                 bins[static_cast<std::size_t>(ty) * tilesX + tx].push_back(t);
@@ -462,10 +487,11 @@ Result<RasterImage> Rasterizer::run(const RasterSettings& settings, Job& job) {
                     return;
                 }
                 const int tx = static_cast<int>(i % tilesX), ty = static_cast<int>(i / tilesX);
-                // Once more: to keep those of all tiles takes several times the mesh.
-                tile.setUps.resize(bins[i].size());
-                for (std::size_t k = 0; k < bins[i].size(); ++k)
-                    (void)setUp(bins[i][k], settings.supersampling, tile.setUps[k], false);
+                tile.setUps.clear();
+                for (const std::uint32_t triangle : bins[i]) {
+                    SetUp s;
+                    if (setUp(triangle, settings.supersampling, s)) tile.setUps.push_back(s);
+                }
                 drawTile(tx, ty, settings.supersampling, tile);
                 shadeTile(tx, ty, settings, tile, out);
                 if (settings.supersampling > 1) drawTile(tx, ty, 1, tile);
