@@ -20,7 +20,7 @@ constexpr int kColourBand = 4;
 constexpr int kSilhouetteBand = 2;
 
 /// Views by what each adds to the coverage; empty ones last.
-std::vector<int> rankViews(const Bundle& bundle) {
+std::vector<int> rankViews(const Bundle& bundle, const std::vector<DepthSurface>& surfaces) {
     const auto views = static_cast<std::int64_t>(bundle.views.size());
     const auto count =
         static_cast<int>(std::clamp<std::int64_t>(20'000'000 / (views * views + 1), 200, 8000));
@@ -28,7 +28,7 @@ std::vector<int> rankViews(const Bundle& bundle) {
     for (const auto& v : bundle.views)
         candidates.push_back(
             {v.camera, v.camera, &v.depth, v.depthBits == 32 ? 0.0 : v.depthCode().step()});
-    const auto problem = coverProblem(sampleBundle(bundle, count), candidates, 0);
+    const auto problem = coverProblem(sampleBundle(bundle, count, surfaces), candidates, 0);
     std::vector<int> rank = chooseCover(problem, static_cast<int>(views), 1.0).chosen;
     std::vector<bool> ranked(bundle.views.size(), false);
     for (const int v : rank) ranked[v] = true;
@@ -74,33 +74,38 @@ void giveAway(std::vector<PruneView>& views, const std::vector<int>& rank,
     }
 }
 
-/// One ring of points around what is kept; returns how many that would be, and adds them when asked
-/// to.
-std::int64_t growBand(std::vector<PruneView>& views, bool apply) {
+/// What is kept with one more ring of points around it.
+struct Ring {
+    std::vector<Image<std::uint8_t>> kept;  ///< of each view
+    std::int64_t added = 0;
+};
+
+Ring nextRing(const std::vector<PruneView>& views) {
+    Ring ring;
+    ring.kept.resize(views.size());
     std::vector<std::int64_t> added(views.size(), 0);
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
-        PruneView& v = views[i];
+        const PruneView& v = views[i];
         const int width = v.kept.width(), height = v.kept.height();
-        Image<std::uint8_t> grown = v.kept;
+        ring.kept[i] = v.kept;
+        // Kept in this row or one beside it, with a column more on each side.
+        std::vector<std::uint8_t> column(static_cast<std::size_t>(width) + 2, 0);
         for (int y = 0; y < height; ++y) {
+            const auto here = v.kept.row(y), above = v.kept.row(std::max(0, y - 1)),
+                       below = v.kept.row(std::min(height - 1, y + 1));
+            const auto surface = v.surface.w.row(y);
+            const auto grown = ring.kept[i].row(y);
+            for (int x = 0; x < width; ++x) column[x + 1] = here[x] | above[x] | below[x];
             for (int x = 0; x < width; ++x) {
-                if (v.kept.at(x, y) || !v.point(x, y)) continue;
-                bool beside = false;
-                for (int ny = std::max(0, y - 1); ny <= std::min(height - 1, y + 1) && !beside;
-                     ++ny) {
-                    for (int nx = std::max(0, x - 1); nx <= std::min(width - 1, x + 1); ++nx)
-                        beside = beside || v.kept.at(nx, ny);
-                }
-                if (!beside) continue;
-                grown.at(x, y) = 1;
+                const bool beside = (column[x] | column[x + 1] | column[x + 2]) != 0;
+                if (!beside || here[x] || std::isnan(surface[x])) continue;
+                grown[x] = 1;
                 ++added[i];
             }
         }
-        if (apply) v.kept = std::move(grown);
     });
-    std::int64_t sum = 0;
-    for (const auto n : added) sum += n;
-    return sum;
+    for (const auto n : added) ring.added += n;
+    return ring;
 }
 
 double lostError(const std::vector<PruneView>& views) {
@@ -279,9 +284,12 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
     STX_CHECK(job.limits.checkAllocation(pixels, 24, "pruning"));
     PruneReport report;
     report.sourcePixels = bundle.pointCount();
-    const std::vector<int> rank = rankViews(bundle);
+    std::vector<DepthSurface> surfaces(bundle.views.size());
+    parallelFor(0, static_cast<std::int64_t>(surfaces.size()),
+                [&](std::int64_t i) { surfaces[i] = depthSurface(bundle.views[i], {}); });
+    const std::vector<int> rank = rankViews(bundle, surfaces);
     STX_CHECK(job.checkCancelled());
-    STX_TRY(auto views, preparePruning(bundle, rank, job));
+    STX_TRY(auto views, preparePruning(bundle, rank, std::move(surfaces), job));
 
     PruneSettings now = settings;
     const std::int64_t budget =
@@ -315,8 +323,10 @@ Result<PruneReport> prune(Bundle& bundle, const PruneSettings& settings, Job& jo
             "one of them sees, and pruning leaves no holes; allow at least that many",
             budget, kept);
     for (int ring = 0; ring < settings.overlap; ++ring) {
-        if (kept + growBand(views, false) > budget) break;
-        kept += growBand(views, true);
+        Ring grown = nextRing(views);
+        if (kept + grown.added > budget) break;
+        kept += grown.added;
+        for (std::size_t i = 0; i < views.size(); ++i) views[i].kept = std::move(grown.kept[i]);
     }
     const double all = static_cast<double>(std::max<std::int64_t>(report.sourcePixels, 1));
     if (settings.minPsnr > 0) {

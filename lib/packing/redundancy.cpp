@@ -53,12 +53,12 @@ double rateAt(const PruneView& p, int x, int y, double w) {
 }  // namespace
 
 Result<std::vector<PruneView>> preparePruning(const Bundle& bundle, const std::vector<int>& rank,
-                                              Job& job) {
+                                              std::vector<DepthSurface> surfaces, Job& job) {
     std::vector<PruneView> views(bundle.views.size());
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
         PruneView& p = views[i];
         p.view = &bundle.views[i];
-        p.surface = depthSurface(*p.view, {});
+        p.surface = std::move(surfaces[i]);
         p.worldFromCamera = glm::mat3_cast(p.view->camera.orientation);
         p.cameraFromWorld = glm::transpose(p.worldFromCamera);
         p.kept = Image<std::uint8_t>(p.view->depth.width(), p.view->depth.height(), 0);

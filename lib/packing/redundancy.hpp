@@ -30,9 +30,12 @@ struct Replacement {
     double error = 0;  ///< squared colour difference, mean over the channels, 0..1
 };
 
-/// Prepares all views: surfaces, bounds, partners in the order of `rank` (rank[i] = view).
+/// Prepares all views: bounds, partners in the order of `rank` (rank[i] = view). `surfaces` are
+/// depthSurface() of all views.
 [[nodiscard]] Result<std::vector<PruneView>> preparePruning(const Bundle& bundle,
-                                                            const std::vector<int>& rank, Job& job);
+                                                            const std::vector<int>& rank,
+                                                            std::vector<DepthSurface> surfaces,
+                                                            Job& job);
 
 /// A pixel that others might replace.
 struct PrunePixel {

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
-#include "lib/surface/depth_gradient.hpp"
 
 namespace stx {
 namespace {
@@ -106,7 +105,8 @@ Sighting sightingOf(const CandidateView& view, const SurfaceSample& sample) {
     return s;
 }
 
-std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
+std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count,
+                                        std::span<const DepthSurface> surfaces) {
     std::vector<CandidateView> views;
     std::int64_t points = 0;
     for (const auto& v : bundle.views) {
@@ -119,7 +119,9 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count) {
     std::vector<std::vector<SurfaceSample>> perView(bundle.views.size());
     parallelFor(0, static_cast<std::int64_t>(perView.size()), [&](std::int64_t i) {
         const ReferenceView& v = bundle.views[i];
-        const DepthSurface surface = depthSurface(v, {});
+        DepthSurface own;
+        if (surfaces.empty()) own = depthSurface(v, {});
+        const DepthSurface& surface = surfaces.empty() ? own : surfaces[i];
         std::int64_t seen = i * 7919 % stride;
         for (int y = 0; y < v.depth.height(); ++y) {
             for (int x = 0; x < v.depth.width(); ++x) {

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "lib/model/bundle.hpp"
 #include "lib/model/mesh.hpp"
 #include "lib/selection/cover.hpp"
+#include "lib/surface/depth_gradient.hpp"
 
 namespace stx {
 
@@ -30,8 +32,9 @@ struct CandidateView {
 
 /// About `count` samples of all that the views of a bundle show. A surface seen by many views
 /// counts once: each sample's area is the inverse of the density with which all views sample its
-/// place.
-[[nodiscard]] std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count);
+/// place. `surfaces` are depthSurface() of all views; empty: they are made here.
+[[nodiscard]] std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count,
+                                                      std::span<const DepthSurface> surfaces = {});
 
 /// How often and how well a candidate samples a piece of surface.
 struct Sighting {

@@ -141,6 +141,15 @@ Line lineAt(const DepthSurface& surface, int x, int y, bool alongY) {
     Line line;
     const int dx = alongY ? 0 : 1, dy = alongY ? 1 : 0;
     const std::uint8_t bit = alongY ? DepthSurface::kDown : DepthSurface::kRight;
+    const int place = alongY ? y : x, size = alongY ? surface.w.height() : surface.w.width();
+    if (place >= 2 && place + 2 < size) {
+        const std::ptrdiff_t step = alongY ? surface.w.width() : 1;
+        const float* w = &surface.w.at(x, y) - 2 * step;
+        const std::uint8_t* links = &surface.links.at(x, y) - 2 * step;
+        for (int i = 0; i < 5; ++i) line.w[i] = w[i * step];
+        for (int i = 0; i < 4; ++i) line.linked[i] = links[i * step] & bit;
+        return line;
+    }
     for (int i = 0; i < 5; ++i) {
         const int px = x + (i - 2) * dx, py = y + (i - 2) * dy;
         const bool inside = surface.w.contains(px, py);
