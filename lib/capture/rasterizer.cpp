@@ -1,13 +1,17 @@
 #include "lib/capture/rasterizer.hpp"
 
+#include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "lib/base/parallel.hpp"
 #include "lib/base/rounding.hpp"
 #include "lib/capture/layers.hpp"
 #include "lib/capture/material_sampler.hpp"
+#include "lib/capture/tile_kernels.hpp"
 #include "lib/geometry/depth_code.hpp"
 
 namespace stx {
@@ -17,13 +21,11 @@ constexpr int kTile =
     32;  // pixels; with 4x4 samples a tile's buffers stay in the second-level cache
 /// Less than this of a surface is not there: half a step of 8 bits.
 constexpr float kLeastAlpha = 0.5f / 255.0f;
+/// Samples of a line that are too few to be worth more than a plain loop.
+constexpr int kFew = 4;
+/// A triangle at most this many samples wide is asked for at all samples around it.
+constexpr int kNarrow = 16;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-
-/// a x + b y + c over pixel positions.
-struct Affine {
-    double a = 0, b = 0, c = 0;
-    [[nodiscard]] double at(double x, double y) const { return a * x + (b * y + c); }
-};
 
 /// Samples of n a pixel, the first at 0.5 / n, from a place on, up to another.
 int firstSample(double from, int n) {
@@ -60,7 +62,8 @@ class Rasterizer {
         : mesh_(mesh),
           camera_(camera),
           cameraFromWorld_(camera.cameraFromWorld()),
-          sampler_(mesh, settings.materials ? Glow::apart : Glow::inColour) {}
+          sampler_(mesh, settings.materials ? Glow::apart : Glow::inColour),
+          pixelSamples_(settings.supersampling) {}
 
     Result<RasterImage> run(const RasterSettings& settings, Job& job);
 
@@ -76,8 +79,8 @@ class Rasterizer {
         /// Of the triangles that may show in it; slots are their numbers here. Those of all tiles
         /// at once would be several times the mesh.
         std::vector<SetUp> setUps;
-        std::vector<float> depth;        ///< nearness of the opaque surface
-        std::vector<std::uint32_t> ids;  ///< its slot, or kNone
+        std::vector<float> depth;        ///< nearness of the opaque surface, and kSpanPadding more
+        std::vector<std::uint32_t> ids;  ///< its slot, or kNone; as many
         Layers layers;                   ///< translucent surfaces in front of it
     };
     /// Shrinks [from, to] to the samples of a line that are inside; false when none is.
@@ -90,6 +93,9 @@ class Rasterizer {
     void shadeTile(int tileX, int tileY, const RasterSettings& settings, const Tile& tile,
                    RasterImage& out) const;
     [[nodiscard]] glm::vec4 shadeUniform(const SetUp& s, int px, int py, int samples) const;
+    [[nodiscard]] std::optional<glm::vec4> sumOfTextured(const Tile& tile,
+                                                         const std::uint32_t* corner, int px,
+                                                         int py, int samples) const;
     [[nodiscard]] glm::vec3 lit(const Lighting& lighting, const SetUp& s, glm::vec3 albedo,
                                 double x, double y) const;
     static std::uint32_t mainSurface(const Tile& tile, std::size_t sample);
@@ -106,6 +112,7 @@ class Rasterizer {
     const glm::dmat4 cameraFromWorld_;
     MaterialSampler sampler_;
     std::vector<glm::vec2> pixels_;  ///< of each vertex; NaN behind the viewpoint
+    PixelSamples pixelSamples_;
 };
 
 void Rasterizer::project() {
@@ -176,7 +183,6 @@ bool Rasterizer::setUp(std::uint32_t triangle, int samples, SetUp& out) const {
 bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, int& from,
                           int& to) {
     // A few samples are asked one by one.
-    constexpr int kFew = 4;
     if (to - from < kFew) {
         const auto& [p, q, r] = s.edge;
         const double atP = p.b * y + p.c, atQ = q.b * y + q.c, atR = r.b * y + r.c;
@@ -190,6 +196,7 @@ bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, 
     }
     // Shrink [from, to] by each edge; the exact predicate decides at the ends, and being monotone
     // in x it holds in between.
+    const double perStep = 1.0 / step;
     for (const auto& e : s.edge) {
         const double rest = e.b * y + e.c;
         const auto inside = [&](int i) { return e.a * (origin + i * step) + rest >= 0; };
@@ -197,7 +204,8 @@ bool Rasterizer::clipSpan(const SetUp& s, double y, double step, double origin, 
             if (rest < 0) return false;
             continue;
         }
-        const double zero = (-rest / e.a - origin) / step;
+        // Near enough to begin with; std::ceil() and std::floor() would be calls.
+        const double zero = (-rest / e.a - origin) * perStep;
         if (e.a > 0) {
             int i = ceilToInt(std::clamp(zero, from - 1.0, to + 2.0));
             i = std::max(i, from);
@@ -225,6 +233,9 @@ void Rasterizer::drawSpan(std::uint32_t slot, double y, int from, int to, double
     const bool holes = sampler_.seeThrough(s.triangle);
     float* const depth = tile.depth.data() + line;
     std::uint32_t* const ids = tile.ids.data() + line;
+    if (!holes && to - from >= kFew)
+        return nearerSamples({from, to, origin, step, s.nearness.a, base, perspective, slot}, depth,
+                             ids);
     for (int i = from; i <= to; ++i) {
         const double x = origin + i * step;
         const auto nearness = static_cast<float>(s.nearness.a * x + base);
@@ -260,21 +271,29 @@ void Rasterizer::drawTile(int tileX, int tileY, int samples, Tile& tile) const {
     auto& depth = tile.depth;
     auto& ids = tile.ids;
     auto& layers = tile.layers;
-    depth.assign(static_cast<std::size_t>(side) * side, -std::numeric_limits<float>::infinity());
-    ids.assign(depth.size(), kNone);
+    const std::size_t pixels = static_cast<std::size_t>(side) * side;
+    depth.assign(pixels + kSpanPadding, -std::numeric_limits<float>::infinity());
+    ids.assign(pixels + kSpanPadding, kNone);
     layers.reset(0);
     const double step = 1.0 / samples;
     const double originX = tileX * kTile + 0.5 * step, originY = tileY * kTile + 0.5 * step;
-    const auto drawLines = [&](const SetUp& s, const auto& drawLine) {
+    struct SampleBox {
+        int left, right, top, bottom;
+    };
+    const auto samplesOf = [&](const SetUp& s) -> SampleBox {
         const glm::dvec2 corner(tileX * kTile, tileY * kTile);
         const glm::dvec2 low = glm::dvec2(s.box.low) - corner,
                          high = glm::dvec2(s.box.high) - corner;
-        const int from = std::max(firstSample(low.x, samples), 0),
-                  to = std::min(lastSample(high.x, samples), side - 1);
-        if (from > to) return;
-        const int last = std::min(lastSample(high.y, samples), side - 1);
-        for (int row = std::max(firstSample(low.y, samples), 0); row <= last; ++row)
-            drawLine(originY + row * step, from, to, static_cast<std::size_t>(row) * side);
+        return {std::max(firstSample(low.x, samples), 0),
+                std::min(lastSample(high.x, samples), side - 1),
+                std::max(firstSample(low.y, samples), 0),
+                std::min(lastSample(high.y, samples), side - 1)};
+    };
+    const auto drawLines = [&](const SampleBox& box, const auto& drawLine) {
+        if (box.left > box.right) return;
+        for (int row = box.top; row <= box.bottom; ++row)
+            drawLine(originY + row * step, box.left, box.right,
+                     static_cast<std::size_t>(row) * side);
     };
     bool translucent = false;
     const auto count = static_cast<std::uint32_t>(tile.setUps.size());
@@ -284,16 +303,23 @@ void Rasterizer::drawTile(int tileX, int tileY, int samples, Tile& tile) const {
             translucent = true;
             continue;
         }
-        drawLines(s, [&](double y, int from, int to, std::size_t line) {
+        const SampleBox box = samplesOf(s);
+        if (box.right - box.left < kNarrow && !sampler_.seeThrough(s.triangle)) {
+            nearerInside({s.edge, &s.nearness, box.left, box.right, box.top, box.bottom, originX,
+                          originY, step, side, !camera_.orthographic, slot},
+                         depth.data(), ids.data());
+            continue;
+        }
+        drawLines(box, [&](double y, int from, int to, std::size_t line) {
             drawSpan(slot, y, from, to, step, originX, line, tile);
         });
     }
     if (!translucent) return;
-    layers.reset(depth.size());
+    layers.reset(pixels);
     for (std::uint32_t slot = 0; slot < count; ++slot) {
         const auto& s = tile.setUps[slot];
         if (!sampler_.translucent(s.triangle)) continue;
-        drawLines(s, [&](double y, int from, int to, std::size_t line) {
+        drawLines(samplesOf(s), [&](double y, int from, int to, std::size_t line) {
             drawLayerSpan(slot, y, from, to, step, originX, line, tile);
         });
     }
@@ -345,6 +371,8 @@ glm::vec4 Rasterizer::shadeUniform(const SetUp& s, int px, int py, int samples) 
             v = {v.a + e.a * uv.y, v.b + e.b * uv.y, v.c + e.c * uv.y};
         }
         const auto& texture = sampler_.texture(s.triangle);
+        if (const auto all = pixelSamples_.sum(texture, u, v, total, px, py))
+            return glm::vec4(*all / static_cast<float>(samples * samples), 1.0f);
         for (int sy = 0; sy < samples; ++sy) {
             const double y = py + (sy + 0.5) * step;
             for (int sx = 0; sx < samples; ++sx) {
@@ -357,6 +385,37 @@ glm::vec4 Rasterizer::shadeUniform(const SetUp& s, int px, int py, int samples) 
         }
     }
     return glm::vec4(sum / static_cast<float>(samples * samples), 1.0f);
+}
+
+/// Sum over a pixel whose samples see a few triangles that have a texture and nothing else; nothing
+/// where it must be asked sample by sample.
+std::optional<glm::vec4> Rasterizer::sumOfTextured(const Tile& tile, const std::uint32_t* corner,
+                                                   int px, int py, int samples) const {
+    // Only then the samples of a pixel lie at the very same places as those of a tile.
+    if (!std::has_single_bit(static_cast<unsigned>(samples))) return {};
+    constexpr int kMost = 4;
+    PixelColours colours[kMost];
+    std::uint32_t slots[kMost];
+    int count = 0;
+    glm::vec4 sum(0.0f);
+    for (int k = 0; k < samples * samples; ++k) {
+        const auto id = corner[k / samples * kTile * samples + k % samples];
+        if (id == kNone) continue;
+        const auto which = static_cast<int>(std::find(slots, slots + count, id) - slots);
+        if (which == count) {
+            const auto& s = tile.setUps[id];
+            const auto* uvs = sampler_.plainTextureUvs(s.triangle);
+            if (count == kMost || uvs == nullptr) return {};
+            const auto& t = mesh_.triangles[s.triangle];
+            if (!pixelSamples_.colours(sampler_.texture(s.triangle), s.edge,
+                                       {(*uvs)[t.x], (*uvs)[t.y], (*uvs)[t.z]}, px, py,
+                                       colours[count]))
+                return {};
+            slots[count++] = id;
+        }
+        sum += glm::vec4(colours[which].at(k), 1.0f);
+    }
+    return sum;
 }
 
 void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings, const Tile& tile,
@@ -380,6 +439,13 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                     tile.setUps[*corner], tileX * kTile + px, tileY * kTile + py, samples);
                 continue;
             }
+            if (plain) {
+                const int x = tileX * kTile + px, y = tileY * kTile + py;
+                if (const auto all = sumOfTextured(tile, corner, x, y, samples)) {
+                    out.colour.at(x, y) = *all * share;
+                    continue;
+                }
+            }
             for (int k = 0; k < samples * samples; ++k) {
                 const int sx = px * samples + k % samples, sy = py * samples + k / samples;
                 const auto sample = static_cast<std::size_t>(sy) * side + sx;
@@ -397,7 +463,11 @@ void Rasterizer::shadeTile(int tileX, int tileY, const RasterSettings& settings,
                 }
                 if (ids[sample] == kNone) continue;
                 const auto& s = tile.setUps[ids[sample]];
-                add(s, glm::vec3(sampler_.colour(s.triangle, barycentric(s, x, y))), through);
+                const auto* constant = sampler_.constantColour(s.triangle);
+                add(s,
+                    constant ? *constant
+                             : glm::vec3(sampler_.colour(s.triangle, barycentric(s, x, y))),
+                    through);
             }
             const int x = tileX * kTile + px, y = tileY * kTile + py;
             out.colour.at(x, y) = sum * share;

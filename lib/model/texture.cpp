@@ -37,16 +37,16 @@ Image<glm::vec4> halved(int w, int h, const At& at) {
 }
 
 /// The colour that a pixel gets from the next coarser level, alpha 1; 0 when there is none.
-/// Bilinear; its texel centres sit between two of ours.
+/// Bilinear; its texel centres sit between two of ours, a quarter of a texel from the nearer one.
 glm::vec4 fromHalf(const Image<glm::vec4>& half, int x, int y) {
-    const float fx = (x + 0.5f) * 0.5f - 0.5f, fy = (y + 0.5f) * 0.5f - 0.5f;
-    const int x0 = static_cast<int>(std::floor(fx)), y0 = static_cast<int>(std::floor(fy));
+    const int x0 = (x + 1) / 2 - 1, y0 = (y + 1) / 2 - 1;
+    const float fx = (x & 1) ? 0.25f : 0.75f, fy = (y & 1) ? 0.25f : 0.75f;
     glm::vec4 sum(0.0f);
     for (int k = 0; k < 4; ++k) {
         const int sx = std::clamp(x0 + (k & 1), 0, half.width() - 1),
                   sy = std::clamp(y0 + (k >> 1), 0, half.height() - 1);
-        const float wx = (k & 1) ? fx - x0 : 1.0f - (fx - x0);
-        const float wy = (k >> 1) ? fy - y0 : 1.0f - (fy - y0);
+        const float wx = (k & 1) ? fx : 1.0f - fx;
+        const float wy = (k >> 1) ? fy : 1.0f - fy;
         sum += half.at(sx, sy) * (wx * wy);
     }
     return sum.a > 0.0f ? sum / sum.a : glm::vec4(0.0f);
