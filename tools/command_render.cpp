@@ -1,3 +1,5 @@
+#include <malloc.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -308,6 +310,14 @@ Result<void> prepareAround(RenderOptions& o, const Command& command, Program& pr
     return {};
 }
 
+/// From now on images that are freed leave their memory to those of the next frame: the system
+/// clears all that it hands out, which took a seventh of the time of a sequence.
+void keepFreedMemory() {
+    constexpr int kLargest = 32 << 20;  // glibc takes no more
+    mallopt(M_MMAP_THRESHOLD, kLargest);
+    mallopt(M_TRIM_THRESHOLD, 8 * kLargest);
+}
+
 Result<int> render(const RenderOptions& given, const Command& command, Program& program) {
     RenderOptions o = given;
     STX_CHECK(prepareAround(o, command, program));
@@ -375,6 +385,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     }
     program.sayNotes();
 
+    if (count > 1) keepFreedMemory();
     FrameWriter writer(writing, program.job);
     auto views = nlohmann::ordered_json::array();
     double total = 0;

@@ -206,9 +206,10 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
     parallelFor(0, static_cast<std::int64_t>(chunks.size()), [&](std::int64_t i) {
         const int first = static_cast<int>(i) * kZipRows;
         const int count = std::min(kZipRows, rows - first);
-        std::vector<std::uint16_t> raw(rowBytes * count / 2);
+        const std::size_t bytes = rowBytes * count;
+        const auto raw = std::make_unique_for_overwrite<std::uint16_t[]>(bytes / 2);
         for (int y = 0; y < count; ++y) {
-            std::uint16_t* const row = raw.data() + y * rowBytes / 2;
+            std::uint16_t* const row = raw.get() + y * rowBytes / 2;
             for (const auto& [name, channel] : channels) {
                 const auto& p = *channel.pixels;
                 const float* from = p.values + (first + y) * width * p.stride;
@@ -217,13 +218,15 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
                     std::copy_n(row + *channel.same, width, to);
                 else if (channel.half)
                     exr::halvesFrom(from, p.stride, {to, width});
+                else if (p.stride == 1)
+                    std::memcpy(to, from, width * sizeof(float));
                 else
                     for (std::size_t x = 0; x < width; ++x)
                         std::memcpy(to + 2 * x, from + x * p.stride, sizeof(float));
             }
         }
-        chunks[i] = exr::zipChunk(
-            {reinterpret_cast<const std::uint8_t*>(raw.data()), 2 * raw.size()}, part.zipLevel);
+        chunks[i] =
+            exr::zipChunk({reinterpret_cast<const std::uint8_t*>(raw.get()), bytes}, part.zipLevel);
     });
     for (std::size_t i = 0; i < chunks.size(); ++i)
         writeChunk(index, top / kZipRows + static_cast<int>(i), chunks[i]);

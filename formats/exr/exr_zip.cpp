@@ -6,28 +6,10 @@
 #include <memory>
 
 #include "formats/files/deflate.hpp"
+#include "lib/base/halves.hpp"
 
 namespace stx::exr {
 namespace {
-
-/// Without a branch, so that compilers make vectors of it.
-inline std::uint32_t halfOf(float value) {
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    const std::uint32_t sign = bits >> 16 & 0x8000u;
-    const std::uint32_t size = bits & 0x7fffffffu;
-    // From 2^-14 on: the exponent's bias changes by 112, and 13 bits are rounded away.
-    const std::uint32_t normal = (size - (112u << 23) + 0xfffu + (size >> 13 & 1u)) >> 13;
-    // Below: the sum with 1/2 rounds at a half's smallest step, 2^-24.
-    const std::uint32_t denormal =
-        std::bit_cast<std::uint32_t>(std::bit_cast<float>(size) + 0.5f) - (126u << 23);
-    const std::uint32_t beyond = 0x7c00u | (size > 0x7f800000u) << 9;  // infinity, NaN
-    const auto choose = [](bool first, std::uint32_t a, std::uint32_t b) {
-        const std::uint32_t mask = 0u - first;
-        return (a & mask) | (b & ~mask);
-    };
-    const std::uint32_t finite = choose(size < (113u << 23), denormal, normal);
-    return sign | choose(size < (143u << 23), finite, beyond);
-}
 
 /// Even bytes, then odd ones, each less the one before.
 void splitAndSubtract(std::span<const std::uint8_t> raw, std::uint8_t* to) {
@@ -42,7 +24,8 @@ void splitAndSubtract(std::span<const std::uint8_t> raw, std::uint8_t* to) {
     for (std::size_t i = 1; i < odds; ++i) to[i] = difference(from[2 * i + 1], from[2 * i - 1]);
 }
 
-/// Without a branch, too. The product moves the exponent's bias, of denormal halves as well.
+/// Without a branch, so that compilers make vectors of it. The product moves the exponent's bias,
+/// of denormal halves as well.
 inline float floatOf(std::uint16_t half) {
     const std::uint32_t size = (half & 0x7fffu) << 13;
     const float scaled = std::bit_cast<float>(size) * 0x1p112f;
@@ -67,13 +50,13 @@ void addAndJoin(std::uint8_t* split, std::span<std::uint8_t> raw) {
 }  // namespace
 
 void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> to) {
+    if (stride == 1) return stx::halvesFrom(from, to);
     constexpr std::size_t kPiece = 256;
     float piece[kPiece];
     for (std::size_t begin = 0; begin < to.size(); begin += kPiece) {
         const std::size_t count = std::min(kPiece, to.size() - begin);
         for (std::size_t i = 0; i < count; ++i) piece[i] = from[(begin + i) * stride];
-        for (std::size_t i = 0; i < count; ++i)
-            to[begin + i] = static_cast<std::uint16_t>(halfOf(piece[i]));
+        stx::halvesFrom(piece, to.subspan(begin, count));
     }
 }
 

@@ -19,32 +19,33 @@ namespace stx {
 
 namespace {
 
-/// Of one channel; lights may make it more than 1, which the table does not have.
-float linearFrom(float coded) {
-    return coded > 1.0f ? linearFromSrgb(coded) : linearByTable(coded);
-}
-
 /// Premultiplied linear light of some rows of an image that is premultiplied in the frame's colour
-/// space.
-Image<glm::vec4> linearRows(const Image<glm::vec4>& image, int top, int rows, bool linear,
-                            const std::optional<glm::vec3>& background) {
-    Image<glm::vec4> out(image.width(), rows);
+/// space: all of the red, then green, blue and alpha, for these are stored apart. Lights may make a
+/// channel more than 1, which the table does not have.
+void toLinearRows(const Image<glm::vec4>& image, int top, int rows, bool linear,
+                  const std::optional<glm::vec3>& background, Image<float>& planes) {
+    if (planes.width() != image.width() || planes.height() != 4 * rows)
+        planes = Image<float>(image.width(), 4 * rows);
+    const LinearTable& table = linearTable();
+    const auto linearFrom = [&table](float coded) {
+        return coded > 1.0f ? linearFromSrgb(coded) : table.linear(coded);
+    };
     parallelForBlocks(0, rows, 16, [&](std::int64_t begin, std::int64_t end) {
         for (auto y = static_cast<int>(begin); y < end; ++y) {
             const auto from = image.row(top + y);
-            const auto to = out.row(y);
-            for (std::size_t x = 0; x < to.size(); ++x) {
+            float* to[4];
+            for (int c = 0; c < 4; ++c) to[c] = planes.row(c * rows + y).data();
+            for (std::size_t x = 0; x < from.size(); ++x) {
                 glm::vec4 p = over(from[x], background);
                 // Coded colours are divided first: the curve and the alpha do not commute.
                 if (!linear && p.a > 0.0f) {
                     if (p.a != 1.0f) p = {glm::vec3(p) / p.a, p.a};
                     p = {glm::vec3(linearFrom(p.r), linearFrom(p.g), linearFrom(p.b)) * p.a, p.a};
                 }
-                to[x] = p;
+                for (int c = 0; c < 4; ++c) to[c][x] = p[c];
             }
         }
     });
-    return out;
 }
 
 std::vector<std::uint8_t> withoutAlpha(const Rgba8Image& rgba) {
@@ -114,17 +115,16 @@ Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOpti
     const bool same = albedo && !behind &&
                       std::memcmp(frame.albedo.data(), frame.colour.data(),
                                   frame.colour.count() * sizeof(glm::vec4)) == 0;
-    Image<glm::vec4> colourRows, albedoRows;
+    Image<float> colourRows, albedoRows;
     STX_TRY(auto writer, ExrWriter::create(file, {part}));
     STX_CHECK(writer.writePart(0, [&](int y, int rows) {
         std::vector<ExrConstPixels> pixels;
-        colourRows = linearRows(frame.colour, y, rows, frame.linear, behind);
-        const float* colours = &colourRows.data()->x;
-        for (int c = 0; c < 4; ++c) pixels.push_back({rgba[c], colours + c, 4});
-        if (albedo && !same) albedoRows = linearRows(frame.albedo, y, rows, frame.linear, {});
-        const float* albedos = same ? colours : albedo ? &albedoRows.data()->x : nullptr;
+        toLinearRows(frame.colour, y, rows, frame.linear, behind, colourRows);
+        for (int c = 0; c < 4; ++c) pixels.push_back({rgba[c], colourRows.row(c * rows).data(), 1});
+        if (albedo && !same) toLinearRows(frame.albedo, y, rows, frame.linear, {}, albedoRows);
+        const auto& albedos = same ? colourRows : albedoRows;
         for (int c = 0; albedo && c < 4; ++c)
-            pixels.push_back({std::string("albedo.") + rgba[c], albedos + c, 4});
+            pixels.push_back({std::string("albedo.") + rgba[c], albedos.row(c * rows).data(), 1});
         if (!frame.depth.empty()) pixels.push_back({"Z", frame.depth.row(y).data(), 1});
         if (normals) {
             const float* first = &frame.normal.row(y).data()->x;

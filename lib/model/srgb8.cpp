@@ -47,15 +47,16 @@ float srgbByTable(float linear) {
 }
 
 float linearByTable(float coded) {
-    static const auto table = [] {
-        std::array<float, 1025> t{};
-        for (int i = 0; i <= 1024; ++i) t[i] = linearFromSrgb(i / 1024.0f);
-        return t;
-    }();
-    if (!(coded > 0.0f)) return 0.0f;
-    const float s = std::min(coded, 1.0f) * 1024.0f;
-    const int i = std::min(static_cast<int>(s), 1023);
-    return table[i] + (table[i + 1] - table[i]) * (s - i);
+    return linearTable().linear(coded);
+}
+
+LinearTable::LinearTable() {
+    for (int i = 0; i <= kSteps; ++i) values_[i] = linearFromSrgb(static_cast<float>(i) / kSteps);
+}
+
+const LinearTable& linearTable() {
+    static const LinearTable table;
+    return table;
 }
 
 }  // namespace stx

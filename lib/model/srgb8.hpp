@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -45,5 +46,25 @@ class Srgb8Tables {
 /// thousandth of an 8-bit step, and many times faster.
 [[nodiscard]] float srgbByTable(float linear);
 [[nodiscard]] float linearByTable(float coded);
+
+/// The table of linearByTable(), for loops over pixels; linearTable() gives the only one.
+class LinearTable {
+  public:
+    LinearTable();
+
+    /// linearByTable() of a value.
+    [[nodiscard]] float linear(float coded) const {
+        if (!(coded > 0.0f)) return 0.0f;
+        const float s = std::min(coded, 1.0f) * kSteps;
+        const int i = std::min(static_cast<int>(s), kSteps - 1);
+        return values_[i] + (values_[i + 1] - values_[i]) * (s - static_cast<float>(i));
+    }
+
+  private:
+    static constexpr int kSteps = 1024;
+    std::array<float, kSteps + 1> values_{};
+};
+
+[[nodiscard]] const LinearTable& linearTable();
 
 }  // namespace stx
