@@ -130,7 +130,7 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
     };
     if (std::holds_alternative<Mesh>(model)) {
         note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
-                            "--splat-coefficient", "--fill"}),
+                            "--splat-coefficient", "--fill", "--match-colours"}),
              "a mesh is rasterised itself, on the processor");
         return;
     }
@@ -534,6 +534,11 @@ void addRender(CommandLine& line, Program& program) {
                    {{"background", Fill::background}, {"none", Fill::none}},
                    "What no view shows: background (--background temporal) or none (default "
                    "background)")
+        .group(drawing);
+    c.choice<bool>("--match-colours", o->settings.matchColours, {{"auto", true}, {"off", false}},
+                   "Gains and offsets between views that differ clearly where they show the same "
+                   "surface (exposure, white balance): auto brings them to those of most, off "
+                   "leaves them (default auto)")
         .group(drawing);
     c.option("--background", o->background,
              "What stands where no view shows a surface. temporal: the bundle's background views, "

@@ -122,13 +122,24 @@ Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const PageSet& set,
 
 /// The views that show what is there now, before the background when it is wanted. A set of
 /// background views only is drawn as any other.
-PageSet inFront(const PageSet& set, const RenderSettings& settings) {
+PageSet inFront(const PageSet& set, const RenderSettings& settings, Job& job) {
+    const auto matched = [&](const PageSet& views) {
+        if (!settings.matchColours || views.views().size() < 2) return views;
+        std::size_t changed = 0;
+        PageSet alike = views.inOneLight(changed);
+        if (changed > 0)
+            job.note(
+                fmt::format("colours of {} of {} views were matched to those of the others "
+                            "(gain and offset); --match-colours off leaves them as they are",
+                            changed, views.views().size()));
+        return alike;
+    };
     const auto views = set.views();
     const auto isBackground = [](const PageView& v) { return v.background; };
     if (std::none_of(views.begin(), views.end(), isBackground) ||
         std::all_of(views.begin(), views.end(), isBackground))
-        return set;
-    const PageSet front = set.part(false);
+        return matched(set);
+    const PageSet front = matched(set.part(false));
     if (settings.fill != Fill::background) return front;
     return front.before(set.part(true).inLightOf(front));
 }
@@ -155,7 +166,7 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         translucent = translucent || changed;
         return opaque;
     };
-    PageSet drawn = solid(inFront(set, settings));
+    PageSet drawn = solid(inFront(set, settings, job));
     if (drawn.behind()) drawn = drawn.before(solid(*drawn.behind()));
     if (translucent)
         job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");

@@ -46,6 +46,9 @@ struct RenderSettings {
     /// Frames carry albedo and normals without lights, too. Not on Backend::gl.
     bool normals = false;
     Fill fill = Fill::background;
+    /// Colours of views that differ from the others where they show the same surface, by exposure
+    /// or white balance, are brought to those of most. Views that agree are drawn as they are.
+    bool matchColours = true;
     /// What is seen where nothing covers a pixel in full, in place of what is around it; null: the
     /// environment that a bundle or an atlas has, if `ownEnvironment`. Frames are opaque then as
     /// far as the environment is; their depth and albedo are the object's alone.

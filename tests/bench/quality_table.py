@@ -8,7 +8,7 @@
 Prints a table of Markdown: mean PSNR in dB over the novel views of each set, of RGB (spheres-miv: of
 full-range Y, as MPEG measures). The naive warp is that of the view that comes nearest to the truth
 (naive_warp.cpp); "where it covers" are the pixels that this warp covers. --damage gives the sources
-the faults of real depth first (noisy_depth.cpp). Sets that are not in STX_SHARED_DIR are left out. README.md here has its table; tests/golden holds it.
+the faults of real depth and of real cameras first (noisy_depth.cpp). Sets that are not in STX_SHARED_DIR are left out. README.md here has its table; tests/golden holds it.
 """
 
 import argparse
@@ -31,7 +31,7 @@ MODELS = {
     "CesiumMilkTruck": "CesiumMilkTruck.gltf",
     "2CylinderEngine": "2CylinderEngine.gltf",
 }
-DAMAGE = ["noise0.5", "noise2", "codes8", "missing3", "edges1"]
+DAMAGE = ["noise0.5", "noise2", "codes8", "missing3", "edges1", "light"]
 SIDE = 512
 BLACK = ["--background", "0,0,0"]
 

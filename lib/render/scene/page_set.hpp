@@ -113,6 +113,14 @@ class PageSet {
     /// colours are multiplied by what they differ by where both show the same surface (for each
     /// channel, robustly; nothing below half a step of 8 bits, nothing above a factor of two).
     [[nodiscard]] PageSet inLightOf(const PageSet& other) const;
+    /// The same with the colours of its views matched where they show the same surfaces, as
+    /// cameras with exposures of their own need it (see matchColours()); the very same when they
+    /// agree already. `changed`: how many views have other colours.
+    [[nodiscard]] PageSet inOneLight(std::size_t& changed) const;
+    /// The texture of a page as it was before inOneLight().
+    [[nodiscard]] const Texture& captured(std::size_t page) const {
+        return data_->captured.empty() ? *pages()[page].texture : *data_->captured[page];
+    }
     /// What is drawn where nothing else is: background views. Null when there are none.
     [[nodiscard]] const PageSet* behind() const { return behind_.get(); }
     /// The same views in front of a background.
@@ -199,8 +207,9 @@ class PageSet {
         int padding = 0;  ///< texels around each rectangle that may be read
         bool pruned = false;
         std::shared_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles
-        /// Of solid() and inLightOf().
+        /// Of solid(), inLightOf() and inOneLight().
         std::vector<std::shared_ptr<const Texture>> changed;
+        std::vector<const Texture*> captured;  ///< by page; empty: those of the pages
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
     static void addBundle(const Bundle& bundle, Data& data);

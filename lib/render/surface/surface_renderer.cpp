@@ -170,13 +170,15 @@ Frame SurfaceRenderer::copyOf(const Source& source) const {
         const auto* normals = source.view->hasNormals ? page.normal
                               : normals_.empty()      ? nullptr
                                                       : &normals_[number];
-        const auto* bytes = page.texture->rgba8();
+        // Its own colours, not those that were matched to other views.
+        const Texture& texture = scene_.set.captured(number);
+        const auto* bytes = texture.rgba8();
         parallelForBlocks(r.y0, r.y1, 32, [&](std::int64_t from, std::int64_t to) {
             for (int y = static_cast<int>(from); y < to; ++y) {
                 for (int x = r.x0; x < r.x1; ++x) {
                     const std::size_t texel = r.texel(x, y);
                     const glm::vec4 c = bytes ? glm::vec4(bytes->data()[texel]) * (1.0f / 255.0f)
-                                              : page.texture->rgbaFloat()->data()[texel];
+                                              : texture.rgbaFloat()->data()[texel];
                     frame.colour.at(x, y) = glm::vec4(glm::vec3(c) * c.a, c.a);
                     frame.depth.at(x, y) = page.depth->data()[texel];
                     if (!frame.normal.empty()) frame.normal.at(x, y) = normals->data()[texel];
