@@ -19,6 +19,7 @@ struct BackgroundOptions {
     std::string output, confidence, maskOf, maskOutput;
     std::string method = "select";
     StillSettings settings;
+    TemporalBackgroundSettings temporal;
 };
 
 /// A mask that is asked for.
@@ -125,11 +126,13 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
                       "it has one frame; a background is found in what others uncover");
     auto found = rememberBackgrounds(
         frames->timeline().times,
-        [&](std::size_t frame, Job& job) { return frames->frame(frame, job); }, {}, program.job);
+        [&](std::size_t frame, Job& job) { return frames->frame(frame, job); }, o.temporal,
+        program.job);
     if (!found) return tl::unexpected(found.error().at(fmt::format("'{}'", o.inputs[0])));
     if (found->empty())
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
-                      "no camera stands still and sees what others hide");
+                      "nothing that stays was seen by two frames or more; a background is made of "
+                      "what stays");
     auto views = nlohmann::ordered_json::array();
     for (const BackgroundModel& model : *found) {
         const auto seen = model.view.pointCount();
@@ -208,8 +211,9 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
 
 void addBackground(CommandLine& line, Program& program) {
     Command c = line.add("background",
-                         "What a camera that stands still sees without those who pass: a picture "
-                         "out of plain\nvideo, or views of a bundle with time\n\n"
+                         "What cameras see without those who pass: a picture out of plain video "
+                         "of a camera that\nstands still, or views of a bundle with time, whose "
+                         "cameras may move\n\n"
                          "  stx background frames/ -o background.png\n"
                          "  stx background frame_%04d.png -o background.png --method n2pg\n"
                          "  stx background hall.y4m -o background.png --mask-of all\n"
@@ -222,7 +226,8 @@ void addBackground(CommandLine& line, Program& program) {
         .required();
     c.option("-o,--output", o->output,
              "Picture to write (.png, .jpg, .tif, .webp, .exr); of a bundle with time: it with a "
-             "background view for each still camera (.mp4, .xmt, .bt, name_%04d.exr)")
+             "background view for each still camera, and for a few poses of those that move (.mp4, "
+             ".xmt, .bt, name_%04d.exr)")
         .required()
         .takes("IMAGE");
     c.option(
@@ -275,6 +280,12 @@ void addBackground(CommandLine& line, Program& program) {
     c.flag("--drift", o->settings.drift,
            "Motion is the change of gradients: light that changes slowly is none")
         .group(select);
+    c.option("--key-views", o->temporal.keyViews,
+             "Poses of cameras that move which get a background, at most; as many as see what all "
+             "frames see (default 8)")
+        .range(1, 64)
+        .takes("N")
+        .group("Bundles with time");
     c.sharedOptions(program.common, kOutput);
     c.runs([o, c](Program& p) -> Result<int> {
         if (o->settings.method != StillMethod::select)
@@ -288,6 +299,7 @@ void addBackground(CommandLine& line, Program& program) {
                                "is of plain video, whose background is a picture"));
             return backgroundOfBundle(*o, p);
         }
+        STX_CHECK(c.refuse({"--key-views"}, "is of bundles with time"));
         return backgroundOfFrames(*o, p);
     });
 }

@@ -8,8 +8,6 @@
 namespace stx::temporal {
 namespace {
 
-/// Samples beside depth edges count this share of others; found by trial.
-constexpr double kWeakShare = 0.25;
 /// Brightness of two groups of samples that differ by more is that of light and shadow: steps of
 /// 0..255, and times what brightness differs by from frame to frame.
 constexpr float kShadow = 6, kShadowTimes = 6;
@@ -144,18 +142,24 @@ void Vote::decide(const PixelLayers<Sample>& layers, std::size_t pixel, Backgrou
         if (others < 2 && other.strong > other.weak &&
             2 * layers.empty < static_cast<std::uint32_t>(frames) && (!layer || other.q > layer->q))
             inFront.data()[pixel][others++] = other.q;
-    if (!layer) return;
-    model.view.depth.data()[pixel] = 1 / layer->q;
-    setColour(model.view.texture, pixel, colourOf(*layer, noise) * gain);
+    if (layer) set(*layer, pixel, model);
+}
+
+template <class Sample>
+void Vote::set(const Layer<Sample>& layer, std::size_t pixel, BackgroundModel& model) const {
+    model.view.depth.data()[pixel] = 1 / layer.q;
+    setColour(model.view.texture, pixel, colourOf(layer, noise) * gain);
     model.confidence.data()[pixel] =
-        std::min(1.0f, static_cast<float>(layer->count()) / static_cast<float>(frames));
-    model.lastSeen.data()[pixel] = static_cast<float>(firstTime + layer->last);
+        std::min(1.0f, static_cast<float>(layer.count()) / static_cast<float>(frames));
+    model.lastSeen.data()[pixel] = static_cast<float>(firstTime + layer.last);
 }
 
 template void Vote::decide(const PixelLayers<ByteSample>&, std::size_t, BackgroundModel&,
                            InFront&) const;
 template void Vote::decide(const PixelLayers<HalfSample>&, std::size_t, BackgroundModel&,
                            InFront&) const;
+template void Vote::set(const Layer<ByteSample>&, std::size_t, BackgroundModel&) const;
+template void Vote::set(const Layer<HalfSample>&, std::size_t, BackgroundModel&) const;
 
 void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise& noise,
                 float step) {

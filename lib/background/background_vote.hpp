@@ -6,6 +6,9 @@
 
 namespace stx::temporal {
 
+/// Samples beside depth edges count this share of others; found by trial.
+inline constexpr double kWeakShare = 0.25;
+
 /// Inverse distances of what a pixel showed before its background, 0 = nothing.
 using InFront = Image<glm::vec2>;
 
@@ -22,6 +25,9 @@ struct Vote {
     template <class Sample>
     void decide(const PixelLayers<Sample>& layers, std::size_t pixel, BackgroundModel& model,
                 InFront& inFront) const;
+    /// Makes this layer the pixel's background.
+    template <class Sample>
+    void set(const Layer<Sample>& layer, std::size_t pixel, BackgroundModel& model) const;
 };
 
 /// Drops parts of moving things that never left their place and so look like background, as the

@@ -1,6 +1,7 @@
 #include "lib/background/frame_gauge.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "lib/model/light_ratio.hpp"
@@ -28,8 +29,11 @@ constexpr float kMemory = 200;
 }  // namespace
 
 std::size_t DepthNoise::binOf(float dist) {
-    const float bin = 2 * std::log2(std::max(dist, 1e-9f)) + kBins / 2;
-    return static_cast<std::size_t>(std::clamp(bin, 0.0f, static_cast<float>(kBins - 1)));
+    // Half octaves of distance, from its bits: the exponent, and whether the rest is √2 or more.
+    const auto bits = std::bit_cast<std::uint32_t>(dist);
+    const int octave = static_cast<int>(bits >> 23) - 127;
+    const int half = (bits & 0x7fffffu) >= 0x3504f3u ? 1 : 0;
+    return static_cast<std::size_t>(std::clamp(2 * octave + half + kBins / 2, 0, kBins - 1));
 }
 
 void DepthNoise::add(float before, float now) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 
+#include "lib/background/moving_cameras.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {
@@ -14,6 +15,10 @@ struct CameraBackground {
     std::string name;
     Camera camera;
     std::optional<TemporalBackground> background;
+
+    [[nodiscard]] bool remembers(int pass) const {
+        return background && pass < background->passes();
+    }
 };
 
 Result<void> addFrame(std::vector<CameraBackground>& cameras, const Bundle& bundle, double time,
@@ -24,12 +29,8 @@ Result<void> addFrame(std::vector<CameraBackground>& cameras, const Bundle& bund
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         CameraBackground& c = cameras[i];
         const ReferenceView& view = bundle.views[i];
-        if (!c.background || pass >= c.background->passes()) continue;
+        if (!c.remembers(pass)) continue;
         if (!sameCamera(view.camera, c.camera)) {
-            job.note(fmt::format(
-                "the camera of view '{}' moves; a background that remembers needs a still one, so "
-                "it gets none",
-                c.name));
             c.background.reset();
             continue;
         }
@@ -58,8 +59,12 @@ Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double>
     int passes = 1;
     std::set<std::string> names;
     const auto total = [&] { return static_cast<std::int64_t>(times.size()) * passes; };
+    const auto anyStill = [&](int pass) {
+        return cameras.empty() || std::any_of(cameras.begin(), cameras.end(),
+                                              [&](const auto& c) { return c.remembers(pass); });
+    };
     for (int pass = 0; pass < passes; ++pass) {
-        for (std::size_t frame = 0; frame < times.size(); ++frame) {
+        for (std::size_t frame = 0; frame < times.size() && anyStill(pass); ++frame) {
             auto bundle = read(frame, job);
             if (!bundle) return propagate(bundle);
             // Background views that it has already are not pictures of this moment.
@@ -83,23 +88,33 @@ Result<std::vector<BackgroundModel>> rememberBackgrounds(std::span<const double>
                          total(), "remembering");
         }
         for (CameraBackground& c : cameras)
-            if (c.background && pass < c.background->passes())
-                STX_CHECK(c.background->endPass(job));
+            if (c.remembers(pass)) STX_CHECK(c.background->endPass(job));
     }
     std::vector<BackgroundModel> models;
-    for (CameraBackground& c : cameras) {
-        if (!c.background) continue;
-        STX_TRY(auto model, c.background->finish(job));
+    const auto take = [&](BackgroundModel model) {
         if (model.view.pointCount() == 0) {
             job.note(
                 fmt::format("nothing stays behind what moves in view '{}'; it gets no "
                             "background",
-                            c.name));
+                            model.view.name));
+            return;
+        }
+        model.view.name = backgroundName(model.view.name, names);
+        models.push_back(std::move(model));
+    };
+    std::vector<std::size_t> moving;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        if (!cameras[i].background) {
+            moving.push_back(i);
             continue;
         }
-        model.view.name = backgroundName(c.name, names);
-        models.push_back(std::move(model));
+        STX_TRY(auto model, cameras[i].background->finish(job));
+        cameras[i].background.reset();
+        take(std::move(model));
     }
+    if (moving.empty()) return models;
+    STX_TRY(auto fused, temporal::rememberMovingCameras(times, read, moving, settings, job));
+    for (BackgroundModel& model : fused) take(std::move(model));
     return models;
 }
 

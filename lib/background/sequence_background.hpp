@@ -13,11 +13,12 @@ namespace stx {
 /// Gives the bundle of one moment, by its number; all have the same views in the same order.
 using FrameReader = std::function<Result<Bundle>(std::size_t frame, Job& job)>;
 
-/// The backgrounds of all still cameras of a sequence, one for each, in the order of the views:
-/// views of their own, named after the camera's view. Frames are read one after another, the whole
+/// The backgrounds of a sequence, as views of their own: one for each still camera, in the order of
+/// the views and named after them, then those of all cameras that move, in a few poses of their
+/// paths (temporal::rememberMovingCameras()). Frames are read one after another, the whole
 /// sequence as often as the memory allowed makes it necessary (TemporalBackground). `times`:
-/// seconds, rising, one for each frame. Cameras that move get none, with a note; so do those whose
-/// background was never seen. Errors: no frames, a sequence whose views change, what reading gives.
+/// seconds, rising, one for each frame. Cameras whose background was never seen get none, with a
+/// note. Errors: no frames, a sequence whose views change, what reading gives.
 [[nodiscard]] Result<std::vector<BackgroundModel>> rememberBackgrounds(
     std::span<const double> times, const FrameReader& read,
     const TemporalBackgroundSettings& settings, Job& job);

@@ -7,6 +7,7 @@
 #include "lib/background/background_vote.hpp"
 #include "lib/background/depth_layers.hpp"
 #include "lib/background/frame_gauge.hpp"
+#include "lib/background/mixed_pixels.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/render/scene/page_set.hpp"
@@ -17,10 +18,6 @@ namespace {
 using temporal::Measurement;
 using temporal::Worth;
 
-/// Samples this near to a depth edge of their own frame may be mixtures of two surfaces, pixels.
-constexpr int kMixedReach = 2;
-/// Depths of neighbours differ by this share or more at an edge, and by this many tolerances.
-constexpr float kEdgeShare = 0.03f, kEdgeTolerances = 2;
 /// Nothing moves where brightness, averaged over 3x3 pixels, changed by less than this many times
 /// what it does in the middle of the picture's pixels, and these steps.
 constexpr float kQuietTimes = 2, kQuietSteps = 1.5f;
@@ -68,10 +65,9 @@ struct TemporalBackground::Impl {
 
     void beginPass();
     [[nodiscard]] Result<void> checkFrame(const ReferenceView& frame, double time) const;
-    /// 1 for pixels within kMixedReach of a depth edge, of the rows of the pass.
-    [[nodiscard]] Image<std::uint8_t> mixedPixels(const ReferenceView& frame) const;
-    /// How much brightness changed since the frame before, of the rows of the pass and one around.
-    [[nodiscard]] Image<std::uint8_t> changes(const ReferenceView& frame, glm::vec3 gain);
+    /// 1 where brightness changed since the frame before, of the rows of the pass.
+    [[nodiscard]] Image<std::uint8_t> movingPixels(const ReferenceView& frame,
+                                                   const temporal::FrameGauge& light);
     void insert(const ReferenceView& frame, const temporal::FrameGauge& light, float time);
 };
 
@@ -104,94 +100,66 @@ Result<void> TemporalBackground::Impl::checkFrame(const ReferenceView& frame, do
     return {};
 }
 
-Image<std::uint8_t> TemporalBackground::Impl::mixedPixels(const ReferenceView& frame) const {
-    const int w = width(), h = height(), top = firstRow();
-    const auto step = static_cast<float>(frame.depthBits == 32 ? 0.0 : frame.depthCode().step());
-    const Image<float>& depth = frame.depth;
-    const temporal::DepthNoise& noise = gauge.noise();
-    const auto jumps = [&](float a, float b) {
-        const bool pointA = hasPoint(a), pointB = hasPoint(b);
-        if (!pointA || !pointB) return pointA != pointB;
-        const float near = std::min(a, b), far = std::max(a, b);
-        if (far - near <= kEdgeShare * far) return false;
-        return far - near > kEdgeTolerances * far * noise.tolerance(far, step);
-    };
-    // An edge is marked on the pixels on both of its sides, and widened by what is left.
-    constexpr int kReach = kMixedReach - 1;
-    const int from = std::max(top - kReach, 0), to = std::min(endRow() + kReach, h);
-    Image<std::uint8_t> across(w, to - from, std::uint8_t{0});
-    parallelForBlocks(from, to, kRows, [&](std::int64_t begin, std::int64_t end) {
-        std::vector<std::uint8_t> edge(static_cast<std::size_t>(w));
-        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-            std::fill(edge.begin(), edge.end(), std::uint8_t{0});
-            const auto row = depth.row(y);
-            for (int x = 0; x + 1 < w; ++x) {
-                const auto i = static_cast<std::size_t>(x);
-                if (jumps(row[i], row[i + 1])) edge[i] = edge[i + 1] = 1;
-            }
-            for (const int other : {y - 1, y + 1}) {
-                if (other < 0 || other >= h) continue;
-                const auto beside = depth.row(other);
-                for (std::size_t i = 0; i < edge.size(); ++i)
-                    if (jumps(row[i], beside[i])) edge[i] = 1;
-            }
-            for (int x = 0; x < w; ++x) {
-                if (!edge[static_cast<std::size_t>(x)]) continue;
-                for (int k = std::max(x - kReach, 0); k <= std::min(x + kReach, w - 1); ++k)
-                    across.at(k, y - from) = 1;
-            }
-        }
-    });
-    Image<std::uint8_t> mixed(w, endRow() - top, std::uint8_t{0});
-    parallelForBlocks(top, endRow(), kRows, [&](std::int64_t begin, std::int64_t end) {
-        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
-            for (int k = std::max(y - kReach, from); k <= std::min(y + kReach, to - 1); ++k)
-                for (int x = 0; x < w; ++x) mixed.at(x, y - top) |= across.at(x, k - from);
-    });
-    return mixed;
-}
-
-Image<std::uint8_t> TemporalBackground::Impl::changes(const ReferenceView& frame, glm::vec3 gain) {
+Image<std::uint8_t> TemporalBackground::Impl::movingPixels(const ReferenceView& frame,
+                                                           const temporal::FrameGauge& light) {
     const int w = width();
     const int from = std::max(firstRow() - 1, 0), to = std::min(endRow() + 1, height());
     const bool first = before.empty();
     if (first) before = Image<std::uint8_t>(w, to - from, std::uint8_t{0});
-    Image<std::uint8_t> changed(w, to - from, std::uint8_t{0});
+    // Changes of brightness, summed over three pixels of a row.
+    Image<std::uint16_t> sums(w, to - from);
+    const glm::vec3 weights = glm::vec3(0.3f, 0.59f, 0.11f) / light.gain;
     parallelForBlocks(from, to, kRows, [&](std::int64_t begin, std::int64_t end) {
+        std::vector<std::uint8_t> changed(static_cast<std::size_t>(w) + 2, 0);
         for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+            std::uint8_t* was = before.row(y - from).data();
             for (int x = 0; x < w; ++x) {
-                const glm::vec3 colour =
-                    temporal::stepsOf(frame.texture, static_cast<std::size_t>(y) * w + x) / gain;
-                const auto now = static_cast<std::uint8_t>(
-                    std::clamp(temporal::brightness(colour) + 0.5f, 0.0f, 255.0f));
-                std::uint8_t& was = before.at(x, y - from);
-                if (!first)
-                    changed.at(x, y - from) = static_cast<std::uint8_t>(std::abs(now - was));
-                was = now;
+                const float bright = glm::dot(
+                    weights, temporal::stepsOf(frame.texture, static_cast<std::size_t>(y) * w + x));
+                const auto now = static_cast<std::uint8_t>(std::clamp(bright + 0.5f, 0.0f, 255.0f));
+                changed[static_cast<std::size_t>(x) + 1] =
+                    first ? std::uint8_t{0} : static_cast<std::uint8_t>(std::abs(now - was[x]));
+                was[x] = now;
             }
+            std::uint16_t* sum = sums.row(y - from).data();
+            for (std::size_t x = 0; x < static_cast<std::size_t>(w); ++x)
+                sum[x] = static_cast<std::uint16_t>(changed[x] + changed[x + 1] + changed[x + 2]);
         }
     });
-    return changed;
+    const float quiet = kQuietTimes * light.noise + kQuietSteps;
+    Image<std::uint8_t> moving(w, endRow() - firstRow());
+    parallelForBlocks(firstRow(), endRow(), kRows, [&](std::int64_t begin, std::int64_t end) {
+        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+            const int above = std::max(y - 1, from), below = std::min(y + 1, to - 1);
+            const int rowsHere = below - above + 1;
+            const std::uint16_t* a = sums.row(above - from).data();
+            const std::uint16_t* b = sums.row(below - from).data();
+            // Of three rows the middle one, of two none besides.
+            const std::uint16_t* m = sums.row(y - from).data();
+            std::uint8_t* out = moving.row(y - firstRow()).data();
+            const auto isMoving = [&](int x, int count) {
+                const int sum = rowsHere == 3   ? a[x] + m[x] + b[x]
+                                : rowsHere == 2 ? a[x] + b[x]
+                                                : m[x];
+                return static_cast<float>(sum) > quiet * static_cast<float>(count);
+            };
+            for (int x = 0; x < w; ++x) out[x] = isMoving(x, 3 * rowsHere);
+            for (const int x : {0, w - 1}) out[x] = isMoving(x, std::min(w, 2) * rowsHere);
+        }
+    });
+    return moving;
 }
 
 void TemporalBackground::Impl::insert(const ReferenceView& frame, const temporal::FrameGauge& light,
                                       float time) {
-    const int w = width(), top = firstRow(), changesTop = std::max(top - 1, 0);
+    const int w = width(), top = firstRow();
     const auto step = static_cast<float>(frame.depthBits == 32 ? 0.0 : frame.depthCode().step());
-    const Image<std::uint8_t> mixed = mixedPixels(frame), changed = changes(frame, light.gain);
-    const float quiet = kQuietTimes * light.noise + kQuietSteps;
+    const Image<float> inverse = temporal::inverseOf(frame.depth);
+    const Image<std::uint8_t> mixed =
+        temporal::mixedPixels(inverse, gauge.noise(), step, top, endRow());
+    const Image<std::uint8_t> moving = movingPixels(frame, light);
     const auto frameNumber = static_cast<std::uint32_t>(frames);
-    const auto moves = [&](int x, int y) {
-        int sum = 0, count = 0;
-        for (int j = std::max(y - 1 - changesTop, 0);
-             j <= std::min(y + 1 - changesTop, changed.height() - 1); ++j) {
-            for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
-                sum += changed.at(i, j);
-                ++count;
-            }
-        }
-        return static_cast<float>(sum) > quiet * static_cast<float>(count);
-    };
+    const glm::vec3 unlit = 1.0f / light.gain;
     std::visit(
         [&](auto& all) {
             parallelForBlocks(top, endRow(), kRows, [&](std::int64_t begin, std::int64_t end) {
@@ -199,23 +167,23 @@ void TemporalBackground::Impl::insert(const ReferenceView& frame, const temporal
                     for (int x = 0; x < w; ++x) {
                         const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
                         auto& layers = all[static_cast<std::size_t>(y - top) * w + x];
-                        const float dist = frame.depth.data()[pixel];
+                        const float q = inverse.data()[pixel];
                         const float alpha = alphaOf(frame, pixel);
-                        if (!hasPoint(dist) || !(dist > 0)) {
+                        if (!(q > 0)) {
                             if (!(alpha > 0)) ++layers.empty;
                             continue;
                         }
                         Measurement m;
-                        m.q = 1 / dist;
-                        m.tolerance = gauge.noise().tolerance(dist, step);
+                        m.q = q;
+                        m.tolerance = gauge.noise().tolerance(frame.depth.data()[pixel], step);
                         m.weak = mixed.at(x, y - top) != 0 || alpha < kFullAlpha;
-                        const bool moving = moves(x, y);
-                        const auto worth = static_cast<Worth>((m.weak ? 2 : 0) + (moving ? 1 : 0));
+                        const auto worth =
+                            static_cast<Worth>((m.weak ? 2 : 0) + moving.at(x, y - top));
                         const std::uint32_t random = temporal::randomOf(pixel, frameNumber);
                         m.key = temporal::keyOf(worth, random);
                         m.heads = random & 1;
                         m.time = time;
-                        m.colour = temporal::stepsOf(frame.texture, pixel) / light.gain;
+                        m.colour = temporal::stepsOf(frame.texture, pixel) * unlit;
                         layers.add(m);
                     }
                 }

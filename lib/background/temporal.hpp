@@ -21,6 +21,7 @@ struct BackgroundModel {
 struct TemporalBackgroundSettings {
     /// Share of the frames that must show a surface before it is believed; two frames at least.
     double support = 0.04;
+    int keyViews = 8;  ///< poses of moving cameras that backgrounds are made for, at most
     std::uint64_t maxMemoryBytes = 0;  ///< 0 = what the job allows
 };
 
