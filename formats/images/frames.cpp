@@ -12,7 +12,7 @@
 #include "formats/images/codec_module.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/parallel.hpp"
-#include "lib/model/srgb8.hpp"
+#include "lib/model/linear_planes.hpp"
 #include "lib/model/texture.hpp"
 
 namespace stx {
@@ -20,30 +20,28 @@ namespace stx {
 namespace {
 
 /// Premultiplied linear light of some rows of an image that is premultiplied in the frame's colour
-/// space: all of the red, then green, blue and alpha, for these are stored apart. Lights may make a
-/// channel more than 1, which the table does not have.
+/// space: all of the red, then green, blue and alpha, for these are stored apart.
 void toLinearRows(const Image<glm::vec4>& image, int top, int rows, bool linear,
                   const std::optional<glm::vec3>& background, Image<float>& planes) {
     if (planes.width() != image.width() || planes.height() != 4 * rows)
         planes = Image<float>(image.width(), 4 * rows);
-    const LinearTable& table = linearTable();
-    const auto linearFrom = [&table](float coded) {
-        return coded > 1.0f ? linearFromSrgb(coded) : table.linear(coded);
-    };
     parallelForBlocks(0, rows, 16, [&](std::int64_t begin, std::int64_t end) {
+        std::vector<glm::vec4> shown(background ? static_cast<std::size_t>(image.width()) : 0);
         for (auto y = static_cast<int>(begin); y < end; ++y) {
-            const auto from = image.row(top + y);
-            float* to[4];
-            for (int c = 0; c < 4; ++c) to[c] = planes.row(c * rows + y).data();
-            for (std::size_t x = 0; x < from.size(); ++x) {
-                glm::vec4 p = over(from[x], background);
-                // Coded colours are divided first: the curve and the alpha do not commute.
-                if (!linear && p.a > 0.0f) {
-                    if (p.a != 1.0f) p = {glm::vec3(p) / p.a, p.a};
-                    p = {glm::vec3(linearFrom(p.r), linearFrom(p.g), linearFrom(p.b)) * p.a, p.a};
-                }
-                for (int c = 0; c < 4; ++c) to[c][x] = p[c];
+            std::span<const glm::vec4> from = image.row(top + y);
+            if (background) {
+                std::ranges::transform(from, shown.begin(),
+                                       [&](glm::vec4 p) { return over(p, background); });
+                from = shown;
             }
+            std::array<float*, 4> to{};
+            for (int c = 0; c < 4; ++c) to[c] = planes.row(c * rows + y).data();
+            if (!linear) {
+                linearPlanes(from.data(), from.size(), to);
+                continue;
+            }
+            for (std::size_t x = 0; x < from.size(); ++x)
+                for (int c = 0; c < 4; ++c) to[c][x] = from[x][c];
         }
     });
 }

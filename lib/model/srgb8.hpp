@@ -60,8 +60,11 @@ class LinearTable {
         return values_[i] + (values_[i + 1] - values_[i]) * (s - static_cast<float>(i));
     }
 
-  private:
     static constexpr int kSteps = 1024;
+    /// Linear light of 0 to 1 in kSteps steps, both ends with it.
+    [[nodiscard]] const float* values() const { return values_.data(); }
+
+  private:
     std::array<float, kSteps + 1> values_{};
 };
 

@@ -1,5 +1,6 @@
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -294,13 +295,16 @@ void CpuSplatRenderer::resolveBlended(Picture& picture, const Band& band) const 
             colourOut[x] = colour;
         }
         if (!wantNormals_) continue;
+        const auto normalOut = frame.normal.row(y);
         for (int x = 0; x < band.width; ++x) {
             const float* n = band.normals + 4 * (start + x);
             const glm::vec3 sum(n[0], n[1], n[2]);
             const float length = glm::length(sum);
-            shade(picture, x, y,
-                  length > 0 && frame.colour.at(x, y).a > 0 ? sum / length : glm::vec3(0.0f));
+            normalOut[x] = length > 0 && colourOut[x].a > 0 ? sum / length : glm::vec3(0.0f);
         }
+        std::ranges::copy(colourOut, frame.albedo.row(y).begin());
+        if (!settings_.lighting.on()) continue;
+        for (int x = 0; x < band.width; ++x) shade(picture, x, y, normalOut[x]);
     }
 }
 
