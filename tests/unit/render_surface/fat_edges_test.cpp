@@ -1,0 +1,114 @@
+// Depth whose surfaces in front reach over what is behind: found by the colours there, and taken
+// back; exact views stay as they are.
+
+#include "lib/render/surface/fat_edges.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lib/render/bench/analytic_scene.hpp"
+#include "tests/noisy_depth.hpp"
+
+namespace stx::surface {
+namespace {
+
+/// Views of the closed room as thinFatEdges() takes them.
+struct Room {
+    Bundle bundle;
+    std::vector<PixelSpace> spaces;
+    std::vector<Image<float>> q;
+
+    explicit Room(Bundle from) : bundle(std::move(from)) {
+        for (const ReferenceView& view : bundle.views) {
+            spaces.emplace_back(view.camera, 0.0);
+            q.push_back(view.depth);
+            for (float& value : q.back().pixels())
+                value = hasPoint(value) ? static_cast<float>(spaces.back().axis.q(value)) : 0.0f;
+        }
+    }
+    [[nodiscard]] std::vector<EdgeView> views(std::size_t count) {
+        std::vector<EdgeView> out;
+        for (std::size_t i = 0; i < count; ++i)
+            out.push_back({&spaces[i], &bundle.views[i].texture, &q[i], 0.0f});
+        return out;
+    }
+};
+
+Bundle exactRoom() {
+    return analyticBundle(AnalyticScene::room, 3);
+}
+
+/// Only where the surface in front is clearly before what is behind: slopes stay.
+void displaceJumps(Bundle& bundle) {
+    Bundle moved = bundle;
+    noisy::displaceEdges(moved, 1);
+    for (std::size_t i = 0; i < bundle.views.size(); ++i)
+        for (std::size_t k = 0; k < bundle.views[i].depth.count(); ++k) {
+            float& dist = bundle.views[i].depth.data()[k];
+            if (moved.views[i].depth.data()[k] < 0.95f * dist)
+                dist = moved.views[i].depth.data()[k];
+        }
+}
+
+/// Share of the pixels whose q is off by more than this share of it.
+double wrong(const Room& room, const Room& exact, std::size_t view, float by) {
+    int count = 0;
+    for (std::size_t k = 0; k < exact.q[view].count(); ++k) {
+        const float truth = exact.q[view].data()[k];
+        count += std::abs(room.q[view].data()[k] - truth) > by * truth;
+    }
+    return static_cast<double>(count) / static_cast<double>(exact.q[view].count());
+}
+
+TEST(FatEdges, ExactViewsStayAsTheyAre) {
+    Room room(exactRoom());
+    const auto before = room.q;
+    EXPECT_GT(colourAtEdges(room.views(3)), 0.7f);
+    EXPECT_EQ(thinFatEdges(room.views(3)), 0);
+    EXPECT_EQ(room.q, before);
+}
+
+TEST(FatEdges, APixelIsTakenBackEverywhereWhereSlopesMovedToo) {
+    const Room exact(exactRoom());
+    Bundle bundle = exactRoom();
+    noisy::displaceEdges(bundle, 1);
+    Room room(std::move(bundle));
+    const Room moved = room;
+    EXPECT_LT(colourAtEdges(room.views(3)), 0.4f);
+    EXPECT_EQ(thinFatEdges(room.views(3)), 1);
+    for (std::size_t v = 0; v < 3; ++v) {
+        EXPECT_LT(wrong(room, exact, v, 0.01f), 0.3 * wrong(moved, exact, v, 0.01f));
+        EXPECT_LT(wrong(room, exact, v, 1e-5f), 0.1 * wrong(moved, exact, v, 1e-5f));
+    }
+}
+
+TEST(FatEdges, OnlyEdgesAreTakenBackWhereSlopesDidNotMove) {
+    const Room exact(exactRoom());
+    Bundle bundle = exactRoom();
+    displaceJumps(bundle);
+    for (const std::size_t count : {1, 3}) {
+        Room room(bundle);
+        const Room moved = room;
+        EXPECT_EQ(thinFatEdges(room.views(count)), 1);
+        for (std::size_t v = 0; v < count; ++v) {
+            EXPECT_LT(wrong(room, exact, v, 0.01f), 0.5 * wrong(moved, exact, v, 0.01f));
+            // Nothing but edges has changed.
+            EXPECT_LT(wrong(room, exact, v, 1e-5f), 1.5 * wrong(moved, exact, v, 1e-5f));
+        }
+    }
+}
+
+TEST(FatEdges, ViewsOfOneColourTellNothing) {
+    Bundle bundle = exactRoom();
+    noisy::displaceEdges(bundle, 1);
+    for (auto& view : bundle.views)
+        view.texture =
+            Rgba8Image(view.camera.width, view.camera.height, glm::u8vec4(90, 90, 90, 255));
+    Room room(std::move(bundle));
+    EXPECT_EQ(colourAtEdges(room.views(3)), 1.0f);
+    EXPECT_EQ(thinFatEdges(room.views(3)), 0);
+}
+
+}  // namespace
+}  // namespace stx::surface
