@@ -87,6 +87,12 @@ Result<void> readReferences(const std::vector<Box>& boxes, Mp4Track& track) {
         ByteReader in = mpod->body;
         while (in.left() >= 4) track.mpod.push_back(in.u32());
     }
+    // In files the clock's stream is named here (ISO/IEC 14496-14, 3.1.2), not by the descriptor.
+    if (const Box* sync = findBox(references, "sync")) {
+        ByteReader in = sync->body;
+        const std::uint32_t id = in.u32();
+        if (!in.failed() && id > 0 && id <= 0xFFFF) track.clock = static_cast<std::uint16_t>(id);
+    }
     return {};
 }
 
@@ -272,6 +278,7 @@ Result<Mp4Track> readTrack(const Box& trak) {
     const Box* stsd = findBox(tables, "stsd");
     if (stsd == nullptr) return damaged(*stbl, "the box 'stsd' is missing");
     STX_CHECK(readSampleEntry(*stsd, dref, track));
+    if (track.clock) track.stream.ocrEsId = track.clock;
     track.facts.objectTypeIndication = track.stream.objectTypeIndication;
     track.facts.streamType = static_cast<std::uint8_t>(track.stream.streamType);
     track.stream.esId = track.facts.trackId;

@@ -32,6 +32,7 @@ struct Mp4Track {
     TrackFacts facts;
     ElementaryStream stream;  ///< from the sample entry; no samples yet
     std::vector<std::uint32_t> mpod;
+    std::optional<std::uint16_t> clock;  ///< tref/sync: whose clock it has
     bool hasEsds = false;
     bool elsewhere = false;  ///< the data are in another file, which is not opened
     std::string path;

@@ -131,6 +131,14 @@ class Writer {
             if (stream.esId != 0) trackOfEs_[stream.esId] = track->id;
             media_.push_back(std::move(*track));
         });
+        // Files name the clock's track beside the descriptor, not in it.
+        for (Track& track : media_) {
+            const auto clock =
+                track.stream.ocrEsId ? trackOfEs_.find(*track.stream.ocrEsId) : trackOfEs_.end();
+            if (clock == trackOfEs_.end()) continue;
+            track.clock = clock->second;
+            track.stream.ocrEsId.reset();
+        }
         return done;
     }
 

@@ -276,10 +276,16 @@ Result<void> writeTrack(ByteWriter& out, const Track& track, std::uint32_t times
         out.u32(static_cast<std::uint32_t>(track.stream.width) << 16);
         out.u32(static_cast<std::uint32_t>(track.stream.height) << 16);
     }
-    if (!track.mpod.empty()) {
+    if (!track.mpod.empty() || track.clock != 0) {
         const BoxScope tref(out, "tref");
-        const BoxScope mpod(out, "mpod");
-        for (const std::uint32_t id : track.mpod) out.u32(id);
+        if (!track.mpod.empty()) {
+            const BoxScope mpod(out, "mpod");
+            for (const std::uint32_t id : track.mpod) out.u32(id);
+        }
+        if (track.clock != 0) {
+            const BoxScope sync(out, "sync");
+            out.u32(track.clock);
+        }
     }
     writeEdits(out, editsOf(track, timescale));
     const BoxScope mdia(out, "mdia");

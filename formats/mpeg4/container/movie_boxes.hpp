@@ -17,6 +17,7 @@ struct Track {
     std::string handler;
     std::string_view handlerName;
     std::vector<std::uint32_t> mpod;
+    std::uint32_t clock = 0;  ///< id of the track whose clock it has (tref/sync); 0 = the scene's
     std::uint64_t bytes = 0;
     std::uint64_t start = 0;     ///< of the first sample, in the stream's timescale
     std::uint64_t duration = 0;  ///< from the first sample on, in the stream's timescale

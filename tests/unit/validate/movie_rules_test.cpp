@@ -1,7 +1,9 @@
 // Rules 7xxx: each broken once in a sound film.
 
+#include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/mapping/sequence_write.hpp"
 #include "formats/validate/validate_mpeg4.hpp"
+#include "tests/shared_data.hpp"
 #include "tests/unit/sequences/moving_views.hpp"
 #include "tests/unit/validate/numbers.hpp"
 
@@ -69,6 +71,35 @@ TEST(ValidateMovies, LoopsNeedAClock) {
                   f.stream(2).ocrEsId = f.stream(3).ocrEsId = std::uint16_t{3};
               }),
               Numbers{});
+}
+
+TEST(ValidateMovies, FilesKeepTheClock) {
+    Film looping = film();
+    looping.movie()->set("loop", true);
+    looping.movie("depth")->set("loop", true);
+    looping.stream(2).ocrEsId = looping.stream(3).ocrEsId = std::uint16_t{3};
+    Job job;
+    const auto bytes = writeMp4(looping.document, job);
+    ASSERT_TRUE(bytes) << bytes.error().text();
+    const auto again = readMp4(ByteSource::fromBytes(*bytes), job);
+    ASSERT_TRUE(again) << again.error().text();
+    EXPECT_EQ(numbersOf(validate(*again, {}, {}, job)), Numbers{});
+    Film read{*again};
+    EXPECT_EQ(read.stream(2).ocrEsId, std::uint16_t{3});
+    EXPECT_EQ(read.stream(3).ocrEsId, std::uint16_t{3});
+}
+
+// Files of another program, whose movies loop on a clock of their own: but for the pictures, which
+// are on the scene's.
+TEST(ValidateMovies, ReadsTheClocksOfOthers) {
+    REQUIRE_SHARED(folder, "reference/motion");
+    for (const char* name : {"avc.mp4", "hevc.mp4", "m4v.mp4", "imgseq.mp4"}) {
+        Job job;
+        const auto findings = validateFile(folder / name, {}, job);
+        ASSERT_TRUE(findings) << findings.error().text();
+        const bool own = name != std::string("imgseq.mp4");
+        EXPECT_EQ(numbersOf(*findings), own ? Numbers{} : Numbers{7003}) << name;
+    }
 }
 
 TEST(ValidateMovies, TheFirstPictureStandsAlone) {
