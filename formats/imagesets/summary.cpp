@@ -1,6 +1,6 @@
 #include "formats/imagesets/summary.hpp"
 
-#include <set>
+#include <unordered_set>
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/motion.hpp"
@@ -37,7 +37,7 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
         summary.timeline = motion.timeline();
     else if (described->frames > 1)
         summary.timeline = steadyTimeline(described->frames, described->rate);
-    std::set<std::filesystem::path> counted;
+    std::unordered_set<std::string> counted;
     for (const SetView& view : described->views) {
         ImageSetSummary::View out;
         out.name = view.name;
@@ -49,7 +49,7 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
             std::error_code ec;
             if (source->missing) {
                 out.missing.push_back(source->name);
-            } else if (!source->path.empty() && counted.insert(source->path).second) {
+            } else if (!source->path.empty() && counted.insert(source->path.native()).second) {
                 if (const auto size = std::filesystem::file_size(source->path, ec); !ec)
                     summary.bytes += size;
             }

@@ -1,7 +1,9 @@
 // transforms.json of NeRF, instant-ngp, nerfstudio and Blender's exporters: camera-to-world
 // matrices in our own axes, intrinsics for all frames or for each.
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
@@ -27,6 +29,16 @@ Result<std::string> cameraModel(const Json& file, const Json& frame, const std::
         if (const auto it = from->find("is_fisheye"); it != from->end() && *it == Json(true))
             model = "OPENCV_FISHEYE";
     return model.value_or("OPENCV");
+}
+
+/// Whether a frame says something of its lens or its size itself; else it is as the file says.
+bool hasOwnIntrinsics(const Json& frame) {
+    constexpr std::string_view kKeys[] = {
+        "camera_model",   "is_fisheye",     "w",  "h",  "fl_x", "fl_y", "cx", "cy",
+        "camera_angle_x", "camera_angle_y", "k1", "k2", "k3",   "k4",   "p1", "p2"};
+    for (auto it = frame.begin(); it != frame.end(); ++it)
+        if (std::ranges::find(kKeys, it.key()) != std::end(kKeys)) return true;
+    return false;
 }
 
 Result<void> setIntrinsics(const Json& file, const Json& frame, const std::string& where,
@@ -200,15 +212,23 @@ Result<std::vector<SetView>> transformsViews(const Json& file, Job& job) {
     const Json& frames = file["frames"];
     STX_CHECK(checkViewCount(frames.size(), job.limits, "'frames'"));
     std::vector<SetView> views;
+    views.reserve(frames.size());
+    std::optional<SetView> common;  ///< what the file says for all
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const std::string where = fmt::format("frames[{}]", i);
         const Json& frame = frames[i];
         if (!frame.is_object())
             return failAt(where, ErrorCode::invalidInput, "an object is expected");
         SetView view;
+        if (hasOwnIntrinsics(frame)) {
+            STX_CHECK(setIntrinsics(file, frame, where, view));
+        } else {
+            // Sets have tens of thousands of such frames.
+            if (!common) STX_CHECK(setIntrinsics(file, frame, where, common.emplace()));
+            view = *common;
+        }
         STX_TRY(const auto name, findText(frame, "file_path", where));
         view.name = name ? nameOfFrame(*name) : fmt::format("frame{:03}", i);
-        STX_CHECK(setIntrinsics(file, frame, where, view));
         STX_CHECK(setPose(frame, where, view, job));
         STX_CHECK(readOwnKeys(frame, where, view));
         STX_CHECK(setTime(file, frame, where, view));
