@@ -27,7 +27,6 @@ std::vector<BackgroundModel> fused(const std::function<ReferenceView(int)>& fram
         },
         {}, job);
     EXPECT_TRUE(models) << models.error().text();
-    for (const auto& note : job.takeNotes()) std::printf("  %s\n", note.c_str());
     return models ? *std::move(models) : std::vector<BackgroundModel>{};
 }
 
@@ -71,16 +70,16 @@ const std::vector<ReferenceView>& walk() {
     return frames;
 }
 
+// Measured: clean 40.1 dB, noisy 36.7, registered 30.2. What two frames never saw together is open.
 TEST(MovingCameraBackground, IsTheEmptyRoom) {
     const auto models = fused([](int i) { return walk()[static_cast<std::size_t>(i)]; },
                               walked::kFrames, walked::timeOf);
     ASSERT_FALSE(models.empty());
     const FusedFigures f = againstEmptyRoom(models);
-    std::printf("clean: %zu key views, %.2f dB, %.4f open, %.4f wrong, %ld ghosts\n", models.size(),
-                f.psnr, f.open, f.wrongDepth, static_cast<long>(f.ghosts));
-    EXPECT_GT(f.psnr, 35);
-    EXPECT_LE(f.open, 0.005);
-    EXPECT_LE(f.wrongDepth, 0.005);
+    EXPECT_GT(f.psnr, 39.5);
+    EXPECT_LE(f.open, 0.012);
+    EXPECT_LE(f.wrongDepth, 0.003);
+    EXPECT_LE(f.ghosts, 100);
 }
 
 TEST(MovingCameraBackground, IsTheEmptyRoomOfNoisySensors) {
@@ -93,11 +92,9 @@ TEST(MovingCameraBackground, IsTheEmptyRoomOfNoisySensors) {
         walked::kFrames, walked::timeOf);
     ASSERT_FALSE(models.empty());
     const FusedFigures f = againstEmptyRoom(models);
-    std::printf("noisy: %zu key views, %.2f dB, %.4f open, %.4f wrong, %ld ghosts\n", models.size(),
-                f.psnr, f.open, f.wrongDepth, static_cast<long>(f.ghosts));
-    EXPECT_GT(f.psnr, 30);
-    EXPECT_LE(f.open, 0.01);
-    EXPECT_LE(f.wrongDepth, 0.02);
+    EXPECT_GT(f.psnr, 36.2);
+    EXPECT_LE(f.open, 0.026);
+    EXPECT_LE(f.wrongDepth, 0.012);
 }
 
 TEST(MovingCameraBackground, PosesThatAreOffAreRegistered) {
@@ -113,10 +110,11 @@ TEST(MovingCameraBackground, PosesThatAreOffAreRegistered) {
     };
     const auto models = fused(off, walked::kFrames, walked::timeOf);
     ASSERT_FALSE(models.empty());
-    // Key views are where the poses given say, as far as they agree.
-    FusedFigures f = againstEmptyRoom(models);
-    std::printf("off: %zu key views, %.2f dB, %.4f open, %.4f wrong, %ld ghosts\n", models.size(),
-                f.psnr, f.open, f.wrongDepth, static_cast<long>(f.ghosts));
+    // Where they are in the room is known only as well as the poses given agree.
+    const FusedFigures f = againstEmptyRoom(models);
+    EXPECT_GT(f.psnr, 29.6);
+    EXPECT_LE(f.open, 0.012);
+    EXPECT_LE(f.wrongDepth, 0.004);
 }
 
 /// Squared errors of 8-bit values.
@@ -186,11 +184,10 @@ TEST(MovingCameraBackground, FillsWhatACameraBesideUncovers) {
             exact.add(perfect.colour.data()[p], t);
         }
     }
-    std::printf("holes: %ld, around %.2f dB, remembered %.2f dB, exact %.2f dB\n",
-                static_cast<long>(spatial.count), spatial.psnr(), remembered.psnr(), exact.psnr());
-    EXPECT_GT(spatial.count, 2000);
-    EXPECT_GT(remembered.psnr(), spatial.psnr() + 6);
-    EXPECT_GT(remembered.psnr(), exact.psnr() - 1.5);
+    // Measured: 20.4 dB from around, 40.4 remembered, 40.9 with the exact room.
+    EXPECT_GT(spatial.count, 10000);
+    EXPECT_GT(remembered.psnr(), spatial.psnr() + 15);
+    EXPECT_GT(remembered.psnr(), exact.psnr() - 1);
 }
 
 // The same of moving-room, whose truth comes from another program: m0 walks, mn walks beside it.
@@ -227,8 +224,9 @@ TEST(MovingCameraBackground, FillsWhatMovingRoomUncovers) {
     std::printf("moving-room: %zu key views, %ld holes, %.2f -> %.2f dB; frames %.2f -> %.2f\n",
                 models.size(), static_cast<long>(spatial.count), spatial.psnr(), remembered.psnr(),
                 spatialAll.psnr(), rememberedAll.psnr());
-    EXPECT_GT(remembered.psnr(), spatial.psnr() + 3);
-    EXPECT_GT(rememberedAll.psnr(), spatialAll.psnr());
+    // Measured: 14.3 and 19.2 dB (what moves is in it, too), frames 24.4 and 26.7.
+    EXPECT_GT(remembered.psnr(), spatial.psnr() + 4);
+    EXPECT_GT(rememberedAll.psnr(), spatialAll.psnr() + 2);
 }
 
 }  // namespace
