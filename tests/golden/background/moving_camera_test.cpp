@@ -221,9 +221,6 @@ TEST(MovingCameraBackground, FillsWhatMovingRoomUncovers) {
             remembered.add(ours.colour.data()[p], truth.data()[p]);
         }
     }
-    std::printf("moving-room: %zu key views, %ld holes, %.2f -> %.2f dB; frames %.2f -> %.2f\n",
-                models.size(), static_cast<long>(spatial.count), spatial.psnr(), remembered.psnr(),
-                spatialAll.psnr(), rememberedAll.psnr());
     // Measured: 14.3 and 19.2 dB (what moves is in it, too), frames 24.4 and 26.7.
     EXPECT_GT(remembered.psnr(), spatial.psnr() + 4);
     EXPECT_GT(rememberedAll.psnr(), spatialAll.psnr() + 2);
