@@ -93,7 +93,7 @@ glm::vec3 colourOf(const Layer<Sample>& layer, float noise) {
     glm::vec3 colour;
     const int used = count - first, cut = used / 4;
     for (int channel = 0; channel < 3; ++channel) {
-        std::array<float, kSamples> sorted;
+        std::array<float, kSamples> sorted{};
         for (int i = 0; i < used; ++i)
             sorted[static_cast<std::size_t>(i)] =
                 values[static_cast<std::size_t>(first + i)].colour[channel];
