@@ -15,6 +15,8 @@ namespace {
 constexpr std::size_t kCandidates = 64;
 /// Poses that move by more pixels when they are registered were not exact; less is noise.
 constexpr double kInexact = 0.5;
+/// A pose that moves by more of the picture's width has gone astray: it stays as given.
+constexpr double kAstray = 0.05;
 /// Frames beside the key views that tell whether poses are exact.
 constexpr std::size_t kProbes = 4;
 /// A scene is all around, not an object in empty space, when its points are this share of the
@@ -71,6 +73,7 @@ class MovingCameras {
     std::vector<ReferenceView> keys_;  ///< their pictures, with registered poses
     std::vector<Camera> keyCameras_;   ///< their poses as given
     bool registers_ = false;
+    double middle_ = 1;          ///< a distance that is usual in the scene
     std::vector<Camera> poses_;  ///< registered, of frame * views + view; width 0 = not yet
     std::int64_t points_ = 0, places_ = 0;
     std::int64_t done_ = 0, total_ = 0;
@@ -145,7 +148,9 @@ Result<void> MovingCameras::registerKeys() {
     std::nth_element(distances.begin(), middle, distances.end());
     STX_TRY(const PoseRefinement refined, refinePoses(probe, {}, job_));
     const double pixels = (refined.maxTurn + refined.maxShift / *middle) * first.camera.fx;
-    registers_ = pixels > kInexact && refined.after.relative <= refined.before.relative;
+    middle_ = *middle;
+    registers_ = pixels > kInexact && pixels < kAstray * first.camera.width &&
+                 refined.after.relative <= refined.before.relative;
     if (!registers_) return {};
     for (std::size_t i = 0; i < keys_.size(); ++i) keys_[i].camera = probe.views[i].camera;
     poses_.resize(times_.size() * views_.size());
@@ -176,8 +181,11 @@ Result<Camera> MovingCameras::poseOf(const ReferenceView& view, const Moment& mo
     pair.views[0].name = "key";
     pair.views[1].name = "frame";
     pair.views[1].camera = carried(view.camera, keyCameras_[best], keys_[best].camera);
-    STX_CHECK(refinePoses(pair, {}, job_));
-    known = carried(pair.views[1].camera, pair.views[0].camera, keys_[best].camera);
+    known = pair.views[1].camera;
+    STX_TRY(const PoseRefinement refined, refinePoses(pair, {}, job_));
+    const double pixels = (refined.maxTurn + refined.maxShift / middle_) * view.camera.fx;
+    if (pixels < kAstray * view.camera.width)
+        known = carried(pair.views[1].camera, pair.views[0].camera, keys_[best].camera);
     return known;
 }
 
