@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <climits>
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
@@ -48,29 +50,28 @@ class Drawn {
         if (t < 2) return ((-0.5f * t + 2.5f) * t - 4) * t + 2;
         return 0;
     }
+    /// cubic() of four pixels, the second of which is `t` (0..1) away.
+    static std::array<float, 4> cubics(float t) {
+        const auto near = [](float d) { return (1.5f * d - 2.5f) * d * d + 1; };
+        const auto far = [](float d) { return ((-0.5f * d + 2.5f) * d - 4) * d + 2; };
+        return {far(1 + t), near(t), near(1 - t), far(2 - t)};
+    }
     [[nodiscard]] glm::vec3 narrow(glm::dvec2 pixel) const {
         const double px = pixel.x - 0.5, py = pixel.y - 0.5;
         const int x0 = static_cast<int>(std::floor(px)), y0 = static_cast<int>(std::floor(py));
         const auto tx = static_cast<float>(px - x0), ty = static_cast<float>(py - y0);
         const int w = copy_.colour.width(), h = copy_.colour.height();
-        float wx[4], sums[3] = {0, 0, 0};
+        const auto wx = cubics(tx), wy = cubics(ty);
         int xs[4];
-        for (int i = 0; i < 4; ++i) {
-            wx[i] = cubic(static_cast<float>(i - 1) - tx);
-            xs[i] = std::clamp(x0 - 1 + i, 0, w - 1);
-        }
+        for (int i = 0; i < 4; ++i) xs[i] = std::clamp(x0 - 1 + i, 0, w - 1);
+        glm::vec4 sums(0);
         for (int j = 0; j < 4; ++j) {
             const glm::u8vec4* row = copy_.colour.row(std::clamp(y0 - 1 + j, 0, h - 1)).data();
-            const float wy = cubic(static_cast<float>(j - 1) - ty);
-            for (int i = 0; i < 4; ++i) {
-                const glm::u8vec4 c = row[xs[i]];
-                const float weight = wy * wx[i];
-                sums[0] += weight * c.r;
-                sums[1] += weight * c.g;
-                sums[2] += weight * c.b;
-            }
+            for (int i = 0; i < 4; ++i)
+                sums += wy[static_cast<std::size_t>(j)] * wx[static_cast<std::size_t>(i)] *
+                        glm::vec4(row[xs[i]]);
         }
-        return glm::clamp(glm::vec3(sums[0], sums[1], sums[2]) / 255.0f, 0.0f, 1.0f);
+        return glm::clamp(glm::vec3(sums) / 255.0f, 0.0f, 1.0f);
     }
     [[nodiscard]] glm::vec3 wide(glm::dvec2 pixel) const {
         const float px = static_cast<float>(pixel.x) - 0.5f;
@@ -128,33 +129,54 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
             const float ty = cy - static_cast<float>(gy);
             const int ys[2] = {std::clamp(gy, 0, labels.height() - 1),
                                std::clamp(gy + 1, 0, labels.height() - 1)};
+            // Four cells around, the same for some pixels.
+            int cellAt = INT_MIN;
+            std::array<bool, 4> mine{};
+            std::array<const glm::vec3*, 4> corrections{};
+            bool some = false;
+            const auto goTo = [&](int whole) {
+                cellAt = whole;
+                const int gx = (whole % labels.width() + labels.width()) % labels.width();
+                some = false;
+                for (std::size_t c = 0; c < 4; ++c) {
+                    int column = gx + static_cast<int>(c & 1);
+                    column -= column >= labels.width() ? labels.width() : 0;
+                    mine[c] = labels.at(column, ys[c >> 1]) == index;
+                    some = some || mine[c];
+                }
+                for (std::size_t c = 0; c < 4 && some; ++c) {
+                    int column = gx + static_cast<int>(c & 1);
+                    column -= column >= labels.width() ? labels.width() : 0;
+                    const int own = print.column(column, labels.width());
+                    const int ownRow = ys[c >> 1] - print.box.y;
+                    corrections[c] = own >= 0 && ownRow >= 0 && ownRow < print.box.height
+                                         ? &correction.at(own, ownRow)
+                                         : nullptr;
+                }
+            };
             for (int x = left; x < right; ++x) {
                 const double cx = (x + 0.5) * cells - 0.5;
                 const int whole = static_cast<int>(std::floor(cx));
-                const auto tx = static_cast<float>(cx - whole);
-                const int gx = (whole % labels.width() + labels.width()) % labels.width();
-                // How far the cells around are this picture's.
-                std::array<float, 4> shares;
-                std::array<int, 4> columns;
-                float weight = 0;
-                for (std::size_t c = 0; c < 4; ++c) {
-                    shares[c] = ((c & 1) ? tx : 1 - tx) * ((c >> 1) ? ty : 1 - ty);
-                    int column = gx + static_cast<int>(c & 1);
-                    column -= column >= labels.width() ? labels.width() : 0;
-                    columns[c] = column < 0 ? column + labels.width() : column;
-                    if (labels.at(columns[c], ys[c >> 1]) == index) weight += shares[c];
+                if (whole != cellAt) goTo(whole);
+                if (!some) {
+                    // On to the next cell, but for rounding.
+                    x = std::max(x, static_cast<int>(std::floor((whole + 1.5) / cells - 0.5)) - 1);
+                    continue;
                 }
+                const auto tx = static_cast<float>(cx - whole);
+                const std::array<float, 4> shares = {(1 - tx) * (1 - ty), tx * (1 - ty),
+                                                     (1 - tx) * ty, tx * ty};
+                // How far the cells around are this picture's.
+                float weight = 0;
+                for (std::size_t c = 0; c < 4; ++c)
+                    if (mine[c]) weight += shares[c];
                 if (weight <= 0) continue;
                 const glm::dvec2 turn = turns[static_cast<std::size_t>(x - left)];
                 glm::vec4 colour = picture.at({-level * turn.x, sine, -level * turn.y});
                 if (colour.a <= 0) continue;
                 glm::vec4 factor(0);
-                for (std::size_t c = 0; c < 4; ++c) {
-                    const int own = print.column(columns[c], labels.width());
-                    const int ownRow = ys[c >> 1] - print.box.y;
-                    if (own >= 0 && ownRow >= 0 && ownRow < print.box.height)
-                        factor += shares[c] * glm::vec4(correction.at(own, ownRow), 1);
-                }
+                for (std::size_t c = 0; c < 4; ++c)
+                    if (corrections[c]) factor += shares[c] * glm::vec4(*corrections[c], 1);
                 const glm::vec3 light =
                     withGain(
                         {linearByTable(colour.r), linearByTable(colour.g), linearByTable(colour.b)},
@@ -193,7 +215,7 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     for (std::size_t i = 0; i < prints.size(); ++i)
         alignment.cameras[static_cast<std::size_t>(prints[i].picture)].gain = gains[i];
     STX_TRY(const auto labels, findSeams(prints, gains, gridWidth, settings.hideSeams, job));
-    const auto corrections = findCorrections(prints, gains, gridWidth);
+    const auto corrections = findCorrections(prints, gains, labels);
 
     PanoramaImage out{Rgba8Image(width, height)};
     // Sums of a band of rows share a quarter of the memory.

@@ -113,7 +113,7 @@ Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
         const GridBox box = boxOf(alignment.cameras[static_cast<std::size_t>(k)], lens, gridWidth);
         cells += static_cast<std::uint64_t>(box.width) * static_cast<std::uint64_t>(box.height);
     }
-    STX_CHECK(job.limits.checkAllocation(cells, 2 * sizeof(glm::vec3) + 8, "finding seams"));
+    STX_CHECK(job.limits.checkAllocation(cells, 3 * sizeof(glm::vec3) + 12, "finding seams"));
     std::vector<Footprint> out(used.size());
     std::vector<Result<void>> made(used.size());
     std::atomic<std::int64_t> done = 0;

@@ -54,16 +54,19 @@ struct Footprint {
     return light * glm::mix(gain, glm::max(gain, glm::vec3(1)), t * t * (3 - 2 * t));
 }
 
-/// What is left of differences in light, smooth over each picture: by how much its light
-/// is to be multiplied, so that pictures melt into each other. Of each footprint, on its box.
-[[nodiscard]] std::vector<Image<glm::vec3>> findCorrections(
-    const std::vector<Footprint>& footprints, const std::vector<glm::dvec3>& gains, int gridWidth);
-
 /// For each cell the index of the footprint to show, -1 = none: seams run where pictures agree
 /// (alpha expansion; Boykov, Veksler and Zabih 2001, with the cost of Kwatra et al. 2003). Edges of
 /// what is seen are extended by two cells.
 [[nodiscard]] Result<Image<int>> findSeams(const std::vector<Footprint>& footprints,
                                            const std::vector<glm::dvec3>& gains, int gridWidth,
                                            bool hideSeams, Job& job);
+
+/// What is left of differences in light: by how much the light of each footprint is to be
+/// multiplied, on its box, so that pictures melt into each other where `labels` (of findSeams()) go
+/// from one to the other. Two bands, as in Burt and Adelson (1983): light is mixed over an eighth
+/// of a picture and as far as both look, details change at the seam.
+[[nodiscard]] std::vector<Image<glm::vec3>> findCorrections(
+    const std::vector<Footprint>& footprints, const std::vector<glm::dvec3>& gains,
+    const Image<int>& labels);
 
 }  // namespace stx::panorama

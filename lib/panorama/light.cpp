@@ -37,25 +37,121 @@ void shared(const Footprint& a, const Footprint& b, int gridWidth, const Visit& 
 }
 
 /// Mean of a square around each pixel, by its weight; three times, which is nearly a bell.
-void smooth(Image<glm::vec4>& image, int radius) {
+/// `around`: rows end where they begin.
+void smooth(Image<glm::vec4>& image, int radius, bool around) {
     const int w = image.width(), h = image.height();
-    std::vector<glm::vec4> line(static_cast<std::size_t>(std::max(w, h)));
-    const auto run = [&](int count, const auto& at) {
-        for (int i = 0; i < count; ++i) line[static_cast<std::size_t>(i)] = at(i);
+    std::vector<glm::vec4> line(static_cast<std::size_t>(std::max(w, h) + 2 * radius + 1));
+    const auto run = [&](int count, bool closed, const auto& at) {
+        for (int i = -radius; i <= count + radius; ++i) {
+            const bool inside = i >= 0 && i < count;
+            line[static_cast<std::size_t>(i + radius)] = inside   ? at(i)
+                                                         : closed ? at((i % count + count) % count)
+                                                                  : glm::vec4(0);
+        }
         glm::dvec4 sum(0);
-        for (int i = 0; i < std::min(radius, count); ++i)
-            sum += glm::dvec4(line[static_cast<std::size_t>(i)]);
+        for (int i = 0; i < 2 * radius; ++i) sum += glm::dvec4(line[static_cast<std::size_t>(i)]);
         for (int i = 0; i < count; ++i) {
-            if (i + radius < count) sum += glm::dvec4(line[static_cast<std::size_t>(i + radius)]);
-            if (i - radius - 1 >= 0)
-                sum -= glm::dvec4(line[static_cast<std::size_t>(i - radius - 1)]);
+            sum += glm::dvec4(line[static_cast<std::size_t>(i + 2 * radius)]);
             at(i) = glm::vec4(sum / (2.0 * radius + 1));
+            sum -= glm::dvec4(line[static_cast<std::size_t>(i)]);
         }
     };
     for (int pass = 0; pass < 3; ++pass) {
-        for (int y = 0; y < h; ++y) run(w, [&](int i) -> glm::vec4& { return image.at(i, y); });
-        for (int x = 0; x < w; ++x) run(h, [&](int i) -> glm::vec4& { return image.at(x, i); });
+        for (int y = 0; y < h; ++y)
+            run(w, around, [&](int i) -> glm::vec4& { return image.at(i, y); });
+        for (int x = 0; x < w; ++x)
+            run(h, false, [&](int i) -> glm::vec4& { return image.at(x, i); });
     }
+}
+
+/// Logarithms of a picture's light with its gain; darkness counts for little.
+Image<glm::vec3> logsOf(const Footprint& f, glm::vec3 gain) {
+    Image<glm::vec3> out(f.box.width, f.box.height);
+    for (std::size_t i = 0; i < out.count(); ++i)
+        if (f.inside.pixels()[i] > 0)
+            out.pixels()[i] = glm::log(withGain(f.colour.pixels()[i], gain) + 0.01f);
+    return out;
+}
+
+/// What is smooth over a picture's box, kept for blocks of cells: sums and counts come in, means
+/// around each block go out.
+class SmoothBlocks {
+  public:
+    explicit SmoothBlocks(const GridBox& box, int gridWidth)
+        : around_(box.width >= gridWidth),
+          blocks_((box.width + kBlock - 1) / kBlock, (box.height + kBlock - 1) / kBlock,
+                  glm::vec4(0)) {}
+    void add(glm::ivec2 cell, glm::vec3 value) {
+        blocks_.at(cell.x / kBlock, cell.y / kBlock) += glm::vec4(value, 1);
+    }
+    /// Means over a bell of `reach` blocks to either side, three times. Where nothing is near, the
+    /// mean of all.
+    void finish(int reach) {
+        glm::vec4 all(0);
+        for (const glm::vec4& block : blocks_.pixels()) all += block;
+        if (all.a <= 0) return;
+        for (glm::vec4& block : blocks_.pixels()) block += all * (1e-3f / all.a);
+        smooth(blocks_, reach, around_);
+        for (glm::vec4& block : blocks_.pixels()) block /= block.a;
+    }
+    /// 0 where nothing was added at all.
+    [[nodiscard]] glm::vec3 at(glm::ivec2 cell) const {
+        const glm::vec2 p = (glm::vec2(cell) + 0.5f) / static_cast<float>(kBlock) - 0.5f;
+        const glm::vec2 floor = glm::floor(p), t = p - floor;
+        const auto block = [&](int dx, int dy) {
+            const int w = blocks_.width();
+            int x = static_cast<int>(floor.x) + dx;
+            x = around_ ? (x + w) % w : std::clamp(x, 0, w - 1);
+            const int y = std::clamp(static_cast<int>(floor.y) + dy, 0, blocks_.height() - 1);
+            return glm::vec3(blocks_.at(x, y));
+        };
+        return glm::mix(glm::mix(block(0, 0), block(1, 0), t.x),
+                        glm::mix(block(0, 1), block(1, 1), t.x), t.y);
+    }
+
+  private:
+    static constexpr int kBlock = 4;  ///< cells
+
+    bool around_;
+    Image<glm::vec4> blocks_;
+};
+
+/// By how much `b` is lighter than `a` where both look (logarithms): what is there to be seen is in
+/// both and cancels out, what is left are the light and the lens.
+SmoothBlocks lightDifference(const Footprint& a, const Image<glm::vec3>& logsA, const Footprint& b,
+                             const Image<glm::vec3>& logsB, int gridWidth) {
+    // What differs by more is something else, not another light.
+    constexpr float kMost = 0.9f;
+    // A bell of 6 cells, a thirtieth of a picture: wider ones leave steps where pictures are darker
+    // at their edges.
+    constexpr int kReach = 1;
+    SmoothBlocks out(a.box, gridWidth);
+    shared(a, b, gridWidth, [&](glm::ivec2 pa, glm::ivec2 pb) {
+        const glm::vec3 log = logsB.at(pb.x, pb.y) - logsA.at(pa.x, pa.y);
+        if (glm::dot(log, log) <= kMost * kMost) out.add(pa, log);
+    });
+    out.finish(kReach);
+    return out;
+}
+
+/// How much of what each cell of a box comes to is this picture's: what is shown of it, with
+/// borders that are an eighth of a picture wide, and nothing where it ends.
+Image<float> weightsOf(const Footprint& f, int index, const Image<int>& labels) {
+    constexpr int kReach = 3;
+    const int gridWidth = labels.width();
+    SmoothBlocks shown(f.box, gridWidth);
+    for (int y = 0; y < f.box.height; ++y)
+        for (int x = 0; x < f.box.width; ++x) {
+            const int column = ((f.box.x + x) % gridWidth + gridWidth) % gridWidth;
+            shown.add({x, y}, glm::vec3(labels.at(column, f.box.y + y) == index ? 1 : 0));
+        }
+    shown.finish(kReach);
+    Image<float> out(f.box.width, f.box.height);
+    for (int y = 0; y < f.box.height; ++y)
+        for (int x = 0; x < f.box.width; ++x)
+            if (const float inside = f.inside.at(x, y); inside > 0)
+                out.at(x, y) = inside * (shown.at({x, y}).x + 1e-3f);
+    return out;
 }
 
 }  // namespace
@@ -106,46 +202,44 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
 }
 
 std::vector<Image<glm::vec3>> findCorrections(const std::vector<Footprint>& prints,
-                                              const std::vector<glm::dvec3>& gains, int gridWidth) {
+                                              const std::vector<glm::dvec3>& gains,
+                                              const Image<int>& labels) {
     const std::size_t n = prints.size();
-    const int height = gridWidth / 2;
-    // The mean of all pictures, each weighing more the farther inside a place is.
-    Image<glm::vec4> mean(gridWidth, height, glm::vec4(0));
-    for (std::size_t k = 0; k < n; ++k) {
-        const Footprint& f = prints[k];
-        for (int y = 0; y < f.box.height; ++y)
-            for (int x = 0; x < f.box.width; ++x) {
-                const float w = f.inside.at(x, y);
-                if (w <= 0) continue;
-                const int column = ((f.box.x + x) % gridWidth + gridWidth) % gridWidth;
-                mean.at(column, f.box.y + y) +=
-                    w * glm::vec4(withGain(f.colour.at(x, y), gains[k]), 1);
-            }
-    }
-    std::vector<Image<glm::vec3>> out(n);
+    const int gridWidth = labels.width();
+    std::vector<Image<glm::vec3>> logs(n), out(n);
+    std::vector<Image<float>> weights(n);
+    parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        logs[k] = logsOf(prints[k], gains[k]);
+        weights[k] = weightsOf(prints[k], static_cast<int>(k), labels);
+    });
+    // Each picture is brought to the mean of all that look at a place, each of which weighs more
+    // the nearer the place is to what is shown of it. Differences are smoothed before they are
+    // weighed: all pictures then come to the same light, and where one ends nothing is seen of it.
     parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
         const Footprint& f = prints[k];
-        Image<glm::vec4> logs(f.box.width, f.box.height, glm::vec4(0));
-        for (int y = 0; y < f.box.height; ++y)
-            for (int x = 0; x < f.box.width; ++x) {
-                if (f.inside.at(x, y) <= 0) continue;
-                const int column = ((f.box.x + x) % gridWidth + gridWidth) % gridWidth;
-                const glm::vec4 all = mean.at(column, f.box.y + y);
-                const glm::vec3 raw = f.colour.at(x, y);
-                const glm::vec3 own = withGain(raw, gains[k]), other = glm::vec3(all) / all.a;
-                const glm::vec3 log = glm::log((other + 0.01f) / (own + 0.01f));
-                // What differs by more is something else, not another light.
-                if (glm::length(log) > 0.5f) continue;
-                logs.at(x, y) = glm::vec4(log, 1);
-            }
-        // A sixteenth of the picture is smooth enough to leave its details alone.
-        smooth(logs, std::max(2, std::min(f.box.width, f.box.height) / 16));
-        out[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(1));
-        for (std::size_t p = 0; p < logs.count(); ++p) {
-            const glm::vec4 l = logs.pixels()[p];
-            if (l.a > 1e-3f) out[k].pixels()[p] = glm::exp(glm::vec3(l) / l.a);
+        Image<glm::vec4> sums(f.box.width, f.box.height);
+        for (std::size_t p = 0; p < sums.count(); ++p)
+            sums.pixels()[p] = glm::vec4(0, 0, 0, weights[k].pixels()[p]);
+        for (std::size_t other = 0; other < n; ++other) {
+            if (other == k || !boxesMeet(f, prints[other], gridWidth)) continue;
+            // The same from both sides.
+            const bool first = k < other;
+            const std::size_t a = first ? k : other, b = first ? other : k;
+            const SmoothBlocks difference =
+                lightDifference(prints[a], logs[a], prints[b], logs[b], gridWidth);
+            shared(prints[a], prints[b], gridWidth, [&](glm::ivec2 pa, glm::ivec2 pb) {
+                const glm::ivec2 own = first ? pa : pb, there = first ? pb : pa;
+                const float weight = weights[other].at(there.x, there.y);
+                const glm::vec3 log = difference.at(pa) * (first ? 1.0f : -1.0f);
+                sums.at(own.x, own.y) += weight * glm::vec4(log, 1);
+            });
         }
+        out[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(1));
+        for (std::size_t p = 0; p < sums.count(); ++p)
+            if (const glm::vec4 s = sums.pixels()[p]; s.a > 0)
+                out[k].pixels()[p] = glm::exp(glm::vec3(s) / s.a);
     });
     return out;
 }
