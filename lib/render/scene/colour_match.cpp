@@ -24,6 +24,8 @@ constexpr double kHalfStep = 0.5 / 255, kStep = 1.0 / 255;
 constexpr double kMostGain = 2.0, kMostOffset = 0.25;
 /// Means of colours are off by this much however many points there are: lights have shapes.
 constexpr double kMiddleDoubt = 0.001;
+/// The variance of a ratio of spreads of colours that have nothing to do with each other.
+constexpr double kLooseDoubt = 0.25;
 /// Offsets are about so large; where colours hardly spread, what differs is taken for a gain.
 constexpr double kUsualOffset = 0.01;
 /// A difference is one when it is as many times what pairs contradict each other by.
@@ -89,9 +91,10 @@ Line fitLine(const SharedColours& pair, int channel) {
         line.spread = std::sqrt(std::min(varA, varB));
         const double doubt = noise * noise / n + kMiddleDoubt * kMiddleDoubt;
         // The ratio of the spreads, and that of the means, each as far as it can be trusted.
-        const double related =
-            std::max(ab / n - line.meanA * line.meanB, 0.0) / std::sqrt(varA * varB);
-        const double spreadWeight = related * line.spread * line.spread / doubt;
+        // Spreads of colours that are loosely related tell of sharpness, not of light.
+        const double related = std::max(ab / n - line.meanA * line.meanB, 0.0);
+        const double loose = std::max(1 - related * related / (varA * varB), 0.0);
+        const double spreadWeight = 1 / (doubt / (line.spread * line.spread) + kLooseDoubt * loose);
         const double middleGain = kUsualOffset / std::min(line.meanA, line.meanB);
         const double meanWeight = 1 / (middleGain * middleGain);
         line.gainWeight = spreadWeight + meanWeight;

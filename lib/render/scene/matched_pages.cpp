@@ -19,6 +19,8 @@ constexpr std::size_t kFewInside = 60;
 constexpr std::size_t kPartners = 8;
 /// Views that show less of each other are not compared.
 constexpr int kLeastShown = 2;
+/// Surfaces are seen from the front when the cosine to their normal is larger.
+constexpr double kFacing = 0.2;
 /// The same surface: depths that differ by no more than this share. Noise may be more; then fewer
 /// points are left.
 constexpr double kSameSurface = 0.015;
@@ -36,6 +38,7 @@ class Samples {
 
     struct Point {
         glm::dvec3 world;
+        glm::dvec3 normal;  ///< of the surface; of single pixels: towards their camera
         glm::vec3 colour;
     };
     [[nodiscard]] std::vector<Point> pointsOf(std::size_t view) const {
@@ -48,19 +51,29 @@ class Samples {
             for (int x = step / 2; x < c.width; x += step) {
                 const float depth = set_.depth(view, x, y);
                 if (!hasPoint(depth)) continue;
-                if (const auto colour = colourAt(view, x, y, depth))
-                    points.push_back(
-                        {c.position + c.orientation * c.unproject(x + 0.5, y + 0.5, depth),
-                         *colour});
+                const auto colour = colourAt(view, x, y, depth);
+                if (!colour) continue;
+                const auto worldAt = [&](int i, int j) {
+                    return c.position +
+                           c.orientation * c.unproject(i + 0.5, j + 0.5, set_.depth(view, i, j));
+                };
+                const glm::dvec3 world = worldAt(x, y);
+                glm::dvec3 normal = towards(c, world);
+                if (radius_ > 0)
+                    normal = glm::normalize(glm::cross(worldAt(x + 1, y) - worldAt(x - 1, y),
+                                                       worldAt(x, y - 1) - worldAt(x, y + 1)));
+                points.push_back({world, normal, *colour});
             }
         }
         return points;
     }
 
     /// What a view shows of a point; nothing when something else is there.
-    [[nodiscard]] std::optional<glm::vec3> shownAt(std::size_t view, glm::dvec3 world) const {
+    [[nodiscard]] std::optional<glm::vec3> shownAt(std::size_t view, const Point& point) const {
         const Camera& c = set_.views()[view].camera;
-        const glm::dvec3 p(cameraFromWorld_[view] * glm::dvec4(world, 1));
+        // The other side of a sheet is another surface.
+        if (!(glm::dot(point.normal, towards(c, point.world)) > kFacing)) return {};
+        const glm::dvec3 p(cameraFromWorld_[view] * glm::dvec4(point.world, 1));
         if (!c.orthographic && !(p.z < 0)) return {};
         const glm::dvec3 at = c.project(p);
         if (!(at.x >= 0 && at.y >= 0 && at.x < c.width && at.y < c.height)) return {};
@@ -68,6 +81,9 @@ class Samples {
     }
 
   private:
+    [[nodiscard]] static glm::dvec3 towards(const Camera& c, glm::dvec3 world) {
+        return c.orthographic ? -c.forward() : glm::normalize(c.position - world);
+    }
     [[nodiscard]] std::optional<glm::vec3> colourAt(std::size_t view, int x, int y,
                                                     double depth) const {
         const Camera& c = set_.views()[view].camera;
@@ -120,7 +136,7 @@ std::vector<SharedColours> sharedColours(const PageSet& set, int radius) {
             if (other == v) continue;
             int shown = 0;
             for (std::size_t k = step / 2; k < points[v].size(); k += step)
-                shown += samples.shownAt(other, points[v][k].world) ? 1 : 0;
+                shown += samples.shownAt(other, points[v][k]) ? 1 : 0;
             if (shown >= kLeastShown) ranked.emplace_back(-shown, other);
         }
         std::sort(ranked.begin(), ranked.end());
@@ -137,11 +153,9 @@ std::vector<SharedColours> sharedColours(const PageSet& set, int radius) {
         SharedColours& pair = pairs[static_cast<std::size_t>(i)];
         // Both ways: what is shown at a point is a little blurred beside the point's own colour.
         for (const Samples::Point& p : points[pair.a])
-            if (const auto b = samples.shownAt(pair.b, p.world))
-                pair.points.push_back({p.colour, *b});
+            if (const auto b = samples.shownAt(pair.b, p)) pair.points.push_back({p.colour, *b});
         for (const Samples::Point& p : points[pair.b])
-            if (const auto a = samples.shownAt(pair.a, p.world))
-                pair.points.push_back({*a, p.colour});
+            if (const auto a = samples.shownAt(pair.a, p)) pair.points.push_back({*a, p.colour});
     });
     return pairs;
 }
