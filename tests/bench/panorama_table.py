@@ -7,7 +7,9 @@ Series that are cut out of known spheres (panorama_series.py) tell the error of 
 all were turned as one), focal length, and what comes back of the original (PSNR, after a gain). Real series
 tell residuals and, where EXIF has it, how far the focal length is from it. --left-out: each picture drawn again
 out of the others. Seconds are the processor's, of all its cores together. With --peers, OpenCV's
-Stitcher and Hugin's command line (pto_gen, cpfind, cpclean, autooptimiser, nona, enblend) run on the same.
+Stitcher and Hugin's command line (pto_gen, cpfind, cpclean, autooptimiser, nona, enblend) run on the same; what
+they left out, and their rotations where they are known, are told: a peer fails where it leaves out a picture or
+a rotation is off by more than a degree.
 Needs python3-opencv; the peers need hugin-tools and enblend. Exit code 1 when a figure misses what is promised.
 """
 import argparse
@@ -24,25 +26,53 @@ import tempfile
 import cv2
 import numpy as np
 
+from panorama_series import matrix_of as camera_matrix
 from panorama_series import painted_sphere, seen_in, write_series
 
 MOST_TURN, MOST_FOCAL, LEAST_PSNR, MOST_RMS, MOST_GAP = 0.02, 0.1, 35.0, 0.6, 0.1
+MOST_PEER_TURN = 1.0
 
+# The second half tells what the first does not: which pictures it used, and how they look. They are the steps
+# and settings of cv::Stitcher's estimateTransform() (4.6).
 CHILD_OPENCV = """
-import cv2, sys
-stitcher = cv2.Stitcher_create()
-status, picture = stitcher.stitch([cv2.imread(f) for f in sys.argv[2:]])
+import cv2, json, math, resource, sys
+import numpy as np
+pictures = [cv2.imread(f) for f in sys.argv[2:]]
+status, picture = cv2.Stitcher_create().stitch(pictures)
 if status == 0: cv2.imwrite(sys.argv[1], picture)
-print(status, 0 if picture is None else picture.shape[1])
+used = resource.getrusage(resource.RUSAGE_SELF)
+found = {"status": status, "seconds": used.ru_utime + used.ru_stime, "cameras": {}}
+try:
+    scale = min(1.0, math.sqrt(0.6e6 / (pictures[0].shape[0] * pictures[0].shape[1])))
+    small = [cv2.resize(p, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR_EXACT) for p in pictures]
+    features = [cv2.detail.computeImageFeatures2(cv2.ORB_create(), p) for p in small]
+    matches = cv2.detail_BestOf2NearestMatcher(False).apply2(features)
+    kept = [int(k) for k in np.ravel(cv2.detail.leaveBiggestComponent(features, matches, 1.0))]
+    features = [features[k] for k in kept]
+    matches = cv2.detail_BestOf2NearestMatcher(False).apply2(features)
+    good, cameras = cv2.detail_HomographyBasedEstimator().apply(features, matches, None)
+    for camera in cameras: camera.R = camera.R.astype(np.float32)
+    adjuster = cv2.detail_BundleAdjusterRay()
+    adjuster.setConfThresh(1.0)
+    good, cameras = adjuster.apply(features, matches, cameras)
+    flip = np.diag([1.0, -1, -1])
+    for k, camera in zip(kept, cameras):
+        found["cameras"][k] = {"rotation": (flip @ camera.R.astype(float) @ flip).tolist(), "focal": camera.focal / scale}
+except Exception as error:
+    found["why"] = str(error)
+print(json.dumps(found))
 """
 
 
 def timed(words, folder, seconds=600):
-    """Exit code, output and the processor's seconds of a command; code 124 when it takes too long."""
+    """Exit code, output and the processor's seconds of a command; code 124 when it takes more than so many."""
+    limit = lambda: resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=seconds, check=False)
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=6 * seconds, check=False,
+                              preexec_fn=limit)
         code, out = done.returncode, done.stdout + done.stderr
+        code = 124 if code in (-24, -9) else code
     except subprocess.TimeoutExpired:
         code, out = 124, ""
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -168,16 +198,52 @@ def measure_stx(stx, files, sphere, focal, folder, keep, left_out):
             show(back, ".1f"), left.group(1) if left else "-", f"{seconds:.1f}"], missed
 
 
-def measure_opencv(files, folder):
+def judged(found, files):
+    """A peer's cells from {index: (rotation, focal length)}: what failed or "ok", and the largest error of a rotation."""
+    if len(found) < len(files):
+        return f"failed: {len(found)} of {len(files)}", "-"
+    known = os.path.join(os.path.dirname(files[0]), "truth.json")
+    if not os.path.exists(known):
+        return "ok", "-"
+    with open(known, encoding="utf-8") as file:
+        truth = [matrix_of(p["rotation"]) for p in json.load(file)["pictures"]]
+    _, off = turn_between(truth, [found[k][0] for k in range(len(files))])
+    return "ok" if off <= MOST_PEER_TURN else "failed: turned", f"{off:.2f}"
+
+
+def measure_opencv(files, focal, folder):
     code, said, seconds = timed([sys.executable, "-c", CHILD_OPENCV, os.path.join(folder, "cv.png"), *files], folder)
-    status = said.split()[0] if code == 0 and said.split() else str(code)
-    return ["ok" if status == "0" else f"failed ({status})", f"{seconds:.1f}"]
+    if code != 0:
+        return [f"failed ({code})", "-", "-", f"{seconds:.1f}"]
+    found = json.loads(said.strip().splitlines()[-1])
+    if found["status"] != 0:
+        return [f"failed: status {found['status']}", "-", "-", f"{found['seconds']:.1f}"]
+    cameras = {int(k): (np.array(c["rotation"]), c["focal"]) for k, c in found["cameras"].items()}
+    verdict, turn = judged(cameras, files)
+    off = "-"
+    if focal and cameras:
+        off = f"{100 * abs(np.median([c[1] for c in cameras.values()]) / focal - 1):.2f}"
+    return [verdict, turn, off, f"{found['seconds']:.1f}"]
+
+
+def hugin_cameras(pto):
+    """Rotations and focal lengths (pixels) in a project of Hugin's; its longitudes grow to the right."""
+    with open(pto, encoding="utf-8") as file:
+        lines = [line for line in file if line.startswith("i ")]
+    value = lambda line, key: float(re.search(rf" {key}=?(-?[0-9.e+-]+)", line).group(1))
+    width, view = value(lines[0], "w"), value(lines[0], "v")
+    focal = width / 2 / math.tan(math.radians(view / 2))
+    found = {}
+    for k, line in enumerate(lines):
+        yaw, pitch, roll = (math.radians(value(line, key)) for key in ("y", "p", "r"))
+        found[k] = (camera_matrix(-yaw, pitch, -roll), focal)
+    return found
 
 
 def measure_hugin(files, focal, folder):
+    """Verdict, error of rotation, of the focal length, seconds."""
     pto = os.path.join(folder, "h.pto")
     total = 0.0
-    code = 0
     for words in (["pto_gen", "-o", pto, *files], ["cpfind", "--multirow", "-o", pto, pto], ["cpclean", "-o", pto, pto],
                   ["autooptimiser", "-a", "-m", "-l", "-s", "-o", pto, pto], ["checkpto", pto],
                   ["pano_modify", "--canvas=AUTO", "--crop=AUTO", "-o", pto, pto], ["nona", "-m", "TIFF_m", "-o", "h_", pto],
@@ -187,16 +253,14 @@ def measure_hugin(files, focal, folder):
         code, said, seconds = timed(words, folder)
         total += seconds
         if words[0] == "checkpto" and "unconnected" in said.lower():
-            return ["in parts", "-", f"{total:.1f}"]
+            return ["failed: in parts", "-", "-", f"{total:.1f}"]
         if code != 0 and words[0] != "checkpto":
-            return [f"{words[0]} failed", "-", f"{total:.1f}"]
-    off = "-"
-    if focal:
-        with open(pto, encoding="utf-8") as file:
-            line = next(line for line in file if line.startswith("i "))
-        width, view = (float(re.search(rf" {key}([0-9.]+)", line).group(1)) for key in ("w", "v"))
-        off = f"{100 * abs(width / 2 / math.tan(math.radians(view / 2)) / focal - 1):.2f}"
-    return ["ok", off, f"{total:.1f}"]
+            return [f"failed: {words[0]} ({code})", "-", "-", f"{total:.1f}"]
+    found = hugin_cameras(pto)
+    verdict, turn = judged(found, files)
+    if not focal:
+        return [verdict, turn, "-", f"{total:.1f}"]
+    return [verdict, turn, f"{100 * abs(found[0][1] / focal - 1):.2f}", f"{total:.1f}"]
 
 
 def main():
@@ -211,7 +275,7 @@ def main():
     o.stx = os.path.abspath(o.stx)
     head = ["series", "used", "rms, px", "turn, °", "focal, %", "gap, °", "back, dB", "left out, dB", "s"]
     if o.peers:
-        head += ["OpenCV", "s", "Hugin", "focal, %", "s"]
+        head += ["OpenCV", "turn, °", "focal, %", "s", "Hugin", "turn, °", "focal, %", "s"]
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))
     failed = 0
     with tempfile.TemporaryDirectory(prefix="stx-panorama-") as folder:
@@ -221,7 +285,7 @@ def main():
             with tempfile.TemporaryDirectory(dir=folder) as work:
                 cells, missed = measure_stx(o.stx, files, sphere, focal, work, o.keep, o.left_out)
                 if o.peers:
-                    cells += measure_opencv(files, work) + measure_hugin(files, focal, work)
+                    cells += measure_opencv(files, focal, work) + measure_hugin(files, focal, work)
             print("| " + " | ".join([name] + cells) + " |", flush=True)
             for text in missed:
                 failed += 1
