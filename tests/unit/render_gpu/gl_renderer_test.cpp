@@ -2,6 +2,7 @@
 
 #include "lib/packing/packing.hpp"
 #include "lib/render/splat/gl/gl_points.hpp"
+#include "tests/painted_environment.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 
 namespace stx {
@@ -125,6 +126,46 @@ TEST(GlRenderer, LightsWithFixedFunctions) {
     }
     ASSERT_GT(looked, 5000);
     EXPECT_LT(error / looked, 0.03);
+}
+
+TEST(GlRenderer, IsLitByAnEnvironmentAsOnTheCpu) {
+    REQUIRE_GPU();
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 3);
+    const auto map = EnvironmentMap::make(paintedCube(32), Limits());
+    ASSERT_TRUE(map);
+    RenderSettings settings = splatSettings();
+    const Camera camera = bundle.views[0].camera;
+    const auto plain = test::drawOn(Backend::gl, bundle, settings, camera);
+    ASSERT_TRUE(plain) << plain.error().text();
+    settings.lighting.ambient = glm::vec3(0.0f);
+    settings.lighting.shininess = 20;
+    const auto light = EnvironmentLight::make(*map, settings.lighting.shininess, Limits());
+    ASSERT_TRUE(light);
+    settings.lighting.environment = *light;
+    std::vector<Frame> frames;
+    for (const float specular : {0.0f, 0.4f}) {
+        settings.lighting.specular = glm::vec3(specular);
+        auto frame = test::drawOn(Backend::gl, bundle, settings, camera);
+        ASSERT_TRUE(frame) << frame.error().text();
+        const Frame expected = test::drawOnCpu(bundle, settings, camera);
+        // Points are squares here and blended there; what is left are edges.
+        double squares = 0;
+        int looked = 0;
+        for (std::size_t i = 0; i < expected.colour.count(); ++i) {
+            const glm::vec4 a = frame->colour.pixels()[i], b = expected.colour.pixels()[i];
+            if (a.a < 1 || b.a < 1) continue;
+            // The same surface in both.
+            if (glm::distance(frame->albedo.pixels()[i], expected.albedo.pixels()[i]) > 0.02f)
+                continue;
+            squares += glm::dot(glm::vec3(a - b), glm::vec3(a - b)) / 3;
+            ++looked;
+        }
+        ASSERT_GT(looked, 800);
+        EXPECT_LT(std::sqrt(squares / looked), 0.015);  // reached: 0.011
+        frames.push_back(std::move(*frame));
+    }
+    EXPECT_LT(psnr(frames[0].colour, plain->colour), 30.0);
+    EXPECT_LT(psnr(frames[0].colour, frames[1].colour), 35.0);
 }
 
 }  // namespace

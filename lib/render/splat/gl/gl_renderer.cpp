@@ -45,6 +45,7 @@ class GlRenderer final : public Renderer {
     Result<void> makeTargets(glm::ivec2 size);
     void setCamera(const Camera& camera) const;
     void setLights(const Camera& camera) const;
+    void lightPoints(const Camera& camera);
     void drawGroups(bool lit) const;
     void readColours(Image<glm::vec4>& to) const;
 
@@ -53,6 +54,7 @@ class GlRenderer final : public Renderer {
     Limits limits_;
     PointArrays points_;
     PointGroups groups_;
+    std::vector<glm::vec4> litColours_;  ///< of the points, where an environment lights
     std::unique_ptr<Targets> targets_;
 };
 
@@ -146,7 +148,31 @@ void GlRenderer::setLights(const Camera& camera) const {
     }
 }
 
+/// Fixed functions have no light from all around: each point gets the colour that all lights
+/// together give it, as the other backends give it to each pixel.
+void GlRenderer::lightPoints(const Camera& camera) {
+    const Lighting world = lightsInWorld(settings_.lighting, camera.worldFromCamera());
+    litColours_ = points_.coloursF;
+    parallelForBlocks(
+        0, static_cast<std::int64_t>(litColours_.size()), 4096,
+        [&](std::int64_t begin, std::int64_t end) {
+            for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+                const glm::vec3 normal = points_.normals[i];
+                if (normal == glm::vec3(0)) continue;
+                const glm::dvec3 place = points_.centre + glm::dvec3(points_.positions[i]);
+                const glm::dvec3 toEye =
+                    camera.orthographic ? -camera.forward() : camera.position - place;
+                litColours_[i] = glm::vec4(
+                    shadePhong(world, glm::vec3(litColours_[i]), glm::vec3(place),
+                               glm::normalize(normal), glm::vec3(glm::normalize(toEye)), true),
+                    1.0f);
+            }
+        });
+}
+
 void GlRenderer::drawGroups(bool lit) const {
+    const bool lightsOfPoints = lit && settings_.lighting.environment;
+    lit = lit && !lightsOfPoints;
     const float nothing[4] = {};
     const float farthest = 1.0f;
     glClearNamedFramebufferfv(targets_->framebuffer.get(), GL_COLOR, 0, nothing);
@@ -163,7 +189,8 @@ void GlRenderer::drawGroups(bool lit) const {
     glVertexPointer(3, GL_FLOAT, 0, points_.positions.data());
     glEnableClientState(GL_COLOR_ARRAY);
     if (points_.inFloats())
-        glColorPointer(4, GL_FLOAT, 0, points_.coloursF.data());
+        glColorPointer(4, GL_FLOAT, 0,
+                       lightsOfPoints ? litColours_.data() : points_.coloursF.data());
     else
         glColorPointer(4, GL_UNSIGNED_BYTE, 0, points_.colours.data());
     if (lit) {
@@ -214,7 +241,10 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
     groupPoints(points_, settings_, camera, static_cast<int>(sizes[1]), groups_);
     if (!groups_.groups.empty()) {
         setCamera(camera);
-        if (lit) setLights(camera);
+        if (lit && settings_.lighting.environment)
+            lightPoints(camera);
+        else if (lit)
+            setLights(camera);
         drawGroups(lit);
     }
     frame.milliseconds =
@@ -249,16 +279,14 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
 
 Result<std::unique_ptr<Renderer>> makeGlRenderer(const PageSet& set, const RenderSettings& settings,
                                                  int device, Job& job) {
-    if (settings.lighting.environment)
-        return fail(ErrorCode::unsupported,
-                    "the gl backend has no light of an environment; use --backend gpu or cpu");
     if (settings.lighting.lights.size() > kMaxLights)
         return fail(ErrorCode::unsupported,
                     "{} lights; the gl backend has {}, use --backend gpu or cpu",
                     settings.lighting.lights.size(), kMaxLights);
     std::uint64_t points = 0;
     for (const Page& page : set.pages()) points += page.depth->count();
-    STX_CHECK(job.limits.checkAllocation(points, 64, "the vertex arrays of the gl backend"));
+    STX_CHECK(job.limits.checkAllocation(points, settings.lighting.environment ? 80 : 64,
+                                         "the vertex arrays of the gl backend"));
     STX_TRY(auto context, EglContext::create(device, EglContext::Profile::compatibility));
     STX_CHECK(context->requireModern("the gl backend", "--backend gpu or cpu"));
     return std::make_unique<GlRenderer>(std::move(context), set, settings, job.limits);
