@@ -111,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(
     Sets, FaultySources,
     testing::Values(Faults{"statue", "noise0.5", 40.4}, Faults{"statue", "noise2", 34.95},
                     Faults{"statue", "missing3", 45.51}, Faults{"statue", "edges1", 45.2},
-                    Faults{"statue", "light", 45.2}, Faults{"oaktree", "edges1", 26.75},
+                    Faults{"statue", "light", 45.5}, Faults{"oaktree", "edges1", 26.75},
                     Faults{"oaktree", "noise0.5", 26.3}, Faults{"oaktree", "noise2", 24.6}),
     [](const auto& faults) {
         std::string name = std::string(faults.param.set) + faults.param.kind;
