@@ -25,12 +25,12 @@ ReferenceView afterSteps(int steps, int x0, int x1, float depth = 2.0f) {
     return view;
 }
 
-struct Film {
+struct WalkedFilm {
     int frames = 0;
     std::function<ReferenceView(int)> frame;
 };
 
-Result<std::vector<BackgroundModel>> remembered(const Film& film, Job& job,
+Result<std::vector<BackgroundModel>> remembered(const WalkedFilm& film, Job& job,
                                                 const TemporalBackgroundSettings& settings = {}) {
     std::vector<double> times;
     for (int i = 0; i < film.frames; ++i) times.push_back(i * 0.04);
@@ -68,10 +68,10 @@ int rightWall(const ReferenceView& view) {
 TEST(MovingBackground, WhatMovesIsCarvedAway) {
     // It stays where it is in the picture, so it moves with the camera, and in one frame of ten it
     // is elsewhere.
-    const Film film{40, [](int i) {
-                        const int from = 4 + (i % 20);
-                        return afterSteps(i / 2, from, from + 12);
-                    }};
+    const WalkedFilm film{40, [](int i) {
+                              const int from = 4 + (i % 20);
+                              return afterSteps(i / 2, from, from + 12);
+                          }};
     Job job;
     const auto models = remembered(film, job);
     ASSERT_TRUE(models) << models.error().text();
@@ -88,8 +88,8 @@ TEST(MovingBackground, WhatMovesIsCarvedAway) {
 TEST(MovingBackground, WhatStandsBeforeTheWallStays) {
     // A board at half the distance goes by twice as fast; what it hides is seen from elsewhere, but
     // is not what is there.
-    const Film film{24,
-                    [](int i) { return afterSteps(i / 2, 40 - 2 * (i / 2), 48 - 2 * (i / 2)); }};
+    const WalkedFilm film{
+        24, [](int i) { return afterSteps(i / 2, 40 - 2 * (i / 2), 48 - 2 * (i / 2)); }};
     Job job;
     const auto models = remembered(film, job);
     ASSERT_TRUE(models) << models.error().text();
@@ -104,10 +104,10 @@ TEST(MovingBackground, WhatStandsBeforeTheWallStays) {
 }
 
 TEST(MovingBackground, SameInAnyMemoryAndOnAnyThreads) {
-    const Film film{40, [](int i) {
-                        const int from = 4 + (i % 20);
-                        return afterSteps(2 * i, from, from + 12);
-                    }};
+    const WalkedFilm film{40, [](int i) {
+                              const int from = 4 + (i % 20);
+                              return afterSteps(2 * i, from, from + 12);
+                          }};
     std::vector<BackgroundModel> first;
     for (const int threads : {1, 3}) {
         for (const std::uint64_t memory : {std::uint64_t{0}, std::uint64_t{600'000}}) {
@@ -132,11 +132,11 @@ TEST(MovingBackground, SameInAnyMemoryAndOnAnyThreads) {
     EXPECT_EQ(remembered(film, job, settings)->size(), 1u);
     settings.maxMemoryBytes = 1000;
     EXPECT_FALSE(remembered(film, job, settings));
-    const Film orthographic{4, [](int i) {
-                                ReferenceView view = afterSteps(i, 0, 0);
-                                view.camera.orthographic = true;
-                                return view;
-                            }};
+    const WalkedFilm orthographic{4, [](int i) {
+                                      ReferenceView view = afterSteps(i, 0, 0);
+                                      view.camera.orthographic = true;
+                                      return view;
+                                  }};
     const auto refused = remembered(orthographic, job);
     ASSERT_FALSE(refused);
     EXPECT_EQ(
