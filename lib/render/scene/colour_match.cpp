@@ -19,8 +19,8 @@ constexpr double kBiweight = 4.685;
 constexpr std::array<double, 8> kLeastBand = {0.2, 0.14, 0.1, 0.07, 0.04, 0, 0, 0};
 /// A median of absolute values is this share of a standard deviation.
 constexpr double kMedianOfNormal = 0.6745;
-/// What rounding to 8 bits leaves, and the least that is a difference.
-constexpr double kHalfStep = 0.5 / 255, kStep = 1.0 / 255;
+/// What rounding to 8 bits leaves.
+constexpr double kHalfStep = 0.5 / 255;
 constexpr double kMostGain = 2.0, kMostOffset = 0.25;
 /// Means of colours are off by this much however many points there are: lights have shapes.
 constexpr double kMiddleDoubt = 0.001;
@@ -28,8 +28,12 @@ constexpr double kMiddleDoubt = 0.001;
 constexpr double kLooseDoubt = 0.25;
 /// Offsets are about so large; where colours hardly spread, what differs is taken for a gain.
 constexpr double kUsualOffset = 0.01;
-/// A difference is one when it is as many times what pairs contradict each other by.
-constexpr double kClear = 2.0;
+/// A difference is one when it is as many times what pairs contradict each other by, and at least
+/// this large. Views of one light that are a few pixels wide come to 4.4 steps of 8 bits and to
+/// three times; views with a light of their own to 17 and more, and to ten times.
+constexpr double kClear = 4.0, kVisible = 5.0 / 255;
+/// The least where no pair closes a ring of others, so that nothing can contradict.
+constexpr double kVisibleAlone = 10.0 / 255;
 /// Weight of "nothing differs", beside which lines weigh thousands.
 constexpr double kNothingDiffers = 1e-2;
 constexpr int kSweeps = 2000;
@@ -193,20 +197,27 @@ Channel solve(std::size_t views, const std::vector<Line>& lines) {
 
     // At two typical colours of each pair: what a map changes, and what is left between the views.
     double most = 0, contradiction = 0;
-    std::size_t count = 0;
+    std::ptrdiff_t used = 0;
+    std::vector<bool> joined(views, false);
     for (const Line& line : lines) {
         if (!(line.middleWeight > 0)) continue;
+        ++used;
+        joined[line.a] = joined[line.b] = true;
         for (const double side : {-1.0, 1.0}) {
             const double a = line.meanA + side * line.spread, b = line.at(a);
             const double mappedA = out.gain[line.a] * a + out.offset[line.a];
             const double mappedB = out.gain[line.b] * b + out.offset[line.b];
             most = std::max({most, std::abs(mappedA - a), std::abs(mappedB - b)});
-            contradiction += (mappedA - mappedB) * (mappedA - mappedB);
-            ++count;
+            contradiction += 0.5 * (mappedA - mappedB) * (mappedA - mappedB);
         }
     }
-    if (count > 0) contradiction = std::sqrt(contradiction / static_cast<double>(count));
-    out.clear = most > std::max(kStep, kClear * contradiction);
+    // As many pairs join the views of a group as it has others than the first; the rest can
+    // contradict.
+    std::ptrdiff_t closing = used;
+    for (std::size_t v = 0; v < views; ++v) closing -= joined[v] && group[v] != v ? 1 : 0;
+    if (closing > 0) contradiction = std::sqrt(contradiction / static_cast<double>(closing));
+    out.clear =
+        closing > 0 ? most > std::max(kVisible, kClear * contradiction) : most > kVisibleAlone;
     return out;
 }
 
