@@ -1,5 +1,3 @@
-#include <malloc.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -308,14 +306,6 @@ Result<void> prepareAround(RenderOptions& o, const Command& command, Program& pr
                     "--size is {}x{}; an equirectangular picture is twice as wide as high", size.x,
                     size.y);
     return {};
-}
-
-/// From now on images that are freed leave their memory to those of the next frame: the system
-/// clears all that it hands out, which took a seventh of the time of a sequence.
-void keepFreedMemory() {
-    constexpr int kLargest = 32 << 20;  // glibc takes no more
-    mallopt(M_MMAP_THRESHOLD, kLargest);
-    mallopt(M_TRIM_THRESHOLD, 8 * kLargest);
 }
 
 Result<int> render(const RenderOptions& given, const Command& command, Program& program) {

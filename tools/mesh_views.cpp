@@ -163,6 +163,7 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
         }
         if (selection) *selection = std::move(*views.selection);
     }
+    if (views.cameras.size() > 1) keepFreedMemory();
     STX_TRY(auto bundle, captureViews(mesh, views.cameras, settings, program.job));
     noteDepthLoss(bundle, program.job);
     return bundle;

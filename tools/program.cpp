@@ -1,5 +1,6 @@
 #include "tools/program.hpp"
 
+#include <malloc.h>
 #include <unistd.h>
 #include <cerrno>
 #include <charconv>
@@ -22,6 +23,12 @@ std::string jsonText(const nlohmann::ordered_json& json) {
 }
 
 }  // namespace
+
+void keepFreedMemory() {
+    constexpr int kLargest = 32 << 20;  // glibc takes no more
+    mallopt(M_MMAP_THRESHOLD, kLargest);
+    mallopt(M_TRIM_THRESHOLD, 8 * kLargest);
+}
 
 void Program::print(std::string_view text) {
     write(printableLines(text));
