@@ -119,9 +119,9 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count,
     std::vector<std::vector<SurfaceSample>> perView(bundle.views.size());
     parallelFor(0, static_cast<std::int64_t>(perView.size()), [&](std::int64_t i) {
         const ReferenceView& v = bundle.views[i];
-        DepthSurface own;
-        if (surfaces.empty()) own = depthSurface(v, {});
-        const DepthSurface& surface = surfaces.empty() ? own : surfaces[i];
+        DepthSurface made;
+        if (surfaces.empty()) made = depthSurface(v, {});
+        const DepthSurface& surface = surfaces.empty() ? made : surfaces[i];
         std::int64_t seen = i * 7919 % stride;
         for (int y = 0; y < v.depth.height(); ++y) {
             for (int x = 0; x < v.depth.width(); ++x) {
@@ -133,8 +133,7 @@ std::vector<SurfaceSample> sampleBundle(const Bundle& bundle, int count,
                 double density = 0;  // samples of all views per unit of area
                 for (std::size_t k = 0; k < views.size(); ++k) {
                     const Sighting by = sightingOf(views[k], s);
-                    const double own = static_cast<std::size_t>(i) == k ? 1.0 : 0.0;
-                    if (by.visible || own > 0)
+                    if (by.visible || static_cast<std::size_t>(i) == k)
                         density += std::max(by.cosine, 0.05) *
                                    (by.visible ? by.density * by.density
                                                : 1 / (v.camera.sampleSpacing(v.depth.at(x, y)).x *
