@@ -6,8 +6,9 @@
 
 #include "lib/model/reference_view.hpp"
 
-/// A room whose every pixel is known, filmed by a camera that walks through it: boxes stand in it,
-/// a sphere crosses it, and another one stands still for most of the time before it leaves.
+/// A room whose every pixel is known, filmed by a camera that walks through it. It has boxes in it,
+/// a sphere that crosses it, and another one that stands still for most of the time before it
+/// leaves.
 namespace walked {
 
 inline constexpr int kWidth = 320, kHeight = 240, kFrames = 36;

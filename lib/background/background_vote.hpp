@@ -9,6 +9,12 @@ namespace stx::temporal {
 /// Samples beside depth edges count this share of others; found by trial.
 inline constexpr double kWeakShare = 0.25;
 
+/// Whether a scene is all around, not an object in empty space, as so many points in so many pixels
+/// tell: a sensor misses a quarter of a room.
+[[nodiscard]] inline bool fillsFrame(std::int64_t points, double pixels) {
+    return static_cast<double>(points) > 0.5 * pixels;
+}
+
 /// Inverse distances of what a pixel showed before its background, 0 = nothing.
 using InFront = Image<glm::vec2>;
 

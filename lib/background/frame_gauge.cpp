@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "lib/base/median.hpp"
 #include "lib/model/light_ratio.hpp"
 
 namespace stx::temporal {
@@ -128,12 +129,7 @@ FrameGauge Gauge::measure(const ReferenceView& frame) {
             p.count = 1;
         }
     }
-    if (!differences.empty()) {
-        const auto middle =
-            differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-        std::nth_element(differences.begin(), middle, differences.end());
-        gauge.noise = *middle;
-    }
+    gauge.noise = medianOf(std::move(differences));
     gains_ += glm::dvec3(gauge.gain);
     noises_ += gauge.noise;
     ++frames_;

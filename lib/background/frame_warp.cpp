@@ -7,6 +7,7 @@
 
 #include "lib/background/mixed_pixels.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/catmull_rom.hpp"
 
 namespace stx::temporal {
 namespace {
@@ -25,13 +26,6 @@ WarpFrame startFrame(const ReferenceView& view, const Camera& camera) {
     frame.inverse = inverseOf(view.depth);
     frame.step = static_cast<float>(view.depthBits == 32 ? 0.0 : view.depthCode().step());
     return frame;
-}
-
-/// Weights of four values at a place between the middle ones (Catmull-Rom).
-std::array<float, 4> weightsAt(float t) {
-    const float t2 = t * t, t3 = t2 * t;
-    return {0.5f * (2 * t2 - t3 - t), 0.5f * (3 * t3 - 5 * t2 + 2), 0.5f * (4 * t2 - 3 * t3 + t),
-            0.5f * (t3 - t2)};
 }
 
 }  // namespace
@@ -129,7 +123,7 @@ glm::vec3 colourAt(const WarpFrame& frame, const Spot& spot, float x, float y) {
         const glm::vec3 upper = glm::mix(r[0], r[1], u), lower = glm::mix(r[w], r[w + 1], u);
         return glm::mix(upper, lower, v);
     }
-    const auto across = weightsAt(u), down = weightsAt(v);
+    const auto across = catmullRomWeights(u), down = catmullRomWeights(v);
     glm::vec3 sum(0.0f), least(1e30f), most(-1e30f);
     for (int j = 0; j < 4; ++j) {
         const glm::vec3* r = &colour.at(ix - 1, iy - 1 + j);

@@ -30,8 +30,8 @@ struct WarpFrame {
 [[nodiscard]] WarpFrame carveFrame(const ReferenceView& view, const Camera& camera,
                                    bool emptyIsFar);
 
-/// Points of one perspective camera in the pixels of another. Distances are planar, in the camera
-/// that they are told of.
+/// Points of one perspective camera in the pixels of another. Distances are planar, each
+/// from the camera that is named with it.
 class CameraPair {
   public:
     CameraPair(const Camera& from, const Camera& to);

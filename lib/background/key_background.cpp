@@ -7,6 +7,7 @@
 
 #include "lib/background/background_vote.hpp"
 #include "lib/background/depth_layers.hpp"
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/model/light_ratio.hpp"
@@ -74,6 +75,10 @@ struct KeyBackground::Impl {
         float seconds;
     };
     [[nodiscard]] Guesses guess(const WarpFrame& frame) const;
+    /// Calls `visit(pixels, pixel, x, y, ray)` for the rays of all pixels in the axes of `pair`'s
+    /// other camera; rows at the same time.
+    template <class Visit>
+    void forEachRay(const CameraPair& pair, const Visit& visit);
     template <class Sample>
     void follow(PixelLayers<Sample>& layers, const Look& look, const CameraPair::Ray& ray,
                 float guess, std::uint32_t random, float& before) const;
@@ -129,12 +134,7 @@ FrameGauge KeyBackground::measure(const ReferenceView& view, const Camera& camer
     std::vector<float> differences;
     for (const LitPair& p : pairs)
         differences.push_back(255 * std::abs(brightness(p.b / gauge.gain) - brightness(p.a)));
-    if (!differences.empty()) {
-        const auto middle =
-            differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-        std::nth_element(differences.begin(), middle, differences.end());
-        gauge.noise = *middle;
-    }
+    gauge.noise = medianOf(std::move(differences));
     return gauge;
 }
 
@@ -172,6 +172,21 @@ KeyBackground::Impl::Guesses KeyBackground::Impl::guess(const WarpFrame& frame) 
         }
     }
     return g;
+}
+
+template <class Visit>
+void KeyBackground::Impl::forEachRay(const CameraPair& pair, const Visit& visit) {
+    const int w = width();
+    std::visit(
+        [&](auto& all) {
+            parallelForBlocks(0, height(), kRowsAtOnce, [&](std::int64_t from, std::int64_t to) {
+                for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y)
+                    for (int x = 0; x < w; ++x)
+                        visit(all, static_cast<std::size_t>(y) * w + x, x, y,
+                              pair.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+            });
+        },
+        pixels);
 }
 
 /// Follows a ray from a guess to what the frame sees on it, and takes that in; `before`: the
@@ -217,29 +232,15 @@ void KeyBackground::see(const WarpFrame& frame, const FrameGauge& light, const D
     const Impl::Look look{
         frame,  pair, noise, light.gain, static_cast<float>(s.key.camera.fx / frame.camera.fx),
         seconds};
-    const int w = s.width(), h = s.height();
-    std::visit(
-        [&](auto& all) {
-            parallelForBlocks(0, h, kRowsAtOnce, [&](std::int64_t from, std::int64_t to) {
-                for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-                    for (int x = 0; x < w; ++x) {
-                        const float near = guesses.near(x, y);
-                        if (!(near > 0)) continue;
-                        const auto ray =
-                            pair.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-                        if (!(ray.slope > kLeastSlope)) continue;
-                        const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
-                        const std::uint32_t random = randomOf(pixel, number);
-                        const float far = guesses.farthest.at(x, y);
-                        float before = 0;
-                        s.follow(all[pixel], look, ray, near, random, before);
-                        if (far > near * (1 + kTwoGuesses))
-                            s.follow(all[pixel], look, ray, far, random, before);
-                    }
-                }
-            });
-        },
-        s.pixels);
+    s.forEachRay(pair, [&](auto& all, std::size_t pixel, int x, int y, const auto& ray) {
+        const float near = guesses.near(x, y);
+        if (!(near > 0) || !(ray.slope > kLeastSlope)) return;
+        const std::uint32_t random = randomOf(pixel, number);
+        const float far = guesses.farthest.at(x, y);
+        float before = 0;
+        s.follow(all[pixel], look, ray, near, random, before);
+        if (far > near * (1 + kTwoGuesses)) s.follow(all[pixel], look, ray, far, random, before);
+    });
     s.gains += glm::dvec3(light.gain);
     s.noises += light.noise;
     ++s.seen;
@@ -248,29 +249,16 @@ void KeyBackground::see(const WarpFrame& frame, const FrameGauge& light, const D
 void KeyBackground::carve(const WarpFrame& frame, const DepthNoise& noise) {
     Impl& s = *impl_;
     const CameraPair pair(s.key.camera, frame.camera);
-    const int w = s.width(), h = s.height();
-    std::visit(
-        [&](auto& all) {
-            parallelForBlocks(0, h, kRowsAtOnce, [&](std::int64_t from, std::int64_t to) {
-                for (int y = static_cast<int>(from); y < static_cast<int>(to); ++y) {
-                    for (int x = 0; x < w; ++x) {
-                        const std::size_t pixel = static_cast<std::size_t>(y) * w + x;
-                        const auto ray =
-                            pair.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-                        for (std::size_t k = 0; k < kLayers; ++k) {
-                            const auto& layer = all[pixel].layers[k];
-                            std::uint16_t& misses = s.misses[pixel][k];
-                            if (layer.count() == 0 || misses == 0xffff) continue;
-                            const glm::vec3 at = pair.at(ray, 1 / layer.q);
-                            if (!(at.z > 0)) continue;
-                            misses +=
-                                clearView(frame, at, kThrough * noise.tolerance(at.z, frame.step));
-                        }
-                    }
-                }
-            });
-        },
-        s.pixels);
+    s.forEachRay(pair, [&](auto& all, std::size_t pixel, int, int, const auto& ray) {
+        for (std::size_t k = 0; k < kLayers; ++k) {
+            const auto& layer = all[pixel].layers[k];
+            std::uint16_t& misses = s.misses[pixel][k];
+            if (layer.count() == 0 || misses == 0xffff) continue;
+            const glm::vec3 at = pair.at(ray, 1 / layer.q);
+            if (!(at.z > 0)) continue;
+            misses += clearView(frame, at, kThrough * noise.tolerance(at.z, frame.step));
+        }
+    });
 }
 
 template <class Sample>

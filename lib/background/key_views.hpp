@@ -14,7 +14,7 @@ struct Glimpse {
     Camera camera;
     Image<float> depth;  ///< of pixels spread evenly over the picture
 
-    /// The pixel position that a place of the grid stands for.
+    /// The pixel position of a place in the grid.
     [[nodiscard]] glm::dvec2 pixelOf(int x, int y) const {
         return {(x + 0.5) * camera.width / depth.width(),
                 (y + 0.5) * camera.height / depth.height()};

@@ -7,7 +7,7 @@
 
 namespace stx::temporal {
 
-/// Inverse distances; 0 where there is no point.
+/// Inverse distances; 0 of pixels without a point.
 [[nodiscard]] Image<float> inverseOf(const Image<float>& depth);
 
 /// Of the rows [from, to) of a frame with these inverse distances: 1 for pixels within two pixels

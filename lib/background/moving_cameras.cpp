@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/background/background_vote.hpp"
 #include "lib/background/key_background.hpp"
 #include "lib/background/key_views.hpp"
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/registration/refine_poses.hpp"
 
@@ -19,9 +21,6 @@ constexpr double kInexact = 0.5;
 constexpr double kAstray = 0.05;
 /// Frames beside the key views that tell whether poses are exact.
 constexpr std::size_t kProbes = 4;
-/// A scene is all around, not an object in empty space, when its points are this share of the
-/// pixels; as in temporal.cpp.
-constexpr double kFilled = 0.5;
 
 /// A camera's picture of one moment.
 struct Moment {
@@ -144,11 +143,9 @@ Result<void> MovingCameras::registerKeys() {
     const Glimpse& first = glimpses_[static_cast<std::size_t>(chosen_[0])];
     for (const float d : first.depth.pixels())
         if (hasPoint(d)) distances.push_back(d);
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
+    middle_ = medianOf(std::move(distances), 1.0f);
     STX_TRY(const PoseRefinement refined, refinePoses(probe, {}, job_));
-    const double pixels = (refined.maxTurn + refined.maxShift / *middle) * first.camera.fx;
-    middle_ = *middle;
+    const double pixels = (refined.maxTurn + refined.maxShift / middle_) * first.camera.fx;
     registers_ = pixels > kInexact && pixels < kAstray * first.camera.width &&
                  refined.after.relative <= refined.before.relative;
     if (!registers_) return {};
@@ -216,7 +213,7 @@ Result<void> MovingCameras::see(std::vector<KeyBackground>& keys, std::size_t fi
 }
 
 Result<void> MovingCameras::carve(std::vector<KeyBackground>& keys, const DepthNoise& noise) {
-    const bool emptyIsFar = static_cast<double>(points_) <= kFilled * static_cast<double>(places_);
+    const bool emptyIsFar = !fillsFrame(points_, static_cast<double>(places_));
     for (std::size_t frame = 0; frame < times_.size(); ++frame) {
         STX_TRY(const auto views, pictures(frame));
         for (std::size_t k = 0; k < views.size(); ++k) {

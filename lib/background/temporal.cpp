@@ -21,9 +21,6 @@ using temporal::Worth;
 /// Nothing moves where brightness, averaged over 3x3 pixels, changed by less than this many times
 /// what it does in the middle of the picture's pixels, and these steps.
 constexpr float kQuietTimes = 2, kQuietSteps = 1.5f;
-/// A scene is all around, not an object in the empty space, when its points are this share of the
-/// pixels: a sensor misses a quarter of a room.
-constexpr double kFilled = 0.5;
 /// Rows that are worked on together.
 constexpr std::int64_t kRows = 8;
 /// Alpha of a pixel that its surface covers in full.
@@ -269,7 +266,7 @@ Result<void> TemporalBackground::endPass(Job& job) {
     vote.frames = s.frames;
     vote.support = s.settings.support;
     const double places = static_cast<double>(s.width()) * s.height() * s.frames;
-    vote.fillsFrame = static_cast<double>(s.points) > kFilled * places;
+    vote.fillsFrame = temporal::fillsFrame(s.points, places);
     vote.gain = s.gauge.meanGain();
     vote.noise = s.gauge.meanNoise();
     vote.firstTime = s.firstTime;

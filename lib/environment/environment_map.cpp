@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/catmull_rom.hpp"
 #include "lib/model/srgb8.hpp"
 
 namespace stx {
@@ -100,16 +101,8 @@ struct Level {
         const float y = v * static_cast<float>(height) + (kBorder - 0.5f);
         const int x0 = std::clamp(static_cast<int>(x), 1, width + 2 * kBorder - 3);
         const int y0 = std::clamp(static_cast<int>(y), 1, height + 2 * kBorder - 3);
-        const auto weights = [](float t, float(&w)[4]) {
-            const float t2 = t * t, t3 = t2 * t;
-            w[0] = -0.5f * t3 + t2 - 0.5f * t;
-            w[1] = 1.5f * t3 - 2.5f * t2 + 1.0f;
-            w[2] = -1.5f * t3 + 2.0f * t2 + 0.5f * t;
-            w[3] = 0.5f * t3 - 0.5f * t2;
-        };
-        float wx[4], wy[4];
-        weights(x - static_cast<float>(x0), wx);
-        weights(y - static_cast<float>(y0), wy);
+        const auto wx = catmullRomWeights(x - static_cast<float>(x0)),
+                   wy = catmullRomWeights(y - static_cast<float>(y0));
         glm::vec4 sum(0.0f), low(INFINITY), high(-INFINITY);
         for (int j = 0; j < 4; ++j) {
             for (int i = 0; i < 4; ++i) {

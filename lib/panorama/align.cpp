@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "lib/base/counted.hpp"
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/panorama/order.hpp"
 #include "lib/panorama/panorama.hpp"
@@ -33,13 +34,6 @@ struct Series {
     TurnModel model;
     AdjustSettings adjusting;
 };
-
-double medianOf(std::vector<double> values, double otherwise) {
-    if (values.empty()) return otherwise;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 /// Fields of view of 21 to 110 degrees across the diagonal.
 std::vector<double> focalsToTry(double hint) {
@@ -298,7 +292,7 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
     std::vector<double> hints;
     for (int k = 0; k < count; ++k)
         if (const double hint = source.focalHint(k); hint > 0) hints.push_back(hint);
-    double hint = medianOf(hints, 0);
+    double hint = medianOf(hints);
     if (given) hint = s.copies[0].extent().x / std::tan(0.5 * settings.fieldOfView);
     STX_TRY(auto search, searchPairs(s.copies, s.features,
                                      given ? std::vector<double>{hint} : focalsToTry(hint), job));

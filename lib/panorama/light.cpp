@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/panorama/footprints.hpp"
 #include "lib/panorama/small_solver.hpp"
@@ -10,12 +11,6 @@ namespace {
 
 /// Light between these is neither noise nor clipped (linear, before gains).
 constexpr float kDarkest = 0.003f, kLightest = 0.8f;
-
-float medianOf(std::vector<float>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 bool boxesMeet(const Footprint& a, const Footprint& b, int gridWidth) {
     if (a.box.y >= b.box.y + b.box.height || b.box.y >= a.box.y + a.box.height) return false;
@@ -178,7 +173,8 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
             });
             if (std::min({logs[0].size(), logs[1].size(), logs[2].size()}) < 30) continue;
             Ratio ratio{a, b, {}, std::sqrt(static_cast<double>(logs[1].size()))};
-            for (int c = 0; c < 3; ++c) ratio.log[c] = medianOf(logs[static_cast<std::size_t>(c)]);
+            for (int c = 0; c < 3; ++c)
+                ratio.log[c] = medianOf(std::move(logs[static_cast<std::size_t>(c)]));
             rows[a].push_back(ratio);
         }
     });

@@ -2,18 +2,10 @@
 #include <cmath>
 
 #include "lib/environment/environment.hpp"
+#include "lib/geometry/catmull_rom.hpp"
 #include "lib/panorama/panorama.hpp"
 
 namespace stx {
-namespace {
-
-/// Catmull-Rom's weights of four neighbours, `t` of the way from the second to the third.
-std::array<float, 4> cubicWeights(float t) {
-    return {0.5f * t * (t * (2 - t) - 1), 0.5f * (t * t * (3 * t - 5) + 2),
-            0.5f * t * (t * (4 - 3 * t) + 1), 0.5f * t * t * (t - 1)};
-}
-
-}  // namespace
 
 glm::dvec3 PanoramaImage::direction(glm::dvec2 position, int width) {
     return latlongDirection(position * glm::dvec2(1.0 / width, 2.0 / width));
@@ -26,8 +18,8 @@ glm::dvec2 PanoramaImage::position(glm::dvec3 direction, int width) {
 glm::vec4 PanoramaImage::sample(glm::dvec3 direction) const {
     const glm::dvec2 p = position(direction, width()) - 0.5;
     const int x0 = static_cast<int>(std::floor(p.x)), y0 = static_cast<int>(std::floor(p.y));
-    const auto wx = cubicWeights(static_cast<float>(p.x - x0));
-    const auto wy = cubicWeights(static_cast<float>(p.y - y0));
+    const auto wx = catmullRomWeights(static_cast<float>(p.x - x0));
+    const auto wy = catmullRomWeights(static_cast<float>(p.y - y0));
     glm::vec4 sum(0);
     for (int j = 0; j < 4; ++j) {
         int y = y0 - 1 + j;

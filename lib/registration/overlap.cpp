@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::registration {
@@ -40,13 +41,6 @@ int lookUp(const ReferenceView& from, const ReferenceView& to, int perAxis, doub
         }
     }
     return points;
-}
-
-double median(std::vector<double>& values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 }  // namespace
@@ -100,12 +94,12 @@ DepthDisagreement disagreement(const Bundle& bundle, const std::vector<Pair>& pa
         lookUp(bundle.views[static_cast<std::size_t>(pair.from)],
                bundle.views[static_cast<std::size_t>(pair.to)], kMeasured,
                settings.overlapTolerance, [&](double d) { differences.push_back(std::abs(d)); });
-        medians[static_cast<std::size_t>(i)] = median(differences);
+        medians[static_cast<std::size_t>(i)] = medianOf(std::move(differences));
     });
     DepthDisagreement result;
     result.pairs = static_cast<int>(pairs.size());
     for (const Pair& pair : pairs) result.overlap += pair.overlap / result.pairs;
-    result.relative = median(medians);
+    result.relative = medianOf(std::move(medians));
     return result;
 }
 

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <span>
 
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/registration/overlap.hpp"
 #include "lib/registration/pose_system.hpp"
@@ -135,13 +136,6 @@ std::vector<PointResiduals> compare(const Bundle& bundle, const std::vector<Pyra
         }
     }
     return all;
-}
-
-double medianOf(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 /// Adds one kind of difference to a pair's equations, weighed by its robust spread.

@@ -7,8 +7,8 @@ Series that are cut out of known spheres (panorama_series.py) tell the error of 
 all were turned as one), focal length, and what comes back of the original (PSNR, after a gain). Real series
 tell residuals and, where EXIF has it, how far the focal length is from it. --left-out: each picture drawn again
 out of the others. Seconds are the processor's, of all its cores together. With --peers, OpenCV's
-Stitcher and Hugin's command line (pto_gen, cpfind, cpclean, autooptimiser, nona, enblend) run on the same; what
-they left out, and their rotations where they are known, are told: a peer fails where it leaves out a picture or
+Stitcher and Hugin's command line (pto_gen, cpfind, cpclean, autooptimiser, nona, enblend) run on the same. The table
+gives what they left out, and their rotations where they are known: a peer fails where it leaves out a picture or
 a rotation is off by more than a degree.
 Needs python3-opencv; the peers need hugin-tools and enblend. Exit code 1 when a figure misses what is promised.
 """

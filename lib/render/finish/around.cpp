@@ -7,6 +7,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/capture/capture.hpp"
+#include "lib/geometry/catmull_rom.hpp"
 #include "lib/render/frame_picture.hpp"
 
 namespace stx {
@@ -15,28 +16,19 @@ namespace {
 /// Neighbouring depths that differ by no more than this share are one surface.
 constexpr float kOneSurface = 0.05f;
 
-void cubicWeights(float t, float (&w)[4]) {
-    const float t2 = t * t, t3 = t2 * t;
-    w[0] = -0.5f * t3 + t2 - 0.5f * t;
-    w[1] = 1.5f * t3 - 2.5f * t2 + 1.0f;
-    w[2] = -1.5f * t3 + 2.0f * t2 + 0.5f * t;
-    w[3] = 0.5f * t3 - 0.5f * t2;
-}
-
 /// Catmull-Rom of premultiplied colours, held to what the four pixels around span.
 glm::vec4 sharp(const Image<glm::vec4>& image, float x, float y) {
     const int x0 = static_cast<int>(std::floor(x - 0.5f)),
               y0 = static_cast<int>(std::floor(y - 0.5f));
-    float wx[4], wy[4];
-    cubicWeights(x - 0.5f - static_cast<float>(x0), wx);
-    cubicWeights(y - 0.5f - static_cast<float>(y0), wy);
+    const auto wx = catmullRomWeights(x - 0.5f - static_cast<float>(x0)),
+               wy = catmullRomWeights(y - 0.5f - static_cast<float>(y0));
     glm::vec4 sum(0.0f), low(INFINITY), high(-INFINITY);
     for (int j = 0; j < 4; ++j) {
         const auto row = image.row(std::clamp(y0 - 1 + j, 0, image.height() - 1));
         for (int i = 0; i < 4; ++i) {
             const glm::vec4 c =
                 row[static_cast<std::size_t>(std::clamp(x0 - 1 + i, 0, image.width() - 1))];
-            sum += c * (wx[i] * wy[j]);
+            sum += c * (wx[static_cast<std::size_t>(i)] * wy[static_cast<std::size_t>(j)]);
             if ((i == 1 || i == 2) && (j == 1 || j == 2)) {
                 low = glm::min(low, c);
                 high = glm::max(high, c);

@@ -39,7 +39,8 @@ constexpr double kNothingDiffers = 1e-2;
 constexpr int kSweeps = 2000;
 constexpr double kSettled = 1e-8;
 
-double medianOf(std::vector<double>& values) {
+/// The middle one, or the mean of two: two views meet halfway.
+double middleOf(std::vector<double>& values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     if (values.size() % 2 != 0) return *middle;
@@ -69,12 +70,12 @@ Line fitLine(const SharedColours& pair, int channel) {
         values.push_back(b / a);
     }
     if (points.size() < kFewColours) return line;
-    line.gain = medianOf(values);
+    line.gain = middleOf(values);
     for (const double leastBand : kLeastBand) {
         const double across = std::sqrt(0.5 * (1 + line.gain * line.gain));
         for (std::size_t i = 0; i < points.size(); ++i)
             values[i] = std::abs(line.at(points[i].first) - points[i].second) / across;
-        const double noise = std::max(medianOf(values) / kMedianOfNormal, kHalfStep);
+        const double noise = std::max(middleOf(values) / kMedianOfNormal, kHalfStep);
         const double band = across * std::max(kBiweight * noise, leastBand);
         double n = 0, sumA = 0, sumB = 0, aa = 0, bb = 0, ab = 0;
         for (const auto& [a, b] : points) {
@@ -168,7 +169,7 @@ std::vector<double> mediansOfGroups(const std::vector<double>& x,
         for (std::size_t v = 0; v < x.size(); ++v)
             if (group[v] == g) values.push_back(x[v]);
         if (values.empty()) continue;
-        const double median = medianOf(values);
+        const double median = middleOf(values);
         for (std::size_t v = 0; v < x.size(); ++v)
             if (group[v] == g) medians[v] = median;
     }

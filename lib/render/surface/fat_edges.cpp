@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::surface {
@@ -153,12 +154,6 @@ std::vector<float> sharesOf(const EdgeView& view) {
     return shares;
 }
 
-float medianOf(std::vector<float>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
 /// A view with a pixel less of what is in front: at its edges, or `everywhere`.
 Image<float> thinned(const EdgeView& view, bool everywhere) {
     const Image<float>& from = *view.q;
@@ -223,7 +218,7 @@ std::optional<float> disagreement(std::span<const EdgeView> views,
         }
     }
     if (apart.size() < kFewPoints) return {};
-    return medianOf(apart);
+    return medianOf(std::move(apart));
 }
 
 }  // namespace
@@ -236,7 +231,7 @@ float colourAtEdges(std::span<const EdgeView> views) {
     });
     std::vector<float> all;
     for (const auto& part : shares) all.insert(all.end(), part.begin(), part.end());
-    return all.size() < kFewEdges ? 1.0f : medianOf(all);
+    return all.size() < kFewEdges ? 1.0f : medianOf(std::move(all));
 }
 
 int thinFatEdges(std::span<const EdgeView> views) {

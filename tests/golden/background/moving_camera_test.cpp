@@ -134,6 +134,12 @@ struct HoleError {
     }
 };
 
+Bundle viewsOf(const std::vector<BackgroundModel>& models) {
+    Bundle bundle;
+    for (const BackgroundModel& model : models) bundle.views.push_back(model.view);
+    return bundle;
+}
+
 Frame drawn(const Bundle& bundle, const Camera& camera, Fill fill, Job& job) {
     RenderSettings settings;
     settings.fill = fill;
@@ -159,11 +165,8 @@ TEST(MovingCameraBackground, FillsWhatACameraBesideUncovers) {
         now.views = {walk()[static_cast<std::size_t>(i)]};
         const Frame open = drawn(now, beside, Fill::none, job);
         const Frame around = drawn(now, beside, Fill::spatial, job);
-        Bundle behind;
-        for (const BackgroundModel& model : models) {
-            now.views.push_back(model.view);
-            behind.views.push_back(model.view);
-        }
+        const Bundle behind = viewsOf(models);
+        now.views.insert(now.views.end(), behind.views.begin(), behind.views.end());
         const Frame known = drawn(behind, beside, Fill::none, job);
         const Frame ours = drawn(now, beside, Fill::background, job);
         for (std::size_t k = 0; k + 1 < now.views.size(); ++k) {
@@ -206,11 +209,8 @@ TEST(MovingCameraBackground, FillsWhatMovingRoomUncovers) {
         now.views = {room.view("m0", i)};
         const Frame open = drawn(now, beside, Fill::none, job);
         const Frame around = drawn(now, beside, Fill::spatial, job);
-        Bundle behind;
-        for (const BackgroundModel& model : models) {
-            now.views.push_back(model.view);
-            behind.views.push_back(model.view);
-        }
+        const Bundle behind = viewsOf(models);
+        now.views.insert(now.views.end(), behind.views.begin(), behind.views.end());
         const Frame known = drawn(behind, beside, Fill::none, job);
         const Frame ours = drawn(now, beside, Fill::background, job);
         for (std::size_t p = 0; p < truth.count(); ++p) {
