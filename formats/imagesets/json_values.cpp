@@ -23,37 +23,6 @@ tl::unexpected<Error> missing(const char* key, const std::string& where) {
 
 }  // namespace
 
-Result<Json> parseJson(ByteSpan bytes) {
-    const auto* text = reinterpret_cast<const char*>(bytes.data());
-    // Deep nesting would be no set of images and exhausts the stack of whoever walks through it.
-    int depth = 0;
-    bool inText = false;
-    for (std::size_t i = 0; i < bytes.size(); ++i) {
-        const char c = text[i];
-        if (inText) {
-            if (c == '\\') ++i;
-            if (c == '"') inText = false;
-        } else if (c == '"') {
-            inText = true;
-        } else if (c == '[' || c == '{') {
-            if (++depth > 64)
-                return fail(ErrorCode::invalidInput, "lists are nested deeper than 64");
-        } else if (c == ']' || c == '}') {
-            --depth;
-        }
-    }
-    try {
-        return Json::parse(text, text + bytes.size());
-    } catch (const Json::parse_error& e) {
-        const std::size_t at = std::min(e.byte, bytes.size());
-        const auto line = 1 + std::count(text, text + at, '\n');
-        return failAt(fmt::format("line {}", line), ErrorCode::invalidInput,
-                      "this is not valid JSON");
-    } catch (const std::exception&) {
-        return fail(ErrorCode::invalidInput, "this is not valid JSON");
-    }
-}
-
 Result<std::optional<double>> findNumber(const Json& object, const char* key,
                                          const std::string& where) {
     const Json* value = find(object, key);

@@ -8,6 +8,7 @@
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/poses.hpp"
+#include "lib/base/parallel.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -265,15 +266,15 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
         return failAt(where, ErrorCode::invalidInput,
                       "the depth's scale is {:g}; it must be above 0", unit);
     STX_TRY(const auto coded, codedDistances(json, where));
-    for (std::size_t i = 0; i < set.views.size(); ++i) {
+    const Json& frames = json["frames"];
+    const auto describe = [&](std::size_t i) -> Result<void> {
         SetView& view = set.views[i];
-        const Json& frame = json["frames"][i];
         const std::string place = fmt::format("{}: frames[{}]", where, i);
-        STX_TRY(const std::string texture, needText(frame, "file_path", place));
+        STX_TRY(const std::string texture, needText(frames[i], "file_path", place));
         const std::string textureFile = withImageEnding(folder, texture);
-        STX_TRY(auto depth, findText(frame, "depth_file_path", place));
+        STX_TRY(auto depth, findText(frames[i], "depth_file_path", place));
         if (!depth) {
-            STX_TRY(depth, findText(frame, "depth_path", place));
+            STX_TRY(depth, findText(frames[i], "depth_path", place));
         }
         if (!depth && path(textureFile).extension() == ".exr") depth = textureFile;
         if (!depth)
@@ -282,7 +283,15 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
         STX_CHECK(findPictures(folder, textureFile, withImageEnding(folder, *depth), place,
                                job.limits, view));
         view.distances = coded ? *coded : distancesOf(unit);
-    }
+        return {};
+    };
+    // Long films have tens of thousands of files to look for.
+    std::vector<Result<void>> done(set.views.size());
+    parallelFor(0, static_cast<std::int64_t>(done.size()), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        done[k] = describe(k);
+    });
+    for (const auto& one : done) STX_CHECK(one);
     return set;
 }
 
