@@ -79,7 +79,7 @@ Result<void> applyMask(const SetView& set, const std::string& pattern, StoredVie
         name.replace(at, 6, std::filesystem::path(set.texture.name).stem().string());
     const std::string where = fmt::format("'{}'", name);
     STX_TRY(const auto bytes, readFile(name, job.limits));
-    STX_TRY(const auto mask, within(where, decodeRgba8(bytes, name, job.limits)));
+    STX_TRY(const auto mask, decodeRgba8(bytes, name, job.limits));
     if (mask.width() != stored.texture.width() || mask.height() != stored.texture.height())
         return failAt(where, ErrorCode::invalidInput,
                       "the mask is {}x{}, but its picture '{}' has {}x{} pixels; both must match",

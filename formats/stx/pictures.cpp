@@ -61,11 +61,10 @@ Result<Frame> render(const Model& model, const Camera& camera, const RenderSetti
 
 Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
-    auto decoded = decodeImage(bytes, path.string(), job.limits);
-    if (!decoded) return tl::unexpected(decoded.error().at(fmt::format("'{}'", path.string())));
+    STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
     Picture picture;
-    if (decoded->linear) picture.linear = rgbaFloatFrom(*decoded);
-    picture.coded = rgba8From(*decoded);
+    if (decoded.linear) picture.linear = rgbaFloatFrom(decoded);
+    picture.coded = rgba8From(decoded);
     return picture;
 }
 

@@ -50,8 +50,7 @@ class PictureFrames final : public VideoFrames {
     [[nodiscard]] Result<Rgba8Image> read(std::size_t k) const {
         const auto& file = files_[k];
         STX_TRY(const auto bytes, readFile(file, job_.limits));
-        return imagesets::within(inQuotes(file.string()),
-                                 decodeRgba8(bytes, file.string(), job_.limits));
+        return decodeRgba8(bytes, file.string(), job_.limits);
     }
 
     std::vector<fs::path> files_;
@@ -188,6 +187,10 @@ Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>
         if (!there)
             return fail(ErrorCode::io, "cannot read '{}': the file or folder does not exist",
                         input.string());
+        if (inputs.size() == 1 && input.extension() == ".json")
+            return failAt(inQuotes(input.string()), ErrorCode::usage,
+                          "plain frames are expected, but this may be a set of images with depth; "
+                          "its background is a view of it: -o film.mp4 or film_%04d.exr");
         const bool regular = fs::is_regular_file(input, ec);
         const std::string head = regular ? headOfFile(input) : std::string();
         const bool film = regular && isCompressedVideo(input, head);
