@@ -21,9 +21,9 @@ using Ray = std::array<float, 12>;
 
 /// How colours are fitted; see shadePieces(). Chosen by trial on the project's image sets.
 struct ShadeSettings {
-    int mostSources = 4;    ///< sources that one piece takes colours from
-    float kernel = 3.0f;    ///< squared radius of the fit, target pixels
-    float ridge = 0.0015f;  ///< holds the linear and quadratic terms down
+    int mostSources = 4;   ///< sources that one piece takes colours from
+    float kernel = 3.5f;   ///< squared radius of the fit, target pixels
+    float ridge = 0.006f;  ///< holds the linear and quadratic terms down
 };
 
 /// What a quality means for a scene; chosen by trial on the project's image sets.

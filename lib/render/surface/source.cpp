@@ -8,6 +8,7 @@
 #include "lib/render/surface/depth_noise.hpp"
 #include "lib/render/surface/fat_edges.hpp"
 #include "lib/render/surface/noisy_views.hpp"
+#include "lib/render/surface/sharpen.hpp"
 
 namespace stx::surface {
 namespace {
@@ -488,7 +489,14 @@ void prepareWhole(std::vector<Source>& sources, std::vector<PreparedPage>& pages
 
 }  // namespace
 
-SurfaceScene::SurfaceScene(const PageSet& pageSet) : set(pageSet) {
+SurfaceScene::SurfaceScene(const PageSet& pageSet, bool sharpens) : set(pageSet) {
+    prepare();
+    if (!sharpens) return;
+    sharpened = sharpenedTextures(*this);
+    for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = sharpened[i].get();
+}
+
+void SurfaceScene::prepare() {
     bool whole = true;
     pages.resize(set.pages().size());
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = set.pages()[i].texture;

@@ -228,9 +228,16 @@ struct SurfaceScene {
     std::vector<PreparedPage> pages;
     std::vector<Source> sources;
 
-    explicit SurfaceScene(const PageSet& pageSet);
+    /// Textures of `pages` that are not the set's own; see sharpenedTextures().
+    std::vector<std::shared_ptr<const Texture>> sharpened;
+
+    /// `sharpens`: colours are read by the fit that wants them sharpened.
+    explicit SurfaceScene(const PageSet& pageSet, bool sharpens = false);
     SurfaceScene(const SurfaceScene&) = delete;
     SurfaceScene& operator=(const SurfaceScene&) = delete;
+
+  private:
+    void prepare();
 };
 
 /// q and info of a block of a source and one pixel around it, row by row.

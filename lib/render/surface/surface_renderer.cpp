@@ -21,7 +21,7 @@ class SurfaceRenderer final : public Renderer {
   public:
     SurfaceRenderer(const PageSet& set, const RenderSettings& settings, Job& job,
                     std::unique_ptr<SurfaceBackend> backend)
-        : scene_(set),
+        : scene_(set, settings.quality != Quality::draft),
           settings_(settings),
           effort_(effortOf(settings.quality, scene_)),
           job_(job),
