@@ -22,6 +22,7 @@ using gpu::ViewEntry;
 
 constexpr int kFrame = 64, kStride = kFrame + 2;
 constexpr std::size_t kPadded = static_cast<std::size_t>(kStride) * kStride;
+constexpr std::size_t kElements = splat::Band::pixels(kFrame, kStride);
 
 struct ScalarShape {
 #include "shaders/shared/splat_shape.glsl"
@@ -29,8 +30,8 @@ struct ScalarShape {
 
 /// What splats leave: the front distance and weighted colours of each pixel, with a border.
 struct Drawn {
-    std::vector<float> front = std::vector<float>(kPadded + 64, kNoDepth);
-    std::vector<glm::vec4> sums = std::vector<glm::vec4>(kPadded + 64, glm::vec4(0));
+    std::vector<float> front = std::vector<float>(kElements, kNoDepth);
+    std::vector<glm::vec4> sums = std::vector<glm::vec4>(kElements, glm::vec4(0));
 };
 
 /// One block of random points under a camera beside their own; odd seeds are orthographic.
@@ -162,8 +163,8 @@ Drawn drawVectors(const Inputs& in) {
     band.depth = out.front.data();
     band.colour = &out.sums[0].x;
     band.missing = missing.data();
-    drawDepth(source, task, {in.coefficient}, band);
-    drawColour(source, task, {in.coefficient}, band);
+    drawDepth(source, task, {}, {in.coefficient}, band);
+    drawColour(source, task, {}, {in.coefficient}, band);
     return out;
 }
 

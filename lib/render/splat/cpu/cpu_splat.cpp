@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 #include <tbb/enumerable_thread_specific.h>
 
@@ -24,6 +25,8 @@ using namespace splat;
 constexpr int kTile = 16;
 // A band's buffers should stay in the second-level cache.
 constexpr int kBandBytes = 1 << 20;
+// Blocks are drawn column by column of the picture; pixels.
+constexpr int kColumn = 64;
 
 // One thread's buffers for a band.
 struct Scratch {
@@ -62,6 +65,7 @@ class CpuSplatRenderer final : public Renderer {
     };
 
     void planFrame(const Camera& camera);
+    std::span<const std::uint32_t> byColumn(int width);
     void drawBand(Picture& picture, int index);
     void resolveBlended(Picture& picture, const Band& band) const;
     void resolvePoints(Picture& picture, const Band& band) const;
@@ -80,6 +84,7 @@ class CpuSplatRenderer final : public Renderer {
     std::vector<RectangleImages> sources_;
     std::vector<BlockTask> tasks_;
     std::vector<std::uint8_t> seen_;
+    std::vector<std::uint32_t> order_;
     std::vector<std::vector<std::uint32_t>> bins_;  // tasks of each band, in order
     tbb::enumerable_thread_specific<Scratch> scratch_;
 };
@@ -129,6 +134,21 @@ void CpuSplatRenderer::planFrame(const Camera& camera) {
     }
 }
 
+// The tasks that are seen, those at the left of the picture first, else in their order: what all
+// views add to a column is added while it is in the cache.
+std::span<const std::uint32_t> CpuSplatRenderer::byColumn(int width) {
+    std::vector<std::uint32_t> first(static_cast<std::size_t>(width / kColumn) + 2, 0);
+    for (std::size_t i = 0; i < tasks_.size(); ++i)
+        if (seen_[i]) ++first[static_cast<std::size_t>(tasks_[i].x0 / kColumn) + 1];
+    for (std::size_t k = 1; k < first.size(); ++k) first[k] += first[k - 1];
+    order_.resize(first.back());
+    for (std::size_t i = 0; i < tasks_.size(); ++i)
+        if (seen_[i])
+            order_[first[static_cast<std::size_t>(tasks_[i].x0 / kColumn)]++] =
+                static_cast<std::uint32_t>(i);
+    return order_;
+}
+
 Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     STX_CHECK(camera.check());
     const auto pixels =
@@ -157,8 +177,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     const int bands = (camera.height + picture.bandRows - 1) / picture.bandRows;
     bins_.resize(bands);
     for (auto& b : bins_) b.clear();
-    for (std::size_t i = 0; i < tasks_.size(); ++i) {
-        if (!seen_[i]) continue;
+    for (const std::uint32_t i : byColumn(camera.width)) {
         int y0 = tasks_[i].y0, y1 = tasks_[i].y1;
         if (picture.shape.coefficient > 0) {
             // Round splats may be larger than the plan, which follows the data.
@@ -168,8 +187,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
             y0 = std::max(0, y0 - static_cast<int>(radius));
             y1 = std::min(camera.height - 1, y1 + static_cast<int>(radius));
         }
-        for (int b = y0 / picture.bandRows; b <= y1 / picture.bandRows; ++b)
-            bins_[b].push_back(static_cast<std::uint32_t>(i));
+        for (int b = y0 / picture.bandRows; b <= y1 / picture.bandRows; ++b) bins_[b].push_back(i);
     }
     parallelFor(0, bands, [&](std::int64_t b) { drawBand(picture, static_cast<int>(b)); });
     if (settings_.splat == SplatRule::data) {
@@ -215,8 +233,7 @@ void CpuSplatRenderer::drawBand(Picture& picture, int index) {
     band.rows = std::min(picture.bandRows, camera.height - band.top);
     band.stride = camera.width + 2;
     band.orthographic = camera.orthographic;
-    // Vectors may read a little past the last row.
-    const std::size_t count = static_cast<std::size_t>(band.rows + 2) * band.stride + 64;
+    const std::size_t count = Band::pixels(band.rows, band.stride);
     if (settings_.splat == SplatRule::point) {
         scratch.points.assign(count, ~std::uint64_t{0});
         band.points = scratch.points.data();
@@ -234,13 +251,21 @@ void CpuSplatRenderer::drawBand(Picture& picture, int index) {
         scratch.normals.assign(4 * count, 0.0f);
         band.normals = scratch.normals.data();
     }
-    for (const auto i : bins_[index])
-        drawDepth(sources_[tasks_[i].source], tasks_[i], picture.shape, band);
+    const auto& bin = bins_[index];
+    const auto after = [&](std::size_t k) {
+        if (k + 1 >= bin.size()) return Ahead{};
+        const BlockTask& next = tasks_[bin[k + 1]];
+        return Ahead{&sources_[next.source], &next};
+    };
+    for (std::size_t k = 0; k < bin.size(); ++k) {
+        const BlockTask& task = tasks_[bin[k]];
+        drawDepth(sources_[task.source], task, after(k), picture.shape, band);
+    }
     findTileMax(band, scratch.tileMax);
-    for (const auto i : bins_[index]) {
-        const BlockTask& task = tasks_[i];
+    for (std::size_t k = 0; k < bin.size(); ++k) {
+        const BlockTask& task = tasks_[bin[k]];
         if (picture.shape.coefficient <= 0 && hidden(task, band, scratch.tileMax)) continue;
-        drawColour(sources_[task.source], task, picture.shape, band);
+        drawColour(sources_[task.source], task, after(k), picture.shape, band);
     }
     resolveBlended(picture, band);
 }

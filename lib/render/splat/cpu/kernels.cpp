@@ -1,5 +1,7 @@
 #include "lib/render/splat/cpu/kernels.hpp"
 
+#include <hwy/cache_control.h>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lib/render/splat/cpu/kernels.cpp"
 #include <hwy/foreach_target.h>
@@ -7,15 +9,38 @@
 #include <hwy/highway.h>
 
 #include "lib/render/splat/cpu/accumulate-inl.hpp"
+#include "lib/render/splat/cpu/patch-inl.hpp"
 #include "lib/render/splat/cpu/point_colour-inl.hpp"
 #include "lib/render/splat/cpu/shape-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stx::splat::HWY_NAMESPACE {
 
+// Fetches a row of a block that comes later, `colours` too when the pass needs them.
+HWY_INLINE void fetchRow(const Ahead& ahead, int row, bool colours) {
+    if (!ahead.source) return;
+    const RectangleImages& s = *ahead.source;
+    const BlockTask& t = *ahead.task;
+    // The end of a row: its beginning may be in the line that the block to the left has fetched.
+    const std::size_t pixel = static_cast<std::size_t>(std::min(t.v0 + row, t.v1 - 1)) * s.stride +
+                              static_cast<std::size_t>(t.u1 - 1);
+    hwy::Prefetch(s.depth + pixel);
+    if (!t.uniform) hwy::Prefetch(s.slopes + pixel);
+    if (!colours && t.opaque) return;
+    if (s.rgba8)
+        hwy::Prefetch(s.rgba8 + 4 * pixel);
+    else
+        hwy::Prefetch(s.rgbaFloat + 4 * pixel);
+}
+
+HWY_INLINE bool isPatch(const Ellipse& e) {
+    return kPatches && e.x1 - e.x0 < kPatch && e.y1 - e.y0 < kPatch;
+}
+
 HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Band& band) {
+    if (isPatch(e)) return depthPatch(e, band);
     const int lanes = static_cast<int>(hn::Lanes(d));
-    forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
+    forRows(e, [&](int x0, int x1, int y) HWY_ATTR {
         float* row = band.depth + static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
         for (int x = x0; x <= x1; x += lanes) {
             const Across a = across(d, e, x, x1, y);
@@ -26,11 +51,13 @@ HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Band& band) {
     });
 }
 
+template <bool kOpaque, bool kNormals>
 HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const PointColour& point, float tolerance,
-                              bool normals, const Band& band) {
+                              const Band& band) {
+    if (isPatch(e)) return colourPatch<kOpaque, kNormals>(e, point, tolerance, band);
     const int lanes = static_cast<int>(hn::Lanes(d));
     HWY_ALIGN float weights[kBlock];
-    forRows(e, band, [&](int x0, int x1, int y) HWY_ATTR {
+    forRows(e, [&](int x0, int x1, int y) HWY_ATTR {
         const std::size_t start = static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
         for (int x = x0; x <= x1; x += lanes) {
             const Across a = across(d, e, x, x1, y);
@@ -50,15 +77,16 @@ HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const PointColour& point, 
                 const Four colour =
                     plus(plus(point.colour, x + k - e.x, point.across), y - e.y, point.down);
                 addTo(band.colour + 4 * at, weights[k], colour);
-                band.missing[at] += weights[k] * point.missing;
-                if (normals) addTo(band.normals + 4 * at, weights[k], point.normal);
+                if (!kOpaque) band.missing[at] += weights[k] * point.missing;
+                if (kNormals) addTo(band.normals + 4 * at, weights[k], point.normal);
             }
         }
     });
 }
 
 template <bool kUniform>
-void depthBlock(const RectangleImages& s, const BlockTask& t, const Band& band) {
+void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
+                const Band& band) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -66,6 +94,7 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Band& band) 
     HWY_ALIGN std::int32_t offset[kBlock];
     HWY_ALIGN float above[2 * kBlock], below[2 * kBlock];
     for (int v = t.v0; v < t.v1; ++v) {
+        fetchRow(ahead, v - t.v0, false);
         const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
@@ -78,7 +107,7 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Band& band) 
             }
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge(d, p, large,
+                    forLarge(d, p, large, band,
                              [&](int, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
             }
             std::uint32_t bits = bitsOf(d, p.small);
@@ -114,7 +143,8 @@ HWY_INLINE VF lowPass(DF d, VF x2) {
 }
 
 template <bool kUniform, bool kOpaque, bool kNormals>
-void colourBlock(const RectangleImages& s, const BlockTask& t, const Band& band) {
+void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
+                 const Band& band) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -135,6 +165,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Band& band)
         }
     }
     for (int v = t.v0; v < t.v1; ++v) {
+        fetchRow(ahead, v - t.v0, true);
         const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
@@ -147,12 +178,12 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Band& band)
             }
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge(d, p, large, [&](int k, const Ellipse& e) HWY_ATTR {
+                    forLarge(d, p, large, band, [&](int k, const Ellipse& e) HWY_ATTR {
                         PointColour point = pointColourOf(s, pixel + k, kOpaque);
                         if (e.uAcross != 0 || e.vDown != 0)
                             addGradient(s, pixel + k, e.uAcross, e.vAcross, e.uDown, e.vDown,
                                         point);
-                        colourEllipse(d, e, point, t.tolerance, kNormals, band);
+                        colourEllipse<kOpaque, kNormals>(d, e, point, t.tolerance, band);
                     });
             }
             if (hn::AllFalse(d, p.small)) continue;
@@ -235,8 +266,14 @@ HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Sha
             const float radius =
                 std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), kLargest);
             const float q = kReach2 / (radius * radius);
-            draw(pixel, Ellipse{h[0] * inverse, h[1] * inverse, h[2], 0, 0, q, 0, q, radius, radius,
-                                kReach2, 1.0f, 0, 0, 0, 0});
+            const float x = h[0] * inverse, y = h[1] * inverse;
+            const DF d;
+            const VF half = hn::Set(d, radius);
+            const Boxes box = boxesOf(d, hn::Set(d, x), hn::Set(d, y), half, half, band);
+            if (hn::AllFalse(d, box.some)) continue;
+            draw(pixel,
+                 Ellipse{x, y, h[2], 0, 0, q, 0, q, kReach2, 1.0f, 0, 0, 0, 0, hn::GetLane(box.x0),
+                         hn::GetLane(box.x1), hn::GetLane(box.y0), hn::GetLane(box.y1)});
         }
     }
 }
@@ -280,41 +317,47 @@ void pointsImpl(const RectangleImages& s, const BlockTask& t, const Band& band) 
     }
 }
 
-void depthImpl(const RectangleImages& s, const BlockTask& t, const Shape& shape, const Band& band) {
+void depthImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead, const Shape& shape,
+               const Band& band) {
     const DF d;
     if (shape.coefficient > 0) {
         forRound(s, t, shape, band, 127,
                  [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
     } else if (t.uniform) {
-        depthBlock<true>(s, t, band);
+        depthBlock<true>(s, t, ahead, band);
     } else {
-        depthBlock<false>(s, t, band);
+        depthBlock<false>(s, t, ahead, band);
     }
 }
 
 template <bool kUniform>
-void colourOfBlock(const RectangleImages& s, const BlockTask& t, const Band& band) {
+void colourOfBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
+                   const Band& band) {
     if (t.opaque && !s.normals)
-        colourBlock<kUniform, true, false>(s, t, band);
+        colourBlock<kUniform, true, false>(s, t, ahead, band);
     else if (t.opaque)
-        colourBlock<kUniform, true, true>(s, t, band);
+        colourBlock<kUniform, true, true>(s, t, ahead, band);
     else if (!s.normals)
-        colourBlock<kUniform, false, false>(s, t, band);
+        colourBlock<kUniform, false, false>(s, t, ahead, band);
     else
-        colourBlock<kUniform, false, true>(s, t, band);
+        colourBlock<kUniform, false, true>(s, t, ahead, band);
 }
 
-void colourImpl(const RectangleImages& s, const BlockTask& t, const Shape& shape,
-                const Band& band) {
+void colourImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
+                const Shape& shape, const Band& band) {
     const DF d;
     if (shape.coefficient > 0) {
         forRound(s, t, shape, band, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
-            colourEllipse(d, e, pointColourOf(s, pixel, t.opaque), t.tolerance, s.normals, band);
+            const PointColour point = pointColourOf(s, pixel, t.opaque);
+            if (s.normals)
+                colourEllipse<false, true>(d, e, point, t.tolerance, band);
+            else
+                colourEllipse<false, false>(d, e, point, t.tolerance, band);
         });
     } else if (t.uniform) {
-        colourOfBlock<true>(s, t, band);
+        colourOfBlock<true>(s, t, ahead, band);
     } else {
-        colourOfBlock<false>(s, t, band);
+        colourOfBlock<false>(s, t, ahead, band);
     }
 }
 
@@ -328,13 +371,13 @@ HWY_EXPORT(depthImpl);
 HWY_EXPORT(colourImpl);
 HWY_EXPORT(pointsImpl);
 
-void drawDepth(const RectangleImages& source, const BlockTask& task, const Shape& shape,
-               const Band& band) {
-    HWY_DYNAMIC_DISPATCH(depthImpl)(source, task, shape, band);
+void drawDepth(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
+               const Shape& shape, const Band& band) {
+    HWY_DYNAMIC_DISPATCH(depthImpl)(source, task, ahead, shape, band);
 }
-void drawColour(const RectangleImages& source, const BlockTask& task, const Shape& shape,
-                const Band& band) {
-    HWY_DYNAMIC_DISPATCH(colourImpl)(source, task, shape, band);
+void drawColour(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
+                const Shape& shape, const Band& band) {
+    HWY_DYNAMIC_DISPATCH(colourImpl)(source, task, ahead, shape, band);
 }
 void drawPoints(const RectangleImages& source, const BlockTask& task, const Band& band) {
     HWY_DYNAMIC_DISPATCH(pointsImpl)(source, task, band);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "lib/render/splat/constants.hpp"
@@ -54,6 +55,12 @@ struct BlockTask {
 /// The rows of the output that one thread owns, with a border of one pixel all around, which is
 /// thrown away. Element (x, y) of the output is number (y - top + 1) * stride + x + 1.
 struct Band {
+    /// Elements of each array: vectors read past the last row, and splats of up to 4x4 pixels read
+    /// and write (what is there already) rows below the border.
+    static constexpr std::size_t pixels(int rows, int stride) {
+        return static_cast<std::size_t>(rows + 4) * static_cast<std::size_t>(stride) + 64;
+    }
+
     int width = 0;  ///< pixels of the output
     int top = 0;    ///< first row
     int rows = 0;
@@ -73,12 +80,19 @@ struct Shape {
     float coefficient = 0;
 };
 
+/// A block that is drawn soon. Its rows are fetched into the cache while another is drawn: memory
+/// cannot tell what comes next from rows of 16 pixels that are thousands of bytes apart.
+struct Ahead {
+    const RectangleImages* source = nullptr;  ///< null: none
+    const BlockTask* task = nullptr;
+};
+
 /// First pass: nearest depth.
-void drawDepth(const RectangleImages& source, const BlockTask& task, const Shape& shape,
-               const Band& band);
+void drawDepth(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
+               const Shape& shape, const Band& band);
 /// Second pass: sums of weighted colours (and normals) near the front.
-void drawColour(const RectangleImages& source, const BlockTask& task, const Shape& shape,
-                const Band& band);
+void drawColour(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
+                const Shape& shape, const Band& band);
 /// SplatRule::point in one pass.
 void drawPoints(const RectangleImages& source, const BlockTask& task, const Band& band);
 

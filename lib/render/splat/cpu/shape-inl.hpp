@@ -154,44 +154,78 @@ struct Ellipse {
     float x, y, z;
     float slopeX, slopeY;
     float qxx, qxy, qyy;
-    float halfX, halfY;
     float core2;
     float quality;
     float uAcross, vAcross, uDown, vDown;
+    int x0, x1, y0, y1;  // the part of its box that lies in the band, inclusive
 };
+
+// The parts of boxes that lie in the band.
+struct Boxes {
+    VI x0, x1, y0, y1;
+    hn::Mask<DF> some;
+};
+
+HWY_INLINE Boxes boxesOf(DF d, VF x, VF y, VF halfX, VF halfY, const Band& band) {
+    const DI di;
+    const VF left = hn::Ceil(hn::Max(hn::Sub(x, halfX), hn::Zero(d)));
+    const VF right = hn::Floor(hn::Min(hn::Add(x, halfX), hn::Set(d, band.width - 1.0f)));
+    const VF above = hn::Ceil(hn::Max(hn::Sub(y, halfY), hn::Set(d, float(band.top))));
+    const VF below = hn::Floor(hn::Min(hn::Add(y, halfY), hn::Set(d, band.top + band.rows - 1.0f)));
+    Boxes out;
+    out.some = hn::And(hn::Le(left, right), hn::Le(above, below));
+    // Coordinates outside of the picture may be beyond what an int holds.
+    const auto whole = [&](VF v)
+                           HWY_ATTR { return hn::ConvertTo(di, hn::IfThenElseZero(out.some, v)); };
+    out.x0 = whole(left);
+    out.x1 = whole(right);
+    out.y0 = whole(above);
+    out.y1 = whole(below);
+    return out;
+}
+
+// Large splats of so many pixels along a side are drawn as a patch.
+constexpr int kPatch = 4;
+
+// Calls draw(k) for each bit k, those four apart one after another: a load that meets parts of
+// stores still under way waits for them, and patches of neighbours share output pixels.
+template <class F>
+HWY_INLINE void forBitsApart(std::uint32_t bits, const F& draw) {
+    for (const std::uint32_t part :
+         {bits & 0x1111u, bits & 0x2222u, bits & 0x4444u, bits & 0x8888u}) {
+        for (std::uint32_t rest = part; rest; rest &= rest - 1) draw(__builtin_ctz(rest));
+    }
+}
 
 // The large splats among some neighbouring pixels, one by one: draw(pixel, ellipse).
 template <class F>
-HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const F& draw) {
-    constexpr int kValues = 15;
+HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Band& band,
+                         const F& draw) {
+    constexpr int kValues = 13;
     HWY_ALIGN float v[kValues][kBlock];
-    const VF all[kValues] = {p.at.x,    p.at.y,    p.at.z,    p.slopeX, p.slopeY,
-                             p.qxx,     p.qxy,     p.qyy,     p.halfX,  p.halfY,
-                             p.quality, p.uAcross, p.vAcross, p.uDown,  p.vDown};
+    HWY_ALIGN std::int32_t box[4][kBlock];
+    const Boxes boxes = boxesOf(d, p.at.x, p.at.y, p.halfX, p.halfY, band);
+    bits &= bitsOf(d, boxes.some);
+    if (!bits) return;
+    const DI di;
+    hn::Store(boxes.x0, di, box[0]);
+    hn::Store(boxes.x1, di, box[1]);
+    hn::Store(boxes.y0, di, box[2]);
+    hn::Store(boxes.y1, di, box[3]);
+    const VF all[kValues] = {p.at.x, p.at.y,    p.at.z,    p.slopeX,  p.slopeY, p.qxx,  p.qxy,
+                             p.qyy,  p.quality, p.uAcross, p.vAcross, p.uDown,  p.vDown};
     for (int k = 0; k < kValues; ++k) hn::Store(all[k], d, v[k]);
-    while (bits) {
-        const int k = __builtin_ctz(bits);
-        bits &= bits - 1;
-        draw(k,
-             Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
-                     v[8][k], v[9][k], kCore2, v[10][k], v[11][k], v[12][k], v[13][k], v[14][k]});
-    }
+    forBitsApart(bits, [&](int k) HWY_ATTR {
+        draw(k, Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
+                        kCore2, v[8][k], v[9][k], v[10][k], v[11][k], v[12][k], box[0][k],
+                        box[1][k], box[2][k], box[3][k]});
+    });
 }
 
 // Calls row(first x, last x, y) for the part of the ellipse's box that lies in the band.
 template <class F>
-HWY_INLINE void forRows(const Ellipse& e, const Band& band, const F& row) {
-    // Off-screen coordinates may be beyond what an int holds.
-    if (!(e.x + e.halfX >= 0 && e.x - e.halfX <= band.width - 1 && e.y + e.halfY >= band.top &&
-          e.y - e.halfY <= band.top + band.rows - 1))
-        return;
-    const int x0 = static_cast<int>(std::ceil(std::max(e.x - e.halfX, 0.0f)));
-    const int x1 = static_cast<int>(std::floor(std::min(e.x + e.halfX, band.width - 1.0f)));
-    const int y0 = static_cast<int>(std::ceil(std::max(e.y - e.halfY, float(band.top))));
-    const int y1 =
-        static_cast<int>(std::floor(std::min(e.y + e.halfY, band.top + band.rows - 1.0f)));
-    if (x0 > x1) return;
-    for (int y = y0; y <= y1; ++y) row(x0, x1, y);
+HWY_INLINE void forRows(const Ellipse& e, const F& row) {
+    for (int y = e.y0; y <= e.y1; ++y) row(e.x0, e.x1, y);
 }
 
 // Lanes of one row of an ellipse: squared deviations and depth of the plane there.
