@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/splat/plan.hpp"
 
 namespace stx {
 namespace {
@@ -68,15 +69,22 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
         return 255.0f;
     const int ix = static_cast<int>(bx), iy = static_cast<int>(by);
     const auto fx = static_cast<float>(px - bx), fy = static_cast<float>(py - by);
+    const auto between = [&](float a, float b, float c, float d) {
+        const float top = a * (1 - fx) + b * fx, bottom = c * (1 - fx) + d * fx;
+        return top * (1 - fy) + bottom * fy;
+    };
+    if (!view.alpha.empty()) {
+        const std::uint8_t* a = view.alpha.row(iy).data() + ix;
+        const std::uint8_t* b = view.alpha.row(iy + 1).data() + ix;
+        return between(a[0], a[1], b[0], b[1]);
+    }
     const PageRectangle* r = set_.find(view.number, ix, iy, ix + 1, iy + 1);
     const Texture* texture = r ? set_.pages()[static_cast<std::size_t>(r->page)].texture : nullptr;
     const auto at = [&](int i, int j) {
         if (r) return alphaOf(*texture, r->texel(i, j));
         return set_.objectOutside(view.number, i, j) ? 255.0f : 0.0f;
     };
-    const float top = at(ix, iy) * (1 - fx) + at(ix + 1, iy) * fx;
-    const float bottom = at(ix, iy + 1) * (1 - fx) + at(ix + 1, iy + 1) * fx;
-    return top * (1 - fy) + bottom * fy;
+    return between(at(ix, iy), at(ix + 1, iy), at(ix, iy + 1), at(ix + 1, iy + 1));
 }
 
 Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
@@ -85,11 +93,11 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
         const auto number = static_cast<std::size_t>(n);
         const Camera& camera = set_.views()[number].camera;
         const int w = camera.width, h = camera.height;
-        const Image<std::uint8_t> alpha = alphaOf(set_, number);
+        Image<std::uint8_t> alpha = alphaOf(set_, number);
         if (std::all_of(alpha.data(), alpha.data() + alpha.count(),
                         [](std::uint8_t a) { return a == 255; }))
             return;
-        View view{number, camera, camera.cameraFromWorld(), {}};
+        View view{number, camera, {}, {}};
         view.around = Image<Around>(w, h, Around::mixed);
         for (int y = kReach; y + kReach < h; ++y) {
             for (int x = kReach; x + kReach < w; ++x) {
@@ -105,6 +113,7 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
                                                     : Around::mixed;
             }
         }
+        if (set_.find(number, 0, 0, w - 1, h - 1)) view.alpha = std::move(alpha);
         all[number] = std::move(view);
     });
     for (auto& view : all) {
@@ -112,37 +121,44 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     }
 }
 
-std::uint32_t Silhouettes::freeSamples(const Camera& camera, const glm::dmat4& worldFromCamera,
-                                       int x, int y, double depth) const {
-    std::uint32_t free = 0;  // a bit for each sample
+/// Which of the `wanted` samples of a pixel, a bit for each, are free at that depth.
+std::uint32_t Silhouettes::freeSamples(const Maps& maps, int x, int y, double depth,
+                                       std::uint32_t wanted) const {
+    std::uint32_t free = 0;
     static_assert(kSamples * kSamples <= 32);
-    const auto project = [&](const View& view, double px, double py) {
-        const glm::dvec3 world(worldFromCamera * glm::dvec4(camera.unproject(px, py, depth), 1.0));
-        return view.camera.project(glm::dvec3(view.cameraFromWorld * glm::dvec4(world, 1.0)));
-    };
-    for (const auto& view : views_) {
-        const auto centre = project(view, x + 0.5, y + 0.5);
-        if (!(centre.z > 0 && centre.x >= 0 && centre.y >= 0 && centre.x < view.camera.width &&
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+        const View& view = views_[v];
+        const splat::PixelMap& m = maps[v];
+        const auto project = [&](const glm::dvec3& h) {
+            const double w = view.camera.orthographic ? 1.0 : 1.0 / h.z;
+            return glm::dvec2(h.x * w + 0.5, h.y * w + 0.5);
+        };
+        const glm::dvec3 h = (m.a0 + m.au * double(x) + m.av * double(y)) * depth + m.b0 +
+                             m.bu * double(x) + m.bv * double(y);
+        if (!(h.z > 0)) continue;
+        const glm::dvec2 centre = project(h);
+        if (!(centre.x >= 0 && centre.y >= 0 && centre.x < view.camera.width &&
               centre.y < view.camera.height))
             continue;
         const auto around = view.around.at(static_cast<int>(centre.x), static_cast<int>(centre.y));
         if (around == Around::full) continue;
-        if (around == Around::empty) return kAllSamples;
+        if (around == Around::empty) return wanted;
         // Within a pixel the way into a reference is as good as affine.
-        const auto right = project(view, x + 1.5, y + 0.5) - centre;
-        const auto down = project(view, x + 0.5, y + 1.5) - centre;
-        for (int k = 0; k < kSamples * kSamples; ++k) {
+        const auto right = project(h + m.au * depth + m.bu) - centre;
+        const auto down = project(h + m.av * depth + m.bv) - centre;
+        for (std::uint32_t rest = wanted & ~free; rest; rest &= rest - 1) {
+            const int k = std::countr_zero(rest);
             const double dx = (k % kSamples + 0.5) / kSamples - 0.5;
             const double dy = (k / kSamples + 0.5) / kSamples - 0.5;
             const auto p = centre + right * dx + down * dy;
             if (alphaBilinear(view, p.x, p.y) < kFree) free |= 1u << k;
         }
-        if (free == kAllSamples) break;
+        if (free == wanted) break;
     }
     return free;
 }
 
-float Silhouettes::coverage(const Camera& camera, const glm::dmat4& worldFromCamera, int x, int y,
+float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y,
                             float depth) const {
     // At a silhouette the surface runs along the ray, so the splat's depth is the least certain
     // thing there is (half a pixel aside is 17 pixels deep on a ball of 300): a ray passes by only
@@ -153,7 +169,7 @@ float Silhouettes::coverage(const Camera& camera, const glm::dmat4& worldFromCam
     for (const int k : kDepthSteps) {
         const double at = depth + k * pixel;
         if (!camera.orthographic && at <= 0) continue;
-        free &= freeSamples(camera, worldFromCamera, x, y, at);
+        free = freeSamples(maps, x, y, at, free);
         if (free == 0) break;
     }
     return 1.0f - static_cast<float>(std::popcount(free)) / (kSamples * kSamples);
@@ -163,7 +179,8 @@ void Silhouettes::carve(Frame& frame, const Camera& camera) const {
     if (none()) return;
     constexpr int kRowsPerTask = 16;
     const int w = frame.depth.width(), h = frame.depth.height();
-    const auto worldFromCamera = camera.worldFromCamera();
+    Maps maps;
+    for (const View& view : views_) maps.push_back(splat::pixelMap(camera, view.camera));
     // Whether a pixel is looked at depends on depths that carving changes: look first, carve then.
     Image<float> covered(w, h, -1.0f);
     parallelFor(0, (h + kRowsPerTask - 1) / kRowsPerTask, [&](std::int64_t task) {
@@ -179,7 +196,7 @@ void Silhouettes::carve(Frame& frame, const Camera& camera) const {
             for (int x = 0; x < w; ++x) {
                 const float depth = frame.depth.at(x, y);
                 if (mark[x] && hasPoint(depth))
-                    covered.at(x, y) = coverage(camera, worldFromCamera, x, y, depth);
+                    covered.at(x, y) = coverage(camera, maps, x, y, depth);
             }
         }
     });

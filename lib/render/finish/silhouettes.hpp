@@ -4,6 +4,7 @@
 
 #include "lib/render/frame.hpp"
 #include "lib/render/scene/page_set.hpp"
+#include "lib/render/splat/cpu/kernels.hpp"
 
 namespace stx {
 
@@ -27,14 +28,18 @@ class Silhouettes {
     struct View {
         std::size_t number = 0;
         Camera camera;
-        glm::dmat4 cameraFromWorld;
         Image<Around> around;  ///< coverage of a pixel and what is next to it
+        /// Coverage, 0..255, of a view that is one rectangle; else empty, and asked of the pages.
+        Image<std::uint8_t> alpha;
     };
+    /// Where the pixels of a picture are in each view.
+    using Maps = std::vector<splat::PixelMap>;
+
     [[nodiscard]] float alphaBilinear(const View& view, double x, double y) const;
-    [[nodiscard]] std::uint32_t freeSamples(const Camera& camera, const glm::dmat4& worldFromCamera,
-                                            int x, int y, double depth) const;
-    [[nodiscard]] float coverage(const Camera& camera, const glm::dmat4& worldFromCamera, int x,
-                                 int y, float depth) const;
+    [[nodiscard]] std::uint32_t freeSamples(const Maps& maps, int x, int y, double depth,
+                                            std::uint32_t wanted) const;
+    [[nodiscard]] float coverage(const Camera& camera, const Maps& maps, int x, int y,
+                                 float depth) const;
 
     PageSet set_;
     std::vector<View> views_;
