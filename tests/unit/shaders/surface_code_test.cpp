@@ -168,8 +168,9 @@ struct Inputs {
             std::vector<std::uint32_t> blocks(s.blocks.size());
             for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b] = static_cast<uint>(b);
             samples.emplace_back(grid.count());
-            rasteriseSource(s, sampleWarps.back(), blocks, grid, std::numeric_limits<float>::max(),
-                            samples.back().data());
+            // What was never written is 0, nothing.
+            (void)rasteriseSource(s, sampleWarps.back(), blocks, grid,
+                                  std::numeric_limits<float>::max(), samples.back().data());
         }
         for (std::size_t i = 0; i < sources().size(); ++i)
             locals.push_back({&sources()[i], warps[i], samples[i].data()});

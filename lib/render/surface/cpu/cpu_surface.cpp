@@ -65,10 +65,10 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
         const FrameSource& f = frame.sources[static_cast<std::size_t>(chosen[k])];
         float* mine = samples.data() + grid.count() * k;
         const auto blocks = f.blocksOf(tile);
-        if (!blocks.empty())
-            rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks, grid,
-                            qLimit, mine);
-        local.push_back({f.source, f.sourceFromPixel, blocks.empty() ? nullptr : mine});
+        const bool drawn = !blocks.empty() &&
+                           rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource),
+                                           blocks, grid, qLimit, mine);
+        local.push_back({f.source, f.sourceFromPixel, drawn ? mine : nullptr});
         shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
     }
     pieces.clear();

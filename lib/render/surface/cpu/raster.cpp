@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include <hwy/cache_control.h>
+
 #include "lib/render/surface/cells.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -31,14 +33,22 @@ HWY_INLINE Vertex project(const Warp& w, float x, float y, float q) {
 
 struct Target {
     float* samples;
+    std::size_t count;
     int side, stride;
     float qLimit;
+    bool empty = true;  ///< nothing was drawn yet, and the samples are not cleared
+
+    HWY_INLINE void clear() {
+        if (!empty) return;
+        std::memset(samples, 0, count * sizeof(float));
+        empty = false;
+    }
 };
 
 /// Fills a convex polygon that turns the right way. `grow` moves its edges out, in samples; with
 /// kExtend only samples that no mesh holds are written.
 template <int kCorners, bool kExtend>
-HWY_INLINE void fillPolygon(const Target& t, const Vertex* v, float grow, std::uint32_t bits) {
+HWY_INLINE void fillPolygon(Target& t, const Vertex* v, float grow, std::uint32_t bits) {
     for (int i = 0; i < kCorners; ++i)
         if (!v[i].front) return;
     float xMin = v[0].x, xMax = v[0].x, yMin = v[0].y, yMax = v[0].y, qMin = v[0].q, qMax = v[0].q;
@@ -66,6 +76,7 @@ HWY_INLINE void fillPolygon(const Target& t, const Vertex* v, float grow, std::u
     const float bx = b.x - bBase.x, by = b.y - bBase.y, bq = b.q - bBase.q;
     const float area = ax * by - ay * bx;
     if (!(area > 0.0f)) return;
+    t.clear();
     const float inverseArea = 1.0f / area;
     const float px = (aq * by - ay * bq) * inverseArea, py = (ax * bq - aq * bx) * inverseArea;
     float cx = 0, cy = 0, cq = 0;
@@ -124,7 +135,7 @@ HWY_INLINE void fillPolygon(const Target& t, const Vertex* v, float grow, std::u
     }
 }
 
-HWY_INLINE void drawLeaf(const Target& t, const Warp& warp, const Leaf& leaf, float grow) {
+HWY_INLINE void drawLeaf(Target& t, const Warp& warp, const Leaf& leaf, float grow) {
     const float n = leaf.size;
     const float x = leaf.x + 0.5f, y = leaf.y + 0.5f;
     const Vertex v[4] = {project(warp, x, y, leaf.q0),
@@ -155,6 +166,7 @@ struct CellGrid {
         const int n = static_cast<int>(hn::Lanes(d));
         const auto& m = warp.m;
         const V steps = hn::ConvertTo(d, hn::Iota(hn::RebindToSigned<decltype(d)>(), 0));
+        const V end = hn::Set(d, static_cast<float>(count));
         for (int i = 0; i < count; i += n) {
             const V vx = hn::Add(hn::Set(d, sx + static_cast<float>(i)), steps);
             const V vq = hn::LoadU(d, depths + i);
@@ -169,8 +181,10 @@ struct CellGrid {
             hn::StoreU(hn::Mul(row(4), inverse), d, &y[j][i]);
             hn::StoreU(hn::Mul(row(8), inverse), d, &q[j][i]);
             hn::StoreU(denominator, d, &w[j][i]);
+            const V beyond = hn::Sub(end, hn::Set(d, static_cast<float>(i)));
+            const auto front = hn::Or(hn::Gt(denominator, hn::Zero(d)), hn::Ge(steps, beyond));
+            allFront = allFront && hn::AllTrue(d, front);
         }
-        for (int i = 0; i < count; ++i) allFront &= w[j][i] > 0.0f;
     }
 
     /// Which cells of row j may show in the tile: those that reach into it and do not turn away
@@ -215,8 +229,10 @@ struct CellGrid {
 };
 
 /// Draws the cells of a block, whose first pixel is (x0, y0).
-HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
-                            const SourceBlock& block, const BlockTexels& texels, int x0, int y0) {
+/// Meanwhile the block whose texels are `ahead` is fetched into the cache: memory cannot tell which
+/// comes next.
+HWY_NOINLINE void drawCells(Target& t, const Source& s, const Warp& warp, const SourceBlock& block,
+                            const BlockTexels& texels, int x0, int y0, const BlockTexels& ahead) {
     CellGrid grid;
     const int xEnd = std::min(x0 + kBlock, s.width - 1), yEnd = std::min(y0 + kBlock, s.height - 1);
     std::uint32_t needed[CellGrid::kSide] = {};
@@ -227,6 +243,11 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
     float depths[CellGrid::kPitch] = {};
     const int columns = xEnd - x0 + 1;
     for (int y = y0; y <= yEnd; ++y) {
+        if (ahead.q) {
+            hwy::Prefetch(ahead.q + ahead.at(0, y - y0));
+            hwy::Prefetch(ahead.q + ahead.at(kBlock - 1, y - y0));
+            hwy::Prefetch(ahead.info + ahead.at(0, y - y0));
+        }
         if (!needed[y - y0]) continue;
         const float* q = texels.q + texels.at(0, y - y0);
         if (columns == CellGrid::kSide)  // by far most: a copy of fixed length is inlined
@@ -282,7 +303,7 @@ HWY_NOINLINE void drawCells(const Target& t, const Source& s, const Warp& warp,
 }
 
 /// Draws the squares around the edge pixels of a block, whose first pixel is (x0, y0).
-HWY_NOINLINE void drawExtensions(const Target& t, const Source& s, const Warp& warp,
+HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
                                  const SourceBlock& block, const BlockTexels& texels, int x0,
                                  int y0) {
     for (int j = 0; j < kBlock; ++j) {
@@ -307,28 +328,37 @@ HWY_NOINLINE void drawExtensions(const Target& t, const Source& s, const Warp& w
     }
 }
 
-void RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uint32_t> blocks,
+bool RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uint32_t> blocks,
                      const SampleGrid& grid, float qLimit, float* samples) {
-    std::memset(samples, 0, grid.count() * sizeof(float));
-    const Target t{samples, grid.side(), grid.stride(), qLimit};
+    Target t{samples, grid.count(), grid.side(), grid.stride(), qLimit};
     BlockBuffer buffer;
     const float leafGrow = kLeafGrow * static_cast<float>(grid.perPixel);
-    for (const std::uint32_t index : blocks) {
-        const SourceBlock& block = s.blocks[index];
+    const auto corner = [&](std::uint32_t index) {
+        return glm::ivec2(static_cast<int>(index % s.blocksX),
+                          static_cast<int>(index / s.blocksX)) *
+               kBlock;
+    };
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        const SourceBlock& block = s.blocks[blocks[k]];
         for (std::uint32_t i = block.leafBegin; i < block.leafEnd; ++i)
             drawLeaf(t, warp, s.leaves[i], leafGrow);
         if (!block.anyCell) continue;
-        const int x0 = static_cast<int>(index % s.blocksX) * kBlock;
-        const int y0 = static_cast<int>(index / s.blocksX) * kBlock;
-        drawCells(t, s, warp, block, blockTexels(s, x0, y0, buffer), x0, y0);
+        // Texels of a view that fills its page stay where they are.
+        BlockTexels ahead;
+        if (s.whole && k + 1 < blocks.size() && s.blocks[blocks[k + 1]].anyCell) {
+            const glm::ivec2 next = corner(blocks[k + 1]);
+            ahead = blockTexels(s, next.x, next.y, buffer);
+        }
+        const glm::ivec2 at = corner(blocks[k]);
+        drawCells(t, s, warp, block, blockTexels(s, at.x, at.y, buffer), at.x, at.y, ahead);
     }
     for (const std::uint32_t index : blocks) {
         const SourceBlock& block = s.blocks[index];
         if (!block.anyEdge) continue;
-        const int x0 = static_cast<int>(index % s.blocksX) * kBlock;
-        const int y0 = static_cast<int>(index / s.blocksX) * kBlock;
-        drawExtensions(t, s, warp, block, blockTexels(s, x0, y0, buffer), x0, y0);
+        const glm::ivec2 at = corner(index);
+        drawExtensions(t, s, warp, block, blockTexels(s, at.x, at.y, buffer), at.x, at.y);
     }
+    return !t.empty;
 }
 
 }  // namespace stx::surface::HWY_NAMESPACE
@@ -339,10 +369,11 @@ namespace stx::surface {
 
 HWY_EXPORT(RasteriseSource);
 
-void rasteriseSource(const Source& source, const Warp& sampleFromSource,
+bool rasteriseSource(const Source& source, const Warp& sampleFromSource,
                      std::span<const std::uint32_t> blocks, const SampleGrid& grid, float qLimit,
                      float* samples) {
-    HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, qLimit, samples);
+    return HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, qLimit,
+                                                 samples);
 }
 
 }  // namespace stx::surface

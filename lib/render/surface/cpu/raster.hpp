@@ -23,9 +23,9 @@ struct SampleGrid {
 /// Draws blocks of one source as a surface into a tile: the nearest q at each sample, 0 where the
 /// source has nothing, with kSampleFlags in its lowest bits. Surfaces seen from behind are left
 /// out. `sampleFromSource` maps source pixel positions to sample indices; q beyond `qLimit` is cut
-/// off.
-void rasteriseSource(const Source& source, const Warp& sampleFromSource,
-                     std::span<const std::uint32_t> blocks, const SampleGrid& grid, float qLimit,
-                     float* samples);
+/// off. False when nothing of it shows there: then `samples` are left as they were.
+[[nodiscard]] bool rasteriseSource(const Source& source, const Warp& sampleFromSource,
+                                   std::span<const std::uint32_t> blocks, const SampleGrid& grid,
+                                   float qLimit, float* samples);
 
 }  // namespace stx::surface

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include <hwy/cache_control.h>
+
 #include "lib/render/surface/constants.hpp"
 #include "lib/render/surface/cpu/shade_groups.hpp"
 
@@ -338,6 +340,21 @@ HWY_NOINLINE void gatherTaps(const Rgba8Image& image, const TapPlace& taps, int 
     }
 }
 
+/// Fetches the texels of the first and the last piece of a group, between which the others mostly
+/// lie, into the cache, while their weights are found.
+HWY_INLINE void fetchAhead(const Source& source, const Lanes* base, int count) {
+    if (!source.whole) return;
+    const Rgba8Image* bytes = source.whole->texture->rgba8();
+    if (!bytes) return;
+    for (const int l : {0, count - 1}) {
+        const int x = std::clamp(static_cast<int>(base[0][l]), 0, source.width - 1);
+        for (int j = 0; j < kTaps; ++j) {
+            const int y = std::clamp(static_cast<int>(base[1][l]) + j, 0, source.height - 1);
+            hwy::Prefetch(bytes->data() + static_cast<std::size_t>(y) * source.width + x);
+        }
+    }
+}
+
 void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
                 const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
     const hn::ScalableTag<float> d;
@@ -384,6 +401,17 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         }
     }
 
+    if (count > settings.mostSources) {
+        // Neighbours mostly leave out the same sources.
+        const auto used = [&](int s) {
+            const View& view = views[s];
+            for (int l = 0; l < g.count; ++l)
+                if (view.weight[l] > 0.0f) return true;
+            return false;
+        };
+        count = static_cast<int>(std::stable_partition(list, list + count, used) - list);
+    }
+
     static thread_local Lanes bases[32][2];
     static thread_local Lanes kernels[32][kTaps * kTaps];
     static thread_local Lanes masks[32][kTaps * kTaps];
@@ -396,6 +424,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.u[l]), shift)), d, &bases[s][0][l]);
             hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.v[l]), shift)), d, &bases[s][1][l]);
         }
+        fetchAhead(*sources[static_cast<std::size_t>(s)].source, bases[s], g.count);
         if (!view.plain) {
             for (int l = 0; l < kGroup; ++l) {
                 float mask[kTaps * kTaps];
