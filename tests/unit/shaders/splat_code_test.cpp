@@ -148,6 +148,7 @@ Drawn drawVectors(const Inputs& in) {
     source.slopes = in.slopes.data();
     source.sizes = in.sizes.data();
     source.stride = kBlock;
+    source.after = kBlock * kBlock;
     source.fx = static_cast<float>(in.view.fx);
     source.fy = static_cast<float>(in.view.fy);
     source.map = in.map;

@@ -104,6 +104,8 @@ RectangleImages sourceOf(const PageRectangle& r, const Page& page, const Prepare
     if (!prepared.sizes.empty()) s.sizes = prepared.sizes.data() + first;
     s.firstPoint = prepared.firstPoint + static_cast<std::uint32_t>(first);
     s.stride = page.width();
+    s.before = static_cast<std::ptrdiff_t>(first);
+    s.after = static_cast<std::ptrdiff_t>(page.depth->count() - first);
     s.orthographic = r.window.orthographic;
     s.fx = static_cast<float>(r.window.fx);
     s.fy = static_cast<float>(r.window.fy);

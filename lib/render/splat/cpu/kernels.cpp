@@ -11,6 +11,7 @@
 #include "lib/render/splat/cpu/accumulate-inl.hpp"
 #include "lib/render/splat/cpu/patch-inl.hpp"
 #include "lib/render/splat/cpu/point_colour-inl.hpp"
+#include "lib/render/splat/cpu/rows-inl.hpp"
 #include "lib/render/splat/cpu/shape-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -142,6 +143,13 @@ HWY_INLINE VF lowPass(DF d, VF x2) {
     return hn::Mul(b, b);
 }
 
+// Whether a vector of 8-bit colours and what surrounds it may be read from a pixel on.
+HWY_INLINE bool canReadAround(const RectangleImages& s, std::size_t pixel, int count, int lanes) {
+    const auto at = static_cast<std::ptrdiff_t>(pixel);
+    return s.rgba8 && count >= lanes && at - s.stride >= -s.before && at >= 1 - s.before &&
+           at + s.stride + lanes <= s.after;
+}
+
 template <bool kUniform, bool kOpaque, bool kNormals>
 void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
                  const Band& band) {
@@ -191,24 +199,43 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             const VF gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
             const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
             const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
-            const auto weigh = [&](VF wx, VF wy, VF depth, VI at, float* to) HWY_ATTR {
+            const auto weigh = [&](VF wx, VF wy, VF depth, VI at, VF& weight) HWY_ATTR {
                 const VF front = hn::GatherIndex(d, band.depth, at);
                 const auto near = hn::And(p.small, hn::Le(depth, hn::Mul(front, tolerance)));
-                hn::Store(hn::IfThenElseZero(near, hn::Mul(wx, wy)), d, to);
+                weight = hn::IfThenElseZero(near, hn::Mul(wx, wy));
                 return near;
             };
+            RowOfPoints r;
             const VF x0 = hn::Mul(p.quality, lowPass(d, hn::Mul(fx, fx)));
             const VF x1 = hn::Mul(p.quality, lowPass(d, hn::Mul(gx, gx)));
             const VF y0 = lowPass(d, hn::Mul(fy, fy)), y1 = lowPass(d, hn::Mul(gy, gy));
             const VI below = hn::Add(p.at.offset, stride);
             const VF zRight = hn::Add(z, zx);
-            const auto any =
-                hn::Or(hn::Or(weigh(x0, y0, z, p.at.offset, w00),
-                              weigh(x1, y0, zRight, hn::Add(p.at.offset, nextPixel), w10)),
-                       hn::Or(weigh(x0, y1, hn::Add(z, zy), below, w01),
-                              weigh(x1, y1, hn::Add(zRight, zy), hn::Add(below, nextPixel), w11)));
-            std::uint32_t bits = bitsOf(d, any);
+            const auto any = hn::Or(
+                hn::Or(weigh(x0, y0, z, p.at.offset, r.w00),
+                       weigh(x1, y0, zRight, hn::Add(p.at.offset, nextPixel), r.w10)),
+                hn::Or(weigh(x0, y1, hn::Add(z, zy), below, r.w01),
+                       weigh(x1, y1, hn::Add(zRight, zy), hn::Add(below, nextPixel), r.w11)));
+            const std::uint32_t bits = bitsOf(d, any);
+            if (!bits) continue;
             hn::Store(p.at.offset, di, offset);
+            if (kWholeRows && kOpaque && !kNormals && canReadAround(s, pixel, count, lanes)) {
+                // Zeros are added for the others: what they hold must be numbers.
+                r.fx = hn::IfThenElseZero(any, fx);
+                r.fy = hn::IfThenElseZero(any, fy);
+                r.uAcross = hn::IfThenElseZero(any, p.uAcross);
+                r.vAcross = hn::IfThenElseZero(any, p.vAcross);
+                r.uDown = hn::IfThenElseZero(any, p.uDown);
+                r.vDown = hn::IfThenElseZero(any, p.vDown);
+                r.offset = offset;
+                r.gradient = !kUniform || t.uAcross != 0 || t.vDown != 0;
+                addRowOfPoints(s, pixel, bits, r, band);
+                continue;
+            }
+            hn::Store(r.w00, d, w00);
+            hn::Store(r.w10, d, w10);
+            hn::Store(r.w01, d, w01);
+            hn::Store(r.w11, d, w11);
             hn::Store(fx, d, fractionX);
             hn::Store(fy, d, fractionY);
             if (!kUniform) {

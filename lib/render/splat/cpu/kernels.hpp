@@ -27,6 +27,8 @@ struct RectangleImages {
     const std::uint8_t* sizes = nullptr;   ///< null: all 1
     std::uint32_t firstPoint = 0;
     int stride = 0;  ///< texels in a row of the page
+    /// Texels of the page before the first one, and from it on: what may be read.
+    std::ptrdiff_t before = 0, after = 0;
     bool orthographic = false;
     float fx = 1, fy = 1;
     PixelMap map;
