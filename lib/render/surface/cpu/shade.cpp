@@ -107,19 +107,20 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
     }
     alignas(64) std::int32_t edge[kGroup];
     findEdges(*s.source, out, edge);
-    int any = 0, rough = 0;
+    std::uint32_t any = 0, rough = 0;
     for (int l = 0; l < kGroup; ++l) {
         const float e = std::min(static_cast<float>(edge[l]) * (1.0f / kEdgeFade), 1.0f);
-        const int on = out.weight[l] > 0.0f ? 1 : 0;
+        const std::uint32_t on = out.weight[l] > 0.0f ? 1u << l : 0;
         any |= on;
-        rough |= on & (static_cast<float>(edge[l]) < kEdgeFade ? 1 : 0);
+        rough |= static_cast<float>(edge[l]) < kEdgeFade ? on : 0;
         out.weight[l] *= kEdgeWeight + (1.0f - kEdgeWeight) * e;
     }
     out.active = any != 0;
-    out.plain = rough == 0;
+    out.rough = rough;
 }
 
-/// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row.
+/// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row,
+/// `out` aligned to a row.
 HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u, float v,
                          const View& view, int baseU, int baseV, float out[kTaps * kTaps]) {
     const Source& source = *s.source;
@@ -136,6 +137,38 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const float allowed =
         kOnSurface * scale + kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * scale);
     const TapPlace taps = view.tapsOf(source, lane, baseU, baseV);
+#if HWY_TARGET != HWY_SCALAR
+    const Rgba8Image* bytes = taps.page->texture->rgba8();
+    if (taps.stepX == 1 && baseU >= taps.x0 && baseV >= taps.y0 && baseU + kTaps <= taps.x1 &&
+        baseV + kTaps <= taps.y1 && (bytes || !source.hasAlpha)) {
+        // The same, a row of taps at once.
+        const hn::FixedTag<float, kTaps> d;
+        const hn::RebindToSigned<decltype(d)> di;
+        const auto far = hn::Set(d, kFarthestTap * scale), limit = hn::Set(d, allowed);
+        const auto du = hn::Add(hn::ConvertTo(d, hn::Iota(di, 0)),
+                                hn::Set(d, static_cast<float>(baseU) + 0.5f - u));
+        for (int j = 0; j < kTaps; ++j) {
+            const float dv = static_cast<float>(baseV + j) + 0.5f - v;
+            const std::size_t texel = taps.texel(0, j);
+            const auto there = hn::LoadU(d, taps.page->q.data() + texel);
+            const auto change = hn::MulAdd(du, hn::Set(d, pu), hn::Set(d, pv * dv));
+            const auto predicted =
+                hn::Add(hn::Set(d, p), hn::Min(hn::Max(change, hn::Neg(far)), far));
+            const auto on = hn::And(hn::Gt(there, hn::Zero(d)),
+                                    hn::Le(hn::Abs(hn::Sub(there, predicted)), limit));
+            auto value = hn::Set(d, 1.0f);
+            if (source.hasAlpha) {
+                const auto* from = reinterpret_cast<const std::int32_t*>(bytes->data() + texel);
+                const auto colours =
+                    hn::BitCast(hn::RebindToUnsigned<decltype(di)>(), hn::LoadU(di, from));
+                const auto alpha = hn::BitCast(di, hn::ShiftRight<24>(colours));
+                value = hn::Mul(hn::ConvertTo(d, alpha), hn::Set(d, 1.0f / 255.0f));
+            }
+            hn::Store(hn::IfThenElseZero(on, value), d, out + kTaps * j);
+        }
+        return;
+    }
+#endif
     for (int j = 0; j < kTaps; ++j) {
         for (int i = 0; i < kTaps; ++i) {
             const int cx = baseU + i, cy = baseV + j;
@@ -425,16 +458,14 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.v[l]), shift)), d, &bases[s][1][l]);
         }
         fetchAhead(*sources[static_cast<std::size_t>(s)].source, bases[s], g.count);
-        if (!view.plain) {
-            for (int l = 0; l < kGroup; ++l) {
-                float mask[kTaps * kTaps];
-                if (l < g.count && view.weight[l] > 0.0f) {
-                    maskTaps(sources[static_cast<std::size_t>(s)], g, l, view.u[l], view.v[l], view,
-                             static_cast<int>(bases[s][0][l]), static_cast<int>(bases[s][1][l]),
-                             mask);
-                } else {
-                    std::fill(mask, mask + kTaps * kTaps, 0.0f);
-                }
+        if (view.rough) {
+            for (Lanes& tap : masks[s]) std::fill(tap.v, tap.v + kGroup, 1.0f);
+            for (std::uint32_t left = view.rough; left; left &= left - 1) {
+                const int l = std::countr_zero(left);
+                if (l >= g.count || !(view.weight[l] > 0.0f)) continue;
+                alignas(16) float mask[kTaps * kTaps];
+                maskTaps(sources[static_cast<std::size_t>(s)], g, l, view.u[l], view.v[l], view,
+                         static_cast<int>(bases[s][0][l]), static_cast<int>(bases[s][1][l]), mask);
                 for (int t = 0; t < kTaps * kTaps; ++t) masks[s][t][l] = mask[t];
             }
         }
@@ -446,7 +477,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             for (int j = 0; j < kTaps; ++j) {
                 for (int i = 0; i < kTaps; ++i) {
                     auto t = kernel.at(d, i, j);
-                    if (!view.plain)
+                    if (view.rough)
                         t.weight = hn::Mul(t.weight, hn::LoadU(d, &masks[s][j * kTaps + i][l]));
                     hn::StoreU(t.weight, d, &kernels[s][j * kTaps + i][l]);
                     const V wx = hn::Mul(t.weight, t.dx), wy = hn::Mul(t.weight, t.dy);

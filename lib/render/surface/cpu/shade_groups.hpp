@@ -22,7 +22,9 @@ struct View {
     Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
     Lanes weight;
     bool active = false;
-    bool plain = true;      ///< all taps of all lanes lie on one surface, fully covered
+    /// A bit for each lane that is near an edge. All taps of others lie on one surface, fully
+    /// covered.
+    std::uint32_t rough = 0;
     TapPlace taps[kGroup];  ///< of sources that are not whole
 
     /// Where the taps of a lane are, from pixel (baseU, baseV) on.
