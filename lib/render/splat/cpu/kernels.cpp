@@ -100,7 +100,7 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
+            Splats p = splatsOf<kUniform, false>(d, s, t, map, i, pixel, count, band);
             if (!t.opaque) {
                 const auto solid = alphaAbove(d, s, pixel, count, 127);
                 p.small = hn::And(p.small, solid);
@@ -108,8 +108,9 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
             }
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge(d, p, large, band,
-                             [&](int, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
+                    forLarge<false>(d, p, large, band, [&](int, const Ellipse& e) HWY_ATTR {
+                        depthEllipse(d, e, band);
+                    });
             }
             std::uint32_t bits = bitsOf(d, p.small);
             if (!bits) continue;
@@ -178,7 +179,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Splats p = splatsOf<kUniform>(d, s, t, map, i, pixel, count, band);
+            Splats p = splatsOf<kUniform, true>(d, s, t, map, i, pixel, count, band);
             if (!kOpaque) {
                 const auto any = alphaAbove(d, s, pixel, count, 0);
                 p.small = hn::And(p.small, any);
@@ -186,7 +187,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             }
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge(d, p, large, band, [&](int k, const Ellipse& e) HWY_ATTR {
+                    forLarge<true>(d, p, large, band, [&](int k, const Ellipse& e) HWY_ATTR {
                         PointColour point = pointColourOf(s, pixel + k, kOpaque);
                         if (e.uAcross != 0 || e.vDown != 0)
                             addGradient(s, pixel + k, e.uAcross, e.vAcross, e.uDown, e.vDown,

@@ -58,8 +58,9 @@ HWY_INLINE void loadShape(DF d, const RectangleImages& s, std::size_t pixel, int
     }
 }
 
-// kUniform: all points of the block are small and share its tilt.
-template <bool kUniform>
+// kUniform: all points of the block are small and share its tilt. kColour: weights and the steps of
+// colours are wanted.
+template <bool kUniform, bool kColour>
 HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, const RowMap& map,
                            int i, std::size_t pixel, int count, const Band& band) {
     Splats out;
@@ -120,19 +121,23 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     const auto limited = [&](VF v) HWY_ATTR { return hn::Min(hn::Max(v, hn::Neg(limit)), limit); };
     out.slopeX = limited(hn::Mul(hn::Sub(hn::Mul(zu, yv), hn::Mul(zv, yu)), perPixel));
     out.slopeY = limited(hn::Mul(hn::Sub(hn::Mul(zv, xu), hn::Mul(zu, xv)), perPixel));
-    const VF density = hn::Div(one, hn::Max(one, hn::Max(square(xu, yu), square(xv, yv))));
-    out.quality = hn::Mul(
-        hn::Mul(hn::Set(d, t.quality), hn::IfThenElse(linked, one, hn::Set(d, kEdgeQuality))),
-        hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
-    const VF fade = hn::IfThenElseZero(
-        linked, hn::Min(one, hn::Max(hn::Zero(d),
-                                     hn::MulAdd(det, hn::Set(d, 1 / kFadeTo), hn::Set(d, -1.0f)))));
-    const VF half =
-        hn::Div(hn::Mul(fade, hn::Set(d, 0.5f * kGradient)), hn::IfThenElse(seen, det, one));
-    out.uAcross = hn::Mul(yv, half);
-    out.uDown = hn::Neg(hn::Mul(xv, half));
-    out.vAcross = hn::Neg(hn::Mul(yu, half));
-    out.vDown = hn::Mul(xu, half);
+    if (kColour) {
+        const VF density = hn::Div(one, hn::Max(one, hn::Max(square(xu, yu), square(xv, yv))));
+        out.quality = hn::Mul(
+            hn::Mul(hn::Set(d, t.quality), hn::IfThenElse(linked, one, hn::Set(d, kEdgeQuality))),
+            hn::Max(hn::Mul(density, density), hn::Set(d, kLeastDensity)));
+        const VF fade = hn::IfThenElseZero(
+            linked, hn::Min(one, hn::Max(hn::Zero(d), hn::MulAdd(det, hn::Set(d, 1 / kFadeTo),
+                                                                 hn::Set(d, -1.0f)))));
+        const VF half =
+            hn::Div(hn::Mul(fade, hn::Set(d, 0.5f * kGradient)), hn::IfThenElse(seen, det, one));
+        out.uAcross = hn::Mul(yv, half);
+        out.uDown = hn::Neg(hn::Mul(xv, half));
+        out.vAcross = hn::Neg(hn::Mul(yu, half));
+        out.vDown = hn::Mul(xu, half);
+    } else {
+        out.quality = out.uAcross = out.vAcross = out.uDown = out.vDown = hn::Zero(d);
+    }
     if (!hn::AllFalse(d, out.large)) {
         // The lattice's Gaussian carried into the picture, and the low-pass filter added.
         const VF k = hn::Mul(hn::Mul(size, size), hn::Set(d, kSigmaSource * kSigmaSource));
@@ -198,7 +203,7 @@ HWY_INLINE void forBitsApart(std::uint32_t bits, const F& draw) {
 }
 
 // The large splats among some neighbouring pixels, one by one: draw(pixel, ellipse).
-template <class F>
+template <bool kColour, class F>
 HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Band& band,
                          const F& draw) {
     constexpr int kValues = 13;
@@ -214,7 +219,15 @@ HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Band& 
     hn::Store(boxes.y1, di, box[3]);
     const VF all[kValues] = {p.at.x, p.at.y,    p.at.z,    p.slopeX,  p.slopeY, p.qxx,  p.qxy,
                              p.qyy,  p.quality, p.uAcross, p.vAcross, p.uDown,  p.vDown};
-    for (int k = 0; k < kValues; ++k) hn::Store(all[k], d, v[k]);
+    constexpr int kShape = 8;  // values without those of colour
+    for (int k = 0; k < (kColour ? kValues : kShape); ++k) hn::Store(all[k], d, v[k]);
+    if (!kColour) {
+        forBitsApart(bits, [&](int k) HWY_ATTR {
+            draw(k, Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
+                            kCore2, 1, 0, 0, 0, 0, box[0][k], box[1][k], box[2][k], box[3][k]});
+        });
+        return;
+    }
     forBitsApart(bits, [&](int k) HWY_ATTR {
         draw(k, Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
                         kCore2, v[8][k], v[9][k], v[10][k], v[11][k], v[12][k], box[0][k],
