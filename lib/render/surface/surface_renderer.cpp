@@ -93,8 +93,13 @@ class SurfaceRenderer final : public Renderer {
 };
 
 Image<float> depthOf(Image<float> q, const DepthAxis& axis) {
-    for (float& value : q.pixels())
-        value = value > 0.0f ? static_cast<float>(axis.dist(value)) : kNoDepth;
+    parallelForBlocks(
+        0, static_cast<std::int64_t>(q.count()), 1 << 16, [&](std::int64_t from, std::int64_t to) {
+            for (std::int64_t i = from; i < to; ++i) {
+                float& value = q.data()[i];
+                value = value > 0.0f ? static_cast<float>(axis.dist(value)) : kNoDepth;
+            }
+        });
     return q;
 }
 
