@@ -48,14 +48,16 @@ Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
 }
 
 /// 1 where some pixel of the row lies within kReach of an empty one, in the row.
-void markRow(const Image<float>& depth, int y, std::vector<std::uint8_t>& near) {
+void markRow(const Image<float>& depth, int y, std::uint8_t* near) {
     const auto row = depth.row(y);
     const int w = depth.width();
-    std::fill(near.begin(), near.end(), std::uint8_t{0});
+    std::fill(near, near + w, std::uint8_t{0});
+    int marked = 0;  // all that shall be, up to here
     for (int x = 0; x < w; ++x) {
         if (hasPoint(row[x])) continue;
-        const int to = std::min(w - 1, x + kReach);
-        for (int i = std::max(0, x - kReach); i <= to; ++i) near[i] = 1;
+        const int to = std::min(w, x + kReach + 1);
+        for (int i = std::max(marked, x - kReach); i < to; ++i) near[i] = 1;
+        marked = to;
     }
 }
 
@@ -184,13 +186,16 @@ void Silhouettes::carve(Frame& frame, const Camera& camera) const {
     // Whether a pixel is looked at depends on depths that carving changes: look first, carve then.
     Image<float> covered(w, h, -1.0f);
     parallelFor(0, (h + kRowsPerTask - 1) / kRowsPerTask, [&](std::int64_t task) {
-        std::vector<std::uint8_t> rowMark(w), mark(w);
         const int from = static_cast<int>(task) * kRowsPerTask,
                   to = std::min(h, from + kRowsPerTask);
+        const int first = std::max(0, from - kReach), last = std::min(h - 1, to - 1 + kReach);
+        Image<std::uint8_t> rowMarks(w, last - first + 1);
+        for (int y = first; y <= last; ++y) markRow(frame.depth, y, rowMarks.row(y - first).data());
+        std::vector<std::uint8_t> mark(w);
         for (int y = from; y < to; ++y) {
             std::fill(mark.begin(), mark.end(), std::uint8_t{0});
             for (int j = std::max(0, y - kReach); j <= std::min(h - 1, y + kReach); ++j) {
-                markRow(frame.depth, j, rowMark);
+                const auto rowMark = rowMarks.row(j - first);
                 for (int x = 0; x < w; ++x) mark[x] |= rowMark[x];
             }
             for (int x = 0; x < w; ++x) {
