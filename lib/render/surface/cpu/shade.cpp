@@ -4,8 +4,6 @@
 #include <bit>
 #include <cmath>
 
-#include <hwy/cache_control.h>
-
 #include "lib/render/surface/constants.hpp"
 #include "lib/render/surface/cpu/shade_groups.hpp"
 
@@ -13,6 +11,8 @@
 #define HWY_TARGET_INCLUDE "lib/render/surface/cpu/shade.cpp"
 #include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
 #include <hwy/highway.h>
+
+#include "lib/render/surface/cpu/fetch-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stx::surface::HWY_NAMESPACE {
@@ -282,110 +282,6 @@ HWY_INLINE void solveFirstRow(D d, const V* m, V ridge, V* out) {
     const V first = hn::Div(hn::Set(d, 1.0f), hn::Max(schur, hn::Mul(m[0], hn::Set(d, 1e-4f))));
     out[0] = first;
     for (int i = 0; i < 5; ++i) out[i + 1] = hn::Neg(hn::Mul(y[i], first));
-}
-
-/// Running sums of one lane's colour: RGBA, several times over, to be added up at the end.
-struct alignas(64) ColourSum {
-    float v[16];
-};
-
-/// The weights of the taps of all pieces of a group, as fetching wants them: the four of a row side
-/// by side.
-struct TapWeights {
-    /// v[row][l % 4] holds the row's taps of piece l from 4 (l / 4) on: what transposing blocks of
-    /// four pieces gives.
-    Lanes v[kTaps][4];
-
-    [[nodiscard]] const float* row(int j, int lane) const { return &v[j][lane & 3][lane & ~3]; }
-
-    /// Keeps four taps of a row for the pieces l and following, a vector of each.
-    template <class D, class V = hn::Vec<D>>
-    HWY_INLINE void store(D d, int j, int l, const V* taps) {
-#if HWY_TARGET == HWY_SCALAR
-        (void)d;
-        for (int i = 0; i < kTaps; ++i) v[j][l & 3][(l & ~3) + i] = hn::GetLane(taps[i]);
-#else
-        const V a = hn::InterleaveLower(d, taps[0], taps[2]);
-        const V b = hn::InterleaveUpper(d, taps[0], taps[2]);
-        const V e = hn::InterleaveLower(d, taps[1], taps[3]);
-        const V f = hn::InterleaveUpper(d, taps[1], taps[3]);
-        hn::StoreU(hn::InterleaveLower(d, a, e), d, &v[j][0][l]);
-        hn::StoreU(hn::InterleaveUpper(d, a, e), d, &v[j][1][l]);
-        hn::StoreU(hn::InterleaveLower(d, b, f), d, &v[j][2][l]);
-        hn::StoreU(hn::InterleaveUpper(d, b, f), d, &v[j][3][l]);
-#endif
-    }
-};
-
-/// Adds the weighted taps of one lane of a float texture.
-HWY_NOINLINE void fetchFloats(const RgbaFloatImage& image, const TapPlace& taps, int baseU,
-                              int baseV, const TapWeights& weights, int lane, ColourSum& sum) {
-    for (int j = 0; j < kTaps; ++j) {
-        for (int i = 0; i < kTaps; ++i) {
-            const int x = baseU + i, y = baseV + j;
-            if (x < taps.x0 || y < taps.y0 || x >= taps.x1 || y >= taps.y1) continue;
-            const float w = weights.row(j, lane)[i];
-            const glm::vec4 texel = image.data()[taps.texel(i, j)];
-            for (int c = 0; c < 4; ++c) sum.v[c] += w * texel[c];
-        }
-    }
-}
-
-/// The same of 8-bit texels, four rows of four: as many of a row at once as a vector takes.
-HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const TapWeights& weights,
-                          int lane, ColourSum& sum) {
-    const hn::CappedTag<float, 16> d;
-    using V = hn::Vec<decltype(d)>;
-    constexpr int kN = static_cast<int>(hn::MaxLanes(d));
-    if constexpr (kN < 4) {
-        for (int t = 0; t < kTaps * kTaps; ++t)
-            for (int c = 0; c < 4; ++c)
-                sum.v[c] += weights.row(t / kTaps, lane)[t % kTaps] *
-                            static_cast<float>(texels[t / kTaps * stride + t % kTaps][c]);
-    } else {
-        constexpr int kTexels = kN / 4;  // in one vector
-        const hn::Rebind<std::uint8_t, decltype(d)> d8;
-        const hn::RebindToSigned<decltype(d)> d32;
-        const auto spread = hn::ShiftRight<2>(hn::Iota(d32, 0));
-        V acc = hn::Load(d, sum.v);
-        for (int j = 0; j < kTaps; ++j) {
-            const V row = hn::LoadDup128(d, weights.row(j, lane));
-            for (int i = 0; i < kTaps; i += kTexels) {
-                const auto* from = &texels[j * stride + i].x;
-                const V texel = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, from)));
-                const auto indices = hn::IndicesFromVec(d, hn::Add(spread, hn::Set(d32, i)));
-                acc = hn::MulAdd(hn::TableLookupLanes(row, indices), texel, acc);
-            }
-        }
-        hn::Store(acc, d, sum.v);
-    }
-}
-
-/// The texels of taps that are not side by side or not all there, which count nothing.
-HWY_NOINLINE void gatherTaps(const Rgba8Image& image, const TapPlace& taps, int baseU, int baseV,
-                             glm::u8vec4* out) {
-    for (int j = 0; j < kTaps; ++j) {
-        for (int i = 0; i < kTaps; ++i) {
-            const int x = baseU + i, y = baseV + j;
-            const bool inside = x >= taps.x0 && y >= taps.y0 && x < taps.x1 && y < taps.y1;
-            out[j * kTaps + i] = inside ? image.data()[taps.texel(i, j)] : glm::u8vec4(0);
-        }
-    }
-}
-
-/// Fetches the texels of the first and the last piece of a group, between which the others mostly
-/// lie, into the cache, while their weights are found.
-HWY_INLINE void fetchAhead(const Source& source, const Lanes* base, int count) {
-    if (!source.whole) return;
-    const Rgba8Image* bytes = source.whole->texture->rgba8();
-    if (!bytes) return;
-    for (const int l : {0, count - 1}) {
-        const int x = std::clamp(static_cast<int>(base[0][l]), 0, source.width - 1);
-        for (int j = 0; j < kTaps; ++j) {
-            const int y = std::clamp(static_cast<int>(base[1][l]) + j, 0, source.height - 1);
-            hwy::Prefetch(bytes->data() + static_cast<std::size_t>(y) * source.width + x);
-        }
-    }
 }
 
 void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
