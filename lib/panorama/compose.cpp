@@ -6,6 +6,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/model/srgb8.hpp"
 #include "lib/panorama/footprints.hpp"
+#include "lib/panorama/kernels.hpp"
 #include "lib/panorama/panorama.hpp"
 #include "lib/panorama/work_copy.hpp"
 
@@ -31,16 +32,27 @@ class Drawn {
         worldFromCamera_ = glm::mat3_cast(camera.worldFromCamera);
     }
 
-    /// sRGB-coded colour (0..1) and how much the picture covers in a direction; 0 = nothing.
-    [[nodiscard]] glm::vec4 at(glm::dvec3 direction) const {
-        const auto p = lens_.position(direction * worldFromCamera_);
-        if (!p) return glm::vec4(0);
-        const glm::dvec2 pixel = copy_.pixel(*p);
-        const double edge = std::min(
-            {pixel.x, pixel.y, copy_.colour.width() - pixel.x, copy_.colour.height() - pixel.y});
-        if (edge <= -0.5) return glm::vec4(0);
-        return {wide_ > 1 ? wide(pixel) : narrow(pixel),
-                static_cast<float>(std::min(1.0, edge + 0.5))};
+    /// Where pixels of a row of the panorama are in the picture (kNowhere: behind the camera). The
+    /// camera of `row` comes from here.
+    void positions(RowOfRays row, double* x, double* y) const {
+        row.worldFromCamera = worldFromCamera_;
+        row.lens = lens_;
+        row.extent = copy_.extent();
+        row.size = copy_.colour.size();
+        positionsOf(row, x, y);
+    }
+    /// How much the picture covers of a pixel of the panorama there; 0 = nothing.
+    [[nodiscard]] float coverage(double x, double y) const {
+        const double edge = std::min({x, y, copy_.colour.width() - x, copy_.colour.height() - y});
+        return edge <= -0.5 ? 0.0f : static_cast<float>(std::min(1.0, edge + 0.5));
+    }
+    /// sRGB-coded colours (0..1) at positions.
+    void colours(const double* x, const double* y, std::size_t count, glm::vec4* out) const {
+        if (wide_ <= 1) {
+            cubicColours(copy_.colour, x, y, count, out);
+            return;
+        }
+        for (std::size_t i = 0; i < count; ++i) out[i] = glm::vec4(wide({x[i], y[i]}), 1);
     }
 
   private:
@@ -49,29 +61,6 @@ class Drawn {
         if (t < 1) return (1.5f * t - 2.5f) * t * t + 1;
         if (t < 2) return ((-0.5f * t + 2.5f) * t - 4) * t + 2;
         return 0;
-    }
-    /// cubic() of four pixels, the second of which is `t` (0..1) away.
-    static std::array<float, 4> cubics(float t) {
-        const auto near = [](float d) { return (1.5f * d - 2.5f) * d * d + 1; };
-        const auto far = [](float d) { return ((-0.5f * d + 2.5f) * d - 4) * d + 2; };
-        return {far(1 + t), near(t), near(1 - t), far(2 - t)};
-    }
-    [[nodiscard]] glm::vec3 narrow(glm::dvec2 pixel) const {
-        const double px = pixel.x - 0.5, py = pixel.y - 0.5;
-        const int x0 = static_cast<int>(std::floor(px)), y0 = static_cast<int>(std::floor(py));
-        const auto tx = static_cast<float>(px - x0), ty = static_cast<float>(py - y0);
-        const int w = copy_.colour.width(), h = copy_.colour.height();
-        const auto wx = cubics(tx), wy = cubics(ty);
-        int xs[4];
-        for (int i = 0; i < 4; ++i) xs[i] = std::clamp(x0 - 1 + i, 0, w - 1);
-        glm::vec4 sums(0);
-        for (int j = 0; j < 4; ++j) {
-            const glm::u8vec4* row = copy_.colour.row(std::clamp(y0 - 1 + j, 0, h - 1)).data();
-            for (int i = 0; i < 4; ++i)
-                sums += wy[static_cast<std::size_t>(j)] * wx[static_cast<std::size_t>(i)] *
-                        glm::vec4(row[xs[i]]);
-        }
-        return glm::clamp(glm::vec3(sums) / 255.0f, 0.0f, 1.0f);
     }
     [[nodiscard]] glm::vec3 wide(glm::dvec2 pixel) const {
         const float px = static_cast<float>(pixel.x) - 0.5f;
@@ -100,15 +89,62 @@ class Drawn {
     float wide_ = 1;
 };
 
+/// Pixels of one row that show a picture.
+struct RowPixels {
+    std::size_t count = 0;
+    std::vector<int> column;
+    std::vector<double> sine, cosine, x, y;  ///< of the longitude; in the picture
+    std::vector<float> weight;
+    std::vector<glm::vec3> factor;
+    std::vector<glm::vec4> colour;
+
+    explicit RowPixels(std::size_t most)
+        : column(most),
+          sine(most),
+          cosine(most),
+          x(most),
+          y(most),
+          weight(most),
+          factor(most),
+          colour(most) {}
+    void add(int c, glm::dvec2 turn, float w, glm::vec3 f) {
+        column[count] = c;
+        sine[count] = turn.x;
+        cosine[count] = turn.y;
+        weight[count] = w;
+        factor[count++] = f;
+    }
+    /// Positions and colours in a picture. What it does not cover is left out; weights become those
+    /// of what it does.
+    void find(const Drawn& picture, double latitudeSine, double latitudeCosine) {
+        picture.positions(
+            {latitudeSine, latitudeCosine, sine.data(), cosine.data(), count, {}, {}, {}, {}},
+            x.data(), y.data());
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const float covered = picture.coverage(x[i], y[i]);
+            if (covered <= 0) continue;
+            column[kept] = column[i];
+            x[kept] = x[i];
+            y[kept] = y[i];
+            weight[kept] = weight[i] * covered;
+            factor[kept++] = factor[i];
+        }
+        count = kept;
+        picture.colours(x.data(), y.data(), count, colour.data());
+    }
+};
+
 /// Adds one picture to rows [top, top + sums.height()) of the panorama: linear light, weighted.
 void draw(const Drawn& picture, const Footprint& print, int index, const Image<int>& labels,
           const glm::dvec3& gain, const Image<glm::vec3>& correction, int width, int top,
           Image<glm::vec4>& sums) {
-    const double cells = static_cast<double>(labels.width()) / width;
+    const int gridWidth = labels.width();
+    const double cells = static_cast<double>(gridWidth) / width;
     const int first = std::max(top, static_cast<int>((print.box.y - 2) / cells));
     const int last = std::min(top + sums.height(),
                               static_cast<int>((print.box.y + print.box.height + 2) / cells) + 1);
-    const bool all = print.box.width >= labels.width();
+    const bool all = print.box.width >= gridWidth;
     const int left = all ? 0 : static_cast<int>(std::floor((print.box.x - 2) / cells));
     const int right =
         all ? width
@@ -120,10 +156,12 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
         const double longitude = M_PI * (1 - 2 * (x + 0.5) / width);
         turns.emplace_back(std::sin(longitude), std::cos(longitude));
     }
+    const LinearTable& linear = linearTable();
     parallelForBlocks(first, last, 4, [&](std::int64_t begin, std::int64_t end) {
+        RowPixels pixels(static_cast<std::size_t>(std::max(0, right - left)));
         for (auto y = static_cast<int>(begin); y < end; ++y) {
             const double latitude = M_PI * (0.5 - 2 * (y + 0.5) / width);
-            const double sine = std::sin(latitude), level = std::cos(latitude);
+            pixels.count = 0;
             const auto cy = static_cast<float>((y + 0.5) * cells - 0.5);
             const int gy = static_cast<int>(std::floor(cy));
             const float ty = cy - static_cast<float>(gy);
@@ -136,18 +174,17 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
             bool some = false;
             const auto goTo = [&](int whole) {
                 cellAt = whole;
-                const int gx = (whole % labels.width() + labels.width()) % labels.width();
+                int gx = whole;
+                while (gx < 0) gx += gridWidth;
+                while (gx >= gridWidth) gx -= gridWidth;
+                const std::array<int, 2> columns = {gx, gx + 1 < gridWidth ? gx + 1 : 0};
                 some = false;
                 for (std::size_t c = 0; c < 4; ++c) {
-                    int column = gx + static_cast<int>(c & 1);
-                    column -= column >= labels.width() ? labels.width() : 0;
-                    mine[c] = labels.at(column, ys[c >> 1]) == index;
+                    mine[c] = labels.at(columns[c & 1], ys[c >> 1]) == index;
                     some = some || mine[c];
                 }
                 for (std::size_t c = 0; c < 4 && some; ++c) {
-                    int column = gx + static_cast<int>(c & 1);
-                    column -= column >= labels.width() ? labels.width() : 0;
-                    const int own = print.column(column, labels.width());
+                    const int own = print.column(columns[c & 1], gridWidth);
                     const int ownRow = ys[c >> 1] - print.box.y;
                     corrections[c] = own >= 0 && ownRow >= 0 && ownRow < print.box.height
                                          ? &correction.at(own, ownRow)
@@ -156,7 +193,8 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
             };
             for (int x = left; x < right; ++x) {
                 const double cx = (x + 0.5) * cells - 0.5;
-                const int whole = static_cast<int>(std::floor(cx));
+                int whole = static_cast<int>(cx);
+                whole -= cx < whole;
                 if (whole != cellAt) goTo(whole);
                 if (!some) {
                     // On to the next cell, but for rounding.
@@ -171,19 +209,22 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
                 for (std::size_t c = 0; c < 4; ++c)
                     if (mine[c]) weight += shares[c];
                 if (weight <= 0) continue;
-                const glm::dvec2 turn = turns[static_cast<std::size_t>(x - left)];
-                glm::vec4 colour = picture.at({-level * turn.x, sine, -level * turn.y});
-                if (colour.a <= 0) continue;
                 glm::vec4 factor(0);
                 for (std::size_t c = 0; c < 4; ++c)
                     if (corrections[c]) factor += shares[c] * glm::vec4(*corrections[c], 1);
+                pixels.add(x, turns[static_cast<std::size_t>(x - left)], weight,
+                           factor.a > 0 ? glm::vec3(factor) / factor.a : glm::vec3(1));
+            }
+            pixels.find(picture, std::sin(latitude), std::cos(latitude));
+            const auto to = sums.row(y - top);
+            for (std::size_t i = 0; i < pixels.count; ++i) {
+                const glm::vec4 c = pixels.colour[i];
                 const glm::vec3 light =
-                    withGain(
-                        {linearByTable(colour.r), linearByTable(colour.g), linearByTable(colour.b)},
-                        gain) *
-                    (factor.a > 0 ? glm::vec3(factor) / factor.a : glm::vec3(1));
-                const float w = weight * colour.a;
-                sums.at((x % width + width) % width, y - top) += w * glm::vec4(light, 1);
+                    withGain({linear.linear(c.r), linear.linear(c.g), linear.linear(c.b)}, gain) *
+                    pixels.factor[i];
+                const int x = pixels.column[i];
+                to[static_cast<std::size_t>((x % width + width) % width)] +=
+                    pixels.weight[i] * glm::vec4(light, 1);
             }
         }
     });

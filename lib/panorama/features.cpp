@@ -143,29 +143,27 @@ std::vector<Feature> cornersOf(const Image<float>& strength, std::size_t most) {
     return out;
 }
 
-glm::vec2 gradientAt(const Gradients& g, glm::vec2 pixel) {
-    const float px = std::clamp(pixel.x - 0.5f, 0.0f, g.x.width() - 1.001f);
-    const float py = std::clamp(pixel.y - 0.5f, 0.0f, g.x.height() - 1.001f);
-    const int x = static_cast<int>(px), y = static_cast<int>(py);
-    const float tx = px - static_cast<float>(x), ty = py - static_cast<float>(y);
-    const auto mix = [&](const Image<float>& i) {
-        const float *a = &i.at(x, y), *b = &i.at(x, y + 1);
-        const float top = a[0] + (a[1] - a[0]) * tx, bottom = b[0] + (b[1] - b[0]) * tx;
-        return top + (bottom - top) * ty;
-    };
-    return {mix(g.x), mix(g.y)};
-}
+/// Gradients at many places around a corner, and then their directions and lengths.
+template <std::size_t Count>
+struct Around {
+    std::array<float, Count> x, y;
+    std::array<float, Count> turn, length;
 
-/// The angle of a vector as a share of a turn, 0..1, to 1e-5: arc tangents by a polynomial.
-float turnOf(glm::vec2 v) {
-    const float x = std::abs(v.x), y = std::abs(v.y);
-    const float a = std::min(x, y) / std::max(std::max(x, y), 1e-20f), s = a * a;
-    float angle = ((-0.0464964749f * s + 0.15931422f) * s - 0.327622764f) * s * a + a;
-    angle *= 0.5f / static_cast<float>(M_PI);
-    if (y > x) angle = 0.25f - angle;
-    if (v.x < 0) angle = 0.5f - angle;
-    return v.y < 0 ? 1 - angle : angle;
-}
+    /// Directions are shares of a turn, 0..1, to 1e-5: arc tangents by a polynomial.
+    void measure() {
+        for (std::size_t i = 0; i < Count; ++i) {
+            const float ax = std::abs(x[i]), ay = std::abs(y[i]);
+            const float less = ax < ay ? ax : ay, more = ax < ay ? ay : ax;
+            const float a = less / (more > 1e-20f ? more : 1e-20f), s = a * a;
+            float angle = ((-0.0464964749f * s + 0.15931422f) * s - 0.327622764f) * s * a + a;
+            angle *= 0.5f / static_cast<float>(M_PI);
+            angle = ay > ax ? 0.25f - angle : angle;
+            angle = x[i] < 0 ? 0.5f - angle : angle;
+            turn[i] = y[i] < 0 ? 1 - angle : angle;
+            length[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]);
+        }
+    }
+};
 
 /// exp(-x) of x = 0, step, 2 step...
 template <std::size_t Count>
@@ -177,16 +175,36 @@ std::array<float, Count> bell(float step) {
 
 /// The directions that gradients around a corner have most: the first, and others nearly as strong.
 std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
-    constexpr int kBins = 36;
+    constexpr int kBins = 36, kReach = 8, kWidth = 2 * kReach + 1;
+    static_assert(kReach + 2 <= kMargin);
     static const auto weights = bell<65>(1.0f / 32);  // by the square of the distance
     std::array<float, kBins> bins{}, smooth{};
-    for (int dy = -8; dy <= 8; ++dy) {
-        for (int dx = -8; dx <= 8; ++dx) {
+    // All places lie between pixels in the same way.
+    const int x0 = static_cast<int>(pixel.x - 0.5f), y0 = static_cast<int>(pixel.y - 0.5f);
+    const float tx = pixel.x - 0.5f - static_cast<float>(x0),
+                ty = pixel.y - 0.5f - static_cast<float>(y0);
+    Around<kWidth * kWidth> around;
+    for (int dy = -kReach; dy <= kReach; ++dy) {
+        const auto line = [&](const Image<float>& from, std::array<float, kWidth * kWidth>& to) {
+            const float *a = &from.at(x0 - kReach, y0 + dy), *b = a + from.width();
+            float* out = to.data() + (dy + kReach) * kWidth;
+            for (int i = 0; i < kWidth; ++i) {
+                const float top = a[i] + (a[i + 1] - a[i]) * tx;
+                const float bottom = b[i] + (b[i + 1] - b[i]) * tx;
+                out[i] = top + (bottom - top) * ty;
+            }
+        };
+        line(g.x, around.x);
+        line(g.y, around.y);
+    }
+    around.measure();
+    for (int dy = -kReach; dy <= kReach; ++dy) {
+        for (int dx = -kReach; dx <= kReach; ++dx) {
             const int r2 = dx * dx + dy * dy;
-            if (r2 > 64) continue;
-            const glm::vec2 v = gradientAt(g, pixel + glm::vec2(dx, dy));
-            const float turn = turnOf(v) * kBins;
-            const float weight = glm::length(v) * weights[static_cast<std::size_t>(r2)];
+            if (r2 > kReach * kReach) continue;
+            const auto i = static_cast<std::size_t>((dy + kReach) * kWidth + dx + kReach);
+            const float turn = around.turn[i] * kBins;
+            const float weight = around.length[i] * weights[static_cast<std::size_t>(r2)];
             const auto bin = static_cast<int>(turn);
             const float t = turn - static_cast<float>(bin);
             bins[static_cast<std::size_t>(bin % kBins)] += weight * (1 - t);
@@ -214,37 +232,87 @@ std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
     return directions;
 }
 
-Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
-    const glm::vec2 right(std::cos(direction), std::sin(direction)), down(-right.y, right.x);
-    // By half the square of the distance in halves of the spacing: at 8 spacings exp(-1/2).
-    static const auto weights = bell<226>(1.0f / 256);
-    std::array<float, 128> bins{};
-    for (int j = 0; j < 16; ++j) {
-        for (int i = 0; i < 16; ++i) {
-            const glm::vec2 offset((static_cast<float>(i) - 7.5f) * kSpacing,
-                                   (static_cast<float>(j) - 7.5f) * kSpacing);
-            const glm::vec2 v = gradientAt(g, pixel + offset.x * right + offset.y * down);
-            const glm::vec2 turned(glm::dot(v, right), glm::dot(v, down));
-            const int dx = 2 * i - 15, dy = 2 * j - 15;
-            const float weight =
-                glm::length(v) * weights[static_cast<std::size_t>((dx * dx + dy * dy) / 2)];
-            if (weight <= 0) continue;
-            const float d = turnOf(turned) * 8;
-            // Shared among the two nearest cells in x and y and the two nearest directions.
+constexpr int kSamples = 16;  ///< of a descriptor along each side
+
+/// How a sample is shared among the cells of a descriptor, 4 x 4 with a margin of one.
+struct Sharing {
+    int cell = 0;                    ///< the upper left of four
+    std::array<float, 4> weights{};  ///< of the four
+    float bell = 0;                  ///< less towards the edge
+};
+
+std::array<Sharing, kSamples * kSamples> sharings() {
+    std::array<Sharing, kSamples * kSamples> out;
+    for (int j = 0; j < kSamples; ++j)
+        for (int i = 0; i < kSamples; ++i) {
+            Sharing& s = out[static_cast<std::size_t>(j * kSamples + i)];
             const float cx = (static_cast<float>(i) + 0.5f) / 4 - 0.5f;
             const float cy = (static_cast<float>(j) + 0.5f) / 4 - 0.5f;
-            const int x0 = static_cast<int>(std::floor(cx)), y0 = static_cast<int>(std::floor(cy));
-            const int d0 = static_cast<int>(d);
-            const float tx = cx - static_cast<float>(x0), ty = cy - static_cast<float>(y0),
-                        td = d - static_cast<float>(d0);
-            for (int k = 0; k < 8; ++k) {
-                const int x = x0 + (k & 1), y = y0 + (k >> 1 & 1), dir = (d0 + (k >> 2)) % 8;
-                if (x < 0 || y < 0 || x > 3 || y > 3) continue;
-                bins[static_cast<std::size_t>((y * 4 + x) * 8 + dir)] +=
-                    weight * ((k & 1) ? tx : 1 - tx) * ((k >> 1 & 1) ? ty : 1 - ty) *
-                    ((k >> 2) ? td : 1 - td);
-            }
+            const int x = static_cast<int>(std::floor(cx)), y = static_cast<int>(std::floor(cy));
+            const float tx = cx - static_cast<float>(x), ty = cy - static_cast<float>(y);
+            s.cell = (y + 1) * 6 + x + 1;
+            s.weights = {(1 - tx) * (1 - ty), tx * (1 - ty), (1 - tx) * ty, tx * ty};
+            // At 8 spacings from the middle exp(-1/2).
+            const int dx = 2 * i - 15, dy = 2 * j - 15;
+            s.bell = std::exp(-static_cast<float>(dx * dx + dy * dy) / 512);
         }
+    return out;
+}
+
+Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
+    static const auto shared = sharings();
+    const glm::vec2 right(std::cos(direction), std::sin(direction)), down(-right.y, right.x);
+    Around<kSamples * kSamples> around;
+    const float lastX = static_cast<float>(g.x.width()) - 1.001f;
+    const float lastY = static_cast<float>(g.x.height()) - 1.001f;
+    const auto stride = static_cast<std::size_t>(g.x.width());
+    for (int j = 0; j < kSamples; ++j) {
+        const glm::vec2 row = pixel - 0.5f + (static_cast<float>(j) - 7.5f) * kSpacing * down;
+        for (int i = 0; i < kSamples; ++i) {
+            const glm::vec2 p = row + (static_cast<float>(i) - 7.5f) * kSpacing * right;
+            const float px = std::clamp(p.x, 0.0f, lastX), py = std::clamp(p.y, 0.0f, lastY);
+            const int x = static_cast<int>(px), y = static_cast<int>(py);
+            const float tx = px - static_cast<float>(x), ty = py - static_cast<float>(y);
+            const std::size_t at =
+                static_cast<std::size_t>(y) * stride + static_cast<std::size_t>(x);
+            const auto between = [&](const float* a) {
+                const float* b = a + stride;
+                const float top = a[0] + (a[1] - a[0]) * tx, bottom = b[0] + (b[1] - b[0]) * tx;
+                return top + (bottom - top) * ty;
+            };
+            const float gx = between(g.x.data() + at), gy = between(g.y.data() + at);
+            const auto k = static_cast<std::size_t>(j * kSamples + i);
+            around.x[k] = gx * right.x + gy * right.y;
+            around.y[k] = gx * down.x + gy * down.y;
+        }
+    }
+    around.measure();
+    // Shared among the two nearest cells in x and y and the two nearest of eight directions; 8 is
+    // 0.
+    constexpr std::size_t kSlots = 10;
+    std::array<float, 6 * 6 * kSlots> slots{};
+    for (std::size_t k = 0; k < shared.size(); ++k) {
+        const Sharing& s = shared[k];
+        const float weight = around.length[k] * s.bell, d = around.turn[k] * 8;
+        const int d0 = static_cast<int>(d);
+        const float td = d - static_cast<float>(d0), first = weight * (1 - td),
+                    second = weight * td;
+        float* to = slots.data() + static_cast<std::size_t>(s.cell) * kSlots + d0;
+        const auto add = [&](std::size_t cell, float share) {
+            to[cell * kSlots] += first * share;
+            to[cell * kSlots + 1] += second * share;
+        };
+        add(0, s.weights[0]);
+        add(1, s.weights[1]);
+        add(6, s.weights[2]);
+        add(7, s.weights[3]);
+    }
+    std::array<float, 128> bins;
+    for (std::size_t cell = 0; cell < 16; ++cell) {
+        const float* from = slots.data() + ((cell / 4 + 1) * 6 + cell % 4 + 1) * kSlots;
+        for (std::size_t i = 0; i < 8; ++i) bins[cell * 8 + i] = from[i];
+        bins[cell * 8] += from[8];
+        bins[cell * 8 + 1] += from[9];
     }
     float sum = 1e-6f;
     for (const float b : bins) sum += b;

@@ -9,8 +9,9 @@
 namespace stx::panorama {
 
 /// Gradients around a corner, turned with it: 4 x 4 cells of 8 directions, as in SIFT (Lowe 2004),
-/// square roots of shares (Arandjelovic, Zisserman 2012) as bytes.
-using Descriptor = std::array<std::uint8_t, 128>;
+/// square roots of shares (Arandjelovic, Zisserman 2012) as bytes. Aligned as caches are: they are
+/// compared in vectors, by the million.
+struct alignas(64) Descriptor : std::array<std::uint8_t, 128> {};
 
 struct Feature {
     glm::vec2 pixel{0};  ///< of the work copy, (0.5, 0.5) is the first pixel's centre

@@ -6,6 +6,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/srgb8.hpp"
+#include "lib/panorama/kernels.hpp"
 #include "lib/panorama/work_copy.hpp"
 
 namespace stx::panorama {
@@ -45,19 +46,37 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
         const glm::u8vec4 p = copy.colour.pixels()[i];
         light.pixels()[i] = {tables.linear(p.r), tables.linear(p.g), tables.linear(p.b)};
     }
-    const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.worldFromCamera);
+    RowOfRays row;
+    row.worldFromCamera = glm::mat3_cast(camera.worldFromCamera);
+    row.lens = lens;
+    row.extent = extent;
+    row.size = light.size();
+    const auto width = static_cast<std::size_t>(f.box.width);
+    std::vector<double> sines(width), cosines(width), px(width), py(width);
+    for (std::size_t x = 0; x < width; ++x) {
+        const double longitude =
+            M_PI * (1 - 2 * (f.box.x + static_cast<double>(x) + 0.5) / gridWidth);
+        sines[x] = std::sin(longitude);
+        cosines[x] = std::cos(longitude);
+    }
+    row.sines = sines.data();
+    row.cosines = cosines.data();
+    row.count = width;
     const double shorter = std::min(extent.x, extent.y);
     for (int y = 0; y < f.box.height; ++y) {
+        const double latitude = M_PI * (0.5 - 2 * (f.box.y + y + 0.5) / gridWidth);
+        row.sine = std::sin(latitude);
+        row.cosine = std::cos(latitude);
+        positionsOf(row, px.data(), py.data());
         for (int x = 0; x < f.box.width; ++x) {
-            const glm::dvec3 d =
-                PanoramaImage::direction({f.box.x + x + 0.5, f.box.y + y + 0.5}, gridWidth);
-            const auto p = lens.position(d * worldFromCamera);
-            if (!p) continue;
-            const double border = std::min(extent.x - std::abs(p->x), extent.y - std::abs(p->y));
+            const glm::dvec2 pixel(px[static_cast<std::size_t>(x)],
+                                   py[static_cast<std::size_t>(x)]);
+            const glm::dvec2 inner = extent - glm::abs(2.0 * pixel / row.size - 1.0) * extent;
+            const double border = std::min(inner.x, inner.y);
             if (border <= 0) continue;
             f.inside.at(x, y) = static_cast<float>(std::max(1e-4, border / shorter));
             f.whole.at(x, y) = border * cells > 1.5 || border > 0.3 * shorter;
-            f.colour.at(x, y) = linearAt(light, copy.pixel(*p));
+            f.colour.at(x, y) = linearAt(light, pixel);
         }
     }
     return f;

@@ -1,11 +1,13 @@
 #include "lib/panorama/matching.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
-#include <cstdlib>
+#include <numeric>
 #include <random>
 
 #include "lib/base/parallel.hpp"
+#include "lib/panorama/kernels.hpp"
 #include "lib/panorama/small_solver.hpp"
 
 namespace stx::panorama {
@@ -19,10 +21,12 @@ constexpr int kRatioPercent = 86;
 /// yet, and the lens is taken for one without distortion.
 constexpr double kRoughTolerance = 0.009;
 
-int distance(const Descriptor& a, const Descriptor& b) {
-    int sum = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
-    return sum;
+std::vector<std::int16_t> sumsOf(const std::vector<Descriptor>& descriptors) {
+    std::vector<std::int16_t> sums;
+    sums.reserve(descriptors.size());
+    for (const Descriptor& d : descriptors)
+        sums.push_back(static_cast<std::int16_t>(std::accumulate(d.begin(), d.end(), 0)));
+    return sums;
 }
 
 /// A turn that takes two rays of one picture to two of another, whose angles are about the same.
@@ -54,21 +58,26 @@ int triesFor(double share) {
 
 std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const WorkCopy& copyB,
                                  const Features& b) {
-    constexpr int kFar = 1 << 30;
-    std::vector<int> nearestOfB(b.points.size(), -1), distanceOfB(b.points.size(), kFar);
+    std::vector<int> nearestOfB(b.points.size(), -1);
+    std::vector<std::int16_t> distanceOfB(b.points.size(), kFarDescriptors);
     struct Best {
-        int at = -1, distance = kFar, next = kFar;
+        int at = -1;
+        std::int16_t distance = kFarDescriptors, next = kFarDescriptors;
     };
     std::vector<Best> best(a.points.size());
-    // In blocks of descriptors that stay in the first cache.
-    constexpr std::size_t kBlock = 128;
-    for (std::size_t block = 0; block < b.points.size(); block += kBlock) {
-        const std::size_t end = std::min(block + kBlock, b.points.size());
+    const auto sumsA = sumsOf(a.descriptors), sumsB = sumsOf(b.descriptors);
+    std::array<std::int16_t, kDescriptorBlock> distances;
+    std::array<std::uint8_t, kDescriptorBlock> indices;
+    for (std::size_t block = 0; block < b.points.size(); block += kDescriptorBlock) {
+        const std::size_t count = std::min(kDescriptorBlock, b.points.size() - block);
         for (std::size_t i = 0; i < a.points.size(); ++i) {
             Best& mine = best[i];
-            const Descriptor own = a.descriptors[i];  // a copy stays in registers
-            for (std::size_t j = block; j < end; ++j) {
-                const int d = distance(own, b.descriptors[j]);
+            const std::size_t near = nearDescriptors(
+                a.descriptors[i], sumsA[i], b.descriptors.data() + block, sumsB.data() + block,
+                distanceOfB.data() + block, count, mine.next, distances.data(), indices.data());
+            for (std::size_t n = 0; n < near; ++n) {
+                const std::size_t j = block + indices[n];
+                const std::int16_t d = distances[indices[n]];
                 if (d < distanceOfB[j]) {
                     distanceOfB[j] = d;
                     nearestOfB[j] = static_cast<int>(i);
@@ -92,7 +101,8 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
     for (std::size_t i = 0; i < best.size(); ++i) {
         const Best& m = best[i];
         if (m.at < 0 || nearestOfB[static_cast<std::size_t>(m.at)] != static_cast<int>(i)) continue;
-        if (std::int64_t{m.distance} * 100 > std::int64_t{m.next} * kRatioPercent) continue;
+        // One that is alone has nothing to be mistaken for.
+        if (m.next < kFarDescriptors && m.distance * 100 > m.next * kRatioPercent) continue;
         matches.push_back({copyA.position(a.points[i].pixel),
                            copyB.position(b.points[static_cast<std::size_t>(m.at)].pixel)});
     }
@@ -143,26 +153,34 @@ Pair agreeingMatches(const std::vector<Match>& matches, const TurnLens& lens, do
         const auto p = lens.position(turn * a[i]);
         return p && glm::distance(*p, matches[i].b) < tolerance;
     };
+    // The same, one array for each coordinate.
+    std::vector<double> columns(5 * matches.size());
+    const auto column = [&](std::size_t c) { return columns.data() + c * matches.size(); };
+    for (std::size_t i = 0; i < matches.size(); ++i)
+        for (int axis = 0; axis < 3; ++axis) {
+            column(static_cast<std::size_t>(axis))[i] = a[i][axis];
+            if (axis < 2) column(static_cast<std::size_t>(3 + axis))[i] = matches[i].b[axis];
+        }
+    const RayMatches rays{column(0), column(1), column(2), column(3), column(4), matches.size()};
     std::mt19937 random(static_cast<std::uint32_t>(matches.size()));
     std::size_t most = 1;
     // Angles on rays as far apart as the tolerance in the picture.
     const double angle = 1.5 * tolerance / lens.focal;
     const auto all = static_cast<double>(matches.size());
+    const auto count32 = static_cast<std::uint32_t>(matches.size());
     // What is too little to count needs not be found; a larger share, once found, needs fewer.
     int tries = triesFor(std::min(1.0, fewestOf(matches.size()) / all));
     for (int t = 0; t < tries; ++t) {
-        const std::size_t i = random() % matches.size(), j = random() % matches.size();
-        if (i == j || glm::distance(a[i], a[j]) < 8 * tolerance) continue;
-        if (std::abs(glm::distance(a[i], a[j]) - glm::distance(b[i], b[j])) > angle) continue;
+        // Numbers of 32 bits are divided in a third of the time.
+        const std::uint32_t i = static_cast<std::uint32_t>(random()) % count32,
+                            j = static_cast<std::uint32_t>(random()) % count32;
+        if (i == j) continue;
+        const double between = glm::distance(a[i], a[j]);
+        if (between < 8 * tolerance) continue;
+        if (std::abs(between - glm::distance(b[i], b[j])) > angle) continue;
         const glm::dquat turn = turnOfTwo(a[i], a[j], b[i], b[j]);
-        const glm::dmat3 matrix = glm::mat3_cast(turn);
-        std::size_t count = 0;
-        for (std::size_t k = 0; k < matches.size() && count + matches.size() - k > most; ++k) {
-            const glm::dvec3 r = matrix * a[k];
-            if (r.z > -0.02) continue;
-            const glm::dvec2 p = glm::dvec2(r) * (lens.focal / -r.z) - matches[k].b;
-            if (glm::dot(p, p) < tolerance * tolerance) ++count;
-        }
+        const std::size_t count =
+            countAgreeing(rays, glm::mat3_cast(turn), lens.focal, tolerance, most);
         if (count > most) {
             most = count;
             best.bFromA = turn;

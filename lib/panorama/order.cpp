@@ -117,10 +117,11 @@ TurnModel chain(const PictureTree& tree, const std::vector<Pair>& pairs, const T
 double focalByClosing(const PictureTree& tree, const std::vector<Pair>& pairs, double focal) {
     constexpr int kSteps = 50;
     constexpr double kStep = 0.012;  // of the logarithm: from 0.55 to 1.8 times the focal length
-    std::vector<double> costs;
-    for (int i = -kSteps; i <= kSteps; ++i) {
-        const TurnLens lens{focal * std::exp(kStep * i), 0};
-        const auto turns = turnsOf(pairs, lens);
+    std::vector<double> costs(2 * kSteps + 1);
+    parallelFor(-kSteps, kSteps + 1, [&](std::int64_t i) {
+        const TurnLens lens{focal * std::exp(kStep * static_cast<double>(i)), 0};
+        std::vector<glm::dquat> turns;
+        for (const Pair& pair : pairs) turns.push_back(turnOf(pair.matches, lens, pair.bFromA));
         const TurnModel model = chainOf(tree, pairs, turns, lens);
         double cost = 0;
         for (std::size_t p = 0; p < pairs.size(); ++p) {
@@ -131,8 +132,8 @@ double focalByClosing(const PictureTree& tree, const std::vector<Pair>& pairs, d
                 turns[p], glm::inverse(model.worldFromCamera[b]) * model.worldFromCamera[a]);
             cost += std::min(off, 1.0) * std::sqrt(static_cast<double>(pairs[p].matches.size()));
         }
-        costs.push_back(cost);
-    }
+        costs[static_cast<std::size_t>(i + kSteps)] = cost;
+    });
     const auto least = std::min_element(costs.begin(), costs.end());
     const double start = costs[kSteps];
     // Only what a turn that closes says is clear; the rest is left to the adjustment.

@@ -184,23 +184,26 @@ std::vector<Match> alignPatches(const std::vector<WorkCopy>& copies,
         const int from = swapped ? b : a, to = swapped ? a : b;
         const auto f = static_cast<std::size_t>(from), t = static_cast<std::size_t>(to);
         // Features that the other picture should show, spread over what both share.
-        std::vector<PatchMove> places;
+        std::vector<glm::dvec2> places;
         glm::dvec2 last(-1e9);
         for (const Feature& feature : features[f].points) {
             // A pixel's centre: the patch is then taken as it is.
             const glm::dvec2 pixel = glm::floor(glm::dvec2(feature.pixel)) + 0.5;
             if (glm::distance(pixel, last) < 3) continue;
             last = pixel;
-            const auto place = expected(copies[f], copies[t], model, from, to, pixel);
-            if (place && insideOf(pyramids[t][0], place->to, kRadius + 2)) places.push_back(*place);
+            const auto there = seenBy(model, from, to, copies[f].position(pixel));
+            if (there && insideOf(pyramids[t][0], copies[t].pixel(*there), kRadius + 2))
+                places.push_back(pixel);
         }
         // In an order that jumps over the picture, until there are enough.
         std::size_t step = std::max<std::size_t>(1, places.size() * 382 / 1000);
         while (std::gcd(step, places.size()) > 1) ++step;
         const std::size_t enough = out.size() + static_cast<std::size_t>(s.most) / 2;
         for (std::size_t n = 0; n < places.size() && out.size() < enough; ++n) {
-            const std::size_t i = n * step % places.size();
-            PatchMove move = places[i];
+            const auto place =
+                expected(copies[f], copies[t], model, from, to, places[n * step % places.size()]);
+            if (!place) continue;
+            PatchMove move = *place;
             double correlation = 1;
             for (int level = 2; level >= 0 && correlation > 0; --level) {
                 if (level == 2 && s.reach < 5) continue;
@@ -213,7 +216,7 @@ std::vector<Match> alignPatches(const std::vector<WorkCopy>& copies,
                 if (correlation > 0.6) move = tried;
                 if (level > 0) correlation = 1;
             }
-            if (correlation < s.alike || glm::distance(move.to, places[i].to) > s.reach) continue;
+            if (correlation < s.alike || glm::distance(move.to, place->to) > s.reach) continue;
             const glm::dvec2 pf = copies[f].position(move.from), pt = copies[t].position(move.to);
             out.push_back(swapped ? Match{pt, pf} : Match{pf, pt});
         }

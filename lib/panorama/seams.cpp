@@ -137,7 +137,7 @@ class SeamGrid {
                 const glm::ivec2 p = wrapped({f.box.x + x, f.box.y + y});
                 const int old = labels_.at(p.x, p.y);
                 if (old >= 0 && old != own) change.at(x, y) = difference(own, old, p);
-                if (!f.whole.at(x, y)) continue;
+                if (!f.whole.at(x, y) || old == own) continue;
                 nodeOf.at(x, y) = static_cast<int>(cells.size());
                 cells.emplace_back(x, y);
             }
@@ -154,7 +154,7 @@ class SeamGrid {
                 if (p.y + d.y < 0 || p.y + d.y >= height_) continue;
                 const glm::ivec2 q = wrapped(p + d);
                 const int other = labels_.at(q.x, q.y);
-                if (other < 0 || (old == own && other == own)) continue;
+                if (other < 0) continue;
                 const glm::ivec2 c = neighbour(f.box, cell + d);
                 const int m = c.x >= 0 ? nodeOf.at(c.x, c.y) : -1;
                 const float atP = change.at(cell.x, cell.y);
@@ -172,9 +172,8 @@ class SeamGrid {
                 if (d.x < 0 || d.y < 0) continue;  // each two once
                 // q is.
                 const float mine =
-                    old == own ? 0
-                    : old < 0  ? kEndOfPicture
-                               : kSeamLength + atP + (other == old ? atQ : difference(old, own, q));
+                    old < 0 ? kEndOfPicture
+                            : kSeamLength + atP + (other == old ? atQ : difference(old, own, q));
                 flow.addTerminal(n, theirs - both, 0);
                 flow.addTerminal(m, -theirs, 0);
                 if (const float capacity = mine + theirs - both; capacity > 0)
