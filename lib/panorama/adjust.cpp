@@ -13,8 +13,15 @@ namespace {
 /// distance to the middle: where pictures cannot tell, there is no distortion.
 constexpr double kDistortionSpread = 0.03;
 
-/// Unknowns of a pair: turn of a (3), of b (3), logarithm of the focal length, k1 / focal^2.
-constexpr std::size_t kOwn = 8;
+/// How much the focal length of a picture differs from that of all, standard deviation of the
+/// logarithm: lenses of cameras that focus anew become longer or shorter by about as much.
+constexpr double kStretchSpread = 0.01;
+
+/// Unknowns of a pair: turn of a (3), of b (3), logarithm of the focal length, k1 / focal^2; with
+/// own focal lengths those of a and of b.
+constexpr std::size_t kShared = 8, kOwn = 10;
+/// For derivatives of focal lengths and distortion.
+constexpr double kSmallStep = 1e-6;
 
 struct Block {
     std::array<double, kOwn * kOwn> matrix{};
@@ -22,30 +29,41 @@ struct Block {
     double cost = 0;
 };
 
+/// The lens of a picture, with a little more focal length, and with a little more distortion.
+using Lenses = std::array<TurnLens, 3>;
+
 /// Distortion is counted at the corner, so that it has the size of a share for every lens.
 TurnLens lensOf(double logFocal, double corner) {
     const double focal = std::exp(logFocal);
     return {focal, corner * focal * focal};
 }
 
-double huber(double squared, double threshold) {
+Lenses lensesOf(const TurnModel& model, int k) {
+    const TurnLens lens = model.lensOf(k);
+    const double logFocal = std::log(lens.focal), corner = lens.k1 / (lens.focal * lens.focal);
+    return {lens, lensOf(logFocal + kSmallStep, corner), lensOf(logFocal, corner + kSmallStep)};
+}
+
+double robust(double squared, const AdjustSettings& s) {
+    const double threshold = s.huberPixels;
+    if (s.cauchy) return threshold * threshold * std::log1p(squared / (threshold * threshold));
     if (squared <= threshold * threshold) return squared;
     return 2 * threshold * std::sqrt(squared) - threshold * threshold;
 }
 
 /// Adds what one picture sees of the other's positions. `sign`: +1 when `from` is picture a.
 void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm::dvec2 from,
-             glm::dvec2 to, bool fromIsA, const std::array<TurnLens, 3>& lenses,
-             const std::array<double, 2>& steps, const AdjustSettings& s, bool derive) {
+             glm::dvec2 to, bool fromIsA, const Lenses& lensesFrom, const Lenses& lensesTo,
+             const AdjustSettings& s, bool derive) {
     std::array<glm::dvec2, 3> seen;
     glm::dvec3 world(0), inTo(0);
     for (std::size_t l = 0; l < (derive ? 3 : 1); ++l) {
-        const glm::dvec3 w = worldFromFrom * lenses[l].ray(from);
+        const glm::dvec3 w = worldFromFrom * lensesFrom[l].ray(from);
         const glm::dvec3 r = w * worldFromTo;  // transposed: to camera space
-        const auto p = lenses[l].position(r);
+        const auto p = lensesTo[l == 1 ? 0 : l].position(r);
         if (!p) {
             // Behind the camera: as bad as a match that is a whole picture off.
-            if (l == 0) block.cost += huber(4 / (s.pixel * s.pixel), s.huberPixels);
+            if (l == 0) block.cost += robust(4 / (s.pixel * s.pixel), s);
             return;
         }
         seen[l] = *p;
@@ -56,12 +74,14 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
     }
     const glm::dvec2 e = (seen[0] - to) / s.pixel;
     const double squared = glm::dot(e, e);
-    block.cost += huber(squared, s.huberPixels);
+    block.cost += robust(squared, s);
     if (!derive) return;
-    const double weight =
-        squared <= s.huberPixels * s.huberPixels ? 1.0 : s.huberPixels / std::sqrt(squared);
+    const double limit = s.huberPixels * s.huberPixels;
+    const double weight = s.cauchy           ? 1 / (1 + squared / limit)
+                          : squared <= limit ? 1.0
+                                             : s.huberPixels / std::sqrt(squared);
     // How the position changes with the ray in the camera.
-    const TurnLens& lens = lenses[0];
+    const TurnLens& lens = lensesTo[0];
     const double z = -inTo.z;
     const glm::dvec2 plane = glm::dvec2(inTo) / z;
     const double r2 = glm::dot(plane, plane), stretch = 1 + lens.k1 * r2;
@@ -79,11 +99,17 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
             own[static_cast<std::size_t>(i)] = fromIsA ? byTurn[i] : -byTurn[i];
             own[static_cast<std::size_t>(3 + i)] = -own[static_cast<std::size_t>(i)];
         }
-        own[6] = (seen[1][row] - seen[0][row]) / (s.pixel * steps[0]);
-        own[7] = (seen[2][row] - seen[0][row]) / (s.pixel * steps[1]);
-        for (std::size_t a = 0; a < kOwn; ++a) {
+        const double byFrom = (seen[1][row] - seen[0][row]) / (s.pixel * kSmallStep);
+        // The distortion stays where it is in the picture.
+        const double byTo = (1 + 3 * lens.k1 * r2) * lens.focal * plane[row] / s.pixel;
+        own[6] = byFrom + byTo;
+        own[7] = (seen[2][row] - seen[0][row]) / (s.pixel * kSmallStep);
+        own[8] = fromIsA ? byFrom : byTo;
+        own[9] = fromIsA ? byTo : byFrom;
+        const std::size_t count = s.ownFocals ? kOwn : kShared;
+        for (std::size_t a = 0; a < count; ++a) {
             block.right[a] -= weight * own[a] * e[row];
-            for (std::size_t b = 0; b < kOwn; ++b)
+            for (std::size_t b = 0; b < count; ++b)
                 block.matrix[a * kOwn + b] += weight * own[a] * own[b];
         }
     }
@@ -91,11 +117,6 @@ void addSide(Block& block, glm::dmat3 worldFromFrom, glm::dmat3 worldFromTo, glm
 
 std::vector<Block> blocksOf(const TurnModel& model, const std::vector<Pair>& pairs,
                             const AdjustSettings& s, bool derive) {
-    const std::array<double, 2> steps = {1e-6, 1e-6};
-    const double logFocal = std::log(model.lens.focal);
-    const double corner = model.lens.k1 / (model.lens.focal * model.lens.focal);
-    const std::array<TurnLens, 3> lenses = {model.lens, lensOf(logFocal + steps[0], corner),
-                                            lensOf(logFocal, corner + steps[1])};
     std::vector<Block> blocks(pairs.size());
     parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
         const Pair& pair = pairs[static_cast<std::size_t>(i)];
@@ -103,23 +124,28 @@ std::vector<Block> blocksOf(const TurnModel& model, const std::vector<Pair>& pai
         if (!model.known[a] || !model.known[b]) return;
         const glm::dmat3 ra = glm::mat3_cast(model.worldFromCamera[a]);
         const glm::dmat3 rb = glm::mat3_cast(model.worldFromCamera[b]);
+        const Lenses la = lensesOf(model, pair.a), lb = lensesOf(model, pair.b);
         Block& block = blocks[static_cast<std::size_t>(i)];
         for (const Match& m : pair.matches) {
-            addSide(block, ra, rb, m.a, m.b, true, lenses, steps, s, derive);
-            addSide(block, rb, ra, m.b, m.a, false, lenses, steps, s, derive);
+            addSide(block, ra, rb, m.a, m.b, true, la, lb, s, derive);
+            addSide(block, rb, ra, m.b, m.a, false, lb, la, s, derive);
         }
     });
     return blocks;
 }
 
-double priorCost(const TurnLens& lens, const AdjustSettings& s) {
+double priorCost(const TurnModel& model, const AdjustSettings& s) {
+    const TurnLens& lens = model.lens;
     const double f = std::log(lens.focal / s.expectedFocal) / s.focalSpread;
     const double k = lens.k1 / (lens.focal * lens.focal) / kDistortionSpread;
-    return (f * f + k * k) * s.noisePixels * s.noisePixels;
+    double stretched = 0;
+    for (const double t : model.stretch) stretched += t * t;
+    stretched /= kStretchSpread * kStretchSpread;
+    return (f * f + k * k + stretched) * s.noisePixels * s.noisePixels;
 }
 
 double costOf(const TurnModel& model, const std::vector<Pair>& pairs, const AdjustSettings& s) {
-    double cost = priorCost(model.lens, s);
+    double cost = priorCost(model, s);
     for (const Block& block : blocksOf(model, pairs, s, false)) cost += block.cost;
     return cost;
 }
@@ -141,6 +167,12 @@ double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSett
         first = false;
     }
     const std::size_t focalAt = unknowns++, cornerAt = unknowns++;
+    std::vector<std::size_t> stretchAt(count, SIZE_MAX);
+    if (s.ownFocals) {
+        model.stretch.resize(count, 0.0);
+        for (std::size_t k = 0; k < count; ++k)
+            if (model.known[k]) stretchAt[k] = unknowns++;
+    }
     double damping = 1e-4;
     double cost = costOf(model, pairs, s);
     for (int iteration = 0; iteration < s.iterations; ++iteration) {
@@ -156,6 +188,8 @@ double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSett
             }
             index[6] = s.fixFocal ? SIZE_MAX : focalAt;
             index[7] = s.fixDistortion ? SIZE_MAX : cornerAt;
+            index[8] = stretchAt[static_cast<std::size_t>(pairs[p].a)];
+            index[9] = stretchAt[static_cast<std::size_t>(pairs[p].b)];
             for (std::size_t i = 0; i < kOwn; ++i) {
                 if (index[i] == SIZE_MAX) continue;
                 right[index[i]] += blocks[p].right[i];
@@ -173,6 +207,14 @@ double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSett
         matrix[cornerAt * unknowns + cornerAt] += k;
         right[cornerAt] -= s.fixDistortion ? 0 : k * corner;
 
+        const double t = noise / (kStretchSpread * kStretchSpread);
+        for (std::size_t c = 0; c < count; ++c) {
+            const std::size_t i = stretchAt[c];
+            if (i == SIZE_MAX) continue;
+            matrix[i * unknowns + i] += t;
+            right[i] -= t * model.stretch[c];
+        }
+
         bool better = false;
         double gain = 0;
         for (int tries = 0; tries < 8 && !better; ++tries) {
@@ -187,6 +229,10 @@ double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSett
                         moved.worldFromCamera[c] =
                             glm::normalize(quatOf({step[at[c]], step[at[c] + 1], step[at[c] + 2]}) *
                                            moved.worldFromCamera[c]);
+                for (std::size_t c = 0; c < count; ++c)
+                    if (stretchAt[c] != SIZE_MAX)
+                        moved.stretch[c] =
+                            std::clamp(moved.stretch[c] + step[stretchAt[c]], -0.1, 0.1);
                 const double logFocal =
                     std::log(model.lens.focal) + std::clamp(step[focalAt], -0.2, 0.2);
                 moved.lens = lensOf(logFocal, std::clamp(corner + step[cornerAt], -0.25, 0.25));
@@ -210,7 +256,7 @@ double adjust(TurnModel& model, const std::vector<Pair>& pairs, const AdjustSett
 std::optional<glm::dvec2> seenBy(const TurnModel& model, int a, int b, glm::dvec2 p) {
     const auto& from = model.worldFromCamera[static_cast<std::size_t>(a)];
     const auto& to = model.worldFromCamera[static_cast<std::size_t>(b)];
-    return model.lens.position(glm::inverse(to) * (from * model.lens.ray(p)));
+    return model.lensOf(b).position(glm::inverse(to) * (from * model.lensOf(a).ray(p)));
 }
 
 double differenceOf(const TurnModel& model, const Pair& pair, const Match& match, double pixel) {

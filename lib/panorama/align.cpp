@@ -160,6 +160,39 @@ double noiseOf(const Series& s) {
                       0.01, 20.0);
 }
 
+/// Half of all matches differ by no more than this, work pixels.
+double medianOfAll(const Series& s) {
+    std::vector<double> differences;
+    for (const Pair& pair : s.pairs)
+        for (const Match& m : pair.matches)
+            differences.push_back(differenceOf(s.model, pair, m, s.adjusting.pixel));
+    return medianOf(std::move(differences), 1e9);
+}
+
+/// Where half of the matches or less are right, brings together what agrees.
+void adjustToMost(Series& s) {
+    s.adjusting.cauchy = true;
+    for (const double pixels : {2.0, 1.0, 0.5}) {
+        s.adjusting.huberPixels = pixels;
+        adjust(s.model, s.pairs, s.adjusting);
+    }
+    s.adjusting.cauchy = false;
+}
+
+/// Cameras that focus anew have another focal length then: each picture gets its own where that
+/// brings matches clearly nearer to each other.
+void tryOwnFocals(Series& s) {
+    constexpr double kNearer = 0.8, kNearEnough = 0.1;
+    const double before = medianOfAll(s);
+    if (before < kNearEnough) return;
+    const TurnModel one = s.model;
+    s.adjusting.ownFocals = true;
+    adjustToMost(s);
+    if (medianOfAll(s) <= kNearer * before) return;
+    s.adjusting.ownFocals = false;
+    s.model = one;
+}
+
 /// By which angle pairs that close a turn disagree with `model`: the strongest pair, or the mean by
 /// matches.
 double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
@@ -170,8 +203,9 @@ double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
         const Pair& pair = pairs[static_cast<std::size_t>(p)];
         const auto& a = model.worldFromCamera[static_cast<std::size_t>(pair.a)];
         const auto& b = model.worldFromCamera[static_cast<std::size_t>(pair.b)];
-        const double off =
-            angleBetween(turnOf(pair.matches, model.lens, pair.bFromA), glm::inverse(b) * a);
+        const double off = angleBetween(
+            turnOf(pair.matches, model.lensOf(pair.a), model.lensOf(pair.b), pair.bFromA),
+            glm::inverse(b) * a);
         const auto weight = static_cast<double>(pair.matches.size());
         sum += weight * off;
         all += weight;
@@ -347,6 +381,8 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
             s.adjusting.huberPixels = pixels;
             adjust(s.model, s.pairs, s.adjusting);
         }
+        adjustToMost(s);
+        if (!given && !s.adjusting.ownFocals) tryOwnFocals(s);
     }
     for (const double most : {3.0, 2.0, 1.3, 0.75}) {
         keepWhatFits(s, most);
@@ -391,7 +427,7 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
         PanoramaCamera camera;
         camera.used = s.model.known[k];
         camera.size = s.copies[k].fullSize;
-        camera.focal = out.focal * s.copies[k].fullHalfDiagonal();
+        camera.focal = s.model.lensOf(static_cast<int>(k)).focal * s.copies[k].fullHalfDiagonal();
         largest = std::max(largest, s.copies[k].fullHalfDiagonal());
         if (camera.used) camera.worldFromCamera = glm::normalize(turn * s.model.worldFromCamera[k]);
         out.cameras.push_back(camera);

@@ -249,7 +249,6 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     const int height = width / 2;
     const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
     STX_CHECK(job.limits.checkAllocation(pixels, 8, "the panorama"));
-    const TurnLens lens{alignment.focal, alignment.k1};
     const int gridWidth = gridWidthFor(alignment, width);
     STX_TRY(const auto prints, footprintsOf(source, alignment, gridWidth, job));
     const auto gains = findGains(prints, gridWidth);
@@ -288,8 +287,8 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
             if (picture.size() != camera.size)
                 return fail(ErrorCode::io, "'{}' changed while it was read",
                             source.name(prints[k].picture));
-            draw(Drawn(std::move(picture), camera, lens, width), prints[k], static_cast<int>(k),
-                 labels, camera.gain, corrections[k], width, top, sums);
+            draw(Drawn(std::move(picture), camera, lensOf(alignment, camera), width), prints[k],
+                 static_cast<int>(k), labels, camera.gain, corrections[k], width, top, sums);
         }
         const Srgb8Tables& tables = srgb8Tables();
         parallelFor(0, sums.height(), [&](std::int64_t y) {

@@ -84,6 +84,12 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
 
 }  // namespace
 
+TurnLens lensOf(const PanoramaAlignment& alignment, const PanoramaCamera& camera) {
+    const double focal = camera.focal / (0.5 * glm::length(glm::dvec2(camera.size)));
+    const double factor = focal / alignment.focal;
+    return {focal, alignment.k1 * factor * factor};
+}
+
 GridBox boxOf(const PanoramaCamera& camera, const TurnLens& lens, int gridWidth) {
     const glm::dvec3 ahead = camera.worldFromCamera * glm::dvec3(0, 0, -1);
     const double latitude = std::asin(std::clamp(ahead.y, -1.0, 1.0));
@@ -126,10 +132,10 @@ Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
     std::vector<int> used;
     for (std::size_t k = 0; k < alignment.cameras.size(); ++k)
         if (alignment.cameras[k].used) used.push_back(static_cast<int>(k));
-    const TurnLens lens{alignment.focal, alignment.k1};
     std::uint64_t cells = 0;
     for (const int k : used) {
-        const GridBox box = boxOf(alignment.cameras[static_cast<std::size_t>(k)], lens, gridWidth);
+        const PanoramaCamera& camera = alignment.cameras[static_cast<std::size_t>(k)];
+        const GridBox box = boxOf(camera, lensOf(alignment, camera), gridWidth);
         cells += static_cast<std::uint64_t>(box.width) * static_cast<std::uint64_t>(box.height);
     }
     STX_CHECK(job.limits.checkAllocation(cells, 3 * sizeof(glm::vec3) + 12, "finding seams"));
@@ -145,9 +151,8 @@ Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
             made[at] = propagate(picture);
             return;
         }
-        out[at] =
-            footprintOf(std::move(*picture), alignment.cameras[static_cast<std::size_t>(used[at])],
-                        lens, gridWidth);
+        const PanoramaCamera& camera = alignment.cameras[static_cast<std::size_t>(used[at])];
+        out[at] = footprintOf(std::move(*picture), camera, lensOf(alignment, camera), gridWidth);
         out[at].picture = used[at];
         job.progress(++done, count, "laying out pictures");
     });

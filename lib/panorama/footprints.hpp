@@ -14,6 +14,9 @@ struct GridBox {
     int x = 0, y = 0, width = 0, height = 0;
 };
 
+/// The lens of one picture: that of all, but for its own focal length.
+[[nodiscard]] TurnLens lensOf(const PanoramaAlignment& alignment, const PanoramaCamera& camera);
+
 /// The box of a picture on a grid of `gridWidth` x gridWidth / 2 cells.
 [[nodiscard]] GridBox boxOf(const PanoramaCamera& camera, const TurnLens& lens, int gridWidth);
 

@@ -84,7 +84,6 @@ Result<std::vector<LeftOutPicture>> leaveEachOut(PictureSource& source,
     const int natural = naturalWidth(alignment);
     compose.width = std::min(settings.width > 0 ? settings.width : natural, kMostWidth);
     const double scale = std::min(1.0, static_cast<double>(compose.width) / natural);
-    const TurnLens lens{alignment.focal, alignment.k1};
     for (std::size_t k = 0; k < out.size(); ++k) {
         const PanoramaCamera& camera = alignment.cameras[k];
         if (!camera.used) continue;
@@ -95,7 +94,7 @@ Result<std::vector<LeftOutPicture>> leaveEachOut(PictureSource& source,
         const double side = std::max(camera.size.x, camera.size.y) * scale;
         const WorkCopy copy =
             makeWorkCopy(std::move(picture), std::max(1, static_cast<int>(std::lround(side))));
-        out[k] = compared(copy, camera, lens, mosaic);
+        out[k] = compared(copy, camera, lensOf(alignment, camera), mosaic);
     }
     return out;
 }

@@ -117,9 +117,10 @@ std::vector<Match> matchFeatures(const WorkCopy& copyA, const Features& a, const
     return single;
 }
 
-glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lens, glm::dquat turn) {
+glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lensA, const TurnLens& lensB,
+                  glm::dquat turn) {
     std::vector<std::pair<glm::dvec3, glm::dvec3>> rays;
-    for (const Match& m : matches) rays.emplace_back(lens.ray(m.a), lens.ray(m.b));
+    for (const Match& m : matches) rays.emplace_back(lensA.ray(m.a), lensB.ray(m.b));
     for (int iteration = 0; iteration < 8; ++iteration) {
         // b = exp(w) turn a, to first order; least squares over the differences of the rays.
         std::vector<double> matrix(9, 0.0), right(3, 0.0);

@@ -30,8 +30,12 @@ struct Pair {
                                    double tolerance);
 
 /// The rotation that brings rays `a` nearest to rays `b`, least squares, from a start.
-[[nodiscard]] glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lens,
-                                glm::dquat start);
+[[nodiscard]] glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lensA,
+                                const TurnLens& lensB, glm::dquat start);
+[[nodiscard]] inline glm::dquat turnOf(const std::vector<Match>& matches, const TurnLens& lens,
+                                       glm::dquat start) {
+    return turnOf(matches, lens, lens, start);
+}
 
 struct PairSearch {
     std::vector<Pair> pairs;

@@ -32,7 +32,7 @@ struct PanoramaCamera {
     bool used = false;  ///< part of the panorama
     glm::dquat worldFromCamera{1.0, 0.0, 0.0, 0.0};
     glm::ivec2 size{0};    ///< pixels
-    double focal = 0;      ///< pixels
+    double focal = 0;      ///< pixels; each its own when the camera focused anew
     glm::dvec3 gain{1.0};  ///< its linear light is multiplied by this
 };
 
@@ -48,8 +48,9 @@ struct PanoramaPair {
 struct PanoramaAlignment {
     std::vector<PanoramaCamera> cameras;  ///< of each picture
     std::vector<PanoramaPair> pairs;
-    double focal = 0;     ///< halves of a picture's diagonal; PanoramaCamera has it in pixels
-    double k1 = 0;        ///< radial distortion, OpenCV's first coefficient
+    /// Of all together, halves of a picture's diagonal; PanoramaCamera has that of each in pixels.
+    double focal = 0;
+    double k1 = 0;        ///< radial distortion, OpenCV's first coefficient, with that focal length
     double rms = 0;       ///< of all matches that fit, pixels of the full pictures
     bool closed = false;  ///< the pictures go all around
     /// Closed: what is missing when the pictures' measured turns are put one after the other with

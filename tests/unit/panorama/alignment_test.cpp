@@ -147,6 +147,22 @@ TEST(AlignPanorama, FindsGains) {
                         camera.gains[0] / camera.gains[k], 0.02);
 }
 
+TEST(AlignPanorama, FindsFocalLengthsOfACameraThatFocusedAnew) {
+    auto camera = partOfATurn();
+    camera.stretch = {1, 1, 1.002, 0.998, 0.985, 0.986};
+    const auto found = mustAlign(camera);
+    ASSERT_EQ(found.used(), 6);
+    EXPECT_LT(rotationError(camera, found), 0.03);
+    EXPECT_LT(found.rms, 0.1);
+    for (std::size_t k = 1; k < 6; ++k)
+        EXPECT_NEAR(found.cameras[k].focal / found.cameras[0].focal, camera.stretch[k], 1e-3) << k;
+    EXPECT_GT(psnrOfPanorama(camera, found, 1024), 35);
+    // One that did not has one.
+    camera.stretch.clear();
+    const auto one = mustAlign(camera);
+    for (const auto& c : one.cameras) EXPECT_EQ(c.focal, one.cameras[0].focal);
+}
+
 TEST(AlignPanorama, IsTheSameOnAnyNumberOfThreads) {
     auto camera = partOfATurn();
     PanoramaAlignment first;

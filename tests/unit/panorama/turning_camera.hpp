@@ -51,7 +51,8 @@ class TurningCamera final : public PictureSource {
     glm::ivec2 size{320, 240};
     panorama::TurnLens lens{1.6, 0};
     std::vector<glm::dquat> worldFromCamera;
-    std::vector<float> gains;  ///< of linear light; empty = 1
+    std::vector<float> gains;     ///< of linear light; empty = 1
+    std::vector<double> stretch;  ///< focal length of each picture over the lens's; empty = 1
     const PanoramaImage* sphere = nullptr;
     double hint = 0;
 
@@ -62,12 +63,14 @@ class TurningCamera final : public PictureSource {
         Rgba8Image out(size.x, size.y);
         const double half = 0.5 * glm::length(glm::dvec2(size));
         const float gain = gains.empty() ? 1.0f : gains[static_cast<std::size_t>(k)];
+        const double longer = stretch.empty() ? 1.0 : stretch[static_cast<std::size_t>(k)];
+        const panorama::TurnLens own{lens.focal * longer, lens.k1 * longer * longer};
         for (int y = 0; y < size.y; ++y)
             for (int x = 0; x < size.x; ++x) {
                 const glm::dvec2 p =
                     glm::dvec2(x + 0.5 - 0.5 * size.x, 0.5 * size.y - y - 0.5) / half;
                 glm::vec3 c(
-                    sphere->sample(worldFromCamera[static_cast<std::size_t>(k)] * lens.ray(p)));
+                    sphere->sample(worldFromCamera[static_cast<std::size_t>(k)] * own.ray(p)));
                 for (int i = 0; i < 3 && gain != 1; ++i)
                     c[i] = srgbByTable(std::min(1.0f, linearByTable(c[i]) * gain));
                 out.at(x, y) = glm::u8vec4(glm::clamp(c, 0.0f, 1.0f) * 255.0f + 0.5f, 255);
