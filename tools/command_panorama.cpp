@@ -73,17 +73,19 @@ nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignmen
                          {"matches", p.matches},
                          {"rmsPixels", p.rms},
                          {"parallaxPixels", p.parallax}});
-    nlohmann::ordered_json report{{"$schema", "panorama-report.schema.json"},
-                                  {"inputs", o.inputs},
-                                  {"output", o.output},
-                                  {"width", size.x},
-                                  {"height", size.y},
-                                  {"pictures", pictures},
-                                  {"used", found.used()},
-                                  {"k1", found.k1},
-                                  {"rmsPixels", found.rms},
-                                  {"pairs", pairs},
-                                  {"closed", found.closed}};
+    nlohmann::ordered_json report{
+        {"$schema", "panorama-report.schema.json"},
+        {"inputs", o.inputs},
+        {"output", o.output},
+        {"width", size.x},
+        {"height", size.y},
+        {"pictures", pictures},
+        {"used", found.used()},
+        {"k1", found.k1},
+        {"vignetting", {found.vignetting.second, found.vignetting.fourth}},
+        {"rmsPixels", found.rms},
+        {"pairs", pairs},
+        {"closed", found.closed}};
     if (found.closed) {
         report["gapBeforeDegrees"] = found.gapBefore * kDegrees;
         report["gapDegrees"] = found.gapAfter * kDegrees;

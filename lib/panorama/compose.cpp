@@ -46,6 +46,11 @@ class Drawn {
         const double edge = std::min({x, y, copy_.colour.width() - x, copy_.colour.height() - y});
         return edge <= -0.5 ? 0.0f : static_cast<float>(std::min(1.0, edge + 0.5));
     }
+    /// The square of a position's distance from the middle, halves of the diagonal.
+    [[nodiscard]] double radius2(double x, double y) const {
+        const glm::dvec2 p = copy_.position({x, y});
+        return glm::dot(p, p);
+    }
     /// sRGB-coded colours (0..1) at positions.
     void colours(const double* x, const double* y, std::size_t count, glm::vec4* out) const {
         if (wide_ <= 1) {
@@ -137,8 +142,8 @@ struct RowPixels {
 
 /// Adds one picture to rows [top, top + sums.height()) of the panorama: linear light, weighted.
 void draw(const Drawn& picture, const Footprint& print, int index, const Image<int>& labels,
-          const glm::dvec3& gain, const Image<glm::vec3>& correction, int width, int top,
-          Image<glm::vec4>& sums) {
+          const glm::dvec3& gain, const Vignetting& vignetting, const Image<glm::vec3>& correction,
+          int width, int top, Image<glm::vec4>& sums) {
     const int gridWidth = labels.width();
     const double cells = static_cast<double>(gridWidth) / width;
     const int first = std::max(top, static_cast<int>((print.box.y - 2) / cells));
@@ -219,8 +224,11 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
             const auto to = sums.row(y - top);
             for (std::size_t i = 0; i < pixels.count; ++i) {
                 const glm::vec4 c = pixels.colour[i];
+                glm::vec3 own = gain;
+                if (!vignetting.none())
+                    own *= vignetting.clearing(picture.radius2(pixels.x[i], pixels.y[i]));
                 const glm::vec3 light =
-                    withGain({linear.linear(c.r), linear.linear(c.g), linear.linear(c.b)}, gain) *
+                    withGain({linear.linear(c.r), linear.linear(c.g), linear.linear(c.b)}, own) *
                     pixels.factor[i];
                 const int x = pixels.column[i];
                 to[static_cast<std::size_t>((x % width + width) % width)] +=
@@ -250,7 +258,9 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
     const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
     STX_CHECK(job.limits.checkAllocation(pixels, 8, "the panorama"));
     const int gridWidth = gridWidthFor(alignment, width);
-    STX_TRY(const auto prints, footprintsOf(source, alignment, gridWidth, job));
+    STX_TRY(auto prints, footprintsOf(source, alignment, gridWidth, job));
+    alignment.vignetting = findVignetting(prints, gridWidth);
+    clearVignetting(prints, alignment.vignetting);
     const auto gains = findGains(prints, gridWidth);
     for (std::size_t i = 0; i < prints.size(); ++i)
         alignment.cameras[static_cast<std::size_t>(prints[i].picture)].gain = gains[i];
@@ -288,7 +298,8 @@ Result<PanoramaImage> composePanorama(PictureSource& source, PanoramaAlignment& 
                 return fail(ErrorCode::io, "'{}' changed while it was read",
                             source.name(prints[k].picture));
             draw(Drawn(std::move(picture), camera, lensOf(alignment, camera), width), prints[k],
-                 static_cast<int>(k), labels, camera.gain, corrections[k], width, top, sums);
+                 static_cast<int>(k), labels, camera.gain, alignment.vignetting, corrections[k],
+                 width, top, sums);
         }
         const Srgb8Tables& tables = srgb8Tables();
         parallelFor(0, sums.height(), [&](std::int64_t y) {

@@ -33,6 +33,7 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
     f.box = boxOf(camera, lens, gridWidth);
     f.colour = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(0));
     f.inside = Image<float>(f.box.width, f.box.height, 0.0f);
+    f.radius2 = Image<float>(f.box.width, f.box.height, 0.0f);
     f.whole = Image<std::uint8_t>(f.box.width, f.box.height, 0);
     // As many pixels as the grid has cells in the middle of the picture.
     const double cells = gridWidth / (2 * M_PI) * lens.focal;  // along half a diagonal
@@ -71,11 +72,13 @@ Footprint footprintOf(Rgba8Image picture, const PanoramaCamera& camera, const Tu
         for (int x = 0; x < f.box.width; ++x) {
             const glm::dvec2 pixel(px[static_cast<std::size_t>(x)],
                                    py[static_cast<std::size_t>(x)]);
-            const glm::dvec2 inner = extent - glm::abs(2.0 * pixel / row.size - 1.0) * extent;
+            const glm::dvec2 p = glm::abs(2.0 * pixel / row.size - 1.0) * extent;
+            const glm::dvec2 inner = extent - p;
             const double border = std::min(inner.x, inner.y);
             if (border <= 0) continue;
             f.inside.at(x, y) = static_cast<float>(std::max(1e-4, border / shorter));
             f.whole.at(x, y) = border * cells > 1.5 || border > 0.3 * shorter;
+            f.radius2.at(x, y) = static_cast<float>(glm::dot(p, p));
             f.colour.at(x, y) = linearAt(light, pixel);
         }
     }
@@ -138,7 +141,7 @@ Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
         const GridBox box = boxOf(camera, lensOf(alignment, camera), gridWidth);
         cells += static_cast<std::uint64_t>(box.width) * static_cast<std::uint64_t>(box.height);
     }
-    STX_CHECK(job.limits.checkAllocation(cells, 3 * sizeof(glm::vec3) + 12, "finding seams"));
+    STX_CHECK(job.limits.checkAllocation(cells, 3 * sizeof(glm::vec3) + 20, "finding seams"));
     std::vector<Footprint> out(used.size());
     std::vector<Result<void>> made(used.size());
     std::atomic<std::int64_t> done = 0;

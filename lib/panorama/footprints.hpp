@@ -27,9 +27,16 @@ struct Footprint {
     Image<glm::vec3> colour;  ///< linear light, before gains; of cells that it sees
     /// How far inside of the picture: 0 = not seen, 1 = the middle.
     Image<float> inside;
+    /// Square of the distance from the picture's middle, halves of its diagonal; of cells it sees.
+    Image<float> radius2;
+    /// By which light is to be multiplied, since the lens is darker there; empty = 1.
+    Image<float> clearing;
     /// Cells that the picture fills wholly, so that seams may be in them.
     Image<std::uint8_t> whole;
 
+    [[nodiscard]] float clearingAt(std::size_t cell) const {
+        return clearing.empty() ? 1.0f : clearing.pixels()[cell];
+    }
     /// Column of the box for one of the grid; -1 = not in the box.
     [[nodiscard]] int column(int gridX, int gridWidth) const {
         const int x = ((gridX - box.x) % gridWidth + gridWidth) % gridWidth;
@@ -44,6 +51,15 @@ struct Footprint {
 [[nodiscard]] Result<std::vector<Footprint>> footprintsOf(PictureSource& source,
                                                           const PanoramaAlignment& alignment,
                                                           int gridWidth, Job& job);
+
+/// The vignetting that explains how pictures differ where they overlap, least squares over the
+/// logarithms of their light's ratios, with weights that leave out what moved (Goldman 2010, with
+/// an even polynomial). None where it is weak, where it explains little, or where the upper and
+/// lower halves of overlaps do not say the same.
+[[nodiscard]] Vignetting findVignetting(const std::vector<Footprint>& footprints, int gridWidth);
+
+/// Puts it into the footprints.
+void clearVignetting(std::vector<Footprint>& footprints, const Vignetting& vignetting);
 
 /// Gains of linear light that make pictures agree where they overlap, least squares over the
 /// medians of pairs, no gain in the mean; of each footprint.

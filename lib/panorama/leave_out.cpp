@@ -23,7 +23,7 @@ struct RowSums {
 
 /// How well `mosaic` shows what the picture shows.
 LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, const TurnLens& lens,
-                        const PanoramaImage& mosaic) {
+                        const Vignetting& vignetting, const PanoramaImage& mosaic) {
     const int width = copy.colour.width(), height = copy.colour.height();
     const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.worldFromCamera);
     const Srgb8Tables& tables = srgb8Tables();
@@ -34,7 +34,8 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
         RowSums& sums = rows[static_cast<std::size_t>(row)];
         for (int x = 0; x < width; ++x) {
             glm::vec4& c = seen.at(x, y);
-            c = mosaic.sample(worldFromCamera * lens.ray(copy.position({x + 0.5, y + 0.5})));
+            const glm::dvec2 p = copy.position({x + 0.5, y + 0.5});
+            c = mosaic.sample(worldFromCamera * lens.ray(p));
             if (c.a < 0.999f) {
                 c.a = 0;
                 continue;
@@ -43,6 +44,9 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
             const glm::dvec3 truth(tables.linear(own.r), tables.linear(own.g),
                                    tables.linear(own.b));
             c = {linearByTable(c.r), linearByTable(c.g), linearByTable(c.b), 1};
+            // As dark as the lens makes it there.
+            if (!vignetting.none())
+                c = glm::vec4(glm::vec3(c) / vignetting.clearing(glm::dot(p, p)), 1);
             sums.product += truth * glm::dvec3(c);
             sums.square += glm::dvec3(c) * glm::dvec3(c);
             ++sums.count;
@@ -94,7 +98,7 @@ Result<std::vector<LeftOutPicture>> leaveEachOut(PictureSource& source,
         const double side = std::max(camera.size.x, camera.size.y) * scale;
         const WorkCopy copy =
             makeWorkCopy(std::move(picture), std::max(1, static_cast<int>(std::lround(side))));
-        out[k] = compared(copy, camera, lensOf(alignment, camera), mosaic);
+        out[k] = compared(copy, camera, lensOf(alignment, camera), others.vignetting, mosaic);
     }
     return out;
 }

@@ -3,33 +3,11 @@
 
 #include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
-#include "lib/panorama/footprints.hpp"
+#include "lib/panorama/overlap.hpp"
 #include "lib/panorama/small_solver.hpp"
 
 namespace stx::panorama {
 namespace {
-
-/// Light between these is neither noise nor clipped (linear, before gains).
-constexpr float kDarkest = 0.003f, kLightest = 0.8f;
-
-bool boxesMeet(const Footprint& a, const Footprint& b, int gridWidth) {
-    if (a.box.y >= b.box.y + b.box.height || b.box.y >= a.box.y + a.box.height) return false;
-    return a.column(b.box.x, gridWidth) >= 0 || b.column(a.box.x, gridWidth) >= 0;
-}
-
-/// Calls visit(cell in a, cell in b) for each cell that both see.
-template <class Visit>
-void shared(const Footprint& a, const Footprint& b, int gridWidth, const Visit& visit) {
-    const int top = std::max(a.box.y, b.box.y);
-    const int bottom = std::min(a.box.y + a.box.height, b.box.y + b.box.height);
-    for (int y = top; y < bottom; ++y)
-        for (int x = 0; x < a.box.width; ++x) {
-            const int other = b.column(a.box.x + x, gridWidth);
-            if (other < 0) continue;
-            const glm::ivec2 inA(x, y - a.box.y), inB(other, y - b.box.y);
-            if (a.inside.at(inA.x, inA.y) > 0 && b.inside.at(inB.x, inB.y) > 0) visit(inA, inB);
-        }
-}
 
 /// Mean of a square around each pixel, by its weight; three times, which is nearly a bell.
 /// `around`: rows end where they begin.
@@ -64,7 +42,8 @@ Image<glm::vec3> logsOf(const Footprint& f, glm::vec3 gain) {
     Image<glm::vec3> out(f.box.width, f.box.height);
     for (std::size_t i = 0; i < out.count(); ++i)
         if (f.inside.pixels()[i] > 0)
-            out.pixels()[i] = glm::log(withGain(f.colour.pixels()[i], gain) + 0.01f);
+            out.pixels()[i] =
+                glm::log(withGain(f.colour.pixels()[i], gain * f.clearingAt(i)) + 0.01f);
     return out;
 }
 
@@ -167,9 +146,14 @@ std::vector<glm::dvec3> findGains(const std::vector<Footprint>& prints, int grid
             shared(prints[a], prints[b], gridWidth, [&](glm::ivec2 pa, glm::ivec2 pb) {
                 const glm::vec3 ca = prints[a].colour.at(pa.x, pa.y);
                 const glm::vec3 cb = prints[b].colour.at(pb.x, pb.y);
+                const float clearing =
+                    prints[a].clearing.empty()
+                        ? 1.0f
+                        : prints[a].clearing.at(pa.x, pa.y) / prints[b].clearing.at(pb.x, pb.y);
                 for (int c = 0; c < 3; ++c)
                     if (std::min(ca[c], cb[c]) > kDarkest && std::max(ca[c], cb[c]) < kLightest)
-                        logs[static_cast<std::size_t>(c)].push_back(std::log(ca[c] / cb[c]));
+                        logs[static_cast<std::size_t>(c)].push_back(
+                            std::log(ca[c] / cb[c] * clearing));
             });
             if (std::min({logs[0].size(), logs[1].size(), logs[2].size()}) < 30) continue;
             Ratio ratio{a, b, {}, std::sqrt(static_cast<double>(logs[1].size()))};

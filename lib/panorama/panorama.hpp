@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,19 @@ struct PanoramaPair {
     double parallax = 0;  ///< nine tenths of what was found differs by no more than this, pixels
 };
 
+/// How much darker a lens is away from the middle of its pictures: the logarithm of its linear
+/// light against the middle's is second * r^2 + fourth * r^4 at distance r, halves of the diagonal.
+/// The same for all pictures of a series.
+struct Vignetting {
+    double second = 0, fourth = 0;
+
+    [[nodiscard]] bool none() const { return second == 0 && fourth == 0; }
+    /// By which linear light is to be multiplied, from the square of the distance.
+    [[nodiscard]] float clearing(double r2) const {
+        return static_cast<float>(std::exp(-r2 * (second + fourth * r2)));
+    }
+};
+
 struct PanoramaAlignment {
     std::vector<PanoramaCamera> cameras;  ///< of each picture
     std::vector<PanoramaPair> pairs;
@@ -56,6 +70,7 @@ struct PanoramaAlignment {
     /// Closed: what is missing when the pictures' measured turns are put one after the other with
     /// the focal length that pairs alone tell, and after all were adjusted together; radians.
     double gapBefore = 0, gapAfter = 0;
+    Vignetting vignetting;  ///< found by composePanorama(), where pictures tell it clearly
 
     [[nodiscard]] int used() const;
 };
@@ -94,10 +109,10 @@ inline constexpr int kMaxPanoramaWidth = 8192;
 /// The width that ComposeSettings::width = 0 stands for.
 [[nodiscard]] int naturalWidth(const PanoramaAlignment& alignment);
 
-/// Draws the panorama: gains in linear light (put into the alignment's cameras), one picture for
-/// each direction with seams where pictures agree, softened. Pictures are read once more, one after
-/// the other. Errors: those of the source; invalidInput when it needs more memory than allowed;
-/// cancelled.
+/// Draws the panorama: gains in linear light and vignetting (put into the alignment), one picture
+/// for each direction with seams where pictures agree, softened. Pictures are read once more, one
+/// after the other. Errors: those of the source; invalidInput when it needs more memory than
+/// allowed; cancelled.
 [[nodiscard]] Result<PanoramaImage> composePanorama(PictureSource& source,
                                                     PanoramaAlignment& alignment,
                                                     const ComposeSettings& settings, Job& job);

@@ -54,7 +54,8 @@ class SeamGrid {
             coded_[k] = Image<glm::vec3>(f.box.width, f.box.height, glm::vec3(0));
             cost_[k] = Image<float>(f.box.width, f.box.height, 0.0f);
             for (std::size_t p = 0; p < coded_[k].count(); ++p) {
-                const glm::vec3 c = withGain(f.colour.pixels()[p], gains[k]);
+                const glm::vec3 c =
+                    withGain(f.colour.pixels()[p], glm::vec3(gains[k]) * f.clearingAt(p));
                 coded_[k].pixels()[p] =
                     255.0f * glm::vec3(srgbByTable(c.r), srgbByTable(c.g), srgbByTable(c.b));
                 const float out = 1 - std::min(1.0f, f.inside.pixels()[p]);

@@ -55,21 +55,28 @@ int largestStep(const Rgba8Image& picture, int apart) {
     return largest;
 }
 
-TEST(ComposePanorama, ShowsNoSeamsInASky) {
-    const PanoramaImage sphere = sky();
-    TurningCamera camera;
-    camera.sphere = &sphere;
+/// What is known of a camera's pictures, but for their light.
+PanoramaAlignment alignmentOf(const TurningCamera& camera) {
     PanoramaAlignment known;
     known.focal = camera.lens.focal;
-    for (int k = 0; k < 4; ++k) {
-        camera.add(0.5 * k, 0.02 * k, 0);
+    known.k1 = camera.lens.k1;
+    for (const glm::dquat& turn : camera.worldFromCamera) {
         PanoramaCamera one;
         one.used = true;
-        one.worldFromCamera = camera.worldFromCamera.back();
+        one.worldFromCamera = turn;
         one.size = camera.size;
         one.focal = known.focal * 0.5 * glm::length(glm::dvec2(camera.size));
         known.cameras.push_back(one);
     }
+    return known;
+}
+
+TEST(ComposePanorama, ShowsNoSeamsInASky) {
+    const PanoramaImage sphere = sky();
+    TurningCamera camera;
+    camera.sphere = &sphere;
+    for (int k = 0; k < 4; ++k) camera.add(0.5 * k, 0.02 * k, 0);
+    PanoramaAlignment known = alignmentOf(camera);
     DarkCorners source(camera);
     Job job;
     const auto made = composePanorama(source, known, {.width = 2048}, job);
@@ -77,6 +84,66 @@ TEST(ComposePanorama, ShowsNoSeamsInASky) {
     // At the outer edges one picture's own darkness changes by a code in two pixels.
     EXPECT_LE(largestStep(made->pixels, 1), 2);
     EXPECT_LE(largestStep(made->pixels, 8), 6);
+}
+
+/// PSNR of a panorama against the sphere, after one gain of linear light; where it covers it.
+double psnrAfterGain(const PanoramaImage& made, const PanoramaImage& sphere) {
+    std::vector<std::pair<glm::vec3, glm::vec3>> both;
+    glm::dvec2 sums(0);
+    for (int y = 0; y < made.height(); ++y)
+        for (int x = 0; x < made.width(); ++x) {
+            const glm::u8vec4 p = made.pixels.at(x, y);
+            if (p.a < 255) continue;
+            const glm::vec3 truth(
+                sphere.sample(PanoramaImage::direction({x + 0.5, y + 0.5}, made.width())));
+            both.emplace_back(glm::vec3(p) / 255.0f, truth);
+            for (int c = 0; c < 3; ++c) {
+                const double a = linearByTable(both.back().first[c]), b = linearByTable(truth[c]);
+                sums += glm::dvec2(a * b, a * a);
+            }
+        }
+    const auto gain = static_cast<float>(sums.x / sums.y);
+    double squares = 0;
+    for (const auto& [a, b] : both)
+        for (int c = 0; c < 3; ++c)
+            squares +=
+                std::pow(255 * (srgbByTable(std::min(1.0f, gain * linearByTable(a[c]))) - b[c]), 2);
+    return 10 * std::log10(255 * 255 * 3 * static_cast<double>(both.size()) / squares);
+}
+
+TurningCamera discsInARow(const PanoramaImage& sphere) {
+    TurningCamera camera;
+    camera.sphere = &sphere;
+    camera.gains = {1, 0.8f, 0.9f, 0.75f, 1};
+    for (int k = 0; k < 5; ++k) camera.add(0.35 * k, 0.03 * (k % 2), 0);
+    return camera;
+}
+
+TEST(FindVignetting, FindsAndClearsIt) {
+    const PanoramaImage sphere{texturedSphere(2048)};
+    TurningCamera camera = discsInARow(sphere);
+    camera.vignetting = {-0.25, -0.35};
+    auto known = alignmentOf(camera);
+    Job job;
+    const auto made = composePanorama(camera, known, {.width = 1024}, job);
+    ASSERT_TRUE(made) << made.error().text();
+    for (const double r : {0.5, 0.7, 0.9}) {
+        const double r2 = r * r;
+        EXPECT_NEAR(known.vignetting.clearing(r2) / camera.vignetting.clearing(r2), 1, 0.02) << r;
+    }
+    EXPECT_GT(psnrAfterGain(*made, sphere), 35);
+    for (std::size_t k = 1; k < 5; ++k)
+        EXPECT_NEAR(known.cameras[k].gain.g / known.cameras[0].gain.g,
+                    camera.gains[0] / camera.gains[k], 0.02);
+}
+
+TEST(FindVignetting, LeavesPicturesWithoutIt) {
+    const PanoramaImage sphere{texturedSphere(2048)};
+    TurningCamera camera = discsInARow(sphere);
+    auto known = alignmentOf(camera);
+    Job job;
+    ASSERT_TRUE(composePanorama(camera, known, {.width = 1024}, job));
+    EXPECT_TRUE(known.vignetting.none());
 }
 
 /// A picture that sees columns [x, x + 160) of the grid, darker towards its sides.

@@ -53,6 +53,7 @@ class TurningCamera final : public PictureSource {
     std::vector<glm::dquat> worldFromCamera;
     std::vector<float> gains;     ///< of linear light; empty = 1
     std::vector<double> stretch;  ///< focal length of each picture over the lens's; empty = 1
+    Vignetting vignetting;
     const PanoramaImage* sphere = nullptr;
     double hint = 0;
 
@@ -71,8 +72,10 @@ class TurningCamera final : public PictureSource {
                     glm::dvec2(x + 0.5 - 0.5 * size.x, 0.5 * size.y - y - 0.5) / half;
                 glm::vec3 c(
                     sphere->sample(worldFromCamera[static_cast<std::size_t>(k)] * own.ray(p)));
-                for (int i = 0; i < 3 && gain != 1; ++i)
-                    c[i] = srgbByTable(std::min(1.0f, linearByTable(c[i]) * gain));
+                const float light =
+                    vignetting.none() ? gain : gain / vignetting.clearing(glm::dot(p, p));
+                for (int i = 0; i < 3 && light != 1; ++i)
+                    c[i] = srgbByTable(std::min(1.0f, linearByTable(c[i]) * light));
                 out.at(x, y) = glm::u8vec4(glm::clamp(c, 0.0f, 1.0f) * 255.0f + 0.5f, 255);
             }
         return out;

@@ -1,0 +1,161 @@
+#include <cmath>
+
+#include "lib/base/median.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/panorama/overlap.hpp"
+
+namespace stx::panorama {
+namespace {
+
+/// One cell that two pictures see: logarithm of their light's ratio, and by how much they differ in
+/// the square and the fourth power of the distance from their middles.
+struct LightRatio {
+    double log = 0;
+    glm::dvec2 powers{0};
+    bool upper = false;  ///< in the upper half of what they share
+};
+
+enum class Half { both, upper, lower };
+
+struct VignettingFit {
+    glm::dvec2 law{0};  ///< of the square and of the fourth power
+    double off = 1e9;   ///< median of what is left of the ratios' differences
+};
+
+/// How much less light there is near the corners (0.9 of the way), logarithm.
+double lossOf(glm::dvec2 law) {
+    return -(0.81 * law.x + 0.81 * 0.81 * law.y);
+}
+
+std::vector<LightRatio> ratiosOf(const Footprint& a, const Footprint& b, int gridWidth) {
+    std::vector<LightRatio> out;
+    const int top = std::max(a.box.y, b.box.y);
+    const int bottom = std::min(a.box.y + a.box.height, b.box.y + b.box.height);
+    shared(a, b, gridWidth, [&](glm::ivec2 pa, glm::ivec2 pb) {
+        if (pa.x % 2 != 0 || pa.y % 2 != 0) return;  // enough of them
+        const glm::vec3 ca = a.colour.at(pa.x, pa.y), cb = b.colour.at(pb.x, pb.y);
+        LightRatio ratio;
+        for (int c = 0; c < 3; ++c) {
+            if (std::min(ca[c], cb[c]) < kDarkest || std::max(ca[c], cb[c]) > kLightest) return;
+            ratio.log += std::log(ca[c] / cb[c]) / 3;
+        }
+        const double ra = a.radius2.at(pa.x, pa.y), rb = b.radius2.at(pb.x, pb.y);
+        ratio.powers = {ra - rb, ra * ra - rb * rb};
+        ratio.upper = 2 * (pa.y + a.box.y) < top + bottom;
+        out.push_back(ratio);
+    });
+    return out;
+}
+
+/// Least squares over the ratios of all pairs, each with a ratio of gains of its own; weights as of
+/// Cauchy's distribution: what moved, and edges, are far off.
+VignettingFit fitVignetting(const std::vector<std::vector<LightRatio>>& pairs, Half half,
+                            bool flat) {
+    constexpr int kFitRounds = 8;
+    const auto counts = [&](const LightRatio& r) {
+        return half == Half::both || r.upper == (half == Half::upper);
+    };
+    std::vector<double> offsets(pairs.size(), 0.0);
+    VignettingFit fit;
+    const auto measure = [&] {
+        std::vector<std::vector<double>> off(pairs.size());
+        parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+            const auto p = static_cast<std::size_t>(i);
+            std::vector<double> left;
+            for (const LightRatio& r : pairs[p])
+                if (counts(r)) left.push_back(r.log - glm::dot(fit.law, r.powers));
+            offsets[p] = medianOf(left);
+            for (double& value : left) value = std::abs(value - offsets[p]);
+            off[p] = std::move(left);
+        });
+        std::vector<double> all;
+        for (const auto& one : off) all.insert(all.end(), one.begin(), one.end());
+        fit.off = medianOf(std::move(all), 1e9);
+    };
+    measure();
+    struct Sums {
+        double w = 0, y = 0, xx = 0, xy = 0, yy = 0, bx = 0, by = 0;
+        glm::dvec2 x{0};
+    };
+    for (int round = 0; round < kFitRounds && !flat; ++round) {
+        const double scale = std::max(2 * fit.off, 1e-3);
+        std::vector<Sums> sums(pairs.size());
+        parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+            const auto p = static_cast<std::size_t>(i);
+            Sums& s = sums[p];
+            for (const LightRatio& r : pairs[p]) {
+                if (!counts(r)) continue;
+                const double off = (r.log - offsets[p] - glm::dot(fit.law, r.powers)) / scale;
+                const double w = 1 / (1 + off * off);
+                s.w += w;
+                s.y += w * r.log;
+                s.x += w * r.powers;
+                s.xx += w * r.powers.x * r.powers.x;
+                s.xy += w * r.powers.x * r.powers.y;
+                s.yy += w * r.powers.y * r.powers.y;
+                s.bx += w * r.powers.x * r.log;
+                s.by += w * r.powers.y * r.log;
+            }
+        });
+        // The gains' ratio of each pair is eliminated. Where pictures cannot tell, there is none.
+        double xx = 1e-9, xy = 0, yy = 1e-9, bx = 0, by = 0;
+        for (const Sums& s : sums) {
+            if (s.w <= 0) continue;
+            xx += s.xx - s.x.x * s.x.x / s.w + 1e-4 * s.w;
+            xy += s.xy - s.x.x * s.x.y / s.w;
+            yy += s.yy - s.x.y * s.x.y / s.w + 1e-4 * s.w;
+            bx += s.bx - s.x.x * s.y / s.w;
+            by += s.by - s.x.y * s.y / s.w;
+        }
+        const double det = xx * yy - xy * xy;
+        if (!(det > 0)) break;
+        fit.law = {(yy * bx - xy * by) / det, (xx * by - xy * bx) / det};
+        measure();
+    }
+    return fit;
+}
+
+}  // namespace
+
+Vignetting findVignetting(const std::vector<Footprint>& prints, int gridWidth) {
+    constexpr std::size_t kFewest = 400;  // cells
+    constexpr double kLeastLoss = 0.03, kMostLoss = 1.5, kBetter = 0.9;
+    std::vector<std::pair<std::size_t, std::size_t>> both;
+    for (std::size_t a = 0; a < prints.size(); ++a)
+        for (std::size_t b = a + 1; b < prints.size(); ++b)
+            if (boxesMeet(prints[a], prints[b], gridWidth)) both.emplace_back(a, b);
+    std::vector<std::vector<LightRatio>> pairs(both.size());
+    parallelFor(0, static_cast<std::int64_t>(both.size()), [&](std::int64_t i) {
+        const auto p = static_cast<std::size_t>(i);
+        pairs[p] = ratiosOf(prints[both[p].first], prints[both[p].second], gridWidth);
+    });
+    std::size_t cells = 0;
+    for (const auto& pair : pairs) cells += pair.size();
+    if (cells < kFewest) return {};
+    const VignettingFit without = fitVignetting(pairs, Half::both, true);
+    const VignettingFit fit = fitVignetting(pairs, Half::both, false);
+    // Darker outwards, in all pictures alike, and so that it explains much of what differs.
+    const double loss = lossOf(fit.law);
+    if (loss < kLeastLoss || loss > kMostLoss || fit.off > kBetter * without.off) return {};
+    for (int step = 1; step <= 10; ++step) {
+        const double r2 = step / 10.0;
+        if (fit.law.x * r2 + fit.law.y * r2 * r2 > 0.02) return {};
+    }
+    for (const Half half : {Half::upper, Half::lower}) {
+        const double own = lossOf(fitVignetting(pairs, half, false).law);
+        if (own < loss / 2 || own > 2 * loss) return {};
+    }
+    return {fit.law.x, fit.law.y};
+}
+
+void clearVignetting(std::vector<Footprint>& prints, const Vignetting& vignetting) {
+    if (vignetting.none()) return;
+    parallelFor(0, static_cast<std::int64_t>(prints.size()), [&](std::int64_t i) {
+        Footprint& f = prints[static_cast<std::size_t>(i)];
+        f.clearing = Image<float>(f.box.width, f.box.height, 1.0f);
+        for (std::size_t p = 0; p < f.clearing.count(); ++p)
+            f.clearing.pixels()[p] = vignetting.clearing(f.radius2.pixels()[p]);
+    });
+}
+
+}  // namespace stx::panorama
