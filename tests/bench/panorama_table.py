@@ -42,6 +42,9 @@ status, picture = cv2.Stitcher_create().stitch(pictures)
 if status == 0: cv2.imwrite(sys.argv[1], picture)
 used = resource.getrusage(resource.RUSAGE_SELF)
 found = {"status": status, "seconds": used.ru_utime + used.ru_stime, "cameras": {}}
+if status != 0:
+    print(json.dumps(found))
+    sys.exit(0)
 try:
     scale = min(1.0, math.sqrt(0.6e6 / (pictures[0].shape[0] * pictures[0].shape[1])))
     small = [cv2.resize(p, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR_EXACT) for p in pictures]
