@@ -1,18 +1,5 @@
 // PNG as integers. A browser's own decoder gives 8 bits, and mixes colours with their alpha.
 
-// Bytes of a data URI.
-function bytesOfUri(uri) {
-    const text = atob(uri.slice(uri.indexOf(",") + 1));
-    const bytes = new Uint8Array(text.length);
-    for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
-    return bytes;
-}
-
-async function inflated(bytes) {
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
 // Undoes the filter of a row (PNG, 9.2); `before` is the row above, `each` the bytes of a pixel.
 function unfilter(kind, row, before, each) {
     for (let i = 0; i < row.length; ++i) {
@@ -42,7 +29,7 @@ async function decodePng(bytes) {
     }
     const packed = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
     parts.reduce((at, part) => (packed.set(part, at), at + part.length), 0);
-    const data = await inflated(packed);
+    const data = new Uint8Array(await inflated(packed).arrayBuffer());
     const each = channels * bits / 8, stride = width * each;
     const plain = new Uint8Array(height * stride);
     let before = new Uint8Array(stride);

@@ -2,7 +2,6 @@
 
 class Viewer {
     constructor() {
-        this.data = JSON.parse(document.getElementById("data").textContent);
         this.canvas = document.getElementById("canvas");
         this.scenes = new Map();  // number -> Scene, the last used at the end
         this.shown = [];
@@ -14,6 +13,7 @@ class Viewer {
     }
 
     async start() {
+        this.data = await inflated(bytesOf("data")).json();
         this.painter = new Painter(this.canvas);
         this.canvas.addEventListener("webglcontextlost", (event) => {
             event.preventDefault();
@@ -44,9 +44,9 @@ class Viewer {
             this.scenes.set(number, known);
             return known;
         }
-        const data = JSON.parse(document.getElementById("scene" + number).textContent);
-        const image = async (k) => decodePng(bytesOfUri(document.getElementById("image" + k).textContent));
-        const loading = Scene.load(this.painter.gl, this.painter.prepare, data, image);
+        const image = (k) => decodePng(bytesOf("image" + k));
+        const loading = inflated(bytesOf("scene" + number)).json()
+            .then((data) => Scene.load(this.painter.gl, this.painter.prepare, data, image));
         this.scenes.set(number, loading);
         const scene = await loading;
         // About 20 bytes a pixel: half a gigabyte of moments.
@@ -381,6 +381,9 @@ class Viewer {
     }
 }
 
+// The panel comes packed with the program.
+document.body.insertAdjacentHTML("afterbegin", kPanel);
+document.querySelector("h1").textContent = document.title;
 const viewer = new Viewer();
 viewer.start().catch((error) => {
     const old = error.message === "no WebGL 2";

@@ -5,10 +5,9 @@
 #include <optional>
 
 #include "embedded_viewer.hpp"
-#include "formats/files/base64.hpp"
-#include "formats/files/deflate.hpp"
 #include "formats/stx/stx.hpp"
 #include "formats/viewer/page_scene.hpp"
+#include "formats/viewer/page_text.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/packing/packing.hpp"
@@ -21,22 +20,14 @@ using Json = nlohmann::ordered_json;
 
 /// Browsers need several times the size of a page to hold it.
 constexpr std::uint64_t kHard = 256ull << 20;
+/// Where what a page holds is put.
+constexpr std::string_view kDataMark = "@DATA@";
 /// Views that all look within this angle of their mean look at a scene, not around an object.
 constexpr double kSameSideCosine = 0.5;
 constexpr double kStartFovDeg = 40.0, kStartElevationDeg = 15.0;
-/// Of zlib; the page's program is packed once.
-constexpr int kBestLevel = 12;
 
-/// JSON that may be in a script element of HTML.
-std::string inScript(const Json& json) {
-    std::string out;
-    for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
-        if (c == '<')
-            out += "\\u003c";
-        else
-            out += c;
-    }
-    return out;
+std::string textOf(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string inHtml(std::string_view text) {
@@ -60,23 +51,10 @@ std::string inHtml(std::string_view text) {
         }
     }
     // As JSON does it, what is not UTF-8 is replaced.
-    return Json::parse(Json(out).dump(-1, ' ', false, Json::error_handler_t::replace));
+    return Json::parse(textOf(out));
 }
 
-/// Code without indentation and lines that are comments.
-std::string withoutComments(std::string_view code) {
-    std::string out;
-    while (!code.empty()) {
-        const std::size_t end = std::min(code.find('\n'), code.size() - 1) + 1;
-        std::string_view line = code.substr(0, end);
-        code.remove_prefix(end);
-        line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
-        if (line != "\n" && !line.starts_with("//")) out += line;
-    }
-    return out;
-}
-
-/// The program of the page and its shaders, packed.
+/// The program of the page, its shaders and its panel, packed.
 std::string packedProgram() {
     Json texts;
     for (const auto& [name, text] : {std::pair{"screen.vert", viewer::screen_vert},
@@ -88,23 +66,27 @@ std::string packedProgram() {
                                      {"silhouettes.frag", viewer::silhouettes_frag},
                                      {"present.frag", viewer::present_frag}})
         texts[name] = withoutComments(text);
-    std::string code = "\"use strict\";\nconst kShaders = " + texts.dump() + ";\n";
+    std::string code = "\"use strict\";\nconst kPanel=" + Json(viewer::panel_html).dump() +
+                       ",kShaders=" + texts.dump() + ";\n";
     for (const auto part : {viewer::png_js, viewer::camera_js, viewer::scene_js, viewer::painter_js,
                             viewer::viewer_js})
         code += withoutComments(part);
-    Bytes packed(zlibBound(code.size()));
-    packed.resize(compressZlib(std::as_bytes(std::span(code)), kBestLevel, packed));
-    return encodeBase64(packed);
+    return packedPageText(code);
 }
 
 /// What a page writes as it goes.
 class PageWriter {
   public:
-    PageWriter(OutputFile file, std::string shell) : file_(std::move(file)) {
-        const std::size_t at = shell.find("@DATA@");
-        end_ = shell.substr(at + 6);
-        shell.resize(at);
-        head_ = std::move(shell);
+    PageWriter(OutputFile file, std::string_view title) : file_(std::move(file)) {
+        const std::string_view shell = viewer::viewer_html;
+        const std::size_t at = shell.find(kDataMark);
+        head_ = shell.substr(0, at);
+        end_ = shell.substr(at + kDataMark.size());
+        const auto put = [](std::string& part, std::string_view mark, const std::string& text) {
+            part.replace(part.find(mark), mark.size(), text);
+        };
+        put(head_, "@TITLE@", inHtml(title));
+        put(end_, "@UNPACK@", withoutComments(viewer::unpack_js));
     }
 
     Result<void> begin() { return write(head_); }
@@ -122,25 +104,24 @@ class PageWriter {
                 if (last.number < 0 || last.bytes != bytes) {
                     last = {images_++, std::move(bytes)};
                     report.imageBytes += last.bytes.size();
-                    STX_CHECK(element("text/plain", fmt::format("image{}", last.number),
-                                      "data:image/png;base64," + encodeBase64(last.bytes)));
+                    STX_CHECK(element(fmt::format("image{}", last.number), pageText(last.bytes)));
                 }
                 numbers[name] = last.number;
             }
             pages.push_back(std::move(numbers));
         }
         scene.description["pages"] = std::move(pages);
-        std::string text = inScript(scene.description);
+        std::string text = packedPageText(textOf(scene.description));
         if (before.number >= 0 && before.text == text) return before.number;
         before.text = std::move(text);
         before.number = scenes_++;
-        STX_CHECK(element("application/json", fmt::format("scene{}", before.number), before.text));
+        STX_CHECK(element(fmt::format("scene{}", before.number), before.text));
         return before.number;
     }
 
     Result<void> finish(const Json& data) {
-        STX_CHECK(element("application/json", "data", inScript(data)));
-        STX_CHECK(element("text/plain", "code", packedProgram()));
+        STX_CHECK(element("data", packedPageText(textOf(data))));
+        STX_CHECK(element("code", packedProgram()));
         STX_CHECK(write(end_));
         return file_.commit();
     }
@@ -162,8 +143,8 @@ class PageWriter {
         report.bytes += text.size();
         return file_.write(text);
     }
-    Result<void> element(std::string_view type, std::string_view id, std::string_view text) {
-        STX_CHECK(write(fmt::format("<script type=\"{}\" id=\"{}\">", type, id)));
+    Result<void> element(std::string_view id, std::string_view text) {
+        STX_CHECK(write(fmt::format("<script type=\"text/plain\" id=\"{}\">", id)));
         STX_CHECK(write(text));
         return write("</script>\n");
     }
@@ -181,12 +162,8 @@ std::string titleOf(const PageOptions& options, const std::string& bundle) {
 
 Result<PageWriter> startPage(const std::filesystem::path& path, const PageOptions& options,
                              const std::string& title) {
-    std::string shell(viewer::viewer_html);
-    const std::string name = inHtml(titleOf(options, title));
-    for (std::size_t at = 0; (at = shell.find("@TITLE@", at)) != std::string::npos;)
-        shell.replace(at, 7, name), at += name.size();
     STX_TRY(auto file, OutputFile::create(path, options.output));
-    PageWriter writer(std::move(file), std::move(shell));
+    PageWriter writer(std::move(file), titleOf(options, title));
     STX_CHECK(writer.begin());
     return writer;
 }

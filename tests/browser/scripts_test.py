@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""The scripts of the viewer are JavaScript that node understands, and its PNG reader reads every filter."""
+"""The scripts of the viewer are JavaScript that node understands, its PNG reader reads every filter, and bytes
+that are written as text come back."""
 import glob
+import json
 import os
 import shutil
 import struct
@@ -32,6 +34,24 @@ def png(width, height, kind, bits, rows):
             chunk(b"IDAT", packed[:20]) + chunk(b"IDAT", packed[20:]) + chunk(b"IEND", b""))
 
 
+def text_of(data):
+    """Bytes as two of 91 characters for each 13 bits, as one for the last 6 (formats/viewer/page_text.hpp)."""
+    digits = [chr(c) for c in range(33, 127) if chr(c) not in '"&<']
+    number, bits, text = int.from_bytes(data, "little"), 8 * len(data), ""
+    for at in range(0, bits, 13):
+        value, left = number >> at & 8191, bits - at
+        text += digits[value % 91] + (digits[value // 91] if left > 6 else "")
+    return text
+
+
+def node_run(node, folder, scripts, code, *args):
+    """The words that code prints which follows scripts of the viewer, in a page of {id: text}, and errors."""
+    page = "const texts = {}, document = {getElementById: (id) => ({textContent: texts[id] || ''})};"
+    script = page + "".join(open(os.path.join(folder, name), encoding="utf-8").read() for name in scripts) + code
+    done = subprocess.run([node, "-e", script, *args], capture_output=True, text=True)
+    return done.stdout.split(), done.stderr[-300:]
+
+
 def main():
     node = shutil.which("node")
     if not node:
@@ -52,13 +72,21 @@ def main():
                 file.write(png(width, height, kind, bits, rows))
             flat = [v for row in rows for v in row]
             wanted = flat if bits == 8 else [256 * a + b for a, b in zip(flat[::2], flat[1::2])]
-            script = (open(os.path.join(folder, "png.js"), encoding="utf-8").read() +
-                      "decodePng(new Uint8Array(require('fs').readFileSync(process.argv[1]))).then(p => console.log("
-                      "[p.width, p.height, p.channels, ...p.values].join(' ')))")
-            done = subprocess.run([node, "-e", script, os.path.join(top, "a.png")], capture_output=True, text=True)
-            if done.stdout.split() != [str(v) for v in [width, height, channels] + wanted]:
+            found, said = node_run(
+                node, folder, ("unpack.js", "png.js"), "decodePng(new Uint8Array(require('fs').readFileSync(process.argv[1])))"
+                ".then(p => console.log([p.width, p.height, p.channels, ...p.values].join(' ')))", os.path.join(top, "a.png"))
+            if found != [str(v) for v in [width, height, channels] + wanted]:
                 failed += 1
-                print(f"FAILED: a PNG of kind {kind} with {bits} bits is read as {done.stdout[:80]} {done.stderr[-300:]}")
+                print(f"FAILED: a PNG of kind {kind} with {bits} bits is read as {found[:20]} {said}")
+    # Each length leaves another number of bits for the last characters.
+    lists = [bytes((x * x * 31 + x * 57 + n) % 256 for x in range(n)) for n in range(40)] + [b"\0" * 13, b"\xff" * 13]
+    texts = {f"a{k}": text_of(data) for k, data in enumerate(lists)}
+    found, said = node_run(
+        node, folder, ("unpack.js",), f"Object.assign(texts, {json.dumps(texts)});"
+        "for (const id of Object.keys(texts)) console.log(Buffer.from(bytesOf(id)).toString('hex') || '-')")
+    if found != [data.hex() or "-" for data in lists]:
+        failed += 1
+        print(f"FAILED: bytes are read from text as {found[:10]} {said}")
     print(f"{failed} failed")
     return 1 if failed else 0
 
