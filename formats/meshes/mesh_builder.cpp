@@ -47,6 +47,12 @@ void copyVertex(std::vector<T>& values, std::uint32_t from) {
     if (!values.empty()) values.push_back(T(values[from]));
 }
 
+/// The uvs that textures have of their own, in a part and in the mesh.
+constexpr std::pair<std::vector<glm::vec2> MeshPart::*, std::vector<glm::vec2> Mesh::*> kOwnUvs[] =
+    {{&MeshPart::normalUvs, &Mesh::normalUvs},
+     {&MeshPart::metallicRoughnessUvs, &Mesh::metallicRoughnessUvs},
+     {&MeshPart::emissiveUvs, &Mesh::emissiveUvs}};
+
 constexpr glm::vec3 kNoNormal{0.0f};
 
 }  // namespace
@@ -87,7 +93,7 @@ Result<void> MeshBuilder::add(MeshPart part) {
     const auto before = positions_.size();
     STX_CHECK(charge(
         count,
-        sizeof(glm::dvec3) + sizeof(glm::vec3) * 2 + sizeof(glm::vec4) * 2 + sizeof(glm::vec2) * 2,
+        sizeof(glm::dvec3) + sizeof(glm::vec3) * 2 + sizeof(glm::vec4) * 2 + sizeof(glm::vec2),
         part.where));
     STX_CHECK(charge(part.triangles.size(), sizeof(glm::uvec3) + 4, part.where));
     if (before + count > std::numeric_limits<std::uint32_t>::max())
@@ -99,10 +105,17 @@ Result<void> MeshBuilder::add(MeshPart part) {
     append(mesh_.normals, before, part.normals, added, kNoNormal);
     append(mesh_.tangents, before, part.tangents, added, glm::vec4(1, 0, 0, 1));
     append(mesh_.colours, before, part.colours, added, glm::vec4(1));
-    if (!part.normalUvs.empty() && mesh_.normalUvs.empty()) mesh_.normalUvs = mesh_.uvs;
-    const auto& normalUvs = part.normalUvs.empty() ? part.uvs : part.normalUvs;
-    if (!part.normalUvs.empty() || !mesh_.normalUvs.empty())
-        append(mesh_.normalUvs, before, normalUvs, added, glm::vec2(0));
+    for (const auto& [ofPart, ofMesh] : kOwnUvs) {
+        const auto& own = part.*ofPart;
+        auto& all = mesh_.*ofMesh;
+        if (own.empty() && all.empty()) continue;
+        if (all.empty()) {
+            STX_CHECK(charge(before, sizeof(glm::vec2), part.where));
+            all = mesh_.uvs;
+        }
+        STX_CHECK(charge(added, sizeof(glm::vec2), part.where));
+        append(all, before, own.empty() ? part.uvs : own, added, glm::vec2(0));
+    }
     append(mesh_.uvs, before, part.uvs, added, glm::vec2(0));
     positions_.insert(positions_.end(), part.positions.begin(), part.positions.end());
 
@@ -140,7 +153,7 @@ void MeshBuilder::dropBrokenPoints(MeshPart& part) {
     keep(part.tangents);
     keep(part.colours);
     keep(part.uvs);
-    keep(part.normalUvs);
+    for (const auto& [own, _] : kOwnUvs) keep(part.*own);
 }
 
 void MeshBuilder::repair(MeshPart& part) {
@@ -151,12 +164,13 @@ void MeshBuilder::repair(MeshPart& part) {
     flatTriangles_ += std::erase_if(part.triangles, withoutArea);
 
     bool broken = false;
-    for (auto& uv : part.uvs) {
-        if (!finite(uv)) uv = glm::vec2(0), broken = true;
-    }
-    for (auto& uv : part.normalUvs) {
-        if (!finite(uv)) uv = glm::vec2(0), broken = true;
-    }
+    const auto repairUvs = [&](std::vector<glm::vec2>& uvs) {
+        for (auto& uv : uvs) {
+            if (!finite(uv)) uv = glm::vec2(0), broken = true;
+        }
+    };
+    repairUvs(part.uvs);
+    for (const auto& [own, _] : kOwnUvs) repairUvs(part.*own);
     if (broken)
         job_.note(
             fmt::format("{}: texture coordinates that are not finite are taken as 0", part.where));
@@ -229,7 +243,7 @@ void MeshBuilder::fillNormals() {
                 copyVertex(mesh_.tangents, v);
                 copyVertex(mesh_.colours, v);
                 copyVertex(mesh_.uvs, v);
-                copyVertex(mesh_.normalUvs, v);
+                for (const auto& [_, own] : kOwnUvs) copyVertex(mesh_.*own, v);
             }
             mesh_.normals[t[k]] = face;
         }
@@ -326,7 +340,7 @@ void addFlatNormals(MeshPart& part) {
                 copyVertex(part.tangents, v);
                 copyVertex(part.colours, v);
                 copyVertex(part.uvs, v);
-                copyVertex(part.normalUvs, v);
+                for (const auto& [own, _] : kOwnUvs) copyVertex(part.*own, v);
             }
             part.normals[t[k]] = face;
         }

@@ -17,7 +17,10 @@ struct MeshPart {
     std::vector<glm::vec4> tangents;
     std::vector<glm::vec4> colours;
     std::vector<glm::vec2> uvs;
+    // Of the other textures, where they differ from uvs.
     std::vector<glm::vec2> normalUvs;
+    std::vector<glm::vec2> metallicRoughnessUvs;
+    std::vector<glm::vec2> emissiveUvs;
     std::vector<glm::uvec3> triangles;
     bool points = false;  ///< the vertices are drawn as points
     std::uint32_t material = 0;

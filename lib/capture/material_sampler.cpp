@@ -117,8 +117,9 @@ glm::vec3 MaterialSampler::emissive(std::uint32_t triangle, glm::vec3 b) const {
     const auto& m = mesh_.materials[mesh_.triangleMaterial[triangle]];
     glm::vec3 emissive = m.emissive;
     if (m.emissiveTexture >= 0 && emissive != glm::vec3(0.0f)) {
-        const auto glow = sampleTexture(mesh_.textures[m.emissiveTexture],
-                                        mix3(mesh_.uvs, mesh_.triangles[triangle], b));
+        const auto glow =
+            sampleTexture(mesh_.textures[m.emissiveTexture],
+                          mix3(uvsOr(mesh_.emissiveUvs), mesh_.triangles[triangle], b));
         for (int k = 0; k < 3; ++k) emissive[k] *= linearByTable(glow[k]);
     }
     return emissive;
@@ -128,8 +129,9 @@ glm::vec2 MaterialSampler::metallicRoughness(std::uint32_t triangle, glm::vec3 b
     const auto& m = mesh_.materials[mesh_.triangleMaterial[triangle]];
     glm::vec2 value(m.metallic, m.roughness);
     if (m.metallicRoughnessTexture >= 0) {
-        const auto texel = sampleTexture(mesh_.textures[m.metallicRoughnessTexture],
-                                         mix3(mesh_.uvs, mesh_.triangles[triangle], b));
+        const auto texel =
+            sampleTexture(mesh_.textures[m.metallicRoughnessTexture],
+                          mix3(uvsOr(mesh_.metallicRoughnessUvs), mesh_.triangles[triangle], b));
         value *= glm::vec2(texel.b, texel.g);
     }
     return value;
@@ -161,9 +163,8 @@ glm::vec3 MaterialSampler::normal(std::uint32_t triangle, glm::vec3 b) const {
     if (!(tangentLength > 1e-6f)) return n;
     tangent /= tangentLength;
     const glm::vec3 bitangent = glm::cross(n, tangent) * (tangent4.w < 0 ? -1.0f : 1.0f);
-    const auto& uvs = mesh_.normalUvs.empty() ? mesh_.uvs : mesh_.normalUvs;
-    glm::vec3 bump =
-        glm::vec3(sampleTexture(mesh_.textures[m.normalTexture], mix3(uvs, t, b))) * 2.0f - 1.0f;
+    const glm::vec2 at = mix3(uvsOr(mesh_.normalUvs), t, b);
+    glm::vec3 bump = glm::vec3(sampleTexture(mesh_.textures[m.normalTexture], at)) * 2.0f - 1.0f;
     bump.x *= m.normalScale;
     bump.y *= m.normalScale;
     return glm::normalize(tangent * bump.x + bitangent * bump.y + n * std::max(bump.z, 1e-3f));

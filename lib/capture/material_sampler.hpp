@@ -59,6 +59,11 @@ class MaterialSampler {
     [[nodiscard]] glm::vec3 normal(std::uint32_t triangle, glm::vec3 barycentric) const;
 
   private:
+    /// The texture coordinates of a texture that may have some of its own.
+    [[nodiscard]] const std::vector<glm::vec2>& uvsOr(const std::vector<glm::vec2>& own) const {
+        return own.empty() ? mesh_.uvs : own;
+    }
+
     const Mesh& mesh_;
     Glow glow_;
     std::vector<bool> seeThrough_;    ///< per material

@@ -111,7 +111,9 @@ Mesh pointsAsDiscs(const Mesh& mesh, const Camera& camera, float radius) {
             if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[p]);
             if (!mesh.colours.empty()) out.colours.push_back(mesh.colours[p]);
             if (!mesh.uvs.empty()) out.uvs.push_back(mesh.uvs[p]);
-            if (!mesh.normalUvs.empty()) out.normalUvs.push_back(mesh.normalUvs[p]);
+            for (const auto uvs :
+                 {&Mesh::normalUvs, &Mesh::metallicRoughnessUvs, &Mesh::emissiveUvs})
+                if (!(mesh.*uvs).empty()) (out.*uvs).push_back((mesh.*uvs)[p]);
             if (!mesh.tangents.empty()) out.tangents.push_back(mesh.tangents[p]);
         }
         for (std::uint32_t k = 2; k < kCorners; ++k) {

@@ -16,7 +16,8 @@ Result<void> Mesh::check() const {
     const auto n = positions.size();
     const auto fits = [&](std::size_t size) { return size == 0 || size == n; };
     if (!fits(normals.size()) || !fits(tangents.size()) || !fits(colours.size()) ||
-        !fits(uvs.size()) || !fits(normalUvs.size()))
+        !fits(uvs.size()) || !fits(normalUvs.size()) || !fits(metallicRoughnessUvs.size()) ||
+        !fits(emissiveUvs.size()))
         return fail(
             ErrorCode::invalidInput,
             "the mesh has {} positions, {} normals, {} colours, {} uvs; all must be as many", n,
@@ -50,9 +51,11 @@ Result<void> Mesh::check() const {
             !textureExists(m.emissiveTexture) || !textureExists(m.metallicRoughnessTexture))
             return fail(ErrorCode::invalidInput, "material '{}' uses a texture that does not exist",
                         m.name);
-        if ((m.baseColourTexture >= 0 || m.emissiveTexture >= 0 ||
-             m.metallicRoughnessTexture >= 0) &&
-            uvs.empty())
+        const auto without = [&](int texture, const std::vector<glm::vec2>& own) {
+            return texture >= 0 && uvs.empty() && own.empty();
+        };
+        if (without(m.baseColourTexture, uvs) || without(m.emissiveTexture, emissiveUvs) ||
+            without(m.metallicRoughnessTexture, metallicRoughnessUvs))
             return fail(ErrorCode::invalidInput,
                         "material '{}' has a texture but the mesh has no uvs", m.name);
     }

@@ -26,13 +26,13 @@ struct MeshTexture {
 struct Material {
     enum class Alpha { opaque, mask, blend };
     std::string name;
-    glm::vec4 baseColour{1.0f};  ///< linear factor, multiplies texture and vertex colour
-    int baseColourTexture = -1;  ///< index into Mesh::textures, -1 = none; sRGB-coded
-    glm::vec3 emissive{0.0f};    ///< linear, added to the base colour; may exceed 1
-    int emissiveTexture = -1;    ///< multiplies `emissive`, -1 = none; sRGB-coded, at Mesh::uvs
-    float metallic = 0.0f;       ///< 0..1, where hasMetallicRoughness
-    float roughness = 1.0f;      ///< 0..1
-    int metallicRoughnessTexture = -1;  ///< G multiplies roughness, B metallic; at Mesh::uvs
+    glm::vec4 baseColour{1.0f};         ///< linear factor, multiplies texture and vertex colour
+    int baseColourTexture = -1;         ///< index into Mesh::textures, -1 = none; sRGB-coded
+    glm::vec3 emissive{0.0f};           ///< linear, added to the base colour; may exceed 1
+    int emissiveTexture = -1;           ///< multiplies `emissive`, -1 = none; sRGB-coded
+    float metallic = 0.0f;              ///< 0..1, where hasMetallicRoughness
+    float roughness = 1.0f;             ///< 0..1
+    int metallicRoughnessTexture = -1;  ///< G multiplies roughness, B metallic
     bool hasMetallicRoughness = false;  ///< the file says the two
     int normalTexture = -1;             ///< tangent-space normal map, -1 = none; linear
     float normalScale = 1.0f;
@@ -53,7 +53,10 @@ struct Mesh {
     std::vector<glm::vec4> tangents;   ///< xyz unit, w = handedness (only with normal maps)
     std::vector<glm::vec4> colours;    ///< linear RGBA, multiplies the base colour
     std::vector<glm::vec2> uvs;  ///< of the base colour texture, its transform applied; v down
-    std::vector<glm::vec2> normalUvs;  ///< of the normal texture, when they differ from uvs
+    // Of the other textures, each when it differs from uvs for some material.
+    std::vector<glm::vec2> normalUvs;
+    std::vector<glm::vec2> metallicRoughnessUvs;
+    std::vector<glm::vec2> emissiveUvs;
 
     std::vector<glm::uvec3> triangles;            ///< indices into the vertex arrays
     std::vector<std::uint32_t> triangleMaterial;  ///< one per triangle, index into materials

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """A cube whose material has metallic-roughness and emissive maps; and what an atlas must hold of them.
 
-    material_model.py make FILE.gltf
+    material_model.py make FILE.gltf [apart]
     material_model.py check ATLAS
 
-The maps are of 4 x 4 texels without interpolation, so each pixel of the atlas is one of their texels.
+The maps are of 4 x 4 texels without interpolation, so each pixel of the atlas is one of their texels. With "apart"
+each map reaches the same texels by coordinates of its own: another set, or a transform.
 """
 import base64
 import json
+import math
 import os
 import struct
 import sys
@@ -57,7 +59,7 @@ def pixels(path):
     return width, height, [p for row in rows for p in row]
 
 
-def make(path):
+def make(path, apart=False):
     positions, uvs, indices = [], [], []
     for axis in range(3):
         for side in (-1, 1):
@@ -93,6 +95,23 @@ def make(path):
                                                 "metallicRoughnessTexture": {"index": 0}},
                        "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 1},
                        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 3}}}]}
+    if apart:
+        # A white base colour at TEXCOORD_0 three times as large; TEXCOORD_1 is (1 - v, u) / 2, and a turn by 90
+        # degrees makes (u, v) of it: v' = v, u' = u (KHR_texture_transform, "rotation").
+        material = model["materials"][0]
+        start = len(buffer)
+        buffer += b"".join(struct.pack("<2f", (1 - v) / 2, u / 2) for u, v in uvs)
+        model["buffers"][0] = {"byteLength": len(buffer), "uri": uri("application/octet-stream", buffer)}
+        model["bufferViews"].append({"buffer": 0, "byteOffset": start, "byteLength": 192})
+        model["accessors"].append({"bufferView": 3, "componentType": 5126, "type": "VEC2", "count": 24})
+        model["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = 3
+        model["images"].append({"uri": uri("image/png", png([(255, 255, 255)] * 16))})
+        model["textures"].append({"source": 2})
+        model["extensionsUsed"].append("KHR_texture_transform")
+        material["pbrMetallicRoughness"]["baseColorTexture"] = {
+            "index": 2, "extensions": {"KHR_texture_transform": {"scale": [3, 3]}}}
+        material["pbrMetallicRoughness"]["metallicRoughnessTexture"].update(
+            texCoord=1, extensions={"KHR_texture_transform": {"scale": [2, 2], "rotation": math.pi / 2, "offset": [0, 1]}})
     json.dump(model, open(path, "w"))
 
 
@@ -121,4 +140,4 @@ def check(atlas):
 
 
 if __name__ == "__main__":
-    {"make": make, "check": check}[sys.argv[1]](sys.argv[2])
+    {"make": make, "check": check}[sys.argv[1]](*sys.argv[2:])

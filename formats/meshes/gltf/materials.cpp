@@ -31,21 +31,23 @@ Result<MaterialUse> Materials::use(std::optional<std::uint64_t> index, const std
     return result;
 }
 
-MaterialUse Materials::withoutTextures(const MaterialUse& use, bool keepBase, bool keepNormal) {
+MaterialUse Materials::withoutTextures(const MaterialUse& use, TexturesKept kept) {
     MaterialUse result = use;
-    if (!keepBase) result.baseColour = {};
-    if (!keepNormal) result.normal = {};
-    const auto [it, isNew] = plain_.try_emplace({use.index, keepBase, keepNormal}, 0);
+    if (!kept.baseColour) result.baseColour = {};
+    if (!kept.normal) result.normal = {};
+    if (!kept.metallicRoughness) result.metallicRoughness = {};
+    if (!kept.emissive) result.emissive = {};
+    const auto [it, isNew] = plain_.try_emplace({use.index, kept}, 0);
     if (isNew) {
         auto material = builder_.materials()[use.index];
-        if (!keepBase) {
-            material.baseColourTexture = -1;
+        if (!kept.baseColour) material.baseColourTexture = -1;
+        if (!kept.metallicRoughness) material.metallicRoughnessTexture = -1;
+        if (!kept.emissive) {
             // A map of what shines, which is dark for the most part.
             if (material.emissiveTexture >= 0) material.emissive = glm::vec3(0.0f);
             material.emissiveTexture = -1;
-            material.metallicRoughnessTexture = -1;
         }
-        if (!keepNormal) material.normalTexture = -1;
+        if (!kept.normal) material.normalTexture = -1;
         it->second = static_cast<std::uint32_t>(builder_.materials().size());
         builder_.materials().push_back(std::move(material));
     }
@@ -155,17 +157,9 @@ Result<void> Materials::readEmissive(const Json& object, const std::string& wher
     if (factor == glm::dvec3(0.0)) return {};
     m.emissive = glm::clamp(glm::vec3(factor), 0.0f, 1e6f);
     if (!info) return {};
-    UvSource uv;
-    STX_TRY(m.emissiveTexture, texture(*info, where + ".emissiveTexture", uv));
-    if (m.emissiveTexture < 0) {
-        m.emissive = glm::vec3(0.0f);
-    } else if (!use.baseColour.used) {
-        use.baseColour = uv;
-    } else if (!(uv == use.baseColour)) {
-        ++dropped["emissive maps with texture coordinates of their own"];
-        m.emissive = glm::vec3(0.0f);
-        m.emissiveTexture = -1;
-    }
+    STX_TRY(m.emissiveTexture, texture(*info, where + ".emissiveTexture", use.emissive));
+    if (m.emissiveTexture < 0) m.emissive = glm::vec3(0.0f);
+    if (!use.baseColour.used) use.baseColour = use.emissive;
     return {};
 }
 
@@ -195,14 +189,9 @@ Result<void> Materials::readMetallicRoughness(const Json* base, bool glossy,
     if (!base) return {};
     STX_TRY(const Json* info, getObject(*base, "metallicRoughnessTexture", where));
     if (!info) return {};
-    UvSource uv;
-    STX_TRY(const int map, texture(*info, where + ".metallicRoughnessTexture", uv));
-    if (map < 0) return {};
-    if (!use.baseColour.used) use.baseColour = uv;
-    if (uv == use.baseColour)
-        m.metallicRoughnessTexture = map;
-    else
-        ++dropped["metallic-roughness maps with texture coordinates of their own"];
+    STX_TRY(m.metallicRoughnessTexture,
+            texture(*info, where + ".metallicRoughnessTexture", use.metallicRoughness));
+    if (!use.baseColour.used) use.baseColour = use.metallicRoughness;
     return {};
 }
 

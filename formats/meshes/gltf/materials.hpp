@@ -21,8 +21,18 @@ struct UvSource {
 /// A material of the file as the mesh's material `index`.
 struct MaterialUse {
     std::uint32_t index = 0;
+    /// Of the mesh's uvs: the base colour's, else those of the first other map that is not for
+    /// normals.
     UvSource baseColour;
-    UvSource normal;
+    UvSource normal, metallicRoughness, emissive;
+};
+
+/// Which textures of a material have texture coordinates. Those that share the base colour's go
+/// with it.
+struct TexturesKept {
+    bool baseColour = true, normal = true, metallicRoughness = true, emissive = true;
+
+    auto operator<=>(const TexturesKept&) const = default;
 };
 
 /// Makes the mesh's materials from the file's, each when it is first used.
@@ -33,9 +43,8 @@ class Materials {
     /// `index` of `materials`, or nothing for glTF's default material.
     [[nodiscard]] Result<MaterialUse> use(std::optional<std::uint64_t> index,
                                           const std::string& user);
-    /// The same material without its textures, for a primitive without texture coordinates.
-    [[nodiscard]] MaterialUse withoutTextures(const MaterialUse& use, bool keepBase,
-                                              bool keepNormal);
+    /// The same material without textures, for a primitive that lacks their coordinates.
+    [[nodiscard]] MaterialUse withoutTextures(const MaterialUse& use, TexturesKept kept);
 
     /// What materials had that a base colour does not show: name -> count.
     std::map<std::string, int> dropped;
@@ -52,7 +61,7 @@ class Materials {
     GltfFile& model_;
     MeshBuilder& builder_;
     std::map<std::int64_t, MaterialUse> known_;
-    std::map<std::tuple<std::uint32_t, bool, bool>, std::uint32_t> plain_;
+    std::map<std::pair<std::uint32_t, TexturesKept>, std::uint32_t> plain_;
 };
 
 }  // namespace stx::gltf

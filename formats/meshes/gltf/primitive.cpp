@@ -251,15 +251,24 @@ Result<Primitive> readPrimitive(GltfFile& model, MeshBuilder& builder, Materials
             STX_TRY(part.normalUvs, readUvs(source));
         }
     }
-    const bool baseWorks = !material.baseColour.used || !part.uvs.empty();
-    const bool normalWorks = !material.normal.used ||
-                             !(part.normalUvs.empty() && part.uvs.empty()) || position->count == 0;
-    if (!baseWorks || !normalWorks) {
+    TexturesKept kept;
+    kept.baseColour = !material.baseColour.used || !part.uvs.empty();
+    kept.normal = !material.normal.used || !(part.normalUvs.empty() && part.uvs.empty()) ||
+                  position->count == 0;
+    // Whether a map has coordinates: its own, which are read here, or the base colour's.
+    const auto readOwn = [&](const UvSource& source, std::vector<glm::vec2>& own) -> Result<bool> {
+        if (!source.used || source == material.baseColour) return kept.baseColour;
+        STX_TRY(own, readUvs(source));
+        return !own.empty();
+    };
+    STX_TRY(kept.metallicRoughness, readOwn(material.metallicRoughness, part.metallicRoughnessUvs));
+    STX_TRY(kept.emissive, readOwn(material.emissive, part.emissiveUvs));
+    if (kept != TexturesKept()) {
         model.job().note(
             fmt::format("{} has a textured material but no texture coordinates for it; the "
                         "plain colour is used",
                         where));
-        material = materials.withoutTextures(material, baseWorks, normalWorks);
+        material = materials.withoutTextures(material, kept);
     }
     part.material = material.index;
 

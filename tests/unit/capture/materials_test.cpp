@@ -91,6 +91,32 @@ TEST(CapturedMaterials, FactorsMultiplyTheMaps) {
     EXPECT_EQ(view.emissive.at(0, 0), glm::vec3(0));
 }
 
+TEST(CapturedMaterials, MapsAreWhereTheirOwnCoordinatesSay) {
+    Mesh mesh = square(glowing(), maps());
+    mesh.emissiveUvs = {{1, 0}, {0, 0}, {0, 1}, {1, 1}};  // mirrored
+    const auto read = [](const Mesh& from) {
+        Job job;
+        auto bundle = captureBundle(from, {before()}, withMaterials(), job);
+        EXPECT_TRUE(bundle) << bundle.error().text();
+        return std::move(bundle->views.at(0));
+    };
+    const ReferenceView light = read(mesh);
+    EXPECT_EQ(light.emissive.at(4, 8), glm::vec3(0));
+    EXPECT_LT(glm::length(light.emissive.at(11, 8) - glm::vec3(2, 1, 0)), 1e-5f);
+    EXPECT_NEAR(light.metallicRoughness.at(4, 8).y, 0.8, 1e-6);
+    std::swap(mesh.emissiveUvs, mesh.metallicRoughnessUvs);
+    const ReferenceView surface = read(mesh);
+    EXPECT_EQ(surface.emissive.at(11, 8), glm::vec3(0));
+    EXPECT_NEAR(surface.metallicRoughness.at(4, 8).y, 0.8 * 102 / 255, 1e-6);
+    EXPECT_NEAR(surface.metallicRoughness.at(11, 8).y, 0.8, 1e-6);
+    // The mesh needs no others then.
+    mesh.uvs.clear();
+    mesh.emissiveUvs = mesh.metallicRoughnessUvs;
+    EXPECT_TRUE(mesh.check());
+    mesh.emissiveUvs.clear();
+    EXPECT_FALSE(mesh.check());
+}
+
 TEST(CapturedMaterials, LightIsInTheColourOrApart) {
     const std::uint8_t base = srgb8FromLinear(0.25f);
     const auto apart = captured(withMaterials()).views.at(0).texture.rgba8()->at(4, 8);

@@ -272,15 +272,16 @@ GltfText metallicQuad(nlohmann::json uv = nlohmann::json::object()) {
     return gltf;
 }
 
+ReadModel readMaterials(const GltfText& gltf, bool materials = true) {
+    TemporaryFolder folder;
+    std::ofstream(folder / "a.gltf") << gltf.text();
+    MeshOptions options;
+    options.materials = materials;
+    return readGood(folder / "a.gltf", options);
+}
+
 TEST(Gltf, MetallicRoughnessIsReadWhereItIsAskedFor) {
-    const auto read = [](const GltfText& gltf, bool materials) {
-        TemporaryFolder folder;
-        std::ofstream(folder / "a.gltf") << gltf.text();
-        MeshOptions options;
-        options.materials = materials;
-        return readGood(folder / "a.gltf", options);
-    };
-    const auto asked = read(metallicQuad(), true);
+    const auto asked = readMaterials(metallicQuad());
     const Material& m = asked.mesh.materials.at(0);
     EXPECT_TRUE(m.hasMetallicRoughness);
     EXPECT_FLOAT_EQ(m.metallic, 0.25f);
@@ -288,17 +289,58 @@ TEST(Gltf, MetallicRoughnessIsReadWhereItIsAskedFor) {
     EXPECT_EQ(m.metallicRoughnessTexture, 0);
     EXPECT_TRUE(asked.notes.empty());
 
-    const auto plain = read(metallicQuad(), false);
+    const auto plain = readMaterials(metallicQuad(), false);
     EXPECT_FALSE(plain.mesh.materials.at(0).hasMetallicRoughness);
     EXPECT_EQ(plain.mesh.materials.at(0).metallicRoughnessTexture, -1);
     EXPECT_TRUE(plain.hasNote("dropped: metallic-roughness maps (1)"));
+    EXPECT_TRUE(asked.mesh.metallicRoughnessUvs.empty());
+}
 
-    // A map elsewhere than the colour would need coordinates of its own.
-    const auto apart = read(
-        metallicQuad({{"extensions", {{"KHR_texture_transform", {{"offset", {0.5, 0}}}}}}}), true);
-    EXPECT_EQ(apart.mesh.materials.at(0).metallicRoughnessTexture, -1);
-    EXPECT_FLOAT_EQ(apart.mesh.materials.at(0).metallic, 0.25f);
-    EXPECT_TRUE(apart.hasNote("metallic-roughness maps with texture coordinates of their own"));
+TEST(Gltf, MapsHaveTheirOwnUvs) {
+    // Colour as it is, metallic-roughness moved, light in a set of its own that is scaled.
+    auto gltf = metallicQuad({{"extensions", {{"KHR_texture_transform", {{"offset", {0.5, 0}}}}}}});
+    gltf.primitive()["attributes"]["TEXCOORD_1"] =
+        gltf.accessor(std::vector<float>{0, 0, 0, 0, 0.25f, 0.75f, 0, 0}, 5126, "VEC2", 4);
+    auto& material = gltf.root["materials"][0];
+    material["emissiveFactor"] = {1, 1, 1};
+    material["emissiveTexture"] = {
+        {"index", 0},
+        {"texCoord", 1},
+        {"extensions", {{"KHR_texture_transform", {{"scale", {2, 1}}}}}}};
+    // One more part has the colour's coordinates for all, and one has none for its light.
+    gltf.addQuad();
+    auto& parts = gltf.root["meshes"][0]["primitives"];
+    gltf.root["materials"].push_back(
+        {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+    parts[1]["material"] = 1;
+    gltf.addQuad();
+    parts[2]["material"] = 0;
+
+    const auto [mesh, notes] = readMaterials(gltf);
+    ASSERT_EQ(mesh.uvs.size(), 12u);
+    ASSERT_EQ(mesh.metallicRoughnessUvs.size(), 12u);
+    ASSERT_EQ(mesh.emissiveUvs.size(), 12u);
+    expectNear(mesh.uvs[2], {1, 1});
+    expectNear(mesh.metallicRoughnessUvs[2], {1.5, 1});
+    expectNear(mesh.emissiveUvs[2], {0.5, 0.75});
+    EXPECT_TRUE(mesh.normalUvs.empty());
+    for (std::size_t i = 4; i < 8; ++i) {
+        EXPECT_EQ(mesh.metallicRoughnessUvs[i], mesh.uvs[i]);
+        EXPECT_EQ(mesh.emissiveUvs[i], mesh.uvs[i]);
+    }
+    expectNear(mesh.metallicRoughnessUvs[10], {1.5, 1});
+    const Material& all = mesh.materials.at(mesh.triangleMaterial.at(0));
+    EXPECT_EQ(all.metallicRoughnessTexture, 0);
+    EXPECT_EQ(all.emissiveTexture, 0);
+    const Material& dark = mesh.materials.at(mesh.triangleMaterial.at(4));
+    EXPECT_EQ(dark.baseColourTexture, 0);
+    EXPECT_EQ(dark.metallicRoughnessTexture, 0);
+    EXPECT_EQ(dark.emissiveTexture, -1);
+    EXPECT_EQ(dark.emissive, glm::vec3(0));
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("primitives[2] has a textured material but no texture coordinates"),
+              std::string::npos)
+        << notes[0];
 }
 
 TEST(Gltf, WhatIsDroppedIsSaidInOneLine) {
