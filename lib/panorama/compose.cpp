@@ -224,12 +224,11 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
             const auto to = sums.row(y - top);
             for (std::size_t i = 0; i < pixels.count; ++i) {
                 const glm::vec4 c = pixels.colour[i];
-                glm::vec3 own = gain;
+                glm::vec3 light{linear.linear(c.r), linear.linear(c.g), linear.linear(c.b)};
                 if (!vignetting.none())
-                    own *= vignetting.clearing(picture.radius2(pixels.x[i], pixels.y[i]));
-                const glm::vec3 light =
-                    withGain({linear.linear(c.r), linear.linear(c.g), linear.linear(c.b)}, own) *
-                    pixels.factor[i];
+                    light = cleared(light,
+                                    vignetting.clearing(picture.radius2(pixels.x[i], pixels.y[i])));
+                light = withGain(light, gain) * pixels.factor[i];
                 const int x = pixels.column[i];
                 to[static_cast<std::size_t>((x % width + width) % width)] +=
                     pixels.weight[i] * glm::vec4(light, 1);

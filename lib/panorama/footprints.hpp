@@ -73,6 +73,14 @@ void clearVignetting(std::vector<Footprint>& footprints, const Vignetting& vigne
     return light * glm::mix(gain, glm::max(gain, glm::vec3(1)), t * t * (3 - 2 * t));
 }
 
+/// Linear light without the picture's vignetting (see Vignetting::clearing()). The brightest become
+/// less brighter, so that clouds near corners keep their shades: what is not white stays below it.
+[[nodiscard]] inline glm::vec3 cleared(glm::vec3 light, float clearing) {
+    const float highest = std::max(light.r, std::max(light.g, light.b));
+    const float squared = highest * highest;
+    return light * (clearing / (1 + (clearing - 1) * squared * squared));
+}
+
 /// For each cell the index of the footprint to show, -1 = none: seams run where pictures agree
 /// (alpha expansion; Boykov, Veksler and Zabih 2001, with the cost of Kwatra et al. 2003). Edges of
 /// what is seen are extended by two cells.

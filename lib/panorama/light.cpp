@@ -43,7 +43,7 @@ Image<glm::vec3> logsOf(const Footprint& f, glm::vec3 gain) {
     for (std::size_t i = 0; i < out.count(); ++i)
         if (f.inside.pixels()[i] > 0)
             out.pixels()[i] =
-                glm::log(withGain(f.colour.pixels()[i], gain * f.clearingAt(i)) + 0.01f);
+                glm::log(withGain(cleared(f.colour.pixels()[i], f.clearingAt(i)), gain) + 0.01f);
     return out;
 }
 

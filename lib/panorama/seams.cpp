@@ -55,7 +55,7 @@ class SeamGrid {
             cost_[k] = Image<float>(f.box.width, f.box.height, 0.0f);
             for (std::size_t p = 0; p < coded_[k].count(); ++p) {
                 const glm::vec3 c =
-                    withGain(f.colour.pixels()[p], glm::vec3(gains[k]) * f.clearingAt(p));
+                    withGain(cleared(f.colour.pixels()[p], f.clearingAt(p)), glm::vec3(gains[k]));
                 coded_[k].pixels()[p] =
                     255.0f * glm::vec3(srgbByTable(c.r), srgbByTable(c.g), srgbByTable(c.b));
                 const float out = 1 - std::min(1.0f, f.inside.pixels()[p]);

@@ -491,7 +491,8 @@ void prepareWhole(std::vector<Source>& sources, std::vector<PreparedPage>& pages
 
 SurfaceScene::SurfaceScene(const PageSet& pageSet, bool sharpens) : set(pageSet) {
     prepare();
-    if (!sharpens) return;
+    // One view cannot tell whether its depth is exact; where it is not, sharper is worse.
+    if (!sharpens || sources.size() < 2) return;
     sharpened = sharpenedTextures(*this);
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = sharpened[i].get();
 }

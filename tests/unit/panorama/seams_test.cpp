@@ -166,6 +166,19 @@ panorama::Footprint darkSided(int picture, int x) {
     return f;
 }
 
+TEST(Cleared, KeepsTheShadesOfWhatIsBright) {
+    for (const float clearing : {1.1f, 1.3f}) {
+        EXPECT_NEAR(panorama::cleared(glm::vec3(0.2f), clearing).r, 0.2f * clearing, 1e-3f);
+        EXPECT_EQ(panorama::cleared(glm::vec3(1.0f), clearing).r, 1.0f);
+        float last = 0;
+        for (int i = 1; i <= 100; ++i) {
+            const float c = panorama::cleared(glm::vec3(0.01f * static_cast<float>(i)), clearing).r;
+            EXPECT_GT(c, last) << i;
+            last = c;
+        }
+    }
+}
+
 TEST(FindCorrections, BringsPicturesToTheSameLightAtASeamNearAnEdge) {
     const std::vector<panorama::Footprint> prints = {darkSided(0, 0), darkSided(1, 90)};
     constexpr int kSeam = 152;  // eight cells before the first one ends

@@ -30,7 +30,7 @@ Rgba8Image greyWithSpot(int x, int y) {
 
 Rgba8Image sharpenedOf(const ReferenceView& view) {
     Bundle bundle;
-    bundle.views = {view};
+    bundle.views = {view, view};
     const SurfaceScene scene(bundle, true);
     return *scene.pages[0].texture->rgba8();
 }
@@ -63,7 +63,7 @@ TEST(Sharpen, ABrightLightLeavesNoBlackRing) {
     RgbaFloatImage image(kSize, kSize, glm::vec4(0.1f, 0.1f, 0.1f, 1.0f));
     image.at(10, 12) = {1000.0f, 0.1f, 0.1f, 1.0f};
     Bundle bundle;
-    bundle.views = {wallWith(image)};
+    bundle.views = {wallWith(image), wallWith(image)};
     const SurfaceScene scene(bundle, true);
     const RgbaFloatImage& out = *scene.pages[0].texture->rgbaFloat();
     EXPECT_FLOAT_EQ(out.at(9, 12).r, 0.05f);
@@ -71,11 +71,14 @@ TEST(Sharpen, ABrightLightLeavesNoBlackRing) {
     EXPECT_GT(out.at(10, 12).r, 1100.0f);
 }
 
-TEST(Sharpen, DraftsReadThePixelsThemselves) {
+TEST(Sharpen, DraftsAndViewsAloneAreReadAsTheyAre) {
     Bundle bundle;
     bundle.views = {wallWith(greyWithSpot(10, 12))};
-    const SurfaceScene scene(bundle);
-    EXPECT_EQ(scene.pages[0].texture, scene.set.pages()[0].texture);
+    const SurfaceScene alone(bundle, true);
+    EXPECT_EQ(alone.pages[0].texture, alone.set.pages()[0].texture);
+    bundle.views.push_back(bundle.views[0]);
+    const SurfaceScene draft(bundle);
+    EXPECT_EQ(draft.pages[0].texture, draft.set.pages()[0].texture);
 }
 
 }  // namespace
