@@ -7,10 +7,10 @@
 
 namespace stx {
 
-/// Bytes as text that may stand in a script element of HTML: 13 bits, the lowest of the bytes
-/// first, are two of the 91 printable characters of ASCII that are not space, '"', '&' or '<', the
-/// lower digit first; up to 6 bits at the end are one character. 1.23 characters a byte, where
-/// base64 has 1.33. unpack.js reads it.
+/// Bytes as text for a script element of HTML: 13 bits, the lowest of the bytes first, are two of
+/// the 91 printable characters of ASCII that are not space, '"', '&' or '<', the lower digit first;
+/// up to 6 bits at the end are one character. 1.23 characters a byte, where base64 has 1.33.
+/// unpack.js reads it.
 [[nodiscard]] std::string pageText(ByteSpan bytes);
 
 /// Text packed by zlib, as pageText().

@@ -81,6 +81,18 @@ void clearVignetting(std::vector<Footprint>& footprints, const Vignetting& vigne
     return light * (clearing / (1 + (clearing - 1) * squared * squared));
 }
 
+/// The light that cleared() makes this of: as dark as the lens makes it there.
+[[nodiscard]] inline glm::vec3 uncleared(glm::vec3 light, float clearing) {
+    const float highest = std::max(light.r, std::max(light.g, light.b));
+    if (!(highest > 0)) return light;
+    float low = 0, high = 1;
+    for (int halving = 0; halving < 16; ++halving) {
+        const float middle = 0.5f * (low + high);
+        (cleared(glm::vec3(middle), clearing).r < highest ? low : high) = middle;
+    }
+    return light * (low / highest);
+}
+
 /// For each cell the index of the footprint to show, -1 = none: seams run where pictures agree
 /// (alpha expansion; Boykov, Veksler and Zabih 2001, with the cost of Kwatra et al. 2003). Edges of
 /// what is seen are extended by two cells.

@@ -44,9 +44,8 @@ LeftOutPicture compared(const WorkCopy& copy, const PanoramaCamera& camera, cons
             const glm::dvec3 truth(tables.linear(own.r), tables.linear(own.g),
                                    tables.linear(own.b));
             c = {linearByTable(c.r), linearByTable(c.g), linearByTable(c.b), 1};
-            // As dark as the lens makes it there.
             if (!vignetting.none())
-                c = glm::vec4(glm::vec3(c) / vignetting.clearing(glm::dot(p, p)), 1);
+                c = glm::vec4(uncleared(glm::vec3(c), vignetting.clearing(glm::dot(p, p))), 1);
             sums.product += truth * glm::dvec3(c);
             sums.square += glm::dvec3(c) * glm::dvec3(c);
             ++sums.count;

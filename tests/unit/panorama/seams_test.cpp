@@ -174,6 +174,8 @@ TEST(Cleared, KeepsTheShadesOfWhatIsBright) {
         for (int i = 1; i <= 100; ++i) {
             const float c = panorama::cleared(glm::vec3(0.01f * static_cast<float>(i)), clearing).r;
             EXPECT_GT(c, last) << i;
+            EXPECT_NEAR(panorama::uncleared(glm::vec3(c), clearing).r,
+                        0.01f * static_cast<float>(i), 1e-3f);
             last = c;
         }
     }
