@@ -103,9 +103,22 @@ FieldValue makeEmpty(std::size_t index, std::index_sequence<I...>) {
 
 }  // namespace
 
+FieldValue::FieldValue() = default;
+FieldValue::FieldValue(const FieldValue& other) = default;
+FieldValue::FieldValue(FieldValue&& other) noexcept = default;
+FieldValue& FieldValue::operator=(const FieldValue& other) = default;
+FieldValue& FieldValue::operator=(FieldValue&& other) noexcept = default;
+FieldValue::~FieldValue() = default;
+
+Command::Command(const Command& other) = default;
+Command::Command(Command&& other) noexcept = default;
+Command& Command::operator=(const Command& other) = default;
+Command& Command::operator=(Command&& other) noexcept = default;
+Command::~Command() = default;
+
 FieldValue emptyValue(FieldType type) {
     return makeEmpty(static_cast<std::size_t>(type),
-                     std::make_index_sequence<std::variant_size_v<FieldValue>>{});
+                     std::make_index_sequence<std::variant_size_v<AnyFieldValue>>{});
 }
 
 const FieldValue& defaultValue(const NodeInfo& node, int fieldIndex) {

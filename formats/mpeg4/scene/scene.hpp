@@ -95,8 +95,7 @@ struct AttributeReference {
     bool operator==(const AttributeReference&) const = default;
 };
 
-/// The value of a field; alternatives in the order of FieldType. double is SFTime.
-using FieldValue =
+using AnyFieldValue =
     std::variant<bool, std::int32_t, float, double, std::string, Url, glm::vec2, glm::vec3, Color,
                  Rotation, PixelImage, NodePtr, glm::vec4, ScriptText, CommandBuffer,
                  AttributeReference, std::vector<std::int32_t>, std::vector<float>,
@@ -104,6 +103,17 @@ using FieldValue =
                  std::vector<glm::vec2>, std::vector<glm::vec3>, std::vector<Color>,
                  std::vector<Rotation>, NodeList, std::vector<glm::vec4>, std::vector<ScriptText>,
                  std::vector<AttributeReference>, std::vector<bool>, std::vector<PixelImage>>;
+/// The value of a field; alternatives in the order of FieldType. double is SFTime. Copied, moved
+/// and destroyed in scene.cpp: code for that many types in each file took much of a build.
+struct FieldValue : AnyFieldValue {
+    using AnyFieldValue::AnyFieldValue;
+    FieldValue();
+    FieldValue(const FieldValue& other);
+    FieldValue(FieldValue&& other) noexcept;
+    FieldValue& operator=(const FieldValue& other);
+    FieldValue& operator=(FieldValue&& other) noexcept;
+    ~FieldValue();
+};
 
 /// Whether T is the C++ type of an MF value.
 template <class T>
@@ -294,9 +304,18 @@ struct DeleteIndexed {
 struct DeleteRoute {
     std::uint32_t routeId = 0;
 };
-using Command =
+using AnyCommand =
     std::variant<ReplaceScene, ReplaceNode, ReplaceField, ReplaceIndexed, ReplaceRoute, InsertNode,
                  InsertIndexed, InsertRoute, DeleteNode, DeleteIndexed, DeleteRoute>;
+/// One command; a class of its own for the reason that FieldValue is one.
+struct Command : AnyCommand {
+    using AnyCommand::AnyCommand;
+    Command(const Command& other);
+    Command(Command&& other) noexcept;
+    Command& operator=(const Command& other);
+    Command& operator=(Command&& other) noexcept;
+    ~Command();
+};
 
 /// One access unit of the scene stream: commands that take effect together.
 struct CommandFrame {
