@@ -14,8 +14,19 @@ namespace {
 constexpr int kEnclosing = 7, kEnclosingPruned = 5, kRoundsPruned = 2;
 /// Neighbours nearer than this share of the farthest are on a surface in front.
 constexpr float kSameDepth = 0.97f;
+/// A pixel with less coverage than the first among eight with that of the second is a speck.
+constexpr float kSpeck = 0.75f, kFull = 0.999f;
 
-/// Closes pixels of whose eight neighbours at least `enclosing` have a depth.
+/// Whether a pixel shows a faint point of a rim, alone among pixels that are covered in full.
+bool isSpeck(const Frame& frame, int x, int y) {
+    if (!(frame.colour.at(x, y).a < kSpeck)) return false;
+    for (int j = y - 1; j <= y + 1; ++j)
+        for (int i = x - 1; i <= x + 1; ++i)
+            if ((i != x || j != y) && !(frame.colour.at(i, j).a >= kFull)) return false;
+    return true;
+}
+
+/// Closes pixels of whose eight neighbours at least `enclosing` have a depth, and specks.
 void closeEnclosed(Frame& frame, int enclosing) {
     struct Closed {
         int x = 0, y = 0;
@@ -32,7 +43,7 @@ void closeEnclosed(Frame& frame, int enclosing) {
         float farthest = 0;
         for (int j = y - 1; j <= y + 1; ++j) {
             for (int i = x - 1; i <= x + 1; ++i) {
-                if (!hasPoint(frame.depth.at(i, j))) continue;
+                if ((i == x && j == y) || !hasPoint(frame.depth.at(i, j))) continue;
                 ++covered;
                 farthest = std::max(farthest, frame.depth.at(i, j));
             }
@@ -44,7 +55,8 @@ void closeEnclosed(Frame& frame, int enclosing) {
         for (int j = y - 1; j <= y + 1; ++j) {
             for (int i = x - 1; i <= x + 1; ++i) {
                 const float depth = frame.depth.at(i, j);
-                if (!hasPoint(depth) || depth < kSameDepth * farthest) continue;
+                if ((i == x && j == y) || !hasPoint(depth) || depth < kSameDepth * farthest)
+                    continue;
                 n += 1;
                 c.depth += depth;
                 c.colour += frame.colour.at(i, j);
@@ -65,7 +77,8 @@ void closeEnclosed(Frame& frame, int enclosing) {
         for (int y = from; y < to; ++y) {
             const auto row = frame.depth.row(y);
             for (int x = 1; x + 1 < width; ++x) {
-                if (!hasPoint(row[x]) && (hasPoint(row[x - 1]) || hasPoint(row[x + 1])))
+                if (hasPoint(row[x]) ? isSpeck(frame, x, y)
+                                     : hasPoint(row[x - 1]) || hasPoint(row[x + 1]))
                     find(x, y, closed[t]);
             }
         }

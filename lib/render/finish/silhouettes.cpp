@@ -89,7 +89,7 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
     return between(at(ix, iy), at(ix + 1, iy), at(ix, iy + 1), at(ix + 1, iy + 1));
 }
 
-Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
+Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)), outlines_(set_) {
     std::vector<View> all(set_.views().size());
     parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
         const auto number = static_cast<std::size_t>(n);
@@ -200,10 +200,16 @@ void Silhouettes::carve(Frame& frame, const Camera& camera) const {
             }
             for (int x = 0; x < w; ++x) {
                 const float depth = frame.depth.at(x, y);
-                if (mark[x] && hasPoint(depth))
-                    covered.at(x, y) = coverage(camera, maps, x, y, depth);
+                if (mark[x] && hasPoint(depth)) covered.at(x, y) = Outlines::kAsked;
             }
         }
+    });
+    outlines_.measure(frame, camera, covered);
+    parallelForBlocks(0, h, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y)
+            for (int x = 0; x < w; ++x)
+                if (covered.at(x, y) == Outlines::kAsked)
+                    covered.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y));
     });
     parallelFor(0, h, [&](std::int64_t row) {
         const int y = static_cast<int>(row);

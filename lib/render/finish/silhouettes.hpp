@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "lib/render/finish/outlines.hpp"
 #include "lib/render/frame.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/cpu/kernels.hpp"
@@ -9,9 +10,10 @@
 namespace stx {
 
 /// Gives splatted pictures the silhouettes that the references saw. A splat at the rim of an object
-/// sticks out by part of a pixel and covers whole pixels; but each reference's alpha shows along
-/// which rays there is nothing at all. Pixels near the background get the share of their area that
-/// no reference sees through as coverage, so silhouettes are thin and smooth.
+/// sticks out by part of a pixel and covers whole pixels. Pixels near the background get the share
+/// of their area that lies within the outermost points as coverage (Outlines); where these are too
+/// few, the share that no reference sees through: each reference's alpha shows along which rays
+/// there is nothing at all. So silhouettes are thin and smooth.
 class Silhouettes {
   public:
     /// Views whose alpha is full everywhere (full scenes) have no vote and cost nothing.
@@ -42,6 +44,7 @@ class Silhouettes {
                                  float depth) const;
 
     PageSet set_;
+    Outlines outlines_;
     std::vector<View> views_;
 };
 
