@@ -220,7 +220,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             const std::uint32_t bits = bitsOf(d, any);
             if (!bits) continue;
             hn::Store(p.at.offset, di, offset);
-            if (kWholeRows && kOpaque && !kNormals && canReadAround(s, pixel, count, lanes)) {
+            if (kWholeRows && kOpaque && canReadAround(s, pixel, count, lanes)) {
                 // Zeros are added for the others: what they hold must be numbers.
                 r.fx = hn::IfThenElseZero(any, fx);
                 r.fy = hn::IfThenElseZero(any, fy);
@@ -231,6 +231,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
                 r.offset = offset;
                 r.gradient = !kUniform || t.uAcross != 0 || t.vDown != 0;
                 addRowOfPoints(s, pixel, bits, r, band);
+                if (kNormals) addNormalsOfRow(s, pixel, bits, r, band);
                 continue;
             }
             hn::Store(r.w00, d, w00);

@@ -30,6 +30,8 @@ struct RowOfPoints {
 constexpr bool kWholeRows = false;
 HWY_INLINE void addRowOfPoints(const RectangleImages&, std::size_t, std::uint32_t,
                                const RowOfPoints&, const Band&) {}
+HWY_INLINE void addNormalsOfRow(const RectangleImages&, std::size_t, std::uint32_t,
+                                const RowOfPoints&, const Band&) {}
 
 #else
 
@@ -102,6 +104,27 @@ HWY_INLINE void addRowOfPoints(const RectangleImages& s, std::size_t pixel, std:
                          hn::Mul(hn::Broadcast<kPoint>(r.w10), hn::Add(c00, across)));
         addPairs<kPoint>(lower, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w01), c01),
                          hn::Mul(hn::Broadcast<kPoint>(r.w11), hn::Add(c01, across)));
+    };
+    group(std::integral_constant<int, 0>());
+    group(std::integral_constant<int, 1>());
+    group(std::integral_constant<int, 2>());
+    group(std::integral_constant<int, 3>());
+}
+
+// The same of their normals, which are the same all over a splat.
+HWY_INLINE void addNormalsOfRow(const RectangleImages& s, std::size_t pixel, std::uint32_t bits,
+                                const RowOfPoints& r, const Band& band) {
+    const DF d;
+    const VB here = hn::LoadU(DB(), reinterpret_cast<const std::uint8_t*>(s.normals) + 4 * pixel);
+    float* lower = band.normals + 4 * static_cast<std::ptrdiff_t>(band.stride);
+    const auto group = [&](auto number) HWY_ATTR {
+        constexpr int kPoint = decltype(number)::value;
+        if (!(bits & (0x1111u << kPoint))) return;
+        const VF n = hn::ConvertTo(d, hn::ShiftRight<24>(hn::ShiftLeft<24>(valueOf<kPoint>(here))));
+        addPairs<kPoint>(band.normals, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w00), n),
+                         hn::Mul(hn::Broadcast<kPoint>(r.w10), n));
+        addPairs<kPoint>(lower, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w01), n),
+                         hn::Mul(hn::Broadcast<kPoint>(r.w11), n));
     };
     group(std::integral_constant<int, 0>());
     group(std::integral_constant<int, 1>());
