@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace stx {
+
+/// Bytes in the order in which zip compression of OpenEXR stores them ("Predictor" and "reorder" of
+/// its reference code): the even ones first, then the odd ones, each as the difference from the one
+/// before, plus 128; the first as it is. `to` has room for as many. `raw` is not empty.
+void splitAndSubtract(std::span<const std::uint8_t> raw, std::uint8_t* to);
+
+/// The inverse: fills `raw` from as many bytes, and changes them.
+void addAndJoin(std::uint8_t* split, std::span<std::uint8_t> raw);
+
+}  // namespace stx
