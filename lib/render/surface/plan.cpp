@@ -218,12 +218,11 @@ std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
     return chosen;
 }
 
-glm::dmat4 SurfaceFrame::sampleFromPixel(int tile) const {
-    const int S = effort.samplesPerPixel;
+glm::dmat4 SurfaceFrame::sampleFromPixel(int tile, int perPixel, int apron) const {
     glm::dmat4 m(1.0);
-    m[0][0] = m[1][1] = S;
-    m[3][0] = -tileX(tile) * S - 0.5;
-    m[3][1] = -tileY(tile) * S - 0.5;
+    m[0][0] = m[1][1] = perPixel;
+    m[3][0] = -(tileX(tile) - apron) * perPixel - 0.5;
+    m[3][1] = -(tileY(tile) - apron) * perPixel - 0.5;
     return m;
 }
 

@@ -71,9 +71,9 @@ struct SurfaceFrame {
     [[nodiscard]] int tileY(int tile) const { return tile / tilesX * kTile; }
     /// The sources that a tile is built from, at most kMostTileSources, in order.
     [[nodiscard]] std::vector<int> sourcesOf(int tile) const;
-    /// Samples of a tile from pixels of the frame: the tile's corner to the origin, S to the pixel,
-    /// the first sample at ½.
-    [[nodiscard]] glm::dmat4 sampleFromPixel(int tile) const;
+    /// Samples of a tile from pixels of the frame: what is `apron` pixels before the tile's corner
+    /// to the origin, `perPixel` to the pixel, the first sample at ½.
+    [[nodiscard]] glm::dmat4 sampleFromPixel(int tile, int perPixel, int apron = 0) const;
     /// Surfaces with a larger q are behind the camera.
     [[nodiscard]] float qLimit() const;
 };

@@ -28,7 +28,8 @@ TEST_P(PlannedBlocks, AreAllThatShowInATile) {
         blocks += every.size();
         drawn += f.blocks.size();
         for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 7) {
-            const Warp warp = warpFrom(frame.sampleFromPixel(tile) * f.pixelFromSource);
+            const Warp warp =
+                warpFrom(frame.sampleFromPixel(tile, effort.samplesPerPixel) * f.pixelFromSource);
             const auto draw = [&](std::span<const std::uint32_t> some,
                                   std::vector<float>& samples) {
                 if (!rasteriseSource(*f.source, warp, some, grid, frame.qLimit(), samples.data()))

@@ -42,13 +42,31 @@ class CpuSurfaceBackend final : public SurfaceBackend {
     const SurfaceFrame* frame_ = nullptr;
 };
 
+/// The squares that those pixels and the pixels beside them are in.
+Squares squaresOf(const TilePixels& pixels) {
+    Squares squares = 0;
+    for (std::size_t y = 0; y < kTile; ++y) {
+        std::uint32_t row = pixels[y];
+        if (y > 0) row |= pixels[y - 1];
+        if (y + 1 < kTile) row |= pixels[y + 1];
+        row |= row << 1 | row >> 1;
+        for (int x = 0; x < 8; ++x)
+            if (row >> (x * kSquare) & ((1u << kSquare) - 1))
+                squares |= Squares{1} << (static_cast<int>(y) / kSquare * 8 + x);
+    }
+    return squares;
+}
+
 void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame out) {
     if (std::all_of(frame.sources.begin(), frame.sources.end(),
                     [&](const FrameSource& f) { return f.blocksOf(tile).empty(); }))
         return;
     const PixelSpace& space = frame.space;
     const int tileX = frame.tileX(tile), tileY = frame.tileY(tile);
-    const SampleGrid grid{frame.effort.samplesPerPixel};
+    const int columns = std::min(kTile, out.q.width() - tileX);
+    const int rows = std::min(kTile, out.q.height() - tileY);
+    const int perPixel = frame.effort.samplesPerPixel;
+    const SampleGrid grid{perPixel};
     static thread_local std::vector<float> samples;
     static thread_local Pieces pieces;
     static thread_local std::vector<glm::vec3> colours;
@@ -56,24 +74,53 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
     static thread_local std::vector<LocalSource> local;
     static thread_local std::vector<ShadeSource> shade;
     const std::vector<int> chosen = frame.sourcesOf(tile);
-    samples.resize(std::max(samples.size(), grid.count() * chosen.size()));
+    const std::size_t room = std::max(grid.count(), kMiddles.count());
+    samples.resize(std::max(samples.size(), room * chosen.size()));
     local.clear();
     shade.clear();
-    const glm::dmat4 sampleFromPixel = frame.sampleFromPixel(tile);
-    const float qLimit = frame.qLimit();
-    for (std::size_t k = 0; k < chosen.size(); ++k) {
-        const FrameSource& f = frame.sources[static_cast<std::size_t>(chosen[k])];
-        float* mine = samples.data() + grid.count() * k;
-        const auto blocks = f.blocksOf(tile);
-        const bool drawn = !blocks.empty() &&
-                           rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource),
-                                           blocks, grid, qLimit, mine);
-        local.push_back({f.source, f.sourceFromPixel, drawn ? mine : nullptr});
+    for (const int k : chosen) {
+        const FrameSource& f = frame.sources[static_cast<std::size_t>(k)];
+        local.push_back({f.source, f.sourceFromPixel, nullptr});
         shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
     }
+    const float qLimit = frame.qLimit();
+    // Where each block of each source is drawn, one source after another.
+    static thread_local std::vector<Squares> drawnIn;
+    drawnIn.clear();
+    const auto drawAll = [&](const SampleGrid& each, const RasterNeeds& needs, bool again) {
+        const glm::dmat4 sampleFromPixel = frame.sampleFromPixel(tile, each.perPixel, each.apron);
+        std::size_t first = 0;
+        for (std::size_t k = 0; k < chosen.size(); ++k) {
+            const FrameSource& f = frame.sources[static_cast<std::size_t>(chosen[k])];
+            float* mine = samples.data() + room * k;
+            const auto blocks = f.blocksOf(tile);
+            if (blocks.empty()) continue;
+            RasterNeeds own = needs;
+            if (again)
+                own.of = {drawnIn.data() + first, blocks.size()};
+            else if (each.apron > 0)
+                drawnIn.resize(first + blocks.size()),
+                    own.drawnIn = {drawnIn.data() + first, blocks.size()};
+            first += blocks.size();
+            const bool drawn =
+                rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks,
+                                each, qLimit, mine, own);
+            local[k].samples = drawn ? mine : nullptr;
+        }
+    };
     pieces.clear();
-    fuseTile(local, grid, space.axis, tileX, tileY, std::min(kTile, out.q.width() - tileX),
-             std::min(kTile, out.q.height() - tileY), pieces);
+    if (perPixel == 1) {
+        drawAll(grid, {}, false);
+        fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces);
+    } else {
+        drawAll(kMiddles, {kAllSquares, true, {}, {}}, false);
+        const TilePixels open =
+            fuseSettled(local, space.axis, tileX, tileY, columns, rows, perPixel, false, pieces);
+        if (const Squares squares = squaresOf(open)) {
+            drawAll(grid, {squares, false, {}, {}}, true);
+            fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces, &open);
+        }
+    }
     shadePieces(pieces, shade, rayFrom(space, space), frame.effort.shade, colours, best);
     std::array<float, kTile * kTile> mainShare{};
     for (std::size_t i = 0; i < pieces.size(); ++i) {

@@ -139,7 +139,7 @@ struct Fuser : Votes {
         return agreed;
     }
 
-    void fuseRow(int row, int columns, Pieces& pieces) {
+    void fuseRow(int row, int columns, std::uint32_t wanted, Pieces& pieces) {
         std::array<RowRange, kMostTileSources> ranges;
         std::array<int, kMostTileSources> list;  // sources that have something there
         int count = 0;
@@ -154,6 +154,7 @@ struct Fuser : Votes {
         const AgreedPixels agreed =
             agreedPixels(ranges, {list.data(), static_cast<std::size_t>(count)});
         for (int column = 0; column < columns; ++column) {
+            if (!(wanted >> column & 1)) continue;
             const auto x = static_cast<std::size_t>(column);
             WholePixel whole = startPixel();
             if (!agreed.doubtful[x]) {
@@ -218,9 +219,51 @@ void Pieces::add(const Piece& piece) {
 }
 
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
-              int tileX, int tileY, int columns, int rows, Pieces& pieces) {
+              int tileX, int tileY, int columns, int rows, Pieces& pieces,
+              const TilePixels* wanted) {
     shared::Fuser fuser(sources, grid, axis, tileX, tileY);
-    for (int row = 0; row < rows; ++row) fuser.fuseRow(row, columns, pieces);
+    for (int row = 0; row < rows; ++row) {
+        const std::uint32_t some = wanted ? (*wanted)[static_cast<std::size_t>(row)] : ~0u;
+        if (some) fuser.fuseRow(row, columns, some, pieces);
+    }
+}
+
+TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& axis, int tileX,
+                       int tileY, int columns, int rows, int perPixel, bool needsTwo,
+                       Pieces& pieces) {
+    static thread_local TileMiddles middles;
+    // Its first pixel is that of the apron.
+    shared::Fuser fuser(sources, kMiddles, axis, tileX - kMiddles.apron, tileY - kMiddles.apron);
+    settlePixels(sources, axis, fuser.tile.step, perPixel, middles);
+    const std::uint32_t inside = columns == kTile ? ~0u : (1u << columns) - 1;
+    TilePixels open{};
+    for (int row = 0; row < rows; ++row) {
+        const auto r = static_cast<std::size_t>(row);
+        std::uint32_t settled = middles.settled[r] & inside;
+        for (std::uint32_t left = settled; left; left &= left - 1) {
+            const int column = std::countr_zero(left);
+            const auto x = static_cast<std::size_t>(column + kMiddles.apron);
+            const auto y = r + static_cast<std::size_t>(kMiddles.apron);
+            if (middles.alone[y][x]) {
+                if (needsTwo) {
+                    settled &= ~(1u << column);
+                    continue;
+                }
+                if (sources.size() > 1 &&
+                    fuser.rejected(middles.q[y][x], 0u, std::countr_zero(middles.seenBy[y][x]),
+                                   static_cast<float>(tileX + column) + 0.5f,
+                                   static_cast<float>(tileY + row) + 0.5f, column + kMiddles.apron,
+                                   row + kMiddles.apron))
+                    continue;
+            }
+            pieces.add({static_cast<float>(tileX + column) + 0.5f,
+                        static_cast<float>(tileY + row) + 0.5f, middles.q[y][x], middles.qx[y][x],
+                        middles.qy[y][x], 1.0f, middles.seenBy[y][x],
+                        static_cast<std::uint32_t>(row * kTile + column)});
+        }
+        open[r] = ~(settled | middles.empty[r]) & inside;
+    }
+    return open;
 }
 
 }  // namespace stx::surface

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "lib/render/surface/cpu/raster.hpp"
+#include "lib/render/surface/cpu/settle.hpp"
 #include "lib/render/surface/votes.hpp"
 
 namespace stx::surface {
@@ -22,9 +24,21 @@ struct Pieces {
     [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 
+/// Some pixels of a tile: bit x of row y.
+using TilePixels = std::array<std::uint32_t, kTile>;
+
 /// Decides what each pixel of a tile shows: fuses the surfaces of the sources, checked against what
-/// the others see. At most 32 sources, at most 4 samples a side.
+/// the others see. At most 32 sources, at most 4 samples a side. Of `wanted` pixels only, if given;
+/// samples of others need not be there, except beside those.
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
-              int tileX, int tileY, int columns, int rows, Pieces& pieces);
+              int tileX, int tileY, int columns, int rows, Pieces& pieces,
+              const TilePixels* wanted = nullptr);
+
+/// Adds the pieces of the pixels that one sample in their middle settles (see settlePixels());
+/// `sources` have samples of kMiddles. Returns the other pixels, where that does not tell. With
+/// `needsTwo` it tells only where two sources show the same surface.
+[[nodiscard]] TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& axis,
+                                     int tileX, int tileY, int columns, int rows, int perPixel,
+                                     bool needsTwo, Pieces& pieces);
 
 }  // namespace stx::surface

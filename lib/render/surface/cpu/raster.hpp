@@ -11,13 +11,34 @@ namespace stx::surface {
 /// Floats of room after each row of samples, so that whole vectors may be loaded and stored.
 inline constexpr int kSamplePadding = 16;
 
-/// The samples of one tile: `side` x `side`, sample (i, j) at tile pixel ((i + ½) / S, (j + ½) /
-/// S).
+/// The samples of one tile and of `apron` pixels around it: `side` x `side`, sample (i, j) at tile
+/// pixel ((i + ½) / S - apron, (j + ½) / S - apron).
 struct SampleGrid {
     int perPixel = 1;  ///< S, samples along one side of a pixel
-    [[nodiscard]] int side() const { return kTile * perPixel; }
+    int apron = 0;
+    [[nodiscard]] int side() const { return (kTile + 2 * apron) * perPixel; }
     [[nodiscard]] int stride() const { return side() + kSamplePadding; }
     [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(side()) * stride(); }
+};
+
+/// Squares of a tile, kSquare pixels wide: bit 8 y + x.
+using Squares = std::uint64_t;
+inline constexpr int kSquare = kTile / 8;
+inline constexpr Squares kAllSquares = ~Squares{0};
+
+/// What rasteriseSource() may leave out or draw larger.
+struct RasterNeeds {
+    /// Samples of other squares are not asked for, and hold anything. Of tiles without an apron.
+    Squares squares = kAllSquares;
+    /// What is near an edge of its source reaches half a sample farther: no pixel that it touches
+    /// goes without it.
+    bool reachFromEdges = false;
+    /// With kMiddles: becomes, of each block, the squares that it may be drawn in, those a pixel
+    /// around included. May be empty.
+    std::span<Squares> drawnIn{};
+    /// That of an earlier call: blocks that are in no square that is asked for are passed over. May
+    /// be empty.
+    std::span<const Squares> of{};
 };
 
 /// Draws blocks of one source as a surface into a tile: the nearest q at each sample, 0 where the
@@ -26,6 +47,6 @@ struct SampleGrid {
 /// off. False when nothing of it shows there: then `samples` are left as they were.
 [[nodiscard]] bool rasteriseSource(const Source& source, const Warp& sampleFromSource,
                                    std::span<const std::uint32_t> blocks, const SampleGrid& grid,
-                                   float qLimit, float* samples);
+                                   float qLimit, float* samples, const RasterNeeds& needs = {});
 
 }  // namespace stx::surface

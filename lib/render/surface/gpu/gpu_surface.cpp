@@ -208,7 +208,8 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
     parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
         const TilePlan& plan = plans[static_cast<std::size_t>(i)];
         const auto t = static_cast<std::size_t>(plan.tile);
-        const glm::dmat4 sampleFromPixel = work.sampleFromPixel(plan.tile);
+        const glm::dmat4 sampleFromPixel =
+            work.sampleFromPixel(plan.tile, work.effort.samplesPerPixel);
         std::uint32_t local = plan.firstLocal, slot = plan.firstSlot;
         std::uint32_t mesh = plan.firstMesh, edge = plan.firstEdge;
         float step = 0;

@@ -1,0 +1,258 @@
+// Convex polygons of four corners, as many at once as a vector takes, drawn into the samples of a
+// tile. Included by raster.cpp once for each SIMD target.
+
+#if defined(STX_SURFACE_POLYGONS_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef STX_SURFACE_POLYGONS_INL_HPP
+#undef STX_SURFACE_POLYGONS_INL_HPP
+#else
+#define STX_SURFACE_POLYGONS_INL_HPP
+#endif
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include <hwy/highway.h>
+
+#include "lib/render/surface/cpu/raster.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::surface::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using FloatTag = hn::CappedTag<float, 16>;
+using BitTag = hn::RebindToUnsigned<FloatTag>;
+using Floats = hn::Vec<FloatTag>;
+using Bits = hn::Vec<BitTag>;
+using FloatMask = hn::Mask<FloatTag>;
+inline constexpr int kLanes = 16;  // at most
+
+HWY_INLINE std::uint32_t bitsOf(FloatMask mask) {
+    const FloatTag d;
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, mask, bytes);
+    std::uint32_t bits = 0;
+    std::memcpy(&bits, bytes, sizeof(bits));
+    return bits & static_cast<std::uint32_t>((std::uint64_t{1} << hn::Lanes(d)) - 1);
+}
+
+struct Target {
+    float* samples;
+    std::size_t count;
+    int side, stride;
+    float qLimit;
+    Squares squares;  ///< that are asked for
+    float squaresPerSample;
+    float edgeGrow;     ///< by which what is near an edge of its source is larger, samples
+    bool empty = true;  ///< nothing was drawn yet, and the samples are not cleared
+
+    HWY_INLINE void clear() {
+        if (!empty) return;
+        empty = false;
+        if (squares == kAllSquares) {
+            std::memset(samples, 0, count * sizeof(float));
+            return;
+        }
+        const int rows = side / 8;
+        for (int y = 0; y < 8; ++y)
+            if (squares >> (8 * y) & 0xff)
+                std::memset(samples + static_cast<std::ptrdiff_t>(y) * rows * stride, 0,
+                            static_cast<std::size_t>(rows) * stride * sizeof(float));
+    }
+
+    /// The squares from those of the samples (x0, y0) to those of (x1, y1), which are in the tile.
+    [[nodiscard]] HWY_INLINE Squares squaresFrom(float x0, float y0, float x1, float y1) const {
+        const auto square = [&](float at) {
+            return std::min(static_cast<int>(at * squaresPerSample), 7);
+        };
+        const int left = square(x0), right = square(x1), top = square(y0), bottom = square(y1);
+        const Squares columns = (Squares{2} << right) - (Squares{1} << left);
+        const Squares rows = (kAllSquares << (8 * top)) & (kAllSquares >> (56 - 8 * bottom));
+        return rows & (columns * 0x0101010101010101u);
+    }
+};
+
+/// Where polygons were drawn, in samples.
+struct Extent {
+    Floats x0, y0, x1, y1;
+
+    HWY_INLINE Extent() {
+        const FloatTag d;
+        x0 = y0 = hn::Set(d, 1e9f);
+        x1 = y1 = hn::Set(d, -1e9f);
+    }
+    HWY_INLINE void add(FloatMask mask, Floats left, Floats top, Floats right, Floats bottom) {
+        x0 = hn::IfThenElse(mask, hn::Min(x0, left), x0);
+        y0 = hn::IfThenElse(mask, hn::Min(y0, top), y0);
+        x1 = hn::IfThenElse(mask, hn::Max(x1, right), x1);
+        y1 = hn::IfThenElse(mask, hn::Max(y1, bottom), y1);
+    }
+};
+
+/// Polygons that turn the right way, one in each lane; those of three corners end where they begin.
+struct Polygons {
+    Floats x[4], y[4], q[4];
+    FloatMask there;
+    Floats grow;  ///< by which their edges move out, samples
+    Bits flags;
+};
+
+/// What filling them needs, of lane l: the plane p0 + px x + py y within low..high, what is inside
+/// of edge i where e0[i] + ex[i] x + ey[i] y is not below 0, and their samples.
+struct Filling {
+    alignas(64) float x0[kLanes], y0[kLanes], x1[kLanes], y1[kLanes];
+    alignas(64) float px[kLanes], py[kLanes], p0[kLanes], low[kLanes], high[kLanes];
+    alignas(64) float ex[4][kLanes], ey[4][kLanes], e0[4][kLanes];
+    alignas(64) std::uint32_t flags[kLanes];
+};
+
+template <bool kExtend>
+HWY_INLINE void fillPolygon(const Target& t, const Filling& f, int l) {
+    const FloatTag d;
+    const BitTag du;
+    const int n = static_cast<int>(hn::Lanes(d));
+    const Floats steps = hn::ConvertTo(d, hn::Iota(hn::RebindToSigned<FloatTag>(), 0));
+    const Floats low = hn::Set(d, f.low[l]), high = hn::Set(d, f.high[l]), zero = hn::Zero(d);
+    const Floats tag = hn::BitCast(d, hn::Set(du, f.flags[l]));
+    const Floats clean = hn::BitCast(d, hn::Set(du, ~std::uint32_t{kSampleFlags}));
+    const int x0 = static_cast<int>(f.x0[l]), x1 = static_cast<int>(f.x1[l]);
+    const int y0 = static_cast<int>(f.y0[l]), y1 = static_cast<int>(f.y1[l]);
+    for (int x = x0; x <= x1; x += n) {
+        const Floats vx = hn::Add(hn::Set(d, static_cast<float>(x)), steps);
+        const FloatMask inColumns = hn::Le(vx, hn::Set(d, f.x1[l]));
+        Floats edge[4];
+        for (int i = 0; i < 4; ++i)
+            edge[i] = hn::MulAdd(hn::Set(d, f.ex[i][l]), vx, hn::Set(d, f.e0[i][l]));
+        const Floats plane = hn::MulAdd(hn::Set(d, f.px[l]), vx, hn::Set(d, f.p0[l]));
+        for (int y = y0; y <= y1; ++y) {
+            const Floats vy = hn::Set(d, static_cast<float>(y));
+            Floats inside = hn::MulAdd(hn::Set(d, f.ey[0][l]), vy, edge[0]);
+            for (int i = 1; i < 4; ++i)
+                inside = hn::Min(inside, hn::MulAdd(hn::Set(d, f.ey[i][l]), vy, edge[i]));
+            FloatMask mask = hn::And(hn::Ge(inside, zero), inColumns);
+            Floats q = hn::MulAdd(hn::Set(d, f.py[l]), vy, plane);
+            q = hn::Min(hn::Max(q, low), high);
+            q = hn::Or(hn::And(q, clean), tag);
+            float* out = t.samples + static_cast<std::ptrdiff_t>(y) * t.stride + x;
+            const Floats old = hn::LoadU(d, out);
+            mask = hn::And(mask, hn::Gt(q, old));
+            if (kExtend) {
+                const Bits oldBits = hn::BitCast(du, old);
+                const auto extension = hn::MaskFromVec(hn::BitCast(
+                    d, hn::VecFromMask(du, hn::TestBit(oldBits, hn::Set(du, kExtensionBit)))));
+                mask = hn::And(mask, hn::Or(hn::Eq(old, zero), extension));
+            }
+            hn::StoreU(hn::IfThenElse(mask, q, old), d, out);
+        }
+    }
+}
+
+/// Draws polygons. With kExtend only samples that no mesh holds are written.
+template <bool kExtend>
+HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
+    const FloatTag d;
+    const BitTag du;
+    const Floats zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    const auto least = [&](const Floats* v)
+                           HWY_ATTR { return hn::Min(hn::Min(v[0], v[1]), hn::Min(v[2], v[3])); };
+    const auto most = [&](const Floats* v)
+                          HWY_ATTR { return hn::Max(hn::Max(v[0], v[1]), hn::Max(v[2], v[3])); };
+    const auto total = [&](const Floats* v)
+                           HWY_ATTR { return hn::Add(hn::Add(v[0], v[1]), hn::Add(v[2], v[3])); };
+    const Floats low = least(p.q), high = most(p.q),
+                 last = hn::Set(d, static_cast<float>(t.side - 1));
+    const Floats fx0 = hn::Max(hn::Sub(least(p.x), p.grow), zero);
+    const Floats fy0 = hn::Max(hn::Sub(least(p.y), p.grow), zero);
+    const Floats fx1 = hn::Min(hn::Add(most(p.x), p.grow), last);
+    const Floats fy1 = hn::Min(hn::Add(most(p.y), p.grow), last);
+    // The diagonals span the plane; its z component is twice the signed area.
+    const Floats ax = hn::Sub(p.x[2], p.x[0]), ay = hn::Sub(p.y[2], p.y[0]),
+                 aq = hn::Sub(p.q[2], p.q[0]);
+    const Floats bx = hn::Sub(p.x[3], p.x[1]), by = hn::Sub(p.y[3], p.y[1]),
+                 bq = hn::Sub(p.q[3], p.q[1]);
+    const Floats area = hn::Sub(hn::Mul(ax, by), hn::Mul(ay, bx));
+    FloatMask mask = hn::And(hn::And(p.there, hn::Gt(area, zero)),
+                             hn::And(hn::Gt(low, zero), hn::Le(high, hn::Set(d, t.qLimit))));
+    mask = hn::And(mask, hn::And(hn::Le(fx0, fx1), hn::Le(fy0, fy1)));
+    if (hn::AllFalse(d, mask)) return;
+    extent.add(mask, fx0, fy0, fx1, fy1);
+    const Floats x0 = hn::Ceil(fx0), y0 = hn::Ceil(fy0), x1 = hn::Floor(fx1), y1 = hn::Floor(fy1);
+    mask = hn::And(mask, hn::And(hn::Le(x0, x1), hn::Le(y0, y1)));
+    if (hn::AllFalse(d, mask)) return;
+    t.clear();
+
+    const Floats inverseArea = hn::Div(one, area);
+    const Floats px = hn::Mul(hn::Sub(hn::Mul(aq, by), hn::Mul(ay, bq)), inverseArea);
+    const Floats py = hn::Mul(hn::Sub(hn::Mul(ax, bq), hn::Mul(aq, bx)), inverseArea);
+    const Floats p0 =
+        hn::Mul(hn::Set(d, 0.25f),
+                hn::NegMulAdd(px, total(p.x), hn::NegMulAdd(py, total(p.y), total(p.q))));
+    Floats ex[4], ey[4], e0[4];
+    for (int i = 0; i < 4; ++i) {
+        const int next = (i + 1) % 4;
+        ex[i] = hn::Sub(p.y[i], p.y[next]);
+        ey[i] = hn::Sub(p.x[next], p.x[i]);
+        const Floats from = hn::MulAdd(ex[i], p.x[i], hn::Mul(ey[i], p.y[i]));
+        e0[i] = hn::MulSub(p.grow, hn::Add(hn::Abs(ex[i]), hn::Abs(ey[i])), from);
+    }
+
+    // Of up to 2x2 samples: each of them in all polygons at once.
+    const FloatMask small =
+        hn::And(mask, hn::And(hn::Le(hn::Sub(x1, x0), one), hn::Le(hn::Sub(y1, y0), one)));
+    if (!hn::AllFalse(d, small)) {
+        const hn::RebindToSigned<FloatTag> di;
+        alignas(64) float values[kLanes];
+        alignas(64) std::int32_t places[kLanes];
+        const Floats clean = hn::BitCast(d, hn::Set(du, ~std::uint32_t{kSampleFlags}));
+        for (int k = 0; k < 4; ++k) {
+            const Floats x = k & 1 ? hn::Add(x0, one) : x0, y = k & 2 ? hn::Add(y0, one) : y0;
+            FloatMask here = hn::And(small, hn::And(hn::Le(x, x1), hn::Le(y, y1)));
+            for (int i = 0; i < 4; ++i)
+                here =
+                    hn::And(here, hn::Ge(hn::MulAdd(ex[i], x, hn::MulAdd(ey[i], y, e0[i])), zero));
+            std::uint32_t left = bitsOf(here);
+            if (!left) continue;
+            Floats q = hn::MulAdd(px, x, hn::MulAdd(py, y, p0));
+            q = hn::Min(hn::Max(q, low), high);
+            hn::Store(hn::Or(hn::And(q, clean), hn::BitCast(d, p.flags)), d, values);
+            const auto place = hn::MulAdd(y, hn::Set(d, static_cast<float>(t.stride)), x);
+            hn::Store(hn::ConvertTo(di, place), di, places);
+            for (; left; left &= left - 1) {
+                const int l = std::countr_zero(left);
+                float& old = t.samples[places[l]];
+                if (kExtend && old != 0.0f && !(std::bit_cast<std::uint32_t>(old) & kExtensionBit))
+                    continue;
+                old = std::max(old, values[l]);
+            }
+        }
+    }
+    std::uint32_t large = bitsOf(hn::AndNot(small, mask));
+    if (!large) return;
+    Filling f;
+    hn::Store(x0, d, f.x0);
+    hn::Store(y0, d, f.y0);
+    hn::Store(x1, d, f.x1);
+    hn::Store(y1, d, f.y1);
+    hn::Store(px, d, f.px);
+    hn::Store(py, d, f.py);
+    hn::Store(p0, d, f.p0);
+    hn::Store(low, d, f.low);
+    hn::Store(high, d, f.high);
+    for (int i = 0; i < 4; ++i) {
+        hn::Store(ex[i], d, f.ex[i]);
+        hn::Store(ey[i], d, f.ey[i]);
+        hn::Store(e0[i], d, f.e0[i]);
+    }
+    hn::Store(p.flags, du, f.flags);
+    for (; large; large &= large - 1) {
+        const int l = std::countr_zero(large);
+        if (t.squares == kAllSquares ||
+            (t.squares & t.squaresFrom(f.x0[l], f.y0[l], f.x1[l], f.y1[l])))
+            fillPolygon<kExtend>(t, f, l);
+    }
+}
+
+}  // namespace stx::surface::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
