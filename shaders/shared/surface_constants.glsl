@@ -68,6 +68,10 @@ CONSTANT float kLeastKeptWeight = 0.02f;
 CONSTANT float kLeastArea = 1e-16f;
 // Pixels this far from an edge count in full, those on it kEdgeWeight.
 CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.01f;
+// Taps farther than kNarrowReach pixels from the position in a source count nothing where no step of a
+// pixel in the frame moves that position by more than the root of kNarrowStep pixels along either axis: the
+// kernel has fallen to 1/400 there.
+CONSTANT float kNarrowStep = 1.3f, kNarrowReach = 1.5f;
 // A sample covers its own pixel, so a coarse source spreads by this share of its Jacobian.
 CONSTANT float kOwn = 0.15f;
 // A tap is on the surface of the piece within this share of q, and this share of the slope, which

@@ -13,6 +13,7 @@ struct SourceView {
     float xu, xv, yu, yv;  // d(x, y in the frame) / d(u, v)
     float weight;          // 0 = does not see it
     bool plain;            // far from edges: all taps are on one surface, fully covered
+    float reach;           // pixels from `at` to the farthest taps that count, along either axis
 };
 
 float rowAt(vec4 row, float x, float y, float q) { return row.x * x + row.y * y + row.z * q + row.w; }
@@ -37,6 +38,8 @@ SourceView viewOf(int s, Piece piece) {
     float inverseDet = 1.0f / max(det, 1e-4f);
     // A plane that is turned away says nothing of how pixels lie to each other.
     bool turned = !(det > 0.0f);
+    float step = max(ux * ux + uy * uy, vx * vx + vy * vy);
+    view.reach = turned || !(step > kNarrowStep) ? kNarrowReach : 2.0f;
     view.xu = turned ? 1.0f : vy * inverseDet;
     view.xv = turned ? 0.0f : -uy * inverseDet;
     view.yu = turned ? 0.0f : -vx * inverseDet;
@@ -104,7 +107,7 @@ Tap tapOf(SourceView view, vec3 metric, ivec2 at) {
     tap.dx = view.xu * du + view.xv * dv;
     tap.dy = view.yu * du + view.yv * dv;
     float r2 = metric.x * tap.dx * tap.dx + metric.y * tap.dx * tap.dy + metric.z * tap.dy * tap.dy;
-    float k = max(1.0f - r2, 0.0f);
+    float k = max(abs(du), abs(dv)) > view.reach ? 0.0f : max(1.0f - r2, 0.0f);
     k *= k;
     k *= k;
     k *= k;

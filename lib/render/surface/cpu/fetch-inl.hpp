@@ -54,8 +54,9 @@ struct TapWeights {
 
 /// Adds the weighted taps of one lane of a float texture.
 HWY_NOINLINE void fetchFloats(const RgbaFloatImage& image, const TapPlace& taps, int baseU,
-                              int baseV, const TapWeights& weights, int lane, ColourSum& sum) {
-    for (int j = 0; j < kTaps; ++j) {
+                              int baseV, int rows, const TapWeights& weights, int lane,
+                              ColourSum& sum) {
+    for (int j = 0; j < rows; ++j) {
         for (int i = 0; i < kTaps; ++i) {
             const int x = baseU + i, y = baseV + j;
             if (x < taps.x0 || y < taps.y0 || x >= taps.x1 || y >= taps.y1) continue;
@@ -66,14 +67,14 @@ HWY_NOINLINE void fetchFloats(const RgbaFloatImage& image, const TapPlace& taps,
     }
 }
 
-/// The same of 8-bit texels, four rows of four: as many of a row at once as a vector takes.
-HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const TapWeights& weights,
-                          int lane, ColourSum& sum) {
+/// The same of 8-bit texels, `rows` of four: as many of a row at once as a vector takes.
+HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, int rows,
+                          const TapWeights& weights, int lane, ColourSum& sum) {
     const hn::CappedTag<float, 16> d;
     using V = hn::Vec<decltype(d)>;
     constexpr int kN = static_cast<int>(hn::MaxLanes(d));
     if constexpr (kN < 4) {
-        for (int t = 0; t < kTaps * kTaps; ++t)
+        for (int t = 0; t < rows * kTaps; ++t)
             for (int c = 0; c < 4; ++c)
                 sum.v[c] += weights.row(t / kTaps, lane)[t % kTaps] *
                             static_cast<float>(texels[t / kTaps * stride + t % kTaps][c]);
@@ -83,7 +84,7 @@ HWY_INLINE void fetchRows(const glm::u8vec4* texels, int stride, const TapWeight
         const hn::RebindToSigned<decltype(d)> d32;
         const auto spread = hn::ShiftRight<2>(hn::Iota(d32, 0));
         V acc = hn::Load(d, sum.v);
-        for (int j = 0; j < kTaps; ++j) {
+        for (int j = 0; j < rows; ++j) {
             const V row = hn::LoadDup128(d, weights.row(j, lane));
             for (int i = 0; i < kTaps; i += kTexels) {
                 const auto* from = &texels[j * stride + i].x;

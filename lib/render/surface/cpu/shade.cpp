@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
+#include <type_traits>
 
 #include "lib/render/surface/constants.hpp"
 #include "lib/render/surface/cpu/shade_groups.hpp"
@@ -13,38 +15,49 @@
 #include <hwy/highway.h>
 
 #include "lib/render/surface/cpu/fetch-inl.hpp"
+#include "lib/render/surface/cpu/fit-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stx::surface::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kMoments = 15;
+/// Sources that a piece takes colours from, at most.
+constexpr int kMostShaded = 8;
+/// Taps a side: all that the kernel reaches, or those within kNarrowReach.
+using Wide = std::integral_constant<int, kTaps>;
+using Narrow = std::integral_constant<int, 3>;
 
 /// The distance to the nearest edge at the position of each lane. Lanes without texels lose their
 /// weight.
 HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) {
     const int lastX = source.width - 1, lastY = source.height - 1;
-    alignas(64) std::int32_t column[kGroup], row[kGroup];
-    for (int l = 0; l < kGroup; ++l) {
-        column[l] = std::min(static_cast<int>(view.u[l]), lastX);
-        row[l] = std::min(static_cast<int>(view.v[l]), lastY);
-    }
     if (source.whole) {
+        const hn::ScalableTag<float> d;
+        const hn::RebindToSigned<decltype(d)> di;
+        alignas(64) std::int32_t texel[kGroup];
+        for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
+            const auto pixel = [&](const Lanes& at, int last) HWY_ATTR {
+                return hn::Min(hn::ConvertTo(di, hn::LoadU(d, &at.v[l])), hn::Set(di, last));
+            };
+            const auto row = hn::Mul(pixel(view.v, lastY), hn::Set(di, source.width));
+            hn::Store(hn::Add(row, pixel(view.u, lastX)), di, texel + l);
+        }
         const std::uint8_t* info = source.whole->info.data();
-        for (int l = 0; l < kGroup; ++l) edge[l] = info[row[l] * source.width + column[l]] >> 4;
+        for (int l = 0; l < kGroup; ++l) edge[l] = info[texel[l]] >> 4;
         return;
     }
     for (int l = 0; l < kGroup; ++l) {
         edge[l] = 0;
         if (!(view.weight[l] > 0.0f)) continue;
+        const int column = std::min(static_cast<int>(view.u[l]), lastX);
+        const int row = std::min(static_cast<int>(view.v[l]), lastY);
         const int baseU = static_cast<int>(std::floor(view.u[l] - 1.5f));
         const int baseV = static_cast<int>(std::floor(view.v[l] - 1.5f));
         const TapPlace& taps = view.taps[l] = source.tapPlaceOf(baseU, baseV);
         if (!taps.page)
             view.weight[l] = 0.0f;
-        else if (column[l] >= taps.x0 && row[l] >= taps.y0 && column[l] < taps.x1 &&
-                 row[l] < taps.y1)
-            edge[l] = taps.page->info.data()[taps.texel(column[l] - baseU, row[l] - baseV)] >> 4;
+        else if (column >= taps.x0 && row >= taps.y0 && column < taps.x1 && row < taps.y1)
+            edge[l] = taps.page->info.data()[taps.texel(column - baseU, row - baseV)] >> 4;
     }
 }
 
@@ -58,6 +71,7 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
     const auto& m = s.sourceFromPixel.m;
     const auto c = [&](float value) { return hn::Set(d, value); };
     const V one = c(1.0f);
+    bool narrow = true;
     for (int l = 0; l < kGroup; l += n) {
         const V x = hn::LoadU(d, g.x + l), y = hn::LoadU(d, g.y + l), q = hn::LoadU(d, g.q + l);
         const V qx = hn::LoadU(d, g.qx + l), qy = hn::LoadU(d, g.qy + l);
@@ -100,23 +114,36 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         hn::StoreU(hn::IfThenElse(active, v, one), d, &out.v[l]);
         // A plane that is turned away says nothing of how pixels lie to each other.
         const auto facing = hn::And(active, hn::Gt(det, hn::Zero(d)));
+        const V finest =
+            hn::Max(hn::MulAdd(ux, ux, hn::Mul(uy, uy)), hn::MulAdd(vx, vx, hn::Mul(vy, vy)));
+        const auto wide = hn::And(facing, hn::Gt(finest, c(kNarrowStep)));
+        narrow = narrow && hn::AllFalse(d, wide);
+        hn::StoreU(hn::IfThenElse(wide, c(2.0f), c(kNarrowReach)), d, &out.reach[l]);
         hn::StoreU(hn::IfThenElse(facing, hn::Mul(vy, inverseDet), one), d, &out.xu[l]);
         hn::StoreU(hn::IfThenElseZero(facing, hn::Neg(hn::Mul(uy, inverseDet))), d, &out.xv[l]);
         hn::StoreU(hn::IfThenElseZero(facing, hn::Neg(hn::Mul(vx, inverseDet))), d, &out.yu[l]);
         hn::StoreU(hn::IfThenElse(facing, hn::Mul(ux, inverseDet), one), d, &out.yv[l]);
     }
+    out.narrow = narrow && s.source->whole;
     alignas(64) std::int32_t edge[kGroup];
     findEdges(*s.source, out, edge);
-    std::uint32_t any = 0, rough = 0;
-    for (int l = 0; l < kGroup; ++l) {
-        const float e = std::min(static_cast<float>(edge[l]) * (1.0f / kEdgeFade), 1.0f);
-        const std::uint32_t on = out.weight[l] > 0.0f ? 1u << l : 0;
-        any |= on;
-        rough |= static_cast<float>(edge[l]) < kEdgeFade ? on : 0;
-        out.weight[l] *= kEdgeWeight + (1.0f - kEdgeWeight) * e;
+    const hn::RebindToSigned<decltype(d)> di;
+    out.rough = 0;
+    out.active = false;
+    for (int l = 0; l < kGroup; l += n) {
+        const V away = hn::ConvertTo(d, hn::Load(di, edge + l));
+        const V weight = hn::LoadU(d, &out.weight[l]);
+        const auto on = hn::Gt(weight, hn::Zero(d));
+        const V fade = hn::Min(hn::Mul(away, c(1.0f / kEdgeFade)), one);
+        hn::StoreU(hn::Mul(weight, hn::MulAdd(c(1.0f - kEdgeWeight), fade, c(kEdgeWeight))), d,
+                   &out.weight[l]);
+        std::uint8_t bytes[8] = {};
+        hn::StoreMaskBits(d, hn::And(on, hn::Lt(away, c(kEdgeFade))), bytes);
+        std::uint32_t bits = 0;
+        std::memcpy(&bits, bytes, sizeof(bits));
+        out.rough |= (bits & ((1u << n) - 1)) << l;
+        out.active = out.active || !hn::AllFalse(d, on);
     }
-    out.active = any != 0;
-    out.rough = rough;
 }
 
 /// 1 (or alpha) for taps on the surface of the piece, 0 for others, of one lane; taps row by row,
@@ -187,103 +214,6 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     }
 }
 
-template <class D, class V = hn::Vec<D>>
-struct Terms {
-    V dx, dy, weight;
-};
-
-/// The map from taps to frame offsets and their kernel, for lanes l.. of one source.
-template <class D>
-struct Kernel {
-    using V = hn::Vec<D>;
-    V x0, y0, xu, xv, yu, yv;  ///< offset of tap (0, 0) and its steps
-    V a, b, c;                 ///< metric: r² = a du² + 2 b du dv + c dv²
-    V u0, v0;
-    V weight;
-
-    HWY_INLINE Kernel(D d, const View& view, const Lanes& baseU, const Lanes& baseV, int l,
-                      float inverseRadius) {
-        const V half = hn::Set(d, 0.5f);
-        u0 = hn::Sub(hn::Add(hn::LoadU(d, &baseU[l]), half), hn::LoadU(d, &view.u[l]));
-        v0 = hn::Sub(hn::Add(hn::LoadU(d, &baseV[l]), half), hn::LoadU(d, &view.v[l]));
-        xu = hn::LoadU(d, &view.xu[l]);
-        xv = hn::LoadU(d, &view.xv[l]);
-        yu = hn::LoadU(d, &view.yu[l]);
-        yv = hn::LoadU(d, &view.yv[l]);
-        x0 = hn::MulAdd(xu, u0, hn::Mul(xv, v0));
-        y0 = hn::MulAdd(yu, u0, hn::Mul(yv, v0));
-        weight = hn::LoadU(d, &view.weight[l]);
-        // (1-h) I + h J Jt, inverted.
-        const V h = hn::Set(d, kOwn), rest = hn::Set(d, 1.0f - kOwn);
-        const V sxx = hn::MulAdd(h, hn::MulAdd(xu, xu, hn::Mul(xv, xv)), rest);
-        const V syy = hn::MulAdd(h, hn::MulAdd(yu, yu, hn::Mul(yv, yv)), rest);
-        const V sxy = hn::Mul(h, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
-        const V scale =
-            hn::Div(hn::Set(d, inverseRadius),
-                    hn::Max(hn::NegMulAdd(sxy, sxy, hn::Mul(sxx, syy)), hn::Set(d, 1e-6f)));
-        a = hn::Mul(syy, scale);
-        b = hn::Mul(hn::Set(d, -2.0f), hn::Mul(sxy, scale));
-        c = hn::Mul(sxx, scale);
-    }
-    HWY_INLINE Terms<D> at(D d, int i, int j) const {
-        const V fi = hn::Set(d, static_cast<float>(i)), fj = hn::Set(d, static_cast<float>(j));
-        Terms<D> t;
-        t.dx = hn::MulAdd(xv, fj, hn::MulAdd(xu, fi, x0));
-        t.dy = hn::MulAdd(yv, fj, hn::MulAdd(yu, fi, y0));
-        const V r = hn::MulAdd(a, hn::Mul(t.dx, t.dx),
-                               hn::MulAdd(b, hn::Mul(t.dx, t.dy), hn::Mul(c, hn::Mul(t.dy, t.dy))));
-        // (1 - r²/R²)^8: close to a Gaussian, and cheaper.
-        V k = hn::Max(hn::Sub(hn::Set(d, 1.0f), r), hn::Zero(d));
-        k = hn::Mul(k, k);
-        k = hn::Mul(k, k);
-        k = hn::Mul(k, k);
-        t.weight = hn::Mul(k, weight);
-        return t;
-    }
-};
-
-/// The first row of the inverse of the 6x6 normal matrix, terms 1, dx, dy, dx², dxdy, dy².
-template <class D, class V = hn::Vec<D>>
-HWY_INLINE void solveFirstRow(D d, const V* m, V ridge, V* out) {
-    // Moments by power: 0:1 1:x 2:y 3:xx 4:xy 5:yy 6:xxx 7:xxy 8:xyy 9:yyy 10:x4 11:x3y 12:x2y2
-    // 13:xy3 14:y4
-    const V hold = hn::Mul(m[0], ridge);
-    constexpr int kIndex[5][5] = {{3, 4, 6, 7, 8},
-                                  {4, 5, 7, 8, 9},
-                                  {6, 7, 10, 11, 12},
-                                  {7, 8, 11, 12, 13},
-                                  {8, 9, 12, 13, 14}};
-    V lower[5][5], inverse[5], z[5];
-    for (int i = 0; i < 5; ++i) {
-        for (int j = 0; j <= i; ++j) {
-            V sum = m[kIndex[i][j]];
-            if (i == j) sum = hn::Add(sum, hold);
-            for (int k = 0; k < j; ++k)
-                sum = hn::NegMulAdd(lower[i][k], hn::Mul(lower[j][k], z[k]), sum);
-            if (i == j) {
-                z[i] = hn::Max(sum, hn::Mul(hold, hn::Set(d, 0.01f)));
-                inverse[i] = hn::Div(hn::Set(d, 1.0f), z[i]);
-            } else {
-                lower[i][j] = hn::Mul(sum, inverse[j]);
-            }
-        }
-    }
-    V y[5];
-    for (int i = 0; i < 5; ++i) {
-        V sum = m[i + 1];
-        for (int k = 0; k < i; ++k) sum = hn::NegMulAdd(lower[i][k], y[k], sum);
-        y[i] = sum;
-    }
-    for (int i = 0; i < 5; ++i) y[i] = hn::Mul(y[i], inverse[i]);
-    for (int i = 4; i >= 0; --i)
-        for (int k = i + 1; k < 5; ++k) y[i] = hn::NegMulAdd(lower[k][i], y[k], y[i]);
-    V schur = m[0];
-    for (int i = 0; i < 5; ++i) schur = hn::NegMulAdd(m[i + 1], y[i], schur);
-    const V first = hn::Div(hn::Set(d, 1.0f), hn::Max(schur, hn::Mul(m[0], hn::Set(d, 1e-4f))));
-    out[0] = first;
-    for (int i = 0; i < 5; ++i) out[i + 1] = hn::Neg(hn::Mul(y[i], first));
-}
-
 void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
                 const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
     const hn::ScalableTag<float> d;
@@ -317,15 +247,26 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     for (int l = 0; l < g.count; ++l) best[l] = static_cast<std::int8_t>(top[l]);
     if (count > settings.mostSources) {
         const int most = settings.mostSources;
-        for (int l = 0; l < g.count; ++l) {
-            float kept[32];
-            for (int k = 0; k < count; ++k) kept[k] = views[list[k]].weight[l];
-            std::nth_element(kept, kept + most, kept + count, std::greater<>());
-            const float dropped = kept[most], least = *std::min_element(kept, kept + most);
+        for (int l = 0; l < kGroup; l += n) {
+            V heaviest[kMostShaded + 1];
+            for (int i = 0; i <= most; ++i) heaviest[i] = hn::Zero(d);
             for (int k = 0; k < count; ++k) {
-                float& weight = views[list[k]].weight[l];
-                const float ratio = dropped / std::max(weight, 1e-20f);
-                weight *= weight < least ? 0.0f : std::max(1.0f - ratio * ratio, kLeastKeptWeight);
+                V weight = hn::LoadU(d, &views[list[k]].weight[l]);
+                for (int i = 0; i <= most; ++i) {
+                    const V heavier = hn::Max(heaviest[i], weight);
+                    weight = hn::Min(heaviest[i], weight);
+                    heaviest[i] = heavier;
+                }
+            }
+            const V dropped = heaviest[most], least = heaviest[most - 1];
+            for (int k = 0; k < count; ++k) {
+                Lanes& weights = views[list[k]].weight;
+                const V weight = hn::LoadU(d, &weights[l]);
+                const V ratio = hn::Div(dropped, hn::Max(weight, hn::Set(d, 1e-20f)));
+                const V kept = hn::Max(hn::NegMulAdd(ratio, ratio, hn::Set(d, 1.0f)),
+                                       hn::Set(d, kLeastKeptWeight));
+                hn::StoreU(hn::IfThenElseZero(hn::Ge(weight, least), hn::Mul(weight, kept)), d,
+                           &weights[l]);
             }
         }
     }
@@ -349,7 +290,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         const int s = list[k];
         View& view = views[s];
         for (int l = 0; l < kGroup; l += n) {
-            const V shift = hn::Set(d, -1.5f);
+            const V shift = hn::Set(d, view.narrow ? -1.0f : -1.5f);
             hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.u[l]), shift)), d, &bases[s][0][l]);
             hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.v[l]), shift)), d, &bases[s][1][l]);
         }
@@ -365,41 +306,22 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
                 for (int t = 0; t < kTaps * kTaps; ++t) masks[s][t][l] = mask[t];
             }
         }
-        for (int l = 0; l < kGroup; l += n) {
-            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
-                                             1.0f / settings.kernel);
-            V m[kMoments];
-            for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
-            for (int j = 0; j < kTaps; ++j) {
-                for (int i = 0; i < kTaps; ++i) {
-                    auto t = kernel.at(d, i, j);
-                    if (view.rough)
-                        t.weight = hn::Mul(t.weight, hn::LoadU(d, &masks[s][j * kTaps + i][l]));
-                    hn::StoreU(t.weight, d, &kernels[s][j * kTaps + i][l]);
-                    const V wx = hn::Mul(t.weight, t.dx), wy = hn::Mul(t.weight, t.dy);
-                    const V wxx = hn::Mul(wx, t.dx), wxy = hn::Mul(wx, t.dy),
-                            wyy = hn::Mul(wy, t.dy);
-                    const V xx = hn::Mul(t.dx, t.dx), xy = hn::Mul(t.dx, t.dy),
-                            yy = hn::Mul(t.dy, t.dy);
-                    m[0] = hn::Add(m[0], t.weight);
-                    m[1] = hn::Add(m[1], wx);
-                    m[2] = hn::Add(m[2], wy);
-                    m[3] = hn::Add(m[3], wxx);
-                    m[4] = hn::Add(m[4], wxy);
-                    m[5] = hn::Add(m[5], wyy);
-                    m[6] = hn::MulAdd(wxx, t.dx, m[6]);
-                    m[7] = hn::MulAdd(wxx, t.dy, m[7]);
-                    m[8] = hn::MulAdd(wyy, t.dx, m[8]);
-                    m[9] = hn::MulAdd(wyy, t.dy, m[9]);
-                    m[10] = hn::MulAdd(wxx, xx, m[10]);
-                    m[11] = hn::MulAdd(wxx, xy, m[11]);
-                    m[12] = hn::MulAdd(wxx, yy, m[12]);
-                    m[13] = hn::MulAdd(wyy, xy, m[13]);
-                    m[14] = hn::MulAdd(wyy, yy, m[14]);
-                }
+        const auto addMoments = [&](auto taps) HWY_ATTR {
+            for (int l = 0; l < kGroup; l += n) {
+                V m[kMoments];
+                for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
+                const Taps<decltype(d), decltype(taps)::value> at(d, view, bases[s][0], bases[s][1],
+                                                                  l);
+                at.addMoments(d, 1.0f / settings.kernel, hn::LoadU(d, &view.weight[l]),
+                              hn::LoadU(d, &view.reach[l]), view.rough ? masks[s] : nullptr,
+                              kernels[s], l, m);
+                for (int i = 0; i < kMoments; ++i) hn::StoreU(m[i], d, &moments[i][l]);
             }
-            for (int i = 0; i < kMoments; ++i) hn::StoreU(m[i], d, &moments[i][l]);
-        }
+        };
+        if (view.narrow)
+            addMoments(Narrow());
+        else
+            addMoments(Wide());
     }
 
     Lanes rows[6];
@@ -418,29 +340,21 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         const int s = list[k];
         const View& view = views[s];
         const Source& source = *sources[static_cast<std::size_t>(s)].source;
-        for (int l = 0; l < kGroup; l += n) {
-            const Kernel<decltype(d)> kernel(d, view, bases[s][0], bases[s][1], l,
-                                             1.0f / settings.kernel);
-            V row[6];
-            for (int i = 0; i < 6; ++i) row[i] = hn::LoadU(d, &rows[i][l]);
-            V sum = hn::LoadU(d, &total[l]);
-            for (int j = 0; j < kTaps; ++j) {
-                V taps[kTaps];
-                for (int i = 0; i < kTaps; ++i) {
-                    const V fi = hn::Set(d, static_cast<float>(i)),
-                            fj = hn::Set(d, static_cast<float>(j));
-                    const V dx = hn::MulAdd(kernel.xv, fj, hn::MulAdd(kernel.xu, fi, kernel.x0));
-                    const V dy = hn::MulAdd(kernel.yv, fj, hn::MulAdd(kernel.yu, fi, kernel.y0));
-                    const V linear = hn::MulAdd(row[1], dx, hn::MulAdd(row[2], dy, row[0]));
-                    const V quadratic = hn::MulAdd(dx, hn::MulAdd(row[3], dx, hn::Mul(row[4], dy)),
-                                                   hn::MulAdd(hn::Mul(row[5], dy), dy, linear));
-                    taps[i] = hn::Mul(hn::LoadU(d, &kernels[s][j * kTaps + i][l]), quadratic);
-                    sum = hn::Add(sum, taps[i]);
-                }
-                weights.store(d, j, l, taps);
+        const auto weigh = [&](auto taps) HWY_ATTR {
+            for (int l = 0; l < kGroup; l += n) {
+                V row[6];
+                for (int i = 0; i < 6; ++i) row[i] = hn::LoadU(d, &rows[i][l]);
+                const Taps<decltype(d), decltype(taps)::value> at(d, view, bases[s][0], bases[s][1],
+                                                                  l);
+                const V sum = at.weigh(d, row, kernels[s], l, weights);
+                hn::StoreU(hn::Add(sum, hn::LoadU(d, &total[l])), d, &total[l]);
             }
-            hn::StoreU(sum, d, &total[l]);
-        }
+        };
+        if (view.narrow)
+            weigh(Narrow());
+        else
+            weigh(Wide());
+        const int tapRows = view.narrow ? Narrow::value : Wide::value;
         for (int l = 0; l < g.count; ++l) {
             if (!(view.weight[l] > 0.0f)) continue;
             const int baseU = static_cast<int>(bases[s][0][l]);
@@ -448,16 +362,16 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             const TapPlace taps = view.tapsOf(source, l, baseU, baseV);
             const Rgba8Image* bytes = taps.page->texture->rgba8();
             if (!bytes) {
-                fetchFloats(*taps.page->texture->rgbaFloat(), taps, baseU, baseV, weights, l,
-                            sums[l]);
+                fetchFloats(*taps.page->texture->rgbaFloat(), taps, baseU, baseV, tapRows, weights,
+                            l, sums[l]);
             } else if (taps.stepX == 1 && baseU >= taps.x0 && baseV >= taps.y0 &&
                        baseU + kTaps <= taps.x1 && baseV + kTaps <= taps.y1) {
-                fetchRows(bytes->data() + taps.first, static_cast<int>(taps.stepY), weights, l,
-                          sums[l]);
+                fetchRows(bytes->data() + taps.first, static_cast<int>(taps.stepY), tapRows,
+                          weights, l, sums[l]);
             } else {
                 glm::u8vec4 gathered[kTaps * kTaps];
                 gatherTaps(*bytes, taps, baseU, baseV, gathered);
-                fetchRows(gathered, kTaps, weights, l, sums[l]);
+                fetchRows(gathered, kTaps, tapRows, weights, l, sums[l]);
             }
         }
     }

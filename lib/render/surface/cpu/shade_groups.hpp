@@ -22,6 +22,10 @@ struct View {
     Lanes xu, xv, yu, yv;  ///< d(x, y in the frame) / d(u, v)
     Lanes weight;
     bool active = false;
+    /// Farther taps count nothing, pixels of the source along either axis (kNarrowReach).
+    Lanes reach;
+    /// That is so of all pieces: three taps a side are enough, from the one before the nearest on.
+    bool narrow = false;
     /// A bit for each lane that is near an edge. All taps of others lie on one surface, fully
     /// covered.
     std::uint32_t rough = 0;
