@@ -87,7 +87,7 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
     // Where each block of each source is drawn, one source after another.
     static thread_local std::vector<Squares> drawnIn;
     drawnIn.clear();
-    const auto drawAll = [&](const SampleGrid& each, const RasterNeeds& needs, bool again) {
+    const auto drawAll = [&](const SampleGrid& each, const RasterNeeds& needs) {
         const glm::dmat4 sampleFromPixel = frame.sampleFromPixel(tile, each.perPixel, each.apron);
         std::size_t first = 0;
         for (std::size_t k = 0; k < chosen.size(); ++k) {
@@ -96,11 +96,12 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
             const auto blocks = f.blocksOf(tile);
             if (blocks.empty()) continue;
             RasterNeeds own = needs;
-            if (again)
+            if (each.apron > 0) {
+                drawnIn.resize(first + blocks.size());
+                own.drawnIn = {drawnIn.data() + first, blocks.size()};
+            } else if (!drawnIn.empty()) {
                 own.of = {drawnIn.data() + first, blocks.size()};
-            else if (each.apron > 0)
-                drawnIn.resize(first + blocks.size()),
-                    own.drawnIn = {drawnIn.data() + first, blocks.size()};
+            }
             first += blocks.size();
             const bool drawn =
                 rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks,
@@ -110,14 +111,15 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
     };
     pieces.clear();
     if (perPixel == 1) {
-        drawAll(grid, {}, false);
+        drawAll(grid, {});
         fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces);
     } else {
-        drawAll(kMiddles, {kAllSquares, true, {}, {}}, false);
+        // First one sample for each pixel; all of them only where that does not tell.
+        drawAll(kMiddles, {kAllSquares, true, {}, {}});
         const TilePixels open =
-            fuseSettled(local, space.axis, tileX, tileY, columns, rows, perPixel, false, pieces);
+            fuseSettled(local, space.axis, tileX, tileY, columns, rows, perPixel, pieces);
         if (const Squares squares = squaresOf(open)) {
-            drawAll(grid, {squares, false, {}, {}}, true);
+            drawAll(grid, {squares, false, {}, {}});
             fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces, &open);
         }
     }

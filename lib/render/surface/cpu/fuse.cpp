@@ -229,8 +229,7 @@ void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, cons
 }
 
 TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& axis, int tileX,
-                       int tileY, int columns, int rows, int perPixel, bool needsTwo,
-                       Pieces& pieces) {
+                       int tileY, int columns, int rows, int perPixel, Pieces& pieces) {
     static thread_local TileMiddles middles;
     // Its first pixel is that of the apron.
     shared::Fuser fuser(sources, kMiddles, axis, tileX - kMiddles.apron, tileY - kMiddles.apron);
@@ -239,23 +238,17 @@ TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& ax
     TilePixels open{};
     for (int row = 0; row < rows; ++row) {
         const auto r = static_cast<std::size_t>(row);
-        std::uint32_t settled = middles.settled[r] & inside;
+        const std::uint32_t settled = middles.settled[r] & inside;
         for (std::uint32_t left = settled; left; left &= left - 1) {
             const int column = std::countr_zero(left);
             const auto x = static_cast<std::size_t>(column + kMiddles.apron);
             const auto y = r + static_cast<std::size_t>(kMiddles.apron);
-            if (middles.alone[y][x]) {
-                if (needsTwo) {
-                    settled &= ~(1u << column);
-                    continue;
-                }
-                if (sources.size() > 1 &&
-                    fuser.rejected(middles.q[y][x], 0u, std::countr_zero(middles.seenBy[y][x]),
-                                   static_cast<float>(tileX + column) + 0.5f,
-                                   static_cast<float>(tileY + row) + 0.5f, column + kMiddles.apron,
-                                   row + kMiddles.apron))
-                    continue;
-            }
+            if (middles.alone[y][x] && sources.size() > 1 &&
+                fuser.rejected(middles.q[y][x], 0u, std::countr_zero(middles.seenBy[y][x]),
+                               static_cast<float>(tileX + column) + 0.5f,
+                               static_cast<float>(tileY + row) + 0.5f, column + kMiddles.apron,
+                               row + kMiddles.apron))
+                continue;
             pieces.add({static_cast<float>(tileX + column) + 0.5f,
                         static_cast<float>(tileY + row) + 0.5f, middles.q[y][x], middles.qx[y][x],
                         middles.qy[y][x], 1.0f, middles.seenBy[y][x],

@@ -35,10 +35,10 @@ void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, cons
               const TilePixels* wanted = nullptr);
 
 /// Adds the pieces of the pixels that one sample in their middle settles (see settlePixels());
-/// `sources` have samples of kMiddles. Returns the other pixels, where that does not tell. With
-/// `needsTwo` it tells only where two sources show the same surface.
+/// `sources` have samples of kMiddles. Returns the other pixels, where that does not tell; those
+/// would get `perPixel` samples a side.
 [[nodiscard]] TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& axis,
                                      int tileX, int tileY, int columns, int rows, int perPixel,
-                                     bool needsTwo, Pieces& pieces);
+                                     Pieces& pieces);
 
 }  // namespace stx::surface
