@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/base/image.hpp"
+#include "lib/model/texture.hpp"
 #include "lib/render/surface/source.hpp"
 
 namespace stx::surface {
@@ -12,7 +13,8 @@ namespace stx::surface {
 /// A view whose depth was noisy, after smoothDepth().
 struct NoisyView {
     const PixelSpace* space = nullptr;
-    Image<float>* q = nullptr;  ///< as in PreparedPage
+    const Texture* texture = nullptr;  ///< of the view alone, as large as its depth
+    Image<float>* q = nullptr;         ///< as in PreparedPage
     /// Of each point: dq/dx and dq/dy of its surface, and how far off q may be (one standard
     /// deviation, in q).
     Image<glm::vec3> surface;

@@ -9,6 +9,7 @@
 #include "lib/render/surface/fat_edges.hpp"
 #include "lib/render/surface/noisy_views.hpp"
 #include "lib/render/surface/sharpen.hpp"
+#include "lib/render/surface/silhouette_points.hpp"
 
 namespace stx::surface {
 namespace {
@@ -477,8 +478,11 @@ void prepareWhole(std::vector<Source>& sources, std::vector<PreparedPage>& pages
         noisyOnes.push_back(k);
         noisy.push_back(std::move(views[k]));
         noisy.back().q = &drafts[k].q;
+        noisy.back().texture = sources[k].whole->texture;
     }
+    keepInSilhouettes(noisy);
     agreeOnDepth(noisy);
+    keepInSilhouettes(noisy);
     std::vector<float> left(sources.size(), 0.0f);
     for (std::size_t n = 0; n < noisy.size(); ++n) left[noisyOnes[n]] = noisy[n].left;
     parallelFor(0, count, [&](std::int64_t i) {

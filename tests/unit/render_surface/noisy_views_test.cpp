@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/render/surface/depth_noise.hpp"
+#include "lib/render/surface/silhouette_points.hpp"
 #include "tests/noisy_depth.hpp"
 
 namespace stx::surface {
@@ -99,6 +100,61 @@ TEST(NoisyViews, OneAloneStaysAsItIs) {
     EXPECT_EQ(sheet.views[0].left, left);
     for (std::size_t k = 0; k < before.count(); ++k)
         ASSERT_EQ(sheet.q[0].data()[k], before.data()[k]);
+}
+
+/// What a camera sees of the plane z = `z`, as q and where it is in the world.
+template <class Visit>
+void forEachOnPlane(const PixelSpace& space, double z, const Visit& visit) {
+    const Camera& camera = space.camera;
+    for (int y = 0; y < kPictureSide; ++y) {
+        for (int x = 0; x < kPictureSide; ++x) {
+            const glm::dvec3 ray = camera.orientation * camera.unproject(x + 0.5, y + 0.5, 1.0);
+            const double dist = (z - camera.position.z) / ray.z;
+            visit(x, y, static_cast<float>(1 / dist), camera.position + ray * dist);
+        }
+    }
+}
+
+TEST(NoisyViews, PointsThatAreOutsideASilhouetteMoveIntoIt) {
+    // A thin sheet from before, and from its edge, where it is a strip of six pixels.
+    constexpr double kHalfStrip = 0.3;
+    constexpr float kDoubtShare = 0.03f;
+    const std::vector<PixelSpace> spaces = {spaceAt(0), spaceAt(1.5707963)};
+    Image<float> before(kPictureSide, kPictureSide), none(kPictureSide, kPictureSide, 0.0f);
+    Image<glm::vec3> surface(kPictureSide, kPictureSide);
+    forEachOnPlane(spaces[0], 0, [&](int x, int y, float q, glm::dvec3) {
+        // Every third point is 1 before the sheet, which is 3.3 of its standard deviations.
+        before.at(x, y) = (x + y) % 3 == 0 ? static_cast<float>(1 / (1 / q - 1)) : q;
+        surface.at(x, y) = {0, 0, kDoubtShare * q};
+    });
+    const Texture full(Rgba8Image(kPictureSide, kPictureSide, glm::u8vec4(255)));
+    Rgba8Image edge(kPictureSide, kPictureSide, glm::u8vec4(0));
+    for (int y = 0; y < kPictureSide; ++y)
+        for (int x = 0; x < kPictureSide; ++x)
+            if (std::abs(x + 0.5 - kPictureSide / 2) < 10 * kHalfStrip)
+                edge.at(x, y) = glm::u8vec4(255);
+    const Texture strip(edge);
+    Image<float> q = before;
+    const std::vector<NoisyView> views = {{&spaces[0], &full, &q, surface, 0},
+                                          {&spaces[1], &strip, &none, surface, 0}};
+    keepInSilhouettes(views);
+    constexpr int kMiddle = kPictureSide / 2, kSeen = 12;
+    for (int y = kMiddle - kSeen; y < kMiddle + kSeen; ++y) {
+        for (int x = kMiddle - kSeen; x < kMiddle + kSeen; ++x) {
+            const double z = kSheetDist - 1.0 / q.at(x, y);
+            ASSERT_LT(std::abs(z), 2 * kHalfStrip) << x << ' ' << y;
+            if ((x + y) % 3 != 0) {
+                ASSERT_EQ(q.at(x, y), before.at(x, y)) << x << ' ' << y;
+            }
+        }
+    }
+    // Exact depth is not touched.
+    for (glm::vec3& s : surface.pixels()) s.z = 0;
+    q = before;
+    const std::vector<NoisyView> exact = {{&spaces[0], &full, &q, surface, 0},
+                                          {&spaces[1], &strip, &none, surface, 0}};
+    keepInSilhouettes(exact);
+    for (std::size_t k = 0; k < q.count(); ++k) ASSERT_EQ(q.data()[k], before.data()[k]);
 }
 
 }  // namespace
