@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/surface/colour_depth.hpp"
 #include "lib/render/surface/depth_noise.hpp"
 #include "lib/render/surface/fat_edges.hpp"
 #include "lib/render/surface/noisy_views.hpp"
@@ -482,6 +483,7 @@ void prepareWhole(std::vector<Source>& sources, std::vector<PreparedPage>& pages
     }
     keepInSilhouettes(noisy);
     agreeOnDepth(noisy);
+    matchColours(noisy);
     keepInSilhouettes(noisy);
     std::vector<float> left(sources.size(), 0.0f);
     for (std::size_t n = 0; n < noisy.size(); ++n) left[noisyOnes[n]] = noisy[n].left;

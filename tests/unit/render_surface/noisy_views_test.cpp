@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lib/render/surface/colour_depth.hpp"
 #include "lib/render/surface/depth_noise.hpp"
 #include "lib/render/surface/silhouette_points.hpp"
 #include "tests/noisy_depth.hpp"
@@ -155,6 +156,48 @@ TEST(NoisyViews, PointsThatAreOutsideASilhouetteMoveIntoIt) {
                                           {&spaces[1], &strip, &none, surface, 0}};
     keepInSilhouettes(exact);
     for (std::size_t k = 0; k < q.count(); ++k) ASSERT_EQ(q.data()[k], before.data()[k]);
+}
+
+TEST(NoisyViews, ColoursTellWhereASurfaceIs) {
+    // All points of the first view are 1 % too far, as what smoothing leaves is alike around a
+    // pixel.
+    constexpr float kOff = 0.01f;
+    const std::vector<double> angles = {0, -0.2, 0.2, 0.4};
+    std::vector<PixelSpace> spaces;
+    for (const double angle : angles) spaces.push_back(spaceAt(angle));
+    std::vector<Image<float>> q;
+    std::vector<Texture> textures;
+    std::vector<Image<glm::vec3>> surfaces;
+    for (const PixelSpace& space : spaces) {
+        Image<float> exact(kPictureSide, kPictureSide);
+        Image<glm::vec3> surface(kPictureSide, kPictureSide);
+        RgbaFloatImage colours(kPictureSide, kPictureSide);
+        forEachOnPlane(space, 0, [&](int x, int y, float here, glm::dvec3 at) {
+            exact.at(x, y) = here;
+            const auto wave = static_cast<float>(std::sin(6 * at.x) * std::cos(5 * at.y));
+            colours.at(x, y) = glm::vec4(glm::vec3(0.5f + 0.3f * wave), 1);
+        });
+        for (int y = 0; y < kPictureSide; ++y) {
+            for (int x = 0; x < kPictureSide; ++x) {
+                const float here = exact.at(x, y);
+                const float slope = x > 0 ? here - exact.at(x - 1, y) : exact.at(1, y) - here;
+                surface.at(x, y) = {slope, 0, kOff * here};
+            }
+        }
+        q.push_back(exact);
+        textures.emplace_back(colours);
+        surfaces.push_back(surface);
+    }
+    const Image<float> exact = q[0];
+    for (float& here : q[0].pixels()) here *= 1 - kOff;
+    std::vector<NoisyView> views;
+    for (std::size_t i = 0; i < spaces.size(); ++i)
+        views.push_back({&spaces[i], &textures[i], &q[i], surfaces[i], 0});
+    matchColours(views);
+    double sum = 0;
+    for (std::size_t k = 0; k < exact.count(); ++k)
+        sum += std::abs(q[0].data()[k] / exact.data()[k] - 1);
+    EXPECT_LT(sum / static_cast<double>(exact.count()), 0.4 * kOff);
 }
 
 }  // namespace
