@@ -5,6 +5,7 @@
 //   ivec2 sizeOf(s), bool hasAlpha(s), float freeAlphaOf(s), Axis axisOf(s)
 //   float clearlyBehindOf(s)   share of q by which a surface must be behind a point, with its noise
 //   float stepOf(s)            of its depth code, scene units
+//   float besideOf(s)          how far to the side its points and those of others may be off, pixels
 //   Place placeOf(s, corner)   where the 2x2 pixels from `corner` on are kept, and in that place
 //   float qAt(s, place, i, j), vec2 gradientAt(s, place, i, j), float alphaOf(s, place, i, j)
 // Pixels of a place that are not inside the source are never asked for.
@@ -13,7 +14,8 @@
 
 // What a source says of a point, in halves of a vote.
 CONSTANT int kNoVote = 0;  // the point is hidden from it, on its surface, or out of its frame
-CONSTANT int kHalfVote = 1;  // it sees past the point, but where its own surfaces end or jump
+// It sees past the point, but where its own surfaces end or jump, or are so steep that noise may do it.
+CONSTANT int kHalfVote = 1;
 CONSTANT int kWholeVote = 2;  // it sees a surface clearly behind the point, or background there
 
 bool inside(ivec2 at, ivec2 size) {
@@ -71,7 +73,7 @@ int voteOf(int s, float x, float y, float q) {
     if (hasAlpha(s) && isBackground(s, corner, alphaAmong(s, place, corner, at - 0.5f - f)))
         return kWholeVote;
     float least = 3.0e38f, most = 0.0f;
-    bool gaps = false;
+    bool gaps = false, doubtful = false;
     for (int j = 0; j < 2; ++j) {
         for (int i = 0; i < 2; ++i) {
             ivec2 c = corner + ivec2(i, j);
@@ -92,10 +94,12 @@ int voteOf(int s, float x, float y, float q) {
             if (p < there + margin - reach) return kNoVote;
             vec2 g = gradientAt(s, place, i, j);
             float predicted = there + g.x * (at.x - 0.5f - float(c.x)) + g.y * (at.y - 0.5f - float(c.y));
-            if (p < predicted + margin + kSlopeDoubt * (abs(g.x) + abs(g.y))) return kNoVote;
+            float slope = abs(g.x) + abs(g.y);
+            if (p < predicted + margin + kSlopeDoubt * slope) return kNoVote;
+            doubtful = doubtful || p < predicted + margin + besideOf(s) * slope;
         }
     }
     if (!(most > 0.0f)) return kNoVote;
     bool linked = !(most - least > kLinkedSamples * relativeScale(axisOf(s), most));
-    return linked && !gaps ? kWholeVote : kHalfVote;
+    return linked && !gaps && !doubtful ? kWholeVote : kHalfVote;
 }

@@ -425,7 +425,13 @@ Draft beginSource(Source& s, NoisyView& noisy) {
 
 void finishSource(Source& s, Draft&& d, float left, std::vector<PreparedPage>& pages) {
     // What smoothing leaves is like the step of a coarser depth code.
-    if (left > 0) s.step = std::max(s.step, left * typicalDist(s, d));
+    if (left > 0) {
+        const float dist = typicalDist(s, d);
+        s.step = std::max(s.step, left * dist);
+        // Noise along the rays of one view is to the side in another that looks from there.
+        const double pixels = s.space.axis.inverse ? s.space.camera.fx / dist : s.space.camera.fx;
+        s.beside = static_cast<float>(pixels * left * dist);
+    }
     findLinks(s, d);
     findEdges(s, d);
     findLeaves(s, d);

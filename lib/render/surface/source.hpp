@@ -120,6 +120,7 @@ struct Source {
     bool hasAlpha = false;  ///< some pixel is not fully covered
     float freeAlpha = kFreeAlpha;
     float step = 0;           ///< scene units between neighbouring depth codes, or left by noise
+    float beside = 0;         ///< how far to the side noise may put points, pixels
     double validShare = 1.0;  ///< of the pixels of the object (points, or full alpha): with depth
     float noise = 0;          ///< how far, as a share of q, pixels stray from their neighbours
     float flat = 0;           ///< share of q by which pixels may leave the plane of a piece

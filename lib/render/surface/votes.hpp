@@ -46,6 +46,7 @@ struct SourcePixels {
     [[nodiscard]] float freeAlphaOf(int s) const { return at(s).freeAlpha; }
     [[nodiscard]] Axis axisOf(int s) const { return at(s).space.axis; }
     [[nodiscard]] float clearlyBehindOf(int s) const { return kClearlyBehind + at(s).noise; }
+    [[nodiscard]] float besideOf(int s) const { return at(s).beside; }
     [[nodiscard]] float stepOf(int s) const { return at(s).step; }
     [[nodiscard]] Place placeOf(int s, ivec2 corner) const {
         return {at(s).placeOf(corner.x, corner.y), corner.x, corner.y};

@@ -45,6 +45,28 @@ TEST(Fuse, OneSurfaceInAPixelHasNoFlagsWhateverItsMean) {
     }
 }
 
+TEST(Fuse, VotesCountHalfWhereNoiseMayPutASteepSurface) {
+    constexpr float kSlope = 0.002f;  // of q, a pixel
+    Bundle bundle;
+    bundle.views = {wallAt(2.0f)};
+    for (int y = 0; y < kTile; ++y)
+        for (int x = 0; x < kTile; ++x)
+            bundle.views[0].depth.at(x, y) = 1.0f / (0.5f + kSlope * static_cast<float>(x));
+    SurfaceScene scene(bundle);
+    const LocalSource local{&scene.sources[0], warpFrom(glm::dmat4(1.0)), nullptr};
+    shared::Votes votes{{{&local, 1}}};
+    constexpr int kPixel = kTile / 2;
+    const auto voteOn = [&](float pixelsBefore) {
+        return votes.voteOf(0, kPixel + 0.5f, kPixel + 0.5f,
+                            0.5f + kSlope * (kPixel + pixelsBefore));
+    };
+    EXPECT_EQ(voteOn(1), shared::Votes::kWholeVote);
+    scene.sources[0].beside = 2;
+    EXPECT_EQ(voteOn(0), shared::Votes::kNoVote);
+    EXPECT_EQ(voteOn(1), shared::Votes::kHalfVote);
+    EXPECT_EQ(voteOn(4), shared::Votes::kWholeVote);
+}
+
 /// What a pixel of four samples shows when two sources show a wall at q = 1 and a third shows
 /// `third`. What they see is nearer than all that: none has a vote against anything.
 Pieces besideTwo(const std::array<std::uint32_t, 4>& third) {

@@ -150,6 +150,7 @@ struct Inputs {
         } else {
             scene = std::make_unique<SurfaceScene>(bundle);
         }
+        for (Source& s : scene->sources) s.beside = 0.5f * static_cast<float>(s.number);
         const glm::dvec3 at(0.1, 0.05, 2.9);
         space = PixelSpace(
             Camera::fromFieldOfView(at, *lookAt(at, {0, 0, 0}), {0.6, 0.6}, false, kFrame, kFrame),
@@ -198,7 +199,8 @@ struct Inputs {
             out.push_back({row(m), row(m + 4), row(m + 8), row(m + 12), row(r), row(r + 4),
                            row(r + 8), glm::ivec4(s.width, s.height, s.hasAlpha, s.blocksX),
                            glm::vec4(1.0f, 1.0f, s.step, kClearlyBehind + s.noise),
-                           places.empty() ? glm::ivec4(0) : places[i]});
+                           places.empty() ? glm::ivec4(0) : places[i],
+                           glm::vec4(s.beside, 0, 0, 0)});
         }
         return out;
     }
