@@ -87,10 +87,6 @@ DeviceChoice deviceChoice(int device) {
 
 namespace {
 
-/// Samples to a pixel, along a side, up to which pictures need no averaging; chosen by trial on the
-/// project's image sets. Splats add what all samples say to a pixel, and find outlines apart.
-constexpr double kEnough = 1.5, kEnoughSplats = 2.5;
-
 /// Points of one pixel, the paper's rule, drafts and conventional OpenGL stay what they are.
 bool averages(Backend backend, const RenderSettings& settings) {
     if (settings.mode == RenderMode::surface) return settings.quality != Quality::draft;
@@ -177,10 +173,7 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     // What is around an open place is a guess; the environment is known.
     if (environment) settings.fill = Fill::none;
     STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));
-    if (averages(backend, settings)) {
-        const double enough = settings.mode == RenderMode::splat ? kEnoughSplats : kEnough;
-        made = withFootprint(std::move(made), drawn, enough, job.limits);
-    }
+    if (averages(backend, settings)) made = withFootprint(std::move(made), drawn, job.limits);
     if (environment) made = withEnvironment(std::move(made), environment);
     return made;
 }

@@ -30,11 +30,9 @@ class Footprint {
 
 /// A renderer that draws pictures which are smaller than the reference views as large as those, and
 /// averages: the renderers of this library look at a handful of samples for each pixel and would
-/// alias. Cameras that see the samples at up to `enough` to the pixel, along a side, and the very
-/// cameras of reference views, are left to `inner`. Larger pictures are held to `limits` and to 16
-/// million pixels.
+/// alias. Cameras that see the samples at up to 1.5 to the pixel, and the very cameras of reference
+/// views, are left to `inner`. Larger pictures are held to `limits` and to 16 million pixels.
 [[nodiscard]] std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner,
-                                                      const PageSet& set, double enough,
-                                                      const Limits& limits);
+                                                      const PageSet& set, const Limits& limits);
 
 }  // namespace stx
