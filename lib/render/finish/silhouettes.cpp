@@ -89,7 +89,7 @@ float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
     return between(at(ix, iy), at(ix + 1, iy), at(ix, iy + 1), at(ix + 1, iy + 1));
 }
 
-Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)), outlines_(set_) {
+Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     std::vector<View> all(set_.views().size());
     parallelFor(0, static_cast<std::int64_t>(all.size()), [&](std::int64_t n) {
         const auto number = static_cast<std::size_t>(n);
@@ -121,6 +121,7 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)), outlines_(set_) {
     for (auto& view : all) {
         if (!view.around.empty()) views_.push_back(std::move(view));
     }
+    if (!views_.empty()) outlines_.emplace(set_);
 }
 
 /// Which of the `wanted` samples of a pixel, a bit for each, are free at that depth.
@@ -204,7 +205,7 @@ void Silhouettes::carve(Frame& frame, const Camera& camera) const {
             }
         }
     });
-    outlines_.measure(frame, camera, covered);
+    outlines_->measure(frame, camera, covered);
     parallelForBlocks(0, h, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y)
             for (int x = 0; x < w; ++x)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "lib/render/finish/outlines.hpp"
@@ -44,7 +45,7 @@ class Silhouettes {
                                  float depth) const;
 
     PageSet set_;
-    Outlines outlines_;
+    std::optional<Outlines> outlines_;  ///< where some view has a vote
     std::vector<View> views_;
 };
 

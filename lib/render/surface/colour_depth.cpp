@@ -54,37 +54,25 @@ struct Pull {
 };
 
 Pull pullOf(const Beside& other, float x, float y, float q, float scale, float light, float doubt) {
-    const glm::vec4 h = other.warp.homogeneous(x, y, q);
-    if (!(h.w > 0.0f)) return {};
-    const float inverse = 1.0f / h.w;
-    const float u = h.x * inverse, v = h.y * inverse, there = h.z * inverse;
+    const ShownSurface s = surfaceShownBy(*other.view, other.warp, x, y, q);
+    // A point that is off by its doubt is off by so much beside the surface that is shown.
+    const float own = s.rate * doubt;
+    if (!s.found || !(s.rate > 0.0f) ||
+        s.off * s.off > kShownBand * kShownBand * (own * own + s.doubt * s.doubt))
+        return {};
     const Image<float>& image = *other.lightness;
-    const float fu = std::floor(u - 0.5f), fv = std::floor(v - 0.5f);
+    const float fu = std::floor(s.u - 0.5f), fv = std::floor(s.v - 0.5f);
     if (!(fu >= 0.0f && fv >= 0.0f && fu + 1 < static_cast<float>(image.width()) &&
           fv + 1 < static_cast<float>(image.height())))
         return {};
     const int px = static_cast<int>(fu), py = static_cast<int>(fv);
-    const float tx = u - 0.5f - fu, ty = v - 0.5f - fv;
+    const float tx = s.u - 0.5f - fu, ty = s.v - 0.5f - fv;
     const float a = image.at(px, py), b = image.at(px + 1, py), c = image.at(px, py + 1),
                 d = image.at(px + 1, py + 1);
     if (a < 0.0f || b < 0.0f || c < 0.0f || d < 0.0f) return {};
-    const int nx = static_cast<int>(u), ny = static_cast<int>(v);
-    const float shown = other.view->q->at(nx, ny);
-    if (!(shown > 0.0f)) return {};
-    const glm::vec3 plane = other.view->surface.at(nx, ny);
-    const float expected = shown + plane.x * (u - static_cast<float>(nx) - 0.5f) +
-                           plane.y * (v - static_cast<float>(ny) - 0.5f);
     const auto& m = other.warp.m;
-    // A point that is off by its doubt is off by so much beside the surface that is shown.
-    const float rate =
-        ((m[10] - there * m[14]) - plane.x * (m[2] - u * m[14]) - plane.y * (m[6] - v * m[14])) *
-        inverse;
-    if (!(rate > 0.0f)) return {};
-    const float own = rate * doubt;
-    const float off = expected - there;
-    if (off * off > kShownBand * kShownBand * (own * own + plane.z * plane.z)) return {};
-    const float du = (m[2] - u * m[14]) * inverse * scale,
-                dv = (m[6] - v * m[14]) * inverse * scale;
+    const float du = (m[2] - s.u * m[14]) * s.inverse * scale,
+                dv = (m[6] - s.v * m[14]) * s.inverse * scale;
     const float gx = (b - a) * (1 - ty) + (d - c) * ty, gy = (c - a) * (1 - tx) + (d - b) * tx;
     const float g = gx * du + gy * dv;
     const float r = ((a * (1 - tx) + b * tx) * (1 - ty) + (c * (1 - tx) + d * tx) * ty) - light;

@@ -77,29 +77,12 @@ struct Opinion {
 };
 
 Opinion opinionOf(const Partner& p, const DepthAxis& axis, float x, float y, float q) {
-    const glm::vec4 h = p.warp.homogeneous(x, y, q);
-    if (!(h.w > 0.0f)) return {};
-    const auto& m = p.warp.m;
-    const float inverse = 1.0f / h.w;
-    const float u = h.x * inverse, v = h.y * inverse, there = h.z * inverse;
-    const Image<float>& image = *p.view->q;
-    if (!(u >= 0.0f && v >= 0.0f && u < static_cast<float>(image.width()) &&
-          v < static_cast<float>(image.height())))
-        return {};
-    const int px = static_cast<int>(u), py = static_cast<int>(v);
-    const float shown = image.at(px, py);
-    if (!(shown > 0.0f)) return {};
-    const glm::vec3 plane = p.view->surface.at(px, py);
-    const float expected = shown + plane.x * (u - static_cast<float>(px) - 0.5f) +
-                           plane.y * (v - static_cast<float>(py) - 0.5f);
-    // How what lies between the point and the surface changes as the point moves along its ray.
-    const float rate =
-        ((m[10] - there * m[14]) - plane.x * (m[2] - u * m[14]) - plane.y * (m[6] - v * m[14])) *
-        inverse;
-    const float across = p.view->space->axis.qPerUnit(shown) / axis.qPerUnit(q);
-    if (!(rate > kFacing * across)) return {};
-    const float doubt = plane.z / rate;
-    return {(expected - there) / rate, doubt * doubt};
+    const ShownSurface s = surfaceShownBy(*p.view, p.warp, x, y, q);
+    if (!s.found) return {};
+    const float across = p.view->space->axis.qPerUnit(s.shown) / axis.qPerUnit(q);
+    if (!(s.rate > kFacing * across)) return {};
+    const float doubt = s.doubt / s.rate;
+    return {s.off / s.rate, doubt * doubt};
 }
 
 /// The new points of one view, and what is left of its noise.
@@ -142,6 +125,34 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
 }
 
 }  // namespace
+
+ShownSurface surfaceShownBy(const NoisyView& other, const Warp& warp, float x, float y, float q) {
+    ShownSurface s;
+    const glm::vec4 h = warp.homogeneous(x, y, q);
+    if (!(h.w > 0.0f)) return s;
+    const auto& m = warp.m;
+    s.inverse = 1.0f / h.w;
+    s.u = h.x * s.inverse;
+    s.v = h.y * s.inverse;
+    s.there = h.z * s.inverse;
+    const Image<float>& image = *other.q;
+    if (!(s.u >= 0.0f && s.v >= 0.0f && s.u < static_cast<float>(image.width()) &&
+          s.v < static_cast<float>(image.height())))
+        return s;
+    const int px = static_cast<int>(s.u), py = static_cast<int>(s.v);
+    s.shown = image.at(px, py);
+    if (!(s.shown > 0.0f)) return s;
+    const glm::vec3 plane = other.surface.at(px, py);
+    const float expected = s.shown + plane.x * (s.u - static_cast<float>(px) - 0.5f) +
+                           plane.y * (s.v - static_cast<float>(py) - 0.5f);
+    s.off = expected - s.there;
+    s.rate = ((m[10] - s.there * m[14]) - plane.x * (m[2] - s.u * m[14]) -
+              plane.y * (m[6] - s.v * m[14])) *
+             s.inverse;
+    s.doubt = plane.z;
+    s.found = true;
+    return s;
+}
 
 void agreeOnDepth(std::span<NoisyView> views) {
     if (views.size() < 2) return;

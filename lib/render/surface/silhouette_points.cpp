@@ -57,11 +57,20 @@ int countOf(const std::vector<Witness>& witnesses, float x, float y, float q) {
     return count;
 }
 
-Image<float> kept(std::span<const NoisyView> views, std::size_t number) {
+/// Whether a view has background anywhere.
+bool hasBackground(const Texture& texture) {
+    const auto pixels = static_cast<std::size_t>(texture.width()) * texture.height();
+    for (std::size_t k = 0; k < pixels; ++k)
+        if (PageSet::alphaOf(texture, k) < kFreeAlpha) return true;
+    return false;
+}
+
+Image<float> kept(std::span<const NoisyView> views, const std::vector<bool>& saysAnything,
+                  std::size_t number) {
     const NoisyView& view = views[number];
     std::vector<Witness> witnesses;
     for (std::size_t i = 0; i < views.size(); ++i) {
-        if (i == number) continue;
+        if (i == number || !saysAnything[i]) continue;
         witnesses.push_back(
             {views[i].texture, views[i].q->width(), views[i].q->height(),
              warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel)});
@@ -95,8 +104,12 @@ Image<float> kept(std::span<const NoisyView> views, std::size_t number) {
 }  // namespace
 
 void keepInSilhouettes(std::span<const NoisyView> views) {
+    std::vector<bool> saysAnything;
+    for (const NoisyView& view : views) saysAnything.push_back(hasBackground(*view.texture));
+    if (std::none_of(saysAnything.begin(), saysAnything.end(), [](bool says) { return says; }))
+        return;
     std::vector<Image<float>> results;
-    for (std::size_t i = 0; i < views.size(); ++i) results.push_back(kept(views, i));
+    for (std::size_t i = 0; i < views.size(); ++i) results.push_back(kept(views, saysAnything, i));
     for (std::size_t i = 0; i < views.size(); ++i) *views[i].q = std::move(results[i]);
 }
 
