@@ -1,4 +1,4 @@
-// Draws a scene: fronts, blended sums, picture with light, finish, screen. stx puts the shaders into kShaders.
+// Draws a scene: fronts, blended sums, picture with light, finish (pinholes, outlines), screen. stx puts the shaders into kShaders.
 
 // A program whose uniforms are set by name; a texture is [texture, target].
 class Program {
@@ -72,6 +72,8 @@ class Painter {
         this.blend = make("splat.vert", "splat.frag", 2);
         this.resolve = make("screen.vert", "resolve.frag", 0);
         this.pinholes = make("screen.vert", "pinholes.frag", 0);
+        this.directions = make("screen.vert", "directions.frag", 0);
+        this.outline = make("outline.vert", "outline.frag", 0);
         this.silhouettes = make("screen.vert", "silhouettes.frag", 0);
         this.present = make("screen.vert", "present.frag", 0);
         this.mostReach = gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE)[1] / 2;
@@ -113,7 +115,8 @@ class Painter {
         gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, front, 0);
         gl.drawBuffers([gl.NONE]);
         gl.readBuffer(gl.NONE);
-        this.frames = [frontFrame, frameOf(colour, normal), frameOf(pictures[0]), frameOf(pictures[1])];
+        this.frames = [frontFrame, frameOf(colour, normal), frameOf(pictures[0]), frameOf(pictures[1]),
+                       frameOf(colour), frameOf(normal)];
         if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE)
             throw new Error("this device cannot draw into textures of floats");
     }
@@ -252,8 +255,24 @@ class Painter {
             [from, to] = to === 3 ? [second, 2] : [first, 3];
         };
         for (const enclosing of rounds) turn(this.pinholes, {enclosing});
-        turn(this.silhouettes, {coverTexture: [scene.cover, array], viewTable: [views.texture, two], viewCount: views.count,
-                                pixelSize: 1 / Math.min(camera.fx, camera.fy), carve: !quick && views.count > 0});
+        const carve = !quick && views.count > 0;
+        // The sums are in the picture now: their textures hold which way the outline runs, and where.
+        if (carve) {
+            pass(4, this.directions, {pictureTexture: [from, two]});
+            gl.bindFramebuffer(gl.FRAMEBUFFER, this.frames[5]);
+            gl.clearBufferfv(gl.COLOR, 0, [-9, -9, 0, 0]);
+            gl.enable(gl.BLEND);
+            gl.blendEquationSeparate(gl.MAX, gl.FUNC_ADD);
+            gl.blendFunc(gl.ONE, gl.ONE);
+            gl.bindVertexArray(this.blockArray);
+            this.outline.use(Object.assign({directionTexture: [colour, two]}, points));
+            if (instances) gl.drawArraysInstanced(gl.POINTS, 0, kBlock * kBlock, instances);
+            gl.bindVertexArray(this.noArray);
+            gl.blendEquation(gl.FUNC_ADD);
+            gl.disable(gl.BLEND);
+        }
+        turn(this.silhouettes, {directionTexture: [colour, two], outlineTexture: [normal, two], coverTexture: [scene.cover, array], viewTable: [views.texture, two], viewCount: views.count,
+                                pixelSize: 1 / Math.min(camera.fx, camera.fy), carve});
         gl.bindFramebuffer(gl.FRAMEBUFFER, null);
         gl.viewport(0, 0, novel.width, novel.height);
         gl.enable(gl.BLEND);

@@ -63,6 +63,9 @@ std::string packedProgram() {
                                      {"splat.frag", viewer::splat_frag},
                                      {"resolve.frag", viewer::resolve_frag},
                                      {"pinholes.frag", viewer::pinholes_frag},
+                                     {"directions.frag", viewer::directions_frag},
+                                     {"outline.vert", viewer::outline_vert},
+                                     {"outline.frag", viewer::outline_frag},
                                      {"silhouettes.frag", viewer::silhouettes_frag},
                                      {"present.frag", viewer::present_frag}})
         texts[name] = withoutComments(text);

@@ -1,9 +1,10 @@
-// Gives the outline the coverage that the views' alpha saw: lib/render/finish/silhouettes.cpp.
+// Gives the outline the coverage of what lies within its outermost points, or where these are too few that
+// which the views' alpha saw: lib/render/finish/outlines.cpp and silhouettes.cpp.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
-uniform sampler2D pictureTexture, frontTexture;
+uniform sampler2D pictureTexture, frontTexture, directionTexture, outlineTexture;
 uniform sampler2DArray coverTexture;  // a layer for each view: alpha, and what is around (scene.js)
 uniform sampler2D viewTable;          // where the frame's pixels are in each view; six texels
 uniform int viewCount;
@@ -15,6 +16,18 @@ const int kReach = 2, kSamples = 4, kAll = (1 << (kSamples * kSamples)) - 1, kSt
 const float kFree = 0.43;
 const float kDepthSteps[kStepCount] =
     float[kStepCount](0.0, 1.0, 3.0, -2.0, 5.0, 8.0, -5.0, 12.0, 17.0, -10.0, 24.0, 32.0, -18.0, 44.0);
+
+const float kEnoughPoints = 12.0;
+
+// Area of the part of a unit square, centred at the origin, on which dot(n, x) < t; n has length 1.
+float areaBelow(float t, vec2 n) {
+    float a = max(abs(n.x), abs(n.y)), b = min(abs(n.x), abs(n.y));
+    float mid = 0.5 * (a + b), size = abs(t);
+    if (size >= mid) return t > 0.0 ? 1.0 : 0.0;
+    if (size <= 0.5 * (a - b)) return 0.5 + t / a;
+    float corner = (mid - size) * (mid - size) / (2.0 * a * b);
+    return t > 0.0 ? 1.0 - corner : corner;
+}
 
 float frontAt(ivec2 at) { return texelFetch(frontTexture, clamp(at, ivec2(0), textureSize(frontTexture, 0) - 1), 0).r; }
 
@@ -60,6 +73,12 @@ void main() {
             near = near || !(texelFetch(pictureTexture, beside, 0).a > 0.0);
         }
     if (!near) return;
+    vec4 reach = texelFetch(outlineTexture, at, 0);
+    if (reach.a >= kEnoughPoints) {
+        vec2 outward = texelFetch(directionTexture, at, 0).xy;
+        picture *= max(0.0, areaBelow(reach.r, outward) - areaBelow(-reach.g, outward)) / picture.a;
+        return;
+    }
     float front = frontAt(at);
     // A pixel that was closed, or is only grazed: the nearest around it.
     for (int k = 0; k < 9 && !(frontAt(at) < 1.0); ++k) front = min(front, frontAt(at + ivec2(k % 3, k / 3) - 1));

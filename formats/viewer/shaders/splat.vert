@@ -1,6 +1,5 @@
-// A vertex is a pixel of a reference view, an instance a block of 16x16 of them. PASS 1 finds the front
-// of each pixel, PASS 2 adds the colours of what lies there.
-#include "formats/viewer/shaders/scene.glsl"
+// A vertex is a point. PASS 1 finds the front of each pixel, PASS 2 adds the colours of what lies there.
+#include "formats/viewer/shaders/points.glsl"
 uniform isampler2DArray slopeTexture;
 uniform sampler2DArray normalTexture;
 uniform vec4 lens;        // 1 / fx, 1 / fy, cx, cy: pixel centres at whole numbers
@@ -46,28 +45,17 @@ void colourGradient(ivec3 texel, vec4 steps, out vec3 toRight, out vec3 toBottom
 void main() {
     gl_Position = vec4(0.0, 0.0, -2.0, 1.0);  // outside: not drawn
     gl_PointSize = 1.0;
-    uint dx = uint(gl_VertexID) & 15u, dy = uint(gl_VertexID) >> 4u;
-    if (dx >= (block.y & 0xffffu) || dy >= (block.y >> 16u)) return;
+    uint u, v;
+    ivec3 texel;
+    if (!texelOf(block, u, v, texel)) return;
     int rectangle = int(block.z);
-    uint u = (block.x & 0xffffu) + dx, v = (block.x >> 16u) + dy;
-    vec4 place = rectangleEntry(rectangle, 6), placeY = rectangleEntry(rectangle, 7);
-    int atX = int(place.w);
-    ivec3 texel = ivec3((atX & 0xffff) + int(u), int(placeY.w) + int(v), atX >> 16);
     uint code = texelFetch(depthTexture, texel, 0).r;
     if (code == 0u) return;
     vec4 rgba = texelFetch(colourTexture, texel, 0);
     // Pixels less than half covered belong to the silhouette: they lend colour but hide nothing.
     if (!(rgba.a > (PASS == 1 ? 0.5 : 0.0))) return;
 
-    Point p;
-    p.view.a0 = rectangleEntry(rectangle, 0);
-    p.view.au = rectangleEntry(rectangle, 1);
-    p.view.av = rectangleEntry(rectangle, 2);
-    p.view.b0 = rectangleEntry(rectangle, 3);
-    p.view.bu = rectangleEntry(rectangle, 4);
-    p.view.bv = rectangleEntry(rectangle, 5);
-    p.source = distanceOf(code, p.view.b0.w, p.view.bu.w, p.view.bv.w);
-    p.flatFrame = false;
+    Point p = pointOf(rectangle, code);
     if (!placePoint(p, float(u), float(v))) return;
     p.task.quality = qualityOf(rectangle, p);
     ivec4 coded = texelFetch(slopeTexture, texel, 0);

@@ -1,0 +1,21 @@
+// Each solid point, over the 3x3 pixels around it: lib/render/finish/outlines.cpp.
+#include "formats/viewer/shaders/points.glsl"
+uniform vec2 frameSize;
+
+layout(location = 0) in uvec3 block;  // u0 | v0 << 16, columns | rows << 16, rectangle
+
+flat out vec2 centre;  // pixel
+
+void main() {
+    gl_Position = vec4(0.0, 0.0, -2.0, 1.0);  // outside: not drawn
+    gl_PointSize = 3.0;
+    uint u, v;
+    ivec3 texel;
+    if (!texelOf(block, u, v, texel)) return;
+    uint code = texelFetch(depthTexture, texel, 0).r;
+    if (code == 0u || !(texelFetch(colourTexture, texel, 0).a >= 0.5)) return;
+    Point p = pointOf(int(block.z), code);
+    if (!placePoint(p, float(u), float(v))) return;
+    centre = p.pixel;
+    gl_Position = vec4((floor(p.pixel + 0.5) + 0.5) / frameSize * 2.0 - 1.0, 0.0, 1.0);
+}
