@@ -22,6 +22,7 @@ import argparse
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -252,6 +253,33 @@ class Measurement:
         if self.wanted(job) and not self.missing(self.spot_model(), job):
             yield from self.timed(job, 0.40, ["render", self.spot("spot.mp4"), "-o", self.work / "one.png"], 5)
 
+    def moving_sources(self):
+        """Four sources of 1024x768 that are new in each frame, as PNG files of colour and of depth."""
+        frames = 12
+        job = f"{frames} frames of four moving sources → png"
+        if not self.wanted(job) or self.missing(self.shared / "data/imagesets/spheres-miv", job):
+            return
+        folder = self.work / "moving"
+        if not folder.exists():
+            self.stx_once("extract", self.spheres(), "-o", folder, "--depth", "png")
+            scene = json.loads((folder / "transforms.json").read_text())
+            scene["frames"] = [self.at_moment(folder, i, source, moment) for moment in range(frames)
+                               for i, source in enumerate(scene["frames"])]
+            (folder / "transforms.json").write_text(json.dumps(scene))
+        command = ["render", folder / "transforms.json", "--cameras", self.one_camera(), "--times", "all",
+                   "-o", self.work / "moved_%02d.png"]
+        yield from self.timed(job, 0.25 * frames, command)
+
+    @staticmethod
+    def at_moment(folder, camera, source, moment):
+        """A source once more, in files of its own."""
+        moved = source | {"time": moment / 25, "camera": camera}
+        for key in ("file_path", "depth_file_path"):
+            old = pathlib.Path(source[key])
+            moved[key] = str(old.with_stem(f"{old.stem}_{moment}"))
+            shutil.copy(folder / old, folder / moved[key])
+        return moved
+
     def one_camera(self):
         path = self.work / "one.json"
         scene = json.loads(self.novel_cameras().read_text())
@@ -314,7 +342,7 @@ class Measurement:
             yield from self.timed(job, 1.0, ["pack", "--prune", self.spheres(), "-o", self.work / "atlas"])
 
     def rows(self):
-        for part in (self.sequences, self.first_pictures, self.frames, self.conversions):
+        for part in (self.sequences, self.first_pictures, self.moving_sources, self.frames, self.conversions):
             yield from part()
 
 
