@@ -209,6 +209,30 @@ Bounds PageSet::bounds() const {
     return bounds;
 }
 
+Texture PageSet::textureOfView(std::size_t number) const {
+    const Camera& camera = views()[number].camera;
+    const auto filled = [&](auto image, auto full, const auto& texelsOf) {
+        for (int y = 0; y < camera.height; ++y)
+            for (int x = 0; x < camera.width; ++x)
+                if (objectOutside(number, x, y)) image.at(x, y).a = full;
+        for (const PageRectangle& r : rectanglesOf(number)) {
+            const auto* texels = texelsOf(*pages()[static_cast<std::size_t>(r.page)].texture);
+            const int padding = views()[number].whole ? 0 : data_->padding;
+            const int x0 = std::max(r.x0 - padding, 0), y0 = std::max(r.y0 - padding, 0);
+            const int x1 = std::min(r.x1 + padding, camera.width);
+            const int y1 = std::min(r.y1 + padding, camera.height);
+            for (int y = y0; y < y1; ++y)
+                for (int x = x0; x < x1; ++x) image.at(x, y) = texels[r.texel(x, y)];
+        }
+        return Texture(std::move(image));
+    };
+    if (linear())
+        return filled(RgbaFloatImage(camera.width, camera.height, glm::vec4(0)), 1.0f,
+                      [](const Texture& t) { return t.rgbaFloat()->data(); });
+    return filled(Rgba8Image(camera.width, camera.height, glm::u8vec4(0)), std::uint8_t{255},
+                  [](const Texture& t) { return t.rgba8()->data(); });
+}
+
 ReferenceView PageSet::copyOfView(std::size_t number) const {
     const PageView& from = views()[number];
     const int width = from.camera.width, height = from.camera.height;
@@ -220,10 +244,7 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
     view.depthBits = from.depthBits;
     view.pruned = from.pruned;
     view.background = from.background;
-    if (linear())
-        view.texture = RgbaFloatImage(width, height, glm::vec4(0));
-    else
-        view.texture = Rgba8Image(width, height, glm::u8vec4(0));
+    view.texture = textureOfView(number);
     view.depth = Image<float>(width, height, kNoDepth);
     if (from.hasNormals) view.normal = Image<glm::vec3>(width, height, glm::vec3(0));
     if (from.hasSplats) {
@@ -233,18 +254,9 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const PageRectangle* r = find(number, x, y);
-            if (!r) {
-                if (!objectOutside(number, x, y)) continue;
-                if (auto* bytes = view.texture.rgba8()) bytes->at(x, y).a = 255;
-                if (auto* floats = view.texture.rgbaFloat()) floats->at(x, y).a = 1.0f;
-                continue;
-            }
+            if (!r) continue;
             const Page& page = pages()[static_cast<std::size_t>(r->page)];
             const std::size_t texel = r->texel(x, y);
-            if (auto* bytes = view.texture.rgba8())
-                bytes->at(x, y) = page.texture->rgba8()->data()[texel];
-            if (auto* floats = view.texture.rgbaFloat())
-                floats->at(x, y) = page.texture->rgbaFloat()->data()[texel];
             view.depth.at(x, y) = page.depth->data()[texel];
             if (from.hasNormals) view.normal.at(x, y) = page.normal->data()[texel];
             if (from.hasSplats) {

@@ -138,22 +138,6 @@ class Edges {
     float step_;
 };
 
-/// The shares of their own colour that pixels at the edges of a view have.
-std::vector<float> sharesOf(const EdgeView& view) {
-    const Edges edges(*view.q, view);
-    std::vector<glm::ivec3> found;
-    const int height = view.q->height(), every = std::max(1, height / kRows);
-    for (int y = every / 2; y < height; y += every)
-        for (int x = 0; x < view.q->width(); ++x)
-            if (const int i = edges.behind(x, y, 4); i >= 0) found.emplace_back(x, y, i);
-    const std::size_t stride = std::max<std::size_t>(1, found.size() / kEdges);
-    std::vector<float> shares;
-    for (std::size_t k = 0; k < found.size(); k += stride)
-        if (const auto share = edges.ownShare(found[k].x, found[k].y, found[k].z))
-            shares.push_back(*share);
-    return shares;
-}
-
 /// A view with a pixel less of what is in front: at its edges, or `everywhere`.
 Image<float> thinned(const EdgeView& view, bool everywhere) {
     const Image<float>& from = *view.q;
@@ -223,20 +207,43 @@ std::optional<float> disagreement(std::span<const EdgeView> views,
 
 }  // namespace
 
+std::vector<float> sharesAtEdges(const EdgeView& view) {
+    const Edges edges(*view.q, view);
+    std::vector<glm::ivec3> found;
+    const int height = view.q->height(), every = std::max(1, height / kRows);
+    for (int y = every / 2; y < height; y += every)
+        for (int x = 0; x < view.q->width(); ++x)
+            if (const int i = edges.behind(x, y, 4); i >= 0) found.emplace_back(x, y, i);
+    const std::size_t stride = std::max<std::size_t>(1, found.size() / kEdges);
+    std::vector<float> shares;
+    for (std::size_t k = 0; k < found.size(); k += stride)
+        if (const auto share = edges.ownShare(found[k].x, found[k].y, found[k].z))
+            shares.push_back(*share);
+    return shares;
+}
+
+float colourAtEdges(std::vector<float> shares) {
+    return shares.size() < kFewEdges ? 1.0f : medianOf(std::move(shares));
+}
+
 float colourAtEdges(std::span<const EdgeView> views) {
     std::vector<std::vector<float>> shares(views.size());
     parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
-        shares[k] = sharesOf(views[k]);
+        shares[k] = sharesAtEdges(views[k]);
     });
     std::vector<float> all;
     for (const auto& part : shares) all.insert(all.end(), part.begin(), part.end());
-    return all.size() < kFewEdges ? 1.0f : medianOf(std::move(all));
+    return colourAtEdges(std::move(all));
+}
+
+bool edgesAreFat(float colour) {
+    return colour < kFat;
 }
 
 int thinFatEdges(std::span<const EdgeView> views) {
     int round = 0;
-    for (; round < kMostRounds && colourAtEdges(views) < kFat; ++round) {
+    for (; round < kMostRounds && edgesAreFat(colourAtEdges(views)); ++round) {
         std::vector<const Image<float>*> before, after;
         std::vector<Image<float>> eroded;
         for (const EdgeView& view : views) {

@@ -463,20 +463,40 @@ std::vector<std::int32_t> placesOfBlocks(const Source& s) {
     return places;
 }
 
-/// Views that fill their pages, side by side: they wait for each other where their depth is noisy
-/// or reaches over their edges.
-void prepareWhole(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
+/// Views in rectangles, one after the other: a draft takes the memory of a whole view. False when
+/// their depth is noisy or reaches over their edges, so that prepareTogether() makes more of them.
+bool prepareAlone(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
+    std::vector<float> shares;
+    for (Source& s : sources) {
+        NoisyView noisy;
+        Draft d = beginSource(s, noisy);
+        if (noisy.left > 0) return false;
+        const Texture texture = s.set->textureOfView(s.number);
+        const auto more = sharesAtEdges({&s.space, &texture, &d.q, s.step});
+        shares.insert(shares.end(), more.begin(), more.end());
+        finishSource(s, std::move(d), 0.0f, pages);
+    }
+    return !edgesAreFat(colourAtEdges(std::move(shares)));
+}
+
+/// Views side by side: they wait for each other where their depth is noisy or reaches over their
+/// edges. Those in rectangles take the memory of whole views meanwhile.
+void prepareTogether(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
     std::vector<Draft> drafts(sources.size());
     std::vector<NoisyView> views(sources.size());
+    std::vector<Texture> copies(sources.size());
+    std::vector<const Texture*> textures(sources.size());
     const auto count = static_cast<std::int64_t>(sources.size());
     parallelFor(0, count, [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
+        const Source& s = sources[k];
         drafts[k] = beginSource(sources[k], views[k]);
+        if (!s.whole) copies[k] = s.set->textureOfView(k);
+        textures[k] = s.whole ? s.whole->texture : &copies[k];
     });
     std::vector<EdgeView> edges;
     for (std::size_t k = 0; k < sources.size(); ++k)
-        edges.push_back(
-            {&sources[k].space, sources[k].whole->texture, &drafts[k].q, sources[k].step});
+        edges.push_back({&sources[k].space, textures[k], &drafts[k].q, sources[k].step});
     thinFatEdges(edges);
     std::vector<std::size_t> noisyOnes;
     std::vector<NoisyView> noisy;
@@ -485,7 +505,7 @@ void prepareWhole(std::vector<Source>& sources, std::vector<PreparedPage>& pages
         noisyOnes.push_back(k);
         noisy.push_back(std::move(views[k]));
         noisy.back().q = &drafts[k].q;
-        noisy.back().texture = sources[k].whole->texture;
+        noisy.back().texture = textures[k];
     }
     keepInSilhouettes(noisy);
     agreeOnDepth(noisy);
@@ -509,10 +529,8 @@ SurfaceScene::SurfaceScene(const PageSet& pageSet, bool sharpens) : set(pageSet)
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = sharpened[i].get();
 }
 
-void SurfaceScene::prepare() {
-    bool whole = true;
-    pages.resize(set.pages().size());
-    for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = set.pages()[i].texture;
+void SurfaceScene::begin() {
+    sources.clear();
     sources.resize(set.views().size());
     for (std::size_t i = 0; i < sources.size(); ++i) {
         Source& s = sources[i];
@@ -520,13 +538,16 @@ void SurfaceScene::prepare() {
         s.number = i;
         s.set = &set;
         s.pages = pages.data();
-        if (s.view->whole)
-            s.whole = pages.data() + set.rectanglesOf(i)[0].page;
-        else
-            whole = false;
+        if (s.view->whole) s.whole = pages.data() + set.rectanglesOf(i)[0].page;
     }
-    if (whole) {
-        prepareWhole(sources, pages);
+}
+
+void SurfaceScene::prepare() {
+    pages.resize(set.pages().size());
+    for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = set.pages()[i].texture;
+    begin();
+    if (std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.whole; })) {
+        prepareTogether(sources, pages);
         return;
     }
     for (std::size_t i = 0; i < pages.size(); ++i) {
@@ -534,13 +555,12 @@ void SurfaceScene::prepare() {
         pages[i].q = Image<float>(page.width(), page.height(), 0.0f);
         pages[i].info = Image<std::uint8_t>(page.width(), page.height(), 0);
     }
-    // One after the other: a draft takes the memory of a whole view.
-    for (Source& s : sources) {
-        NoisyView noisy;
-        Draft d = beginSource(s, noisy);
-        finishSource(s, std::move(d), noisy.left, pages);
-        if (!s.whole) s.placeOfBlock = placesOfBlocks(s);
+    if (!prepareAlone(sources, pages)) {
+        begin();
+        prepareTogether(sources, pages);
     }
+    for (Source& s : sources)
+        if (!s.whole) s.placeOfBlock = placesOfBlocks(s);
 }
 
 }  // namespace stx::surface

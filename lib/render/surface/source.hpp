@@ -238,6 +238,7 @@ struct SurfaceScene {
     SurfaceScene& operator=(const SurfaceScene&) = delete;
 
   private:
+    void begin();
     void prepare();
 };
 

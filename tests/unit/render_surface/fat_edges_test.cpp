@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lib/packing/packing.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "tests/noisy_depth.hpp"
 
@@ -108,6 +109,37 @@ TEST(FatEdges, ViewsOfOneColourTellNothing) {
     Room room(std::move(bundle));
     EXPECT_EQ(colourAtEdges(room.views(3)), 1.0f);
     EXPECT_EQ(thinFatEdges(room.views(3)), 0);
+}
+
+/// Pixels whose q is not the same when the views are drawn from an atlas.
+int changedByPacking(const Bundle& bundle) {
+    Job job;
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    const auto atlas = pack(bundle, settings, job);
+    if (!atlas) return -1;
+    const auto set = PageSet::of(*atlas, job);
+    if (!set || set->views()[0].whole) return -1;
+    const SurfaceScene whole{PageSet(bundle)}, packed(*set);
+    int changed = 0;
+    for (std::size_t v = 0; v < bundle.views.size(); ++v)
+        for (int y = 0; y < whole.sources[v].height; ++y)
+            for (int x = 0; x < whole.sources[v].width; ++x)
+                changed += whole.sources[v].q(x, y) != packed.sources[v].q(x, y);
+    return changed;
+}
+
+TEST(FatEdges, AreTakenBackInAnAtlasAsInWholeViews) {
+    Bundle bundle = exactRoom();
+    noisy::displaceEdges(bundle, 1);
+    EXPECT_EQ(changedByPacking(bundle), 0);
+}
+
+TEST(NoisyDepth, AgreesInAnAtlasAsInWholeViews) {
+    Bundle bundle = exactRoom();
+    bundle.views.resize(2);
+    noisy::addNoise(bundle, 0.005);
+    EXPECT_EQ(changedByPacking(bundle), 0);
 }
 
 }  // namespace
