@@ -1,13 +1,32 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "lib/render/finish/outline_points.hpp"
 #include "lib/render/frame.hpp"
 #include "lib/render/scene/page_set.hpp"
-#include "lib/render/splat/cpu/kernels.hpp"
 
 namespace stx {
+
+/// Calls call(x) for each value of a row that `test` is true of, from the left. Rows where few are
+/// cost little.
+template <class Test, class Call>
+void forWhere(std::span<const float> row, const Test& test, const Call& call) {
+    constexpr std::size_t kAtOnce = 32;
+    for (std::size_t first = 0; first < row.size(); first += kAtOnce) {
+        const std::size_t end = std::min(row.size(), first + kAtOnce);
+        // Without branches, so that compilers make vectors of it.
+        unsigned any = 0;
+        for (std::size_t x = first; x < end; ++x) any |= test(row[x]) ? 1u : 0u;
+        if (!any) continue;
+        for (std::size_t x = first; x < end; ++x)
+            if (test(row[x])) call(static_cast<int>(x));
+    }
+}
 
 /// Where the outline of an object runs through the pixels beside it, to a fraction of a pixel: no
 /// point of any view lies beyond it. Splats reach beyond it by part of a pixel. Where a surface
@@ -28,21 +47,12 @@ class Outlines {
     void measure(const Frame& frame, const Camera& camera, Image<float>& covered) const;
 
   private:
-    static constexpr int kBlockSide = 16;
-    struct Block {
-        std::uint32_t rectangle = 0;
-        std::uint16_t u0 = 0, v0 = 0, u1 = 0, v1 = 0;  ///< u1 and v1 one past the last
-        float zMin = kNoDepth, zMax = 0;               ///< of its points
-        std::uint16_t solid[kBlockSide] = {};          ///< a bit for each point of a row
-    };
     struct Band;
 
-    static void addToRow(Band& band, std::size_t first, float dx, float dy);
-    void addPoints(const Block& block, const splat::PixelMap& m, bool orthographic,
-                   const Block* ahead, Band& band) const;
+    [[nodiscard]] OutlineDepths depthsOf(const OutlineBlock& block) const;
 
     PageSet set_;
-    std::vector<Block> blocks_;
+    std::vector<OutlineBlock> blocks_;
 };
 
 }  // namespace stx

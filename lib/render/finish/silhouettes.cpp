@@ -47,18 +47,21 @@ Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
     return alpha;
 }
 
-/// 1 where some pixel of the row lies within kReach of an empty one, in the row.
-void markRow(const Image<float>& depth, int y, std::uint8_t* near) {
-    const auto row = depth.row(y);
+/// 1 where some pixel of the row lies within kReach of an empty one, in the row. `empty` holds
+/// kReach elements more on either side. Without branches, so that compilers make vectors of it.
+bool markRow(const Image<float>& depth, int y, std::uint8_t* empty, std::uint8_t* near) {
+    const float* row = depth.row(y).data();
     const int w = depth.width();
-    std::fill(near, near + w, std::uint8_t{0});
-    int marked = 0;  // all that shall be, up to here
+    unsigned any = 0;
     for (int x = 0; x < w; ++x) {
-        if (hasPoint(row[x])) continue;
-        const int to = std::min(w, x + kReach + 1);
-        for (int i = std::max(marked, x - kReach); i < to; ++i) near[i] = 1;
-        marked = to;
+        const std::uint8_t e = hasPoint(row[x]) ? 0 : 1;
+        empty[kReach + x] = e;
+        any |= e;
     }
+    static_assert(kReach == 2);
+    for (int x = 0; x < w; ++x)
+        near[x] = empty[x] | empty[x + 1] | empty[x + 2] | empty[x + 3] | empty[x + 4];
+    return any;
 }
 
 }  // namespace
@@ -191,39 +194,48 @@ void Silhouettes::carve(Frame& frame, const Camera& camera) const {
                   to = std::min(h, from + kRowsPerTask);
         const int first = std::max(0, from - kReach), last = std::min(h - 1, to - 1 + kReach);
         Image<std::uint8_t> rowMarks(w, last - first + 1);
-        for (int y = first; y <= last; ++y) markRow(frame.depth, y, rowMarks.row(y - first).data());
-        std::vector<std::uint8_t> mark(w);
+        std::vector<std::uint8_t> empty(static_cast<std::size_t>(w) + 2 * kReach), mark(w);
+        std::vector<std::uint8_t> any(static_cast<std::size_t>(last - first + 1));
+        for (int y = first; y <= last; ++y)
+            any[y - first] = markRow(frame.depth, y, empty.data(), rowMarks.row(y - first).data());
         for (int y = from; y < to; ++y) {
             std::fill(mark.begin(), mark.end(), std::uint8_t{0});
+            bool some = false;
             for (int j = std::max(0, y - kReach); j <= std::min(h - 1, y + kReach); ++j) {
-                const auto rowMark = rowMarks.row(j - first);
+                if (!any[j - first]) continue;
+                some = true;
+                const std::uint8_t* rowMark = rowMarks.row(j - first).data();
                 for (int x = 0; x < w; ++x) mark[x] |= rowMark[x];
             }
-            for (int x = 0; x < w; ++x) {
-                const float depth = frame.depth.at(x, y);
-                if (mark[x] && hasPoint(depth)) covered.at(x, y) = Outlines::kAsked;
-            }
+            if (!some) continue;
+            const float* depth = frame.depth.row(y).data();
+            float* asked = covered.row(y).data();
+            for (int x = 0; x < w; ++x)
+                asked[x] = (mark[x] != 0) & hasPoint(depth[x]) ? Outlines::kAsked : -1.0f;
         }
     });
     outlines_->measure(frame, camera, covered);
     parallelForBlocks(0, h, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y)
-            for (int x = 0; x < w; ++x)
-                if (covered.at(x, y) == Outlines::kAsked)
+            forWhere(
+                covered.row(y), [](float c) { return c == Outlines::kAsked; },
+                [&](int x) {
                     covered.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y));
+                });
     });
     parallelFor(0, h, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
-        for (int x = 0; x < w; ++x) {
+        const auto set = [&](int x) {
             const float share = covered.at(x, y);
-            if (share < 0.0f) continue;
             const auto scaled = [share](glm::vec4 c) { return c.w > 0.0f ? c * (share / c.w) : c; };
             frame.colour.at(x, y) = scaled(frame.colour.at(x, y));
             if (!frame.albedo.empty()) frame.albedo.at(x, y) = scaled(frame.albedo.at(x, y));
-            if (share > 0.0f) continue;
+            if (share > 0.0f) return;
             frame.depth.at(x, y) = kNoDepth;
             if (!frame.normal.empty()) frame.normal.at(x, y) = glm::vec3(0.0f);
-        }
+        };
+        forWhere(
+            covered.row(y), [](float c) { return c >= 0.0f; }, set);
     });
 }
 
