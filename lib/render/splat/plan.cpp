@@ -203,13 +203,14 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
                                      : 0.5f;
     task.nearest = 0.999f * least * task.zMin / (1.0f + task.tolerance);
 
+    const double reach = task.small ? kReachSmall : kReachPixels + kReachRadii * std::sqrt(cover2);
+    task.reach = static_cast<float>(std::min(reach, 1e30));
     if (crossing) {
         task.x0 = task.y0 = 0;
         task.x1 = novel.width - 1;
         task.y1 = novel.height - 1;
         return true;
     }
-    const double reach = task.small ? kReachSmall : kReachPixels + kReachRadii * std::sqrt(cover2);
     x0 -= reach;
     y0 -= reach;
     x1 += reach;

@@ -22,7 +22,7 @@ using gpu::ViewEntry;
 
 constexpr int kFrame = 64, kStride = kFrame + 2;
 constexpr std::size_t kPadded = static_cast<std::size_t>(kStride) * kStride;
-constexpr std::size_t kElements = splat::Band::pixels(kFrame, kStride);
+constexpr std::size_t kElements = splat::Region::pixels(kFrame, kStride);
 
 struct ScalarShape {
 #include "shaders/shared/splat_shape.glsl"
@@ -157,15 +157,15 @@ Drawn drawVectors(const Inputs& in) {
     task.uniform = task.small = false;
     Drawn out;
     std::vector<float> missing(out.front.size());
-    Band band;
-    band.width = band.rows = kFrame;
-    band.stride = kStride;
-    band.orthographic = in.novel.orthographic;
-    band.depth = out.front.data();
-    band.colour = &out.sums[0].x;
-    band.missing = missing.data();
-    drawDepth(source, task, {}, {in.coefficient}, band);
-    drawColour(source, task, {}, {in.coefficient}, band);
+    Region region;
+    region.width = region.rows = kFrame;
+    region.stride = kStride;
+    region.orthographic = in.novel.orthographic;
+    region.depth = out.front.data();
+    region.colour = &out.sums[0].x;
+    region.missing = missing.data();
+    drawDepth(source, task, {}, {in.coefficient}, region);
+    drawColour(source, task, {}, {in.coefficient}, region);
     return out;
 }
 

@@ -52,7 +52,7 @@ HWY_INLINE VF loadDepth(DF d, const float* from, int count) {
 }
 
 // Points of a row and their places: the pixel to the upper left of each (only where `inside`
-// the band), how far into the next it lies (0..1), its novel depth.
+// the region), how far into the next it lies (0..1), its novel depth.
 struct Projection {
     VI offset;
     VF x, y, fx, fy, z;
@@ -60,7 +60,7 @@ struct Projection {
     hn::Mask<DF> inFront, inside;
 };
 
-HWY_INLINE Projection project(DF d, const RowMap& m, int i, VF z, const Band& band) {
+HWY_INLINE Projection project(DF d, const RowMap& m, int i, VF z, const Region& region) {
     const VF index = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(i)));
     Projection out;
     const auto h = [&](int k) HWY_ATTR {
@@ -72,7 +72,7 @@ HWY_INLINE Projection project(DF d, const RowMap& m, int i, VF z, const Band& ba
     out.y = h(1);
     out.z = h(2);
     out.inverse = hn::Set(d, 1.0f);
-    if (!band.orthographic) {
+    if (!region.orthographic) {
         out.inverse = hn::Div(out.inverse, out.z);
         out.x = hn::Mul(out.x, out.inverse);
         out.y = hn::Mul(out.y, out.inverse);
@@ -80,18 +80,18 @@ HWY_INLINE Projection project(DF d, const RowMap& m, int i, VF z, const Band& ba
     const VF x0 = hn::Floor(out.x), y0 = hn::Floor(out.y);
     // Comparisons with NaN are false, which takes care of pixels without a point.
     out.inFront = hn::And(hn::Gt(out.z, hn::Set(d, kNearest)), hn::Lt(z, hn::Set(d, kInfinity)));
-    out.inside = hn::And(
-        hn::And(hn::And(hn::Ge(x0, hn::Set(d, -1.0f)), hn::Lt(x0, hn::Set(d, float(band.width)))),
-                hn::And(hn::Ge(y0, hn::Set(d, float(band.top - 1))),
-                        hn::Lt(y0, hn::Set(d, float(band.top + band.rows))))),
-        out.inFront);
+    out.inside = hn::And(hn::And(hn::And(hn::Ge(x0, hn::Set(d, float(region.left - 1))),
+                                         hn::Lt(x0, hn::Set(d, float(region.left + region.width)))),
+                                 hn::And(hn::Ge(y0, hn::Set(d, float(region.top - 1))),
+                                         hn::Lt(y0, hn::Set(d, float(region.top + region.rows))))),
+                         out.inFront);
     const DI di;
     // Zero where outside, so that conversions and gathers stay in range.
-    const VF xs = hn::IfThenElseZero(out.inside, x0);
-    const VF ys = hn::IfThenElse(out.inside, y0, hn::Set(d, float(band.top)));
-    const VI row = hn::Sub(hn::ConvertTo(di, ys), hn::Set(di, band.top - 1));
-    out.offset = hn::Add(hn::Mul(row, hn::Set(di, band.stride)),
-                         hn::Add(hn::ConvertTo(di, xs), hn::Set(di, 1)));
+    const VF xs = hn::IfThenElse(out.inside, x0, hn::Set(d, float(region.left)));
+    const VF ys = hn::IfThenElse(out.inside, y0, hn::Set(d, float(region.top)));
+    const VI row = hn::Sub(hn::ConvertTo(di, ys), hn::Set(di, region.top - 1));
+    out.offset = hn::Add(hn::Mul(row, hn::Set(di, region.stride)),
+                         hn::Sub(hn::ConvertTo(di, xs), hn::Set(di, region.left - 1)));
     out.fx = hn::Sub(out.x, x0);
     out.fy = hn::Sub(out.y, y0);
     return out;

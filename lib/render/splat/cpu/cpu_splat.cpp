@@ -23,12 +23,12 @@ namespace {
 using namespace splat;
 
 constexpr int kTile = 16;
-// A band's buffers should stay in the second-level cache.
-constexpr int kBandBytes = 1 << 20;
+// What one thread draws at once: its buffers should stay in the second-level cache.
+constexpr int kRegionWidth = 256, kRegionRows = 128;
 // Blocks are drawn column by column of the picture; pixels.
 constexpr int kColumn = 64;
 
-// One thread's buffers for a band.
+// One thread's buffers for a region.
 struct Scratch {
     std::vector<float> depth, colour, missing, normals, tileMax;
     std::vector<std::uint64_t> points;
@@ -61,14 +61,14 @@ class CpuSplatRenderer final : public Renderer {
         Lighting lighting;
         Shape shape;
         Frame frame;
-        int bandRows = 0;
+        int across = 0;  // regions in a row
     };
 
     void planFrame(const Camera& camera);
     std::span<const std::uint32_t> byColumn(int width);
-    void drawBand(Picture& picture, int index);
-    void resolveBlended(Picture& picture, const Band& band) const;
-    void resolvePoints(Picture& picture, const Band& band) const;
+    void drawRegion(Picture& picture, int index);
+    void resolveBlended(Picture& picture, const Region& region) const;
+    void resolvePoints(Picture& picture, const Region& region) const;
     void shade(Picture& picture, int x, int y, glm::vec3 normal) const;
 
     PageSet set_;
@@ -85,7 +85,7 @@ class CpuSplatRenderer final : public Renderer {
     std::vector<BlockTask> tasks_;
     std::vector<std::uint8_t> seen_;
     std::vector<std::uint32_t> order_;
-    std::vector<std::vector<std::uint32_t>> bins_;  // tasks of each band, in order
+    std::vector<std::vector<std::uint32_t>> bins_;  // tasks of each region, in order
     tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 
@@ -175,23 +175,28 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
         picture.shape.coefficient =
             static_cast<float>(paperCoefficient(prepared_.rectangles, settings_, camera));
 
-    picture.bandRows = std::clamp(kBandBytes / (24 * camera.width), 16, 64);
-    const int bands = (camera.height + picture.bandRows - 1) / picture.bandRows;
-    bins_.resize(bands);
+    picture.across = (camera.width + kRegionWidth - 1) / kRegionWidth;
+    const int regions = picture.across * ((camera.height + kRegionRows - 1) / kRegionRows);
+    bins_.resize(static_cast<std::size_t>(regions));
     for (auto& b : bins_) b.clear();
     for (const std::uint32_t i : byColumn(camera.width)) {
-        int y0 = tasks_[i].y0, y1 = tasks_[i].y1;
+        const BlockTask& task = tasks_[i];
+        int x0 = task.x0, x1 = task.x1, y0 = task.y0, y1 = task.y1;
         if (picture.shape.coefficient > 0) {
             // Round splats may be larger than the plan, which follows the data.
-            const double z = std::max(1e-9f, tasks_[i].zMin);
-            const double radius =
-                std::min(300.0, 1 + picture.shape.coefficient / (camera.orthographic ? 1.0 : z));
-            y0 = std::max(0, y0 - static_cast<int>(radius));
-            y1 = std::min(camera.height - 1, y1 + static_cast<int>(radius));
+            const double z = std::max(1e-9f, task.zMin);
+            const int radius = static_cast<int>(
+                std::min(300.0, 1 + picture.shape.coefficient / (camera.orthographic ? 1.0 : z)));
+            x0 = std::max(0, x0 - radius);
+            x1 = std::min(camera.width - 1, x1 + radius);
+            y0 = std::max(0, y0 - radius);
+            y1 = std::min(camera.height - 1, y1 + radius);
         }
-        for (int b = y0 / picture.bandRows; b <= y1 / picture.bandRows; ++b) bins_[b].push_back(i);
+        for (int y = y0 / kRegionRows; y <= y1 / kRegionRows; ++y)
+            for (int x = x0 / kRegionWidth; x <= x1 / kRegionWidth; ++x)
+                bins_[static_cast<std::size_t>(y * picture.across + x)].push_back(i);
     }
-    parallelFor(0, bands, [&](std::int64_t b) { drawBand(picture, static_cast<int>(b)); });
+    parallelFor(0, regions, [&](std::int64_t n) { drawRegion(picture, static_cast<int>(n)); });
     if (settings_.splat == SplatRule::data) {
         closePinholes(picture.frame, set_.pruned());
         silhouettes_.carve(picture.frame, camera);
@@ -201,15 +206,15 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     return std::move(picture.frame);
 }
 
-// The farthest depth in each tile of a band: what lies behind is hidden.
-void findTileMax(const Band& band, std::vector<float>& tileMax) {
-    const int across = (band.width + kTile - 1) / kTile, down = (band.rows + kTile - 1) / kTile;
+// The farthest depth in each tile of a region: what lies behind is hidden.
+void findTileMax(const Region& region, std::vector<float>& tileMax) {
+    const int across = (region.width + kTile - 1) / kTile, down = (region.rows + kTile - 1) / kTile;
     tileMax.assign(static_cast<std::size_t>(across) * down, 0.0f);
-    for (int y = 0; y < band.rows; ++y) {
-        const float* row = band.depth + static_cast<std::size_t>(y + 1) * band.stride + 1;
+    for (int y = 0; y < region.rows; ++y) {
+        const float* row = region.depth + static_cast<std::size_t>(y + 1) * region.stride + 1;
         float* out = tileMax.data() + static_cast<std::size_t>(y / kTile) * across;
         for (int t = 0; t < across; ++t) {
-            const int end = std::min(band.width, (t + 1) * kTile);
+            const int end = std::min(region.width, (t + 1) * kTile);
             float m = out[t];
             for (int x = t * kTile; x < end; ++x) m = row[x] > m ? row[x] : m;
             out[t] = m;
@@ -217,43 +222,54 @@ void findTileMax(const Band& band, std::vector<float>& tileMax) {
     }
 }
 
-bool hidden(const BlockTask& t, const Band& band, const std::vector<float>& tileMax) {
-    const int across = (band.width + kTile - 1) / kTile;
-    const int y0 = std::max(t.y0 - band.top, 0), y1 = std::min(t.y1 - band.top, band.rows - 1);
+bool hidden(const BlockTask& t, const Region& region, const std::vector<float>& tileMax) {
+    const int across = (region.width + kTile - 1) / kTile;
+    const int y0 = std::max(t.y0 - region.top, 0),
+              y1 = std::min(t.y1 - region.top, region.rows - 1);
+    const int x0 = std::max(t.x0 - region.left, 0),
+              x1 = std::min(t.x1 - region.left, region.width - 1);
     for (int y = y0 / kTile; y <= y1 / kTile; ++y)
-        for (int x = t.x0 / kTile; x <= t.x1 / kTile; ++x)
+        for (int x = x0 / kTile; x <= x1 / kTile; ++x)
             if (t.nearest <= tileMax[static_cast<std::size_t>(y) * across + x]) return false;
     return true;
 }
 
-void CpuSplatRenderer::drawBand(Picture& picture, int index) {
+void CpuSplatRenderer::drawRegion(Picture& picture, int index) {
     const Camera& camera = picture.camera;
     Scratch& scratch = scratch_.local();
-    Band band;
-    band.width = camera.width;
-    band.top = index * picture.bandRows;
-    band.rows = std::min(picture.bandRows, camera.height - band.top);
-    band.stride = camera.width + 2;
-    band.orthographic = camera.orthographic;
-    const std::size_t count = Band::pixels(band.rows, band.stride);
+    Region region;
+    region.left = index % picture.across * kRegionWidth;
+    region.top = index / picture.across * kRegionRows;
+    region.width = std::min(kRegionWidth, camera.width - region.left);
+    region.rows = std::min(kRegionRows, camera.height - region.top);
+    region.stride = region.width + 2;
+    region.orthographic = camera.orthographic;
+    const auto& bin = bins_[static_cast<std::size_t>(index)];
+    if (bin.empty()) {
+        for (int y = region.top; y < region.top + region.rows; ++y) {
+            float* depth = picture.frame.depth.row(y).data() + region.left;
+            std::fill(depth, depth + region.width, kNoDepth);
+        }
+        return;
+    }
+    const std::size_t count = Region::pixels(region.rows, region.stride);
     if (settings_.splat == SplatRule::point) {
         scratch.points.assign(count, ~std::uint64_t{0});
-        band.points = scratch.points.data();
-        for (const auto i : bins_[index]) drawPoints(sources_[tasks_[i].source], tasks_[i], band);
-        resolvePoints(picture, band);
+        region.points = scratch.points.data();
+        for (const auto i : bin) drawPoints(sources_[tasks_[i].source], tasks_[i], region);
+        resolvePoints(picture, region);
         return;
     }
     scratch.depth.assign(count, kNoDepth);
     scratch.colour.assign(4 * count, 0.0f);
     scratch.missing.assign(count, 0.0f);
-    band.depth = scratch.depth.data();
-    band.colour = scratch.colour.data();
-    band.missing = scratch.missing.data();
+    region.depth = scratch.depth.data();
+    region.colour = scratch.colour.data();
+    region.missing = scratch.missing.data();
     if (wantNormals_) {
         scratch.normals.assign(4 * count, 0.0f);
-        band.normals = scratch.normals.data();
+        region.normals = scratch.normals.data();
     }
-    const auto& bin = bins_[index];
     const auto after = [&](std::size_t k) {
         if (k + 1 >= bin.size()) return Ahead{};
         const BlockTask& next = tasks_[bin[k + 1]];
@@ -261,15 +277,15 @@ void CpuSplatRenderer::drawBand(Picture& picture, int index) {
     };
     for (std::size_t k = 0; k < bin.size(); ++k) {
         const BlockTask& task = tasks_[bin[k]];
-        drawDepth(sources_[task.source], task, after(k), picture.shape, band);
+        drawDepth(sources_[task.source], task, after(k), picture.shape, region);
     }
-    findTileMax(band, scratch.tileMax);
+    findTileMax(region, scratch.tileMax);
     for (std::size_t k = 0; k < bin.size(); ++k) {
         const BlockTask& task = tasks_[bin[k]];
-        if (picture.shape.coefficient <= 0 && hidden(task, band, scratch.tileMax)) continue;
-        drawColour(sources_[task.source], task, after(k), picture.shape, band);
+        if (picture.shape.coefficient <= 0 && hidden(task, region, scratch.tileMax)) continue;
+        drawColour(sources_[task.source], task, after(k), picture.shape, region);
     }
-    resolveBlended(picture, band);
+    resolveBlended(picture, region);
 }
 
 void CpuSplatRenderer::shade(Picture& picture, int x, int y, glm::vec3 normal) const {
@@ -289,18 +305,18 @@ void CpuSplatRenderer::shade(Picture& picture, int x, int y, glm::vec3 normal) c
     frame.colour.at(x, y) = glm::vec4(lit * albedo.a, albedo.a);
 }
 
-void CpuSplatRenderer::resolveBlended(Picture& picture, const Band& band) const {
+void CpuSplatRenderer::resolveBlended(Picture& picture, const Region& region) const {
     Frame& frame = picture.frame;
-    for (int row = 0; row < band.rows; ++row) {
-        const int y = band.top + row;
-        const std::size_t start = static_cast<std::size_t>(row + 1) * band.stride + 1;
-        const auto depthOut = frame.depth.row(y);
-        const auto colourOut = frame.colour.row(y);
-        for (int x = 0; x < band.width; ++x) {
+    for (int row = 0; row < region.rows; ++row) {
+        const int y = region.top + row;
+        const std::size_t start = static_cast<std::size_t>(row + 1) * region.stride + 1;
+        float* depthOut = frame.depth.row(y).data() + region.left;
+        glm::vec4* colourOut = frame.colour.row(y).data() + region.left;
+        for (int x = 0; x < region.width; ++x) {
             const std::size_t i = start + x;
-            const float* sums = band.colour + 4 * i;
-            const float total = sums[3] + band.missing[i];
-            float depth = band.depth[i];
+            const float* sums = region.colour + 4 * i;
+            const float total = sums[3] + region.missing[i];
+            float depth = region.depth[i];
             glm::vec4 colour(0.0f);
             if (total > 0) {
                 const float scale = 1.0f / total;
@@ -313,8 +329,8 @@ void CpuSplatRenderer::resolveBlended(Picture& picture, const Band& band) const 
                 // Only faint splats of a silhouette reach here, or only the skirts of full ones.
                 if (!(colour.a < 0.5f)) colour = glm::vec4(0.0f);
                 if (colour.a > 0)
-                    for (const int step : {-1, 1, -band.stride, band.stride})
-                        depth = std::min(depth, band.depth[i + step]);
+                    for (const int step : {-1, 1, -region.stride, region.stride})
+                        depth = std::min(depth, region.depth[i + step]);
             } else if (!hasPoint(depth)) {
                 colour = glm::vec4(0.0f);
             }
@@ -322,28 +338,29 @@ void CpuSplatRenderer::resolveBlended(Picture& picture, const Band& band) const 
             colourOut[x] = colour;
         }
         if (!wantNormals_) continue;
-        const auto normalOut = frame.normal.row(y);
-        for (int x = 0; x < band.width; ++x) {
-            const float* n = band.normals + 4 * (start + x);
+        glm::vec3* normalOut = frame.normal.row(y).data() + region.left;
+        for (int x = 0; x < region.width; ++x) {
+            const float* n = region.normals + 4 * (start + x);
             const glm::vec3 sum(n[0], n[1], n[2]);
             const float length = glm::length(sum);
             normalOut[x] = length > 0 && colourOut[x].a > 0 ? sum / length : glm::vec3(0.0f);
         }
-        std::ranges::copy(colourOut, frame.albedo.row(y).begin());
+        std::copy_n(colourOut, region.width, frame.albedo.row(y).data() + region.left);
         if (!settings_.lighting.on()) continue;
-        for (int x = 0; x < band.width; ++x) shade(picture, x, y, normalOut[x]);
+        for (int x = 0; x < region.width; ++x) shade(picture, region.left + x, y, normalOut[x]);
     }
 }
 
-void CpuSplatRenderer::resolvePoints(Picture& picture, const Band& band) const {
+void CpuSplatRenderer::resolvePoints(Picture& picture, const Region& region) const {
     Frame& frame = picture.frame;
-    for (int row = 0; row < band.rows; ++row) {
-        const int y = band.top + row;
+    for (int row = 0; row < region.rows; ++row) {
+        const int y = region.top + row;
         const std::uint64_t* keys =
-            band.points + static_cast<std::size_t>(row + 1) * band.stride + 1;
+            region.points + static_cast<std::size_t>(row + 1) * region.stride + 1;
         std::size_t k = 0;
-        for (int x = 0; x < band.width; ++x) {
-            const std::uint64_t key = keys[x];
+        for (int column = 0; column < region.width; ++column) {
+            const int x = region.left + column;
+            const std::uint64_t key = keys[column];
             if (key == ~std::uint64_t{0}) {
                 frame.depth.at(x, y) = kNoDepth;
                 continue;

@@ -34,35 +34,52 @@ HWY_INLINE void fetchRow(const Ahead& ahead, int row, bool colours) {
         hwy::Prefetch(s.rgbaFloat + 4 * pixel);
 }
 
-HWY_INLINE bool isPatch(const Ellipse& e) {
-    return kPatches && e.x1 - e.x0 < kPatch && e.y1 - e.y0 < kPatch;
+HWY_INLINE bool inPatches(const Ellipse& e) {
+    return kPatches && e.x1 - e.x0 < kMostPatches * kPatch && e.y1 - e.y0 < kMostPatches * kPatch;
 }
 
-HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Band& band) {
-    if (isPatch(e)) return depthPatch(e, band);
+// Calls draw(patch) for each part of an ellipse.
+template <class F>
+HWY_INLINE void forPatches(const Ellipse& e, const F& draw) {
+    Ellipse patch = e;
+    for (patch.y0 = e.y0; patch.y0 <= e.y1; patch.y0 += kPatch) {
+        patch.y1 = std::min(e.y1, patch.y0 + kPatch - 1);
+        for (patch.x0 = e.x0; patch.x0 <= e.x1; patch.x0 += kPatch) {
+            patch.x1 = std::min(e.x1, patch.x0 + kPatch - 1);
+            draw(patch);
+        }
+    }
+}
+
+HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Region& region) {
+    if (inPatches(e))
+        return forPatches(e, [&](const Ellipse& p) HWY_ATTR { depthPatch(p, region); });
     const int lanes = static_cast<int>(hn::Lanes(d));
     forRows(e, [&](int x0, int x1, int y) HWY_ATTR {
-        float* row = band.depth + static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
-        for (int x = x0; x <= x1; x += lanes) {
+        float* row = region.depth + region.element(x0, y);
+        for (int x = x0; x <= x1; x += lanes, row += lanes) {
             const Across a = across(d, e, x, x1, y);
             const auto core = hn::And(a.in, hn::Le(a.q, hn::Set(d, e.core2)));
-            const VF old = hn::LoadU(d, row + x);
-            hn::StoreU(hn::IfThenElse(core, hn::Min(old, a.z), old), d, row + x);
+            const VF old = hn::LoadU(d, row);
+            hn::StoreU(hn::IfThenElse(core, hn::Min(old, a.z), old), d, row);
         }
     });
 }
 
 template <bool kOpaque, bool kNormals>
 HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const PointColour& point, float tolerance,
-                              const Band& band) {
-    if (isPatch(e)) return colourPatch<kOpaque, kNormals>(e, point, tolerance, band);
+                              const Region& region) {
+    if (inPatches(e))
+        return forPatches(e, [&](const Ellipse& p) HWY_ATTR {
+            colourPatch<kOpaque, kNormals>(p, point, tolerance, region);
+        });
     const int lanes = static_cast<int>(hn::Lanes(d));
     HWY_ALIGN float weights[kBlock];
     forRows(e, [&](int x0, int x1, int y) HWY_ATTR {
-        const std::size_t start = static_cast<std::size_t>(y - band.top + 1) * band.stride + 1;
-        for (int x = x0; x <= x1; x += lanes) {
+        std::size_t start = region.element(x0, y);
+        for (int x = x0; x <= x1; x += lanes, start += static_cast<std::size_t>(lanes)) {
             const Across a = across(d, e, x, x1, y);
-            const VF front = hn::LoadU(d, band.depth + start + x);
+            const VF front = hn::LoadU(d, region.depth + start);
             const auto near = hn::And(hn::And(a.in, hn::Lt(a.q, hn::Set(d, kReach2))),
                                       hn::Le(a.z, hn::Mul(front, hn::Set(d, 1.0f + tolerance))));
             std::uint32_t bits = bitsOf(d, near);
@@ -74,12 +91,12 @@ HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const PointColour& point, 
             while (bits) {
                 const int k = __builtin_ctz(bits);
                 bits &= bits - 1;
-                const std::size_t at = start + x + k;
+                const std::size_t at = start + static_cast<std::size_t>(k);
                 const Four colour =
                     plus(plus(point.colour, x + k - e.x, point.across), y - e.y, point.down);
-                addTo(band.colour + 4 * at, weights[k], colour);
-                if (!kOpaque) band.missing[at] += weights[k] * point.missing;
-                if (kNormals) addTo(band.normals + 4 * at, weights[k], point.normal);
+                addTo(region.colour + 4 * at, weights[k], colour);
+                if (!kOpaque) region.missing[at] += weights[k] * point.missing;
+                if (kNormals) addTo(region.normals + 4 * at, weights[k], point.normal);
             }
         }
     });
@@ -87,7 +104,7 @@ HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const PointColour& point, 
 
 template <bool kUniform>
 void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
-                const Band& band) {
+                const Region& region) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -100,7 +117,7 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Splats p = splatsOf<kUniform, false>(d, s, t, map, i, pixel, count, band);
+            Splats p = splatsOf<kUniform, false>(d, s, t, map, i, pixel, count, region);
             if (!t.opaque) {
                 const auto solid = alphaAbove(d, s, pixel, count, 127);
                 p.small = hn::And(p.small, solid);
@@ -108,8 +125,8 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
             }
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge<false>(d, p, large, band, [&](int, const Ellipse& e) HWY_ATTR {
-                        depthEllipse(d, e, band);
+                    forLarge<false>(d, p, large, region, [&](int, const Ellipse& e) HWY_ATTR {
+                        depthEllipse(d, e, region);
                     });
             }
             std::uint32_t bits = bitsOf(d, p.small);
@@ -129,9 +146,9 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
             storePairs(d, core(fx2, gy2, hn::Add(z, zy)),
                        core(gx2, gy2, hn::Add(hn::Add(z, zx), zy)), below);
             forBits(bits, [&](int k) HWY_ATTR {
-                float* to = band.depth + offset[k];
+                float* to = region.depth + offset[k];
                 leastOfPair(to, above + 2 * k);
-                leastOfPair(to + band.stride, below + 2 * k);
+                leastOfPair(to + region.stride, below + 2 * k);
             });
         }
     }
@@ -153,13 +170,13 @@ HWY_INLINE bool canReadAround(const RectangleImages& s, std::size_t pixel, int c
 
 template <bool kUniform, bool kOpaque, bool kNormals>
 void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
-                 const Band& band) {
+                 const Region& region) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const VF one = hn::Set(d, 1.0f);
     const VF tolerance = hn::Set(d, 1.0f + t.tolerance);
-    const VI stride = hn::Set(di, band.stride), nextPixel = hn::Set(di, 1);
+    const VI stride = hn::Set(di, region.stride), nextPixel = hn::Set(di, 1);
     HWY_ALIGN std::int32_t offset[kBlock];
     HWY_ALIGN float w00[kBlock], w10[kBlock], w01[kBlock], w11[kBlock];
     HWY_ALIGN float fractionX[kBlock], fractionY[kBlock];
@@ -179,7 +196,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Splats p = splatsOf<kUniform, true>(d, s, t, map, i, pixel, count, band);
+            Splats p = splatsOf<kUniform, true>(d, s, t, map, i, pixel, count, region);
             if (!kOpaque) {
                 const auto any = alphaAbove(d, s, pixel, count, 0);
                 p.small = hn::And(p.small, any);
@@ -187,12 +204,12 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             }
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge<true>(d, p, large, band, [&](int k, const Ellipse& e) HWY_ATTR {
+                    forLarge<true>(d, p, large, region, [&](int k, const Ellipse& e) HWY_ATTR {
                         PointColour point = pointColourOf(s, pixel + k, kOpaque);
                         if (e.uAcross != 0 || e.vDown != 0)
                             addGradient(s, pixel + k, e.uAcross, e.vAcross, e.uDown, e.vDown,
                                         point);
-                        colourEllipse<kOpaque, kNormals>(d, e, point, t.tolerance, band);
+                        colourEllipse<kOpaque, kNormals>(d, e, point, t.tolerance, region);
                     });
             }
             if (hn::AllFalse(d, p.small)) continue;
@@ -201,7 +218,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             const VF zx = hn::Mul(p.at.z, p.slopeX), zy = hn::Mul(p.at.z, p.slopeY);
             const VF z = hn::NegMulAdd(fx, zx, hn::NegMulAdd(fy, zy, p.at.z));
             const auto weigh = [&](VF wx, VF wy, VF depth, VI at, VF& weight) HWY_ATTR {
-                const VF front = hn::GatherIndex(d, band.depth, at);
+                const VF front = hn::GatherIndex(d, region.depth, at);
                 const auto near = hn::And(p.small, hn::Le(depth, hn::Mul(front, tolerance)));
                 weight = hn::IfThenElseZero(near, hn::Mul(wx, wy));
                 return near;
@@ -230,8 +247,8 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
                 r.vDown = hn::IfThenElseZero(any, p.vDown);
                 r.offset = offset;
                 r.gradient = !kUniform || t.uAcross != 0 || t.vDown != 0;
-                addRowOfPoints(s, pixel, bits, r, band);
-                if (kNormals) addNormalsOfRow(s, pixel, bits, r, band);
+                addRowOfPoints(s, pixel, bits, r, region);
+                if (kNormals) addNormalsOfRow(s, pixel, bits, r, region);
                 continue;
             }
             hn::Store(r.w00, d, w00);
@@ -254,18 +271,19 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
                                       -fractionY[k], point.down);
                 const Four c01 = plus(c00, point.down);
                 const std::size_t at = static_cast<std::size_t>(offset[k]);
-                const std::size_t under = at + static_cast<std::size_t>(band.stride);
-                addToPair(band.colour + 4 * at, w00[k], c00, w10[k], plus(c00, point.across));
-                addToPair(band.colour + 4 * under, w01[k], c01, w11[k], plus(c01, point.across));
+                const std::size_t under = at + static_cast<std::size_t>(region.stride);
+                addToPair(region.colour + 4 * at, w00[k], c00, w10[k], plus(c00, point.across));
+                addToPair(region.colour + 4 * under, w01[k], c01, w11[k], plus(c01, point.across));
                 if (!kOpaque) {
-                    band.missing[at] += w00[k] * point.missing;
-                    band.missing[at + 1] += w10[k] * point.missing;
-                    band.missing[under] += w01[k] * point.missing;
-                    band.missing[under + 1] += w11[k] * point.missing;
+                    region.missing[at] += w00[k] * point.missing;
+                    region.missing[at + 1] += w10[k] * point.missing;
+                    region.missing[under] += w01[k] * point.missing;
+                    region.missing[under + 1] += w11[k] * point.missing;
                 }
                 if (kNormals) {
-                    addToPair(band.normals + 4 * at, w00[k], point.normal, w10[k], point.normal);
-                    addToPair(band.normals + 4 * under, w01[k], point.normal, w11[k], point.normal);
+                    addToPair(region.normals + 4 * at, w00[k], point.normal, w10[k], point.normal);
+                    addToPair(region.normals + 4 * under, w01[k], point.normal, w11[k],
+                              point.normal);
                 }
             });
         }
@@ -277,7 +295,7 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
 // Calls draw(pixel, splat) for each point of a block as a round splat.
 template <class F>
 HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Shape& shape,
-                         const Band& band, int alphaThreshold, const F& draw) {
+                         const Region& region, int alphaThreshold, const F& draw) {
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int u = t.u0; u < t.u1; ++u) {
@@ -291,14 +309,14 @@ HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Sha
                 h[k] = (map.a[k] + i * map.au[k]) * s.depth[pixel] + (map.b[k] + i * map.bu[k]);
             }
             if (!(h[2] > kNearest)) continue;
-            const float inverse = band.orthographic ? 1.0f : 1.0f / h[2];
+            const float inverse = region.orthographic ? 1.0f : 1.0f / h[2];
             const float radius =
                 std::min(std::max(0.5f, 0.5f * shape.coefficient * inverse), kLargest);
             const float q = kReach2 / (radius * radius);
             const float x = h[0] * inverse, y = h[1] * inverse;
             const DF d;
             const VF half = hn::Set(d, radius);
-            const Boxes box = boxesOf(d, hn::Set(d, x), hn::Set(d, y), half, half, band);
+            const Boxes box = boxesOf(d, hn::Set(d, x), hn::Set(d, y), half, half, region);
             if (hn::AllFalse(d, box.some)) continue;
             draw(pixel,
                  Ellipse{x, y, h[2], 0, 0, q, 0, q, kReach2, 1.0f, 0, 0, 0, 0, hn::GetLane(box.x0),
@@ -309,20 +327,20 @@ HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Sha
 
 // --- Points of one pixel ---------------------------------------------------------------------
 
-void pointsImpl(const RectangleImages& s, const BlockTask& t, const Band& band) {
+void pointsImpl(const RectangleImages& s, const BlockTask& t, const Region& region) {
     const DF d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     HWY_ALIGN std::int32_t offset[kBlock];
     HWY_ALIGN std::uint32_t depth[kBlock];
     const VF half = hn::Set(d, 0.5f);
-    const VI one = hn::Set(di, 1), stride = hn::Set(di, band.stride);
+    const VI one = hn::Set(di, 1), stride = hn::Set(di, region.stride);
     for (int v = t.v0; v < t.v1; ++v) {
         const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Projection p = project(d, map, i, loadDepth(d, s.depth + pixel, count), band);
+            Projection p = project(d, map, i, loadDepth(d, s.depth + pixel, count), region);
             if (!t.opaque) p.inside = hn::And(p.inside, alphaAbove(d, s, pixel, count, 0));
             std::uint32_t bits = bitsOf(d, p.inside);
             if (!bits) continue;
@@ -339,7 +357,7 @@ void pointsImpl(const RectangleImages& s, const BlockTask& t, const Band& band) 
                 const int k = __builtin_ctz(bits);
                 bits &= bits - 1;
                 const std::uint64_t key = (std::uint64_t{depth[k]} << 32) | (first + k);
-                std::uint64_t& to = band.points[offset[k]];
+                std::uint64_t& to = region.points[offset[k]];
                 to = key < to ? key : to;
             }
         }
@@ -347,46 +365,46 @@ void pointsImpl(const RectangleImages& s, const BlockTask& t, const Band& band) 
 }
 
 void depthImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead, const Shape& shape,
-               const Band& band) {
+               const Region& region) {
     const DF d;
     if (shape.coefficient > 0) {
-        forRound(s, t, shape, band, 127,
-                 [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, band); });
+        forRound(s, t, shape, region, 127,
+                 [&](std::size_t, const Ellipse& e) HWY_ATTR { depthEllipse(d, e, region); });
     } else if (t.uniform) {
-        depthBlock<true>(s, t, ahead, band);
+        depthBlock<true>(s, t, ahead, region);
     } else {
-        depthBlock<false>(s, t, ahead, band);
+        depthBlock<false>(s, t, ahead, region);
     }
 }
 
 template <bool kUniform>
 void colourOfBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
-                   const Band& band) {
+                   const Region& region) {
     if (t.opaque && !s.normals)
-        colourBlock<kUniform, true, false>(s, t, ahead, band);
+        colourBlock<kUniform, true, false>(s, t, ahead, region);
     else if (t.opaque)
-        colourBlock<kUniform, true, true>(s, t, ahead, band);
+        colourBlock<kUniform, true, true>(s, t, ahead, region);
     else if (!s.normals)
-        colourBlock<kUniform, false, false>(s, t, ahead, band);
+        colourBlock<kUniform, false, false>(s, t, ahead, region);
     else
-        colourBlock<kUniform, false, true>(s, t, ahead, band);
+        colourBlock<kUniform, false, true>(s, t, ahead, region);
 }
 
 void colourImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead,
-                const Shape& shape, const Band& band) {
+                const Shape& shape, const Region& region) {
     const DF d;
     if (shape.coefficient > 0) {
-        forRound(s, t, shape, band, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
+        forRound(s, t, shape, region, 0, [&](std::size_t pixel, const Ellipse& e) HWY_ATTR {
             const PointColour point = pointColourOf(s, pixel, t.opaque);
             if (s.normals)
-                colourEllipse<false, true>(d, e, point, t.tolerance, band);
+                colourEllipse<false, true>(d, e, point, t.tolerance, region);
             else
-                colourEllipse<false, false>(d, e, point, t.tolerance, band);
+                colourEllipse<false, false>(d, e, point, t.tolerance, region);
         });
     } else if (t.uniform) {
-        colourOfBlock<true>(s, t, ahead, band);
+        colourOfBlock<true>(s, t, ahead, region);
     } else {
-        colourOfBlock<false>(s, t, ahead, band);
+        colourOfBlock<false>(s, t, ahead, region);
     }
 }
 
@@ -401,15 +419,15 @@ HWY_EXPORT(colourImpl);
 HWY_EXPORT(pointsImpl);
 
 void drawDepth(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
-               const Shape& shape, const Band& band) {
-    HWY_DYNAMIC_DISPATCH(depthImpl)(source, task, ahead, shape, band);
+               const Shape& shape, const Region& region) {
+    HWY_DYNAMIC_DISPATCH(depthImpl)(source, task, ahead, shape, region);
 }
 void drawColour(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
-                const Shape& shape, const Band& band) {
-    HWY_DYNAMIC_DISPATCH(colourImpl)(source, task, ahead, shape, band);
+                const Shape& shape, const Region& region) {
+    HWY_DYNAMIC_DISPATCH(colourImpl)(source, task, ahead, shape, region);
 }
-void drawPoints(const RectangleImages& source, const BlockTask& task, const Band& band) {
-    HWY_DYNAMIC_DISPATCH(pointsImpl)(source, task, band);
+void drawPoints(const RectangleImages& source, const BlockTask& task, const Region& region) {
+    HWY_DYNAMIC_DISPATCH(pointsImpl)(source, task, region);
 }
 
 }  // namespace stx::splat

@@ -49,23 +49,29 @@ struct BlockTask {
     float density = 1;        ///< weight by the density of samples
     /// If uniform: half the source pixels that go by per output pixel, to continue colours with.
     float uAcross = 0, vAcross = 0, uDown = 0, vDown = 0;
-    float zMin = 0;     ///< nearest novel depth of its points
-    float nearest = 0;  ///< its splats show nowhere that something nearer than this covers
+    float zMin = 0;       ///< nearest novel depth of its points
+    float reach = 1e30f;  ///< its splats reach no farther from their points, pixels
+    float nearest = 0;    ///< its splats show nowhere that something nearer than this covers
     std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< output pixels it may touch, inclusive
 };
 
-/// The rows of the output that one thread owns, with a border of one pixel all around, which is
-/// thrown away. Element (x, y) of the output is number (y - top + 1) * stride + x + 1.
-struct Band {
+/// The part of the output that one thread owns, with a border of one pixel all around, which is
+/// thrown away.
+struct Region {
     /// Elements of each array: vectors read past the last row, and splats of up to 4x4 pixels read
     /// and write (what is there already) rows below the border.
     static constexpr std::size_t pixels(int rows, int stride) {
         return static_cast<std::size_t>(rows + 4) * static_cast<std::size_t>(stride) + 64;
     }
 
-    int width = 0;  ///< pixels of the output
-    int top = 0;    ///< first row
-    int rows = 0;
+    /// The element of pixel (x, y) of the output.
+    [[nodiscard]] std::size_t element(int x, int y) const {
+        return static_cast<std::size_t>(y - top + 1) * static_cast<std::size_t>(stride) +
+               static_cast<std::size_t>(x - left + 1);
+    }
+
+    int left = 0, top = 0;      ///< its first pixel in the output
+    int width = 0, rows = 0;    ///< pixels
     int stride = 0;             ///< width + 2
     bool orthographic = false;  ///< the novel camera
     float* depth = nullptr;     ///< nearest novel depth; infinity = nothing
@@ -91,11 +97,11 @@ struct Ahead {
 
 /// First pass: nearest depth.
 void drawDepth(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
-               const Shape& shape, const Band& band);
+               const Shape& shape, const Region& region);
 /// Second pass: sums of weighted colours (and normals) near the front.
 void drawColour(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
-                const Shape& shape, const Band& band);
+                const Shape& shape, const Region& region);
 /// SplatRule::point in one pass.
-void drawPoints(const RectangleImages& source, const BlockTask& task, const Band& band);
+void drawPoints(const RectangleImages& source, const BlockTask& task, const Region& region);
 
 }  // namespace stx::splat

@@ -1,4 +1,4 @@
-// Large splats of up to 4x4 pixels, which is what most are: all their pixels at once. Included by
+// Large splats in patches of up to 4x4 pixels: all pixels of a patch at once. Included by
 // kernels.cpp once for each SIMD target.
 
 #if defined(STX_SPLAT_PATCH_INL_HPP) == defined(HWY_TARGET_TOGGLE)
@@ -20,9 +20,9 @@ namespace stx::splat::HWY_NAMESPACE {
 #if HWY_TARGET == HWY_SCALAR
 
 constexpr bool kPatches = false;
-HWY_INLINE void depthPatch(const Ellipse&, const Band&) {}
+HWY_INLINE void depthPatch(const Ellipse&, const Region&) {}
 template <bool kOpaque, bool kNormals>
-HWY_INLINE void colourPatch(const Ellipse&, const PointColour&, float, const Band&) {}
+HWY_INLINE void colourPatch(const Ellipse&, const PointColour&, float, const Region&) {}
 
 #else
 
@@ -79,20 +79,20 @@ HWY_INLINE PatchRows patchRows(const Ellipse& e, int first) {
     return out;
 }
 
-HWY_INLINE std::size_t firstOf(const Ellipse& e, const Band& band) {
-    return static_cast<std::size_t>(e.y0 - band.top + 1) * band.stride + e.x0 + 1;
+HWY_INLINE std::size_t firstOf(const Ellipse& e, const Region& region) {
+    return region.element(e.x0, e.y0);
 }
 
-HWY_INLINE void depthPatch(const Ellipse& e, const Band& band) {
+HWY_INLINE void depthPatch(const Ellipse& e, const Region& region) {
     const DP d;
     const D4 d4;
     HWY_ALIGN float depth[kLanes];
-    float* to = band.depth + firstOf(e, band);
+    float* to = region.depth + firstOf(e, region);
     for (int first = 0; first < kPatch; first += kRowsOfLanes) {
         const PatchRows p = patchRows(e, first);
         const auto core = hn::And(p.in, hn::Le(p.q, hn::Set(d, e.core2)));
         hn::Store(hn::IfThenElse(core, p.z, hn::Set(d, kInfinity)), d, depth);
-        for (int row = 0; row < kRowsOfLanes; ++row, to += band.stride)
+        for (int row = 0; row < kRowsOfLanes; ++row, to += region.stride)
             hn::StoreU(hn::Min(hn::Load(d4, depth + kPatch * row), hn::LoadU(d4, to)), d4, to);
     }
 }
@@ -117,25 +117,27 @@ HWY_INLINE VP repeated(Four value) {
 
 template <bool kOpaque, bool kNormals>
 HWY_INLINE void colourPatch(const Ellipse& e, const PointColour& point, float tolerance,
-                            const Band& band) {
+                            const Region& region) {
     const DP d;
     const D4 d4;
     HWY_ALIGN float weights[kPatch * kPatch];
-    const std::size_t start = firstOf(e, band);
-    const std::ptrdiff_t stride = band.stride;
-    bool any = false;
+    const std::size_t start = firstOf(e, region);
+    const std::ptrdiff_t stride = region.stride;
+    std::uint32_t some = 0;  // a bit for each pixel
     for (int first = 0; first < kPatch; first += kRowsOfLanes) {
         const PatchRows p = patchRows(e, first);
-        const VP front = loadRows(band.depth + start + first * stride, stride);
+        const VP front = loadRows(region.depth + start + first * stride, stride);
         const auto near = hn::And(hn::And(p.in, hn::Lt(p.q, hn::Set(d, kReach2))),
                                   hn::Le(p.z, hn::Mul(front, hn::Set(d, 1.0f + tolerance))));
         // Falls off like a Gaussian and reaches zero at kReach2.
         const VP fall = hn::MulAdd(p.q, hn::Set(d, -1.0f / kReach2), hn::Set(d, 1.0f));
         const VP weight = hn::Mul(hn::Mul(fall, fall), hn::Mul(fall, hn::Set(d, e.quality)));
         hn::Store(hn::IfThenElseZero(near, weight), d, weights + kPatch * first);
-        any = any || !hn::AllFalse(d, near);
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(d, near, bits);
+        some |= (bits[0] | (std::uint32_t{bits[1]} << 8)) << (kPatch * first);
     }
-    if (!any) return;
+    if (!some) return;
     const hn::RebindToSigned<DP> di;
     const VP across = repeated(point.across), down = repeated(point.down);
     const VP dx = hn::Add(hn::ConvertTo(d, hn::ShiftRight<2>(hn::Iota(di, 0))),
@@ -144,17 +146,18 @@ HWY_INLINE void colourPatch(const Ellipse& e, const PointColour& point, float to
     const VP step = hn::Mul(across, hn::Set(d, static_cast<float>(kRowsOfLanes)));
     const VP zero = hn::Zero(d);
     VP colour = hn::MulAdd(dx, across, hn::MulAdd(dy, down, repeated(point.colour)));
-    for (int row = 0; row < kPatch; ++row, colour = hn::Add(colour, down)) {
+    for (int row = 0; row < kPatch; ++row, colour = hn::Add(colour, down), some >>= kPatch) {
+        if (!(some & ((1u << kPatch) - 1))) continue;
         const std::size_t at = start + static_cast<std::size_t>(row * stride);
         const float* w = weights + kPatch * row;
-        addRow(band.colour + 4 * at, w, colour, step);
+        addRow(region.colour + 4 * at, w, colour, step);
         if (!kOpaque && point.missing > 0) {
-            float* missing = band.missing + at;
+            float* missing = region.missing + at;
             hn::StoreU(
                 hn::MulAdd(hn::Load(d4, w), hn::Set(d4, point.missing), hn::LoadU(d4, missing)), d4,
                 missing);
         }
-        if (kNormals) addRow(band.normals + 4 * at, w, repeated(point.normal), zero);
+        if (kNormals) addRow(region.normals + 4 * at, w, repeated(point.normal), zero);
     }
 }
 

@@ -29,9 +29,9 @@ struct RowOfPoints {
 
 constexpr bool kWholeRows = false;
 HWY_INLINE void addRowOfPoints(const RectangleImages&, std::size_t, std::uint32_t,
-                               const RowOfPoints&, const Band&) {}
+                               const RowOfPoints&, const Region&) {}
 HWY_INLINE void addNormalsOfRow(const RectangleImages&, std::size_t, std::uint32_t,
-                                const RowOfPoints&, const Band&) {}
+                                const RowOfPoints&, const Region&) {}
 
 #else
 
@@ -73,7 +73,7 @@ HWY_INLINE void addPairs(float* sums, const std::int32_t* offset, VF left, VF ri
 
 // Adds those of the points whose `bits` are set, and zeros for others of their block.
 HWY_INLINE void addRowOfPoints(const RectangleImages& s, std::size_t pixel, std::uint32_t bits,
-                               const RowOfPoints& r, const Band& band) {
+                               const RowOfPoints& r, const Region& region) {
     const DF d;
     const DB db;
     const std::size_t row = static_cast<std::size_t>(s.stride);
@@ -81,7 +81,7 @@ HWY_INLINE void addRowOfPoints(const RectangleImages& s, std::size_t pixel, std:
     const VB here = hn::LoadU(db, at);
     const VB left = hn::LoadU(db, at - 4), right = hn::LoadU(db, at + 4);
     const VB above = hn::LoadU(db, at - 4 * row), below = hn::LoadU(db, at + 4 * row);
-    float* lower = band.colour + 4 * static_cast<std::ptrdiff_t>(band.stride);
+    float* lower = region.colour + 4 * static_cast<std::ptrdiff_t>(region.stride);
     // Points four apart do not share pixels, mostly: a load that meets parts of stores still under
     // way waits for them.
     const auto group = [&](auto number) HWY_ATTR {
@@ -100,7 +100,7 @@ HWY_INLINE void addRowOfPoints(const RectangleImages& s, std::size_t pixel, std:
             c00 = hn::NegMulAdd(fy, down, hn::NegMulAdd(fx, across, c00));
         }
         const VF c01 = hn::Add(c00, down);
-        addPairs<kPoint>(band.colour, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w00), c00),
+        addPairs<kPoint>(region.colour, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w00), c00),
                          hn::Mul(hn::Broadcast<kPoint>(r.w10), hn::Add(c00, across)));
         addPairs<kPoint>(lower, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w01), c01),
                          hn::Mul(hn::Broadcast<kPoint>(r.w11), hn::Add(c01, across)));
@@ -113,15 +113,15 @@ HWY_INLINE void addRowOfPoints(const RectangleImages& s, std::size_t pixel, std:
 
 // The same of their normals, which are the same all over a splat.
 HWY_INLINE void addNormalsOfRow(const RectangleImages& s, std::size_t pixel, std::uint32_t bits,
-                                const RowOfPoints& r, const Band& band) {
+                                const RowOfPoints& r, const Region& region) {
     const DF d;
     const VB here = hn::LoadU(DB(), reinterpret_cast<const std::uint8_t*>(s.normals) + 4 * pixel);
-    float* lower = band.normals + 4 * static_cast<std::ptrdiff_t>(band.stride);
+    float* lower = region.normals + 4 * static_cast<std::ptrdiff_t>(region.stride);
     const auto group = [&](auto number) HWY_ATTR {
         constexpr int kPoint = decltype(number)::value;
         if (!(bits & (0x1111u << kPoint))) return;
         const VF n = hn::ConvertTo(d, hn::ShiftRight<24>(hn::ShiftLeft<24>(valueOf<kPoint>(here))));
-        addPairs<kPoint>(band.normals, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w00), n),
+        addPairs<kPoint>(region.normals, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w00), n),
                          hn::Mul(hn::Broadcast<kPoint>(r.w10), n));
         addPairs<kPoint>(lower, r.offset, hn::Mul(hn::Broadcast<kPoint>(r.w01), n),
                          hn::Mul(hn::Broadcast<kPoint>(r.w11), n));

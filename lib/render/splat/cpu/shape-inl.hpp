@@ -58,14 +58,24 @@ HWY_INLINE void loadShape(DF d, const RectangleImages& s, std::size_t pixel, int
     }
 }
 
+// Whether the splats of some points may touch the region.
+HWY_INLINE bool reachesRegion(DF d, const Projection& at, float reach, const Region& region) {
+    const auto within = [&](VF v, int first, int count) HWY_ATTR {
+        return hn::And(hn::Ge(v, hn::Set(d, float(first) - reach)),
+                       hn::Le(v, hn::Set(d, float(first + count - 1) + reach)));
+    };
+    return !hn::AllFalse(d, hn::And(at.inFront, hn::And(within(at.x, region.left, region.width),
+                                                        within(at.y, region.top, region.rows))));
+}
+
 // kUniform: all points of the block are small and share its tilt. kColour: weights and the steps of
 // colours are wanted.
 template <bool kUniform, bool kColour>
 HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, const RowMap& map,
-                           int i, std::size_t pixel, int count, const Band& band) {
+                           int i, std::size_t pixel, int count, const Region& region) {
     Splats out;
     const VF depth = loadDepth(d, s.depth + pixel, count);
-    out.at = project(d, map, i, depth, band);
+    out.at = project(d, map, i, depth, region);
     const VF one = hn::Set(d, 1.0f);
     if (kUniform) {
         out.small = out.at.inside;
@@ -78,6 +88,10 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
         out.vAcross = hn::Set(d, t.vAcross);
         out.uDown = hn::Set(d, t.uDown);
         out.vDown = hn::Set(d, t.vDown);
+        return out;
+    }
+    if (!reachesRegion(d, out.at, t.reach, region)) {
+        out.small = out.large = hn::Lt(one, one);
         return out;
     }
     VF su, sv, size;
@@ -97,7 +111,7 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
     };
     const VF zu = hu(2), zv = hv(2);
     VF xu = hu(0), yu = hu(1), xv = hv(0), yv = hv(1);
-    if (!band.orthographic) {
+    if (!region.orthographic) {
         xu = hn::Mul(hn::NegMulAdd(out.at.x, zu, xu), out.at.inverse);
         yu = hn::Mul(hn::NegMulAdd(out.at.y, zu, yu), out.at.inverse);
         xv = hn::Mul(hn::NegMulAdd(out.at.x, zv, xv), out.at.inverse);
@@ -162,21 +176,23 @@ struct Ellipse {
     float core2;
     float quality;
     float uAcross, vAcross, uDown, vDown;
-    int x0, x1, y0, y1;  // the part of its box that lies in the band, inclusive
+    int x0, x1, y0, y1;  // the part of its box that lies in the region, inclusive
 };
 
-// The parts of boxes that lie in the band.
+// The parts of boxes that lie in the region.
 struct Boxes {
     VI x0, x1, y0, y1;
     hn::Mask<DF> some;
 };
 
-HWY_INLINE Boxes boxesOf(DF d, VF x, VF y, VF halfX, VF halfY, const Band& band) {
+HWY_INLINE Boxes boxesOf(DF d, VF x, VF y, VF halfX, VF halfY, const Region& region) {
     const DI di;
-    const VF left = hn::Ceil(hn::Max(hn::Sub(x, halfX), hn::Zero(d)));
-    const VF right = hn::Floor(hn::Min(hn::Add(x, halfX), hn::Set(d, band.width - 1.0f)));
-    const VF above = hn::Ceil(hn::Max(hn::Sub(y, halfY), hn::Set(d, float(band.top))));
-    const VF below = hn::Floor(hn::Min(hn::Add(y, halfY), hn::Set(d, band.top + band.rows - 1.0f)));
+    const VF left = hn::Ceil(hn::Max(hn::Sub(x, halfX), hn::Set(d, float(region.left))));
+    const VF right =
+        hn::Floor(hn::Min(hn::Add(x, halfX), hn::Set(d, region.left + region.width - 1.0f)));
+    const VF above = hn::Ceil(hn::Max(hn::Sub(y, halfY), hn::Set(d, float(region.top))));
+    const VF below =
+        hn::Floor(hn::Min(hn::Add(y, halfY), hn::Set(d, region.top + region.rows - 1.0f)));
     Boxes out;
     out.some = hn::And(hn::Le(left, right), hn::Le(above, below));
     // Coordinates outside of the picture may be beyond what an int holds.
@@ -189,8 +205,8 @@ HWY_INLINE Boxes boxesOf(DF d, VF x, VF y, VF halfX, VF halfY, const Band& band)
     return out;
 }
 
-// Large splats of so many pixels along a side are drawn as a patch.
-constexpr int kPatch = 4;
+// Large splats are drawn in patches of so many pixels along a side, up to so many of these.
+constexpr int kPatch = 4, kMostPatches = 4;
 
 // Calls draw(k) for each bit k, those four apart one after another: a load that meets parts of
 // stores still under way waits for them, and patches of neighbours share output pixels.
@@ -204,12 +220,12 @@ HWY_INLINE void forBitsApart(std::uint32_t bits, const F& draw) {
 
 // The large splats among some neighbouring pixels, one by one: draw(pixel, ellipse).
 template <bool kColour, class F>
-HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Band& band,
+HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Region& region,
                          const F& draw) {
     constexpr int kValues = 13;
     HWY_ALIGN float v[kValues][kBlock];
     HWY_ALIGN std::int32_t box[4][kBlock];
-    const Boxes boxes = boxesOf(d, p.at.x, p.at.y, p.halfX, p.halfY, band);
+    const Boxes boxes = boxesOf(d, p.at.x, p.at.y, p.halfX, p.halfY, region);
     bits &= bitsOf(d, boxes.some);
     if (!bits) return;
     const DI di;
@@ -235,7 +251,7 @@ HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Band& 
     });
 }
 
-// Calls row(first x, last x, y) for the part of the ellipse's box that lies in the band.
+// Calls row(first x, last x, y) for the part of the ellipse's box that lies in the region.
 template <class F>
 HWY_INLINE void forRows(const Ellipse& e, const F& row) {
     for (int y = e.y0; y <= e.y1; ++y) row(e.x0, e.x1, y);
