@@ -71,6 +71,8 @@ class Renderer {
     /// that frame while it reads back and finishes the one before. Only a hint: frames are the same
     /// without it.
     virtual void expect(const Camera& next) { (void)next; }
+    /// Takes a frame that is not needed any more; its memory may serve for the next one.
+    virtual void reuse(Frame&& frame) { (void)frame; }
     /// "cpu", "gpu" or "gl".
     [[nodiscard]] virtual std::string backend() const = 0;
     /// GL_RENDERER, or the processor's name and the SIMD target in use.

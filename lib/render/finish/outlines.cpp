@@ -105,8 +105,10 @@ OutlineDepths Outlines::depthsOf(const OutlineBlock& block) const {
     return {page.depth->data() + static_cast<std::size_t>(r.pageY) * stride + r.pageX, stride};
 }
 
-void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& covered) const {
+void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& covered,
+                       const Extent& asked) const {
     const int w = frame.depth.width(), h = frame.depth.height();
+    const Extent part = asked.grown(0, w, h);
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     static_assert(kBandRows % kTile == 0);
     Image<std::uint8_t> tiles(tilesX, tilesY);
@@ -116,8 +118,10 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         band.top = static_cast<int>(n) * kBandRows;
         band.rows = std::min(kBandRows, h - band.top);
         band.width = w;
-        for (int y = band.top; y < band.top + band.rows; ++y) {
-            const auto prepare = [&](int x) {
+        const int last = std::min(part.y1, band.top + band.rows);
+        for (int y = std::max(part.y0, band.top); y < last; ++y) {
+            const auto prepare = [&](int column) {
+                const int x = part.x0 + column;
                 float nx = 0, ny = 0, all = 0;
                 for (int j = -kAround; j <= kAround; ++j) {
                     for (int i = -kAround; i <= kAround; ++i) {
@@ -143,7 +147,9 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
                 tiles.at(x / kTile, y / kTile) = 1;
             };
             forWhere(
-                covered.row(y), [](float c) { return c == kAsked; }, prepare);
+                covered.row(y).subspan(static_cast<std::size_t>(part.x0),
+                                       static_cast<std::size_t>(part.x1 - part.x0)),
+                [](float c) { return c == kAsked; }, prepare);
         }
     });
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "lib/render/finish/extent.hpp"
 #include "lib/render/finish/outline_points.hpp"
 #include "lib/render/frame.hpp"
 #include "lib/render/scene/page_set.hpp"
@@ -43,8 +44,9 @@ class Outlines {
     /// Replaces those values of `covered` that are kAsked by the share of the pixel's area that is
     /// covered, 0..1, where so many points lie around it that their outermost tell. `covered` has
     /// the frame's size; pixels that are asked for must be near the background, which is where
-    /// `frame` has no depth. The same on any number of threads.
-    void measure(const Frame& frame, const Camera& camera, Image<float>& covered) const;
+    /// `frame` has no depth, and lie in `part`. The same on any number of threads.
+    void measure(const Frame& frame, const Camera& camera, Image<float>& covered,
+                 const Extent& part = {}) const;
 
   private:
     struct Band;

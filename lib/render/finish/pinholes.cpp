@@ -27,7 +27,7 @@ bool isSpeck(const Frame& frame, int x, int y) {
 }
 
 /// Closes pixels of whose eight neighbours at least `enclosing` have a depth, and specks.
-void closeEnclosed(Frame& frame, int enclosing) {
+void closeEnclosed(Frame& frame, int enclosing, const Extent& part) {
     struct Closed {
         int x = 0, y = 0;
         glm::vec4 colour{0.0f}, albedo{0.0f};
@@ -36,7 +36,7 @@ void closeEnclosed(Frame& frame, int enclosing) {
     };
     constexpr int kRowsPerTask = 32;
     const int width = frame.depth.width(), height = frame.depth.height();
-    const int tasks = (height + kRowsPerTask - 1) / kRowsPerTask;
+    const int tasks = (part.y1 - part.y0 + kRowsPerTask - 1) / kRowsPerTask;
     std::vector<std::vector<Closed>> closed(tasks);
     const auto find = [&](int x, int y, std::vector<Closed>& out) {
         int covered = 0;
@@ -72,11 +72,12 @@ void closeEnclosed(Frame& frame, int enclosing) {
         out.push_back(c);
     };
     parallelFor(0, tasks, [&](std::int64_t t) {
-        const int from = std::max(1, static_cast<int>(t) * kRowsPerTask);
-        const int to = std::min(height - 1, (static_cast<int>(t) + 1) * kRowsPerTask);
+        const int first = part.y0 + static_cast<int>(t) * kRowsPerTask;
+        const int from = std::max(1, first);
+        const int to = std::min({height - 1, part.y1, first + kRowsPerTask});
         for (int y = from; y < to; ++y) {
             const auto row = frame.depth.row(y);
-            for (int x = 1; x + 1 < width; ++x) {
+            for (int x = std::max(1, part.x0); x < std::min(width - 1, part.x1); ++x) {
                 if (hasPoint(row[x]) ? isSpeck(frame, x, y)
                                      : hasPoint(row[x - 1]) || hasPoint(row[x + 1]))
                     find(x, y, closed[t]);
@@ -97,10 +98,13 @@ void closeEnclosed(Frame& frame, int enclosing) {
 
 }  // namespace
 
-void closePinholes(Frame& frame, bool pruned) {
-    closeEnclosed(frame, kEnclosing);
+void closePinholes(Frame& frame, bool pruned, const Extent& drawn) {
+    // What closes lies among what was drawn.
+    const Extent part = drawn.grown(1, frame.depth.width(), frame.depth.height());
+    closeEnclosed(frame, kEnclosing, part);
     if (!pruned) return;
-    for (int round = 0; round < kRoundsPruned; ++round) closeEnclosed(frame, kEnclosingPruned);
+    for (int round = 0; round < kRoundsPruned; ++round)
+        closeEnclosed(frame, kEnclosingPruned, part);
 }
 
 }  // namespace stx

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "lib/render/finish/extent.hpp"
 #include "lib/render/frame.hpp"
 
 namespace stx {
@@ -13,7 +14,7 @@ namespace stx {
 /// `pruned`: the views were pruned. Then each piece of surface has the samples of one view only,
 /// which leave open slits a pixel or two wide where the others would have helped out: those close,
 /// too (five neighbours are enough, twice). Where that fills the corner of a silhouette,
-/// Silhouettes takes it away again.
-void closePinholes(Frame& frame, bool pruned);
+/// Silhouettes takes it away again. All that was drawn lies in `drawn`.
+void closePinholes(Frame& frame, bool pruned, const Extent& drawn = {});
 
 }  // namespace stx

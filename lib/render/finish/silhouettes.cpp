@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/splat/plan.hpp"
@@ -47,21 +48,14 @@ Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
     return alpha;
 }
 
-/// 1 where some pixel of the row lies within kReach of an empty one, in the row. `empty` holds
-/// kReach elements more on either side. Without branches, so that compilers make vectors of it.
-bool markRow(const Image<float>& depth, int y, std::uint8_t* empty, std::uint8_t* near) {
-    const float* row = depth.row(y).data();
-    const int w = depth.width();
-    unsigned any = 0;
-    for (int x = 0; x < w; ++x) {
-        const std::uint8_t e = hasPoint(row[x]) ? 0 : 1;
-        empty[kReach + x] = e;
-        any |= e;
-    }
+/// 1 where one of the `count` pixels of a row lies within kReach of an empty one, in the row.
+/// `empty` holds kReach elements more on either side, which are 0. Without branches, so that
+/// compilers make vectors of it.
+void markRow(const float* depth, int count, std::uint8_t* empty, std::uint8_t* near) {
+    for (int x = 0; x < count; ++x) empty[kReach + x] = hasPoint(depth[x]) ? 0 : 1;
     static_assert(kReach == 2);
-    for (int x = 0; x < w; ++x)
+    for (int x = 0; x < count; ++x)
         near[x] = empty[x] | empty[x + 1] | empty[x + 2] | empty[x + 3] | empty[x + 4];
-    return any;
 }
 
 }  // namespace
@@ -181,61 +175,73 @@ float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y
     return 1.0f - static_cast<float>(std::popcount(free)) / (kSamples * kSamples);
 }
 
-void Silhouettes::carve(Frame& frame, const Camera& camera) const {
+void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn) {
     if (none()) return;
     constexpr int kRowsPerTask = 16;
     const int w = frame.depth.width(), h = frame.depth.height();
+    // Whatever is not empty in it has what is near in it, too.
+    const Extent part = drawn.grown(kReach, w, h);
+    const int across = part.x1 - part.x0,
+              tasks = (part.y1 - part.y0 + kRowsPerTask - 1) / kRowsPerTask;
     Maps maps;
     for (const View& view : views_) maps.push_back(splat::pixelMap(camera, view.camera));
     // Whether a pixel is looked at depends on depths that carving changes: look first, carve then.
-    Image<float> covered(w, h, -1.0f);
-    parallelFor(0, (h + kRowsPerTask - 1) / kRowsPerTask, [&](std::int64_t task) {
-        const int from = static_cast<int>(task) * kRowsPerTask,
-                  to = std::min(h, from + kRowsPerTask);
-        const int first = std::max(0, from - kReach), last = std::min(h - 1, to - 1 + kReach);
-        Image<std::uint8_t> rowMarks(w, last - first + 1);
-        std::vector<std::uint8_t> empty(static_cast<std::size_t>(w) + 2 * kReach), mark(w);
-        std::vector<std::uint8_t> any(static_cast<std::size_t>(last - first + 1));
+    if (covered_.size() != frame.depth.size()) covered_ = Image<float>(w, h, -1.0f);
+    const auto partOf = [&](int y) {
+        return covered_.row(y).subspan(static_cast<std::size_t>(part.x0),
+                                       static_cast<std::size_t>(across));
+    };
+    const auto inRows = [&](const auto& call) {
+        parallelFor(0, tasks, [&](std::int64_t task) {
+            const int from = part.y0 + static_cast<int>(task) * kRowsPerTask;
+            call(from, std::min(part.y1, from + kRowsPerTask));
+        });
+    };
+    inRows([&](int from, int to) {
+        const int first = std::max(part.y0, from - kReach),
+                  last = std::min(part.y1 - 1, to - 1 + kReach);
+        Image<std::uint8_t> rowMarks(across, last - first + 1);
+        std::vector<std::uint8_t> empty(static_cast<std::size_t>(across) + 2 * kReach);
+        std::vector<std::uint8_t> mark(static_cast<std::size_t>(across));
         for (int y = first; y <= last; ++y)
-            any[y - first] = markRow(frame.depth, y, empty.data(), rowMarks.row(y - first).data());
+            markRow(frame.depth.row(y).data() + part.x0, across, empty.data(),
+                    rowMarks.row(y - first).data());
         for (int y = from; y < to; ++y) {
             std::fill(mark.begin(), mark.end(), std::uint8_t{0});
-            bool some = false;
-            for (int j = std::max(0, y - kReach); j <= std::min(h - 1, y + kReach); ++j) {
-                if (!any[j - first]) continue;
-                some = true;
+            for (int j = std::max(first, y - kReach); j <= std::min(last, y + kReach); ++j) {
                 const std::uint8_t* rowMark = rowMarks.row(j - first).data();
-                for (int x = 0; x < w; ++x) mark[x] |= rowMark[x];
+                for (int x = 0; x < across; ++x) mark[x] |= rowMark[x];
             }
-            if (!some) continue;
-            const float* depth = frame.depth.row(y).data();
-            float* asked = covered.row(y).data();
-            for (int x = 0; x < w; ++x)
+            const float* depth = frame.depth.row(y).data() + part.x0;
+            float* asked = partOf(y).data();
+            for (int x = 0; x < across; ++x)
                 asked[x] = (mark[x] != 0) & hasPoint(depth[x]) ? Outlines::kAsked : -1.0f;
         }
     });
-    outlines_->measure(frame, camera, covered);
-    parallelForBlocks(0, h, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y)
+    outlines_->measure(frame, camera, covered_, part);
+    inRows([&](int from, int to) {
+        for (int y = from; y < to; ++y)
             forWhere(
-                covered.row(y), [](float c) { return c == Outlines::kAsked; },
-                [&](int x) {
-                    covered.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y));
+                partOf(y), [](float c) { return c == Outlines::kAsked; },
+                [&](int column) {
+                    const int x = part.x0 + column;
+                    covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y));
                 });
     });
-    parallelFor(0, h, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
-        const auto set = [&](int x) {
-            const float share = covered.at(x, y);
-            const auto scaled = [share](glm::vec4 c) { return c.w > 0.0f ? c * (share / c.w) : c; };
-            frame.colour.at(x, y) = scaled(frame.colour.at(x, y));
-            if (!frame.albedo.empty()) frame.albedo.at(x, y) = scaled(frame.albedo.at(x, y));
-            if (share > 0.0f) return;
-            frame.depth.at(x, y) = kNoDepth;
-            if (!frame.normal.empty()) frame.normal.at(x, y) = glm::vec3(0.0f);
-        };
-        forWhere(
-            covered.row(y), [](float c) { return c >= 0.0f; }, set);
+    const auto set = [&](int x, int y) {
+        const float share = std::exchange(covered_.at(x, y), -1.0f);
+        const auto scaled = [share](glm::vec4 c) { return c.w > 0.0f ? c * (share / c.w) : c; };
+        frame.colour.at(x, y) = scaled(frame.colour.at(x, y));
+        if (!frame.albedo.empty()) frame.albedo.at(x, y) = scaled(frame.albedo.at(x, y));
+        if (share > 0.0f) return;
+        frame.depth.at(x, y) = kNoDepth;
+        if (!frame.normal.empty()) frame.normal.at(x, y) = glm::vec3(0.0f);
+    };
+    inRows([&](int from, int to) {
+        for (int y = from; y < to; ++y)
+            forWhere(
+                partOf(y), [](float c) { return c >= 0.0f; },
+                [&](int column) { set(part.x0 + column, y); });
     });
 }
 

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "lib/render/finish/extent.hpp"
 #include "lib/render/finish/outlines.hpp"
 #include "lib/render/frame.hpp"
 #include "lib/render/scene/page_set.hpp"
@@ -23,8 +24,9 @@ class Silhouettes {
     /// Nothing to do for these views.
     [[nodiscard]] bool none() const { return views_.empty(); }
     /// Sets alpha, premultiplied colour and albedo of the pixels within two pixels of the
-    /// background; what is left with no coverage gets empty. The same on any number of threads.
-    void carve(Frame& frame, const Camera& camera) const;
+    /// background; what is left with no coverage gets empty. All that was drawn lies in `drawn`.
+    /// The same on any number of threads.
+    void carve(Frame& frame, const Camera& camera, const Extent& drawn = {});
 
   private:
     enum class Around : std::uint8_t { mixed, full, empty };
@@ -47,6 +49,8 @@ class Silhouettes {
     PageSet set_;
     std::optional<Outlines> outlines_;  ///< where some view has a vote
     std::vector<View> views_;
+    /// Of the frame that is carved; between frames -1 all over.
+    Image<float> covered_;
 };
 
 }  // namespace stx

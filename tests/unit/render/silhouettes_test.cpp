@@ -79,7 +79,7 @@ TEST(Silhouettes, FatEdgesGetTheCoverageThatTheReferenceSaw) {
 TEST(Silhouettes, FullScenesAreLeftAlone) {
     auto bundle = discBundle();
     for (auto& p : bundle.views[0].texture.rgba8()->pixels()) p.w = 255;
-    const Silhouettes silhouettes(bundle);
+    Silhouettes silhouettes(bundle);
     EXPECT_TRUE(silhouettes.none());
     auto frame = fatFrame(bundle.views[0].camera);
     const auto before = frame.colour;

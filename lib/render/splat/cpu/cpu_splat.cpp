@@ -52,6 +52,7 @@ class CpuSplatRenderer final : public Renderer {
     }
 
     Result<Frame> render(const Camera& camera) override;
+    void reuse(Frame&& frame) override { spare_ = std::move(frame); }
     std::string backend() const override { return "cpu"; }
     std::string device() const override { return cpuDeviceName(); }
 
@@ -79,6 +80,8 @@ class CpuSplatRenderer final : public Renderer {
     Silhouettes silhouettes_;
     bool opaque_ = true;
     std::size_t blockCount_ = 0;
+
+    Frame spare_;  // memory for the next frame
 
     // Of the frame being drawn.
     std::vector<RectangleImages> sources_;
@@ -158,17 +161,21 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     STX_CHECK(limits_.checkAllocation(pixels, wantNormals_ ? 48 : 20, "the frame"));
     const auto start = std::chrono::steady_clock::now();
     Picture picture{camera, lightsInWorld(settings_.lighting, camera.worldFromCamera()), {}, {}, 0};
-    picture.frame.linear = set_.linear();
     parallelFor(0, 2, [&](std::int64_t part) {
         if (part == 0) {
             planFrame(camera);
         } else {
-            picture.frame.colour = Image<glm::vec4>(camera.width, camera.height);
-            picture.frame.depth = Image<float>(camera.width, camera.height);
-            if (wantNormals_) {
-                picture.frame.albedo = Image<glm::vec4>(camera.width, camera.height);
-                picture.frame.normal = Image<glm::vec3>(camera.width, camera.height);
-            }
+            picture.frame = std::move(spare_);
+            spare_ = {};
+            const auto sized = [&](auto& image, bool wanted) {
+                if (!wanted || image.size() != glm::ivec2(camera.width, camera.height))
+                    image = {wanted ? camera.width : 0, wanted ? camera.height : 0};
+            };
+            sized(picture.frame.colour, true);
+            sized(picture.frame.depth, true);
+            sized(picture.frame.albedo, wantNormals_);
+            sized(picture.frame.normal, wantNormals_);
+            picture.frame.linear = set_.linear();
         }
     });
     if (settings_.splat == SplatRule::paper)
@@ -179,8 +186,11 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     const int regions = picture.across * ((camera.height + kRegionRows - 1) / kRegionRows);
     bins_.resize(static_cast<std::size_t>(regions));
     for (auto& b : bins_) b.clear();
+    Extent drawn{camera.width, camera.height, 0, 0};
     for (const std::uint32_t i : byColumn(camera.width)) {
         const BlockTask& task = tasks_[i];
+        drawn = {std::min(drawn.x0, task.x0), std::min(drawn.y0, task.y0),
+                 std::max(drawn.x1, task.x1 + 1), std::max(drawn.y1, task.y1 + 1)};
         int x0 = task.x0, x1 = task.x1, y0 = task.y0, y1 = task.y1;
         if (picture.shape.coefficient > 0) {
             // Round splats may be larger than the plan, which follows the data.
@@ -198,8 +208,8 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     }
     parallelFor(0, regions, [&](std::int64_t n) { drawRegion(picture, static_cast<int>(n)); });
     if (settings_.splat == SplatRule::data) {
-        closePinholes(picture.frame, set_.pruned());
-        silhouettes_.carve(picture.frame, camera);
+        closePinholes(picture.frame, set_.pruned(), drawn);
+        silhouettes_.carve(picture.frame, camera, drawn);
     }
     picture.frame.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -247,8 +257,15 @@ void CpuSplatRenderer::drawRegion(Picture& picture, int index) {
     const auto& bin = bins_[static_cast<std::size_t>(index)];
     if (bin.empty()) {
         for (int y = region.top; y < region.top + region.rows; ++y) {
-            float* depth = picture.frame.depth.row(y).data() + region.left;
-            std::fill(depth, depth + region.width, kNoDepth);
+            const auto fill = [&](auto& image, auto value) {
+                if (image.empty()) return;
+                auto* row = image.row(y).data() + region.left;
+                std::fill(row, row + region.width, value);
+            };
+            fill(picture.frame.depth, kNoDepth);
+            fill(picture.frame.colour, glm::vec4(0.0f));
+            fill(picture.frame.albedo, glm::vec4(0.0f));
+            fill(picture.frame.normal, glm::vec3(0.0f));
         }
         return;
     }
@@ -363,6 +380,11 @@ void CpuSplatRenderer::resolvePoints(Picture& picture, const Region& region) con
             const std::uint64_t key = keys[column];
             if (key == ~std::uint64_t{0}) {
                 frame.depth.at(x, y) = kNoDepth;
+                frame.colour.at(x, y) = glm::vec4(0.0f);
+                if (wantNormals_) {
+                    frame.albedo.at(x, y) = glm::vec4(0.0f);
+                    frame.normal.at(x, y) = glm::vec3(0.0f);
+                }
                 continue;
             }
             const auto bits = static_cast<std::uint32_t>(key >> 32);

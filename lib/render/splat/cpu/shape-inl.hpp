@@ -162,7 +162,8 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
         out.qxx = hn::Mul(vyy, scale);
         out.qyy = hn::Mul(vxx, scale);
         out.qxy = hn::Neg(hn::Mul(vxy, scale));
-        const VF reach = hn::Set(d, kReach2), largest = hn::Set(d, kLargest);
+        // In the first pass only what hides is drawn.
+        const VF reach = hn::Set(d, kColour ? kReach2 : kCore2), largest = hn::Set(d, kLargest);
         out.halfX = hn::Min(hn::Sqrt(hn::Mul(reach, vxx)), largest);
         out.halfY = hn::Min(hn::Sqrt(hn::Mul(reach, vyy)), largest);
     }
