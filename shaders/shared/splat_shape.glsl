@@ -130,6 +130,6 @@ bool ownSplat(Point p, int codeU, int codeV, float size, bool allSmall, OUT(Spla
     // vxx vyy - vxy vxy without cancellation.
     float determinant = k * k * det * det + kSigmaPixel2 * (vxx + vyy - kSigmaPixel2);
     s.q = vec3(vyy / determinant, -2.0f * vxy / determinant, vxx / determinant);
-    s.reach = min(vec2(sqrt(kReach2 * vxx), sqrt(kReach2 * vyy)), vec2(kLargest));
+    s.reach = min(vec2(sqrt(kDrawn2 * vxx), sqrt(kDrawn2 * vyy)), vec2(kLargest));
     return true;
 }

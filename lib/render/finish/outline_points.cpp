@@ -59,6 +59,7 @@ void addPointsImpl(const OutlineBlock& block, const OutlineDepths& depths, const
     const int lanes = static_cast<int>(hn::Lanes(d));
     HWY_ALIGN float px[kOutlineBlock], py[kOutlineBlock];
     HWY_ALIGN std::int32_t column[kOutlineBlock], row[kOutlineBlock];
+    HWY_ALIGN std::int32_t place[kOutlineBlock], beside[kOutlineBlock];
     const auto set = [&](float v) HWY_ATTR { return hn::Set(d, v); };
     const auto width = static_cast<float>(rows.width), height = static_cast<float>(rows.rows);
     const int count = block.u1 - block.u0;
@@ -88,22 +89,33 @@ void addPointsImpl(const OutlineBlock& block, const OutlineDepths& depths, const
                 hn::And(hn::And(hn::Gt(along, hn::Zero(d)),
                                 hn::And(hn::Ge(x, set(-0.5f)), hn::Lt(x, set(width - 0.5f)))),
                         hn::And(hn::Ge(y, set(-1.5f)), hn::Lt(y, set(height + 0.5f))));
-            std::uint32_t points = splat::HWY_NAMESPACE::bitsOf(d, inside) & (solid >> i);
-            if (!points) continue;
+            if (hn::AllFalse(d, inside)) continue;
             // From the upper left corner of the border.
             const auto whole = [&](auto value) HWY_ATTR {
                 return hn::ConvertTo(di, hn::IfThenElseZero(inside, hn::Add(value, set(1.5f))));
             };
+            const auto toX = whole(x), toY = whole(y);
+            const auto at = hn::Add(hn::Mul(toY, hn::Set(di, rows.stride)), toX);
+            // Most points are beside nothing that is asked for. Gathers read four bytes each.
+            const auto near =
+                hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(rows.near), at),
+                        hn::Set(di, 0xff));
+            const auto asking = hn::RebindMask(d, hn::Gt(near, hn::Zero(di)));
+            std::uint32_t points =
+                splat::HWY_NAMESPACE::bitsOf(d, hn::And(inside, asking)) & (solid >> i);
+            if (!points) continue;
             hn::Store(x, d, px);
             hn::Store(y, d, py);
-            hn::Store(whole(x), di, column);
-            hn::Store(whole(y), di, row);
+            hn::Store(toX, di, column);
+            hn::Store(toY, di, row);
+            hn::Store(at, di, place);
+            hn::Store(near, di, beside);
             for (; points; points &= points - 1) {
                 const int k = __builtin_ctz(points);
-                const int at = row[k] * rows.stride + column[k];
-                for (std::uint32_t asked = rows.near[at]; asked; asked &= asked - 1) {
+                for (auto asked = static_cast<std::uint32_t>(beside[k]); asked;
+                     asked &= asked - 1) {
                     const int below = __builtin_ctz(asked) - 1;
-                    addToRow(rows, static_cast<std::size_t>(at + below * rows.stride - 1),
+                    addToRow(rows, static_cast<std::size_t>(place[k] + below * rows.stride - 1),
                              px[k] - static_cast<float>(column[k] - 2),
                              py[k] - static_cast<float>(row[k] + below - 1));
                 }

@@ -31,6 +31,7 @@ struct OutlineDepths {
 struct OutlineRows {
     int width = 0, rows = 0, top = 0, stride = 0;
     /// What is asked for next to a pixel and there: bit 0 in the row above, 1 in its row, 2 below.
+    /// Three bytes after the last may be read.
     const std::uint8_t* near = nullptr;
     const float* outX = nullptr;  ///< out of the object, length 1; NaN where not asked for
     const float* outY = nullptr;

@@ -52,7 +52,7 @@ struct Outlines::Band {
         constexpr float kFar = std::numeric_limits<float>::infinity();
         constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
         const int w = width + 4, h = rows + 2;
-        near = Image<std::uint8_t>(w, h);
+        near = Image<std::uint8_t>(w, h + 1);  // four bytes are read at once
         outX = Image<float>(w, h, kNone);
         outY = Image<float>(w, h, kNone);
         high = Image<float>(w, h, -kFar);

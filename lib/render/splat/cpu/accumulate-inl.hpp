@@ -29,18 +29,35 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // A row of a block: H = (a + i au) z + (b + i bu) for its i-th pixel.
 struct RowMap {
     float a[3], au[3], av[3], b[3], bu[3], bv[3];
-    RowMap(const PixelMap& m, int u, int v) {
-        const glm::dvec3 rowA = m.a0 + m.au * double(u) + m.av * double(v);
-        const glm::dvec3 rowB = m.b0 + m.bu * double(u) + m.bv * double(v);
+    RowMap(const PixelMap& m, int u, int v)
+        : map_(m),
+          a_(m.a0 + m.au * double(u) + m.av * double(v)),
+          b_(m.b0 + m.bu * double(u) + m.bv * double(v)) {
         for (int k = 0; k < 3; ++k) {
-            a[k] = static_cast<float>(rowA[k]);
             au[k] = static_cast<float>(m.au[k]);
             av[k] = static_cast<float>(m.av[k]);
-            bv[k] = static_cast<float>(m.bv[k]);
-            b[k] = static_cast<float>(rowB[k]);
             bu[k] = static_cast<float>(m.bu[k]);
+            bv[k] = static_cast<float>(m.bv[k]);
+        }
+        round();
+    }
+    // Goes on to the row below.
+    void next() {
+        a_ += map_.av;
+        b_ += map_.bv;
+        round();
+    }
+
+  private:
+    void round() {
+        for (int k = 0; k < 3; ++k) {
+            a[k] = static_cast<float>(a_[k]);
+            b[k] = static_cast<float>(b_[k]);
         }
     }
+
+    const PixelMap& map_;
+    glm::dvec3 a_, b_;
 };
 
 // Depths of `count` pixels, infinity after them.

@@ -111,9 +111,9 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
     const VF one = hn::Set(d, 1.0f), infinity = hn::Set(d, kInfinity);
     HWY_ALIGN std::int32_t offset[kBlock];
     HWY_ALIGN float above[2 * kBlock], below[2 * kBlock];
-    for (int v = t.v0; v < t.v1; ++v) {
+    RowMap map(s.map, t.u0, t.v0);
+    for (int v = t.v0; v < t.v1; ++v, map.next()) {
         fetchRow(ahead, v - t.v0, false);
-        const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
@@ -190,9 +190,9 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
             vDown[i] = t.vDown;
         }
     }
-    for (int v = t.v0; v < t.v1; ++v) {
+    RowMap map(s.map, t.u0, t.v0);
+    for (int v = t.v0; v < t.v1; ++v, map.next()) {
         fetchRow(ahead, v - t.v0, true);
-        const RowMap map(s.map, t.u0, v);
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;

@@ -163,7 +163,7 @@ HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, c
         out.qyy = hn::Mul(vxx, scale);
         out.qxy = hn::Neg(hn::Mul(vxy, scale));
         // In the first pass only what hides is drawn.
-        const VF reach = hn::Set(d, kColour ? kReach2 : kCore2), largest = hn::Set(d, kLargest);
+        const VF reach = hn::Set(d, kColour ? kDrawn2 : kCore2), largest = hn::Set(d, kLargest);
         out.halfX = hn::Min(hn::Sqrt(hn::Mul(reach, vxx)), largest);
         out.halfY = hn::Min(hn::Sqrt(hn::Mul(reach, vyy)), largest);
     }
