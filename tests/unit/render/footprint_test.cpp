@@ -95,6 +95,13 @@ TEST(Footprint, AveragesWhatIsThere) {
     // A quarter covered: colour fades, and there is no depth to speak of.
     EXPECT_EQ(small.colour.at(1, 0).a, 0.25f);
     EXPECT_FALSE(hasPoint(small.depth.at(1, 0)));
+
+    // The same of colour and depth alone, which has a loop of its own.
+    large.albedo = {};
+    large.normal = {};
+    const Frame plain = minified(large, 2);
+    EXPECT_TRUE(plain.colour == small.colour && plain.depth == small.depth);
+    EXPECT_TRUE(plain.albedo.empty() && plain.normal.empty());
 }
 
 }  // namespace

@@ -76,6 +76,26 @@ TEST(Silhouettes, FatEdgesGetTheCoverageThatTheReferenceSaw) {
     EXPECT_EQ(frame.colour.at(kSize / 2, kSize / 2).w, 1.0f);
 }
 
+TEST(Silhouettes, AreThoseOfWhatWasDrawn) {
+    const auto bundle = discBundle();
+    const auto& camera = bundle.views[0].camera;
+    auto whole = fatFrame(camera);
+    Extent drawn{kSize, kSize, 0, 0};
+    for (int y = 0; y < kSize; ++y)
+        for (int x = 0; x < kSize; ++x)
+            if (hasPoint(whole.depth.at(x, y)))
+                drawn = {std::min(drawn.x0, x), std::min(drawn.y0, y), std::max(drawn.x1, x + 1),
+                         std::max(drawn.y1, y + 1)};
+    auto part = whole, again = whole;
+    Silhouettes silhouettes(bundle);
+    silhouettes.carve(whole, camera);
+    silhouettes.carve(part, camera, drawn);
+    silhouettes.carve(again, camera);
+    EXPECT_FALSE(whole.colour == fatFrame(camera).colour);
+    EXPECT_TRUE(part.colour == whole.colour && part.depth == whole.depth);
+    EXPECT_TRUE(again.colour == whole.colour && again.depth == whole.depth);
+}
+
 TEST(Silhouettes, FullScenesAreLeftAlone) {
     auto bundle = discBundle();
     for (auto& p : bundle.views[0].texture.rgba8()->pixels()) p.w = 255;

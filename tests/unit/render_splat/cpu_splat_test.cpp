@@ -211,6 +211,60 @@ TEST(CpuSplat, ThreadsDoNotChangeAByte) {
     }
 }
 
+// Pictures are drawn in parts, splats as several patches: where those end must not show.
+TEST(CpuSplat, WhatIsDrawnAtOnceDoesNotShow) {
+    Bundle bundle;
+    bundle.views.push_back(
+        planeView(cameraAt({0, 0, 0}, {0, 0, -1}, 128, 0.9), 2.0, 0.7, [](int x, int y) {
+            return glm::u8vec4(x * 2, y * 2, (x * 7 + y * 3) % 256, x < 64 ? 255 : 200);
+        }));
+    Camera whole = cameraAt({0.3, 0.2, 0.9}, {0, 0, -2}, 600, 1.2);
+    whole = whole.resized(620, 300);
+    Camera moved = whole;
+    constexpr int kX = 101, kY = 53;
+    moved.cx -= kX;
+    moved.cy -= kY;
+    moved.width -= kX;
+    moved.height -= kY;
+    const Frame a = drawn(bundle, whole, splatSettings());
+    const Frame b = drawn(bundle, moved, splatSettings());
+    double worst = 0;
+    std::int64_t covered = 0, other = 0;
+    for (int y = 3; y + 3 < moved.height; ++y) {
+        for (int x = 3; x + 3 < moved.width; ++x) {
+            const glm::vec4 d = a.colour.at(x + kX, y + kY) - b.colour.at(x, y);
+            worst = std::max({worst, std::abs(double{d.x}), std::abs(double{d.y}),
+                              std::abs(double{d.z}), std::abs(double{d.w})});
+            covered += b.colour.at(x, y).a > 0;
+            other += hasPoint(a.depth.at(x + kX, y + kY)) != hasPoint(b.depth.at(x, y));
+        }
+    }
+    EXPECT_GT(covered, 30000);
+    EXPECT_EQ(other, 0);
+    EXPECT_LT(worst, 2e-3);
+}
+
+TEST(CpuSplat, AFrameGivenBackLeavesNothingInTheNext) {
+    Bundle bundle;
+    bundle.views.push_back(planeView(cameraAt({0, 0, 0}, {0, 0, -1}, 96, 0.5), 3.0, 0.2, kGrey));
+    const Camera near = cameraAt({0, 0, -1}, {0, 0, -3}, 400, 0.7);
+    const Camera far = cameraAt({1, 0.5, 6}, {0, 0, -3}, 400, 0.7);
+    for (const auto rule : {SplatRule::data, SplatRule::point}) {
+        RenderSettings settings = splatSettings(rule);
+        settings.normals = true;
+        Job job;
+        const auto renderer = makeCpuSplatRenderer(bundle, settings, job);
+        const Frame alone = drawn(bundle, far, settings);
+        auto first = renderer->render(near);
+        ASSERT_TRUE(first);
+        renderer->reuse(*std::move(first));
+        const auto second = renderer->render(far);
+        ASSERT_TRUE(second);
+        EXPECT_TRUE(second->colour == alone.colour && second->depth == alone.depth);
+        EXPECT_TRUE(second->albedo == alone.albedo && second->normal == alone.normal);
+    }
+}
+
 TEST(CpuSplat, EverySimdTargetDrawsTheSame) {
     const Bundle bundle = analyticBundle(AnalyticScene::object, 4, 2);
     const Camera camera = analyticCamera(AnalyticScene::object, 0.6, 4).resized(331, 203);
