@@ -213,35 +213,39 @@ TEST(CpuSplat, ThreadsDoNotChangeAByte) {
 
 // Pictures are drawn in parts, splats as several patches: where those end must not show.
 TEST(CpuSplat, WhatIsDrawnAtOnceDoesNotShow) {
-    Bundle bundle;
-    bundle.views.push_back(
-        planeView(cameraAt({0, 0, 0}, {0, 0, -1}, 128, 0.9), 2.0, 0.7, [](int x, int y) {
-            return glm::u8vec4(x * 2, y * 2, (x * 7 + y * 3) % 256, x < 64 ? 255 : 200);
-        }));
-    Camera whole = cameraAt({0.3, 0.2, 0.9}, {0, 0, -2}, 600, 1.2);
-    whole = whole.resized(620, 300);
-    Camera moved = whole;
-    constexpr int kX = 101, kY = 53;
-    moved.cx -= kX;
-    moved.cy -= kY;
-    moved.width -= kX;
-    moved.height -= kY;
-    const Frame a = drawn(bundle, whole, splatSettings());
-    const Frame b = drawn(bundle, moved, splatSettings());
-    double worst = 0;
-    std::int64_t covered = 0, other = 0;
-    for (int y = 3; y + 3 < moved.height; ++y) {
-        for (int x = 3; x + 3 < moved.width; ++x) {
-            const glm::vec4 d = a.colour.at(x + kX, y + kY) - b.colour.at(x, y);
-            worst = std::max({worst, std::abs(double{d.x}), std::abs(double{d.y}),
-                              std::abs(double{d.z}), std::abs(double{d.w})});
-            covered += b.colour.at(x, y).a > 0;
-            other += hasPoint(a.depth.at(x + kX, y + kY)) != hasPoint(b.depth.at(x, y));
+    for (const int side : {128, 800}) {
+        SCOPED_TRACE(side == 128 ? "large splats" : "small splats");
+        Bundle bundle;
+        bundle.views.push_back(
+            planeView(cameraAt({0, 0, 0}, {0, 0, -1}, side, 0.9), 2.0, 0.7, [&](int x, int y) {
+                return glm::u8vec4(x * 255 / side, y * 255 / side, (x * 7 + y * 3) % 256,
+                                   x < side / 2 ? 255 : 200);
+            }));
+        Camera whole = cameraAt({0.3, 0.2, 0.9}, {0, 0, -2}, 600, 1.2);
+        whole = whole.resized(620, 300);
+        Camera moved = whole;
+        constexpr int kX = 101, kY = 53;
+        moved.cx -= kX;
+        moved.cy -= kY;
+        moved.width -= kX;
+        moved.height -= kY;
+        const Frame a = drawn(bundle, whole, splatSettings());
+        const Frame b = drawn(bundle, moved, splatSettings());
+        double worst = 0;
+        std::int64_t covered = 0, other = 0;
+        for (int y = 3; y + 3 < moved.height; ++y) {
+            for (int x = 3; x + 3 < moved.width; ++x) {
+                const glm::vec4 d = a.colour.at(x + kX, y + kY) - b.colour.at(x, y);
+                worst = std::max({worst, std::abs(double{d.x}), std::abs(double{d.y}),
+                                  std::abs(double{d.z}), std::abs(double{d.w})});
+                covered += b.colour.at(x, y).a > 0;
+                other += hasPoint(a.depth.at(x + kX, y + kY)) != hasPoint(b.depth.at(x, y));
+            }
         }
+        EXPECT_GT(covered, 30000);
+        EXPECT_EQ(other, 0);
+        EXPECT_LT(worst, 2e-3);
     }
-    EXPECT_GT(covered, 30000);
-    EXPECT_EQ(other, 0);
-    EXPECT_LT(worst, 2e-3);
 }
 
 TEST(CpuSplat, AFrameGivenBackLeavesNothingInTheNext) {
