@@ -1,6 +1,7 @@
 // Surface mode's code that C++ and the shaders share (shaders/shared/) against the processor's
 // vectors and against the shaders on a device: the same random sources, three ways.
 
+#include <array>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 #include "lib/packing/packing.hpp"
 #include "lib/render/surface/cells.hpp"
 #include "lib/render/surface/cpu/fuse.hpp"
+#include "lib/render/surface/cpu/fuse_samples.hpp"
 #include "lib/render/surface/cpu/raster.hpp"
 #include "lib/render/surface/cpu/shade.hpp"
 
@@ -73,6 +75,23 @@ struct ScalarRaster {
                           s.infoAt(at, 0, 0) & Info::kBesideBackground);
         });
     }
+};
+
+struct ScalarFuse : Votes {
+    static constexpr int SAMPLES = 16, S = kPerPixel, SIDE = kTile * kPerPixel;
+    const DepthAxis& axis;
+    int stride;
+    TileEntry tile{};
+
+    ScalarFuse(std::span<const LocalSource> local, const DepthAxis& frameAxis, int samplesStride)
+        : Votes{{local}}, axis(frameAxis), stride(samplesStride) {}
+    [[nodiscard]] const DepthAxis& frameAxis() const { return axis; }
+    [[nodiscard]] static int sourceOf(int k) { return k; }
+    [[nodiscard]] uint sampleOf(int k, int i, int j) const {
+        return std::bit_cast<uint>(locals[static_cast<std::size_t>(k)]
+                                       .samples[static_cast<std::ptrdiff_t>(j) * stride + i]);
+    }
+#include "shaders/shared/surface_fuse.glsl"
 };
 
 struct ScalarShade : SourcePixels {
@@ -280,6 +299,37 @@ TEST_P(SurfaceCode, DrawsAsTheProcessorsVectorsDo) {
         EXPECT_GT(std::count_if(expected.begin(), expected.end(), [](uint v) { return v != 0; }),
                   static_cast<std::ptrdiff_t>(expected.size() / 4));
     }
+}
+
+TEST_P(SurfaceCode, FusesSamplesAsTheProcessorsVectorsDo) {
+    const glm::ivec2 corner = Inputs::first(GetParam() % 4);
+    ScalarFuse scalar(in.locals, in.space.axis, in.grid.stride());
+    scalar.tile = {corner.x, corner.y, 0, kSources, 0, 0, 0, 0};
+    for (const Source& s : in.sources()) scalar.tile.step = std::max(scalar.tile.step, s.step);
+    const SampledTile tile{in.locals, in.grid, in.space.axis, scalar.tile.step, corner.x, corner.y};
+    const std::array<int, kSources> all{0, 1, 2, 3};
+    int strays = 0, shown = 0, rejected = 0;
+    for (int k = 0; k < kTile * kTile; ++k) {
+        const int column = k % kTile, row = k / kTile;
+        ShownSamples vectors;
+        fuseSamplesOf(tile, all, column, row, vectors);
+        for (int n = 0; n < kPerPixel * kPerPixel; ++n) {
+            const int i = column * kPerPixel + n % kPerPixel, j = row * kPerPixel + n / kPerPixel;
+            float q = 0;
+            uint seenBy = 0;
+            const bool there = scalar.fuseSample(i, j, q, seenBy);
+            strays += there ? vectors.seenBy[n] != seenBy || std::abs(vectors.q[n] - q) > 1e-5f * q
+                            : vectors.q[n] != 0.0f;
+            float front = 0;
+            for (int s = 0; s < kSources; ++s)
+                front = std::max(front, std::bit_cast<float>(scalar.sampleOf(s, i, j)));
+            shown += there;
+            rejected += front > 0.0f && !(q > 0.99f * front);
+        }
+    }
+    EXPECT_LE(strays, shown / 500);
+    EXPECT_GT(shown, 4000);
+    EXPECT_GT(rejected, 100);
 }
 
 TEST_P(SurfaceCode, ShadesAsTheProcessorsVectorsDo) {

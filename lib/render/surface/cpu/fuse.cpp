@@ -5,6 +5,7 @@
 #include <bit>
 #include <span>
 
+#include "lib/render/surface/cpu/fuse_samples.hpp"
 #include "lib/render/surface/votes.hpp"
 
 namespace stx::surface {
@@ -96,13 +97,15 @@ struct AgreedPixels {
 struct Fuser : Votes {
     static constexpr int SAMPLES = 16;
 
+    const SampleGrid grid;
     const DepthAxis& axis;
     TileEntry tile;
     int S, SIDE, stride;
 
-    Fuser(std::span<const LocalSource> local, const SampleGrid& grid, const DepthAxis& frameAxis,
+    Fuser(std::span<const LocalSource> local, const SampleGrid& samples, const DepthAxis& frameAxis,
           int tileX, int tileY)
         : Votes{{local}},
+          grid(samples),
           axis(frameAxis),
           tile{tileX, tileY, 0, static_cast<uint>(local.size()), 0, 0, 0, 0},
           S(grid.perPixel),
@@ -137,6 +140,26 @@ struct Fuser : Votes {
                     [=](float) { return kSame * 1.0f + step * perUnit; });
         }
         return agreed;
+    }
+
+    /// fuseSamples(), of a pixel in which only the sources `among` may have something.
+    void showSamples(std::span<const int> among, int column, int row) {
+        ShownSamples shown;
+        fuseSamplesOf({locals, grid, axis, tile.step, tile.x, tile.y}, among, column, row, shown);
+        shownCount = 0;
+        for (int k = 0; k < S * S; ++k) {
+            const float q = shown.q[k];
+            if (q == 0.0f) continue;
+            int at = shownCount++;
+            for (; at > 0 && shownQ[at - 1] < q; --at) {
+                shownQ[at] = shownQ[at - 1];
+                shownTo[at] = shownTo[at - 1];
+                shownAt[at] = shownAt[at - 1];
+            }
+            shownQ[at] = q;
+            shownTo[at] = shown.seenBy[k];
+            shownAt[at] = k;
+        }
     }
 
     void fuseRow(int row, int columns, std::uint32_t wanted, Pieces& pieces) {
@@ -183,7 +206,7 @@ struct Fuser : Votes {
                 if (simplePiece(whole, also, column, row, piece)) pieces.add(piece);
                 continue;
             }
-            fuseSamples(column, row);
+            showSamples({list.data(), static_cast<std::size_t>(count)}, column, row);
             for (int begin = 0; begin < shownCount;) {
                 const int end = pieceEnd(begin);
                 pieces.add(pieceOf(column, row, begin, end));

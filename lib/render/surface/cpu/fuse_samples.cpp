@@ -1,0 +1,257 @@
+#include "lib/render/surface/cpu/fuse_samples.hpp"
+
+#include <array>
+#include <bit>
+#include <cstring>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lib/render/surface/cpu/fuse_samples.cpp"
+#include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
+#include <hwy/highway.h>
+
+#include "lib/render/surface/cpu/votes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::surface::HWY_NAMESPACE {
+
+/// The samples of a pixel, of the sources that have any there.
+struct PixelSamples {
+    /// 0 = nothing.
+    alignas(64) float q[kMostTileSources][kMostSamples];
+    int owner[kMostTileSources];  ///< the source's number in the tile
+    int count = 0;
+
+    HWY_INLINE PixelSamples(const SampledTile& tile, std::span<const int> among, int column,
+                            int row) {
+        const int side = tile.grid.perPixel, stride = tile.grid.stride();
+        for (const int k : among) {
+            const float* from = tile.sources[static_cast<std::size_t>(k)].samples +
+                                static_cast<std::ptrdiff_t>(row) * side * stride + column * side;
+            float* to = q[count];
+            float most = 0.0f;
+            std::memset(to, 0, sizeof(q[0]));
+            for (int j = 0; j < side; ++j) {
+                for (int i = 0; i < side; ++i) {
+                    const float value = from[j * stride + i];
+                    to[j * side + i] = value;
+                    most = value > most ? value : most;
+                }
+            }
+            if (most > 0.0f) owner[count++] = k;
+        }
+    }
+};
+
+/// A vector of the samples of a pixel.
+struct SampleFuser {
+    const SampledTile& tile;
+    shared::Votes& votes;
+    const PixelSamples& pixel;
+    int first;  ///< sample
+    Points x, y;
+
+    HWY_INLINE Points sampleOf(int i) const { return hn::LoadU(PointTag(), pixel.q[i] + first); }
+    /// sameWithin() of the shared code.
+    HWY_INLINE Points sameWithin(Points q) const {
+        const PointTag d;
+        const Points scale = tile.axis.inverse ? q : hn::Set(d, 1.0f);
+        const Points perUnit =
+            tile.axis.inverse ? hn::Mul(q, q) : hn::Set(d, tile.axis.qPerUnit(1.0f));
+        return hn::MulAdd(hn::Set(d, kSame), scale, hn::Mul(hn::Set(d, tile.step), perUnit));
+    }
+    static HWY_INLINE PointMask flagged(Points q, std::uint32_t flags) {
+        const PointTag d;
+        const hn::RebindToUnsigned<PointTag> du;
+        return hn::RebindMask(
+            d, hn::Ne(hn::And(hn::BitCast(du, q), hn::Set(du, flags)), hn::Zero(du)));
+    }
+
+    /// rejected() of the shared code, of the points of `asked` at q, which `owner` shows, by number
+    /// in `pixel`.
+    HWY_INLINE PointMask rejected(Points q, Counts owner, PointMask asked) const {
+        const PointTag d;
+        const CountTag di;
+        const FramePoints points{x, y, q};
+        const auto asCounts = [&](PointMask mask) HWY_ATTR { return hn::RebindMask(di, mask); };
+        const auto isOwner = [&](int i) HWY_ATTR {
+            return hn::RebindMask(d, hn::Eq(owner, hn::Set(di, i)));
+        };
+        const PointMask nearEdge = hn::And(asked, flagged(q, kNearEdgeBit));
+        PointMask out = hn::Lt(q, hn::Zero(d)), silhouette = out;  // none
+        for (int i = 0; i < pixel.count && !hn::AllFalse(d, nearEdge); ++i) {
+            const PointMask mine = hn::And(nearEdge, isOwner(i));
+            const int s = pixel.owner[i];
+            if (!votes.hasAlpha(s) || hn::AllFalse(d, mine)) continue;
+            const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, true);
+            const VotingSource from(votes.at(s));
+            Points alpha;
+            if (from.colour) {
+                alpha = alphaOf(from.colour, FourTexels(*from.source, p, mine), p);
+            } else {
+                alignas(64) float u[kMostPoints], v[kMostPoints], each[kMostPoints] = {};
+                hn::Store(p.u, d, u);
+                hn::Store(p.v, d, v);
+                for (std::uint32_t left = lanesOf(mine); left; left &= left - 1) {
+                    const int l = std::countr_zero(left);
+                    each[l] = votes.alphaAt(s, {u[l], v[l]});
+                }
+                alpha = hn::Load(d, each);
+            }
+            out = hn::Or(out, areBackground(votes, s, p, alpha, mine));
+            silhouette = hn::Or(silhouette, hn::And(mine, hn::Lt(alpha, hn::Set(d, kSolidAlpha))));
+        }
+        asked = hn::AndNot(out, asked);
+        if (hn::AllFalse(d, asked)) return out;
+
+        using shared::Votes;
+        const Points within = sameWithin(q);
+        const Counts whole = hn::Set(di, Votes::kWholeVote);
+        Counts against = hn::Zero(di);
+        Counts enough =
+            hn::IfThenElse(asCounts(nearEdge), hn::Set(di, Votes::kWholeVote * kVotesNearEdge),
+                           hn::Set(di, Votes::kWholeVote * kVotesElsewhere));
+        // Who does not show it: sources that show something else, and those that show nothing.
+        std::uint32_t others[kMostTileSources];
+        std::uint32_t listed = 0;
+        for (int i = 0; i < pixel.count; ++i) {
+            const int k = pixel.owner[i];
+            listed |= 1u << k;
+            const Points value = sampleOf(i);
+            const PointMask theirs = hn::AndNot(isOwner(i), asked);
+            const PointMask shows = hn::And(hn::And(theirs, hn::Gt(value, hn::Zero(d))),
+                                            hn::Lt(hn::Abs(hn::Sub(value, q)), within));
+            others[k] = lanesOf(hn::AndNot(shows, theirs));
+            const PointMask extension = hn::And(shows, flagged(value, kExtensionBit));
+            PointMask supports = hn::AndNot(extension, shows);
+            if (!hn::AllFalse(d, extension)) {
+                const Counts vote = votesOf(votes, VotingSource(votes.at(k)), k, points, extension);
+                against = hn::Add(against, vote);
+                const PointMask none = hn::RebindMask(d, hn::Eq(vote, hn::Zero(di)));
+                supports = hn::Or(supports, hn::And(hn::And(extension, silhouette), none));
+            }
+            enough = hn::Add(enough, hn::IfThenElseZero(asCounts(supports), whole));
+        }
+        // How many are left to be asked.
+        const int count = static_cast<int>(tile.sources.size());
+        Counts most = hn::Set(di, Votes::kWholeVote * (count - pixel.count));
+        for (int i = 0; i < pixel.count; ++i)
+            most =
+                hn::Add(most, hn::IfThenElseZero(asCounts(maskOf(others[pixel.owner[i]])), whole));
+        std::uint32_t open = lanesOf(asked);
+        for (int k = 0; k < count; ++k) {
+            // Those that have enough, and those that cannot have it any more, need no other.
+            open &= lanesOf(hn::RebindMask(d, hn::Gt(enough, against))) &
+                    ~lanesOf(hn::RebindMask(d, hn::Gt(enough, hn::Add(against, most))));
+            if (!open) break;
+            const bool lists = listed >> k & 1u;
+            const PointMask other = lists ? maskOf(others[k]) : asked;
+            most = hn::Sub(most, hn::IfThenElseZero(asCounts(other), whole));
+            const std::uint32_t asks = lists ? others[k] & open : open;
+            if (!asks) continue;
+            against = hn::Add(against,
+                              votesOf(votes, VotingSource(votes.at(k)), k, points, maskOf(asks)));
+        }
+        const PointMask few = hn::RebindMask(d, hn::Gt(enough, against));
+        return hn::Or(out, hn::AndNot(few, asked));
+    }
+
+    HWY_INLINE void fuse(ShownSamples& out) const {
+        const PointTag d;
+        const CountTag di;
+        const hn::RebindToUnsigned<PointTag> du;
+        const Points zero = hn::Zero(d);
+        Points shown = zero;
+        auto seenBy = hn::Zero(du);
+        PointMask open = hn::Eq(zero, zero);
+        // By number in `pixel`: the lanes whose sample was rejected.
+        std::uint32_t gone[kMostTileSources] = {};
+        const auto leftOf = [&](int i) HWY_ATTR {
+            const Points q = sampleOf(i);
+            return gone[i] ? hn::IfThenZeroElse(maskOf(gone[i]), q) : q;
+        };
+        for (;;) {
+            Points front = zero;
+            Counts owner = hn::Zero(di);
+            for (int i = 0; i < pixel.count; ++i) {
+                const Points q = leftOf(i);
+                const PointMask nearer = hn::Gt(q, front);
+                front = hn::IfThenElse(nearer, q, front);
+                owner = hn::IfThenElse(hn::RebindMask(di, nearer), hn::Set(di, i), owner);
+            }
+            open = hn::And(open, hn::Gt(front, zero));
+            if (hn::AllFalse(d, open)) break;
+            const Points behind = hn::Sub(front, sameWithin(front));
+            // Two that agree far from their edges need no votes.
+            Points sure = zero, sum = zero, weights = zero;
+            auto meshes = hn::Zero(du), extensions = hn::Zero(du);
+            for (int i = 0; i < pixel.count; ++i) {
+                const Points q = leftOf(i);
+                const PointMask joins = hn::And(hn::Gt(q, behind), hn::Gt(q, zero));
+                const PointMask extension = hn::And(joins, flagged(q, kExtensionBit));
+                const PointMask mesh = hn::AndNot(extension, joins);
+                const Points weight =
+                    hn::IfThenElse(extension, hn::Set(d, kExtensionWeight), hn::Set(d, 1.0f));
+                sure = hn::Add(sure, hn::IfThenElseZero(hn::AndNot(flagged(q, kSampleFlags), joins),
+                                                        hn::Set(d, 1.0f)));
+                const Points counts = hn::IfThenElseZero(joins, weight);
+                sum = hn::MulAdd(counts, hn::Sub(q, front), sum);
+                weights = hn::Add(weights, counts);
+                const auto bit = hn::Set(du, 1u << pixel.owner[i]);
+                meshes = hn::Or(meshes, hn::IfThenElseZero(hn::RebindMask(du, mesh), bit));
+                extensions =
+                    hn::Or(extensions, hn::IfThenElseZero(hn::RebindMask(du, extension), bit));
+            }
+            const PointMask clean = hn::AndNot(flagged(front, kSampleFlags), open);
+            const PointMask isSure = hn::And(clean, hn::Ge(sure, hn::Set(d, 2.0f)));
+            const PointMask asked = hn::AndNot(isSure, open);
+            PointMask against = asked;
+            if (!hn::AllFalse(d, asked)) against = rejected(front, owner, asked);
+            const PointMask taken = hn::AndNot(against, open);
+            shown = hn::IfThenElse(taken, hn::Add(front, hn::Div(sum, weights)), shown);
+            const auto noMesh = hn::Eq(meshes, hn::Zero(du));
+            seenBy = hn::IfThenElse(hn::RebindMask(du, taken),
+                                    hn::IfThenElse(noMesh, extensions, meshes), seenBy);
+            open = hn::And(open, against);
+            if (hn::AllFalse(d, open)) break;
+            for (int i = 0; i < pixel.count; ++i)
+                gone[i] |= lanesOf(hn::And(open, hn::RebindMask(d, hn::Eq(owner, hn::Set(di, i)))));
+        }
+        hn::StoreU(shown, d, out.q + first);
+        hn::StoreU(seenBy, du, out.seenBy + first);
+    }
+};
+
+void FuseSamplesOf(const SampledTile& tile, std::span<const int> among, int column, int row,
+                   ShownSamples& out) {
+    const PointTag d;
+    const int n = static_cast<int>(hn::Lanes(d));
+    const int side = tile.grid.perPixel;
+    shared::Votes votes{{tile.sources}};
+    const PixelSamples pixel(tile, among, column, row);
+    alignas(64) float x[kMostSamples] = {}, y[kMostSamples] = {};
+    const float scale = 1.0f / static_cast<float>(side);
+    for (int l = 0; l < side * side; ++l) {
+        x[l] = static_cast<float>(tile.x) +
+               (static_cast<float>(column * side + l % side) + 0.5f) * scale;
+        y[l] =
+            static_cast<float>(tile.y) + (static_cast<float>(row * side + l / side) + 0.5f) * scale;
+    }
+    for (int l = 0; l < side * side; l += n)
+        SampleFuser{tile, votes, pixel, l, hn::LoadU(d, x + l), hn::LoadU(d, y + l)}.fuse(out);
+}
+
+}  // namespace stx::surface::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stx::surface {
+
+HWY_EXPORT(FuseSamplesOf);
+
+void fuseSamplesOf(const SampledTile& tile, std::span<const int> among, int column, int row,
+                   ShownSamples& out) {
+    HWY_DYNAMIC_DISPATCH(FuseSamplesOf)(tile, among, column, row, out);
+}
+
+}  // namespace stx::surface
+#endif

@@ -1,0 +1,301 @@
+// Free-space votes on a vector of points at once: shaders/shared/surface_votes.glsl. Included by
+// fuse_samples.cpp once for each SIMD target.
+
+#if defined(STX_SURFACE_VOTES_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef STX_SURFACE_VOTES_INL_HPP
+#undef STX_SURFACE_VOTES_INL_HPP
+#else
+#define STX_SURFACE_VOTES_INL_HPP
+#endif
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include <hwy/highway.h>
+
+#include "lib/render/surface/votes.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::surface::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using PointTag = hn::CappedTag<float, 16>;
+using CountTag = hn::RebindToSigned<PointTag>;
+using Points = hn::Vec<PointTag>;
+using Counts = hn::Vec<CountTag>;
+using PointMask = hn::Mask<PointTag>;
+inline constexpr int kMostPoints = 16;  // in a vector
+
+HWY_INLINE std::uint32_t lanesOf(PointMask mask) {
+    const PointTag d;
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, mask, bytes);
+    std::uint32_t bits = 0;
+    std::memcpy(&bits, bytes, sizeof(bits));
+    return bits & static_cast<std::uint32_t>((std::uint64_t{1} << hn::Lanes(d)) - 1);
+}
+
+HWY_INLINE PointMask maskOf(std::uint32_t lanes) {
+    const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(lanes),
+                                   static_cast<std::uint8_t>(lanes >> 8)};
+    return hn::LoadMaskBits(PointTag(), bytes);
+}
+
+/// Points of the frame.
+struct FramePoints {
+    Points x, y, q;
+};
+
+/// Points in the image of one source, between the middles of four of its pixels.
+struct SourcePoints {
+    Points u, v, q;         ///< position, pixels, and depth
+    Counts column, row;     ///< of the upper left of those pixels, from -1 on
+    Points alongX, alongY;  ///< from its middle on, 0..1
+    PointMask inside;
+
+    HWY_INLINE SourcePoints(const LocalSource& local, const FramePoints& p, bool clamped) {
+        const PointTag d;
+        const CountTag di;
+        const auto& m = local.sourceFromPixel.m;
+        const auto row4 = [&](int r) HWY_ATTR {
+            const Points rest = hn::MulAdd(hn::Set(d, m[r + 2]), p.q, hn::Set(d, m[r + 3]));
+            return hn::MulAdd(hn::Set(d, m[r]), p.x, hn::MulAdd(hn::Set(d, m[r + 1]), p.y, rest));
+        };
+        const Points zero = hn::Zero(d), half = hn::Set(d, 0.5f);
+        const Points width = hn::Set(d, static_cast<float>(local.source->width));
+        const Points height = hn::Set(d, static_cast<float>(local.source->height));
+        const Points w = row4(12), inverse = hn::Div(hn::Set(d, 1.0f), w);
+        u = hn::Mul(row4(0), inverse);
+        v = hn::Mul(row4(4), inverse);
+        q = hn::Mul(row4(8), inverse);
+        if (clamped) {
+            u = hn::Min(hn::Max(u, zero), width);
+            v = hn::Min(hn::Max(v, zero), height);
+        }
+        const auto within = [&](Points at, Points end)
+                                HWY_ATTR { return hn::And(hn::Ge(at, zero), hn::Lt(at, end)); };
+        inside = hn::And(hn::And(within(u, width), within(v, height)),
+                         hn::And(hn::Gt(w, zero), hn::Gt(q, zero)));
+        const Points fromX = hn::Sub(u, half), fromY = hn::Sub(v, half);
+        const Points left = hn::Floor(fromX), top = hn::Floor(fromY);
+        alongX = hn::Sub(fromX, left);
+        alongY = hn::Sub(fromY, top);
+        column = hn::ConvertTo(di, left);
+        row = hn::ConvertTo(di, top);
+    }
+};
+
+/// What of a source may be read many points at a time.
+struct VotingSource {
+    const Source* source;
+    const float* q = nullptr;  ///< null: one point at a time
+    const std::uint8_t* info = nullptr;
+    const glm::u8vec4* colour = nullptr;  ///< null: no alpha
+
+    explicit VotingSource(const Source& s) : source(&s) {
+        if (!s.whole) return;
+        const Rgba8Image* bytes = s.whole->texture->rgba8();
+        if (s.hasAlpha && !bytes) return;
+        q = s.whole->q.data();
+        info = s.whole->info.data();
+        if (s.hasAlpha) colour = bytes->data();
+    }
+};
+
+/// Where four pixels of a whole source are; those outside of it stand for their neighbours inside.
+struct FourTexels {
+    Counts at[2][2];  ///< row, column
+    PointMask column[2], row[2];
+
+    HWY_INLINE FourTexels(const Source& s, const SourcePoints& p, PointMask wanted) {
+        const PointTag d;
+        const CountTag di;
+        const Counts zero = hn::Zero(di), one = hn::Set(di, 1);
+        const auto asPoints = [&](auto mask) HWY_ATTR { return hn::RebindMask(d, mask); };
+        const Counts before = hn::Set(di, -1);
+        const Counts lastX = hn::Set(di, s.width - 1), lastY = hn::Set(di, s.height - 1);
+        const Counts nextX = hn::Add(p.column, one), nextY = hn::Add(p.row, one);
+        column[0] = asPoints(hn::Gt(p.column, before));
+        column[1] = asPoints(hn::Gt(lastX, p.column));
+        row[0] = asPoints(hn::Gt(p.row, before));
+        row[1] = asPoints(hn::Gt(lastY, p.row));
+        const auto clamped = [&](Counts place, Counts last)
+                                 HWY_ATTR { return hn::Min(hn::Max(place, zero), last); };
+        const Counts x[2] = {clamped(p.column, lastX), clamped(nextX, lastX)};
+        const Counts y[2] = {clamped(p.row, lastY), clamped(nextY, lastY)};
+        const auto reads = hn::RebindMask(di, wanted);
+        for (int j = 0; j < 2; ++j)
+            for (int i = 0; i < 2; ++i)
+                at[j][i] =
+                    hn::IfThenElseZero(reads, hn::Add(hn::Mul(y[j], hn::Set(di, s.width)), x[i]));
+    }
+};
+
+HWY_INLINE Points alphaOf(const glm::u8vec4* colour, const FourTexels& texels,
+                          const SourcePoints& p) {
+    const PointTag d;
+    const CountTag di;
+    const hn::RebindToUnsigned<PointTag> du;
+    const auto* words = reinterpret_cast<const std::int32_t*>(colour);
+    const auto alpha = [&](int j, int i) HWY_ATTR {
+        const auto bits = hn::BitCast(du, hn::GatherIndex(di, words, texels.at[j][i]));
+        return hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<24>(bits))),
+                       hn::Set(d, 1.0f / 255.0f));
+    };
+    const auto mix = [&](Points a, Points b, Points along)
+                         HWY_ATTR { return hn::MulAdd(b, along, hn::NegMulAdd(a, along, a)); };
+    return mix(mix(alpha(0, 0), alpha(0, 1), p.alongX), mix(alpha(1, 0), alpha(1, 1), p.alongX),
+               p.alongY);
+}
+
+/// isBackground() of those points, whose alpha is given.
+HWY_INLINE PointMask areBackground(shared::Votes& votes, int s, const SourcePoints& p, Points alpha,
+                                   PointMask wanted) {
+    const PointTag d;
+    const CountTag di;
+    const PointMask little = hn::And(wanted, hn::Lt(alpha, hn::Set(d, votes.freeAlphaOf(s))));
+    if (hn::AllFalse(d, little)) return little;
+    const PointMask some = hn::And(little, hn::Gt(alpha, hn::Zero(d)));
+    std::uint32_t doubtful = lanesOf(some);
+    if (doubtful == 0) return little;
+    alignas(64) std::int32_t column[kMostPoints], row[kMostPoints];
+    hn::Store(p.column, di, column);
+    hn::Store(p.row, di, row);
+    std::uint32_t background = lanesOf(little) & ~doubtful;
+    for (; doubtful; doubtful &= doubtful - 1) {
+        const int l = std::countr_zero(doubtful);
+        if (!(votes.largestAlphaAround(s, {column[l], row[l]}) < kSolidAlpha))
+            background |= 1u << l;
+    }
+    return maskOf(background);
+}
+
+/// PreparedPage::info at those texels, of an image of so many.
+HWY_INLINE Counts infoAt(const std::uint8_t* info, std::int32_t count, Counts texels) {
+    const CountTag di;
+    const hn::RebindToUnsigned<CountTag> du;
+    // Whole words, for that is what vectors gather.
+    const Counts word = hn::Min(hn::ShiftRight<2>(texels), hn::Set(di, std::max(count / 4 - 1, 0)));
+    const auto bits =
+        hn::BitCast(du, hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(info), word));
+    const auto place = hn::BitCast(du, hn::ShiftLeft<3>(hn::And(texels, hn::Set(di, 3))));
+    return hn::BitCast(di, hn::And(hn::Shr(bits, place), hn::Set(du, 255u)));
+}
+
+/// Of the points of `asked`, those that the upper left of the pixels around them tells to have no
+/// vote of a source, from its depth there and how that changes.
+HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p, Counts texel,
+                                 Counts info, float clearlyBehind, PointMask asked) {
+    const PointTag d;
+    const CountTag di;
+    const DepthAxis& axis = from.source->space.axis;
+    const std::int32_t width = from.source->width;
+    const Points zero = hn::Zero(d);
+    const Points scale = axis.inverse ? p.q : hn::Set(d, 1.0f);
+    const Points perUnit = axis.inverse ? hn::Mul(p.q, p.q) : hn::Set(d, axis.qPerUnit(1.0f));
+    const Points margin = hn::MulAdd(hn::Set(d, clearlyBehind), scale,
+                                     hn::Mul(hn::Set(d, from.source->step), perUnit));
+    const Points there = hn::GatherIndex(d, from.q, texel);
+    // The cheap half of the test first: most surfaces are not behind the point at all.
+    const Points reach = hn::Set(d, 4.0f * kLinkedSamples);
+    const Points nearest =
+        hn::Sub(hn::Add(there, margin), axis.inverse ? hn::Mul(reach, there) : reach);
+    const PointMask has = hn::And(asked, hn::Gt(there, zero));
+    const PointMask hidden =
+        hn::Or(hn::And(asked, hn::Lt(there, zero)), hn::And(has, hn::Lt(p.q, nearest)));
+    const PointMask left = hn::AndNot(hidden, has);
+    if (hn::AllFalse(d, left)) return hidden;
+    const auto gather = [&](std::int32_t step) HWY_ATTR {
+        const Counts at =
+            hn::IfThenElseZero(hn::RebindMask(di, left), hn::Add(texel, hn::Set(di, step)));
+        return hn::GatherIndex(d, from.q, at);
+    };
+    const auto links = [&](Counts bits, std::uint8_t link) HWY_ATTR {
+        return hn::RebindMask(d, hn::TestBit(bits, hn::Set(di, std::int32_t{link})));
+    };
+    const auto infoBeside = [&](std::int32_t step) HWY_ATTR {
+        const Counts at =
+            hn::IfThenElseZero(hn::RebindMask(di, left), hn::Add(texel, hn::Set(di, step)));
+        return infoAt(from.info, width * from.source->height, at);
+    };
+    /// chooseSlope() of shaders/shared/surface_slope.glsl.
+    const auto slopeOf = [&](PointMask before, Points q0, PointMask after, Points q1) HWY_ATTR {
+        const Points half = hn::Set(d, 0.5f);
+        const Points a = hn::Sub(there, q0), b = hn::Sub(q1, there);
+        const Points sizeA = hn::Abs(a), sizeB = hn::Abs(b);
+        Points both = hn::Mul(half, hn::Add(a, b));
+        both = hn::IfThenElse(hn::Lt(sizeB, hn::Mul(half, sizeA)), b, both);
+        both = hn::IfThenElse(hn::Lt(sizeA, hn::Mul(half, sizeB)), a, both);
+        return hn::IfThenElse(hn::And(before, after), both,
+                              hn::IfThenElse(before, a, hn::IfThenElseZero(after, b)));
+    };
+    const Points gx = slopeOf(links(infoBeside(-1), Info::kLinkRight), gather(-1),
+                              links(info, Info::kLinkRight), gather(1));
+    const Points gy = slopeOf(links(infoBeside(-width), Info::kLinkDown), gather(-width),
+                              links(info, Info::kLinkDown), gather(width));
+    const Points slope = hn::Add(hn::Abs(gx), hn::Abs(gy));
+    const Points predicted = hn::MulAdd(gx, p.alongX, hn::MulAdd(gy, p.alongY, there));
+    const Points least =
+        hn::Add(hn::Add(predicted, margin), hn::Mul(hn::Set(d, kSlopeDoubt), slope));
+    return hn::Or(hidden, hn::And(left, hn::Lt(p.q, least)));
+}
+
+/// voteOf() of source `s` on the points of `wanted`, 0 on others.
+HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
+                          const FramePoints& points, PointMask wanted) {
+    const PointTag d;
+    const CountTag di;
+    PointMask left = wanted;
+    Counts cast = hn::Zero(di);
+    if (from.q) {
+        const Source& source = *from.source;
+        const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, false);
+        left = hn::And(left, p.inside);
+        if (hn::AllFalse(d, left)) return cast;
+        // With pixels all around; few others are asked for.
+        const Counts zero = hn::Zero(di), one = hn::Set(di, 1);
+        const PointMask amid = hn::RebindMask(
+            d, hn::And(hn::And(hn::Gt(p.column, zero), hn::Gt(p.row, zero)),
+                       hn::And(hn::Gt(hn::Set(di, source.width - 1), hn::Add(p.column, one)),
+                               hn::Gt(hn::Set(di, source.height - 1), hn::Add(p.row, one)))));
+        const PointMask asked = hn::And(left, amid);
+        const Counts texel =
+            hn::IfThenElseZero(hn::RebindMask(di, asked),
+                               hn::Add(hn::Mul(p.row, hn::Set(di, source.width)), p.column));
+        const Counts info = infoAt(from.info, source.width * source.height, texel);
+        PointMask hidden = withoutVote(from, p, texel, info, votes.clearlyBehindOf(s), asked);
+        if (from.colour) {
+            // Background is not hidden: it is never far from an edge.
+            const PointMask nearEdge =
+                hn::RebindMask(d, hn::Lt(hn::ShiftRight<4>(info), hn::Set(di, kFarFromEdge - 1)));
+            const PointMask doubtful = hn::Or(hn::AndNot(amid, left), hn::And(asked, nearEdge));
+            if (!hn::AllFalse(d, doubtful)) {
+                const Points alpha = alphaOf(from.colour, FourTexels(source, p, doubtful), p);
+                const PointMask background = areBackground(votes, s, p, alpha, doubtful);
+                cast = hn::IfThenElseZero(hn::RebindMask(di, background),
+                                          hn::Set(di, shared::Votes::kWholeVote));
+                left = hn::AndNot(background, left);
+            }
+        }
+        left = hn::AndNot(hidden, left);
+    }
+    std::uint32_t one = lanesOf(left);
+    if (!one) return cast;
+    alignas(64) float x[kMostPoints], y[kMostPoints], q[kMostPoints];
+    alignas(64) std::int32_t vote[kMostPoints];
+    hn::Store(points.x, d, x);
+    hn::Store(points.y, d, y);
+    hn::Store(points.q, d, q);
+    hn::Store(cast, di, vote);
+    for (; one; one &= one - 1) {
+        const int l = std::countr_zero(one);
+        vote[l] = votes.voteOf(s, x[l], y[l], q[l]);
+    }
+    return hn::Load(di, vote);
+}
+
+}  // namespace stx::surface::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
