@@ -13,6 +13,8 @@ namespace {
 /// What a block may reach out of its range by, relative to SourceBlock::reach, and the share of q
 /// that rounding may add.
 constexpr float kBlockMargin = 1.05f, kBlockRounding = 1e-5f;
+/// What rounding may add to the terms that tell which way a block faces.
+constexpr double kFacingRounding = 1e-3;
 /// Where some of a block is behind the camera, it counts from this share of its largest w.
 constexpr float kNearestShare = 1e-4f;
 
@@ -32,6 +34,34 @@ void addBounds(const Source& s, Bounds& bounds) {
     }
 }
 
+/// Whether all that is drawn of a block is seen from behind. `eye`: that of the frame in the space
+/// of the source's pixels, homogeneous.
+bool isTurnedAway(const Source& s, const SourceBlock& block, int x, int y, const glm::dvec4& eye) {
+    // A plane q = q0 + gx (x - x0) + gy (y - y0) faces the eye where
+    // gx (x - x0) + gy (y - y0) < q - q0 there; each term by its range over the block.
+    struct Range {
+        double low, high;
+        [[nodiscard]] double size() const { return std::max(std::abs(low), std::abs(high)); }
+    };
+    const auto between = [](double a, double b) { return Range{std::min(a, b), std::max(a, b)}; };
+    const auto product = [&](Range a, Range b) {
+        const double all[] = {a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high};
+        return Range{*std::min_element(all, all + 4), *std::max_element(all, all + 4)};
+    };
+    const double margin =
+        kBlockMargin * block.reach + kBlockRounding * s.space.axis.relativeScale(block.qMax);
+    const auto along = [&](double at, double from, float least, float most) {
+        return product({least, most},
+                       between(at - (from - 1.0) * eye.w, at - (from + kBlock + 2.0) * eye.w));
+    };
+    const Range ofX = along(eye.x, x, block.leastSlope.x, block.mostSlope.x);
+    const Range ofY = along(eye.y, y, block.leastSlope.y, block.mostSlope.y);
+    const Range depth =
+        between(eye.z - (block.qMin - margin) * eye.w, eye.z - (block.qMax + margin) * eye.w);
+    return ofX.low + ofY.low - depth.high >
+           kFacingRounding * (ofX.size() + ofY.size() + depth.size());
+}
+
 FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, int tilesY) {
     FrameSource f;
     f.source = &s;
@@ -39,6 +69,10 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
     f.sourceFromPixel = warpFrom(s.space.pixelFromWorld * space.worldFromPixel);
     f.fromEye = rayFrom(s.space, space);
     const Warp warp = warpFrom(f.pixelFromSource);
+    const glm::dvec4 eye = s.space.pixelFromWorld * (space.camera.orthographic
+                                                         ? glm::dvec4(-space.camera.forward(), 0.0)
+                                                         : glm::dvec4(space.camera.position, 1.0));
+    f.turnedAway.assign(s.blocks.size(), 0);
     struct Range {
         std::uint32_t block;
         int x0, y0, x1, y1;
@@ -100,6 +134,8 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
                       static_cast<int>(y1) / kTile,
                       h.w > 0 ? (behind ? -h.z : h.z) / h.w : 0.0};
         ranges.push_back(r);
+        f.turnedAway[index] =
+            isTurnedAway(s, block, static_cast<int>(bx), static_cast<int>(by), eye);
         for (int ty = r.y0; ty <= r.y1; ++ty)
             for (int tx = r.x0; tx <= r.x1; ++tx)
                 ++f.tileBegin[static_cast<std::size_t>(ty * tilesX + tx) + 1];

@@ -45,6 +45,8 @@ struct FrameSource {
     Ray fromEye{};
     std::vector<std::uint32_t> tileBegin;  ///< tile t has blocks[tileBegin[t] .. tileBegin[t + 1])
     std::vector<std::uint32_t> blocks;
+    /// By block of the source: not 0 where all of it is seen from behind, which draws nothing.
+    std::vector<std::uint8_t> turnedAway;
     /// Of each of them: q in the frame of its middle, 0 = behind; negative where some of the block
     /// is behind.
     std::vector<double> middles;

@@ -335,6 +335,42 @@ float reachOf(const Source& s, const Draft& d, const SourceBlock& block, int x0,
     return reach;
 }
 
+/// Fills SourceBlock::leastSlope and mostSlope; `leaves`: the block's.
+void findSlopes(const Source& s, const Draft& d, std::span<const Leaf> leaves, SourceBlock& block,
+                int x0, int y0) {
+    glm::vec2 least(std::numeric_limits<float>::max()), most(-least);
+    const auto add = [&](glm::vec2 slope) {
+        least = glm::min(least, slope);
+        most = glm::max(most, slope);
+    };
+    for (const Leaf& leaf : leaves) add({leaf.qx, leaf.qy});
+    for (int j = 0; block.anyCell && j < kBlock; ++j) {
+        for (std::uint32_t left = block.cells[j]; left; left &= left - 1) {
+            // However it is cut in two, its triangles have the slopes of two of its sides.
+            const float* q = &d.q.at(x0 + std::countr_zero(left), y0 + j);
+            add({q[1] - q[0], q[s.width] - q[0]});
+            add({q[s.width + 1] - q[s.width], q[s.width + 1] - q[1]});
+        }
+    }
+    for (int j = 0; block.anyEdge && j < kBlock; ++j) {
+        for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
+            // Its corners leave the pixel's q by so much at most.
+            const int x = x0 + std::countr_zero(left), y = y0 + j;
+            const float q = d.q.at(x, y);
+            const glm::vec2 g =
+                gradientFrom(&d.q.at(x, y), &d.info.at(x, y), 1, s.width, x > 0, y > 0);
+            const float limit = kExtensionReach * s.space.axis.relativeScale(q);
+            for (const float half : {kHalfInside, kHalfBesideBackground}) {
+                const float sum = std::clamp(half * (g.x + g.y), -limit, limit);
+                const float difference = std::clamp(half * (g.x - g.y), -limit, limit);
+                add(glm::vec2(sum + difference, sum - difference) / (2 * half));
+            }
+        }
+    }
+    block.leastSlope = least;
+    block.mostSlope = most;
+}
+
 void findLeaves(Source& s, const Draft& d) {
     s.noise = std::min(unevenness(s, d), kMostNoise);
     const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
@@ -363,6 +399,8 @@ void findLeaves(Source& s, const Draft& d) {
             divide(s, d, x0, y0, kBlock, s.flat, block, leaves);
             block.leafEnd = static_cast<std::uint32_t>(leaves.size());
             block.reach = reachOf(s, d, block, x0, y0);
+            findSlopes(s, d, {leaves.data() + block.leafBegin, leaves.data() + block.leafEnd},
+                       block, x0, y0);
         }
     });
     for (int by = 0; by < s.blocksY; ++by) {

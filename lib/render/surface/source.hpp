@@ -74,6 +74,8 @@ struct Leaf {
 struct SourceBlock {
     float qMin = 0, qMax = 0;  ///< over the block and one pixel around; 0, 0 = nothing here
     float reach = 0;           ///< by which what is drawn may leave that range, in q
+    /// dq/dx and dq/dy of all that is drawn of it are between these.
+    glm::vec2 leastSlope{0}, mostSlope{0};
     std::uint32_t leafBegin = 0, leafEnd = 0;
     std::array<std::uint16_t, kBlock> cells{};  ///< 2x2 quads, by upper left pixel, in no leaf
     std::array<std::uint16_t, kBlock> edges{};  ///< pixels that lay out an extension

@@ -84,25 +84,36 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
         shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
     }
     const float qLimit = frame.qLimit();
-    // Where each block of each source is drawn, one source after another.
+    // The blocks of each source that may show, one source after another, and where each is drawn.
+    static thread_local std::vector<std::uint32_t> facing;
+    static thread_local std::vector<std::size_t> facingEnd;
     static thread_local std::vector<Squares> drawnIn;
+    facing.clear();
+    facingEnd.clear();
     drawnIn.clear();
+    for (const int k : chosen) {
+        const FrameSource& f = frame.sources[static_cast<std::size_t>(k)];
+        for (const std::uint32_t block : f.blocksOf(tile))
+            if (!f.turnedAway[block]) facing.push_back(block);
+        facingEnd.push_back(facing.size());
+    }
     const auto drawAll = [&](const SampleGrid& each, const RasterNeeds& needs) {
         const glm::dmat4 sampleFromPixel = frame.sampleFromPixel(tile, each.perPixel, each.apron);
         std::size_t first = 0;
         for (std::size_t k = 0; k < chosen.size(); ++k) {
             const FrameSource& f = frame.sources[static_cast<std::size_t>(chosen[k])];
             float* mine = samples.data() + room * k;
-            const auto blocks = f.blocksOf(tile);
+            const std::span<const std::uint32_t> blocks{facing.data() + first,
+                                                        facingEnd[k] - first};
             if (blocks.empty()) continue;
             RasterNeeds own = needs;
             if (each.apron > 0) {
-                drawnIn.resize(first + blocks.size());
+                drawnIn.resize(facingEnd[k]);
                 own.drawnIn = {drawnIn.data() + first, blocks.size()};
             } else if (!drawnIn.empty()) {
                 own.of = {drawnIn.data() + first, blocks.size()};
             }
-            first += blocks.size();
+            first = facingEnd[k];
             const bool drawn =
                 rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks,
                                 each, qLimit, mine, own);
