@@ -230,6 +230,17 @@ void Pieces::clear() {
     pixel.clear();
 }
 
+void Pieces::resize(std::size_t size) {
+    x.resize(size);
+    y.resize(size);
+    q.resize(size);
+    qx.resize(size);
+    qy.resize(size);
+    share.resize(size);
+    sources.resize(size);
+    pixel.resize(size);
+}
+
 void Pieces::add(const Piece& piece) {
     x.push_back(piece.x);
     y.push_back(piece.y);
@@ -259,26 +270,45 @@ TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& ax
     settlePixels(sources, axis, fuser.tile.step, perPixel, middles);
     const std::uint32_t inside = columns == kTile ? ~0u : (1u << columns) - 1;
     TilePixels open{};
+    std::size_t next = pieces.size(), most = next;
+    for (int row = 0; row < rows; ++row)
+        most += static_cast<std::size_t>(
+            std::popcount(middles.settled[static_cast<std::size_t>(row)] & inside));
+    pieces.resize(most);
     for (int row = 0; row < rows; ++row) {
-        const auto r = static_cast<std::size_t>(row);
+        const auto r = static_cast<std::size_t>(row), y = r + kMiddles.apron;
         const std::uint32_t settled = middles.settled[r] & inside;
-        for (std::uint32_t left = settled; left; left &= left - 1) {
-            const int column = std::countr_zero(left);
-            const auto x = static_cast<std::size_t>(column + kMiddles.apron);
-            const auto y = r + static_cast<std::size_t>(kMiddles.apron);
-            if (middles.alone[y][x] && sources.size() > 1 &&
-                fuser.rejected(middles.q[y][x], 0u, std::countr_zero(middles.seenBy[y][x]),
-                               static_cast<float>(tileX + column) + 0.5f,
-                               static_cast<float>(tileY + row) + 0.5f, column + kMiddles.apron,
-                               row + kMiddles.apron))
-                continue;
-            pieces.add({static_cast<float>(tileX + column) + 0.5f,
-                        static_cast<float>(tileY + row) + 0.5f, middles.q[y][x], middles.qx[y][x],
-                        middles.qy[y][x], 1.0f, middles.seenBy[y][x],
-                        static_cast<std::uint32_t>(row * kTile + column)});
-        }
         open[r] = ~(settled | middles.empty[r]) & inside;
+        std::uint32_t alone = 0;
+        for (std::size_t x = 0; x < kTile; ++x)
+            alone |= (middles.alone[y][x + kMiddles.apron] ? 1u : 0u) << x;
+        std::uint32_t shown = settled;
+        if (sources.size() > 1) {
+            for (std::uint32_t left = settled & alone; left; left &= left - 1) {
+                const int column = std::countr_zero(left);
+                const auto x = static_cast<std::size_t>(column + kMiddles.apron);
+                if (fuser.rejected(middles.q[y][x], 0u, std::countr_zero(middles.seenBy[y][x]),
+                                   static_cast<float>(tileX + column) + 0.5f,
+                                   static_cast<float>(tileY + row) + 0.5f,
+                                   column + kMiddles.apron, row + kMiddles.apron))
+                    shown &= ~(1u << column);
+            }
+        }
+        const auto put = [&](std::size_t at, std::size_t column) {
+            const std::size_t x = column + kMiddles.apron;
+            pieces.x[at] = static_cast<float>(tileX + static_cast<int>(column)) + 0.5f;
+            pieces.y[at] = static_cast<float>(tileY + row) + 0.5f;
+            pieces.q[at] = middles.q[y][x];
+            pieces.qx[at] = middles.qx[y][x];
+            pieces.qy[at] = middles.qy[y][x];
+            pieces.share[at] = 1.0f;
+            pieces.sources[at] = middles.seenBy[y][x];
+            pieces.pixel[at] = static_cast<std::uint16_t>(r * kTile + column);
+        };
+        for (; shown; shown &= shown - 1)
+            put(next++, static_cast<std::size_t>(std::countr_zero(shown)));
     }
+    pieces.resize(next);
     return open;
 }
 

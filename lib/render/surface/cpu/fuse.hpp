@@ -21,6 +21,7 @@ struct Pieces {
 
     void clear();
     void add(const Piece& piece);
+    void resize(std::size_t size);
     [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 

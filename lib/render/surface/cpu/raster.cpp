@@ -117,26 +117,6 @@ struct CellRows {
         }
     }
 
-    /// Cells, by their corners 00, 10, 11, 01, some of which may show in the tile: others are
-    /// beside it, or seen from behind however they are cut.
-    static HWY_INLINE FloatMask mayShow(const Target& t, const Floats* x, const Floats* y) {
-        const FloatTag d;
-        const Floats first = hn::Set(d, -t.edgeGrow);
-        const Floats last = hn::Set(d, static_cast<float>(t.side - 1) + t.edgeGrow);
-        const auto within = [&](const Floats* at) HWY_ATTR {
-            const Floats least = hn::Min(hn::Min(at[0], at[1]), hn::Min(at[2], at[3]));
-            const Floats most = hn::Max(hn::Max(at[0], at[1]), hn::Max(at[2], at[3]));
-            return hn::And(hn::Ge(most, first), hn::Le(least, last));
-        };
-        const auto turns = [&](int a, int b, int c) HWY_ATTR {
-            const Floats left = hn::Mul(hn::Sub(x[b], x[a]), hn::Sub(y[c], y[a]));
-            return hn::Gt(left, hn::Mul(hn::Sub(y[b], y[a]), hn::Sub(x[c], x[a])));
-        };
-        const FloatMask facing =
-            hn::Or(hn::Or(turns(0, 1, 2), turns(0, 2, 3)), hn::Or(turns(0, 1, 3), turns(1, 2, 3)));
-        return hn::And(facing, hn::And(within(x), within(y)));
-    }
-
     /// Draws those of the cells below row j that `cells` has: cellShape() and cellNearEdge(), as
     /// many at once as a vector takes.
     HWY_INLINE void draw(Target& t, const Source& s, int j, std::uint32_t cells,
@@ -147,7 +127,7 @@ struct CellRows {
         const Row &top = rows[j & 1], &bottom = rows[(j & 1) ^ 1];
         const Floats zero = hn::Zero(d);
         for (int i = 0; i < kBlock; i += n) {
-            std::uint32_t some = cells >> i & ((1u << n) - 1);
+            const std::uint32_t some = cells >> i & ((1u << n) - 1);
             if (!some) continue;
             // Corners 00, 10, 11, 01: around the cell.
             const Row* const row[4] = {&top, &top, &bottom, &bottom};
@@ -157,10 +137,6 @@ struct CellRows {
             for (int c = 0; c < 4; ++c) {
                 x[c] = hn::LoadU(d, row[c]->x + column[c]);
                 y[c] = hn::LoadU(d, row[c]->y + column[c]);
-            }
-            some &= bitsOf(mayShow(t, x, y));
-            if (!some) continue;
-            for (int c = 0; c < 4; ++c) {
                 q[c] = hn::LoadU(d, row[c]->q + column[c]);
                 depth[c] = hn::LoadU(d, row[c]->depth + column[c]);
                 info[c] = hn::LoadU(du, row[c]->info + column[c]);
