@@ -289,8 +289,8 @@ TilePixels fuseSettled(std::span<const LocalSource> sources, const DepthAxis& ax
                 const auto x = static_cast<std::size_t>(column + kMiddles.apron);
                 if (fuser.rejected(middles.q[y][x], 0u, std::countr_zero(middles.seenBy[y][x]),
                                    static_cast<float>(tileX + column) + 0.5f,
-                                   static_cast<float>(tileY + row) + 0.5f,
-                                   column + kMiddles.apron, row + kMiddles.apron))
+                                   static_cast<float>(tileY + row) + 0.5f, column + kMiddles.apron,
+                                   row + kMiddles.apron))
                     shown &= ~(1u << column);
             }
         }

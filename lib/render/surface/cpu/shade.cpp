@@ -214,6 +214,32 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     }
 }
 
+/// The texels of a view that fills its page, when the taps of all lanes that have weight are in it:
+/// `first` becomes the first of each lane, any of the others, whose taps weigh nothing. Null when
+/// taps must be looked at one lane at a time.
+HWY_INLINE const Rgba8Image* findRows(const Source& source, const View& view, const Lanes* bases,
+                                      std::int32_t* first) {
+    const hn::ScalableTag<float> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    if (!source.whole || source.width < kTaps || source.height < kTaps) return nullptr;
+    const Rgba8Image* bytes = source.whole->texture->rgba8();
+    if (!bytes) return nullptr;
+    const auto lastU = hn::Set(d, static_cast<float>(source.width - kTaps));
+    const auto lastV = hn::Set(d, static_cast<float>(source.height - kTaps));
+    for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
+        const auto u = hn::LoadU(d, &bases[0][l]), v = hn::LoadU(d, &bases[1][l]);
+        const auto zero = hn::Zero(d);
+        const auto counts = hn::Gt(hn::LoadU(d, &view.weight[l]), zero);
+        const auto inside = hn::And(hn::And(hn::Ge(u, zero), hn::Le(u, lastU)),
+                                    hn::And(hn::Ge(v, zero), hn::Le(v, lastV)));
+        if (!hn::AllFalse(d, hn::AndNot(inside, counts))) return nullptr;
+        const auto texel =
+            hn::Add(hn::Mul(hn::ConvertTo(di, v), hn::Set(di, source.width)), hn::ConvertTo(di, u));
+        hn::StoreU(hn::IfThenElseZero(hn::RebindMask(di, counts), texel), di, first + l);
+    }
+    return bytes;
+}
+
 void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
                 const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
     const hn::ScalableTag<float> d;
@@ -336,6 +362,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
     ColourSum sums[kGroup] = {};
     alignas(64) float total[kGroup] = {};
     TapWeights weights;
+    alignas(64) std::int32_t rowsFrom[kGroup];
     for (int k = 0; k < count; ++k) {
         const int s = list[k];
         const View& view = views[s];
@@ -355,6 +382,18 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
         else
             weigh(Wide());
         const int tapRows = view.narrow ? Narrow::value : Wide::value;
+        if (const Rgba8Image* bytes = findRows(source, view, bases[s], rowsFrom)) {
+            const auto fetch = [&](auto taps) HWY_ATTR {
+                for (int l = 0; l < g.count; ++l)
+                    fetchRows(bytes->data() + rowsFrom[l], source.width, decltype(taps)::value,
+                              weights, l, sums[l]);
+            };
+            if (view.narrow)
+                fetch(Narrow());
+            else
+                fetch(Wide());
+            continue;
+        }
         for (int l = 0; l < g.count; ++l) {
             if (!(view.weight[l] > 0.0f)) continue;
             const int baseU = static_cast<int>(bases[s][0][l]);
