@@ -18,49 +18,62 @@ struct RowRange {
     std::array<std::uint32_t, kTile> any, common;  ///< flags of any, and of all that are there
 };
 
-/// Of pixels of S x S samples each; false when there is nothing in any of them.
+/// Pixels of a row that are looked at together.
+constexpr int kRun = 8;
+
+/// Of pixels of S x S samples each, in the runs that have some of `wanted`, a bit each; others have
+/// nothing. False when there is nothing in any of them.
 template <int S>
-bool summarisePixels(const float* lines, int stride, RowRange& out) {
-    constexpr int kSide = kTile * S;
-    // Down the columns first, which vectors do.
-    std::array<float, kSide> low, high;
-    std::array<std::uint32_t, kSide> any, common;
-    for (int i = 0; i < kSide; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        const auto bits = std::bit_cast<std::uint32_t>(lines[i]);
-        low[k] = high[k] = lines[i];
-        any[k] = bits;
-        common[k] = bits == 0 ? ~0u : bits;
-    }
-    for (int j = 1; j < S; ++j) {
-        const float* line = lines + static_cast<std::ptrdiff_t>(j) * stride;
+bool summarisePixels(const float* lines, int stride, std::uint32_t wanted, RowRange& out) {
+    constexpr int kSide = kRun * S;
+    std::uint32_t all = 0;
+    for (std::size_t begin = 0; begin < kTile; begin += kRun) {
+        if (!(wanted >> begin & ((1u << kRun) - 1))) {
+            for (std::size_t x = begin; x < begin + kRun; ++x) {
+                out.low[x] = out.high[x] = 0.0f;
+                out.any[x] = out.common[x] = 0;
+            }
+            continue;
+        }
+        // Down the columns first, which vectors do.
+        const float* const from = lines + begin * S;
+        std::array<float, kSide> low, high;
+        std::array<std::uint32_t, kSide> any, common;
         for (int i = 0; i < kSide; ++i) {
             const auto k = static_cast<std::size_t>(i);
-            const float q = line[i];
-            const auto bits = std::bit_cast<std::uint32_t>(q);
-            low[k] = q < low[k] ? q : low[k];
-            high[k] = q > high[k] ? q : high[k];
-            any[k] |= bits;
-            common[k] &= bits == 0 ? ~0u : bits;
+            const auto bits = std::bit_cast<std::uint32_t>(from[i]);
+            low[k] = high[k] = from[i];
+            any[k] = bits;
+            common[k] = bits == 0 ? ~0u : bits;
+        }
+        for (int j = 1; j < S; ++j) {
+            const float* line = from + static_cast<std::ptrdiff_t>(j) * stride;
+            for (int i = 0; i < kSide; ++i) {
+                const auto k = static_cast<std::size_t>(i);
+                const float q = line[i];
+                const auto bits = std::bit_cast<std::uint32_t>(q);
+                low[k] = q < low[k] ? q : low[k];
+                high[k] = q > high[k] ? q : high[k];
+                any[k] |= bits;
+                common[k] &= bits == 0 ? ~0u : bits;
+            }
+        }
+        for (const std::uint32_t bits : any) all |= bits;
+        for (std::size_t x = 0; x < kRun; ++x) {
+            const std::size_t first = x * S, at = begin + x;
+            out.low[at] = low[first];
+            out.high[at] = high[first];
+            out.any[at] = any[first];
+            out.common[at] = common[first];
+            for (std::size_t i = first + 1; i < first + S; ++i) {
+                out.low[at] = std::min(out.low[at], low[i]);
+                out.high[at] = std::max(out.high[at], high[i]);
+                out.any[at] |= any[i];
+                out.common[at] &= common[i];
+            }
         }
     }
-    std::uint32_t all = 0;
-    for (const std::uint32_t bits : any) all |= bits;
-    if (all == 0) return false;
-    for (std::size_t x = 0; x < kTile; ++x) {
-        const std::size_t first = x * S;
-        out.low[x] = low[first];
-        out.high[x] = high[first];
-        out.any[x] = any[first];
-        out.common[x] = common[first];
-        for (std::size_t i = first + 1; i < first + S; ++i) {
-            out.low[x] = std::min(out.low[x], low[i]);
-            out.high[x] = std::max(out.high[x], high[i]);
-            out.any[x] |= any[i];
-            out.common[x] &= common[i];
-        }
-    }
-    return true;
+    return all != 0;
 }
 
 /// The pixels of a row that all their sources are sure of, and agree on: what addSource() makes of
@@ -171,7 +184,7 @@ struct Fuser : Votes {
             const float* lines = locals[s].samples + static_cast<std::ptrdiff_t>(row) * S * stride;
             constexpr std::array summarise = {summarisePixels<1>, summarisePixels<2>,
                                               summarisePixels<3>, summarisePixels<4>};
-            if (summarise[static_cast<std::size_t>(S - 1)](lines, stride, ranges[s]))
+            if (summarise[static_cast<std::size_t>(S - 1)](lines, stride, wanted, ranges[s]))
                 list[static_cast<std::size_t>(count++)] = static_cast<int>(s);
         }
         const AgreedPixels agreed =
