@@ -44,6 +44,43 @@ TEST_P(PlannedBlocks, AreAllThatShowInATile) {
     EXPECT_LT(static_cast<double>(drawn), 4.7 * static_cast<double>(blocks));
 }
 
+/// What is said to be seen from behind must have nothing to draw in any tile.
+TEST(TurnedAwayBlocks, DrawNothing) {
+    Bundle bundle;
+    for (int i = 0; i < 4; ++i)
+        bundle.views.push_back(viewOfAnalyticScene(
+            AnalyticScene::object, analyticCamera(AnalyticScene::object, i, 4).resized(768, 768)));
+    const SurfaceScene scene(bundle);
+    for (const bool orthographic : {false, true}) {
+        std::size_t away = 0, blocks = 0;
+        for (const double angle : {0.4, 1.5, 3.0, 4.5}) {
+            Camera camera = analyticCamera(AnalyticScene::object, angle, 4);
+            if (orthographic) {
+                const double size = 2.2 * boundsOf(scene).radius() / camera.width;
+                camera.orthographic = true;
+                camera.fx = camera.fy = 1.0 / size;
+            }
+            const SurfaceFrame frame = planFrame(scene, boundsOf(scene), Effort{}, camera);
+            const SampleGrid grid{2};
+            std::vector<float> samples(grid.count());
+            for (const FrameSource& f : frame.sources) {
+                for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 3) {
+                    std::vector<std::uint32_t> behind;
+                    for (const std::uint32_t block : f.blocksOf(tile))
+                        if (f.turnedAway[block]) behind.push_back(block);
+                    away += behind.size();
+                    blocks += f.blocksOf(tile).size();
+                    const Warp warp = warpFrom(frame.sampleFromPixel(tile, 2) * f.pixelFromSource);
+                    ASSERT_FALSE(rasteriseSource(*f.source, warp, behind, grid, frame.qLimit(),
+                                                 samples.data()))
+                        << "source " << f.source->number << ", tile " << tile;
+                }
+            }
+        }
+        EXPECT_GT(away, blocks / 20) << (orthographic ? "orthographic" : "perspective");
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, PlannedBlocks,
                          testing::Values(AnalyticScene::object, AnalyticScene::room));
 
