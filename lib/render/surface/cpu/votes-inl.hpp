@@ -94,7 +94,7 @@ struct VotingSource {
     const glm::u8vec4* colour = nullptr;  ///< null: no alpha
 
     explicit VotingSource(const Source& s) : source(&s) {
-        if (!s.whole) return;
+        if (!s.whole || s.width < 4) return;  // a word of info, at least
         const Rgba8Image* bytes = s.whole->texture->rgba8();
         if (s.hasAlpha && !bytes) return;
         q = s.whole->q.data();
