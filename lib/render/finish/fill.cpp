@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/surface/votes.hpp"
@@ -21,18 +23,23 @@ constexpr float kMostlyOpen = 0.5f;
 /// Distances to surface are counted up to this, pixels.
 constexpr std::uint8_t kFarthestCounted = 255;
 
-// Small holes (fillUnseen).
-/// How far surface is looked for in each direction, pixels.
-constexpr int kReach = 12;
-/// Directions that must meet surface, of eight: see enclosed().
+// Holes that no source looks into (fillUnseen).
+/// How far surface is looked for in each direction around a small hole, pixels, and directions that
+/// must meet some, of eight: see enclosed().
+constexpr int kSmallReach = 12;
 constexpr int kLeastDirections = 6;
-/// The ray is looked at from this share of q in front of the nearest hit to this share of q behind
+/// The ray is looked at from this share of q in front of the nearest rim to this share of q behind
 /// the farthest, but no farther than twice its distance (half its q).
 constexpr float kInFront = 0.02f, kBehind = 0.05f, kFarthestShare = 0.5f;
 /// Depths that are tried on the way, and how many in a row must be hidden.
 constexpr int kDepths = 48, kHiddenDepths = 2;
-/// Colours of surfaces in front of the fill, by more than this share of q, weigh less by this.
-constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f;
+/// Pixels behind a rim that tell its slope, while q changes by no more than this share from the rim
+/// to the first of them, and by no more than the other beside that from each to the next.
+constexpr int kSlopePixels = 3;
+constexpr float kFirstChange = 0.02f, kNextChange = 0.005f;
+/// Colours of rims in front of the fill, by more than this share of q, weigh less by this; those of
+/// surfaces that end before the pixel by the other.
+constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f, kEndedWeight = 0.2f;
 
 // Backgrounds (fillBackground).
 /// Pixels farther than this from any surface are filled from a picture of half the size, nearer
@@ -61,6 +68,15 @@ struct Fill {
     int x, y;
     glm::vec3 colour;
     float q;
+    glm::vec3 normal{0.0f};  ///< zero where unknown
+};
+
+/// Where a direction from an open pixel meets surface.
+struct Rim {
+    Hit hit;
+    int x = 0, y = 0;
+    float continued = 0;     ///< q of its plane at the open pixel
+    bool continues = false;  ///< no source sees past it there
 };
 
 /// Filled pixels of each row, put in at the end so that no fill feeds on another.
@@ -71,7 +87,10 @@ void putIn(OpenFrame& frame, const std::vector<std::vector<Fill>>& rows) {
             const float open = 1.0f - pixel.a;
             pixel += glm::vec4(fill.colour * open, open);
             float& q = frame.q.at(fill.x, fill.y);
-            if (!(q > 0.0f) || open > kMostlyOpen) q = fill.q;
+            if (q > 0.0f && open <= kMostlyOpen) continue;
+            q = fill.q;
+            if (frame.normal && fill.normal != glm::vec3(0.0f))
+                frame.normal->at(fill.x, fill.y) = fill.normal;
         }
     }
 }
@@ -129,22 +148,105 @@ bool enclosed(unsigned directionsMet) {
     return open == 0x11u || open == 0x22u || open == 0x44u || open == 0x88u;
 }
 
+/// Whether any source sees past a point.
+bool isFree(std::span<const LocalSource> sources, float x, float y, float q) {
+    return std::any_of(sources.begin(), sources.end(),
+                       [&](const LocalSource& s) { return seesPast(s, x, y, q); });
+}
+
 /// The depth of a hidden stretch of the ray through (x, y) between two depths, 0 = none.
 float hiddenDepth(std::span<const LocalSource> sources, float x, float y, float qNear, float qFar) {
     int unknown = 0;
     for (int step = 0; step < kDepths; ++step) {
         const float q = qNear + (qFar - qNear) * static_cast<float>(step) / (kDepths - 1);
-        bool free = false;
-        for (const LocalSource& s : sources) {
-            if (seesPast(s, x, y, q)) {
-                free = true;
-                break;
-            }
-        }
-        unknown = free ? 0 : unknown + 1;
+        unknown = isFree(sources, x, y, q) ? 0 : unknown + 1;
         if (unknown == kHiddenDepths) return q;
     }
     return 0.0f;
+}
+
+/// How much q changes from each pixel to the next behind a rim at (x, y), 0 where the surface ends
+/// there.
+float slopeBehind(const OpenFrame& frame, int x, int y, const std::array<int, 2>& direction) {
+    const float rim = frame.q.at(x, y), scale = frame.space.axis.relativeScale(rim);
+    float before = rim, slope = 0;
+    for (int i = 1; i <= kSlopePixels; ++i) {
+        const int nx = x + direction[0] * i, ny = y + direction[1] * i;
+        if (!frame.q.contains(nx, ny) || !closed(frame, nx, ny)) break;
+        const float q = frame.q.at(nx, ny);
+        if (std::abs(q - before - slope) > (i == 1 ? kFirstChange : kNextChange) * scale) break;
+        slope = (q - rim) / static_cast<float>(i);
+        before = q;
+    }
+    return slope;
+}
+
+/// The rims that the eight directions from (x, y) meet, and a bit for each direction that meets
+/// one; none where the opening is neither enclosed() nor at most `widest` pixels wide in all
+/// directions.
+unsigned rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distances, int x, int y,
+                    int widest, std::array<Rim, 8>& rims) {
+    const int reach = std::max(kSmallReach, widest);
+    std::array<int, 8> steps{};
+    int count = 0;
+    unsigned met = 0, nearby = 0;
+    for (std::size_t k = 0; k < kDirections.size(); ++k) {
+        // Too few can be met.
+        if (count + 8 - static_cast<int>(k) < kLeastDirections) return 0;
+        const std::array<int, 2>& direction = kDirections[k];
+        // No surface is nearer than the distances say.
+        for (int step = std::max<int>(distances.at(x, y), 1); step <= reach;) {
+            const int nx = x + direction[0] * step, ny = y + direction[1] * step;
+            if (!frame.q.contains(nx, ny)) break;
+            if (const int distance = distances.at(nx, ny); distance > 0) {
+                step += distance;
+                continue;
+            }
+            steps[k] = step;
+            Rim& rim = rims[static_cast<std::size_t>(count++)];
+            const auto along = static_cast<float>(step);
+            rim = {hitAt(frame, nx, ny, ((k & 1) ? 1.41421356f : 1.0f) * along), nx, ny};
+            rim.continued = rim.hit.q - slopeBehind(frame, nx, ny, direction) * along;
+            met |= 1u << k;
+            if (step <= kSmallReach) nearby |= 1u << k;
+            break;
+        }
+    }
+    if (enclosed(nearby)) return met;
+    if (met != 0xffu) return 0;
+    for (std::size_t k = 0; k < 4; ++k)
+        if (steps[k] + steps[k + 4] > widest) return 0;
+    return met;
+}
+
+/// What fills an open pixel that is hidden from all sources from `hidden` on. The rims' planes are
+/// continued into the hole: the nearest that stays hidden is what the pixel shows. Its colour is
+/// the mean of the rims, most of those that continue.
+Fill continued(const OpenFrame& frame, std::span<const LocalSource> sources, int x, int y,
+               float hidden, std::span<Rim> rims) {
+    const float foreground = hidden + kForeground * frame.space.axis.relativeScale(hidden);
+    const Rim* nearest = nullptr;
+    for (Rim& rim : rims) {
+        rim.continues =
+            rim.continued > 0.0f && !isFree(sources, static_cast<float>(x) + 0.5f,
+                                            static_cast<float>(y) + 0.5f, rim.continued);
+        if (rim.continues && (!nearest || rim.continued > nearest->continued)) nearest = &rim;
+    }
+    Fill fill{x, y, glm::vec3(0.0f), hidden};
+    if (nearest) {
+        fill.q = std::min(nearest->continued, hidden);
+        if (frame.normal) fill.normal = frame.normal->at(nearest->x, nearest->y);
+    }
+    float weights = 0;
+    for (const Rim& rim : rims) {
+        float weight = 1.0f / (rim.hit.distance * std::sqrt(rim.hit.distance));
+        if (rim.hit.q > foreground) weight *= kForegroundWeight;
+        if (!rim.continues) weight *= kEndedWeight;
+        fill.colour += weight * rim.hit.colour;
+        weights += weight;
+    }
+    fill.colour /= weights;
+    return fill;
 }
 
 /// The frame at half the size, rounded up: each pixel is the mean of the closed ones among its
@@ -270,7 +372,8 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int
 
 }  // namespace
 
-void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
+void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest) {
+    const int reach = std::max(kSmallReach, widest / 2);
     const int width = frame.q.width(), height = frame.q.height();
     const Image<std::uint8_t> distances = distancesToSurface(frame);
     std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
@@ -278,47 +381,25 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
                 // Farther from surface no direction meets any.
-                if (distances.at(x, y) > kReach || frame.albedo.at(x, y).a >= kClosed) continue;
-                std::array<Hit, 8> hits;
-                int count = 0;
-                unsigned met = 0;  // a bit for each direction
+                if (distances.at(x, y) > reach || frame.albedo.at(x, y).a >= kClosed) continue;
+                std::array<Rim, 8> room;
+                const unsigned met = rimsAround(frame, distances, x, y, widest, room);
+                if (!met) continue;
+                const std::span<Rim> rims(room.data(),
+                                          static_cast<std::size_t>(std::popcount(met)));
                 float nearest = 0, farthest = std::numeric_limits<float>::max();
-                for (std::size_t k = 0;
-                     k < kDirections.size() && count + 8 - static_cast<int>(k) >= kLeastDirections;
-                     ++k) {
-                    for (int step = 1; step <= kReach; ++step) {
-                        const int nx = x + kDirections[k][0] * step,
-                                  ny = y + kDirections[k][1] * step;
-                        if (!frame.q.contains(nx, ny)) break;
-                        if (!closed(frame, nx, ny)) continue;
-                        const float length = (k & 1) ? 1.41421356f : 1.0f;
-                        hits[static_cast<std::size_t>(count)] =
-                            hitAt(frame, nx, ny, length * static_cast<float>(step));
-                        nearest = std::max(nearest, hits[static_cast<std::size_t>(count)].q);
-                        farthest = std::min(farthest, hits[static_cast<std::size_t>(count)].q);
-                        ++count;
-                        met |= 1u << k;
-                        break;
-                    }
+                for (const Rim& rim : rims) {
+                    nearest = std::max(nearest, rim.hit.q);
+                    farthest = std::min(farthest, rim.hit.q);
                 }
-                if (!enclosed(met)) continue;
                 const float scale = frame.space.axis.relativeScale(nearest);
-                const float q =
+                const float hidden =
                     hiddenDepth(sources, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f,
                                 nearest + kInFront * scale,
                                 std::max(farthest - kBehind * scale, kFarthestShare * farthest));
-                if (!(q > 0.0f)) continue;
-                glm::vec3 sum(0.0f);
-                float weights = 0;
-                for (int k = 0; k < count; ++k) {
-                    const Hit& hit = hits[static_cast<std::size_t>(k)];
-                    float weight = 1.0f / (hit.distance * hit.distance);
-                    if (hit.q > q + kForeground * frame.space.axis.relativeScale(q))
-                        weight *= kForegroundWeight;
-                    sum += weight * hit.colour;
-                    weights += weight;
-                }
-                rows[static_cast<std::size_t>(y)].push_back({x, y, sum / weights, q});
+                if (!(hidden > 0.0f)) continue;
+                rows[static_cast<std::size_t>(y)].push_back(
+                    continued(frame, sources, x, y, hidden, rims));
             }
         }
     });

@@ -13,11 +13,16 @@ struct OpenFrame {
     Image<glm::vec4>& albedo;  ///< premultiplied; alpha below 1 is open
     Image<float>& q;           ///< of the main surface of each pixel, 0 = none
     const PixelSpace& space;
+    Image<glm::vec3>* normal = nullptr;  ///< world, zero where unknown; null when not wanted
 };
 
-/// Fills small holes that no source looks into: where most directions meet surface nearby and a
-/// stretch of the ray is hidden from every source. Gaps that a source sees through stay open.
-void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources);
+/// Fills holes that no source looks into: where a stretch of the ray is hidden from every source,
+/// and most directions meet surface nearby or the hole is at most `widest` pixels wide (0 = small
+/// ones only). Gaps that a source sees through stay open. Depth and normal are those of the surface
+/// that continues there: the planes of the surfaces around are followed into the hole, and the
+/// nearest that no source sees past counts. Where all end, depth is where the hidden stretch
+/// begins, and the normal stays as it is.
+void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest);
 
 /// Fills everything that is open from the background around it: for scenes that fill the frame.
 /// Near surface along rays through the picture, beyond from a picture of half the size that was

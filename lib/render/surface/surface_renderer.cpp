@@ -16,6 +16,9 @@ namespace {
 constexpr double kLeastValidShare = 0.9;
 /// Scenes fill the frame when this share of the views' borders is covered.
 constexpr double kFilledBorder = 0.5;
+/// Holes that no view looks into are filled up to this width, pixels: what is wider may be a gap
+/// between parts that too few views look through.
+constexpr int kWidestHole = 48;
 
 class SurfaceRenderer final : public Renderer {
   public:
@@ -249,7 +252,8 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
         std::vector<LocalSource> all;
         for (const FrameSource& f : work->sources)
             all.push_back({f.source, f.sourceFromPixel, nullptr});
-        fillUnseen({frame.colour, q, space}, all);
+        fillUnseen({frame.colour, q, space, frame.normal.empty() ? nullptr : &frame.normal}, all,
+                   settings_.fill == Fill::none ? 0 : kWidestHole);
     }
     frame.depth = depthOf(std::move(q), space.axis);
     return {};

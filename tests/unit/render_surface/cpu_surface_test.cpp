@@ -328,6 +328,57 @@ TEST(CpuSurface, LongSlitsAreFilledUnlessSomebodyLooksThroughThem) {
     EXPECT_LT(draw(open, novel).colour.at(middle.x, middle.y).a, 0.05f) << "seen through: open";
 }
 
+/// A red plate with a square opening (or a slot from its middle to its upper edge), and a blue wall
+/// behind it. Two views look in from the sides: neither sees the middle of the wall.
+Bundle pit(bool slot, bool wall) {
+    const Scene scene = [=](glm::dvec3 from, glm::dvec3 along) {
+        auto plate = plane(
+            0,
+            [=](double x, double y) {
+                const bool opening = std::abs(x) < 0.22 && y > -0.22 && (slot || y < 0.22);
+                return std::abs(x) < 0.9 && std::abs(y) < 0.9 && !opening;
+            },
+            from, along);
+        if (plate) {
+            plate->colour = {0.8, 0.1, 0.1};
+            return plate;
+        }
+        auto behind = plane(
+            -0.85, [](double x, double y) { return std::abs(x) < 0.7 && std::abs(y) < 0.7; }, from,
+            along);
+        if (behind) behind->colour = {0.1, 0.2, 0.9};
+        return wall ? behind : std::optional<Hit>();
+    };
+    return bundleOf(scene, {at({1.8, 0, 3}), at({-1.8, 0, 3})});
+}
+
+TEST(CpuSurface, AHoleShowsTheSurfaceThatContinuesIntoIt) {
+    const Camera novel = at({0, 0, 3}, {0, 0, 0}, 240);
+    RenderSettings settings;
+    settings.normals = true;
+    const Bundle bundle = pit(false, true);
+    const Frame frame = draw(bundle, novel, settings);
+    const Frame open = draw(bundle, novel, with(Quality::normal, Fill::none));
+    int unseen = 0;
+    for (int y = 110; y < 130; ++y) {
+        for (int x = 104; x < 136; ++x) {
+            if (open.colour.at(x, y).a > 0.01f) continue;
+            ++unseen;
+            const glm::vec4 c = frame.colour.at(x, y);
+            ASSERT_GT(c.a, 0.99f) << x << "," << y;
+            // The wall's own rim has half of the plate in it, as views take pictures.
+            EXPECT_GT(c.b, 0.4f) << "the plate bled into " << x << "," << y;
+            EXPECT_NEAR(frame.depth.at(x, y), 3.85f, 0.02f) << x << "," << y;
+            EXPECT_GT(frame.normal.at(x, y).z, 0.99f) << x << "," << y;
+        }
+    }
+    EXPECT_GT(unseen, 50) << "open with --fill none";
+    // Nothing is behind it: both views see through.
+    EXPECT_LT(draw(pit(false, false), novel).colour.at(120, 120).a, 0.05f);
+    // Open to one side, as between two legs: too wide to tell.
+    EXPECT_LT(draw(pit(true, true), novel).colour.at(120, 95).a, 0.05f);
+}
+
 TEST(CpuSurface, WhatNobodySawIsFilledFromTheBackground) {
     const Scene room = [](glm::dvec3 from, glm::dvec3 along) -> std::optional<Hit> {
         auto wall = plane(
