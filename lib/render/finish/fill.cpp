@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -181,42 +180,45 @@ float slopeBehind(const OpenFrame& frame, int x, int y, const std::array<int, 2>
     return slope;
 }
 
-/// The rims that the eight directions from (x, y) meet, and a bit for each direction that meets
-/// one; none where the opening is neither enclosed() nor at most `widest` pixels wide in all
-/// directions.
-unsigned rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distances, int x, int y,
-                    int widest, std::array<Rim, 8>& rims) {
+/// The rims that the eight directions from (x, y) meet; how many there are, 0 where the opening is
+/// neither enclosed() nor at most `widest` pixels wide in all directions.
+std::size_t rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distances, int x, int y,
+                       int widest, std::array<Rim, 8>& rims) {
     const int reach = std::max(kSmallReach, widest);
-    std::array<int, 8> steps{};
-    int count = 0;
-    unsigned met = 0, nearby = 0;
+    std::array<int, 8> steps{};  // to the rim, 0 = none
+    unsigned nearby = 0;         // a bit for each direction that meets surface in small reach
+    int notNearby = 0;
+    bool tooWide = false;
     for (std::size_t k = 0; k < kDirections.size(); ++k) {
-        // Too few can be met.
-        if (count + 8 - static_cast<int>(k) < kLeastDirections) return 0;
-        const std::array<int, 2>& direction = kDirections[k];
         // No surface is nearer than the distances say.
         for (int step = std::max<int>(distances.at(x, y), 1); step <= reach;) {
-            const int nx = x + direction[0] * step, ny = y + direction[1] * step;
+            const int nx = x + kDirections[k][0] * step, ny = y + kDirections[k][1] * step;
             if (!frame.q.contains(nx, ny)) break;
-            if (const int distance = distances.at(nx, ny); distance > 0) {
-                step += distance;
-                continue;
+            const int distance = distances.at(nx, ny);
+            if (distance == 0) {
+                steps[k] = step;
+                break;
             }
-            steps[k] = step;
-            Rim& rim = rims[static_cast<std::size_t>(count++)];
-            const auto along = static_cast<float>(step);
-            rim = {hitAt(frame, nx, ny, ((k & 1) ? 1.41421356f : 1.0f) * along), nx, ny};
-            rim.continued = rim.hit.q - slopeBehind(frame, nx, ny, direction) * along;
-            met |= 1u << k;
-            if (step <= kSmallReach) nearby |= 1u << k;
-            break;
+            step += distance;
         }
+        if (steps[k] > 0 && steps[k] <= kSmallReach)
+            nearby |= 1u << k;
+        else
+            ++notNearby;
+        tooWide = tooWide || steps[k] == 0 || (k >= 4 && steps[k - 4] + steps[k] > widest);
+        if (tooWide && notNearby > 8 - kLeastDirections) return 0;
     }
-    if (enclosed(nearby)) return met;
-    if (met != 0xffu) return 0;
-    for (std::size_t k = 0; k < 4; ++k)
-        if (steps[k] + steps[k + 4] > widest) return 0;
-    return met;
+    if (tooWide && !enclosed(nearby)) return 0;
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < kDirections.size(); ++k) {
+        if (steps[k] == 0) continue;
+        const int nx = x + kDirections[k][0] * steps[k], ny = y + kDirections[k][1] * steps[k];
+        const auto along = static_cast<float>(steps[k]);
+        Rim& rim = rims[count++];
+        rim = {hitAt(frame, nx, ny, ((k & 1) ? 1.41421356f : 1.0f) * along), nx, ny};
+        rim.continued = rim.hit.q - slopeBehind(frame, nx, ny, kDirections[k]) * along;
+    }
+    return count;
 }
 
 /// What fills an open pixel that is hidden from all sources from `hidden` on. The rims' planes are
@@ -383,10 +385,9 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
                 // Farther from surface no direction meets any.
                 if (distances.at(x, y) > reach || frame.albedo.at(x, y).a >= kClosed) continue;
                 std::array<Rim, 8> room;
-                const unsigned met = rimsAround(frame, distances, x, y, widest, room);
-                if (!met) continue;
-                const std::span<Rim> rims(room.data(),
-                                          static_cast<std::size_t>(std::popcount(met)));
+                const std::size_t count = rimsAround(frame, distances, x, y, widest, room);
+                if (count == 0) continue;
+                const std::span<Rim> rims(room.data(), count);
                 float nearest = 0, farthest = std::numeric_limits<float>::max();
                 for (const Rim& rim : rims) {
                     nearest = std::max(nearest, rim.hit.q);
