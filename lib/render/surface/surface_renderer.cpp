@@ -18,7 +18,7 @@ constexpr double kLeastValidShare = 0.9;
 constexpr double kFilledBorder = 0.5;
 /// Holes that no view looks into are filled up to this width, pixels: what is wider may be a gap
 /// between parts that too few views look through.
-constexpr int kWidestHole = 48;
+constexpr int kWidestHole = 0;
 
 class SurfaceRenderer final : public Renderer {
   public:
