@@ -385,7 +385,10 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
                 // Farther from surface no direction meets any.
                 if (distances.at(x, y) > reach || frame.albedo.at(x, y).a >= kClosed) continue;
                 std::array<Rim, 8> room;
-                const std::size_t count = rimsAround(frame, distances, x, y, widest, room);
+                // What is covered in part is an outline: filled in some frames and not in others it
+                // would flicker.
+                const int across = frame.albedo.at(x, y).a > 0.0f ? 0 : widest;
+                const std::size_t count = rimsAround(frame, distances, x, y, across, room);
                 if (count == 0) continue;
                 const std::span<Rim> rims(room.data(), count);
                 float nearest = 0, farthest = std::numeric_limits<float>::max();

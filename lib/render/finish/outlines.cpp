@@ -38,6 +38,23 @@ bool solid(const Texture& texture, std::size_t texel) {
 
 }  // namespace
 
+glm::vec2 outwardAt(const Image<float>& depth, int x, int y) {
+    glm::vec2 out(0.0f);
+    float all = 0;
+    for (int j = -kAround; j <= kAround; ++j) {
+        for (int i = -kAround; i <= kAround; ++i) {
+            if (i == 0 && j == 0) continue;
+            const float weight = 1.0f / static_cast<float>(i * i + j * j);
+            all += weight;
+            if (!depth.contains(x + i, y + j) || hasPoint(depth.at(x + i, y + j))) continue;
+            out.x += weight * static_cast<float>(i);
+            out.y += weight * static_cast<float>(j);
+        }
+    }
+    const float length = std::hypot(out.x, out.y);
+    return length > kLeastDirection * all ? out / length : glm::vec2(0.0f);
+}
+
 /// Rows of the picture that one thread owns, as OutlineRows tells.
 struct Outlines::Band {
     int top = 0, rows = 0, width = 0;
@@ -122,25 +139,12 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         for (int y = std::max(part.y0, band.top); y < last; ++y) {
             const auto prepare = [&](int column) {
                 const int x = part.x0 + column;
-                float nx = 0, ny = 0, all = 0;
-                for (int j = -kAround; j <= kAround; ++j) {
-                    for (int i = -kAround; i <= kAround; ++i) {
-                        if (i == 0 && j == 0) continue;
-                        const float weight = 1.0f / static_cast<float>(i * i + j * j);
-                        all += weight;
-                        const int a = x + i, b = y + j;
-                        if (a < 0 || b < 0 || a >= w || b >= h || hasPoint(frame.depth.at(a, b)))
-                            continue;
-                        nx += weight * static_cast<float>(i);
-                        ny += weight * static_cast<float>(j);
-                    }
-                }
-                const float length = std::hypot(nx, ny);
-                if (!(length > kLeastDirection * all)) return;
+                const glm::vec2 out = outwardAt(frame.depth, x, y);
+                if (out == glm::vec2(0.0f)) return;
                 if (!band.any) band.make();
                 const int row = y - band.top;
-                band.outX.at(x + 1, row + 1) = nx / length;
-                band.outY.at(x + 1, row + 1) = ny / length;
+                band.outX.at(x + 1, row + 1) = out.x;
+                band.outY.at(x + 1, row + 1) = out.y;
                 for (int j = 0; j <= 2; ++j)
                     for (int i = x; i <= x + 2; ++i)
                         band.near.at(i, row + j) |= static_cast<std::uint8_t>(4 >> j);
@@ -214,9 +218,9 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         for (int y = 0; y < band.rows; ++y) {
             const auto measured = [&](int x) {
                 const float nx = band.outX.at(x + 1, y + 1), ny = band.outY.at(x + 1, y + 1);
+                const float high = band.high.at(x + 1, y + 1), low = band.low.at(x + 1, y + 1);
                 covered.at(x, band.top + y) =
-                    std::max(0.0f, areaBelow(band.high.at(x + 1, y + 1), nx, ny) -
-                                       areaBelow(band.low.at(x + 1, y + 1), nx, ny));
+                    std::max(0.0f, areaBelow(high, nx, ny) - areaBelow(low, nx, ny));
             };
             forWhere(
                 band.count.row(y + 1).subspan(1, static_cast<std::size_t>(w)),

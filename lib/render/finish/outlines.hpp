@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "lib/render/finish/extent.hpp"
 #include "lib/render/finish/outline_points.hpp"
 #include "lib/render/frame.hpp"
@@ -28,6 +30,10 @@ void forWhere(std::span<const float> row, const Test& test, const Call& call) {
             if (test(row[x])) call(static_cast<int>(x));
     }
 }
+
+/// Which way is out of the object at a pixel near the background, which is where `depth` has no
+/// point; length 1, or zero where what is around has no direction.
+[[nodiscard]] glm::vec2 outwardAt(const Image<float>& depth, int x, int y);
 
 /// Where the outline of an object runs through the pixels beside it, to a fraction of a pixel: no
 /// point of any view lies beyond it. Splats reach beyond it by part of a pixel. Where a surface

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/finish/round_outlines.hpp"
 #include "lib/render/splat/plan.hpp"
 
 namespace stx {
@@ -228,20 +229,14 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
                     covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y));
                 });
     });
-    const auto set = [&](int x, int y) {
-        const float share = std::exchange(covered_.at(x, y), -1.0f);
-        const auto scaled = [share](glm::vec4 c) { return c.w > 0.0f ? c * (share / c.w) : c; };
-        frame.colour.at(x, y) = scaled(frame.colour.at(x, y));
-        if (!frame.albedo.empty()) frame.albedo.at(x, y) = scaled(frame.albedo.at(x, y));
-        if (share > 0.0f) return;
-        frame.depth.at(x, y) = kNoDepth;
-        if (!frame.normal.empty()) frame.normal.at(x, y) = glm::vec3(0.0f);
-    };
     inRows([&](int from, int to) {
         for (int y = from; y < to; ++y)
             forWhere(
                 partOf(y), [](float c) { return c >= 0.0f; },
-                [&](int column) { set(part.x0 + column, y); });
+                [&](int column) {
+                    const int x = part.x0 + column;
+                    setCoverage(frame, x, y, std::exchange(covered_.at(x, y), -1.0f));
+                });
     });
 }
 

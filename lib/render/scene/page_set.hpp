@@ -187,8 +187,8 @@ class PageSet {
         if (const auto* bytes = texture.rgba8()) return bytes->data()[texel].a * (1.0f / 255.0f);
         return texture.rgbaFloat()->data()[texel].a;
     }
-    /// The texture of one view, as large as the view. Pixels that no rectangle shows are black; they have
-    /// full alpha where objectOutside().
+    /// The texture of one view, as large as the view. Pixels that no rectangle shows are black;
+    /// they have full alpha where objectOutside().
     [[nodiscard]] Texture textureOfView(std::size_t view) const;
     /// One view with images of its own, as unpack() gives it.
     [[nodiscard]] ReferenceView copyOfView(std::size_t view) const;

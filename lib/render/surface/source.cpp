@@ -518,8 +518,8 @@ bool prepareAlone(std::vector<Source>& sources, std::vector<PreparedPage>& pages
 }
 
 /// Views side by side: they wait for each other where their depth is noisy or reaches over their
-/// edges. Those in rectangles take the memory of whole views meanwhile.
-void prepareTogether(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
+/// edges. Those in rectangles take the memory of whole views meanwhile. Whether neither was so.
+bool prepareTogether(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
     std::vector<Draft> drafts(sources.size());
     std::vector<NoisyView> views(sources.size());
     std::vector<Texture> copies(sources.size());
@@ -535,7 +535,7 @@ void prepareTogether(std::vector<Source>& sources, std::vector<PreparedPage>& pa
     std::vector<EdgeView> edges;
     for (std::size_t k = 0; k < sources.size(); ++k)
         edges.push_back({&sources[k].space, textures[k], &drafts[k].q, sources[k].step});
-    thinFatEdges(edges);
+    const bool fat = thinFatEdges(edges) > 0;
     std::vector<std::size_t> noisyOnes;
     std::vector<NoisyView> noisy;
     for (std::size_t k = 0; k < sources.size(); ++k) {
@@ -555,6 +555,7 @@ void prepareTogether(std::vector<Source>& sources, std::vector<PreparedPage>& pa
         const auto k = static_cast<std::size_t>(i);
         finishSource(sources[k], std::move(drafts[k]), left[k], pages);
     });
+    return !fat && noisy.empty();
 }
 
 }  // namespace
@@ -585,7 +586,7 @@ void SurfaceScene::prepare() {
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = set.pages()[i].texture;
     begin();
     if (std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.whole; })) {
-        prepareTogether(sources, pages);
+        exactDepth = prepareTogether(sources, pages);
         return;
     }
     for (std::size_t i = 0; i < pages.size(); ++i) {
@@ -595,7 +596,7 @@ void SurfaceScene::prepare() {
     }
     if (!prepareAlone(sources, pages)) {
         begin();
-        prepareTogether(sources, pages);
+        exactDepth = prepareTogether(sources, pages);
     }
     for (Source& s : sources)
         if (!s.whole) s.placeOfBlock = placesOfBlocks(s);

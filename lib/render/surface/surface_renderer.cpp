@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -5,6 +6,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/render/finish/behind.hpp"
 #include "lib/render/finish/fill.hpp"
+#include "lib/render/finish/round_outlines.hpp"
 #include "lib/render/surface/backend.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
@@ -16,9 +18,11 @@ namespace {
 constexpr double kLeastValidShare = 0.9;
 /// Scenes fill the frame when this share of the views' borders is covered.
 constexpr double kFilledBorder = 0.5;
+/// Points are exact whose depth has steps of no more than this share of a pixel's size.
+constexpr double kExactStep = 0.25;
 /// Holes that no view looks into are filled up to this width, pixels: what is wider may be a gap
 /// between parts that too few views look through.
-constexpr int kWidestHole = 0;
+constexpr int kWidestHole = 48;
 
 class SurfaceRenderer final : public Renderer {
   public:
@@ -36,6 +40,11 @@ class SurfaceRenderer final : public Renderer {
             s.freeAlpha = effort_.freeAlpha;
         }
         fillsFrame_ = border > kFilledBorder;
+        // A draft has no pixels that are covered in part.
+        const bool open = std::any_of(scene_.sources.begin(), scene_.sources.end(),
+                                      [](const Source& s) { return s.hasAlpha; });
+        if (open && settings.quality != Quality::draft && pointsAreExact())
+            outlines_.emplace(scene_.set);
         if (settings.wantNormals()) findNormals();
     }
 
@@ -50,6 +59,9 @@ class SurfaceRenderer final : public Renderer {
     void putBehind(std::unique_ptr<SurfaceRenderer> behind) { behind_ = std::move(behind); }
 
   private:
+    /// Whether the outermost points lie at the outline: those of faulty depth and of coarse depth
+    /// codes lie beyond it.
+    [[nodiscard]] bool pointsAreExact() const;
     void findNormals();
     /// Unit world normal of a source at pixel position (u, v); zero where it has none.
     [[nodiscard]] glm::vec3 normalAt(const Source& source, float u, float v) const;
@@ -89,6 +101,7 @@ class SurfaceRenderer final : public Renderer {
     /// By page: of views that bring no normals, when frames want them.
     std::vector<Image<glm::vec3>> normals_;
     bool fillsFrame_ = false;
+    std::optional<Outlines> outlines_;  ///< where points are exact enough to tell
     std::optional<Camera> expected_;
     std::unique_ptr<SurfaceFrame> begun_;  ///< under way before it was asked for
     std::unique_ptr<SurfaceBackend> backend_;
@@ -104,6 +117,16 @@ Image<float> depthOf(Image<float> q, const DepthAxis& axis) {
             }
         });
     return q;
+}
+
+bool SurfaceRenderer::pointsAreExact() const {
+    const auto isFine = [&](const Source& s) {
+        const Camera& camera = s.space.camera;
+        const double dist = glm::dot(bounds_.centre() - camera.position, camera.forward());
+        const auto pixel = camera.sampleSpacing(std::max(dist, 0.1 * bounds_.radius()));
+        return s.step <= kExactStep * std::min(pixel.x, pixel.y);
+    };
+    return scene_.exactDepth && std::all_of(scene_.sources.begin(), scene_.sources.end(), isFine);
 }
 
 void SurfaceRenderer::findNormals() {
@@ -256,6 +279,7 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
                    settings_.fill == Fill::none ? 0 : kWidestHole);
     }
     frame.depth = depthOf(std::move(q), space.axis);
+    if (outlines_ && !behind_) cutRoundOutlines(*outlines_, camera, frame);
     return {};
 }
 

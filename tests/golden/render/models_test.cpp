@@ -167,15 +167,15 @@ TEST(Textures, StaySharpWhereTheyAreAsFineAsThePixels) {
 INSTANTIATE_TEST_SUITE_P(
     Models, ModelGolden,
     testing::Values(
-        Model{"amphora", "", {41.3, 41.35, 37.0}},
-        Model{"spot", "data/meshes/obj/spot/spot_triangulated.obj", {49.5, 50.0, 45.6}},
-        Model{"Fox", "data/meshes/gltf/draco-repo/Fox/glTF/Fox.gltf", {47.3, 49.3, 42.95}},
+        Model{"amphora", "", {41.6, 41.85, 37.0}},
+        Model{"spot", "data/meshes/obj/spot/spot_triangulated.obj", {52.6, 52.65, 45.6}},
+        Model{"Fox", "data/meshes/gltf/draco-repo/Fox/glTF/Fox.gltf", {49.15, 50.4, 42.95}},
         Model{"CesiumMilkTruck",
               "data/meshes/gltf/draco-repo/CesiumMilkTruck/glTF/CesiumMilkTruck.gltf",
-              {41.0, 42.45, 36.7}},
+              {41.5, 42.6, 36.7}},
         Model{"Engine",
               "data/meshes/gltf-draco/2CylinderEngine/2CylinderEngine.gltf",
-              {35.0, 35.2, 27.8}}),
+              {35.25, 35.3, 27.8}}),
     [](const auto& model) { return model.param.name; });
 
 /// How coverage moves from picture to picture, ours against the mesh's: the root of the mean
@@ -213,8 +213,8 @@ TEST(Silhouettes, StayPutWhileTheCameraMoves) {
     const double bad = flicker(jagged, expected);
     RecordProperty("jagged", fmt::format("{:.3f}", bad));
     EXPECT_GT(bad, 0.2);
-    // Reached: 0.075, 0.071, 0.096.
-    const std::array<double, 3> most{0.08, 0.076, 0.102};
+    // Reached: 0.073, 0.066, 0.050.
+    const std::array<double, 3> most{0.078, 0.071, 0.055};
     for (std::size_t w = 0; w < kWays.size(); ++w) {
         const auto renderer = makeRenderer(Backend::cpu, bundle, kWays[w].settings, -1, job);
         ASSERT_TRUE(renderer);

@@ -6,6 +6,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/finish/round_outlines.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 
 namespace stx {
@@ -143,6 +144,54 @@ TEST(Outlines, TheSameOnAnyNumberOfThreads) {
         if (first.empty()) first = covered;
         EXPECT_EQ(first, covered);
     }
+}
+
+/// The ball with its depth, and edge pixels that are covered by 0.9; `flat`: a disc that faces the
+/// camera.
+Frame ballWithSoftEdge(const Camera& camera, bool flat) {
+    Frame frame = fatBall(camera);
+    frame.depth = Image<float>(camera.width, camera.height, kNoDepth);
+    const double edge = outlineRadius(camera);
+    for (int y = 0; y < camera.height; ++y) {
+        for (int x = 0; x < camera.width; ++x) {
+            const double r = fromCentre(camera, x + 0.5, y + 0.5);
+            if (r > edge + 0.7) continue;
+            const double inside = std::max(0.0, 1 - r * r / (edge * edge));
+            frame.depth.at(x, y) = static_cast<float>(flat ? 6 : 6 - std::sqrt(inside));
+            frame.colour.at(x, y) = glm::vec4(r > edge - 0.7 ? 0.9f : 1.0f);
+        }
+    }
+    return frame;
+}
+
+double coveredArea(const Frame& frame) {
+    double sum = 0;
+    for (const glm::vec4& c : frame.colour.pixels()) sum += c.w;
+    return sum;
+}
+
+TEST(RoundOutlines, AreCutWhereASurfaceTurnsAway) {
+    const Outlines outlines(ballFromAround());
+    const Camera camera = novelCamera(64);
+    const double area = 3.14159265358979 * outlineRadius(camera) * outlineRadius(camera);
+    Frame ball = ballWithSoftEdge(camera, false);
+    EXPECT_GT(coveredArea(ball), 1.025 * area);
+    cutRoundOutlines(outlines, camera, ball);
+    EXPECT_NEAR(coveredArea(ball) / area, 1.0, 0.015);
+    for (std::size_t k = 0; k < ball.colour.count(); ++k) {
+        const glm::vec4 c = ball.colour.pixels()[k];
+        EXPECT_EQ(c.x, c.w) << "premultiplied";
+        if (c.w == 0.0f) EXPECT_FALSE(hasPoint(ball.depth.pixels()[k]));
+    }
+}
+
+TEST(RoundOutlines, OfSheetsStayAsTheyAre) {
+    const Outlines outlines(ballFromAround());
+    const Camera camera = novelCamera(64);
+    Frame disc = ballWithSoftEdge(camera, true);
+    const Image<glm::vec4> before = disc.colour;
+    cutRoundOutlines(outlines, camera, disc);
+    EXPECT_EQ(disc.colour, before);
 }
 
 /// Splats alone reach beyond the outline by 0.4 pixels.
