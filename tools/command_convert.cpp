@@ -514,6 +514,13 @@ void addConvert(CommandLine& line, Program& program) {
          "Smooth the stairs of depth stored in integers, within half a step: auto (8-bit "
          "depth), on, off")
         .group(sets);
+    c.choice<CloseGaps>(
+         "--close-gaps", set.closeGaps,
+         {{"auto", CloseGaps::automatic}, {"off", CloseGaps::off}, {"on", CloseGaps::on}},
+         "Give pixels without depth, up to a fiftieth of the picture's longer side from known "
+         "ones, that "
+         "of the surface whose colours lead there: auto (older Middlebury sets), on, off")
+        .group(sets);
     c.choice<AlignEdges>(
          "--align-edges", set.alignEdges,
          {{"auto", AlignEdges::automatic}, {"off", AlignEdges::off}, {"on", AlignEdges::on}},

@@ -35,6 +35,14 @@ enum class AlignEdges {
     off,
 };
 
+/// Pixels without depth get that of the surface whose colours lead there: closeDepthGaps() of
+/// lib/surface.
+enum class CloseGaps {
+    automatic,  ///< older Middlebury sets
+    on,
+    off,
+};
+
 /// How pictures stored as Y, Cb, Cr become RGB.
 struct YuvColour {
     bool bt601 = false;      ///< the matrix of BT.601 instead of BT.709
@@ -73,6 +81,7 @@ struct ImageSetOptions {
     /// Moves the cameras so that views that overlap agree; see lib/registration.
     bool refinePoses = false;
     Dequantise dequantise = Dequantise::automatic;
+    CloseGaps closeGaps = CloseGaps::automatic;
     AlignEdges alignEdges = AlignEdges::automatic;
     /// Depth that is smaller than its picture is raised to the picture's size along the picture's
     /// edges; else the picture is reduced to the depth's.

@@ -12,6 +12,7 @@
 #include "formats/imagesets/set_view.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/surface/depth_edges.hpp"
+#include "lib/surface/depth_gaps.hpp"
 #include "lib/surface/depth_steps.hpp"
 
 namespace stx::imagesets {
@@ -208,6 +209,19 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, con
     return {};
 }
 
+/// Closes gaps of the depth along the picture's colours.
+void closeGaps(const SetView& set, const ImageSetOptions& options, StoredView& stored, Job& job) {
+    if (options.closeGaps == CloseGaps::off ||
+        (options.closeGaps == CloseGaps::automatic && !set.measured))
+        return;
+    const std::int64_t closed = closeDepthGaps(stored.depth, stored.texture);
+    if (closed > 0)
+        job.note(fmt::format(
+            "view '{}': {} pixels without depth ({:.2g} %) get that of the surface "
+            "whose colours lead there",
+            set.name, closed, 100.0 * static_cast<double>(closed) / stored.depth.count()));
+}
+
 /// Moves the depth edges to the picture's.
 void align(const SetView& set, const ImageSetOptions& options, StoredView& stored, Job& job) {
     if (options.alignEdges == AlignEdges::off ||
@@ -308,6 +322,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     }
 
     if (raise) stored.depth = raiseDepth(stored.depth, stored.texture);
+    closeGaps(set, options, stored, job);
     align(set, options, stored, job);
 
     std::vector<ReferenceView> views;

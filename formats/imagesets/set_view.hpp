@@ -72,7 +72,7 @@ struct SetView {
     std::string taker;
 
     bool sensor = false;    ///< mixed pixels at depth edges are to be expected
-    bool measured = false;  ///< stereo's disparities, whose edges lie beside the picture's
+    bool measured = false;  ///< stereo's disparities: gaps, and edges beside the picture's
     /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
     int depthBits = 0;                        ///< with planes: 8, 16, 32
