@@ -34,6 +34,9 @@ constexpr double kUsualOffset = 0.01;
 constexpr double kClear = 4.0, kVisible = 5.0 / 255;
 /// The least where no pair closes a ring of others, so that nothing can contradict.
 constexpr double kVisibleAlone = 10.0 / 255;
+/// From this many times that on it is undone in full, less below: frames of a film, each matched by
+/// itself, must not jump where a difference is now taken for one and now not.
+constexpr double kSure = 1.5;
 /// Weight of "nothing differs", beside which lines weigh thousands.
 constexpr double kNothingDiffers = 1e-2;
 constexpr int kSweeps = 2000;
@@ -157,7 +160,7 @@ std::vector<std::size_t> groupsOf(std::size_t views, const std::vector<Line>& li
 
 struct Channel {
     std::vector<double> gain, offset;
-    bool clear = false;  ///< some view differs clearly
+    double clear = 0;  ///< how clearly some view differs: more than 1 is a difference
 };
 
 /// The median of the values of each view's group.
@@ -217,8 +220,7 @@ Channel solve(std::size_t views, const std::vector<Line>& lines) {
     std::ptrdiff_t closing = used;
     for (std::size_t v = 0; v < views; ++v) closing -= joined[v] && group[v] != v ? 1 : 0;
     if (closing > 0) contradiction = std::sqrt(contradiction / static_cast<double>(closing));
-    out.clear =
-        closing > 0 ? most > std::max(kVisible, kClear * contradiction) : most > kVisibleAlone;
+    out.clear = most / (closing > 0 ? std::max(kVisible, kClear * contradiction) : kVisibleAlone);
     return out;
 }
 
@@ -227,22 +229,23 @@ Channel solve(std::size_t views, const std::vector<Line>& lines) {
 std::vector<ColourMap> matchColours(std::size_t views, std::span<const SharedColours> pairs) {
     std::vector<ColourMap> maps(views);
     std::vector<Channel> channels;
-    bool clear = false;
+    double clear = 0;
     for (int channel = 0; channel < 3; ++channel) {
         std::vector<Line> lines;
         for (const SharedColours& pair : pairs) lines.push_back(fitLine(pair, channel));
         channels.push_back(solve(views, lines));
-        clear = clear || channels.back().clear;
+        clear = std::max(clear, channels.back().clear);
     }
-    if (!clear) return maps;
+    if (!(clear > 1)) return maps;
+    const double share = std::min((clear - 1) / (kSure - 1), 1.0);
     for (std::size_t v = 0; v < views; ++v) {
         ColourMap map;
         bool moves = false, fits = true;
         for (int c = 0; c < 3; ++c) {
             const double gain = channels[static_cast<std::size_t>(c)].gain[v];
             const double offset = channels[static_cast<std::size_t>(c)].offset[v];
-            map.gain[c] = static_cast<float>(gain);
-            map.offset[c] = static_cast<float>(offset);
+            map.gain[c] = static_cast<float>(1 + share * (gain - 1));
+            map.offset[c] = static_cast<float>(share * offset);
             moves =
                 moves || std::abs(offset) > kHalfStep || std::abs(gain + offset - 1) > kHalfStep;
             fits =

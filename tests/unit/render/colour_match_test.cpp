@@ -64,6 +64,21 @@ TEST(ColourMatch, ViewsThatAgreeKeepTheirColours) {
             EXPECT_TRUE(map.changesNothing());
 }
 
+TEST(ColourMatch, WhatGrowsSlowlyIsUndoneWithoutAJump) {
+    float before = 0;
+    bool some = false, none = false;
+    for (float gain = 1.0f; gain > 0.9f; gain -= 0.0025f) {
+        const auto maps = matchColours(kViews, pairsOf(glm::vec3(gain), glm::vec3(0)));
+        const float undone = maps[kChanged](glm::vec3(0.6f)).x - 0.6f;
+        // A step is 0.4 steps of 8 bits at 0.6; as long as the map grows, it makes up for others.
+        EXPECT_LT(std::abs(undone - before), 2.0f / 255) << gain;
+        before = undone;
+        none = none || undone == 0;
+        some = some || undone > 8.0f / 255;
+    }
+    EXPECT_TRUE(none && some);
+}
+
 TEST(ColourMatch, FewColoursTellNothing) {
     EXPECT_TRUE(matchColours(2, {})[0].changesNothing());
     std::vector<SharedColours> few(1);
