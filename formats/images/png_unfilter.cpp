@@ -8,14 +8,15 @@
 namespace stx {
 namespace {
 
-// A byte depends on the one before it, so a row is one long chain. Rows that follow each other are done
-// at once, each a pixel behind the one above it: what a row finds above is what that one had a moment
-// ago. GCC and clang make vector instructions of these types on every processor.
+// A byte depends on the one before it, so a row is one long chain. Rows that follow each other are
+// done at once, each a pixel behind the one above it: what a row finds above is what that one had a
+// moment ago. GCC and clang make vector instructions of these types on every processor.
 
 constexpr std::size_t kBytes = 16;
 using Lanes = std::uint8_t __attribute__((vector_size(kBytes)));
 
-/// A pixel as one number, and as many of them as fill Lanes. Pixels of 3 and 6 bytes leave some idle.
+/// A pixel as one number, and as many of them as fill Lanes. Pixels of 3 and 6 bytes leave some
+/// idle.
 template <class T>
 struct PixelsOf;
 template <>
@@ -128,8 +129,8 @@ class Wave {
         const auto before = reinterpret_cast<Pixels>(left_);
         const Pixels up = {(k == 0 ? first : before[k == 0 ? 0 : k - 1])...};
         const auto upBytes = reinterpret_cast<Lanes>(up);
-        left_ = reinterpret_cast<Lanes>(raw) +
-                guessOf<kAllPaeth>(filters_, left_, upBytes, corner_);
+        left_ =
+            reinterpret_cast<Lanes>(raw) + guessOf<kAllPaeth>(filters_, left_, upBytes, corner_);
         corner_ = upBytes;
         const auto done = reinterpret_cast<Pixels>(left_);
         ((kAll || has(t, k) ? store(done[k], at(t, k)) : void()), ...);

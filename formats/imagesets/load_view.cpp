@@ -66,9 +66,9 @@ void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool 
         work(*texture.rgbaFloat(), 1.0f);
 }
 
-std::int64_t countPoints(const Image<float>& depth) {
-    return std::count_if(depth.pixels().begin(), depth.pixels().end(),
-                         [](float d) { return hasPoint(d); });
+bool anyPoint(const Image<float>& depth) {
+    return std::any_of(depth.pixels().begin(), depth.pixels().end(),
+                       [](float d) { return hasPoint(d); });
 }
 
 /// Takes away what a mask does not show: its grey is the share of a pixel that belongs to the
@@ -160,7 +160,7 @@ Result<ReferenceView> finish(const SetView& set, std::string name, const Camera&
     view.camera = camera;
     view.texture = std::move(texture);
     view.depth = std::move(depth);
-    if (view.pointCount() == 0) return view;
+    if (!anyPoint(view.depth)) return view;
     bleedColour(view.texture);
     setPlanes(view, set, options, job);
     return view;
@@ -239,8 +239,12 @@ void align(const SetView& set, const ImageSetOptions& options, StoredView& store
 
 Distances scaledIntegers(double unit, float alsoNone) {
     return [unit, alsoNone](Image<float>& values, const Camera&, int, Job&) -> Result<void> {
-        for (float& v : values.pixels())
-            v = v == 0 || v == alsoNone ? kNoDepth : static_cast<float>(v * unit);
+        for (float& v : values.pixels()) {
+            // No branch: compilers make vectors of it.
+            const auto dist = static_cast<float>(v * unit);
+            const bool none = static_cast<int>(v == 0) | static_cast<int>(v == alsoNone);
+            v = none ? kNoDepth : dist;
+        }
         return {};
     };
 }
@@ -301,7 +305,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     STX_CHECK(
         within(fmt::format("'{}'", set.depth.name),
                toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored, job)));
-    if (countPoints(stored.depth) == 0)
+    if (!anyPoint(stored.depth))
         return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                       "not one of its {}x{} pixels has a valid depth; at least one is needed", dw,
                       dh);
@@ -314,7 +318,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
             job.note(fmt::format("view '{}': {} mixed pixels at depth edges are dropped ({:.2g} %)",
                                  set.name, dropped,
                                  100.0 * static_cast<double>(dropped) / stored.depth.count()));
-        if (countPoints(stored.depth) == 0)
+        if (!anyPoint(stored.depth))
             return failAt(
                 fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                 "all of its pixels look like noise at depth edges; keep them, if they are "
@@ -335,7 +339,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                 faceOfPanorama(stored.texture, stored.depth, faces[i], camera, *set.panorama);
             STX_TRY(auto view, finish(set, fmt::format("{}_{}", set.name, kFaces[i]), faces[i],
                                       std::move(texture), std::move(depth), true, options, job));
-            if (view.pointCount() > 0) views.push_back(std::move(view));
+            if (anyPoint(view.depth)) views.push_back(std::move(view));
         }
         if (views.empty())
             return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
@@ -367,7 +371,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     }
     STX_TRY(auto view, finish(set, set.name, camera, std::move(stored.texture),
                               std::move(stored.depth), stored.alpha, options, job));
-    if (view.pointCount() == 0)
+    if (!anyPoint(view.depth))
         return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                       "every pixel with a valid depth is transparent or outside the picture");
     views.push_back(std::move(view));

@@ -6,6 +6,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/capture/material_sampler.hpp"
+#include "lib/model/depth_values.hpp"
 #include "lib/model/strays.hpp"
 
 namespace stx {
@@ -48,13 +49,9 @@ void noteTranslucent(const Mesh& mesh, Job& job) {
 }  // namespace
 
 void fitDepthRange(ReferenceView& view) {
-    float nearest = kNoDepth, farthest = 0.0f;
-    for (const float d : view.depth.pixels()) {
-        if (!hasPoint(d)) continue;
-        nearest = std::min(nearest, d);
-        farthest = std::max(farthest, d);
-    }
-    if (!hasPoint(nearest)) return;
+    const DepthSummary points = summariseDepth(view.depth.pixels());
+    if (points.points == 0) return;
+    float nearest = points.nearest, farthest = std::max(points.farthest, 0.0f);
     // A flat object facing the camera still needs a range.
     if (nearest == farthest) {
         const float slack = std::max(farthest * 1e-4f, 1e-6f);
@@ -64,10 +61,7 @@ void fitDepthRange(ReferenceView& view) {
     view.nearPlane = nearest;
     view.farPlane = farthest;
     if (view.depthBits == 32) return;
-    const auto code = view.depthCode();
-    for (float& d : view.depth.pixels()) {
-        if (hasPoint(d)) d = static_cast<float>(code.decode(code.encode(d)));
-    }
+    roundToCode(view.depth.pixels(), view.depthCode());
 }
 
 Result<ReferenceView> captureView(const Mesh& mesh, const Camera& camera, std::string name,

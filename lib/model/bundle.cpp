@@ -3,22 +3,103 @@
 #include <algorithm>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/depth_values.hpp"
 
 namespace stx {
 
 std::int64_t ReferenceView::pointCount() const {
-    std::int64_t n = 0;
-    for (const float d : depth.pixels()) n += hasPoint(d) ? 1 : 0;
-    return n;
+    return summariseDepth(depth.pixels()).points;
 }
 
 Result<std::int64_t> ReferenceView::checkedPointCount() const {
-    std::int64_t n = 0;
-    for (const float d : depth.pixels()) {
-        if (!(d >= 0)) return depthError(d);
-        n += hasPoint(d) ? 1 : 0;
+    const DepthSummary summary = summariseDepth(depth.pixels());
+    if (!summary.wrong) return summary.points;
+    return depthError(*std::ranges::find_if(depth.pixels(), [](float d) { return !(d >= 0); }));
+}
+
+namespace {
+
+/// Side of the squares of pixels that computeBounds() looks at as one.
+constexpr int kSquare = 16;
+/// By which share of their sizes sums of coordinates may be off, and much more.
+constexpr double kRounding = 1e-12;
+
+/// A square of pixels with points, and the range of their distances.
+struct DepthSquare {
+    int x0, y0, x1, y1;  ///< the last ones included
+    float nearest, farthest;
+};
+
+std::vector<DepthSquare> depthSquares(const Image<float>& depth) {
+    std::vector<DepthSquare> squares;
+    for (int y0 = 0; y0 < depth.height(); y0 += kSquare) {
+        const int y1 = std::min(y0 + kSquare, depth.height()) - 1;
+        for (int x0 = 0; x0 < depth.width(); x0 += kSquare) {
+            const int x1 = std::min(x0 + kSquare, depth.width()) - 1;
+            // By columns: compilers make vectors of it.
+            float nearest[kSquare], farthest[kSquare];
+            std::fill_n(nearest, kSquare, kNoDepth);
+            std::fill_n(farthest, kSquare, -kNoDepth);
+            for (int y = y0; y <= y1; ++y) {
+                const float* row = &depth.at(x0, y);
+                for (int i = 0; i <= x1 - x0; ++i) {
+                    const float d = row[i], far = hasPoint(d) ? d : -kNoDepth;
+                    nearest[i] = d < nearest[i] ? d : nearest[i];
+                    farthest[i] = far > farthest[i] ? far : farthest[i];
+                }
+            }
+            const float least = *std::min_element(nearest, nearest + kSquare);
+            if (hasPoint(least))
+                squares.push_back(
+                    {x0, y0, x1, y1, least, *std::max_element(farthest, farthest + kSquare)});
+        }
     }
-    return n;
+    return squares;
+}
+
+/// Where the points of a square can be: coordinates are linear in each of x, y and the distance, so
+/// they are between those of its corners.
+Bounds reachOf(const Camera& camera, const glm::dmat3& worldFromCamera, const DepthSquare& s) {
+    Bounds reach;
+    double size = 0;
+    for (const int x : {s.x0, s.x1}) {
+        for (const int y : {s.y0, s.y1}) {
+            for (const float dist : {s.nearest, s.farthest}) {
+                const auto p = camera.unproject(x + 0.5, y + 0.5, dist);
+                reach.add(camera.position + worldFromCamera * p);
+                size = std::max(size, glm::length(p));
+            }
+        }
+    }
+    const glm::dvec3 slack(kRounding * (size + glm::length(camera.position)));
+    reach.min -= slack;
+    reach.max += slack;
+    return reach;
+}
+
+}  // namespace
+
+Bounds ReferenceView::computeBounds() const {
+    Bounds bounds;
+    const auto add = [&](int x, int y) {
+        if (hasPoint(depth.at(x, y))) bounds.add(worldPoint(x, y));
+    };
+    // A few points first, so that most squares turn out to be within them.
+    const auto squares = depthSquares(depth);
+    for (const DepthSquare& s : squares)
+        for (const int x : {s.x0, s.x1})
+            for (const int y : {s.y0, s.y1}) add(x, y);
+    const glm::dmat3 worldFromCamera = glm::mat3_cast(camera.orientation);
+    for (const DepthSquare& s : squares) {
+        const Bounds reach = reachOf(camera, worldFromCamera, s);
+        // False, too, where the reach is not a number.
+        if (glm::all(glm::greaterThanEqual(reach.min, bounds.min)) &&
+            glm::all(glm::lessThanEqual(reach.max, bounds.max)))
+            continue;
+        for (int y = s.y0; y <= s.y1; ++y)
+            for (int x = s.x0; x <= s.x1; ++x) add(x, y);
+    }
+    return bounds;
 }
 
 Result<void> ReferenceView::checkHeader() const {
@@ -91,14 +172,8 @@ std::int64_t Bundle::pointCount() const {
 
 Bounds Bundle::computeBounds() const {
     std::vector<Bounds> each(views.size());
-    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
-        const auto& v = views[i];
-        for (int y = 0; y < v.depth.height(); ++y) {
-            for (int x = 0; x < v.depth.width(); ++x) {
-                if (hasPoint(v.depth.at(x, y))) each[i].add(v.worldPoint(x, y));
-            }
-        }
-    });
+    parallelFor(0, static_cast<std::int64_t>(views.size()),
+                [&](std::int64_t i) { each[i] = views[i].computeBounds(); });
     Bounds all;
     for (const auto& b : each) {
         if (b.empty()) continue;

@@ -62,6 +62,8 @@ struct ReferenceView {
     [[nodiscard]] std::int64_t pointCount() const;
     /// The same, and the error of check() when a depth is NaN or below 0.
     [[nodiscard]] Result<std::int64_t> checkedPointCount() const;
+    /// World bounds of all points, of worldPoint() of each; empty when there are none.
+    [[nodiscard]] Bounds computeBounds() const;
     /// World position of the point of pixel (x, y), whose depth must be one.
     [[nodiscard]] glm::dvec3 worldPoint(int x, int y) const {
         return camera.position +

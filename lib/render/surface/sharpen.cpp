@@ -1,8 +1,10 @@
 #include "lib/render/surface/sharpen.hpp"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/surface/source_rows.hpp"
 
 namespace stx::surface {
 namespace {
@@ -53,9 +55,18 @@ void sharpen(const Source& s, const PageRectangle& r, const Pixel* from, Pixel* 
     const int around = s.whole ? 0 : PageSet::kPadding;
     const int x0 = std::max(r.x0 - around, 0) + 1, x1 = std::min(r.x1 + around, s.width) - 1;
     const int y0 = std::max(r.y0 - around, 0) + 1, y1 = std::min(r.y1 + around, s.height) - 1;
+    if (x0 >= x1) return;
     parallelForBlocks(y0, y1, 32, [&](std::int64_t first, std::int64_t end) {
         for (int y = static_cast<int>(first); y < end; ++y) {
-            for (int x = x0; x < x1; ++x) {
+            int x = x0;
+            if constexpr (std::is_same_v<Pixel, glm::u8vec4>) {
+                const std::size_t at = r.texel(x0, y);
+                if (r.stepX == 1)
+                    x += static_cast<int>(sharpenRow(from + at, info + at, r.stepY,
+                                                     static_cast<std::size_t>(x1 - x0), kFromEdge,
+                                                     kShare256, to + at));
+            }
+            for (; x < x1; ++x) {
                 const Cross t{r.texel(x, y), r.texel(x - 1, y), r.texel(x + 1, y),
                               r.texel(x, y - 1), r.texel(x, y + 1)};
                 if (onOneSurface(info, t)) to[t.middle] = sharpened(from, t);

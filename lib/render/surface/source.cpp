@@ -1,60 +1,21 @@
 #include "lib/render/surface/source.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/surface/colour_depth.hpp"
 #include "lib/render/surface/depth_noise.hpp"
+#include "lib/render/surface/draft.hpp"
 #include "lib/render/surface/fat_edges.hpp"
 #include "lib/render/surface/noisy_views.hpp"
 #include "lib/render/surface/sharpen.hpp"
 #include "lib/render/surface/silhouette_points.hpp"
+#include "lib/render/surface/source_rows.hpp"
 
 namespace stx::surface {
 namespace {
-
-// Where no source is named the value was chosen by trial on the project's image sets and meshes.
-
-/// Neighbours whose q differ by less than this share of it are one surface; by more than the
-/// second, never; between them, when the slope goes on within this share of the step.
-constexpr float kLinkAlways = 0.005f, kLinkNever = 0.03f, kSameSlope = 0.5f;
-/// Steps of the depth code that neighbours may differ by all the same: one, and rounding.
-constexpr float kLinkSteps = 1.5f;
-/// A leaf may leave its plane by this many pixels of parallax at a right angle; of noisy depth by
-/// this many times the noise, up to three times as many pixels.
-constexpr float kPlanarPixels = 0.08f;
-constexpr double kPlanarNoise = 1.5;
-constexpr float kPlanarMost = 3.0f;
-/// Depth noisier than this share of q counts as this noisy.
-constexpr float kMostNoise = 0.01f;
-
-/// Whether neighbours b and c lie on one surface, given the pixels before and after them (0 =
-/// none). Small steps always do; larger ones when the surface goes on with the same slope.
-bool linked(const DepthAxis& axis, float codeStep, float a, float b, float c, float d) {
-    if (!(b > 0.0f && c > 0.0f)) return false;
-    const float step = c - b, size = std::abs(step);
-    const float scale = axis.relativeScale(std::max(b, c));
-    if (size < kLinkAlways * scale + kLinkSteps * codeStep * axis.qPerUnit(std::max(b, c)))
-        return true;
-    if (size >= kLinkNever * scale) return false;
-    const float agree = kSameSlope * size;
-    return (a > 0.0f && std::abs(step - (b - a)) < agree) ||
-           (d > 0.0f && std::abs(step - (d - c)) < agree);
-}
-
-/// A view while it is prepared: its pixels side by side, wherever they are kept.
-struct Draft {
-    Image<float> q;               ///< see PreparedPage
-    Image<std::uint8_t> info;     ///< see PreparedPage
-    Image<std::uint8_t> covered;  ///< 1 = full alpha
-
-    [[nodiscard]] bool linkRight(int x, int y) const { return info.at(x, y) & Info::kLinkRight; }
-    [[nodiscard]] bool linkDown(int x, int y) const { return info.at(x, y) & Info::kLinkDown; }
-    [[nodiscard]] int edgeDistance(int x, int y) const { return info.at(x, y) >> 4; }
-    [[nodiscard]] bool pruned(int x, int y) const { return q.at(x, y) < 0.0f; }
-};
 
 /// Of orthographic views; 0 for others, whose depth axis does not need it.
 double farthestPoint(const PageSet& set, std::size_t view) {
@@ -108,11 +69,31 @@ Draft draftOf(const Source& s) {
         const auto* bytes = texture.rgba8();
         const float* depth = s.set->pages()[static_cast<std::size_t>(r.page)].depth->data();
         const DepthAxis axis = s.space.axis;
-        forEachPixel(s, r, 0, [&](int x, int y, std::size_t texel) {
-            mark(x, y,
-                 bytes ? bytes->data()[texel].a == 255 : PageSet::alphaOf(texture, texel) >= 1.0f);
-            const float dist = depth[texel];
-            if (hasPoint(dist) && dist > 0.0f) d.q.at(x, y) = static_cast<float>(axis.q(dist));
+        const auto width = static_cast<std::size_t>(r.x1 - r.x0);
+        parallelForBlocks(r.y0, r.y1, 32, [&](std::int64_t from, std::int64_t to) {
+            for (int y = static_cast<int>(from); y < to; ++y) {
+                const std::size_t first = r.texel(r.x0, y);
+                const auto texel = [&](std::size_t i) {
+                    return first +
+                           static_cast<std::size_t>(static_cast<std::ptrdiff_t>(i) * r.stepX);
+                };
+                std::uint8_t* covered = &d.covered.at(r.x0, y);
+                float* q = &d.q.at(r.x0, y);
+                for (std::size_t i = 0; i < width; ++i)
+                    covered[i] = bytes ? bytes->data()[texel(i)].a == 255
+                                       : PageSet::alphaOf(texture, texel(i)) >= 1.0f;
+                if (axis.inverse && r.stepX == 1) {
+                    // 1 / dist in floats is what it is in doubles and rounded then.
+                    invertDistances(depth + first, covered, width, pruned ? -1.0f : 0.0f, q);
+                    continue;
+                }
+                for (std::size_t i = 0; i < width; ++i) {
+                    const float dist = depth[texel(i)];
+                    q[i] = hasPoint(dist) && dist > 0.0f ? static_cast<float>(axis.q(dist))
+                           : covered[i] != 0 && pruned   ? -1.0f
+                                                         : 0.0f;
+                }
+            }
         });
     }
     return d;
@@ -147,27 +128,26 @@ void findLinks(const Source& s, Draft& d) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             const float *above = rowOf(y - 1), *here = rowOf(y), *below = rowOf(y + 1),
                         *second = rowOf(y + 2);
-            const bool first = y == 0, last = y + 1 == height;
-            std::uint8_t* const info = d.info.row(y).data();
-            for (int x = 0; x < width; ++x) {
-                const float q = here[x];
-                if (!(q > 0.0f)) {
-                    info[x] = 0;
-                    continue;
-                }
-                const float left = x > 0 ? here[x - 1] : -1.0f;
-                const float right = x + 1 < width ? here[x + 1] : -1.0f;
-                std::uint8_t bits = 0;
-                if (linked(axis, s.step, left, q, right, x + 2 < width ? here[x + 2] : 0.0f))
-                    bits |= Info::kLinkRight;
-                if (linked(axis, s.step, above[x], q, below[x], second[x])) bits |= Info::kLinkDown;
-                if (left == 0.0f || right == 0.0f || (!first && above[x] == 0.0f) ||
-                    (!last && below[x] == 0.0f))
-                    bits |= Info::kBesideBackground;
-                info[x] = bits;
-            }
+            linkRow({above, here, below, second, y == 0, y + 1 == height}, width, axis, s.step,
+                    d.info.row(y).data());
         }
     });
+}
+
+/// Whether eight pixels from x on, above 0, all have links to all sides and full alpha, as most
+/// have.
+bool insideSurface(const Draft& d, int x, int y) {
+    const auto eight = [](const std::uint8_t* from) {
+        std::uint64_t bytes = 0;
+        std::memcpy(&bytes, from, 8);
+        return bytes;
+    };
+    constexpr std::uint64_t kEach = 0x0101010101010101;
+    const std::uint8_t* info = &d.info.at(x, y);
+    const std::uint64_t both = eight(info) & (eight(info - 1) | ~(kEach * Info::kLinkRight)) &
+                               (eight(&d.info.at(x, y - 1)) | ~(kEach * Info::kLinkDown));
+    constexpr std::uint64_t kAll = kEach * (Info::kLinkRight | Info::kLinkDown);
+    return (both & kAll) == kAll && eight(&d.covered.at(x, y)) == kEach;
 }
 
 /// Fills the block's edge masks and the distances to edges.
@@ -177,6 +157,10 @@ void findEdges(Source& s, Draft& d) {
         for (int y = static_cast<int>(from) * kBlock; y < std::min<int>(to * kBlock, s.height);
              ++y) {
             for (int x = 0; x < s.width; ++x) {
+                if (x > 0 && y > 0 && x + 8 <= s.width && insideSurface(d, x, y)) {
+                    x += 7;
+                    continue;
+                }
                 const float q = d.q.at(x, y);
                 if (!(q > 0.0f)) {
                     if (!(q < 0.0f)) distance.at(x, y) = 0;
@@ -225,204 +209,16 @@ void findEdges(Source& s, Draft& d) {
                 std::uint8_t* out = distance.row(y).data();
                 for (int x = 0; x < s.width; ++x) {
                     const std::uint8_t beside = std::min(above[x], below[x]);
-                    const auto next = static_cast<std::uint8_t>(std::min(beside, here[x]) + 1);
-                    out[x] = std::min(out[x], next);
+                    const std::uint8_t least = std::min(beside, here[x]);
+                    const auto next = static_cast<std::uint8_t>(least + 1);
+                    const std::uint8_t was = out[x];
+                    out[x] = next < was ? next : was;
                 }
             }
         });
     }
     for (std::size_t i = 0; i < distance.count(); ++i)
         d.info.data()[i] |= static_cast<std::uint8_t>(distance.data()[i] << 4);
-}
-
-/// The least-squares plane of (size+1)² pixels, when no pixel leaves it by more than `tolerance`.
-bool fitPlane(const Source& s, const Draft& d, int x0, int y0, int size, float tolerance,
-              Leaf& leaf) {
-    const int n = size + 1;
-    for (int y = y0; y <= y0 + size; ++y)
-        for (int x = x0; x <= x0 + size; ++x)
-            if (d.edgeDistance(x, y) < 3) return false;
-    const float anchor = d.q.at(x0, y0);
-    float sum = 0, sumX = 0, sumY = 0;
-    const float half = static_cast<float>(size) * 0.5f;
-    for (int y = 0; y < n; ++y) {
-        const float* row = &d.q.at(x0, y0 + y);
-        for (int x = 0; x < n; ++x) {
-            const float above = row[x] - anchor;
-            sum += above;
-            sumX += above * (static_cast<float>(x) - half);
-            sumY += above * (static_cast<float>(y) - half);
-        }
-    }
-    const float spread =
-        static_cast<float>(n) * static_cast<float>(n) * static_cast<float>(n * n - 1) / 12.0f;
-    leaf.x = static_cast<std::uint16_t>(x0);
-    leaf.y = static_cast<std::uint16_t>(y0);
-    leaf.size = static_cast<std::uint16_t>(size);
-    leaf.qx = sumX / spread;
-    leaf.qy = sumY / spread;
-    leaf.q0 = anchor + sum / static_cast<float>(n * n) - half * (leaf.qx + leaf.qy);
-    const float limit = tolerance * s.space.axis.relativeScale(anchor);
-    for (int y = 0; y < n; ++y) {
-        const float* row = &d.q.at(x0, y0 + y);
-        for (int x = 0; x < n; ++x) {
-            const float on =
-                leaf.q0 + leaf.qx * static_cast<float>(x) + leaf.qy * static_cast<float>(y);
-            if (!(std::abs(on - row[x]) <= limit)) return false;
-        }
-    }
-    return true;
-}
-
-void divide(const Source& s, const Draft& d, int x, int y, int size, float tolerance,
-            SourceBlock& block, std::vector<Leaf>& leaves) {
-    if (x >= s.width - 1 || y >= s.height - 1) return;
-    if (size > 1 && x + size < s.width && y + size < s.height) {
-        Leaf leaf;
-        if (fitPlane(s, d, x, y, size, tolerance, leaf)) {
-            leaves.push_back(leaf);
-            return;
-        }
-    }
-    if (size > 1) {
-        const int h = size / 2;
-        divide(s, d, x, y, h, tolerance, block, leaves);
-        divide(s, d, x + h, y, h, tolerance, block, leaves);
-        divide(s, d, x, y + h, h, tolerance, block, leaves);
-        divide(s, d, x + h, y + h, h, tolerance, block, leaves);
-        return;
-    }
-    const int links =
-        d.linkRight(x, y) + d.linkDown(x, y) + d.linkRight(x, y + 1) + d.linkDown(x + 1, y);
-    if (links < 2) return;
-    block.cells[y % kBlock] |= static_cast<std::uint16_t>(1u << (x % kBlock));
-    block.anyCell = true;
-}
-
-/// How far the code of the depth makes planes uneven: the median second difference, relative.
-float unevenness(const Source& s, const Draft& d) {
-    std::vector<float> values;
-    const int step = std::max(1, s.height / 64);
-    for (int y = step / 2; y < s.height; y += step) {
-        for (int x = 1; x + 1 < s.width; x += 3) {
-            if (d.edgeDistance(x, y) < 3) continue;
-            const float q = d.q.at(x, y);
-            if (!(q > 0 && d.q.at(x - 1, y) > 0 && d.q.at(x + 1, y) > 0)) continue;
-            values.push_back(std::abs(d.q.at(x - 1, y) - 2 * q + d.q.at(x + 1, y)) /
-                             s.space.axis.relativeScale(q));
-        }
-    }
-    if (values.empty()) return 0.0f;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-/// See SourceBlock::reach: leaves are near their pixels, extensions go on with a pixel's gradient.
-float reachOf(const Source& s, const Draft& d, const SourceBlock& block, int x0, int y0) {
-    const float scale = s.space.axis.relativeScale(block.qMax);
-    float reach = block.leafEnd > block.leafBegin ? s.flat * scale : 0.0f;
-    for (int j = 0; block.anyEdge && j < kBlock; ++j) {
-        for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
-            const int x = x0 + std::countr_zero(left), y = y0 + j;
-            const glm::vec2 g =
-                gradientFrom(&d.q.at(x, y), &d.info.at(x, y), 1, s.width, x > 0, y > 0);
-            reach =
-                std::max(reach, std::min(kHalfBesideBackground * (std::abs(g.x) + std::abs(g.y)),
-                                         kExtensionReach * scale));
-        }
-    }
-    return reach;
-}
-
-/// Fills SourceBlock::leastSlope and mostSlope; `leaves`: the block's.
-void findSlopes(const Source& s, const Draft& d, std::span<const Leaf> leaves, SourceBlock& block,
-                int x0, int y0) {
-    glm::vec2 least(std::numeric_limits<float>::max()), most(-least);
-    const auto add = [&](glm::vec2 slope) {
-        least = glm::min(least, slope);
-        most = glm::max(most, slope);
-    };
-    for (const Leaf& leaf : leaves) add({leaf.qx, leaf.qy});
-    for (int j = 0; block.anyCell && j < kBlock; ++j) {
-        for (std::uint32_t left = block.cells[j]; left; left &= left - 1) {
-            // However it is cut in two, its triangles have the slopes of two of its sides.
-            const float* q = &d.q.at(x0 + std::countr_zero(left), y0 + j);
-            add({q[1] - q[0], q[s.width] - q[0]});
-            add({q[s.width + 1] - q[s.width], q[s.width + 1] - q[1]});
-        }
-    }
-    for (int j = 0; block.anyEdge && j < kBlock; ++j) {
-        for (std::uint32_t left = block.edges[j]; left; left &= left - 1) {
-            // Its corners leave the pixel's q by so much at most.
-            const int x = x0 + std::countr_zero(left), y = y0 + j;
-            const float q = d.q.at(x, y);
-            const glm::vec2 g =
-                gradientFrom(&d.q.at(x, y), &d.info.at(x, y), 1, s.width, x > 0, y > 0);
-            const float limit = kExtensionReach * s.space.axis.relativeScale(q);
-            for (const float half : {kHalfInside, kHalfBesideBackground}) {
-                const float sum = std::clamp(half * (g.x + g.y), -limit, limit);
-                const float difference = std::clamp(half * (g.x - g.y), -limit, limit);
-                add(glm::vec2(sum + difference, sum - difference) / (2 * half));
-            }
-        }
-    }
-    block.leastSlope = least;
-    block.mostSlope = most;
-}
-
-void findLeaves(Source& s, const Draft& d) {
-    s.noise = std::min(unevenness(s, d), kMostNoise);
-    const double focal = std::max(s.space.camera.fx, s.space.camera.fy);
-    const double perPixel = 1.0 / (focal * (s.space.axis.inverse ? 1.0 : s.space.axis.unit));
-    s.flat = static_cast<float>(std::clamp<double>(kPlanarNoise * s.noise, kPlanarPixels * perPixel,
-                                                   kPlanarMost * kPlanarPixels * perPixel));
-    std::vector<std::vector<Leaf>> rows(static_cast<std::size_t>(s.blocksY));
-    parallelFor(0, s.blocksY, [&](std::int64_t by) {
-        auto& leaves = rows[static_cast<std::size_t>(by)];
-        for (int bx = 0; bx < s.blocksX; ++bx) {
-            auto& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
-            const int x0 = bx * kBlock, y0 = static_cast<int>(by) * kBlock;
-            float low = std::numeric_limits<float>::max(), high = 0;
-            for (int y = y0; y <= std::min(y0 + kBlock, s.height - 1); ++y) {
-                for (int x = x0; x <= std::min(x0 + kBlock, s.width - 1); ++x) {
-                    const float q = d.q.at(x, y);
-                    if (!(q > 0)) continue;
-                    low = std::min(low, q);
-                    high = std::max(high, q);
-                }
-            }
-            if (!(high > 0)) continue;
-            block.qMin = low;
-            block.qMax = high;
-            block.leafBegin = static_cast<std::uint32_t>(leaves.size());
-            divide(s, d, x0, y0, kBlock, s.flat, block, leaves);
-            block.leafEnd = static_cast<std::uint32_t>(leaves.size());
-            block.reach = reachOf(s, d, block, x0, y0);
-            findSlopes(s, d, {leaves.data() + block.leafBegin, leaves.data() + block.leafEnd},
-                       block, x0, y0);
-        }
-    });
-    for (int by = 0; by < s.blocksY; ++by) {
-        const auto base = static_cast<std::uint32_t>(s.leaves.size());
-        const auto& leaves = rows[static_cast<std::size_t>(by)];
-        s.leaves.insert(s.leaves.end(), leaves.begin(), leaves.end());
-        for (int bx = 0; bx < s.blocksX; ++bx) {
-            auto& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
-            block.leafBegin += base;
-            block.leafEnd += base;
-        }
-    }
-}
-
-/// See Source::validShare.
-double validShareOf(const Draft& d) {
-    std::int64_t points = 0, object = 0;
-    for (std::size_t i = 0; i < d.q.count(); ++i) {
-        points += d.q.data()[i] > 0.0f;
-        object += d.q.data()[i] > 0.0f || d.covered.data()[i];
-    }
-    return object > 0 ? static_cast<double>(points) / static_cast<double>(object) : 1.0;
 }
 
 /// The median distance of a view's points, scene units; orthographic: what shares of q are shares
@@ -450,10 +246,11 @@ Draft beginSource(Source& s, NoisyView& noisy) {
     s.blocksY = (s.height + kBlock - 1) / kBlock;
     s.blocks.resize(static_cast<std::size_t>(s.blocksX) * s.blocksY);
     Draft d = draftOf(s);
-    const auto& covered = d.covered;
-    s.hasAlpha = std::find(covered.data(), covered.data() + covered.count(), 0) !=
-                 covered.data() + covered.count();
-    s.validShare = validShareOf(d);
+    const DraftCounts counts = countPixels(d.q.data(), d.covered.data(), d.q.count());
+    s.hasAlpha = counts.covered < static_cast<std::int64_t>(d.covered.count());
+    s.validShare = counts.object > 0
+                       ? static_cast<double>(counts.points) / static_cast<double>(counts.object)
+                       : 1.0;
     const float noise = depthNoise(d.q, s.space.axis);
     closePinholes(d.q, d.covered, s.space.axis, noise);
     noisy.left = smoothDepth(d.q, s.space.axis, noise, &noisy.surface);

@@ -1,0 +1,115 @@
+#include "lib/model/depth_values.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lib/model/depth_values.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using DF = hn::ScalableTag<float>;
+using DD = hn::RepartitionToWide<DF>;
+using DI = hn::RebindToSigned<DF>;
+
+void depthSummaryImpl(std::span<const float> distances, DepthSummary& summary) {
+    const DF d;
+    const DI di;
+    // So many that 32 bits hold what each lane counts.
+    constexpr std::size_t kPiece = std::size_t{1} << 24;
+    const std::size_t lanes = hn::Lanes(d);
+    const auto none = hn::Set(d, kNoDepth), zero = hn::Zero(d);
+    auto nearest = none, farthest = hn::Neg(none);
+    auto wrong = hn::Lt(zero, zero);  // none
+    std::size_t i = 0;
+    while (i + lanes <= distances.size()) {
+        const std::size_t end = std::min(distances.size() - lanes + 1, i + kPiece);
+        auto missing = hn::Zero(di);
+        std::size_t seen = 0;
+        for (; i < end; i += lanes, seen += lanes) {
+            const auto v = hn::LoadU(d, distances.data() + i);
+            const auto point = hn::Lt(v, none);
+            // A mask is -1 in each of its lanes.
+            missing = hn::Add(missing, hn::BitCast(di, hn::VecFromMask(d, hn::Not(point))));
+            nearest = hn::Min(nearest, hn::IfThenElse(point, v, none));
+            farthest = hn::Max(farthest, hn::IfThenElse(point, v, hn::Neg(none)));
+            wrong = hn::Or(wrong, hn::Not(hn::Ge(v, zero)));
+        }
+        std::int32_t each[hn::MaxLanes(DI())];
+        hn::StoreU(missing, di, each);
+        summary.points += static_cast<std::int64_t>(seen);
+        for (std::size_t k = 0; k < lanes; ++k) summary.points += each[k];
+    }
+    summary.nearest = hn::GetLane(hn::MinOfLanes(d, nearest));
+    summary.farthest = hn::GetLane(hn::MaxOfLanes(d, farthest));
+    summary.wrong = !hn::AllFalse(d, wrong);
+    for (; i < distances.size(); ++i) {
+        const float v = distances[i];
+        summary.wrong = summary.wrong || !(v >= 0);
+        if (!hasPoint(v)) continue;
+        ++summary.points;
+        summary.nearest = std::min(summary.nearest, v);
+        summary.farthest = std::max(summary.farthest, v);
+    }
+}
+
+/// The operations of DepthCode, in its order.
+HWY_INLINE hn::Vec<DD> roundedToCode(hn::Vec<DD> dist, const DepthCode& code) {
+    const DD d;
+    const auto one = hn::Set(d, 1.0), most = hn::Set(d, static_cast<double>(code.dmax)),
+               steps = hn::Set(d, code.dmax - 1.0);
+    const auto range = hn::Set(d, code.farPlane - code.nearPlane);
+    const auto exact =
+        hn::Add(one, hn::Div(hn::Mul(steps, hn::Sub(hn::Set(d, code.farPlane), dist)), range));
+    // As std::round() does what is above 0: halves go up. Others become 1.
+    const auto below = hn::Floor(exact);
+    const auto half = hn::Ge(hn::Sub(exact, below), hn::Set(d, 0.5));
+    const auto number = hn::Min(hn::Max(hn::Add(below, hn::IfThenElseZero(half, one)), one), most);
+    const auto share = hn::Sub(one, hn::Div(hn::Sub(number, one), steps));
+    return hn::Add(hn::Set(d, code.nearPlane), hn::Mul(share, range));
+}
+
+void roundToCodeImpl(std::span<float> distances, const DepthCode& code) {
+    const DD d;
+    const hn::Rebind<float, DD> df;
+    const std::size_t lanes = hn::Lanes(d);
+    const auto none = hn::Set(df, kNoDepth);
+    std::size_t i = 0;
+    for (; i + lanes <= distances.size(); i += lanes) {
+        const auto v = hn::LoadU(df, distances.data() + i);
+        const auto point = hn::Lt(v, none);
+        const auto rounded = hn::DemoteTo(df, roundedToCode(hn::PromoteTo(d, v), code));
+        hn::StoreU(hn::IfThenElse(point, rounded, v), df, distances.data() + i);
+    }
+    for (; i < distances.size(); ++i)
+        if (hasPoint(distances[i]))
+            distances[i] = static_cast<float>(code.decode(code.encode(distances[i])));
+}
+
+}  // namespace stx::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stx {
+
+HWY_EXPORT(depthSummaryImpl);
+HWY_EXPORT(roundToCodeImpl);
+
+DepthSummary summariseDepth(std::span<const float> distances) {
+    DepthSummary summary;
+    HWY_DYNAMIC_DISPATCH(depthSummaryImpl)(distances, summary);
+    return summary;
+}
+
+void roundToCode(std::span<float> distances, const DepthCode& code) {
+    HWY_DYNAMIC_DISPATCH(roundToCodeImpl)(distances, code);
+}
+
+}  // namespace stx
+#endif

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "lib/geometry/depth_code.hpp"
+
+namespace stx {
+
+/// What a depth image holds.
+struct DepthSummary {
+    std::int64_t points = 0;  ///< values below kNoDepth
+    /// The least and the largest of the points, scene units; kNoDepth and -kNoDepth without one.
+    float nearest = kNoDepth, farthest = -kNoDepth;
+    bool wrong = false;  ///< some value is NaN or below 0
+};
+
+[[nodiscard]] DepthSummary summariseDepth(std::span<const float> distances);
+
+/// Makes of each point the distance that its code stands for: decode(encode()), to the bit.
+/// Precondition: `code` has farPlane > nearPlane, both finite.
+void roundToCode(std::span<float> distances, const DepthCode& code);
+
+}  // namespace stx
