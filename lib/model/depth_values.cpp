@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <vector>
 
 HWY_BEFORE_NAMESPACE();
 namespace stx::HWY_NAMESPACE {
@@ -92,6 +93,88 @@ void roundToCodeImpl(std::span<float> distances, const DepthCode& code) {
             distances[i] = static_cast<float>(code.decode(code.encode(distances[i])));
 }
 
+using VD = hn::Vec<DD>;
+
+/// A vector of points, or of what stands for one.
+struct Points {
+    VD x, y, z;
+};
+
+HWY_INLINE Points cross(const Points& a, const Points& b) {
+    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(b.y, a.z)),
+            hn::Sub(hn::Mul(a.z, b.x), hn::Mul(b.z, a.x)),
+            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(b.x, a.y))};
+}
+
+/// The operations of ReferenceView::worldPoint(), in its order.
+struct ToWorld {
+    Points axis, eye;
+    VD angle;
+
+    explicit ToWorld(const Camera& c)
+        : axis{hn::Set(DD(), c.orientation.x), hn::Set(DD(), c.orientation.y),
+               hn::Set(DD(), c.orientation.z)},
+          eye{hn::Set(DD(), c.position.x), hn::Set(DD(), c.position.y),
+              hn::Set(DD(), c.position.z)},
+          angle(hn::Set(DD(), c.orientation.w)) {}
+
+    HWY_INLINE Points operator()(const Points& p) const {
+        const Points once = cross(axis, p), twice = cross(axis, once);
+        const auto turned = [&](VD eyeAt, VD at, VD first, VD second) HWY_ATTR {
+            const VD both = hn::Add(hn::Mul(first, angle), second);
+            return hn::Add(eyeAt, hn::Add(at, hn::Mul(both, hn::Set(DD(), 2.0))));
+        };
+        return {turned(eye.x, p.x, once.x, twice.x), turned(eye.y, p.y, once.y, twice.y),
+                turned(eye.z, p.z, once.z, twice.z)};
+    }
+};
+
+/// `columns`: what unproject() gives along x at distance 1, for each pixel of a row and as many
+/// more as fill a vector.
+void boundsImpl(const Image<float>& distances, const Camera& camera, const double* columns,
+                Bounds& bounds) {
+    const DD d;
+    const hn::Rebind<float, DD> df;
+    const std::size_t lanes = hn::Lanes(d);
+    const auto width = static_cast<std::size_t>(distances.width());
+    const ToWorld toWorld(camera);
+    const VD one = hn::Set(d, 1.0), none = hn::Set(d, static_cast<double>(kNoDepth));
+    Points least{none, none, none}, most{hn::Neg(none), hn::Neg(none), hn::Neg(none)};
+    for (int y = 0; y < distances.height(); ++y) {
+        const float* row = distances.row(y).data();
+        const VD down = hn::Set(d, -(y + 0.5 - camera.cy) / camera.fy);
+        const auto add = [&](const float* from, std::size_t x) HWY_ATTR {
+            const VD dist = hn::PromoteTo(d, hn::LoadU(df, from));
+            const auto point = hn::Lt(dist, none);
+            const VD scale = camera.orthographic ? one : dist;
+            const Points p = toWorld(
+                {hn::Mul(hn::LoadU(d, columns + x), scale), hn::Mul(down, scale), hn::Neg(dist)});
+            const auto widen = [&](VD at, VD& low, VD& high) HWY_ATTR {
+                low = hn::Min(low, hn::IfThenElse(point, at, none));
+                high = hn::Max(high, hn::IfThenElse(point, at, hn::Neg(none)));
+            };
+            widen(p.x, least.x, most.x);
+            widen(p.y, least.y, most.y);
+            widen(p.z, least.z, most.z);
+        };
+        std::size_t x = 0;
+        for (; x + lanes <= width; x += lanes) add(row + x, x);
+        if (x == width) continue;
+        float last[hn::MaxLanes(DD())];
+        std::fill_n(last, lanes, kNoDepth);
+        std::copy(row + x, row + width, last);
+        add(last, x);
+    }
+    const auto lowest = [&](VD v) HWY_ATTR { return hn::GetLane(hn::MinOfLanes(d, v)); };
+    const auto highest = [&](VD v) HWY_ATTR { return hn::GetLane(hn::MaxOfLanes(d, v)); };
+    bounds.min = {lowest(least.x), lowest(least.y), lowest(least.z)};
+    bounds.max = {highest(most.x), highest(most.y), highest(most.z)};
+}
+
+std::size_t lanesOfBounds() {
+    return hn::Lanes(DD());
+}
+
 }  // namespace stx::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -100,11 +183,23 @@ namespace stx {
 
 HWY_EXPORT(depthSummaryImpl);
 HWY_EXPORT(roundToCodeImpl);
+HWY_EXPORT(boundsImpl);
+HWY_EXPORT(lanesOfBounds);
 
 DepthSummary summariseDepth(std::span<const float> distances) {
     DepthSummary summary;
     HWY_DYNAMIC_DISPATCH(depthSummaryImpl)(distances, summary);
     return summary;
+}
+
+Bounds boundsOfPoints(const Image<float>& distances, const Camera& camera) {
+    const std::size_t beyond = HWY_DYNAMIC_DISPATCH(lanesOfBounds)();
+    std::vector<double> columns(static_cast<std::size_t>(distances.width()) + beyond);
+    for (int x = 0; x < distances.width(); ++x)
+        columns[static_cast<std::size_t>(x)] = (x + 0.5 - camera.cx) / camera.fx;
+    Bounds bounds;
+    HWY_DYNAMIC_DISPATCH(boundsImpl)(distances, camera, columns.data(), bounds);
+    return bounds;
 }
 
 void roundToCode(std::span<float> distances, const DepthCode& code) {

@@ -3,6 +3,9 @@
 #include <cstdint>
 #include <span>
 
+#include "lib/base/image.hpp"
+#include "lib/geometry/bounds.hpp"
+#include "lib/geometry/camera.hpp"
 #include "lib/geometry/depth_code.hpp"
 
 namespace stx {
@@ -16,6 +19,10 @@ struct DepthSummary {
 };
 
 [[nodiscard]] DepthSummary summariseDepth(std::span<const float> distances);
+
+/// World bounds of the points of a depth image, to the bit those of ReferenceView::worldPoint();
+/// empty without a point.
+[[nodiscard]] Bounds boundsOfPoints(const Image<float>& distances, const Camera& camera);
 
 /// Makes of each point the distance that its code stands for: decode(encode()), to the bit.
 /// Precondition: `code` has farPlane > nearPlane, both finite.

@@ -21,8 +21,18 @@ Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>
         const float alpha = PageSet::alphaOf(texture, texel);
         return alpha > 0.0f && alpha < 1.0f && hasPoint(depth.data()[texel]);
     };
+    // Most pictures have no such pixel at all: this is a loop that compilers make vectors of.
+    const auto mayBeTranslucent = [&](int y) {
+        const auto* bytes = texture.rgba8();
+        if (!bytes) return true;
+        int any = 0;
+        for (const glm::u8vec4 p : bytes->row(y))
+            any |= static_cast<int>(static_cast<std::uint8_t>(p.a - 1) < 254);
+        return any != 0;
+    };
     parallelFor(kInside, h - kInside, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
+        if (!mayBeTranslucent(y)) return;
         for (int x = kInside; x + kInside < w; ++x) {
             if (!isTranslucent(x, y)) continue;
             bool all = true;

@@ -207,7 +207,8 @@ void findEdges(Source& s, Draft& d) {
                 const std::uint8_t* here = rows.row(y).data();
                 const std::uint8_t* below = rows.row(std::min(y + 1, s.height - 1)).data();
                 std::uint8_t* out = distance.row(y).data();
-                for (int x = 0; x < s.width; ++x) {
+                const int width = s.width;
+                for (int x = 0; x < width; ++x) {
                     const std::uint8_t beside = std::min(above[x], below[x]);
                     const std::uint8_t least = std::min(beside, here[x]);
                     const auto next = static_cast<std::uint8_t>(least + 1);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -19,18 +20,69 @@ constexpr float kPlanarMost = 3.0f;
 /// Depth noisier than this share of q counts as this noisy.
 constexpr float kMostNoise = 0.01f;
 
-/// The least-squares plane of (size+1)² pixels, when no pixel leaves it by more than `tolerance`.
-bool fitPlane(const Source& s, const Draft& d, int x0, int y0, int size, float tolerance,
-              Leaf& leaf) {
-    const int n = size + 1;
-    for (int y = y0; y <= y0 + size; ++y)
-        for (int x = x0; x <= x0 + size; ++x)
-            if (d.edgeDistance(x, y) < 3) return false;
-    const float anchor = d.q.at(x0, y0);
+/// Leaves keep so far from edges, pixels.
+constexpr int kInside = 3;
+/// What rounding may add to second differences and planes, of the largest q.
+constexpr float kRoundingOfPlanes = 4e-6f;
+
+/// What divide() works on.
+struct Division {
+    const Source& s;
+    const Draft& d;
+    SourceBlock& block;
+    std::vector<Leaf>& leaves;
+    int x0, y0;  ///< of the block
+    /// By row of the block and the one below it: which of its pixels and the one beside it are
+    /// kInside.
+    std::array<std::uint32_t, kBlock + 1> inside{};
+};
+
+void findInside(Division& v) {
+    const int rows = std::min<int>(kBlock + 1, v.s.height - v.y0);
+    const int columns = std::min<int>(kBlock + 1, v.s.width - v.x0);
+    for (int y = 0; y < rows; ++y) {
+        const std::uint8_t* info = &v.d.info.at(v.x0, v.y0 + y);
+        std::uint32_t bits = 0;
+        for (int x = 0; x < columns; ++x)
+            bits |= static_cast<std::uint32_t>(info[x] >= kInside << 4) << x;
+        v.inside[static_cast<std::size_t>(y)] = bits;
+    }
+}
+
+/// False where no plane has all pixels within `limit`, which most squares of this kind show in a
+/// few of them: on a plane, the second difference of three is 0. `q`: the first of (kSize+1)²
+/// pixels.
+template <int kSize>
+bool mayBePlane(const float* q, std::ptrdiff_t stride, float limit, float largest) {
+    const float most = 4.01f * limit + kRoundingOfPlanes * largest;
+    const auto bends = [&](std::ptrdiff_t first, std::ptrdiff_t step) {
+        const float difference =
+            (q[first] - q[first + step]) - (q[first + step] - q[first + 2 * step]);
+        return !(std::abs(difference) <= most);
+    };
+    constexpr std::ptrdiff_t kHalf = kSize / 2;
+    for (std::ptrdiff_t k = 0; k <= kSize; k += kHalf)
+        if (bends(k * stride, kHalf) || bends(k, kHalf * stride)) return false;
+    return !bends(0, kHalf * (stride + 1)) && !bends(kSize, kHalf * (stride - 1));
+}
+
+/// The least-squares plane of (kSize+1)² pixels, when no pixel leaves it by more than `tolerance`.
+template <int kSize>
+bool fitPlane(const Division& v, int x0, int y0, float tolerance, Leaf& leaf) {
+    constexpr int n = kSize + 1;
+    std::uint32_t inside = ~0u;
+    for (int y = 0; y < n; ++y) inside &= v.inside[static_cast<std::size_t>(y0 - v.y0 + y)];
+    constexpr std::uint32_t kAll = (1u << n) - 1;
+    if ((inside >> (x0 - v.x0) & kAll) != kAll) return false;
+    const std::ptrdiff_t stride = v.s.width;
+    const float* q = &v.d.q.at(x0, y0);
+    const float anchor = q[0];
+    const float limit = tolerance * v.s.space.axis.relativeScale(anchor);
+    if (!mayBePlane<kSize>(q, stride, limit, v.block.qMax)) return false;
     float sum = 0, sumX = 0, sumY = 0;
-    const float half = static_cast<float>(size) * 0.5f;
+    constexpr float half = static_cast<float>(kSize) * 0.5f;
     for (int y = 0; y < n; ++y) {
-        const float* row = &d.q.at(x0, y0 + y);
+        const float* row = q + y * stride;
         for (int x = 0; x < n; ++x) {
             const float above = row[x] - anchor;
             sum += above;
@@ -38,49 +90,82 @@ bool fitPlane(const Source& s, const Draft& d, int x0, int y0, int size, float t
             sumY += above * (static_cast<float>(y) - half);
         }
     }
-    const float spread =
+    constexpr float spread =
         static_cast<float>(n) * static_cast<float>(n) * static_cast<float>(n * n - 1) / 12.0f;
     leaf.x = static_cast<std::uint16_t>(x0);
     leaf.y = static_cast<std::uint16_t>(y0);
-    leaf.size = static_cast<std::uint16_t>(size);
+    leaf.size = static_cast<std::uint16_t>(kSize);
     leaf.qx = sumX / spread;
     leaf.qy = sumY / spread;
     leaf.q0 = anchor + sum / static_cast<float>(n * n) - half * (leaf.qx + leaf.qy);
-    const float limit = tolerance * s.space.axis.relativeScale(anchor);
     for (int y = 0; y < n; ++y) {
-        const float* row = &d.q.at(x0, y0 + y);
+        const float* row = q + y * stride;
+        // Without a way out in between: compilers make vectors of it.
+        int beyond = 0;
         for (int x = 0; x < n; ++x) {
             const float on =
                 leaf.q0 + leaf.qx * static_cast<float>(x) + leaf.qy * static_cast<float>(y);
-            if (!(std::abs(on - row[x]) <= limit)) return false;
+            beyond |= static_cast<int>(!(std::abs(on - row[x]) <= limit));
         }
+        if (beyond != 0) return false;
     }
     return true;
 }
 
-void divide(const Source& s, const Draft& d, int x, int y, int size, float tolerance,
-            SourceBlock& block, std::vector<Leaf>& leaves) {
+template <int kSize>
+void divide(Division& v, int x, int y, float tolerance) {
+    const Source& s = v.s;
     if (x >= s.width - 1 || y >= s.height - 1) return;
-    if (size > 1 && x + size < s.width && y + size < s.height) {
-        Leaf leaf;
-        if (fitPlane(s, d, x, y, size, tolerance, leaf)) {
-            leaves.push_back(leaf);
-            return;
+    if constexpr (kSize > 1) {
+        if (x + kSize < s.width && y + kSize < s.height) {
+            Leaf leaf;
+            if (fitPlane<kSize>(v, x, y, tolerance, leaf)) {
+                v.leaves.push_back(leaf);
+                return;
+            }
         }
+        constexpr int h = kSize / 2;
+        divide<h>(v, x, y, tolerance);
+        divide<h>(v, x + h, y, tolerance);
+        divide<h>(v, x, y + h, tolerance);
+        divide<h>(v, x + h, y + h, tolerance);
+    } else {
+        const Draft& d = v.d;
+        const int links =
+            d.linkRight(x, y) + d.linkDown(x, y) + d.linkRight(x, y + 1) + d.linkDown(x + 1, y);
+        if (links < 2) return;
+        v.block.cells[y % kBlock] |= static_cast<std::uint16_t>(1u << (x % kBlock));
+        v.block.anyCell = true;
     }
-    if (size > 1) {
-        const int h = size / 2;
-        divide(s, d, x, y, h, tolerance, block, leaves);
-        divide(s, d, x + h, y, h, tolerance, block, leaves);
-        divide(s, d, x, y + h, h, tolerance, block, leaves);
-        divide(s, d, x + h, y + h, h, tolerance, block, leaves);
-        return;
+}
+
+/// The range of the points of a block and one pixel around it; 0, 0 without one.
+void findRange(const Source& s, const Draft& d, int x0, int y0, SourceBlock& block) {
+    constexpr float kMost = std::numeric_limits<float>::max();
+    // By columns: compilers make vectors of it.
+    constexpr int kColumns = kBlock + 1;
+    float low[kColumns], high[kColumns] = {};
+    std::fill_n(low, kColumns, kMost);
+    const int y1 = std::min(y0 + kBlock, s.height - 1);
+    const int columns = std::min(kColumns, s.width - x0);
+    const auto widen = [&](const float* q, int count) {
+        for (int i = 0; i < count; ++i) {
+            const float point = q[i] > 0.0f ? q[i] : kMost;
+            low[i] = point < low[i] ? point : low[i];
+            high[i] = q[i] > high[i] ? q[i] : high[i];
+        }
+    };
+    for (int y = y0; y <= y1; ++y) {
+        const float* q = &d.q.at(x0, y);
+        if (columns == kColumns)
+            widen(q, kColumns);
+        else
+            widen(q, columns);
     }
-    const int links =
-        d.linkRight(x, y) + d.linkDown(x, y) + d.linkRight(x, y + 1) + d.linkDown(x + 1, y);
-    if (links < 2) return;
-    block.cells[y % kBlock] |= static_cast<std::uint16_t>(1u << (x % kBlock));
-    block.anyCell = true;
+    const float most = *std::max_element(high, high + kColumns);
+    if (!(most > 0)) return;
+    block.qMin = *std::min_element(low, low + kColumns);
+    block.qMax = most;
 }
 
 /// How far the code of the depth makes planes uneven: the median second difference, relative.
@@ -169,20 +254,12 @@ void findLeaves(Source& s, const Draft& d) {
         for (int bx = 0; bx < s.blocksX; ++bx) {
             auto& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
             const int x0 = bx * kBlock, y0 = static_cast<int>(by) * kBlock;
-            float low = std::numeric_limits<float>::max(), high = 0;
-            for (int y = y0; y <= std::min(y0 + kBlock, s.height - 1); ++y) {
-                for (int x = x0; x <= std::min(x0 + kBlock, s.width - 1); ++x) {
-                    const float q = d.q.at(x, y);
-                    if (!(q > 0)) continue;
-                    low = std::min(low, q);
-                    high = std::max(high, q);
-                }
-            }
-            if (!(high > 0)) continue;
-            block.qMin = low;
-            block.qMax = high;
+            findRange(s, d, x0, y0, block);
+            if (!(block.qMax > 0)) continue;
             block.leafBegin = static_cast<std::uint32_t>(leaves.size());
-            divide(s, d, x0, y0, kBlock, s.flat, block, leaves);
+            Division division{s, d, block, leaves, x0, y0};
+            findInside(division);
+            divide<kBlock>(division, x0, y0, s.flat);
             block.leafEnd = static_cast<std::uint32_t>(leaves.size());
             block.reach = reachOf(s, d, block, x0, y0);
             findSlopes(s, d, {leaves.data() + block.leafBegin, leaves.data() + block.leafEnd},
