@@ -337,6 +337,7 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     writing.noClobber = program.common.noClobber;
     STX_CHECK(FrameWriter::check(writing));
 
+    keepFreedMemory();
     preloadCodecs(o.input);
     STX_TRY(const auto around, environmentOf(o.environment, program.job));
     if (around) {
@@ -375,7 +376,6 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
     }
     program.sayNotes();
 
-    if (count > 1) keepFreedMemory();
     FrameWriter writer(writing, program.job);
     auto views = nlohmann::ordered_json::array();
     double total = 0;

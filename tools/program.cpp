@@ -28,6 +28,8 @@ void keepFreedMemory() {
     constexpr int kLargest = 32 << 20;  // glibc takes no more
     mallopt(M_MMAP_THRESHOLD, kLargest);
     mallopt(M_TRIM_THRESHOLD, 8 * kLargest);
+    // Asked for in larger pieces, memory comes in larger pages, too, where the system has them.
+    mallopt(M_TOP_PAD, kLargest / 2);
 }
 
 void Program::print(std::string_view text) {

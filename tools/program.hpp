@@ -30,8 +30,8 @@ struct CommonOptions {
     std::string format = "text";  ///< or "json", for commands that answer on stdout
 };
 
-/// From now on memory that is freed serves what comes next, where picture follows picture: the
-/// system clears all that it hands out, which took a seventh of the time of a sequence.
+/// From now on memory that is freed serves what comes next, where image follows image: the system
+/// clears all that it hands out, page by page, which took a seventh of the time of a sequence.
 void keepFreedMemory();
 
 /// What a command gets: its options, a Job to pass on, and where to say things.

@@ -1,6 +1,8 @@
 #include "lib/base/byte_planes.hpp"
 
+#include <bit>
 #include <cstddef>
+#include <cstring>
 
 namespace stx {
 
@@ -16,11 +18,35 @@ void splitAndSubtract(std::span<const std::uint8_t> raw, std::uint8_t* to) {
     for (std::size_t i = 1; i < odds; ++i) to[i] = difference(from[2 * i + 1], from[2 * i - 1]);
 }
 
+namespace {
+
+/// Eight differences, as splitAndSubtract() makes them, become values, `last` being the one before.
+std::uint64_t sumsOfEight(std::uint64_t differences, std::uint8_t last) {
+    constexpr std::uint64_t kEvens = 0x00ff00ff00ff00ff, kFours = 0x0001000100010001;
+    // In lanes of 16 bits, so that no sum reaches the next.
+    const std::uint64_t centred = differences ^ 0x8080808080808080;  // less 128
+    const std::uint64_t odd = centred >> 8 & kEvens, pairs = (centred & kEvens) + odd;
+    const std::uint64_t upTo = (pairs + last) * kFours;
+    return ((upTo - odd) & kEvens) | (upTo & kEvens) << 8;
+}
+
+}  // namespace
+
 void addAndJoin(std::uint8_t* split, std::span<std::uint8_t> raw) {
     const std::size_t evens = (raw.size() + 1) / 2, odds = raw.size() / 2;
     std::uint8_t last = split[0];
-    for (std::size_t i = 1; i < raw.size(); ++i)
-        split[i] = last = static_cast<std::uint8_t>(last + split[i] - 128);
+    std::size_t at = 1;
+    if constexpr (std::endian::native == std::endian::little) {
+        for (; at + 8 <= raw.size(); at += 8) {
+            std::uint64_t eight = 0;
+            std::memcpy(&eight, split + at, 8);
+            eight = sumsOfEight(eight, last);
+            std::memcpy(split + at, &eight, 8);
+            last = static_cast<std::uint8_t>(eight >> 56);
+        }
+    }
+    for (; at < raw.size(); ++at)
+        split[at] = last = static_cast<std::uint8_t>(last + split[at] - 128);
     for (std::size_t i = 0; i < odds; ++i) {
         raw[2 * i] = split[i];
         raw[2 * i + 1] = split[evens + i];
