@@ -77,6 +77,8 @@ struct ExrConstPixels {
     std::string channel;
     const float* values = nullptr;
     std::size_t stride = 1;  ///< floats
+    /// Of channels of type half, in place of values: pixel (x, y) is halves[y * width + x].
+    const std::uint16_t* halves = nullptr;
 };
 
 /// An OpenEXR file that is being read. Headers are read at once, in milliseconds, pixels on

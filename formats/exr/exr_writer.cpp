@@ -17,7 +17,6 @@
 #include <bit>
 #include <cstring>
 #include <map>
-#include <optional>
 #include <set>
 
 #include "formats/exr/exr_adapt.hpp"
@@ -25,6 +24,8 @@
 #include "formats/exr/exr_streams.hpp"
 #include "formats/exr/exr_zip.hpp"
 #include "formats/files/source_date.hpp"
+#include "lib/base/byte_planes.hpp"
+#include "lib/base/pack_rows.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -113,6 +114,66 @@ int chunksOf(int rows) {
     return (rows + kZipRows - 1) / kZipRows;
 }
 
+/// A channel of the rows that are written.
+struct Channel {
+    const ExrConstPixels* pixels;
+    bool half;
+    std::size_t words;   ///< 16-bit ones, of a row
+    std::size_t at = 0;  ///< where it begins in a row of the file, words
+    int same = -1;       ///< an earlier channel that has the same values
+};
+
+/// Row `y` as it is in the file: words of the channel itself, or in `room`.
+const std::uint16_t* wordsOf(const Channel& channel, std::size_t width, int y,
+                             std::vector<std::uint16_t>& room) {
+    const ExrConstPixels& p = *channel.pixels;
+    const std::size_t first = static_cast<std::size_t>(y) * width;
+    if (channel.half && p.halves) return p.halves + first;
+    const float* from = p.values + first * p.stride;
+    if (channel.half)
+        exr::halvesFrom(from, p.stride, {room.data(), width});
+    else if (p.stride == 1)
+        std::memcpy(room.data(), from, width * sizeof(float));
+    else
+        for (std::size_t x = 0; x < width; ++x)
+            std::memcpy(room.data() + 2 * x, from + x * p.stride, sizeof(float));
+    return room.data();
+}
+
+/// The bytes of `count` rows from `first` on, in the order of splitAndSubtract().
+void splitRows(std::span<const Channel> channels, std::size_t width, int first, int count,
+               std::uint8_t* split) {
+    const std::size_t rowWords = channels.back().at + channels.back().words;
+    const std::size_t half = rowWords * static_cast<std::size_t>(count);
+    struct Ends {
+        std::uint16_t first, last;
+    };
+    std::vector<Ends> ends(channels.size());
+    std::vector<std::uint16_t> room(2 * width);
+    std::uint16_t before = 128;  // so that the first byte stays as it is
+    for (int y = 0; y < count; ++y) {
+        std::uint8_t* const low = split + rowWords * static_cast<std::size_t>(y);
+        for (std::size_t k = 0; k < channels.size(); ++k) {
+            const Channel& channel = channels[k];
+            std::uint8_t* const to = low + channel.at;
+            if (channel.same >= 0) {
+                ends[k] = ends[channel.same];
+                const std::uint8_t* from = low + channels[channel.same].at;
+                std::copy_n(from, channel.words, to);
+                std::copy_n(from + half, channel.words, to + half);
+                splitAndSubtract({&ends[k].first, 1}, before, to, to + half);
+            } else {
+                const std::uint16_t* words = wordsOf(channel, width, first + y, room);
+                ends[k] = {words[0], words[channel.words - 1]};
+                splitAndSubtract({words, channel.words}, before, to, to + half);
+            }
+            before = ends[k].last;
+        }
+    }
+    // The first high byte follows the last low one.
+    split[half] = static_cast<std::uint8_t>(split[half] - before);
+}
+
 }  // namespace
 
 struct ExrWriter::Impl {
@@ -167,13 +228,7 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
                                         const std::vector<ExrConstPixels>& pixels) {
     const ExrPart& part = parts[index];
     const auto width = static_cast<std::size_t>(part.width);
-    struct Channel {
-        const ExrConstPixels* pixels;
-        bool half;
-        std::size_t at = 0;                 ///< where it begins in a row of the file, 16-bit words
-        std::optional<std::size_t> same{};  ///< where the same values are in the row already
-    };
-    std::map<std::string_view, Channel> channels;  // in the order of the file
+    std::map<std::string_view, Channel> byName;  // in the order of the file
     std::size_t rowBytes = 0;
     for (const auto& p : pixels) {
         const auto* channel = part.channel(p.channel);
@@ -181,52 +236,45 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
             return failAt(where, ErrorCode::failed, "part {} has no channel '{}'", index,
                           p.channel);
         const bool half = channel->type == ExrChannel::Type::half;
-        if (channels.emplace(p.channel, Channel{&p, half}).second)
+        if (byName.emplace(p.channel, Channel{&p, half, half ? width : 2 * width}).second)
             rowBytes += width * (half ? 2 : 4);
     }
-    if (channels.size() != part.channels.size())
+    if (byName.size() != part.channels.size())
         return failAt(where, ErrorCode::failed, "part {} has {} channels, and {} are given", index,
-                      part.channels.size(), channels.size());
+                      part.channels.size(), byName.size());
     if (rowBytes * kZipRows > INT32_MAX)
         return failAt(where, ErrorCode::unsupported,
                       "part {} has rows of {} bytes; a chunk of {} rows has less than 2 GiB", index,
                       rowBytes, kZipRows);
 
+    std::vector<Channel> channels;
+    std::vector<RowPart> rowParts;
+    std::map<const void*, int> halves;  // by their first value
     std::size_t at = 0;
-    std::map<const float*, std::size_t> halves;  // by their first value
-    for (auto& [name, channel] : channels) {
+    for (auto& [name, channel] : byName) {
         channel.at = at;
-        at += width * (channel.half ? 1 : 2);
-        if (!channel.half) continue;
-        const auto [first, isNew] = halves.emplace(channel.pixels->values, channel.at);
-        if (!isNew) channel.same = first->second;
+        at += channel.words;
+        if (channel.half) {
+            const void* first = channel.pixels->halves ? static_cast<const void*>(channel.pixels->halves)
+                                                       : channel.pixels->values;
+            const auto [same, isNew] = halves.emplace(first, static_cast<int>(channels.size()));
+            if (!isNew) channel.same = same->second;
+        }
+        rowParts.push_back({static_cast<std::uint32_t>(channel.words), channel.half ? 1u : 2u,
+                            channel.same});
+        channels.push_back(channel);
     }
+    if (part.width < kPackedWidth || rowBytes * kZipRows > kLargestPacked) rowParts.clear();
 
     std::vector<Bytes> chunks(static_cast<std::size_t>(chunksOf(rows)));
     parallelFor(0, static_cast<std::int64_t>(chunks.size()), [&](std::int64_t i) {
         const int first = static_cast<int>(i) * kZipRows;
         const int count = std::min(kZipRows, rows - first);
-        const std::size_t bytes = rowBytes * count;
-        const auto raw = std::make_unique_for_overwrite<std::uint16_t[]>(bytes / 2);
-        for (int y = 0; y < count; ++y) {
-            std::uint16_t* const row = raw.get() + y * rowBytes / 2;
-            for (const auto& [name, channel] : channels) {
-                const auto& p = *channel.pixels;
-                const float* from = p.values + (first + y) * width * p.stride;
-                std::uint16_t* const to = row + channel.at;
-                if (channel.same)
-                    std::copy_n(row + *channel.same, width, to);
-                else if (channel.half)
-                    exr::halvesFrom(from, p.stride, {to, width});
-                else if (p.stride == 1)
-                    std::memcpy(to, from, width * sizeof(float));
-                else
-                    for (std::size_t x = 0; x < width; ++x)
-                        std::memcpy(to + 2 * x, from + x * p.stride, sizeof(float));
-            }
-        }
-        chunks[i] =
-            exr::zipChunk({reinterpret_cast<const std::uint8_t*>(raw.get()), bytes}, part.zipLevel);
+        const auto split =
+            std::make_unique_for_overwrite<std::uint8_t[]>(rowBytes * static_cast<std::size_t>(count));
+        splitRows(channels, width, first, count, split.get());
+        chunks[i] = exr::zipSplitChunk({split.get(), rowBytes * static_cast<std::size_t>(count)},
+                                       part.zipLevel, count, rowParts);
     });
     for (std::size_t i = 0; i < chunks.size(); ++i)
         writeChunk(index, top / kZipRows + static_cast<int>(i), chunks[i]);
@@ -254,7 +302,13 @@ Result<void> ExrWriter::writePart(int index, const std::vector<ExrConstPixels>& 
     const auto width = static_cast<std::size_t>(impl_->parts[index].width);
     return writePart(index, [&](int y, int) {
         auto rows = pixels;
-        for (auto& p : rows) p.values += static_cast<std::size_t>(y) * width * p.stride;
+        for (auto& p : rows) {
+            const std::size_t first = static_cast<std::size_t>(y) * width;
+            if (p.halves)
+                p.halves += first;
+            else
+                p.values += first * p.stride;
+        }
         return rows;
     });
 }

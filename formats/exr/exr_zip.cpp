@@ -38,13 +38,22 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 Bytes zipChunk(std::span<const std::uint8_t> raw, int level) {
     const auto split = std::make_unique_for_overwrite<std::uint8_t[]>(raw.size());
     splitAndSubtract(raw, split.get());
-    const std::span bytes(split.get(), raw.size());
-    const auto packed = std::make_unique_for_overwrite<std::byte[]>(raw.size());
+    return zipSplitChunk({split.get(), raw.size()}, level, 0, {});
+}
+
+Bytes zipSplitChunk(std::span<std::uint8_t> split, int level, int rows,
+                    std::span<const RowPart> parts) {
+    const auto bytes = std::as_bytes(split);
+    const auto packed = std::make_unique_for_overwrite<std::byte[]>(split.size());
     // No room for as many bytes as there were: then it gives 0.
-    const std::size_t size =
-        compressZlib(std::as_bytes(bytes), level, {packed.get(), raw.size() - 1});
-    const auto stored = size == 0 ? std::as_bytes(raw) : ByteSpan(packed.get(), size);
-    return {stored.begin(), stored.end()};
+    const std::span to(packed.get(), split.size() - 1);
+    const std::size_t size = level == 1 && !parts.empty()
+                                 ? packRows(split, rows, parts, adler32(bytes), to)
+                                 : compressZlib(bytes, level, to);
+    if (size > 0) return {packed.get(), packed.get() + size};
+    const std::span raw(reinterpret_cast<std::uint8_t*>(packed.get()), split.size());
+    addAndJoin(split.data(), raw);
+    return {packed.get(), packed.get() + split.size()};
 }
 
 void floatsFrom(std::span<const std::uint16_t> halves, float* to, std::size_t stride) {

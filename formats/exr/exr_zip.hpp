@@ -5,6 +5,7 @@
 #include <span>
 
 #include "formats/files/files.hpp"
+#include "lib/base/pack_rows.hpp"
 
 namespace stx::exr {
 
@@ -18,6 +19,11 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 /// as the difference from the one before, deflated at `level` (see compressZlib()). `raw` itself
 /// when that does not make it smaller, as OpenEXR wants it. Throws std::bad_alloc.
 [[nodiscard]] Bytes zipChunk(std::span<const std::uint8_t> raw, int level);
+
+/// The same of a chunk whose bytes are in that order already, and are changed. Where `parts` tells
+/// what each of `rows` rows is made of, level 1 is packRows().
+[[nodiscard]] Bytes zipSplitChunk(std::span<std::uint8_t> split, int level, int rows,
+                                  std::span<const RowPart> parts);
 
 /// The inverse of halvesFrom(), exact: writes every `stride`-th of `to`.
 void floatsFrom(std::span<const std::uint16_t> halves, float* to, std::size_t stride);

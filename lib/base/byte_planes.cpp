@@ -32,6 +32,22 @@ std::uint64_t sumsOfEight(std::uint64_t differences, std::uint8_t last) {
 
 }  // namespace
 
+void splitAndSubtract(std::span<const std::uint16_t> words, std::uint16_t before, std::uint8_t* low,
+                      std::uint8_t* high) {
+    if (words.empty()) return;
+    const auto first = [](unsigned a, unsigned b) { return static_cast<std::uint8_t>(a - b + 128); };
+    const auto second = [](unsigned a, unsigned b) {
+        return static_cast<std::uint8_t>((a >> 8) - (b >> 8) + 128);
+    };
+    low[0] = first(words[0], before);
+    high[0] = second(words[0], before);
+    const std::uint16_t* from = words.data();
+    for (std::size_t i = 1; i < words.size(); ++i) {
+        low[i] = first(from[i], from[i - 1]);
+        high[i] = second(from[i], from[i - 1]);
+    }
+}
+
 void addAndJoin(std::uint8_t* split, std::span<std::uint8_t> raw) {
     const std::size_t evens = (raw.size() + 1) / 2, odds = raw.size() / 2;
     std::uint8_t last = split[0];
