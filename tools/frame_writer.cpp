@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "formats/images/frames.hpp"
 #include "lib/base/parallel.hpp"
 #include "tools/program.hpp"
 
@@ -50,9 +49,11 @@ std::string FrameWriter::nameOf(int frame) const {
 Result<void> FrameWriter::write(int index, Frame frame, const Camera& camera) {
     Item item{index, {}, {}, camera};
     STX_TRY(const auto format, frameFormat(settings_.pattern));
-    // Only OpenEXR has room for more than 8 bits and colours; what waits is kept small.
+    // Only OpenEXR has room for more than 8 bits and colours; what waits is kept small, and the
+    // next frame gets the memory of this one.
     if (settings_.pattern != "-" && format == FrameFormat::exr) {
-        item.frame = std::move(frame);
+        item.frame = exrFrameOf(frame, settings_.background);
+        frame = {};
     } else {
         frame.albedo = {};
         frame.depth = {};
@@ -110,7 +111,7 @@ Result<void> FrameWriter::writeOne(const Item& item) {
         file.pngLevel = settings_.compression;
         file.camera = item.camera;
         file.around = settings_.around;
-        return item.picture.empty() ? writeFrame(item.frame, nameOf(item.index), file)
+        return item.picture.empty() ? writeExrFrame(item.frame, nameOf(item.index), file)
                                     : writePicture(item.picture, nameOf(item.index), file);
     }
     if (!stream_) {

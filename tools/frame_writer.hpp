@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "formats/files/files.hpp"
+#include "formats/images/frames.hpp"
 #include "formats/images/y4m.hpp"
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
@@ -48,7 +49,7 @@ class FrameWriter {
   private:
     struct Item {
         int index = 0;
-        Frame frame;         ///< for OpenEXR
+        ExrFrame frame;      ///< for OpenEXR
         Rgba8Image picture;  ///< for the others
         Camera camera;
     };

@@ -1,16 +1,18 @@
 #include "formats/images/frames.hpp"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cctype>
 #include <cmath>
 #include <cstring>
 
 #include "formats/exr/bundle_exr.hpp"
-#include "formats/exr/exr_colour.hpp"
 #include "formats/exr/exr_file.hpp"
 #include "formats/files/source_date.hpp"
 #include "formats/images/codec_module.hpp"
 #include "formats/images/images.hpp"
+#include "lib/base/halves.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/linear_planes.hpp"
 #include "lib/model/texture.hpp"
@@ -19,31 +21,41 @@ namespace stx {
 
 namespace {
 
-/// Premultiplied linear light of some rows of an image that is premultiplied in the frame's colour
-/// space: all of the red, then green, blue and alpha, for these are stored apart.
-void toLinearRows(const Image<glm::vec4>& image, int top, int rows, bool linear,
-                  const std::optional<glm::vec3>& background, Image<float>& planes) {
-    if (planes.width() != image.width() || planes.height() != 4 * rows)
-        planes = Image<float>(image.width(), 4 * rows);
-    parallelForBlocks(0, rows, 16, [&](std::int64_t begin, std::int64_t end) {
-        std::vector<glm::vec4> shown(background ? static_cast<std::size_t>(image.width()) : 0);
+/// Premultiplied linear light of an image that is premultiplied in the frame's colour space: a plane
+/// of red, then green, blue and alpha, for these are stored apart. True when all of `other`, if
+/// there is one, is the same as the image.
+bool toLinearPlanes(const Image<glm::vec4>& image, bool linear,
+                    const std::optional<glm::vec3>& background, const Image<glm::vec4>* other,
+                    std::uint16_t* planes) {
+    const auto width = static_cast<std::size_t>(image.width());
+    std::atomic<bool> same = true;
+    parallelForBlocks(0, image.height(), 16, [&](std::int64_t begin, std::int64_t end) {
+        std::vector<glm::vec4> shown(background ? width : 0);
+        std::vector<float> light(linear ? 0 : 4 * width);
         for (auto y = static_cast<int>(begin); y < end; ++y) {
-            std::span<const glm::vec4> from = image.row(top + y);
+            std::span<const glm::vec4> from = image.row(y);
+            if (other && same &&
+                std::memcmp(from.data(), other->row(y).data(), from.size_bytes()) != 0)
+                same = false;
             if (background) {
                 std::ranges::transform(from, shown.begin(),
                                        [&](glm::vec4 p) { return over(p, background); });
                 from = shown;
             }
-            std::array<float*, 4> to{};
-            for (int c = 0; c < 4; ++c) to[c] = planes.row(c * rows + y).data();
-            if (!linear) {
-                linearPlanes(from.data(), from.size(), to);
+            std::array<std::uint16_t*, 4> to{};
+            for (std::size_t c = 0; c < 4; ++c)
+                to[c] = planes + c * image.count() + static_cast<std::size_t>(y) * width;
+            if (linear) {
+                halfPlanes(&from.data()->x, 4, width, to.data());
                 continue;
             }
-            for (std::size_t x = 0; x < from.size(); ++x)
-                for (int c = 0; c < 4; ++c) to[c][x] = from[x][c];
+            std::array<float*, 4> values{};
+            for (std::size_t c = 0; c < 4; ++c) values[c] = light.data() + c * width;
+            linearPlanes(from.data(), width, values);
+            for (std::size_t c = 0; c < 4; ++c) halvesFrom(values[c], {to[c], width});
         }
     });
+    return same;
 }
 
 std::vector<std::uint8_t> withoutAlpha(const Rgba8Image& rgba) {
@@ -85,10 +97,10 @@ Result<void> writeByModule(const Rgba8Image& rgba, FrameFormat format, const Out
     return {};
 }
 
-Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOptions& options) {
+Result<void> writeExr(const ExrFrame& frame, OutputFile& file, const FrameOptions& options) {
     ExrPart part;
-    part.width = part.displayWidth = frame.colour.width();
-    part.height = part.displayHeight = frame.colour.height();
+    part.width = part.displayWidth = frame.width;
+    part.height = part.displayHeight = frame.height;
     part.zipLevel = 1;
     if (options.around) {
         part.envmap = ExrPart::Envmap::latlong;
@@ -99,39 +111,19 @@ Result<void> writeExrFrame(const Frame& frame, OutputFile& file, const FrameOpti
         // Planes only scale the third coordinate of NDC, which nobody uses.
         setExrCamera(part, *options.camera, 0.0, 1.0);
     }
-    const char* rgba[] = {"R", "G", "B", "A"};
-    for (const char* c : rgba) part.channels.push_back({c, ExrChannel::Type::half});
-    const bool albedo = !frame.albedo.empty(), normals = !frame.normal.empty();
-    for (const char* c : rgba)
-        if (albedo) part.channels.push_back({std::string("albedo.") + c, ExrChannel::Type::half});
-    if (!frame.depth.empty()) part.channels.push_back({"Z", ExrChannel::Type::float32});
-    for (const char* c : {"N.X", "N.Y", "N.Z"})
-        if (normals) part.channels.push_back({c, ExrChannel::Type::half});
-
-    const auto behind = inSpaceOf(frame, options.background);
-    // Without lights and a background albedo is the colour.
-    const bool same = albedo && !behind &&
-                      std::memcmp(frame.albedo.data(), frame.colour.data(),
-                                  frame.colour.count() * sizeof(glm::vec4)) == 0;
-    Image<float> colourRows, albedoRows;
+    const std::size_t pixels = static_cast<std::size_t>(frame.width) * frame.height;
+    std::vector<ExrConstPixels> values;
+    for (const auto& [name, plane] : frame.channels) {
+        part.channels.push_back({name, ExrChannel::Type::half});
+        values.push_back({.channel = name,
+                          .halves = frame.planes.get() + static_cast<std::size_t>(plane) * pixels});
+    }
+    if (!frame.depth.empty()) {
+        part.channels.push_back({"Z", ExrChannel::Type::float32});
+        values.push_back({.channel = "Z", .values = frame.depth.data()});
+    }
     STX_TRY(auto writer, ExrWriter::create(file, {part}));
-    STX_CHECK(writer.writePart(0, [&](int y, int rows) {
-        std::vector<ExrConstPixels> pixels;
-        toLinearRows(frame.colour, y, rows, frame.linear, behind, colourRows);
-        for (int c = 0; c < 4; ++c) pixels.push_back({rgba[c], colourRows.row(c * rows).data(), 1});
-        if (albedo && !same) toLinearRows(frame.albedo, y, rows, frame.linear, {}, albedoRows);
-        const auto& albedos = same ? colourRows : albedoRows;
-        for (int c = 0; albedo && c < 4; ++c)
-            pixels.push_back({std::string("albedo.") + rgba[c], albedos.row(c * rows).data(), 1});
-        if (!frame.depth.empty()) pixels.push_back({"Z", frame.depth.row(y).data(), 1});
-        if (normals) {
-            const float* first = &frame.normal.row(y).data()->x;
-            pixels.push_back({"N.X", first, 3});
-            pixels.push_back({"N.Y", first + 1, 3});
-            pixels.push_back({"N.Z", first + 2, 3});
-        }
-        return pixels;
-    }));
+    STX_CHECK(writer.writePart(0, values));
     return writer.finish();
 }
 
@@ -173,6 +165,58 @@ Result<Bytes> encodePicture(const Rgba8Image& rgba, FrameFormat format,
     return encodePng(rgba.width(), rgba.height(), 3, 8, rgb.data(), true, options.pngLevel);
 }
 
+ExrFrame exrFrameOf(const Frame& frame, const std::optional<glm::vec3>& background) {
+    ExrFrame out;
+    out.width = frame.colour.width();
+    out.height = frame.colour.height();
+    const std::size_t pixels = frame.colour.count();
+    const bool albedo = !frame.albedo.empty(), normals = !frame.normal.empty();
+    const int most = 4 + (albedo ? 4 : 0) + (normals ? 3 : 0);
+    out.planes =
+        std::make_unique_for_overwrite<std::uint16_t[]>(static_cast<std::size_t>(most) * pixels);
+    int planes = 0;
+    const auto next = [&](int count) {
+        std::uint16_t* to = out.planes.get() + static_cast<std::size_t>(planes) * pixels;
+        planes += count;
+        return to;
+    };
+    constexpr std::array kNames = {"R", "G", "B", "A"};
+    const auto behind = inSpaceOf(frame, background);
+    // Without lights and a background albedo is the colour.
+    const bool same = toLinearPlanes(frame.colour, frame.linear, behind,
+                                     albedo && !behind ? &frame.albedo : nullptr, next(4));
+    for (int c = 0; c < 4; ++c) out.channels.emplace_back(kNames[c], c);
+    if (albedo) {
+        const bool own = behind || !same;
+        for (int c = 0; c < 4; ++c)
+            out.channels.emplace_back(fmt::format("albedo.{}", kNames[c]), c + (own ? planes : 0));
+        if (own) (void)toLinearPlanes(frame.albedo, frame.linear, {}, nullptr, next(4));
+    }
+    if (normals) {
+        for (int c = 0; c < 3; ++c)
+            out.channels.emplace_back(fmt::format("N.{}", "XYZ"[c]), c + planes);
+        std::uint16_t* const first = next(3);
+        const auto width = static_cast<std::size_t>(out.width);
+        parallelForBlocks(0, out.height, 16, [&](std::int64_t begin, std::int64_t end) {
+            for (auto y = static_cast<int>(begin); y < end; ++y) {
+                std::uint16_t* const to = first + static_cast<std::size_t>(y) * width;
+                const std::array<std::uint16_t*, 3> rows = {to, to + pixels, to + 2 * pixels};
+                halfPlanes(&frame.normal.row(y).data()->x, 3, width, rows.data());
+            }
+        });
+    }
+    out.depth = frame.depth;
+    return out;
+}
+
+Result<void> writeExrFrame(const ExrFrame& frame, const std::filesystem::path& path,
+                           const FrameOptions& options) {
+    STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
+    if (auto ok = writeExr(frame, file, options); !ok)
+        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    return file.commit();
+}
+
 Result<void> writePicture(const Rgba8Image& picture, const std::filesystem::path& path,
                           const FrameOptions& options) {
     STX_TRY(const FrameFormat format, frameFormat(path));
@@ -193,10 +237,7 @@ Result<void> writeFrame(const Frame& frame, const std::filesystem::path& path,
     STX_TRY(const FrameFormat format, frameFormat(path));
     if (format != FrameFormat::exr)
         return writePicture(pictureOf(frame, format, options.background), path, options);
-    STX_TRY(auto file, OutputFile::create(path, {.noClobber = options.noClobber}));
-    if (auto ok = writeExrFrame(frame, file, options); !ok)
-        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
-    return file.commit();
+    return writeExrFrame(exrFrameOf(frame, options.background), path, options);
 }
 
 }  // namespace stx

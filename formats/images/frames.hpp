@@ -1,7 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <glm/glm.hpp>
 
@@ -38,6 +43,16 @@ struct FrameOptions {
     bool around = false;
 };
 
+/// A frame in the types of an OpenEXR file, which take half of the memory.
+struct ExrFrame {
+    /// Channels of type half, each with its plane; albedo that is the colour has no planes of its
+    /// own.
+    std::vector<std::pair<std::string, int>> channels;
+    std::unique_ptr<std::uint16_t[]> planes;  ///< of width x height, one after the other
+    int width = 0, height = 0;
+    Image<float> depth;  ///< empty where the frame has none
+};
+
 /// Writes one picture whole or not at all, by the name's ending. Linear frames are coded as sRGB
 /// for all but EXR, sRGB-coded ones are made linear for EXR. EXR channels: R G B A (half,
 /// premultiplied), Z (float32, +inf where nothing was drawn), N.X N.Y N.Z (half) when there are
@@ -49,6 +64,12 @@ struct FrameOptions {
 /// for JPEG a black one at least.
 [[nodiscard]] Rgba8Image pictureOf(const Frame& frame, FrameFormat format,
                                    const std::optional<glm::vec3>& background);
+/// What a frame becomes in an EXR file: linear, with the background behind it.
+[[nodiscard]] ExrFrame exrFrameOf(const Frame& frame,
+                                  const std::optional<glm::vec3>& background);
+/// Writes what exrFrameOf() gave as writeFrame() would the frame. `path` ends in .exr.
+[[nodiscard]] Result<void> writeExrFrame(const ExrFrame& frame, const std::filesystem::path& path,
+                                         const FrameOptions& options = {});
 /// Writes what pictureOf() gave as writeFrame() would the frame. Error (failed) for EXR.
 [[nodiscard]] Result<void> writePicture(const Rgba8Image& picture,
                                         const std::filesystem::path& path,

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <memory>
 #include <string_view>
 #include <vector>
 
 #include "formats/files/deflate.hpp"
 #include "formats/images/reader.hpp"
+#include "lib/base/paeth.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -21,19 +21,11 @@ using Row = std::vector<std::uint8_t>;
 enum Filter : std::uint8_t { none, sub, up, average, paeth };
 constexpr int kFilters = 5;
 
-/// The predictor of clause 9.4.
-inline int paethOf(int left, int above, int corner) {
-    const int toLeft = std::abs(above - corner), toAbove = std::abs(left - corner),
-              toCorner = std::abs(left + above - 2 * corner);
-    return toLeft <= toAbove && toLeft <= toCorner ? left : toAbove <= toCorner ? above : corner;
-}
-
 /// One row filtered. `row` and `above` have `step` zeros before their first byte.
 void filterRow(Filter filter, const std::uint8_t* row, const std::uint8_t* above, std::size_t size,
                std::size_t step, std::uint8_t* out) {
     const auto byte = [](int value) { return static_cast<std::uint8_t>(value); };
     const std::uint8_t* left = row - step;
-    const std::uint8_t* corner = above - step;
     switch (filter) {
         case none:
             std::copy(row, row + size, out);
@@ -48,8 +40,7 @@ void filterRow(Filter filter, const std::uint8_t* row, const std::uint8_t* above
             for (std::size_t i = 0; i < size; ++i) out[i] = byte(row[i] - (left[i] + above[i]) / 2);
             break;
         case paeth:
-            for (std::size_t i = 0; i < size; ++i)
-                out[i] = byte(row[i] - paethOf(left[i], above[i], corner[i]));
+            subtractPaeth(row, above, size, step, out);
             break;
     }
 }

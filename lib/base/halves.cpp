@@ -60,6 +60,34 @@ void halvesImpl(const float* from, std::uint16_t* to, std::size_t count) {
     std::copy_n(halves, count - i, to + i);
 }
 
+void planesOfHalves(const float* from, int values, std::size_t count,
+                    std::uint16_t* const* planes) {
+    const DF d;
+    const DU du;
+    const hn::Rebind<std::uint16_t, DU> half;
+    using VF = hn::Vec<DF>;
+    const std::size_t lanes = hn::Lanes(d);
+    const auto store = [&](VF v, std::uint16_t* to) HWY_ATTR {
+        hn::StoreU(hn::TruncateTo(half, halfBits(du, hn::BitCast(du, v))), half, to);
+    };
+    std::size_t i = 0;
+    for (; i + lanes <= count; i += lanes) {
+        VF a = hn::Zero(d), b = a, c = a, e = a;
+        if (values == 3) {
+            hn::LoadInterleaved3(d, from + 3 * i, a, b, c);
+        } else {
+            hn::LoadInterleaved4(d, from + 4 * i, a, b, c, e);
+            store(e, planes[3] + i);
+        }
+        store(a, planes[0] + i);
+        store(b, planes[1] + i);
+        store(c, planes[2] + i);
+    }
+    for (; i < count; ++i)
+        for (int k = 0; k < values; ++k)
+            halvesImpl(from + i * static_cast<std::size_t>(values) + k, planes[k] + i, 1);
+}
+
 }  // namespace stx::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -67,9 +95,14 @@ HWY_AFTER_NAMESPACE();
 namespace stx {
 
 HWY_EXPORT(halvesImpl);
+HWY_EXPORT(planesOfHalves);
 
 void halvesFrom(const float* from, std::span<std::uint16_t> to) {
     HWY_DYNAMIC_DISPATCH(halvesImpl)(from, to.data(), to.size());
+}
+
+void halfPlanes(const float* from, int values, std::size_t count, std::uint16_t* const* planes) {
+    HWY_DYNAMIC_DISPATCH(planesOfHalves)(from, values, count, planes);
 }
 
 }  // namespace stx
