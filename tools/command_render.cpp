@@ -421,7 +421,8 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
                 : std::ranges::all_of(frame->colour.pixels(),
                                       [](glm::vec4 c) { return !(c.a > 0); });
         if (nothing) ++empty;
-        STX_CHECK(writer.write(static_cast<int>(i), std::move(*frame), camera));
+        STX_CHECK(writer.write(static_cast<int>(i), *frame, camera));
+        renderer->reuse(std::move(*frame));
         program.job.progress(static_cast<std::int64_t>(i - part.first) + 1,
                              static_cast<std::int64_t>(part.end - part.first), "rendering");
     }

@@ -46,23 +46,16 @@ std::string FrameWriter::nameOf(int frame) const {
     return frameName(settings_.pattern, frame).value_or(settings_.pattern);
 }
 
-Result<void> FrameWriter::write(int index, Frame frame, const Camera& camera) {
+Result<void> FrameWriter::write(int index, const Frame& frame, const Camera& camera) {
     Item item{index, {}, {}, camera};
     STX_TRY(const auto format, frameFormat(settings_.pattern));
-    // Only OpenEXR has room for more than 8 bits and colours; what waits is kept small, and the
-    // next frame gets the memory of this one.
-    if (settings_.pattern != "-" && format == FrameFormat::exr) {
+    // Only OpenEXR has room for more than 8 bits and colours; what waits is kept small.
+    if (settings_.pattern == "-")
+        item.picture = rgba8From(frame, settings_.background.value_or(glm::vec3(0.0f)));
+    else if (format == FrameFormat::exr)
         item.frame = exrFrameOf(frame, settings_.background);
-        frame = {};
-    } else {
-        frame.albedo = {};
-        frame.depth = {};
-        frame.normal = {};
-        item.picture = settings_.pattern == "-"
-                           ? rgba8From(frame, settings_.background.value_or(glm::vec3(0.0f)))
-                           : pictureOf(frame, format, settings_.background);
-        frame.colour = {};
-    }
+    else
+        item.picture = pictureOf(frame, format, settings_.background);
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return queue_.size() < kQueue || error_; });
     if (error_) return tl::unexpected(*error_);

@@ -40,9 +40,9 @@ class FrameWriter {
     FrameWriter& operator=(const FrameWriter&) = delete;
 
     [[nodiscard]] std::string nameOf(int frame) const;
-    /// Takes a frame; blocks while the queue is full. The error of an earlier frame comes back here
-    /// or from finish().
-    [[nodiscard]] Result<void> write(int index, Frame frame, const Camera& camera);
+    /// Makes of a frame what its file will hold, and has that written; blocks while the queue is
+    /// full. The error of an earlier frame comes back here or from finish().
+    [[nodiscard]] Result<void> write(int index, const Frame& frame, const Camera& camera);
     /// Waits until everything is on disk.
     [[nodiscard]] Result<void> finish();
 

@@ -47,6 +47,11 @@ OutputStream::OutputStream(const std::filesystem::path& path)
 
 void OutputStream::write(const char* from, int count) {
     auto left = static_cast<std::size_t>(std::max(count, 0));
+    if (left >= block_.size() / 4) {
+        flush();
+        put(from, left);
+        return;
+    }
     while (left > 0) {
         if (filled_ == block_.size()) flush();
         const std::size_t n = std::min(left, block_.size() - filled_);
@@ -58,10 +63,15 @@ void OutputStream::write(const char* from, int count) {
 }
 
 void OutputStream::flush() {
+    put(block_.data(), filled_);
+    filled_ = 0;
+}
+
+void OutputStream::put(const char* from, std::size_t count) {
     std::size_t done = 0;
-    while (done < filled_) {
-        const auto n = ::pwrite(fd_.get(), block_.data() + done, filled_ - done,
-                                static_cast<off_t>(at_ + done));
+    while (done < count) {
+        const auto n =
+            ::pwrite(fd_.get(), from + done, count - done, static_cast<off_t>(at_ + done));
         if (n < 0 && errno == EINTR) continue;
         if (n < 0) {
             error_ = errno;
@@ -69,8 +79,7 @@ void OutputStream::flush() {
         }
         done += static_cast<std::size_t>(n);
     }
-    at_ += filled_;
-    filled_ = 0;
+    at_ += count;
 }
 
 void OutputStream::seekp(std::uint64_t position) {

@@ -69,6 +69,7 @@ class OutputStream final : public Imf::OStream {
 
   private:
     void flush();
+    void put(const char* from, std::size_t count);
     Descriptor fd_;
     std::vector<char> block_;
     std::size_t filled_ = 0;

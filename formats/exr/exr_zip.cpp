@@ -43,17 +43,20 @@ Bytes zipChunk(std::span<const std::uint8_t> raw, int level) {
 
 Bytes zipSplitChunk(std::span<std::uint8_t> split, int level, int rows,
                     std::span<const RowPart> parts) {
+    const bool byRows = level == 1 && !parts.empty();
+    const auto packed = std::make_unique_for_overwrite<std::uint8_t[]>(
+        byRows ? packedRoom(split.size()) : split.size());
     const auto bytes = std::as_bytes(split);
-    const auto packed = std::make_unique_for_overwrite<std::byte[]>(split.size());
     // No room for as many bytes as there were: then it gives 0.
-    const std::span to(packed.get(), split.size() - 1);
-    const std::size_t size = level == 1 && !parts.empty()
-                                 ? packRows(split, rows, parts, adler32(bytes), to)
-                                 : compressZlib(bytes, level, to);
-    if (size > 0) return {packed.get(), packed.get() + size};
-    const std::span raw(reinterpret_cast<std::uint8_t*>(packed.get()), split.size());
-    addAndJoin(split.data(), raw);
-    return {packed.get(), packed.get() + split.size()};
+    const std::size_t size =
+        byRows ? packRows(split, rows, parts, adler32(bytes), packed.get())
+               : compressZlib(bytes, level,
+                              std::as_writable_bytes(std::span(packed.get(), split.size() - 1)));
+    const bool smaller = size > 0 && size < split.size();
+    const std::span to(packed.get(), smaller ? size : split.size());
+    if (!smaller) addAndJoin(split.data(), to);
+    const auto stored = std::as_bytes(to);
+    return {stored.begin(), stored.end()};
 }
 
 void floatsFrom(std::span<const std::uint16_t> halves, float* to, std::size_t stride) {

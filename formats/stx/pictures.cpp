@@ -33,6 +33,7 @@ class KeptRenderer final : public Renderer {
 
     Result<Frame> render(const Camera& camera) override { return renderer_->render(camera); }
     void expect(const Camera& next) override { renderer_->expect(next); }
+    void reuse(Frame&& frame) override { renderer_->reuse(std::move(frame)); }
     std::string backend() const override { return renderer_->backend(); }
     std::string device() const override { return renderer_->device(); }
 

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <memory>
 #include <vector>
 
 #include "lib/base/deflate_blocks.hpp"
@@ -290,15 +289,8 @@ std::size_t RowPacker::writeCoded(std::size_t at, std::span<const deflate::Codes
 }  // namespace
 
 std::size_t packRows(std::span<const std::uint8_t> split, int rows, std::span<const RowPart> parts,
-                     std::uint32_t adler, std::span<std::byte> to) {
-    // No literal takes more than 14 bits and no repeat of eight bytes more than 46; a block's own
-    // codes are told for 1200 literals, or where that is less than 9 bits for each; 48 stored
-    // bytes between two blocks take eight more.
-    const auto packed = std::make_unique_for_overwrite<std::uint8_t[]>(2 * split.size() + 512);
-    const std::size_t size = RowPacker(split, rows, parts).pack(adler, packed.get());
-    if (size >= to.size()) return 0;
-    std::memcpy(to.data(), packed.get(), size);
-    return size;
+                     std::uint32_t adler, std::uint8_t* to) {
+    return RowPacker(split, rows, parts).pack(adler, to);
 }
 
 }  // namespace stx

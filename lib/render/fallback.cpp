@@ -22,6 +22,7 @@ class FallbackRenderer final : public Renderer {
         return current_->render(camera);
     }
     void expect(const Camera& next) override { current_->expect(next); }
+    void reuse(Frame&& frame) override { current_->reuse(std::move(frame)); }
     std::string backend() const override { return current_->backend(); }
     std::string device() const override { return current_->device(); }
 

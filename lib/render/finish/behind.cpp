@@ -20,15 +20,17 @@ class BackgroundRenderer final : public Renderer {
 
     Result<Frame> render(const Camera& camera) override {
         STX_TRY(Frame frame, front_->render(camera));
-        STX_TRY(const Frame background, background_->render(camera));
+        STX_TRY(Frame background, background_->render(camera));
         putBehind(frame, background, [](int, int, float) { return false; });
         frame.milliseconds += background.milliseconds;
+        background_->reuse(std::move(background));
         return frame;
     }
     void expect(const Camera& next) override {
         front_->expect(next);
         background_->expect(next);
     }
+    void reuse(Frame&& frame) override { front_->reuse(std::move(frame)); }
     std::string backend() const override { return front_->backend(); }
     std::string device() const override { return front_->device(); }
 

@@ -29,7 +29,8 @@ class FootprintRenderer final : public Renderer {
     Result<Frame> render(const Camera& camera) override {
         STX_CHECK(camera.check());
         const int factor = factorOf(camera);
-        if (factor == 1) return inner_->render(camera);
+        large_ = factor > 1;
+        if (!large_) return inner_->render(camera);
         STX_TRY(Frame large, inner_->render(enlarged(camera, factor)));
         Frame out = minified(large, factor);
         inner_->reuse(std::move(large));
@@ -37,6 +38,10 @@ class FootprintRenderer final : public Renderer {
     }
     void expect(const Camera& next) override {
         if (next.check()) inner_->expect(enlarged(next, factorOf(next)));
+    }
+    void reuse(Frame&& frame) override {
+        // Beside a larger one, which is kept already, it is of no use.
+        if (!large_) inner_->reuse(std::move(frame));
     }
     std::string backend() const override { return inner_->backend(); }
     std::string device() const override { return inner_->device(); }
@@ -68,6 +73,7 @@ class FootprintRenderer final : public Renderer {
     PageSet set_;
     Footprint footprint_;
     Limits limits_;
+    bool large_ = false;  ///< the last frame came from a larger one
 };
 
 }  // namespace

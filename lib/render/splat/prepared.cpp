@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/base/rounding.hpp"
 
 namespace stx::splat {
 namespace {
@@ -178,7 +179,8 @@ void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, Prepar
         if (!out.normals.empty()) {
             const glm::vec3 n = hasNormal ? glm::normalize(at(w.page.normal))
                                           : worldFromCamera * normalFromSlope(slope, ray);
-            out.normals[i] = glm::i8vec4(glm::round(glm::vec4(n, 0) * 127.0f));
+            const auto code = [](float v) { return static_cast<std::int8_t>(roundToInt(v * 127.0f)); };
+            out.normals[i] = {code(n.x), code(n.y), code(n.z), 0};
         }
     }
 }

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/base/rounding.hpp"
 #include "lib/render/finish/behind.hpp"
 #include "lib/render/finish/fill.hpp"
 #include "lib/render/finish/round_outlines.hpp"
@@ -65,6 +66,8 @@ class SurfaceRenderer final : public Renderer {
     void findNormals();
     /// Unit world normal of a source at pixel position (u, v); zero where it has none.
     [[nodiscard]] glm::vec3 normalAt(const Source& source, float u, float v) const;
+    /// The same of all pixels of a frame; see DrawnFrame::origin.
+    void normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>& normal) const;
     [[nodiscard]] std::unique_ptr<SurfaceFrame> plan(const Camera& camera) const {
         auto frame = std::make_unique<SurfaceFrame>(planFrame(scene_, bounds_, effort_, camera));
         frame->wantOrigin = settings_.wantNormals();
@@ -325,6 +328,47 @@ Result<Frame> SurfaceRenderer::drawTiles(const Camera& camera,
     return frame;
 }
 
+void SurfaceRenderer::normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>& normal) const {
+    /// Of views that fill a page: theirs, row by row.
+    struct Whole {
+        const glm::vec3* normals = nullptr;
+        int width = 0, height = 0;
+    };
+    std::vector<Whole> views(scene_.sources.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const Source& s = scene_.sources[i];
+        if (!s.whole) continue;
+        const auto page = static_cast<std::size_t>(s.whole - scene_.pages.data());
+        views[i] = {(s.view->hasNormals ? *scene_.set.pages()[page].normal : normals_[page]).data(),
+                    s.width, s.height};
+    }
+    const auto one = [&](glm::vec3 at) {
+        const auto number = static_cast<std::size_t>(at.x);
+        const Whole& view = views[number];
+        const float u = at.y - 0.5f, v = at.z - 0.5f;
+        const int x = floorToInt(u), y = floorToInt(v);
+        if (!view.normals || x < 0 || y < 0 || x + 1 >= view.width || y + 1 >= view.height)
+            return normalAt(scene_.sources[number], at.y, at.z);
+        // As in normalAt().
+        const glm::vec3* n = view.normals + static_cast<std::ptrdiff_t>(y) * view.width + x;
+        const float tu = u - static_cast<float>(x), tv = v - static_cast<float>(y);
+        glm::vec3 sum(0.0f);
+        sum += (1 - tu) * (1 - tv) * n[0];
+        sum += tu * (1 - tv) * n[1];
+        sum += (1 - tu) * tv * n[view.width];
+        sum += tu * tv * n[view.width + 1];
+        const float length = glm::length(sum);
+        return length > 1e-6f ? sum / length : glm::vec3(0.0f);
+    };
+    parallelForBlocks(0, static_cast<std::int64_t>(origin.count()), 4096,
+                      [&](std::int64_t from, std::int64_t to) {
+                          for (auto i = static_cast<std::size_t>(from);
+                               i < static_cast<std::size_t>(to); ++i)
+                              if (const glm::vec3 at = origin.data()[i]; !(at.x < 0))
+                                  normal.data()[i] = one(at);
+                      });
+}
+
 Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Image<float>& q) {
     const Camera& camera = work.space.camera;
     frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0.0f));
@@ -336,16 +380,7 @@ Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Im
     }
     STX_CHECK(backend_->finish({frame.colour, q, origin}));
     STX_CHECK(job_.checkCancelled());
-    parallelForBlocks(0, static_cast<std::int64_t>(origin.count()), 4096,
-                      [&](std::int64_t from, std::int64_t to) {
-                          for (auto i = static_cast<std::size_t>(from);
-                               i < static_cast<std::size_t>(to); ++i) {
-                              const glm::vec3 at = origin.data()[i];
-                              if (at.x < 0) continue;
-                              const Source& s = scene_.sources[static_cast<std::size_t>(at.x)];
-                              frame.normal.data()[i] = normalAt(s, at.y, at.z);
-                          }
-                      });
+    if (work.wantOrigin) normalsAt(origin, frame.normal);
     return {};
 }
 
