@@ -1,6 +1,7 @@
 #include "lib/render/splat/prepared.hpp"
 
 #include <cmath>
+#include <optional>
 
 #include "lib/base/parallel.hpp"
 #include "lib/base/rounding.hpp"
@@ -35,13 +36,40 @@ glm::vec2 slopeFromNormal(glm::vec3 n, glm::vec3 ray) {
     return {-n.x / towards, n.y / towards};
 }
 
-glm::vec3 normalFromSlope(glm::vec2 slope, glm::vec3 ray) {
+inline glm::vec3 normalFromSlope(glm::vec2 slope, glm::vec3 ray) {
     // The tangents along u and v in camera space, per sample spacing; their product faces the
     // camera.
     const glm::vec3 alongU = glm::vec3(1, 0, 0) + slope.x * ray;
     const glm::vec3 alongV = glm::vec3(0, -1, 0) + slope.y * ray;
     return glm::normalize(glm::cross(alongV, alongU));
 }
+
+/// Normals of a row of texels, times 127, in the world.
+struct NormalRow {
+    std::vector<float> slopeX, slopeY, rayX;
+    std::vector<std::int8_t> x, y, z;
+
+    explicit NormalRow(const Camera& camera) {
+        const auto width = static_cast<std::size_t>(camera.width);
+        slopeX.resize(width);
+        slopeY.resize(width);
+        for (std::size_t i = 0; i < width; ++i)
+            rayX.push_back(rayOf(camera, static_cast<int>(i), 0).x);
+        x.resize(width);
+        y.resize(width);
+        z.resize(width);
+    }
+    /// Of the slopes. In a loop of its own, of which compilers make vectors.
+    void find(const glm::mat3& worldFromCamera, glm::vec2 rayYZ) {
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            const glm::vec3 n = worldFromCamera * normalFromSlope({slopeX[i], slopeY[i]},
+                                                                  {rayX[i], rayYZ.x, rayYZ.y});
+            x[i] = static_cast<std::int8_t>(roundToInt(n.x * 127.0f));
+            y[i] = static_cast<std::int8_t>(roundToInt(n.y * 127.0f));
+            z[i] = static_cast<std::int8_t>(roundToInt(n.z * 127.0f));
+        }
+    }
+};
 
 // Slope along one axis from the depths before, at and after a pixel, `scale` making it a tangent.
 // A side counts when it is a point and not too steep; when only one does, that one.
@@ -134,9 +162,9 @@ bool usable(glm::vec3 v) {
     return glm::dot(v, v) > 0.0f;
 }
 
-void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, PreparedPage& out) {
+void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, NormalRow* normals,
+                PreparedPage& out) {
     const Camera& camera = w.camera();
-    const glm::mat3 worldFromCamera = glm::transpose(cameraFromWorld);
     for (int x = 0; x < camera.width; ++x) {
         const std::size_t i = w.texel(x, y);
         if (!hasPoint(w.depth(x, y))) continue;
@@ -176,12 +204,21 @@ void prepareRow(const Window& w, const glm::mat3& cameraFromWorld, int y, Prepar
         };
         out.slopes[i] = {flagged(coded(slope.x), around.linked),
                          flagged(coded(slope.y), around.rim)};
-        if (!out.normals.empty()) {
-            const glm::vec3 n = hasNormal ? glm::normalize(at(w.page.normal))
-                                          : worldFromCamera * normalFromSlope(slope, ray);
-            const auto code = [](float v) { return static_cast<std::int8_t>(roundToInt(v * 127.0f)); };
-            out.normals[i] = {code(n.x), code(n.y), code(n.z), 0};
+        if (normals) {
+            normals->slopeX[static_cast<std::size_t>(x)] = slope.x;
+            normals->slopeY[static_cast<std::size_t>(x)] = slope.y;
         }
+    }
+    if (!normals) return;
+    const glm::vec3 ray = rayOf(camera, 0, y);
+    normals->find(glm::transpose(cameraFromWorld), {ray.y, ray.z});
+    for (int x = 0; x < camera.width; ++x) {
+        const std::size_t i = w.texel(x, y), k = static_cast<std::size_t>(x);
+        if (!hasPoint(w.depth(x, y))) continue;
+        out.normals[i] = {normals->x[k], normals->y[k], normals->z[k], 0};
+        if (!w.view.hasNormals || !usable(w.page.normal->data()[i])) continue;
+        const glm::vec3 own = glm::normalize(w.page.normal->data()[i]) * 127.0f;
+        out.normals[i] = {roundToInt(own.x), roundToInt(own.y), roundToInt(own.z), 0};
     }
 }
 
@@ -244,8 +281,11 @@ PreparedPages preparePages(const PageSet& set, bool wantNormals) {
         const glm::mat3 cameraFromWorld(
             glm::mat3_cast(glm::conjugate(rectangle.window.orientation)));
         parallelForBlocks(0, rectangle.height, 16, [&](std::int64_t from, std::int64_t to) {
+            std::optional<NormalRow> normals;
+            if (!page.normals.empty()) normals.emplace(w.camera());
             for (auto y = from; y < to; ++y)
-                prepareRow(w, cameraFromWorld, static_cast<int>(y), page);
+                prepareRow(w, cameraFromWorld, static_cast<int>(y), normals ? &*normals : nullptr,
+                           page);
         });
         const int rows = (rectangle.height + kBlock - 1) / kBlock;
         std::vector<std::vector<BlockInfo>> perRow(static_cast<std::size_t>(rows));

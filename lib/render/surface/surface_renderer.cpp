@@ -4,11 +4,11 @@
 #include <optional>
 
 #include "lib/base/parallel.hpp"
-#include "lib/base/rounding.hpp"
 #include "lib/render/finish/behind.hpp"
 #include "lib/render/finish/fill.hpp"
 #include "lib/render/finish/round_outlines.hpp"
 #include "lib/render/surface/backend.hpp"
+#include "lib/render/surface/view_normals.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
 namespace stx::surface {
@@ -134,17 +134,23 @@ bool SurfaceRenderer::pointsAreExact() const {
 
 void SurfaceRenderer::findNormals() {
     normals_.resize(scene_.pages.size());
+    // Views of an atlas share pages.
     for (std::size_t i = 0; i < scene_.sources.size(); ++i) {
         if (scene_.sources[i].view->hasNormals) continue;
+        for (const PageRectangle& r : scene_.set.rectanglesOf(i)) {
+            const auto page = static_cast<std::size_t>(r.page);
+            if (normals_[page].empty())
+                normals_[page] = Image<glm::vec3>(scene_.pages[page].q.width(),
+                                                  scene_.pages[page].q.height(), glm::vec3(0.0f));
+        }
+    }
+    const auto ofView = [&](std::size_t i) {
         const ReferenceView view = scene_.set.copyOfView(i);
         const DepthSurface surface = depthSurface(view, {});
         const glm::dmat3 worldFromCamera = glm::mat3_cast(view.camera.orientation);
         for (const PageRectangle& r : scene_.set.rectanglesOf(i)) {
             const auto page = static_cast<std::size_t>(r.page);
             // A whole view has no padding: the clipped range is the rectangle.
-            if (normals_[page].empty())
-                normals_[page] = Image<glm::vec3>(scene_.pages[page].q.width(),
-                                                  scene_.pages[page].q.height(), glm::vec3(0.0f));
             const int x0 = std::max(r.x0 - PageSet::kPadding, 0);
             const int x1 = std::min(r.x1 + PageSet::kPadding, view.camera.width);
             const int y0 = std::max(r.y0 - PageSet::kPadding, 0);
@@ -158,7 +164,12 @@ void SurfaceRenderer::findNormals() {
                                                               surface.gradient.at(x, y)));
             });
         }
-    }
+    };
+    // Several at once: half of each is done by one thread.
+    parallelFor(0, static_cast<std::int64_t>(scene_.sources.size()), [&](std::int64_t n) {
+        const auto i = static_cast<std::size_t>(n);
+        if (!scene_.sources[i].view->hasNormals) ofView(i);
+    });
 }
 
 glm::vec3 SurfaceRenderer::normalAt(const Source& source, float u, float v) const {
@@ -329,12 +340,7 @@ Result<Frame> SurfaceRenderer::drawTiles(const Camera& camera,
 }
 
 void SurfaceRenderer::normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>& normal) const {
-    /// Of views that fill a page: theirs, row by row.
-    struct Whole {
-        const glm::vec3* normals = nullptr;
-        int width = 0, height = 0;
-    };
-    std::vector<Whole> views(scene_.sources.size());
+    std::vector<ViewNormals> views(scene_.sources.size());
     for (std::size_t i = 0; i < views.size(); ++i) {
         const Source& s = scene_.sources[i];
         if (!s.whole) continue;
@@ -342,31 +348,21 @@ void SurfaceRenderer::normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>
         views[i] = {(s.view->hasNormals ? *scene_.set.pages()[page].normal : normals_[page]).data(),
                     s.width, s.height};
     }
-    const auto one = [&](glm::vec3 at) {
-        const auto number = static_cast<std::size_t>(at.x);
-        const Whole& view = views[number];
-        const float u = at.y - 0.5f, v = at.z - 0.5f;
-        const int x = floorToInt(u), y = floorToInt(v);
-        if (!view.normals || x < 0 || y < 0 || x + 1 >= view.width || y + 1 >= view.height)
-            return normalAt(scene_.sources[number], at.y, at.z);
-        // As in normalAt().
-        const glm::vec3* n = view.normals + static_cast<std::ptrdiff_t>(y) * view.width + x;
-        const float tu = u - static_cast<float>(x), tv = v - static_cast<float>(y);
-        glm::vec3 sum(0.0f);
-        sum += (1 - tu) * (1 - tv) * n[0];
-        sum += tu * (1 - tv) * n[1];
-        sum += (1 - tu) * tv * n[view.width];
-        sum += tu * tv * n[view.width + 1];
-        const float length = glm::length(sum);
-        return length > 1e-6f ? sum / length : glm::vec3(0.0f);
-    };
-    parallelForBlocks(0, static_cast<std::int64_t>(origin.count()), 4096,
-                      [&](std::int64_t from, std::int64_t to) {
-                          for (auto i = static_cast<std::size_t>(from);
-                               i < static_cast<std::size_t>(to); ++i)
-                              if (const glm::vec3 at = origin.data()[i]; !(at.x < 0))
-                                  normal.data()[i] = one(at);
-                      });
+    parallelForBlocks(
+        0, static_cast<std::int64_t>(origin.count()), 4096,
+        [&](std::int64_t from, std::int64_t to) {
+            const auto first = static_cast<std::size_t>(from), end = static_cast<std::size_t>(to);
+            if (normalsBetween(origin.pixels().subspan(first, end - first), views,
+                               normal.data() + first))
+                return;
+            for (std::size_t i = first; i < end; ++i) {
+                const glm::vec3 at = origin.data()[i];
+                if (at.x < 0) continue;
+                const auto number = static_cast<std::size_t>(at.x);
+                if (!isBetween(views[number], at.y, at.z))
+                    normal.data()[i] = normalAt(scene_.sources[number], at.y, at.z);
+            }
+        });
 }
 
 Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Image<float>& q) {
