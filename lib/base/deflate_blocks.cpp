@@ -290,15 +290,18 @@ void BlockWriter::literals(std::span<const std::uint8_t> bytes) {
     const Codes::Word* words = codes_->symbols_.data();
     const std::uint8_t* from = bytes.data();
     const std::uint8_t* const last = from + bytes.size();
+    // A copy, for bytes that are written might be the object's own.
+    BlockWriter out = *this;
     for (; last - from >= 4; from += 4) {
         // In pairs, for each word waits for the size of the one before.
         const auto a = words[from[0]], b = words[from[1]], c = words[from[2]], d = words[from[3]];
         const int first = a.size + b.size;
         const std::uint64_t ab = a.bits | static_cast<std::uint64_t>(b.bits) << a.size;
         const std::uint64_t cd = c.bits | static_cast<std::uint64_t>(d.bits) << c.size;
-        put(ab | cd << first, first + c.size + d.size);
+        out.put(ab | cd << first, first + c.size + d.size);
     }
-    for (; from != last; ++from) put(words[*from].bits, words[*from].size);
+    for (; from != last; ++from) out.put(words[*from].bits, words[*from].size);
+    *this = out;
 }
 
 void BlockWriter::repeat(std::uint32_t size, std::uint32_t distance) {

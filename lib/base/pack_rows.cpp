@@ -46,14 +46,13 @@ std::uint64_t eightBytes(const std::uint8_t* from) {
 }
 
 /// In four tables, since a count that follows the same one waits for it.
-void addTo(Histogram& histogram, std::span<const std::uint8_t> bytes) {
-    std::array<Histogram, 4> tables{};
+using Tables = std::array<Histogram, 4>;
+
+void addTo(Tables& tables, std::span<const std::uint8_t> bytes) {
     std::size_t i = 0;
     for (; i + 4 <= bytes.size(); i += 4)
         for (std::size_t k = 0; k < 4; ++k) ++tables[k][bytes[i + k]];
     for (; i < bytes.size(); ++i) ++tables[0][bytes[i]];
-    for (std::size_t v = 0; v < 256; ++v)
-        histogram[v] += tables[0][v] + tables[1][v] + tables[2][v] + tables[3][v];
 }
 
 /// Bits of all values of a histogram in the best code.
@@ -84,6 +83,7 @@ class RowPacker {
           rows_(rows),
           parts_(parts),
           half_(static_cast<std::uint32_t>(split.size() / 2)),
+          tables_(2 * parts.size()),
           seen_(2 * parts.size()),
           stored_(2 * parts.size()) {}
 
@@ -129,7 +129,8 @@ class RowPacker {
     std::span<const RowPart> parts_;
     std::uint32_t half_;  ///< where the high bytes begin
     std::vector<Piece> pieces_;
-    std::vector<Histogram> seen_;  ///< of each part's rows that were looked at
+    std::vector<Tables> tables_;   ///< of each part's rows that were looked at
+    std::vector<Histogram> seen_;  ///< their sums
     std::vector<std::uint8_t> stored_;
 };
 
@@ -189,10 +190,13 @@ void RowPacker::findPieces() {
             }
             for (auto i = before; line % rows_ % kLookedAt == 0 && i < pieces_.size(); ++i)
                 if (const Piece& p = pieces_[i]; p.distance == 0 && p.size > 1)
-                    addTo(seen_[kind], bytesOf(p));
+                    addTo(tables_[kind], bytesOf(p));
             at = end;
         }
     }
+    for (std::size_t kind = 0; kind < seen_.size(); ++kind)
+        for (const Histogram& table : tables_[kind])
+            for (std::size_t v = 0; v < 256; ++v) seen_[kind][v] += table[v];
 }
 
 void RowPacker::choose(std::size_t half) {

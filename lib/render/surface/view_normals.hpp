@@ -13,13 +13,13 @@ struct ViewNormals {
     std::int32_t width = 0, height = 0;
 };
 
-/// What normalBetween() gives for each of `origins` (see DrawnFrame::origin) whose four pixels lie
-/// in a view of `views`; zero for the others, and for pixels without an origin. False when one of
-/// the others has an origin: those are the caller's, see isBetween().
+/// The unit normal at each of `origins` (see DrawnFrame::origin), bilinear between the four pixels
+/// around it; zero where there is none, and where they do not lie in a view of `views`. False when
+/// there is one of the latter: those are the caller's, see isBetween().
 bool normalsBetween(std::span<const glm::vec3> origins, std::span<const ViewNormals> views,
                     glm::vec3* normals);
 
-/// Whether the four pixels around an origin lie in its view.
+/// Whether the four pixels around an origin lie in its view and are not the last ones.
 [[nodiscard]] bool isBetween(const ViewNormals& view, float u, float v);
 
 }  // namespace stx::surface
