@@ -47,7 +47,7 @@ inline glm::vec3 normalFromSlope(glm::vec2 slope, glm::vec3 ray) {
 /// Normals of a row of texels, times 127, in the world.
 struct NormalRow {
     std::vector<float> slopeX, slopeY, rayX;
-    std::vector<std::int8_t> x, y, z;
+    std::vector<std::int16_t> x, y, z;
 
     explicit NormalRow(const Camera& camera) {
         const auto width = static_cast<std::size_t>(camera.width);
@@ -61,12 +61,15 @@ struct NormalRow {
     }
     /// Of the slopes. In a loop of its own, of which compilers make vectors.
     void find(const glm::mat3& worldFromCamera, glm::vec2 rayYZ) {
-        for (std::size_t i = 0; i < x.size(); ++i) {
-            const glm::vec3 n = worldFromCamera * normalFromSlope({slopeX[i], slopeY[i]},
-                                                                  {rayX[i], rayYZ.x, rayYZ.y});
-            x[i] = static_cast<std::int8_t>(roundToInt(n.x * 127.0f));
-            y[i] = static_cast<std::int8_t>(roundToInt(n.y * 127.0f));
-            z[i] = static_cast<std::int8_t>(roundToInt(n.z * 127.0f));
+        const glm::mat3 turn = worldFromCamera;
+        const float *const sx = slopeX.data(), *const sy = slopeY.data(), *const rx = rayX.data();
+        std::int16_t *const toX = x.data(), *const toY = y.data(), *const toZ = z.data();
+        const auto count = static_cast<std::ptrdiff_t>(x.size());
+        for (std::ptrdiff_t i = 0; i < count; ++i) {
+            const glm::vec3 n = turn * normalFromSlope({sx[i], sy[i]}, {rx[i], rayYZ.x, rayYZ.y});
+            toX[i] = static_cast<std::int16_t>(roundToInt(n.x * 127.0f));
+            toY[i] = static_cast<std::int16_t>(roundToInt(n.y * 127.0f));
+            toZ[i] = static_cast<std::int16_t>(roundToInt(n.z * 127.0f));
         }
     }
 };

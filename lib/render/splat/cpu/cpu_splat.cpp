@@ -356,12 +356,8 @@ void CpuSplatRenderer::resolveBlended(Picture& picture, const Region& region) co
         }
         if (!wantNormals_) continue;
         glm::vec3* normalOut = frame.normal.row(y).data() + region.left;
-        for (int x = 0; x < region.width; ++x) {
-            const float* n = region.normals + 4 * (start + x);
-            const glm::vec3 sum(n[0], n[1], n[2]);
-            const float length = glm::length(sum);
-            normalOut[x] = length > 0 && colourOut[x].a > 0 ? sum / length : glm::vec3(0.0f);
-        }
+        resolveNormals(region.normals + 4 * start, colourOut,
+                       static_cast<std::size_t>(region.width), normalOut);
         std::copy_n(colourOut, region.width, frame.albedo.row(y).data() + region.left);
         if (!settings_.lighting.on()) continue;
         for (int x = 0; x < region.width; ++x) shade(picture, region.left + x, y, normalOut[x]);

@@ -32,6 +32,7 @@ HWY_INLINE void fetchRow(const Ahead& ahead, int row, bool colours) {
         hwy::Prefetch(s.rgba8 + 4 * pixel);
     else
         hwy::Prefetch(s.rgbaFloat + 4 * pixel);
+    if (colours && s.normals) hwy::Prefetch(s.normals + 4 * pixel);
 }
 
 HWY_INLINE bool inPatches(const Ellipse& e) {
@@ -408,6 +409,34 @@ void colourImpl(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
     }
 }
 
+void normalsImpl(const float* sums, const glm::vec4* colours, std::size_t count, glm::vec3* to) {
+    using D = hn::ScalableTag<float>;
+    using V = hn::Vec<D>;
+    const D d;
+    const std::size_t lanes = hn::Lanes(d);
+    const V zero = hn::Zero(d);
+    const auto some = [&](const float* sum, const float* colour, float* out) HWY_ATTR {
+        V x = zero, y = zero, z = zero, a = zero, r = zero, g = zero, b = zero;
+        hn::LoadInterleaved4(d, sum, x, y, z, a);
+        hn::LoadInterleaved4(d, colour, r, g, b, a);
+        const V length =
+            hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z)));
+        const auto has = hn::And(hn::Gt(length, zero), hn::Gt(a, zero));
+        hn::StoreInterleaved3(hn::IfThenElseZero(has, hn::Div(x, length)),
+                              hn::IfThenElseZero(has, hn::Div(y, length)),
+                              hn::IfThenElseZero(has, hn::Div(z, length)), d, out);
+    };
+    std::size_t i = 0;
+    for (; i + lanes <= count; i += lanes) some(sums + 4 * i, &colours[i].x, &to[i].x);
+    if (i == count) return;
+    float sum[4 * hn::MaxLanes(d)] = {}, colour[4 * hn::MaxLanes(d)] = {},
+          out[3 * hn::MaxLanes(d)];
+    std::copy(sums + 4 * i, sums + 4 * count, sum);
+    std::copy(&colours[i].x, &colours[i].x + 4 * (count - i), colour);
+    some(sum, colour, out);
+    std::copy_n(out, 3 * (count - i), &to[i].x);
+}
+
 }  // namespace stx::splat::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -417,6 +446,7 @@ namespace stx::splat {
 HWY_EXPORT(depthImpl);
 HWY_EXPORT(colourImpl);
 HWY_EXPORT(pointsImpl);
+HWY_EXPORT(normalsImpl);
 
 void drawDepth(const RectangleImages& source, const BlockTask& task, const Ahead& ahead,
                const Shape& shape, const Region& region) {
@@ -428,6 +458,9 @@ void drawColour(const RectangleImages& source, const BlockTask& task, const Ahea
 }
 void drawPoints(const RectangleImages& source, const BlockTask& task, const Region& region) {
     HWY_DYNAMIC_DISPATCH(pointsImpl)(source, task, region);
+}
+void resolveNormals(const float* sums, const glm::vec4* colours, std::size_t count, glm::vec3* to) {
+    HWY_DYNAMIC_DISPATCH(normalsImpl)(sums, colours, count, to);
 }
 
 }  // namespace stx::splat
