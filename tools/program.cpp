@@ -30,6 +30,8 @@ void keepFreedMemory() {
     mallopt(M_TRIM_THRESHOLD, 8 * kLargest);
     // Asked for in larger pieces, memory comes in larger pages, too, where the system has them.
     mallopt(M_TOP_PAD, kLargest / 2);
+    // Threads come and go, more of them than run at a time; each arena keeps memory of its own.
+    mallopt(M_ARENA_MAX, threadCount());
 }
 
 void Program::print(std::string_view text) {

@@ -72,7 +72,7 @@ template <bool kAllPaeth>
 Lanes guessOf(const Filters& f, Lanes left, Lanes up, Lanes corner) {
     const Lanes paeth = paethOf(left, up, corner);
     if constexpr (kAllPaeth) return paeth;
-    const Lanes average = (left & up) + (((left ^ up) >> 1) & 0x7f);
+    const Lanes average = (left & up) + ((left ^ up) >> 1);
     return (f.paeth & paeth) | (f.sub & left) | (f.up & up) | (f.average & average);
 }
 
