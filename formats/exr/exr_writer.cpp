@@ -255,13 +255,14 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
         channel.at = at;
         at += channel.words;
         if (channel.half) {
-            const void* first = channel.pixels->halves ? static_cast<const void*>(channel.pixels->halves)
-                                                       : channel.pixels->values;
+            const void* first = channel.pixels->halves
+                                    ? static_cast<const void*>(channel.pixels->halves)
+                                    : channel.pixels->values;
             const auto [same, isNew] = halves.emplace(first, static_cast<int>(channels.size()));
             if (!isNew) channel.same = same->second;
         }
-        rowParts.push_back({static_cast<std::uint32_t>(channel.words), channel.half ? 1u : 2u,
-                            channel.same});
+        rowParts.push_back(
+            {static_cast<std::uint32_t>(channel.words), channel.half ? 1u : 2u, channel.same});
         channels.push_back(channel);
     }
     if (part.width < kPackedWidth || rowBytes * kZipRows > kLargestPacked) rowParts.clear();
@@ -270,8 +271,8 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
     parallelFor(0, static_cast<std::int64_t>(chunks.size()), [&](std::int64_t i) {
         const int first = static_cast<int>(i) * kZipRows;
         const int count = std::min(kZipRows, rows - first);
-        const auto split =
-            std::make_unique_for_overwrite<std::uint8_t[]>(rowBytes * static_cast<std::size_t>(count));
+        const auto split = std::make_unique_for_overwrite<std::uint8_t[]>(
+            rowBytes * static_cast<std::size_t>(count));
         splitRows(channels, width, first, count, split.get());
         chunks[i] = exr::zipSplitChunk({split.get(), rowBytes * static_cast<std::size_t>(count)},
                                        part.zipLevel, count, rowParts);

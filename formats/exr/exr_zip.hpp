@@ -20,8 +20,8 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 /// when that does not make it smaller, as OpenEXR wants it. Throws std::bad_alloc.
 [[nodiscard]] Bytes zipChunk(std::span<const std::uint8_t> raw, int level);
 
-/// The same of a chunk whose bytes are in that order already, and are changed. Where `parts` tells
-/// what each of `rows` rows is made of, level 1 is packRows().
+/// The same of a chunk whose bytes are in that order already; they may be changed. Where `parts`
+/// tells what each of `rows` rows is made of, level 1 is packRows(). Throws std::bad_alloc.
 [[nodiscard]] Bytes zipSplitChunk(std::span<std::uint8_t> split, int level, int rows,
                                   std::span<const RowPart> parts);
 

@@ -19,8 +19,9 @@ namespace stx {
 /// The sum of bytes that a zlib stream ends with.
 [[nodiscard]] std::uint32_t adler32(std::span<const std::byte> bytes);
 
-/// The inverse of compressZlib(): fills all of `to` with what a zlib stream holds, by libdeflate. False, and anything
-/// in `to`, when the stream is damaged or holds another number of bytes. Throws std::bad_alloc.
+/// The inverse of compressZlib(): fills all of `to` with what a zlib stream holds, by libdeflate.
+/// False, and anything in `to`, when the stream is damaged or holds another number of bytes. Throws
+/// std::bad_alloc.
 [[nodiscard]] bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to);
 
 }  // namespace stx

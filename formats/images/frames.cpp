@@ -21,9 +21,9 @@ namespace stx {
 
 namespace {
 
-/// Premultiplied linear light of an image that is premultiplied in the frame's colour space: a plane
-/// of red, then green, blue and alpha, for these are stored apart. True when all of `other`, if
-/// there is one, is the same as the image.
+/// Premultiplied linear light of an image that is premultiplied in the frame's colour space: a
+/// plane of red, then green, blue and alpha, for these are stored apart. True when all of `other`,
+/// if there is one, is the same as the image.
 bool toLinearPlanes(const Image<glm::vec4>& image, bool linear,
                     const std::optional<glm::vec3>& background, const Image<glm::vec4>* other,
                     std::uint16_t* planes) {

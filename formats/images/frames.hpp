@@ -65,8 +65,7 @@ struct ExrFrame {
 [[nodiscard]] Rgba8Image pictureOf(const Frame& frame, FrameFormat format,
                                    const std::optional<glm::vec3>& background);
 /// What a frame becomes in an EXR file: linear, with the background behind it.
-[[nodiscard]] ExrFrame exrFrameOf(const Frame& frame,
-                                  const std::optional<glm::vec3>& background);
+[[nodiscard]] ExrFrame exrFrameOf(const Frame& frame, const std::optional<glm::vec3>& background);
 /// Writes what exrFrameOf() gave as writeFrame() would the frame. `path` ends in .exr.
 [[nodiscard]] Result<void> writeExrFrame(const ExrFrame& frame, const std::filesystem::path& path,
                                          const FrameOptions& options = {});

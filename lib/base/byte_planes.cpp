@@ -35,7 +35,9 @@ std::uint64_t sumsOfEight(std::uint64_t differences, std::uint8_t last) {
 void splitAndSubtract(std::span<const std::uint16_t> words, std::uint16_t before, std::uint8_t* low,
                       std::uint8_t* high) {
     if (words.empty()) return;
-    const auto first = [](unsigned a, unsigned b) { return static_cast<std::uint8_t>(a - b + 128); };
+    const auto first = [](unsigned a, unsigned b) {
+        return static_cast<std::uint8_t>(a - b + 128);
+    };
     const auto second = [](unsigned a, unsigned b) {
         return static_cast<std::uint8_t>((a >> 8) - (b >> 8) + 128);
     };

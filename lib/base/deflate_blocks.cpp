@@ -131,8 +131,7 @@ void wordsFrom(std::span<const std::uint8_t> sizes, Codes::Word* words) {
         std::uint32_t reversed = 0;
         if (size) {
             const std::uint32_t word = next[size]++;
-            for (int bit = 0; bit < size; ++bit)
-                reversed |= (word >> bit & 1) << (size - 1 - bit);
+            for (int bit = 0; bit < size; ++bit) reversed |= (word >> bit & 1) << (size - 1 - bit);
         }
         words[i] = {static_cast<std::uint16_t>(reversed), static_cast<std::uint8_t>(size)};
     }
@@ -228,7 +227,8 @@ void Codes::writeHead() {
     wordSizes(counts, 7, wordSize.data());
     std::array<Word, kSizeSymbols> words;
     wordsFrom(wordSize, words.data());
-    constexpr std::array kOrder = {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15};
+    constexpr std::array kOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
+                                   11, 4,  12, 3, 13, 2, 14, 1, 15};
     int told = kSizeSymbols;
     while (told > 4 && wordSize[kOrder[told - 1]] == 0) --told;
 

@@ -120,8 +120,7 @@ class RowPacker {
     }
     /// Writes pieces from `at` on, as many as go together; the first one behind them.
     [[nodiscard]] std::size_t writeStored(std::size_t at, deflate::BlockWriter& out) const;
-    [[nodiscard]] std::size_t writeCoded(std::size_t at,
-                                         std::span<const deflate::Codes, 2> codes,
+    [[nodiscard]] std::size_t writeCoded(std::size_t at, std::span<const deflate::Codes, 2> codes,
                                          deflate::BlockWriter& out) const;
 
     std::span<const std::uint8_t> split_;
@@ -214,9 +213,9 @@ void RowPacker::choose(std::size_t half) {
         }
         if (values == 0) continue;
         // What few values seem to have in common is chance, for about 0.7 bits of each value.
-        stored_[kind] = values >= kFewValues &&
-                        bitsOf(seen) + 0.7f * static_cast<float>(different) >
-                            kStoredShare * 8.0f * static_cast<float>(values);
+        stored_[kind] =
+            values >= kFewValues && bitsOf(seen) + 0.7f * static_cast<float>(different) >
+                                        kStoredShare * 8.0f * static_cast<float>(values);
         if (stored_[kind])
             stored += values;
         else

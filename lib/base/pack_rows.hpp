@@ -6,8 +6,8 @@
 
 namespace stx {
 
-/// One channel's share of a row in a chunk of OpenEXR whose bytes are split: low bytes of its 16-bit
-/// words in the first half of the chunk, high bytes in the second.
+/// One channel's share of a row in a chunk of OpenEXR whose bytes are split: low bytes of its
+/// 16-bit words in the first half of the chunk, high bytes in the second.
 struct RowPart {
     std::uint32_t bytes = 0;
     /// Bytes after which values of one size follow each other: 1 of halves, 2 of floats.
@@ -31,12 +31,12 @@ constexpr std::size_t kLargestPacked = std::size_t{1} << 26;
     return 2 * size + 512;
 }
 
-/// A zlib stream of a chunk whose bytes are in the order of splitAndSubtract(): `rows` times `parts`
-/// of low bytes, then as many of high ones. Half of the time of a general compressor: it knows
-/// which parts are the same, finds runs, and tells once for each channel of a chunk whether its
-/// bytes are worth a code; those that are not (low bytes of colours, depth) are stored as they are.
-/// `adler` is the Adler-32 of all bytes. The size of the stream; `to` has packedRoom() of them.
-/// Throws std::bad_alloc.
+/// A zlib stream of a chunk whose bytes are in the order of splitAndSubtract(): `rows` times
+/// `parts` of low bytes, then as many of high ones. Faster than a general compressor: it knows
+/// which parts are the same, finds runs, and decides once for each channel of a chunk whether its
+/// bytes are worth a code; those that are not (low bytes of colours, depth) are stored as they
+/// are. `adler` is the Adler-32 of all bytes. The size of the stream; `to` has packedRoom() of
+/// them. Throws std::bad_alloc.
 [[nodiscard]] std::size_t packRows(std::span<const std::uint8_t> split, int rows,
                                    std::span<const RowPart> parts, std::uint32_t adler,
                                    std::uint8_t* to);

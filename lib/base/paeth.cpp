@@ -24,13 +24,13 @@ HWY_INLINE hn::Mask<D> isUpTo(V a, V b) {
     return hn::Eq(hn::Min(a, b), a);
 }
 
-/// In eight bits: left + above - 2 * corner is the sum of two differences, so its size is the sum of
-/// their sizes where they have one sign (more than 255 is never the least), else the difference.
+/// In eight bits: left + above - 2 * corner is the sum of two differences, so its size is the sum
+/// of their sizes where they have one sign (more than 255 is never the least), else the difference.
 HWY_INLINE V expectedOf(V left, V above, V corner) {
     const V toLeft = distanceOf(above, corner), toAbove = distanceOf(left, corner);
     const auto apart = hn::Xor(isUpTo(left, corner), isUpTo(above, corner));
-    const V toCorner = hn::IfThenElse(apart, distanceOf(toLeft, toAbove),
-                                      hn::SaturatedAdd(toLeft, toAbove));
+    const V toCorner =
+        hn::IfThenElse(apart, distanceOf(toLeft, toAbove), hn::SaturatedAdd(toLeft, toAbove));
     const auto isLeft = hn::And(isUpTo(toLeft, toAbove), isUpTo(toLeft, toCorner));
     return hn::IfThenElse(isLeft, left, hn::IfThenElse(isUpTo(toAbove, toCorner), above, corner));
 }

@@ -348,21 +348,21 @@ void SurfaceRenderer::normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>
         views[i] = {(s.view->hasNormals ? *scene_.set.pages()[page].normal : normals_[page]).data(),
                     s.width, s.height};
     }
-    parallelForBlocks(
-        0, static_cast<std::int64_t>(origin.count()), 4096,
-        [&](std::int64_t from, std::int64_t to) {
-            const auto first = static_cast<std::size_t>(from), end = static_cast<std::size_t>(to);
-            if (normalsBetween(origin.pixels().subspan(first, end - first), views,
-                               normal.data() + first))
-                return;
-            for (std::size_t i = first; i < end; ++i) {
-                const glm::vec3 at = origin.data()[i];
-                if (at.x < 0) continue;
-                const auto number = static_cast<std::size_t>(at.x);
-                if (!isBetween(views[number], at.y, at.z))
-                    normal.data()[i] = normalAt(scene_.sources[number], at.y, at.z);
-            }
-        });
+    parallelForBlocks(0, static_cast<std::int64_t>(origin.count()), 4096,
+                      [&](std::int64_t from, std::int64_t to) {
+                          const auto first = static_cast<std::size_t>(from),
+                                     end = static_cast<std::size_t>(to);
+                          if (normalsBetween(origin.pixels().subspan(first, end - first), views,
+                                             normal.data() + first))
+                              return;
+                          for (std::size_t i = first; i < end; ++i) {
+                              const glm::vec3 at = origin.data()[i];
+                              if (at.x < 0) continue;
+                              const auto number = static_cast<std::size_t>(at.x);
+                              if (!isBetween(views[number], at.y, at.z))
+                                  normal.data()[i] = normalAt(scene_.sources[number], at.y, at.z);
+                          }
+                      });
 }
 
 Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Image<float>& q) {

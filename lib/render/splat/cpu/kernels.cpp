@@ -419,8 +419,7 @@ void normalsImpl(const float* sums, const glm::vec4* colours, std::size_t count,
         V x = zero, y = zero, z = zero, a = zero, r = zero, g = zero, b = zero;
         hn::LoadInterleaved4(d, sum, x, y, z, a);
         hn::LoadInterleaved4(d, colour, r, g, b, a);
-        const V length =
-            hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z)));
+        const V length = hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z)));
         const auto has = hn::And(hn::Gt(length, zero), hn::Gt(a, zero));
         hn::StoreInterleaved3(hn::IfThenElseZero(has, hn::Div(x, length)),
                               hn::IfThenElseZero(has, hn::Div(y, length)),
@@ -429,8 +428,7 @@ void normalsImpl(const float* sums, const glm::vec4* colours, std::size_t count,
     std::size_t i = 0;
     for (; i + lanes <= count; i += lanes) some(sums + 4 * i, &colours[i].x, &to[i].x);
     if (i == count) return;
-    float sum[4 * hn::MaxLanes(d)] = {}, colour[4 * hn::MaxLanes(d)] = {},
-          out[3 * hn::MaxLanes(d)];
+    float sum[4 * hn::MaxLanes(d)] = {}, colour[4 * hn::MaxLanes(d)] = {}, out[3 * hn::MaxLanes(d)];
     std::copy(sums + 4 * i, sums + 4 * count, sum);
     std::copy(&colours[i].x, &colours[i].x + 4 * (count - i), colour);
     some(sum, colour, out);
