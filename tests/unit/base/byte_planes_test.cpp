@@ -28,6 +28,17 @@ std::vector<std::uint8_t> someBytes(std::size_t count, unsigned seed) {
     return out;
 }
 
+TEST(BytePlanes, WhatIsSplitIsJoinedAgain) {
+    std::mt19937 random(2);
+    for (std::size_t size = 1; size < 100; ++size) {
+        std::vector<std::uint8_t> raw(size), split(size), joined(size);
+        for (auto& byte : raw) byte = static_cast<std::uint8_t>(random());
+        splitAndSubtract(raw, split.data());
+        addAndJoin(split.data(), joined);
+        EXPECT_EQ(joined, raw) << size;
+    }
+}
+
 TEST(BytePlanes, WordsInPiecesGiveWhatAllBytesGive) {
     for (const std::size_t words : {1u, 2u, 3u, 17u, 400u}) {
         const auto raw = someBytes(2 * words, static_cast<unsigned>(words));
