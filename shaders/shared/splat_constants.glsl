@@ -17,8 +17,8 @@ CONSTANT float kSigmaSource = 0.5f, kSigmaPixel = 0.3f;
 // Where a large splat ends, and where it stops to hide, in squared standard deviations. The
 // lattice closes at half a diagonal: 0.5 / kSigmaSource^2 = 2.
 CONSTANT float kReach2 = 5.0f, kCore2 = 2.1f;
-// It is drawn up to here along either axis: beyond it weighs less than a hundredth.
-CONSTANT float kDrawn2 = 4.0f;
+// It is drawn up to here along either axis: all that hides, and of the rest what weighs a ninth or more.
+CONSTANT float kDrawn2 = 2.6f;
 // None is larger, in pixels from its centre: a point almost at the viewpoint would fill the frame.
 CONSTANT float kLargest = 256.0f;
 // Steeper planes (relative depth per pixel) are nearly edge-on and would run away.

@@ -82,7 +82,7 @@ void addPointsImpl(const OutlineBlock& block, const OutlineDepths& depths, const
             };
             const auto along = h(2);
             const auto w = orthographic ? set(1.0f) : hn::Div(set(1.0f), along);
-            const auto x = hn::Mul(h(0), w);
+            const auto x = hn::Sub(hn::Mul(h(0), w), set(static_cast<float>(rows.left)));
             const auto y = hn::Sub(hn::Mul(h(1), w), set(static_cast<float>(rows.top)));
             // False for what is not a number.
             const auto inside =

@@ -25,11 +25,11 @@ struct OutlineDepths {
     std::size_t stride = 0;
 };
 
-/// Rows of a picture in which points tell of outlines. Element (x, y) of the picture is number
-/// (y - top + 1) * stride + x + 1 of each array: there is a border of one pixel, and two elements
-/// more at the right, since four are added to at once.
+/// A part of a picture in which points tell of outlines. Element (x, y) of the picture is number
+/// (y - top + 1) * stride + x - left + 1 of each array: there is a border of one pixel, and two
+/// elements more at the right, since four are added to at once.
 struct OutlineRows {
-    int width = 0, rows = 0, top = 0, stride = 0;
+    int width = 0, rows = 0, left = 0, top = 0, stride = 0;
     /// What is asked for next to a pixel and there: bit 0 in the row above, 1 in its row, 2 below.
     /// Three bytes after the last may be read.
     const std::uint8_t* near = nullptr;

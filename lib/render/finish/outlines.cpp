@@ -55,33 +55,43 @@ glm::vec2 outwardAt(const Image<float>& depth, int x, int y) {
     return length > kLeastDirection * all ? out / length : glm::vec2(0.0f);
 }
 
-/// Rows of the picture that one thread owns, as OutlineRows tells.
+/// Rows of the picture that one thread owns, as OutlineRows tells. Its memory serves for all
+/// frames.
 struct Outlines::Band {
-    int top = 0, rows = 0, width = 0;
-    bool any = false;          ///< some pixel is asked for; else the images are empty
-    Image<std::uint8_t> near;  ///< see OutlineRows
-    Image<float> outX, outY;   ///< out of the object, length 1; NaN where not asked for
-    Image<float> high, low;    ///< outermost and innermost point along that, pixels
-    Image<float> count;        ///< of points
+    int left = 0, top = 0, rows = 0, width = 0, stride = 0;
+    bool any = false;                ///< some pixel is asked for; else the arrays are not made
+    std::vector<std::uint8_t> near;  ///< see OutlineRows
+    std::vector<float> outX, outY;   ///< out of the object, length 1; NaN where not asked for
+    std::vector<float> high, low;    ///< outermost and innermost point along that, pixels
+    std::vector<float> count;        ///< of points
     std::vector<std::uint32_t> blocks;
 
     void make() {
         constexpr float kFar = std::numeric_limits<float>::infinity();
         constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-        const int w = width + 4, h = rows + 2;
-        near = Image<std::uint8_t>(w, h + 1);  // four bytes are read at once
-        outX = Image<float>(w, h, kNone);
-        outY = Image<float>(w, h, kNone);
-        high = Image<float>(w, h, -kFar);
-        low = Image<float>(w, h, kFar);
-        count = Image<float>(w, h);
+        stride = width + 4;
+        const auto size = static_cast<std::size_t>(stride) * static_cast<std::size_t>(rows + 2);
+        near.assign(size + 4, 0);  // four bytes are read at once
+        outX.assign(size, kNone);
+        outY.assign(size, kNone);
+        high.assign(size, -kFar);
+        low.assign(size, kFar);
+        count.assign(size, 0.0f);
         any = true;
     }
+    /// The element of a pixel of the picture.
+    [[nodiscard]] std::size_t element(int x, int y) const {
+        return static_cast<std::size_t>(y - top + 1) * static_cast<std::size_t>(stride) +
+               static_cast<std::size_t>(x - left + 1);
+    }
     [[nodiscard]] OutlineRows arrays() {
-        return {width,       rows,        top,         near.width(), near.data(),
-                outX.data(), outY.data(), high.data(), low.data(),   count.data()};
+        return {width,       rows,        left,        top,        stride,      near.data(),
+                outX.data(), outY.data(), high.data(), low.data(), count.data()};
     }
 };
+
+Outlines::Outlines(Outlines&&) noexcept = default;
+Outlines::~Outlines() = default;
 
 Outlines::Outlines(PageSet set) : set_(std::move(set)) {
     const auto rectangles = set_.rectangles();
@@ -123,18 +133,23 @@ OutlineDepths Outlines::depthsOf(const OutlineBlock& block) const {
 }
 
 void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& covered,
-                       const Extent& asked) const {
+                       const Extent& asked) {
     const int w = frame.depth.width(), h = frame.depth.height();
     const Extent part = asked.grown(0, w, h);
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     static_assert(kBandRows % kTile == 0);
     Image<std::uint8_t> tiles(tilesX, tilesY);
-    std::vector<Band> bands(static_cast<std::size_t>((h + kBandRows - 1) / kBandRows));
-    parallelFor(0, static_cast<std::int64_t>(bands.size()), [&](std::int64_t n) {
-        Band& band = bands[static_cast<std::size_t>(n)];
+    bands_.resize(static_cast<std::size_t>((h + kBandRows - 1) / kBandRows));
+    // Points beside the part tell of what is in it, too.
+    const Extent around = part.grown(1, w, h);
+    parallelFor(0, static_cast<std::int64_t>(bands_.size()), [&](std::int64_t n) {
+        Band& band = bands_[static_cast<std::size_t>(n)];
+        band.left = around.x0;
         band.top = static_cast<int>(n) * kBandRows;
         band.rows = std::min(kBandRows, h - band.top);
-        band.width = w;
+        band.width = around.x1 - around.x0;
+        band.any = false;
+        band.blocks.clear();
         const int last = std::min(part.y1, band.top + band.rows);
         for (int y = std::max(part.y0, band.top); y < last; ++y) {
             const auto prepare = [&](int column) {
@@ -142,12 +157,12 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
                 const glm::vec2 out = outwardAt(frame.depth, x, y);
                 if (out == glm::vec2(0.0f)) return;
                 if (!band.any) band.make();
-                const int row = y - band.top;
-                band.outX.at(x + 1, row + 1) = out.x;
-                band.outY.at(x + 1, row + 1) = out.y;
+                const std::size_t at = band.element(x, y);
+                band.outX[at] = out.x;
+                band.outY[at] = out.y;
                 for (int j = 0; j <= 2; ++j)
-                    for (int i = x; i <= x + 2; ++i)
-                        band.near.at(i, row + j) |= static_cast<std::uint8_t>(4 >> j);
+                    for (int i = x - 1; i <= x + 1; ++i)
+                        band.near[band.element(i, y + j - 1)] |= static_cast<std::uint8_t>(4 >> j);
                 tiles.at(x / kTile, y / kTile) = 1;
             };
             forWhere(
@@ -201,11 +216,11 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         });
     for (std::size_t n = 0; n < blocks_.size(); ++n)
         for (int b = reached[n].from / kBandRows; b <= reached[n].to / kBandRows; ++b)
-            if (reached[n].to >= 0 && bands[static_cast<std::size_t>(b)].any)
-                bands[static_cast<std::size_t>(b)].blocks.push_back(static_cast<std::uint32_t>(n));
+            if (reached[n].to >= 0 && bands_[static_cast<std::size_t>(b)].any)
+                bands_[static_cast<std::size_t>(b)].blocks.push_back(static_cast<std::uint32_t>(n));
 
-    parallelFor(0, static_cast<std::int64_t>(bands.size()), [&](std::int64_t n) {
-        Band& band = bands[static_cast<std::size_t>(n)];
+    parallelFor(0, static_cast<std::int64_t>(bands_.size()), [&](std::int64_t n) {
+        Band& band = bands_[static_cast<std::size_t>(n)];
         if (!band.any) return;
         const OutlineRows rows = band.arrays();
         for (std::size_t k = 0; k < band.blocks.size(); ++k) {
@@ -215,15 +230,16 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
             addOutlinePoints(block, depthsOf(block), maps[block.rectangle], camera.orthographic,
                              next, last ? OutlineDepths{} : depthsOf(next), rows);
         }
-        for (int y = 0; y < band.rows; ++y) {
-            const auto measured = [&](int x) {
-                const float nx = band.outX.at(x + 1, y + 1), ny = band.outY.at(x + 1, y + 1);
-                const float high = band.high.at(x + 1, y + 1), low = band.low.at(x + 1, y + 1);
-                covered.at(x, band.top + y) =
-                    std::max(0.0f, areaBelow(high, nx, ny) - areaBelow(low, nx, ny));
+        for (int y = band.top; y < band.top + band.rows; ++y) {
+            const std::size_t first = band.element(band.left, y);
+            const auto measured = [&](int column) {
+                const std::size_t at = first + static_cast<std::size_t>(column);
+                const float nx = band.outX[at], ny = band.outY[at];
+                covered.at(band.left + column, y) = std::max(
+                    0.0f, areaBelow(band.high[at], nx, ny) - areaBelow(band.low[at], nx, ny));
             };
             forWhere(
-                band.count.row(y + 1).subspan(1, static_cast<std::size_t>(w)),
+                std::span(band.count).subspan(first, static_cast<std::size_t>(band.width)),
                 [](float points) { return points >= kEnoughPoints; }, measured);
         }
     });

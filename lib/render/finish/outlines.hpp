@@ -46,13 +46,16 @@ class Outlines {
 
     /// Points are those with an alpha of at least one half.
     explicit Outlines(PageSet set);
+    Outlines(Outlines&&) noexcept;
+    ~Outlines();
 
     /// Replaces those values of `covered` that are kAsked by the share of the pixel's area that is
     /// covered, 0..1, where so many points lie around it that their outermost tell. `covered` has
     /// the frame's size; pixels that are asked for must be near the background, which is where
-    /// `frame` has no depth, and lie in `part`. The same on any number of threads.
+    /// `frame` has no depth, and lie in `part`. The same on any number of threads. Of one frame at
+    /// a time: what it measures in is kept for the next.
     void measure(const Frame& frame, const Camera& camera, Image<float>& covered,
-                 const Extent& part = {}) const;
+                 const Extent& part = {});
 
   private:
     struct Band;
@@ -61,6 +64,7 @@ class Outlines {
 
     PageSet set_;
     std::vector<OutlineBlock> blocks_;
+    std::vector<Band> bands_;
 };
 
 }  // namespace stx

@@ -45,7 +45,7 @@ void setCoverage(Frame& frame, int x, int y, float share) {
     if (!frame.normal.empty()) frame.normal.at(x, y) = glm::vec3(0.0f);
 }
 
-void cutRoundOutlines(const Outlines& outlines, const Camera& camera, Frame& frame) {
+void cutRoundOutlines(Outlines& outlines, const Camera& camera, Frame& frame) {
     const int w = frame.depth.width(), h = frame.depth.height();
     constexpr int kRows = 16;
     Image<float> covered(w, h, -1.0f);

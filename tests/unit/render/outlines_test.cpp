@@ -146,6 +146,24 @@ TEST(Outlines, TheSameOnAnyNumberOfThreads) {
     }
 }
 
+TEST(Outlines, OfAFrameKnowNothingOfTheFrameBefore) {
+    const Bundle bundle = ballFromAround();
+    Outlines outlines(bundle);
+    for (const int size : {200, 64, 300, 200}) {
+        const Camera camera = novelCamera(size);
+        const Frame frame = fatBall(camera);
+        Image<float> alone = allAsked(frame), covered = alone, part = alone;
+        Outlines(bundle).measure(frame, camera, alone);
+        outlines.measure(frame, camera, covered);
+        EXPECT_EQ(covered, alone) << size;
+        // All that is asked for lies here.
+        const int reach = static_cast<int>(outlineRadius(camera)) + 2;
+        const int from = size / 2 - reach, to = size / 2 + reach;
+        outlines.measure(frame, camera, part, {from, from, to, to});
+        EXPECT_EQ(part, alone) << "a part of " << size;
+    }
+}
+
 /// The ball with its depth, and edge pixels that are covered by 0.9; `flat`: a disc that faces the
 /// camera.
 Frame ballWithSoftEdge(const Camera& camera, bool flat) {
@@ -171,7 +189,8 @@ double coveredArea(const Frame& frame) {
 }
 
 TEST(RoundOutlines, AreCutWhereASurfaceTurnsAway) {
-    const Outlines outlines(ballFromAround());
+    const Bundle bundle = ballFromAround();
+    Outlines outlines(bundle);
     const Camera camera = novelCamera(64);
     const double area = 3.14159265358979 * outlineRadius(camera) * outlineRadius(camera);
     Frame ball = ballWithSoftEdge(camera, false);
@@ -186,7 +205,8 @@ TEST(RoundOutlines, AreCutWhereASurfaceTurnsAway) {
 }
 
 TEST(RoundOutlines, OfSheetsStayAsTheyAre) {
-    const Outlines outlines(ballFromAround());
+    const Bundle bundle = ballFromAround();
+    Outlines outlines(bundle);
     const Camera camera = novelCamera(64);
     Frame disc = ballWithSoftEdge(camera, true);
     const Image<glm::vec4> before = disc.colour;

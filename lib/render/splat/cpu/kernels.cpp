@@ -41,20 +41,20 @@ HWY_INLINE bool inPatches(const Ellipse& e) {
 
 // Calls draw(patch) for each part of an ellipse.
 template <class F>
-HWY_INLINE void forPatches(const Ellipse& e, const F& draw) {
+HWY_INLINE void forPatches(const Ellipse& e, const Region& region, const F& draw) {
     Ellipse patch = e;
     for (patch.y0 = e.y0; patch.y0 <= e.y1; patch.y0 += kPatch) {
         patch.y1 = std::min(e.y1, patch.y0 + kPatch - 1);
         for (patch.x0 = e.x0; patch.x0 <= e.x1; patch.x0 += kPatch) {
             patch.x1 = std::min(e.x1, patch.x0 + kPatch - 1);
-            draw(patch);
+            draw(patchOf(patch, region));
         }
     }
 }
 
 HWY_INLINE void depthEllipse(DF d, const Ellipse& e, const Region& region) {
     if (inPatches(e))
-        return forPatches(e, [&](const Ellipse& p) HWY_ATTR { depthPatch(p, region); });
+        return forPatches(e, region, [&](const Patch& p) HWY_ATTR { depthPatch(p, region); });
     const int lanes = static_cast<int>(hn::Lanes(d));
     forRows(e, [&](int x0, int x1, int y) HWY_ATTR {
         float* row = region.depth + region.element(x0, y);
@@ -71,7 +71,7 @@ template <bool kOpaque, bool kNormals>
 HWY_INLINE void colourEllipse(DF d, const Ellipse& e, const PointColour& point, float tolerance,
                               const Region& region) {
     if (inPatches(e))
-        return forPatches(e, [&](const Ellipse& p) HWY_ATTR {
+        return forPatches(e, region, [&](const Patch& p) HWY_ATTR {
             colourPatch<kOpaque, kNormals>(p, point, tolerance, region);
         });
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -126,9 +126,12 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
             }
             if (!kUniform) {
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge<false>(d, p, large, region, [&](int, const Ellipse& e) HWY_ATTR {
-                        depthEllipse(d, e, region);
-                    });
+                    forLarge<false>(
+                        d, p, large, region,
+                        [&](int, const Patch& patch, const Steps&)
+                            HWY_ATTR { depthPatch(patch, region); },
+                        [&](int, const Ellipse& e, const Steps&)
+                            HWY_ATTR { depthEllipse(d, e, region); });
             }
             std::uint32_t bits = bitsOf(d, p.small);
             if (!bits) continue;
@@ -204,14 +207,24 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
                 p.large = hn::And(p.large, any);
             }
             if (!kUniform) {
+                const auto colourOf = [&](int k, const Steps& steps) HWY_ATTR {
+                    PointColour point = pointColourOf(s, pixel + k, kOpaque);
+                    if (steps.uAcross != 0 || steps.vDown != 0)
+                        addGradient(s, pixel + k, steps.uAcross, steps.vAcross, steps.uDown,
+                                    steps.vDown, point);
+                    return point;
+                };
                 if (const std::uint32_t large = bitsOf(d, p.large))
-                    forLarge<true>(d, p, large, region, [&](int k, const Ellipse& e) HWY_ATTR {
-                        PointColour point = pointColourOf(s, pixel + k, kOpaque);
-                        if (e.uAcross != 0 || e.vDown != 0)
-                            addGradient(s, pixel + k, e.uAcross, e.vAcross, e.uDown, e.vDown,
-                                        point);
-                        colourEllipse<kOpaque, kNormals>(d, e, point, t.tolerance, region);
-                    });
+                    forLarge<true>(
+                        d, p, large, region,
+                        [&](int k, const Patch& patch, const Steps& steps) HWY_ATTR {
+                            colourPatch<kOpaque, kNormals>(patch, colourOf(k, steps), t.tolerance,
+                                                           region);
+                        },
+                        [&](int k, const Ellipse& e, const Steps& steps) HWY_ATTR {
+                            colourEllipse<kOpaque, kNormals>(d, e, colourOf(k, steps), t.tolerance,
+                                                             region);
+                        });
             }
             if (hn::AllFalse(d, p.small)) continue;
             const VF fx = p.at.fx, fy = p.at.fy;
@@ -319,9 +332,8 @@ HWY_INLINE void forRound(const RectangleImages& s, const BlockTask& t, const Sha
             const VF half = hn::Set(d, radius);
             const Boxes box = boxesOf(d, hn::Set(d, x), hn::Set(d, y), half, half, region);
             if (hn::AllFalse(d, box.some)) continue;
-            draw(pixel,
-                 Ellipse{x, y, h[2], 0, 0, q, 0, q, kReach2, 1.0f, 0, 0, 0, 0, hn::GetLane(box.x0),
-                         hn::GetLane(box.x1), hn::GetLane(box.y0), hn::GetLane(box.y1)});
+            draw(pixel, Ellipse{x, y, h[2], 0, 0, q, 0, q, kReach2, 1.0f, hn::GetLane(box.x0),
+                                hn::GetLane(box.x1), hn::GetLane(box.y0), hn::GetLane(box.y1)});
         }
     }
 }

@@ -19,14 +19,12 @@ namespace stx::splat::HWY_NAMESPACE {
 
 #if HWY_TARGET == HWY_SCALAR
 
-constexpr bool kPatches = false;
-HWY_INLINE void depthPatch(const Ellipse&, const Region&) {}
+HWY_INLINE void depthPatch(const Patch&, const Region&) {}
 template <bool kOpaque, bool kNormals>
-HWY_INLINE void colourPatch(const Ellipse&, const PointColour&, float, const Region&) {}
+HWY_INLINE void colourPatch(const Patch&, const PointColour&, float, const Region&) {}
 
 #else
 
-constexpr bool kPatches = true;
 // Pixels of a patch that fit a vector: whole rows of four.
 constexpr int kLanes = HWY_HAVE_SCALABLE || HWY_MAX_BYTES < 32 ? 4 : HWY_MAX_BYTES < 64 ? 8 : 16;
 constexpr int kRowsOfLanes = kLanes / kPatch;
@@ -58,39 +56,34 @@ struct PatchRows {
     hn::Mask<DP> in;
 };
 
-HWY_INLINE PatchRows patchRows(const Ellipse& e, int first) {
+HWY_INLINE PatchRows patchRows(const Patch& p, int first) {
     const DP d;
     const hn::RebindToSigned<DP> di;
     const auto lane = hn::Iota(di, 0);
     const VP column = hn::ConvertTo(d, hn::And(lane, hn::Set(di, kPatch - 1)));
     const VP row =
         hn::Add(hn::ConvertTo(d, hn::ShiftRight<2>(lane)), hn::Set(d, static_cast<float>(first)));
-    const VP dx = hn::Add(column, hn::Set(d, static_cast<float>(e.x0) - e.x));
-    const VP dy = hn::Add(row, hn::Set(d, static_cast<float>(e.y0) - e.y));
+    const VP dx = hn::Add(column, hn::Set(d, p.dx));
+    const VP dy = hn::Add(row, hn::Set(d, p.dy));
     PatchRows out;
-    out.q = hn::MulAdd(dx, hn::MulAdd(dx, hn::Set(d, e.qxx), hn::Mul(dy, hn::Set(d, 2 * e.qxy))),
-                       hn::Mul(hn::Mul(dy, dy), hn::Set(d, e.qyy)));
-    out.z = hn::MulAdd(dx, hn::Set(d, e.slopeX * e.z),
-                       hn::MulAdd(dy, hn::Set(d, e.slopeY * e.z), hn::Set(d, e.z)));
+    out.q = hn::MulAdd(dx, hn::MulAdd(dx, hn::Set(d, p.qxx), hn::Mul(dy, hn::Set(d, p.twiceQxy))),
+                       hn::Mul(hn::Mul(dy, dy), hn::Set(d, p.qyy)));
+    const VP z = hn::Set(d, p.z);
+    out.z = hn::MulAdd(dx, hn::Set(d, p.zx), hn::MulAdd(dy, hn::Set(d, p.zy), z));
     // A plane that runs through the viewpoint must not hide all.
-    out.z = hn::Max(out.z, hn::Set(d, 0.5f * e.z));
-    out.in = hn::And(hn::Le(column, hn::Set(d, static_cast<float>(e.x1 - e.x0))),
-                     hn::Le(row, hn::Set(d, static_cast<float>(e.y1 - e.y0))));
+    out.z = hn::Max(out.z, hn::Mul(z, hn::Set(d, 0.5f)));
+    out.in = hn::And(hn::Le(column, hn::Set(d, p.wide)), hn::Le(row, hn::Set(d, p.high)));
     return out;
 }
 
-HWY_INLINE std::size_t firstOf(const Ellipse& e, const Region& region) {
-    return region.element(e.x0, e.y0);
-}
-
-HWY_INLINE void depthPatch(const Ellipse& e, const Region& region) {
+HWY_INLINE void depthPatch(const Patch& patch, const Region& region) {
     const DP d;
     const D4 d4;
     HWY_ALIGN float depth[kLanes];
-    float* to = region.depth + firstOf(e, region);
+    float* to = region.depth + patch.at;
     for (int first = 0; first < kPatch; first += kRowsOfLanes) {
-        const PatchRows p = patchRows(e, first);
-        const auto core = hn::And(p.in, hn::Le(p.q, hn::Set(d, e.core2)));
+        const PatchRows p = patchRows(patch, first);
+        const auto core = hn::And(p.in, hn::Le(p.q, hn::Set(d, patch.core2)));
         hn::Store(hn::IfThenElse(core, p.z, hn::Set(d, kInfinity)), d, depth);
         for (int row = 0; row < kRowsOfLanes; ++row, to += region.stride)
             hn::StoreU(hn::Min(hn::Load(d4, depth + kPatch * row), hn::LoadU(d4, to)), d4, to);
@@ -116,22 +109,22 @@ HWY_INLINE VP repeated(Four value) {
 }
 
 template <bool kOpaque, bool kNormals>
-HWY_INLINE void colourPatch(const Ellipse& e, const PointColour& point, float tolerance,
+HWY_INLINE void colourPatch(const Patch& patch, const PointColour& point, float tolerance,
                             const Region& region) {
     const DP d;
     const D4 d4;
     HWY_ALIGN float weights[kPatch * kPatch];
-    const std::size_t start = firstOf(e, region);
+    const std::size_t start = patch.at;
     const std::ptrdiff_t stride = region.stride;
     std::uint32_t some = 0;  // a bit for each pixel
     for (int first = 0; first < kPatch; first += kRowsOfLanes) {
-        const PatchRows p = patchRows(e, first);
+        const PatchRows p = patchRows(patch, first);
         const VP front = loadRows(region.depth + start + first * stride, stride);
         const auto near = hn::And(hn::And(p.in, hn::Lt(p.q, hn::Set(d, kReach2))),
                                   hn::Le(p.z, hn::Mul(front, hn::Set(d, 1.0f + tolerance))));
         // Falls off like a Gaussian and reaches zero at kReach2.
         const VP fall = hn::MulAdd(p.q, hn::Set(d, -1.0f / kReach2), hn::Set(d, 1.0f));
-        const VP weight = hn::Mul(hn::Mul(fall, fall), hn::Mul(fall, hn::Set(d, e.quality)));
+        const VP weight = hn::Mul(hn::Mul(fall, fall), hn::Mul(fall, hn::Set(d, patch.quality)));
         hn::Store(hn::IfThenElseZero(near, weight), d, weights + kPatch * first);
         std::uint8_t bits[8] = {};
         hn::StoreMaskBits(d, near, bits);
@@ -140,14 +133,14 @@ HWY_INLINE void colourPatch(const Ellipse& e, const PointColour& point, float to
     if (!some) return;
     const hn::RebindToSigned<DP> di;
     const VP across = repeated(point.across), down = repeated(point.down);
-    const VP dx = hn::Add(hn::ConvertTo(d, hn::ShiftRight<2>(hn::Iota(di, 0))),
-                          hn::Set(d, static_cast<float>(e.x0) - e.x));
-    const VP dy = hn::Set(d, static_cast<float>(e.y0) - e.y);
+    const VP dx =
+        hn::Add(hn::ConvertTo(d, hn::ShiftRight<2>(hn::Iota(di, 0))), hn::Set(d, patch.dx));
+    const VP dy = hn::Set(d, patch.dy);
     const VP step = hn::Mul(across, hn::Set(d, static_cast<float>(kRowsOfLanes)));
     const VP zero = hn::Zero(d);
     VP colour = hn::MulAdd(dx, across, hn::MulAdd(dy, down, repeated(point.colour)));
-    for (int row = 0; row < kPatch; ++row, colour = hn::Add(colour, down), some >>= kPatch) {
-        if (!(some & ((1u << kPatch) - 1))) continue;
+    // Rows without a pixel get zeros added: which rows these are no processor can foresee.
+    for (int row = 0; row < kPatch; ++row, colour = hn::Add(colour, down)) {
         const std::size_t at = start + static_cast<std::size_t>(row * stride);
         const float* w = weights + kPatch * row;
         addRow(region.colour + 4 * at, w, colour, step);

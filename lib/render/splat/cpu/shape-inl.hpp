@@ -176,7 +176,6 @@ struct Ellipse {
     float qxx, qxy, qyy;
     float core2;
     float quality;
-    float uAcross, vAcross, uDown, vDown;
     int x0, x1, y0, y1;  // the part of its box that lies in the region, inclusive
 };
 
@@ -207,6 +206,7 @@ HWY_INLINE Boxes boxesOf(DF d, VF x, VF y, VF halfX, VF halfY, const Region& reg
 }
 
 // Large splats are drawn in patches of so many pixels along a side, up to so many of these.
+constexpr bool kPatches = HWY_TARGET != HWY_SCALAR;
 constexpr int kPatch = 4, kMostPatches = 4;
 
 // Calls draw(k) for each bit k, those four apart one after another: a load that meets parts of
@@ -219,36 +219,122 @@ HWY_INLINE void forBitsApart(std::uint32_t bits, const F& draw) {
     }
 }
 
-// The large splats among some neighbouring pixels, one by one: draw(pixel, ellipse).
-template <bool kColour, class F>
+// Up to 4x4 pixels of a large splat.
+struct Patch {
+    std::size_t at;    // element of the first one in the region
+    float dx, dy;      // from the splat to that pixel
+    float wide, high;  // columns and rows after the first
+    float z, zx, zy;   // depth of the splat, and change of depth per pixel
+    float qxx, twiceQxy, qyy;
+    float core2;
+    float quality;
+};
+
+HWY_INLINE Patch patchOf(const Ellipse& e, const Region& region) {
+    return {region.element(e.x0, e.y0),
+            static_cast<float>(e.x0) - e.x,
+            static_cast<float>(e.y0) - e.y,
+            static_cast<float>(e.x1 - e.x0),
+            static_cast<float>(e.y1 - e.y0),
+            e.z,
+            e.slopeX * e.z,
+            e.slopeY * e.z,
+            e.qxx,
+            2 * e.qxy,
+            e.qyy,
+            e.core2,
+            e.quality};
+}
+
+// How the colour of a splat goes on: half the source pixels that go by per output pixel.
+struct Steps {
+    float uAcross, vAcross, uDown, vDown;
+};
+
+// The large splats among some neighbouring pixels, one by one: drawPatch(pixel, patch, steps) where
+// one patch holds it, else drawEllipse(pixel, ellipse, steps). What patches need is found for all
+// at once.
+template <bool kColour, class P, class E>
 HWY_INLINE void forLarge(DF d, const Splats& p, std::uint32_t bits, const Region& region,
-                         const F& draw) {
-    constexpr int kValues = 13;
+                         const P& drawPatch, const E& drawEllipse) {
+    enum Value {
+        X,
+        Y,
+        Z,
+        SlopeX,
+        SlopeY,
+        Qxx,
+        Qxy,
+        Qyy,
+        Dx,
+        Dy,
+        Wide,
+        High,
+        Zx,
+        Zy,
+        Qxy2,
+        kShape,
+        Quality = kShape,
+        UAcross,
+        VAcross,
+        UDown,
+        VDown,
+        kValues
+    };
     HWY_ALIGN float v[kValues][kBlock];
-    HWY_ALIGN std::int32_t box[4][kBlock];
+    HWY_ALIGN std::int32_t box[4][kBlock], element[kBlock];
     const Boxes boxes = boxesOf(d, p.at.x, p.at.y, p.halfX, p.halfY, region);
     bits &= bitsOf(d, boxes.some);
     if (!bits) return;
     const DI di;
+    const VF wide = hn::ConvertTo(d, hn::Sub(boxes.x1, boxes.x0)),
+             high = hn::ConvertTo(d, hn::Sub(boxes.y1, boxes.y0)), most = hn::Set(d, kPatch - 1.0f);
+    const std::uint32_t one = bitsOf(d, hn::And(hn::Le(wide, most), hn::Le(high, most)));
     hn::Store(boxes.x0, di, box[0]);
     hn::Store(boxes.x1, di, box[1]);
     hn::Store(boxes.y0, di, box[2]);
     hn::Store(boxes.y1, di, box[3]);
-    const VF all[kValues] = {p.at.x, p.at.y,    p.at.z,    p.slopeX,  p.slopeY, p.qxx,  p.qxy,
-                             p.qyy,  p.quality, p.uAcross, p.vAcross, p.uDown,  p.vDown};
-    constexpr int kShape = 8;  // values without those of colour
+    hn::Store(
+        hn::Add(hn::Mul(hn::Sub(boxes.y0, hn::Set(di, region.top - 1)), hn::Set(di, region.stride)),
+                hn::Sub(boxes.x0, hn::Set(di, region.left - 1))),
+        di, element);
+    const VF all[kValues] = {p.at.x,
+                             p.at.y,
+                             p.at.z,
+                             p.slopeX,
+                             p.slopeY,
+                             p.qxx,
+                             p.qxy,
+                             p.qyy,
+                             hn::Sub(hn::ConvertTo(d, boxes.x0), p.at.x),
+                             hn::Sub(hn::ConvertTo(d, boxes.y0), p.at.y),
+                             wide,
+                             high,
+                             hn::Mul(p.slopeX, p.at.z),
+                             hn::Mul(p.slopeY, p.at.z),
+                             hn::Add(p.qxy, p.qxy),
+                             p.quality,
+                             p.uAcross,
+                             p.vAcross,
+                             p.uDown,
+                             p.vDown};
     for (int k = 0; k < (kColour ? kValues : kShape); ++k) hn::Store(all[k], d, v[k]);
-    if (!kColour) {
-        forBitsApart(bits, [&](int k) HWY_ATTR {
-            draw(k, Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
-                            kCore2, 1, 0, 0, 0, 0, box[0][k], box[1][k], box[2][k], box[3][k]});
-        });
-        return;
-    }
     forBitsApart(bits, [&](int k) HWY_ATTR {
-        draw(k, Ellipse{v[0][k], v[1][k], v[2][k], v[3][k], v[4][k], v[5][k], v[6][k], v[7][k],
-                        kCore2, v[8][k], v[9][k], v[10][k], v[11][k], v[12][k], box[0][k],
-                        box[1][k], box[2][k], box[3][k]});
+        const float quality = kColour ? v[Quality][k] : 1.0f;
+        const Steps steps = kColour ? Steps{v[UAcross][k], v[VAcross][k], v[UDown][k], v[VDown][k]}
+                                    : Steps{0, 0, 0, 0};
+        if (kPatches && (one >> k & 1))
+            drawPatch(k,
+                      Patch{static_cast<std::size_t>(element[k]), v[Dx][k], v[Dy][k], v[Wide][k],
+                            v[High][k], v[Z][k], v[Zx][k], v[Zy][k], v[Qxx][k], v[Qxy2][k],
+                            v[Qyy][k], kCore2, quality},
+                      steps);
+        else
+            drawEllipse(
+                k,
+                Ellipse{v[X][k], v[Y][k], v[Z][k], v[SlopeX][k], v[SlopeY][k], v[Qxx][k], v[Qxy][k],
+                        v[Qyy][k], kCore2, quality, box[0][k], box[1][k], box[2][k], box[3][k]},
+                steps);
     });
 }
 
