@@ -122,12 +122,15 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
     if (!views_.empty()) outlines_.emplace(set_);
 }
 
-/// Which of the `wanted` samples of a pixel, a bit for each, are free at that depth.
+/// Which of the `wanted` samples of a pixel, a bit for each, are free at that depth. Asks view
+/// `first` first, and leaves there the one that told the last of them.
 std::uint32_t Silhouettes::freeSamples(const Maps& maps, int x, int y, double depth,
-                                       std::uint32_t wanted) const {
+                                       std::uint32_t wanted, std::size_t& first) const {
     std::uint32_t free = 0;
     static_assert(kSamples * kSamples <= 32);
-    for (std::size_t v = 0; v < views_.size(); ++v) {
+    const std::size_t asked = first;
+    for (std::size_t k = 0; k < views_.size(); ++k) {
+        const std::size_t v = k == 0 ? asked : k <= asked ? k - 1 : k;
         const View& view = views_[v];
         const splat::PixelMap& m = maps[v];
         const auto project = [&](const glm::dvec3& h) {
@@ -143,24 +146,30 @@ std::uint32_t Silhouettes::freeSamples(const Maps& maps, int x, int y, double de
             continue;
         const auto around = view.around.at(static_cast<int>(centre.x), static_cast<int>(centre.y));
         if (around == Around::full) continue;
-        if (around == Around::empty) return wanted;
+        if (around == Around::empty) {
+            first = v;
+            return wanted;
+        }
         // Within a pixel the way into a reference is as good as affine.
         const auto right = project(h + m.au * depth + m.bu) - centre;
         const auto down = project(h + m.av * depth + m.bv) - centre;
         for (std::uint32_t rest = wanted & ~free; rest; rest &= rest - 1) {
-            const int k = std::countr_zero(rest);
-            const double dx = (k % kSamples + 0.5) / kSamples - 0.5;
-            const double dy = (k / kSamples + 0.5) / kSamples - 0.5;
+            const int sample = std::countr_zero(rest);
+            const double dx = (sample % kSamples + 0.5) / kSamples - 0.5;
+            const double dy = (sample / kSamples + 0.5) / kSamples - 0.5;
             const auto p = centre + right * dx + down * dy;
-            if (alphaBilinear(view, p.x, p.y) < kFree) free |= 1u << k;
+            if (alphaBilinear(view, p.x, p.y) < kFree) free |= 1u << sample;
         }
-        if (free == wanted) break;
+        if (free == wanted) {
+            first = v;
+            break;
+        }
     }
     return free;
 }
 
 float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y,
-                            float depth) const {
+                            float depth, std::size_t& first) const {
     // At a silhouette the surface runs along the ray, so the splat's depth is the least certain
     // thing there is (half a pixel aside is 17 pixels deep on a ball of 300): a ray passes by only
     // if nothing around that depth is solid for all references.
@@ -170,7 +179,7 @@ float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y
     for (const int k : kDepthSteps) {
         const double at = depth + k * pixel;
         if (!camera.orthographic && at <= 0) continue;
-        free = freeSamples(maps, x, y, at, free);
+        free = freeSamples(maps, x, y, at, free, first);
         if (free == 0) break;
     }
     return 1.0f - static_cast<float>(std::popcount(free)) / (kSamples * kSamples);
@@ -221,12 +230,14 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
     });
     outlines_->measure(frame, camera, covered_, part);
     inRows([&](int from, int to) {
+        // What one view sees past at a pixel it mostly sees past beside it, and before and behind.
+        std::size_t seesPast = 0;
         for (int y = from; y < to; ++y)
             forWhere(
                 partOf(y), [](float c) { return c == Outlines::kAsked; },
                 [&](int column) {
                     const int x = part.x0 + column;
-                    covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y));
+                    covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y), seesPast);
                 });
     });
     inRows([&](int from, int to) {
