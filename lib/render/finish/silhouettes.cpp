@@ -168,8 +168,8 @@ std::uint32_t Silhouettes::freeSamples(const Maps& maps, int x, int y, double de
     return free;
 }
 
-float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y,
-                            float depth, std::size_t& first) const {
+float Silhouettes::coverage(const Camera& camera, const Maps& maps, int x, int y, float depth,
+                            std::size_t& first) const {
     // At a silhouette the surface runs along the ray, so the splat's depth is the least certain
     // thing there is (half a pixel aside is 17 pixels deep on a ball of 300): a ray passes by only
     // if nothing around that depth is solid for all references.
@@ -237,7 +237,8 @@ void Silhouettes::carve(Frame& frame, const Camera& camera, const Extent& drawn)
                 partOf(y), [](float c) { return c == Outlines::kAsked; },
                 [&](int column) {
                     const int x = part.x0 + column;
-                    covered_.at(x, y) = coverage(camera, maps, x, y, frame.depth.at(x, y), seesPast);
+                    covered_.at(x, y) =
+                        coverage(camera, maps, x, y, frame.depth.at(x, y), seesPast);
                 });
     });
     inRows([&](int from, int to) {
