@@ -17,6 +17,8 @@ CONSTANT int kNoVote = 0;  // the point is hidden from it, on its surface, or ou
 // It sees past the point, but where its own surfaces end or jump, or are so steep that noise may do it.
 CONSTANT int kHalfVote = 1;
 CONSTANT int kWholeVote = 2;  // it sees a surface clearly behind the point, or background there
+// It sees background there and its depth is noisy: alpha is not.
+CONSTANT int kTwoVotes = 4;
 
 bool inside(ivec2 at, ivec2 size) {
     return at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
@@ -49,6 +51,9 @@ float largestAlphaAround(int s, ivec2 corner) {
     return largest;
 }
 
+// The vote of a source that sees background.
+int backgroundVoteOf(int s) { return besideOf(s) > 0.0f ? kTwoVotes : kWholeVote; }
+
 // Whether a source with this bilinear alpha between the 2x2 pixels from `corner` on sees background
 // there. Only beside what covers a pixel in full does a part of its alpha tell: thin parts and leaves
 // never reach an alpha of 1.
@@ -71,7 +76,7 @@ int voteOf(int s, float x, float y, float q) {
     ivec2 corner = ivec2(f);
     Place place = placeOf(s, corner);
     if (hasAlpha(s) && isBackground(s, corner, alphaAmong(s, place, corner, at - 0.5f - f)))
-        return kWholeVote;
+        return backgroundVoteOf(s);
     float least = 3.0e38f, most = 0.0f;
     bool gaps = false, doubtful = false;
     for (int j = 0; j < 2; ++j) {

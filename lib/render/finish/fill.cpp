@@ -10,6 +10,21 @@
 #include "lib/render/surface/votes.hpp"
 
 namespace stx::surface {
+namespace shared {
+
+/// Votes on what noise may have taken away: only what lies before a noisy surface by far more than
+/// is left of its noise is free.
+struct WideVotes : SourcePixels {
+    static constexpr float kWide = 4.0f;
+
+    [[nodiscard]] float stepOf(int s) const {
+        return at(s).beside > 0.0f ? kWide * at(s).step : at(s).step;
+    }
+#include "shaders/shared/surface_votes.glsl"
+};
+
+}  // namespace shared
+
 namespace {
 
 // Where no source is named the value was chosen by trial on the project's image sets and meshes.
@@ -147,8 +162,18 @@ bool enclosed(unsigned directionsMet) {
     return open == 0x11u || open == 0x22u || open == 0x44u || open == 0x88u;
 }
 
-/// Whether any source sees past a point.
+/// Whether any source sees past a point, in noisy views clearly.
 bool isFree(std::span<const LocalSource> sources, float x, float y, float q) {
+    if (std::any_of(sources.begin(), sources.end(),
+                    [](const LocalSource& s) { return s.source->beside > 0.0f; })) {
+        shared::WideVotes votes{{sources}};
+        int free = 0;
+        for (int s = 0; s < static_cast<int>(sources.size()); ++s) {
+            free += votes.voteOf(s, x, y, q);
+            if (free >= shared::WideVotes::kWholeVote) return true;
+        }
+        return false;
+    }
     return std::any_of(sources.begin(), sources.end(),
                        [&](const LocalSource& s) { return seesPast(s, x, y, q); });
 }

@@ -24,12 +24,23 @@ constexpr int kRadii[] = {1, 2, 4, 6, 8};
 constexpr float kAim = 0.001f;
 /// The window grows while all estimates so far agree within so many of their standard deviations.
 constexpr float kAgree = 2.0f;
-/// Points further from the plane than so many standard deviations are on another surface.
-constexpr float kFirstBand = 4.0f, kBand = 2.5f;
-/// Neighbours that must be on one surface around a pinhole, within this share of q and kBand
+/// Points further from the plane than so many standard deviations are on another surface; first of
+/// all a point's own value stands for the plane.
+struct Bands {
+    float first, then;
+};
+/// Wide bands leave surfaces as they are, narrow ones keep leaves apart that are no further from
+/// each other than the noise.
+constexpr Bands kWideBands{4.0f, 3.0f}, kNarrowBands{1.7f, 1.2f};
+/// A view is clutter, or not at all, where this share of the points around a point is beside its
+/// surface, but not by more than so many wide bands.
+constexpr float kClutter = 0.12f, kNoClutter = 0.06f, kNotFar = 3.0f;
+/// Points that tell it: every how many columns and rows, and how far around them, pixels.
+constexpr int kClutterColumns = 3, kClutterRows = 5, kClutterRadius = 2;
+/// Neighbours that must be on one surface around a pinhole, within this share of q and so many
 /// standard deviations. (Between leaves fewer are not a surface.)
 constexpr int kLeastNeighbours = 8;
-constexpr float kPinholeBand = 0.004f;
+constexpr float kPinholeBand = 0.004f, kPinholeDeviations = 2.5f;
 
 /// q = q0 + gx dx + gy dy around a pixel.
 struct LocalPlane {
@@ -92,6 +103,45 @@ LocalPlane fitAround(const Image<float>& q, int x, int y, int radius, const Loca
     return out;
 }
 
+/// The bands for a view with so much noise, by how much clutter there is in it.
+Bands bandsFor(const Image<float>& q, const DepthAxis& axis, float noise) {
+    double beside = 0;
+    std::int64_t points = 0;
+    for (int y = 1; y < q.height(); y += kClutterRows) {
+        for (int x = 1; x < q.width(); x += kClutterColumns) {
+            const float here = q.at(x, y);
+            if (!(here > 0.0f)) continue;
+            const float sigma = noise * axis.relativeScale(here), band = kWideBands.then * sigma;
+            const LocalPlane plane = fitAround(q, x, y, 1, {here}, kWideBands.first * sigma);
+            float near = 0, off = 0;
+            for (int j = -kClutterRadius; j <= kClutterRadius; ++j) {
+                for (int i = -kClutterRadius; i <= kClutterRadius; ++i) {
+                    const float there = q.contains(x + i, y + j) ? q.at(x + i, y + j) : 0.0f;
+                    if (!(there > 0.0f)) continue;
+                    const float distance =
+                        std::abs(there - plane.q0 - plane.gx * static_cast<float>(i) -
+                                 plane.gy * static_cast<float>(j));
+                    if (distance > kNotFar * band) continue;
+                    constexpr auto kReach =
+                        static_cast<float>((kClutterRadius + 1) * (kClutterRadius + 1));
+                    const float weight =
+                        std::max(1.0f - static_cast<float>(i * i + j * j) / kReach, 0.0f);
+                    near += weight;
+                    if (distance > band) off += weight;
+                }
+            }
+            if (!(near > 0.0f)) continue;
+            beside += off / near;
+            ++points;
+        }
+    }
+    if (points == 0) return kWideBands;
+    const auto share = static_cast<float>(beside / static_cast<double>(points));
+    const float t = std::clamp((share - kNoClutter) / (kClutter - kNoClutter), 0.0f, 1.0f);
+    return {std::lerp(kWideBands.first, kNarrowBands.first, t),
+            std::lerp(kWideBands.then, kNarrowBands.then, t)};
+}
+
 }  // namespace
 
 std::optional<double> meanOfRows(const std::vector<double>& sums,
@@ -130,6 +180,7 @@ float depthNoise(const Image<float>& q, const DepthAxis& axis) {
 float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm::vec3>* surface) {
     if (noise < kLeastNoise) return 0.0f;
     const Image<float> from = q;
+    const Bands bands = bandsFor(from, axis, noise);
     if (surface) *surface = Image<glm::vec3>(q.width(), q.height(), glm::vec3(0.0f));
     std::vector<double> left(static_cast<std::size_t>(q.height()), 0.0);
     std::vector<std::int64_t> points(left.size(), 0);
@@ -145,7 +196,7 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
                 glm::vec2 slope(0.0f);
                 for (const int radius : kRadii) {
                     plane = fitAround(from, x, y, radius, plane,
-                                      (radius == kRadii[0] ? kFirstBand : kBand) * sigma);
+                                      (radius == kRadii[0] ? bands.first : bands.then) * sigma);
                     const float deviation = sigma / std::sqrt(std::max(plane.alike, 1.0f));
                     least = std::max(least, plane.q0 - kAgree * deviation);
                     most = std::min(most, plane.q0 + kAgree * deviation);
@@ -181,7 +232,8 @@ void closePinholes(Image<float>& q, const Image<std::uint8_t>& covered, const De
                 if (count < kLeastNeighbours) continue;
                 std::nth_element(around, around + count / 2, around + count);
                 const float middle = around[count / 2];
-                const float band = (kPinholeBand + kBand * noise) * axis.relativeScale(middle);
+                const float band =
+                    (kPinholeBand + kPinholeDeviations * noise) * axis.relativeScale(middle);
                 const LocalPlane plane = fitAround(from, x, y, 1, {middle}, band);
                 if (plane.points >= kLeastNeighbours && plane.q0 > 0.0f) q.at(x, y) = plane.q0;
             }

@@ -19,7 +19,7 @@ constexpr int kAgreementRounds = 2;
 constexpr std::size_t kPartners = 8;
 /// Surfaces further apart than so many standard deviations are not the same.
 constexpr float kAgreementBand = 3.0f;
-/// A view that sees the surface from behind or along it says nothing: the least share of what a
+/// A view that sees the surface along it says nothing: the least share of what a
 /// surface across its rays would change by.
 constexpr float kFacing = 0.2f;
 /// Points that few views confirm are further off than the mean: what is left counts as so many
@@ -80,7 +80,10 @@ Opinion opinionOf(const Partner& p, const DepthAxis& axis, float x, float y, flo
     const ShownSurface s = surfaceShownBy(*p.view, p.warp, x, y, q);
     if (!s.found) return {};
     const float across = p.view->space->axis.qPerUnit(s.shown) / axis.qPerUnit(q);
-    if (!(s.rate > kFacing * across)) return {};
+    if (!(std::abs(s.rate) > kFacing * across)) return {};
+    // Seen from behind it may be the other side of the same thing, which is no thinner than
+    // nothing.
+    if (s.rate < 0.0f && s.off >= 0.0f) return {};
     const float doubt = s.doubt / s.rate;
     return {s.off / s.rate, doubt * doubt};
 }

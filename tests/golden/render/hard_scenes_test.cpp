@@ -81,7 +81,8 @@ INSTANTIATE_TEST_SUITE_P(Sets, HardScenes,
 struct Faults {
     const char* set;
     const char* kind;  ///< see noisy::damage()
-    double best;       ///< dB, the first novel view
+    double best;       ///< dB
+    int view = 0;      ///< the novel view
 };
 
 class FaultySources : public testing::TestWithParam<Faults> {};
@@ -95,8 +96,9 @@ TEST_P(FaultySources, StaysAboveTheNaiveWarp) {
     ASSERT_TRUE(noisy::damage(*bundle, faults.kind));
     const auto cameras = readCameraFile(folder / "transforms_test.json", job);
     ASSERT_TRUE(cameras) << cameras.error().text();
-    const Camera& camera = (*cameras)[0].camera;
-    const auto truth = spheres::picture(folder / "test/rgb_000.png");
+    const Camera& camera = (*cameras)[static_cast<std::size_t>(faults.view)].camera;
+    const auto truth =
+        spheres::picture(folder / ("test/rgb_00" + std::to_string(faults.view) + ".png"));
     double naive = 0;
     for (const ReferenceView& view : bundle->views)
         naive = std::max(naive, *compare(naiveWarp(view, camera).picture, truth)->psnrRgb);
@@ -109,12 +111,15 @@ TEST_P(FaultySources, StaysAboveTheNaiveWarp) {
 
 INSTANTIATE_TEST_SUITE_P(
     Sets, FaultySources,
-    testing::Values(Faults{"statue", "noise0.5", 41.55}, Faults{"statue", "noise2", 37.5},
-                    Faults{"statue", "missing3", 45.51}, Faults{"statue", "edges1", 45.2},
-                    Faults{"statue", "light", 45.5}, Faults{"oaktree", "edges1", 26.75},
-                    Faults{"oaktree", "noise0.5", 27.65}, Faults{"oaktree", "noise2", 25.75}),
+    testing::Values(Faults{"statue", "noise0.5", 42.25}, Faults{"statue", "noise2", 37.3},
+                    // Looks at the backs of what most views see, where votes leave holes.
+                    Faults{"statue", "noise0.5", 38.65, 3}, Faults{"statue", "missing3", 45.51},
+                    Faults{"statue", "edges1", 45.2}, Faults{"statue", "light", 45.5},
+                    Faults{"oaktree", "edges1", 26.75}, Faults{"oaktree", "noise0.5", 28.5},
+                    Faults{"oaktree", "noise2", 26.85}),
     [](const auto& faults) {
         std::string name = std::string(faults.param.set) + faults.param.kind;
+        if (faults.param.view) name += "view" + std::to_string(faults.param.view);
         std::erase(name, '.');
         return name;
     });

@@ -93,6 +93,33 @@ TEST(NoisyViews, OtherSurfacesAndTheirBacksDoNotCount) {
     }
 }
 
+TEST(NoisyViews, NoPointIsBehindWhatAnotherSeesFromBehind) {
+    // Both sides of a sheet: each view has it farther away than the other, or nearer, as if it
+    // were thick.
+    constexpr float kOff = 0.003f, kDoubtShare = 0.002f;
+    for (const float off : {-kOff, kOff}) {
+        NoisySheet sheet({0.85, 2.25});
+        for (std::size_t i = 0; i < 2; ++i) {
+            const Image<float>& exact = sheet.exact[i];
+            for (int y = 0; y < kPictureSide; ++y) {
+                for (int x = 0; x < kPictureSide; ++x) {
+                    const int left = std::min(x, kPictureSide - 2);
+                    sheet.q[i].at(x, y) = (1 + off) * exact.at(x, y);
+                    sheet.views[i].surface.at(x, y) = {exact.at(left + 1, y) - exact.at(left, y), 0,
+                                                       kDoubtShare * exact.at(x, y)};
+                }
+            }
+        }
+        agreeOnDepth(sheet.views);
+        const double middle = sheet.q[0].at(kPictureSide / 2, kPictureSide / 2) /
+                              sheet.exact[0].at(kPictureSide / 2, kPictureSide / 2);
+        if (off < 0)
+            EXPECT_NEAR(middle, 1, 0.1 * kOff);
+        else
+            EXPECT_NEAR(middle, 1 + kOff, 1e-6);
+    }
+}
+
 TEST(NoisyViews, OneAloneStaysAsItIs) {
     NoisySheet sheet({0.2});
     const Image<float> before = sheet.q[0];

@@ -1,5 +1,6 @@
 #include "lib/render/surface/cpu/fuse_samples.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
@@ -47,7 +48,8 @@ struct SampleFuser {
     const SampledTile& tile;
     shared::Votes& votes;
     const PixelSamples& pixel;
-    int first;  ///< sample
+    int mostOfOne;  ///< what one source may say at most
+    int first;      ///< sample
     Points x, y;
 
     HWY_INLINE Points sampleOf(int i) const { return hn::LoadU(PointTag(), pixel.q[i] + first); }
@@ -131,12 +133,13 @@ struct SampleFuser {
             }
             enough = hn::Add(enough, hn::IfThenElseZero(asCounts(supports), whole));
         }
-        // How many are left to be asked.
+        // What those that are left to be asked may say at most.
         const int count = static_cast<int>(tile.sources.size());
-        Counts most = hn::Set(di, Votes::kWholeVote * (count - pixel.count));
+        const Counts each = hn::Set(di, mostOfOne);
+        Counts most = hn::Set(di, mostOfOne * (count - pixel.count));
         for (int i = 0; i < pixel.count; ++i)
             most =
-                hn::Add(most, hn::IfThenElseZero(asCounts(maskOf(others[pixel.owner[i]])), whole));
+                hn::Add(most, hn::IfThenElseZero(asCounts(maskOf(others[pixel.owner[i]])), each));
         std::uint32_t open = lanesOf(asked);
         for (int k = 0; k < count; ++k) {
             // Those that have enough, and those that cannot have it any more, need no other.
@@ -145,7 +148,7 @@ struct SampleFuser {
             if (!open) break;
             const bool lists = listed >> k & 1u;
             const PointMask other = lists ? maskOf(others[k]) : asked;
-            most = hn::Sub(most, hn::IfThenElseZero(asCounts(other), whole));
+            most = hn::Sub(most, hn::IfThenElseZero(asCounts(other), each));
             const std::uint32_t asks = lists ? others[k] & open : open;
             if (!asks) continue;
             against = hn::Add(against,
@@ -227,6 +230,9 @@ void FuseSamplesOf(const SampledTile& tile, std::span<const int> among, int colu
     const int n = static_cast<int>(hn::Lanes(d));
     const int side = tile.grid.perPixel;
     shared::Votes votes{{tile.sources}};
+    int mostOfOne = shared::Votes::kWholeVote;
+    for (int k = 0; k < static_cast<int>(tile.sources.size()); ++k)
+        mostOfOne = std::max(mostOfOne, votes.backgroundVoteOf(k));
     const PixelSamples pixel(tile, among, column, row);
     alignas(64) float x[kMostSamples] = {}, y[kMostSamples] = {};
     const float scale = 1.0f / static_cast<float>(side);
@@ -237,7 +243,8 @@ void FuseSamplesOf(const SampledTile& tile, std::span<const int> among, int colu
             static_cast<float>(tile.y) + (static_cast<float>(row * side + l / side) + 0.5f) * scale;
     }
     for (int l = 0; l < side * side; l += n)
-        SampleFuser{tile, votes, pixel, l, hn::LoadU(d, x + l), hn::LoadU(d, y + l)}.fuse(out);
+        SampleFuser{tile, votes, pixel, mostOfOne, l, hn::LoadU(d, x + l), hn::LoadU(d, y + l)}
+            .fuse(out);
 }
 
 }  // namespace stx::surface::HWY_NAMESPACE

@@ -274,7 +274,7 @@ HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
                 const Points alpha = alphaOf(from.colour, FourTexels(source, p, doubtful), p);
                 const PointMask background = areBackground(votes, s, p, alpha, doubtful);
                 cast = hn::IfThenElseZero(hn::RebindMask(di, background),
-                                          hn::Set(di, shared::Votes::kWholeVote));
+                                          hn::Set(di, votes.backgroundVoteOf(s)));
                 left = hn::AndNot(background, left);
             }
         }
