@@ -57,23 +57,6 @@ TEST(DepthNoise, SmoothingLeavesAFifthOfItAndKeepsTheStep) {
             EXPECT_NEAR(q.at(x, y) / exact.at(x, y), 1, 0.015) << x << " " << y;
 }
 
-TEST(DepthNoise, LeavesNoFurtherApartThanTheNoiseStayApart) {
-    // Strips three pixels wide, each 2 % behind or before the next: four standard deviations.
-    constexpr double kNoise = 0.005;
-    const auto strips = [](double noise) {
-        const Image<float> near = steppedPlane(0, noise);
-        Image<float> q = near;
-        for (int y = 0; y < kSide; ++y)
-            for (int x = 0; x < kSide; ++x)
-                if ((x / 3 + y / 3) % 2) q.at(x, y) *= 1.02f;
-        return q;
-    };
-    const Image<float> exact = strips(0);
-    Image<float> q = strips(kNoise);
-    smoothDepth(q, {}, kNoise);
-    EXPECT_LT(difference(q, exact), kNoise);
-}
-
 TEST(DepthNoise, ExactDepthStaysAsItIs) {
     const Image<float> exact = steppedPlane(0.05, 0);
     Image<float> q = exact;
