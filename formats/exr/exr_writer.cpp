@@ -25,7 +25,6 @@
 #include "formats/exr/exr_zip.hpp"
 #include "formats/files/source_date.hpp"
 #include "lib/base/byte_planes.hpp"
-#include "lib/base/pack_rows.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -248,7 +247,6 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
                       rowBytes, kZipRows);
 
     std::vector<Channel> channels;
-    std::vector<RowPart> rowParts;
     std::map<const void*, int> halves;  // by their first value
     std::size_t at = 0;
     for (auto& [name, channel] : byName) {
@@ -261,11 +259,8 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
             const auto [same, isNew] = halves.emplace(first, static_cast<int>(channels.size()));
             if (!isNew) channel.same = same->second;
         }
-        rowParts.push_back(
-            {static_cast<std::uint32_t>(channel.words), channel.half ? 1u : 2u, channel.same});
         channels.push_back(channel);
     }
-    if (part.width < kPackedWidth || rowBytes * kZipRows > kLargestPacked) rowParts.clear();
 
     std::vector<Bytes> chunks(static_cast<std::size_t>(chunksOf(rows)));
     parallelFor(0, static_cast<std::int64_t>(chunks.size()), [&](std::int64_t i) {
@@ -275,7 +270,7 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
             rowBytes * static_cast<std::size_t>(count));
         splitRows(channels, width, first, count, split.get());
         chunks[i] = exr::zipSplitChunk({split.get(), rowBytes * static_cast<std::size_t>(count)},
-                                       part.zipLevel, count, rowParts);
+                                       part.zipLevel);
     });
     for (std::size_t i = 0; i < chunks.size(); ++i)
         writeChunk(index, top / kZipRows + static_cast<int>(i), chunks[i]);

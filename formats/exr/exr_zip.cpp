@@ -38,23 +38,17 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 Bytes zipChunk(std::span<const std::uint8_t> raw, int level) {
     const auto split = std::make_unique_for_overwrite<std::uint8_t[]>(raw.size());
     splitAndSubtract(raw, split.get());
-    return zipSplitChunk({split.get(), raw.size()}, level, 0, {});
+    return zipSplitChunk({split.get(), raw.size()}, level);
 }
 
-Bytes zipSplitChunk(std::span<std::uint8_t> split, int level, int rows,
-                    std::span<const RowPart> parts) {
-    const bool byRows = level == 1 && !parts.empty();
-    const auto packed = std::make_unique_for_overwrite<std::uint8_t[]>(
-        byRows ? packedRoom(split.size()) : split.size());
-    const auto bytes = std::as_bytes(split);
+Bytes zipSplitChunk(std::span<std::uint8_t> split, int level) {
+    const auto packed = std::make_unique_for_overwrite<std::uint8_t[]>(split.size());
     // No room for as many bytes as there were: then it gives 0.
     const std::size_t size =
-        byRows ? packRows(split, rows, parts, adler32(bytes), packed.get())
-               : compressZlib(bytes, level,
-                              std::as_writable_bytes(std::span(packed.get(), split.size() - 1)));
-    const bool smaller = size > 0 && size < split.size();
-    const std::span to(packed.get(), smaller ? size : split.size());
-    if (!smaller) addAndJoin(split.data(), to);
+        compressZlib(std::as_bytes(split), level,
+                     std::as_writable_bytes(std::span(packed.get(), split.size() - 1)));
+    const std::span to(packed.get(), size > 0 ? size : split.size());
+    if (size == 0) addAndJoin(split.data(), to);
     const auto stored = std::as_bytes(to);
     return {stored.begin(), stored.end()};
 }

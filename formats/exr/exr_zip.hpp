@@ -5,7 +5,6 @@
 #include <span>
 
 #include "formats/files/files.hpp"
-#include "lib/base/pack_rows.hpp"
 
 namespace stx::exr {
 
@@ -20,10 +19,9 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
 /// when that does not make it smaller, as OpenEXR wants it. Throws std::bad_alloc.
 [[nodiscard]] Bytes zipChunk(std::span<const std::uint8_t> raw, int level);
 
-/// The same of a chunk whose bytes are in that order already; they may be changed. Where `parts`
-/// tells what each of `rows` rows is made of, level 1 is packRows(). Throws std::bad_alloc.
-[[nodiscard]] Bytes zipSplitChunk(std::span<std::uint8_t> split, int level, int rows,
-                                  std::span<const RowPart> parts);
+/// The same of a chunk whose bytes are in that order already; they may be changed. Throws
+/// std::bad_alloc.
+[[nodiscard]] Bytes zipSplitChunk(std::span<std::uint8_t> split, int level);
 
 /// The inverse of halvesFrom(), exact: writes every `stride`-th of `to`.
 void floatsFrom(std::span<const std::uint16_t> halves, float* to, std::size_t stride);

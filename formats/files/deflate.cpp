@@ -63,10 +63,6 @@ std::size_t compressZlib(std::span<const std::byte> from, int level, std::span<s
                                     to.size());
 }
 
-std::uint32_t adler32(std::span<const std::byte> bytes) {
-    return libdeflate_adler32(1, bytes.data(), bytes.size());
-}
-
 bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to) {
     const Decompressor decompressor(libdeflate_alloc_decompressor());
     if (!decompressor) throw std::bad_alloc();

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <span>
 
 namespace stx {
@@ -15,9 +14,6 @@ namespace stx {
 /// std::bad_alloc.
 [[nodiscard]] std::size_t compressZlib(std::span<const std::byte> from, int level,
                                        std::span<std::byte> to);
-
-/// The sum of bytes that a zlib stream ends with.
-[[nodiscard]] std::uint32_t adler32(std::span<const std::byte> bytes);
 
 /// The inverse of compressZlib(): fills all of `to` with what a zlib stream holds, by libdeflate.
 /// False, and anything in `to`, when the stream is damaged or holds another number of bytes. Throws
