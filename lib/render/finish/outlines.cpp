@@ -1,6 +1,7 @@
 #include "lib/render/finish/outlines.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -173,9 +174,22 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
     });
 
     std::vector<splat::PixelMap> maps;
-    for (const PageRectangle& r : set_.rectangles())
-        maps.push_back(splat::pixelMap(r.window, camera));
+    std::vector<std::array<glm::vec3, 6>> coarseMaps;  // near enough for the reach of a block
+    for (const PageRectangle& r : set_.rectangles()) {
+        const auto& m = maps.emplace_back(splat::pixelMap(r.window, camera));
+        coarseMaps.push_back({m.a0, m.au, m.av, m.b0, m.bu, m.bv});
+    }
 
+    // Asked for above and to the left of a tile: few blocks reach any, and the others must not
+    // cost.
+    Image<std::uint32_t> before(tilesX + 1, tilesY + 1);
+    for (int y = 0; y < tilesY; ++y) {
+        std::uint32_t row = 0;
+        for (int x = 0; x < tilesX; ++x) {
+            row += tiles.at(x, y);
+            before.at(x + 1, y + 1) = before.at(x + 1, y) + row;
+        }
+    }
     // Which blocks have points there.
     struct Rows {
         int from = 0, to = -1;  // inclusive
@@ -185,33 +199,36 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         0, static_cast<std::int64_t>(blocks_.size()), 512, [&](std::int64_t from, std::int64_t to) {
             for (auto n = static_cast<std::size_t>(from); n < static_cast<std::size_t>(to); ++n) {
                 const OutlineBlock& b = blocks_[n];
-                const splat::PixelMap& m = maps[b.rectangle];
-                double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300, least = 1e300;
-                for (int corner = 0; corner < 4; ++corner) {
-                    const double u = (corner & 1) ? b.u1 - 1 : b.u0;
-                    const double v = (corner & 2) ? b.v1 - 1 : b.v0;
-                    const glm::dvec3 a = m.a0 + m.au * u + m.av * v, o = m.b0 + m.bu * u + m.bv * v;
-                    for (const float z : {b.zMin, b.zMax}) {
-                        const glm::dvec3 at = a * double(z) + o;
-                        least = std::min(least, at.z);
-                        const double scale = camera.orthographic ? 1.0 : 1.0 / at.z;
-                        x0 = std::min(x0, at.x * scale);
-                        x1 = std::max(x1, at.x * scale);
-                        y0 = std::min(y0, at.y * scale);
-                        y1 = std::max(y1, at.y * scale);
-                    }
+                const auto& [a0, au, av, b0, bu, bv] = coarseMaps[b.rectangle];
+                // Eight corners side by side, so that compilers make vectors of it.
+                std::array<float, 8> x, y, along;
+                for (std::size_t corner = 0; corner < 8; ++corner) {
+                    const auto u = static_cast<float>(corner & 1 ? b.u1 - 1 : b.u0);
+                    const auto v = static_cast<float>(corner & 2 ? b.v1 - 1 : b.v0);
+                    const float z = corner & 4 ? b.zMax : b.zMin;
+                    const glm::vec3 at = (a0 + au * u + av * v) * z + b0 + bu * u + bv * v;
+                    const float scale = camera.orthographic ? 1.0f : 1.0f / at.z;
+                    along[corner] = at.z;
+                    x[corner] = at.x * scale;
+                    y[corner] = at.y * scale;
                 }
+                const auto [x0, x1] = std::ranges::minmax(x);
+                const auto [y0, y1] = std::ranges::minmax(y);
+                const float least = std::ranges::min(along);
                 // What reaches behind the camera is too near to draw an outline.
                 if (!(least > 0)) continue;
-                constexpr double kRoom = 1.5;
-                if (!(x1 >= -kRoom && y1 >= -kRoom && x0 <= w + kRoom && y0 <= h + kRoom)) continue;
-                const int left = static_cast<int>(std::max(0.0, x0 - kRoom));
-                const int right = static_cast<int>(std::min(w - 1.0, x1 + kRoom));
-                const int above = static_cast<int>(std::max(0.0, y0 - kRoom));
-                const int below = static_cast<int>(std::min(h - 1.0, y1 + kRoom));
-                for (int y = above / kTile; y <= below / kTile && reached[n].to < 0; ++y)
-                    for (int x = left / kTile; x <= right / kTile; ++x)
-                        if (tiles.at(x, y)) reached[n] = {above, below};
+                constexpr float kRoom = 1.5f;
+                if (!(x1 >= -kRoom && y1 >= -kRoom && x0 <= static_cast<float>(w) + kRoom &&
+                      y0 <= static_cast<float>(h) + kRoom))
+                    continue;
+                const int left = static_cast<int>(std::max(0.0f, x0 - kRoom));
+                const int right = static_cast<int>(std::min(static_cast<float>(w - 1), x1 + kRoom));
+                const int above = static_cast<int>(std::max(0.0f, y0 - kRoom));
+                const int below = static_cast<int>(std::min(static_cast<float>(h - 1), y1 + kRoom));
+                const int endX = right / kTile + 1, endY = below / kTile + 1;
+                if (before.at(endX, endY) - before.at(left / kTile, endY) !=
+                    before.at(endX, above / kTile) - before.at(left / kTile, above / kTile))
+                    reached[n] = {above, below};
             }
         });
     for (std::size_t n = 0; n < blocks_.size(); ++n)

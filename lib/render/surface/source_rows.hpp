@@ -28,7 +28,8 @@ struct LinkRows {
     const float *above = nullptr, *here = nullptr, *below = nullptr, *second = nullptr;
     bool first = false, last = false;  ///< of the picture
 };
-/// The bits of Info for `width` pixels, whose edge distances stay 0. `step`: scene units, of the depth code or what noise makes of it.
+/// The bits of Info for `width` pixels, whose edge distances stay 0. `step`: scene units, of the
+/// depth code or what noise makes of it.
 void linkRow(const LinkRows& rows, int width, const DepthAxis& axis, float step,
              std::uint8_t* info);
 
