@@ -357,6 +357,7 @@ TEST(MiddleburyTraps, BigEndianFloatsAndOlderSetsWithUnknownPixels) {
     options.focal = 90;
     options.baseline = 0.2;
     options.disparityOffset = 30;
+    options.closeGaps = CloseGaps::off;
     const auto pair = readSet(older.path(), options);
     ASSERT_TRUE(pair) << pair.error().text();
     ASSERT_EQ(pair->views.size(), 2u);
