@@ -14,7 +14,7 @@
 namespace stx {
 namespace {
 
-// Chosen by trial on Middlebury 2006, Aloe; tests/bench tells.
+// Chosen by trial on Middlebury 2006, Aloe (tests/bench/pictures.md).
 /// Gaps are closed up to the longer side divided by this.
 constexpr int kReachDivisor = 50;
 /// A path costs this much a pixel ...

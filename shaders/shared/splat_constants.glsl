@@ -1,5 +1,5 @@
 // The numbers that splat mode is tuned with: C++ has them by lib/render/splat/constants.hpp. Where no
-// source is named the value was chosen by measurement on the image sets and meshes of tests/bench/README.md.
+// source is named the value was chosen by measurement on the image sets and meshes of tests/bench/pictures.md.
 
 // Nearer than this the projection means nothing.
 CONSTANT float kNearest = 1e-12f;

@@ -1,6 +1,6 @@
 // The numbers that surface mode is tuned with: C++ has them by lib/render/surface/constants.hpp.
 // Depths are in q (see DepthAxis), shares of q or of 1. Where no source is named the value was
-// chosen by measurement on the image sets and meshes of tests/bench/README.md.
+// chosen by measurement on the image sets and meshes of tests/bench/pictures.md.
 
 // Side of the tiles that a frame is drawn in, pixels.
 CONSTANT int kTile = 32;

@@ -10,7 +10,7 @@
 namespace stx::surface {
 namespace {
 
-// Chosen by trial on the sets of tests/bench/README.md with noise added.
+// Chosen by trial on the sets of tests/bench/pictures.md with noise added.
 
 /// The second time points are nearer to where they belong.
 constexpr int kColourRounds = 2;

@@ -9,8 +9,8 @@
 namespace stx::surface {
 namespace {
 
-// Where no source is named the value was chosen by trial on the sets of tests/bench/README.md with
-// noise added.
+// Where no source is named the value was chosen by trial on the sets of tests/bench/pictures.md
+// with noise added.
 
 /// One in twenty pixels has a smaller one, where the smallest of the four second differences
 /// through a pixel is taken, of independent normal noise of standard deviation 1 (by simulation).

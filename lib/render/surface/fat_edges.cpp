@@ -11,7 +11,7 @@
 namespace stx::surface {
 namespace {
 
-// Chosen by trial on the sets of tests/bench/README.md with edges moved by a pixel.
+// Chosen by trial on the sets of tests/bench/pictures.md with edges moved by a pixel.
 
 /// An edge is a jump of more than this share of q, and so many times what q changes by beside it.
 constexpr float kJumpOfEdge = 0.005f, kBesideSlope = 3.0f;

@@ -11,7 +11,7 @@
 namespace stx::surface {
 namespace {
 
-// Chosen by trial on the sets of tests/bench/README.md with noise added.
+// Chosen by trial on the sets of tests/bench/pictures.md with noise added.
 
 /// The second time the points of all views are nearer to each other, and more of them agree.
 constexpr int kAgreementRounds = 2;

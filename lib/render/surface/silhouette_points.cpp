@@ -11,7 +11,7 @@
 namespace stx::surface {
 namespace {
 
-// Chosen by trial on the sets of tests/bench/README.md with noise added.
+// Chosen by trial on the sets of tests/bench/pictures.md with noise added.
 
 /// Places are looked at up to so many standard deviations away, so many on each side.
 constexpr float kFarthestDoubts = 6.0f;
