@@ -1,29 +1,16 @@
 #include "lib/model/depth_values.hpp"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <bit>
 #include <random>
 #include <vector>
 
 #include "lib/model/reference_view.hpp"
+#include "tests/every_target.hpp"
 
 namespace stx {
 namespace {
-
-/// Runs what follows on each kind of vectors that this machine has.
-template <class Body>
-void onEveryTarget(const Body& body) {
-    for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-        hwy::SetSupportedTargetsForTest(target);
-        hwy::GetChosenTarget().DeInit();
-        SCOPED_TRACE(hwy::TargetName(target));
-        body();
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().DeInit();
-}
 
 /// Distances of 2 to 9 with holes.
 std::vector<float> someDistances(std::size_t count, unsigned seed) {

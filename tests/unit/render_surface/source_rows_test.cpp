@@ -1,28 +1,16 @@
 #include "lib/render/surface/source_rows.hpp"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
 
+#include "tests/every_target.hpp"
+
 namespace stx::surface {
 namespace {
-
-/// Runs what follows on each kind of vectors that this machine has.
-template <class Body>
-void onEveryKindOfVectors(const Body& body) {
-    for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-        hwy::SetSupportedTargetsForTest(target);
-        hwy::GetChosenTarget().DeInit();
-        SCOPED_TRACE(hwy::TargetName(target));
-        body();
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().DeInit();
-}
 
 /// Whether b and c are one surface, as SurfaceScene has it.
 bool linked(const DepthAxis& axis, float codeStep, float a, float b, float c, float d) {
@@ -49,7 +37,7 @@ std::vector<float> someRow(int width, std::mt19937& random) {
 }
 
 TEST(SourceRows, LinksAreThoseOfTheDefinitionAtAnyWidth) {
-    onEveryKindOfVectors([] {
+    onEveryTarget([] {
         std::mt19937 random(5);
         for (int width = 1; width < 70; ++width) {
             for (const bool inverse : {true, false}) {
@@ -83,7 +71,7 @@ TEST(SourceRows, LinksAreThoseOfTheDefinitionAtAnyWidth) {
 }
 
 TEST(SourceRows, DistancesAreInvertedAndPixelsCounted) {
-    onEveryKindOfVectors([] {
+    onEveryTarget([] {
         std::mt19937 random(6);
         for (const std::size_t count : {0, 1, 15, 16, 67}) {
             std::vector<float> distances(count), q(count);
@@ -116,7 +104,7 @@ TEST(SourceRows, DistancesAreInvertedAndPixelsCounted) {
 
 TEST(SourceRows, ColoursOfOneSurfaceAreSharpened) {
     constexpr int kWidth = 70, kShare = 11, kFromEdge = 2;
-    onEveryKindOfVectors([] {
+    onEveryTarget([] {
         std::mt19937 random(7);
         std::vector<glm::u8vec4> from(3 * kWidth);
         std::vector<std::uint8_t> info(from.size());
