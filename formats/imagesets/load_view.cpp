@@ -175,6 +175,26 @@ void dropImpossible(Image<float>& distances) {
 
 namespace {
 
+/// Moves all depth by what other pictures of the set show. `values`: as stored, without stairs.
+Result<void> shiftTogether(const SetView& set, const Camera& camera, const Image<float>& values,
+                           StoredView& stored, Job& job) {
+    const float shift = set.shift ? set.shift(values, stored.texture, job) : 0.0f;
+    if (shift == 0.0f) return {};
+    Image<float> moved = values;
+    for (float& v : moved.pixels())
+        if (hasPoint(v)) v += shift;
+    Job notesAgain;
+    STX_CHECK(set.distances(moved, camera, stored.depthBits, notesAgain));
+    dropImpossible(moved);
+    for (std::size_t i = 0; i < moved.count(); ++i)
+        if (hasPoint(stored.depth.data()[i]) && hasPoint(moved.data()[i]))
+            stored.depth.data()[i] = moved.data()[i];
+    job.note(fmt::format(
+        "view '{}': {:.2f} are added to its stored depth, which other pictures of the set show",
+        set.name, shift));
+    return {};
+}
+
 /// Makes distances of the stored values, and smooths the stairs of coarse ones.
 Result<void> toDistances(const SetView& set, const ImageSetOptions& options, const Camera& camera,
                          StoredView& stored, Job& job) {
@@ -191,6 +211,7 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, con
     for (std::size_t i = 0; i < codes.count(); ++i)
         if (!hasPoint(stored.depth.data()[i])) codes.data()[i] = kNoDepth;
     smoothDepthSteps(codes);
+    const Image<float> smoothed = set.shift ? codes : Image<float>();
     Job notesAgain;
     STX_CHECK(set.distances(codes, camera, bits, notesAgain));
     dropImpossible(codes);
@@ -206,7 +227,7 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, con
         fmt::format("view '{}': the stairs of its {}-bit depth are smoothed within half a step, "
                     "{:.3g} scene units at most",
                     set.name, bits, most));
-    return {};
+    return shiftTogether(set, camera, smoothed, stored, job);
 }
 
 /// Closes gaps of the depth along the picture's colours.

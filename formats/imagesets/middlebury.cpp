@@ -11,6 +11,7 @@
 #include "formats/imagesets/middlebury.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/text_lines.hpp"
+#include "lib/registration/disparity_shift.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -76,6 +77,33 @@ std::optional<int> numberAfter(const std::string& stem, std::string_view prefix)
     return value;
 }
 
+/// A picture of an older set, from which disparities of others are looked at.
+struct NumberedPicture {
+    int number = 0;
+    PictureSource source;
+};
+
+/// See SetView::shift, of view `number`. Integers may have been cut off, but not by more than half
+/// a step either way from where they are.
+auto shiftBy(std::vector<NumberedPicture> pictures, int number, double scale) {
+    return [=](const Image<float>& values, const Texture& texture, Job& job) {
+        std::vector<SidePicture> beside;
+        for (const NumberedPicture& p : pictures) {
+            if (p.number == number) continue;
+            // Only a help: what cannot be read is not needed.
+            auto read = readColour(p.source, {}, job);
+            if (read && read->texture.width() == texture.width() &&
+                read->texture.height() == texture.height())
+                beside.push_back({std::move(read->texture), (p.number - number) / 4.0});
+        }
+        Image<float> disparities = values;
+        for (float& d : disparities.pixels())
+            if (hasPoint(d)) d = static_cast<float>(d / scale);
+        const double shift = disparityShift(disparities, texture, beside, 0.6 / scale);
+        return static_cast<float>(std::clamp(shift * scale, -0.5, 0.5));
+    };
+}
+
 Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& options, Job& job) {
     const std::string where = inQuotes(folder.string());
     if (!(options.focal > 0 && options.baseline > 0))
@@ -104,6 +132,15 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
         const auto stem = path(name).stem().string();
         if (numberAfter(stem, "disp") == 1 || numberAfter(stem, "view") == 1) first = 1;
     }
+    std::vector<NumberedPicture> pictures;
+    for (const std::string& name : files) {
+        const auto stem = path(name).stem().string();
+        const auto number = numberAfter(stem, "view");
+        const auto older = number ? number : numberAfter(stem, "im");
+        if (!older) continue;
+        STX_TRY(auto source, sourceInside(folder, name, where, job.limits));
+        pictures.push_back({*older, std::move(source)});
+    }
     for (const std::string& name : files) {
         const auto number = numberAfter(path(name).stem().string(), "disp");
         if (!number) continue;
@@ -120,6 +157,7 @@ Result<SetDescription> describeOlder(const path& folder, const ImageSetOptions& 
                                size.x * 0.5 + offset * steps, size.y * 0.5, size.x, size.y);
         view.distances =
             distancesOf(options.baseline * options.focal, options.disparityScale, offset);
+        view.shift = shiftBy(pictures, *number, options.disparityScale);
         view.measured = true;
         set.views.push_back(std::move(view));
     }

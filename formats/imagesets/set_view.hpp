@@ -66,6 +66,9 @@ struct SetView {
     std::optional<Error> missing;
 
     Distances distances;  ///< null: the stored values are distances already
+    /// What all stored values are too small by, in their own unit, as other pictures of the set
+    /// show; 0 where they do not. The values come without stairs. Null: none can tell.
+    std::function<float(const Image<float>& values, const Texture& texture, Job& job)> shift;
 
     /// When it was taken, in seconds, and by which camera (empty: the set does not say).
     std::optional<double> time;
