@@ -269,8 +269,8 @@ Result<void> ExrWriter::Impl::writeRows(int index, int top, int rows,
         const auto split = std::make_unique_for_overwrite<std::uint8_t[]>(
             rowBytes * static_cast<std::size_t>(count));
         splitRows(channels, width, first, count, split.get());
-        chunks[i] = exr::zipSplitChunk({split.get(), rowBytes * static_cast<std::size_t>(count)},
-                                       part.zipLevel);
+        chunks[i] =
+            exr::zipChunk({split.get(), rowBytes * static_cast<std::size_t>(count)}, part.zipLevel);
     });
     for (std::size_t i = 0; i < chunks.size(); ++i)
         writeChunk(index, top / kZipRows + static_cast<int>(i), chunks[i]);

@@ -35,13 +35,7 @@ void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> 
     }
 }
 
-Bytes zipChunk(std::span<const std::uint8_t> raw, int level) {
-    const auto split = std::make_unique_for_overwrite<std::uint8_t[]>(raw.size());
-    splitAndSubtract(raw, split.get());
-    return zipSplitChunk({split.get(), raw.size()}, level);
-}
-
-Bytes zipSplitChunk(std::span<std::uint8_t> split, int level) {
+Bytes zipChunk(std::span<std::uint8_t> split, int level) {
     const auto packed = std::make_unique_for_overwrite<std::uint8_t[]>(split.size());
     // No room for as many bytes as there were: then it gives 0.
     const std::size_t size =

@@ -95,7 +95,7 @@ void roundToCodeImpl(std::span<float> distances, const DepthCode& code) {
 
 using VD = hn::Vec<DD>;
 
-/// A vector of points, or of what stands for one.
+/// As many points or directions as a vector has lanes.
 struct Points {
     VD x, y, z;
 };

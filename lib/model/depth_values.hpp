@@ -24,7 +24,7 @@ struct DepthSummary {
 /// empty without a point.
 [[nodiscard]] Bounds boundsOfPoints(const Image<float>& distances, const Camera& camera);
 
-/// Makes of each point the distance that its code stands for: decode(encode()), to the bit.
+/// Replaces the distance of each point by that of its code: decode(encode()), to the bit.
 /// Precondition: `code` has farPlane > nearPlane, both finite.
 void roundToCode(std::span<float> distances, const DepthCode& code);
 

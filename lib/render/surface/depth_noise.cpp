@@ -24,8 +24,8 @@ constexpr int kRadii[] = {1, 2, 4, 6, 8};
 constexpr float kAim = 0.001f;
 /// The window grows while all estimates so far agree within so many of their standard deviations.
 constexpr float kAgree = 2.0f;
-/// Points further from the plane than so many standard deviations are on another surface; first of
-/// all a point's own value stands for the plane.
+/// Points further from the plane than so many standard deviations are on another surface. The first
+/// round has no plane yet and measures from the point itself.
 struct Bands {
     float first, then;
 };

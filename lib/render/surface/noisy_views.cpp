@@ -81,8 +81,8 @@ Opinion opinionOf(const Partner& p, const DepthAxis& axis, float x, float y, flo
     if (!s.found) return {};
     const float across = p.view->space->axis.qPerUnit(s.shown) / axis.qPerUnit(q);
     if (!(std::abs(s.rate) > kFacing * across)) return {};
-    // Seen from behind it may be the other side of the same thing, which is no thinner than
-    // nothing.
+    // Seen from behind it may be the other side of something thick: points on the right side of it
+    // stay where they are.
     if (s.rate < 0.0f && s.off >= 0.0f) return {};
     const float doubt = s.doubt / s.rate;
     return {s.off / s.rate, doubt * doubt};

@@ -202,8 +202,8 @@ TEST(MiddleburyAloe, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
         EXPECT_GE(warped.psnr, warped.naive + gain);
         EXPECT_GE(warped.covered, 0.84);
     }
-    // The same with a picture of which nothing is known but where it was taken from: what all
-    // disparities are off by is told by the other one alone.
+    // The same without the picture that is compared with: only the other one can show how far all
+    // disparities are off.
     for (const auto& [number, told, naive, gain] :
          {std::tuple{3, 5, 31.34, 3.05}, std::tuple{5, 3, 29.16, 1.75}}) {
         const auto part = partOf(set, {"disp1", "view1", fmt::format("view{}", told)});

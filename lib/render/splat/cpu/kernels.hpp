@@ -104,7 +104,7 @@ void drawColour(const RectangleImages& source, const BlockTask& task, const Ahea
 /// SplatRule::point in one pass.
 void drawPoints(const RectangleImages& source, const BlockTask& task, const Region& region);
 /// Unit normals of `count` pixels out of the sums of four values each that drawColour() left; zero
-/// where there is no sum or `colours` is open.
+/// where nothing was added or `colours` has no alpha.
 void resolveNormals(const float* sums, const glm::vec4* colours, std::size_t count, glm::vec3* to);
 
 }  // namespace stx::splat
