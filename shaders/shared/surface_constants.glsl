@@ -40,8 +40,9 @@ CONSTANT float kExtensionWeight = 0.01f;
 // half, and a threshold of one half or more removes them; this is clearly less. Among pruned
 // sources often only one is left to show a piece of surface, and no other agrees with it where it
 // touches another's silhouette: less still (the largest value at which spot, Fox, CesiumMilkTruck
-// and 2CylinderEngine open at no pixel).
-CONSTANT float kFreeAlpha = 0.45f, kFreeAlphaPruned = 0.36f;
+// and 2CylinderEngine open at no pixel). Where few sources vote, the one vote that is asked for beyond
+// the support makes outlines larger by more: a larger threshold makes up for some of that.
+CONSTANT float kFreeAlpha = 0.45f, kFreeAlphaOfFew = 0.4625f, kFreeAlphaPruned = 0.36f;
 // Alpha from which on a pixel is covered in full, rounding apart.
 CONSTANT float kSolidAlpha = 0.99f;
 // A point this share of its depth in front of a surface is in front of it.

@@ -181,9 +181,9 @@ Effort effortOf(Quality quality, const SurfaceScene& scene) {
             e.shade.mostSources = 2;
             break;
         case Quality::normal:
+            e.freeAlpha = kFreeAlphaOfFew;
             break;
         case Quality::best:
-            e.samplesPerPixel = 4;
             e.mostGeometry = kMostTileSources;
             break;
     }

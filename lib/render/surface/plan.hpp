@@ -28,7 +28,7 @@ struct ShadeSettings {
 
 /// What a quality means for a scene; chosen by trial on the project's image sets.
 struct Effort {
-    int samplesPerPixel = 3;  ///< along one side of a pixel
+    int samplesPerPixel = 4;  ///< along one side of a pixel
     int mostGeometry = 8;     ///< sources that one tile is built from, at most kMostTileSources
     float freeAlpha = kFreeAlpha;
     /// Of many sources those that have something in a tile come first: pruned views.
