@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/finish/for_where.hpp"
 #include "lib/render/surface/votes.hpp"
 
 namespace stx::surface {
@@ -118,33 +120,73 @@ Hit hitAt(const OpenFrame& frame, int x, int y, float distance) {
     return {glm::vec3(c) / c.a, frame.q.at(x, y), distance};
 }
 
+/// The closed ones among up to 64 pixels of a row, a bit each.
+std::uint64_t closedBits(const glm::vec4* albedo, const float* q, std::size_t count) {
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < count; ++i)
+        bits |= static_cast<std::uint64_t>(albedo[i].a >= kClosed && q[i] > 0.0f) << i;
+    return bits;
+}
+
+/// Distances along a row to the nearest closed pixel of the row.
+void distancesAlong(std::span<const glm::vec4> albedo, std::span<const float> q,
+                    std::span<std::uint8_t> row) {
+    const auto width = static_cast<int>(row.size());
+    std::fill(row.begin(), row.end(), std::uint8_t{0});
+    const auto put = [&](int begin, int end) {
+        // What is beside the picture is not closed.
+        constexpr int kNone = kFarthestCounted;
+        const int left = begin > 0 ? begin - 1 : begin - kNone;
+        const int right = end < width ? end : end + kNone;
+        for (int x = begin; x < end; ++x)
+            row[static_cast<std::size_t>(x)] =
+                static_cast<std::uint8_t>(std::min({x - left, right - x, kNone}));
+    };
+    int begin = -1;  // of the open run that x is in, -1 = none
+    for (int x = 0; x < width;) {
+        const auto first = static_cast<std::size_t>(x);
+        const int count = std::min(64, width - x);
+        std::uint64_t bits = closedBits(&albedo[first], &q[first], static_cast<std::size_t>(count));
+        for (int at = 0; at < count;) {
+            // To the next pixel that is of the other kind.
+            const std::uint64_t left = (begin < 0 ? ~bits : bits) >> at << at;
+            at = std::min(std::countr_zero(left), count);
+            if (at == count) break;
+            if (begin >= 0) put(begin, x + at);
+            begin = begin < 0 ? x + at : -1;
+        }
+        x += count;
+    }
+    if (begin >= 0) put(begin, width);
+}
+
+/// Lowers the distances of a row to what those of the row before or after it tell.
+void distancesAcross(std::uint8_t* __restrict row, const std::uint8_t* __restrict other,
+                     int width) {
+    // In bytes throughout, which vectors do sixteen at once and more.
+    const auto least = [](std::uint8_t a, std::uint8_t b) { return a < b ? a : b; };
+    const auto next = [&](std::uint8_t d) {
+        return static_cast<std::uint8_t>(least(d, kFarthestCounted - 1) + 1);
+    };
+    for (int x = 1; x < width - 1; ++x)
+        row[x] = least(row[x], next(least(least(other[x - 1], other[x]), other[x + 1])));
+    for (const int x : {0, width - 1}) {
+        const int before = std::max(x - 1, 0), after = std::min(x + 1, width - 1);
+        row[x] = least(row[x], next(least(least(other[before], other[x]), other[after])));
+    }
+}
+
 /// How far each pixel is from the nearest closed one, the larger of columns and rows, at most
-/// kFarthestCounted.
+/// kFarthestCounted; 0 for closed ones and no others.
 Image<std::uint8_t> distancesToSurface(const OpenFrame& frame) {
     const int width = frame.q.width(), height = frame.q.height();
     Image<std::uint8_t> distances(width, height);
-    const auto next = [](std::uint8_t d) {
-        return static_cast<std::uint8_t>(d + (d < kFarthestCounted ? 1 : 0));
-    };
     parallelForBlocks(0, height, 32, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            std::uint8_t* row = distances.row(y).data();
-            std::uint8_t d = kFarthestCounted;
-            for (int x = 0; x < width; ++x) row[x] = d = closed(frame, x, y) ? 0 : next(d);
-            for (int x = width - 1; x-- > 0;) row[x] = std::min(row[x], next(row[x + 1]));
-        }
+        for (int y = static_cast<int>(from); y < to; ++y)
+            distancesAlong(frame.albedo.row(y), frame.q.row(y), distances.row(y));
     });
-    // The nearest of three in the row before, one row farther.
     const auto pass = [&](int y, int before) {
-        std::uint8_t* row = distances.row(y).data();
-        const std::uint8_t* other = distances.row(before).data();
-        const auto take = [&](int x, std::uint8_t nearest) {
-            row[x] = std::min(row[x], next(nearest));
-        };
-        take(0, std::min(other[0], other[std::min(1, width - 1)]));
-        for (int x = 1; x < width - 1; ++x)
-            take(x, std::min(std::min(other[x - 1], other[x]), other[x + 1]));
-        take(width - 1, std::min(other[std::max(width - 2, 0)], other[width - 1]));
+        distancesAcross(distances.row(y).data(), distances.row(before).data(), width);
     };
     for (int y = 1; y < height; ++y) pass(y, y - 1);
     for (int y = height - 1; y-- > 0;) pass(y, y + 1);
@@ -206,33 +248,47 @@ float slopeBehind(const OpenFrame& frame, int x, int y, const std::array<int, 2>
 }
 
 /// The rims that the eight directions from (x, y) meet; how many there are, 0 where the opening is
-/// neither enclosed() nor at most `widest` pixels wide in all directions.
+/// neither enclosed() nor at most `widest` pixels wide in all directions. `far`: a bit for each
+/// direction that met nothing nearby at the pixel before, which are likely to decide again; becomes
+/// this pixel's.
 std::size_t rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distances, int x, int y,
-                       int widest, std::array<Rim, 8>& rims) {
+                       int widest, unsigned& far, std::array<Rim, 8>& rims) {
     const int reach = std::max(kSmallReach, widest);
+    const int width = distances.width(), height = distances.height();
+    const std::uint8_t* const here = distances.row(y).data() + x;
     std::array<int, 8> steps{};  // to the rim, 0 = none
     unsigned nearby = 0;         // a bit for each direction that meets surface in small reach
-    int notNearby = 0;
+    unsigned notNearby = 0;
     bool tooWide = false;
-    for (std::size_t k = 0; k < kDirections.size(); ++k) {
-        // No surface is nearer than the distances say.
-        for (int step = std::max<int>(distances.at(x, y), 1); step <= reach;) {
-            const int nx = x + kDirections[k][0] * step, ny = y + kDirections[k][1] * step;
-            if (!frame.q.contains(nx, ny)) break;
-            const int distance = distances.at(nx, ny);
-            if (distance == 0) {
-                steps[k] = step;
-                break;
+    for (const unsigned some : {far, ~far & 0xffu}) {
+        for (unsigned left = some; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+            const auto [dx, dy] = kDirections[k];
+            const auto room = [](int along, int at, int size) {
+                return along == 0 ? size : along > 0 ? size - 1 - at : at;
+            };
+            const int most = std::min({reach, room(dx, x, width), room(dy, y, height)});
+            const std::ptrdiff_t stride = static_cast<std::ptrdiff_t>(dy) * width + dx;
+            // No surface is nearer than the distances say.
+            for (int step = std::max<int>(*here, 1); step <= most;) {
+                const int distance = here[step * stride];
+                if (distance == 0) {
+                    steps[k] = step;
+                    break;
+                }
+                step += distance;
             }
-            step += distance;
+            const bool isNear = steps[k] > 0 && steps[k] <= kSmallReach;
+            (isNear ? nearby : notNearby) |= 1u << k;
+            tooWide = tooWide || steps[k] == 0;
+            if (tooWide && std::popcount(notNearby) > 8 - kLeastDirections) {
+                far = notNearby;
+                return 0;
+            }
         }
-        if (steps[k] > 0 && steps[k] <= kSmallReach)
-            nearby |= 1u << k;
-        else
-            ++notNearby;
-        tooWide = tooWide || steps[k] == 0 || (k >= 4 && steps[k - 4] + steps[k] > widest);
-        if (tooWide && notNearby > 8 - kLeastDirections) return 0;
     }
+    far = notNearby;
+    for (std::size_t k = 0; k < 4; ++k) tooWide = tooWide || steps[k] + steps[k + 4] > widest;
     if (tooWide && !enclosed(nearby)) return 0;
     std::size_t count = 0;
     for (std::size_t k = 0; k < kDirections.size(); ++k) {
@@ -401,20 +457,20 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int
 
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest) {
     const int reach = std::max(kSmallReach, widest / 2);
-    const int width = frame.q.width(), height = frame.q.height();
+    const int height = frame.q.height();
     const Image<std::uint8_t> distances = distancesToSurface(frame);
     std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
     parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
+        unsigned far = 0;
+        std::array<Rim, 8> room;
         for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < width; ++x) {
-                // Farther from surface no direction meets any.
-                if (distances.at(x, y) > reach || frame.albedo.at(x, y).a >= kClosed) continue;
-                std::array<Rim, 8> room;
+            const auto look = [&](int x) {
+                if (frame.albedo.at(x, y).a >= kClosed) return;
                 // What is covered in part is an outline: filled in some frames and not in others it
                 // would flicker.
                 const int across = frame.albedo.at(x, y).a > 0.0f ? 0 : widest;
-                const std::size_t count = rimsAround(frame, distances, x, y, across, room);
-                if (count == 0) continue;
+                const std::size_t count = rimsAround(frame, distances, x, y, across, far, room);
+                if (count == 0) return;
                 const std::span<Rim> rims(room.data(), count);
                 float nearest = 0, farthest = std::numeric_limits<float>::max();
                 for (const Rim& rim : rims) {
@@ -426,10 +482,13 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
                     hiddenDepth(sources, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f,
                                 nearest + kInFront * scale,
                                 std::max(farthest - kBehind * scale, kFarthestShare * farthest));
-                if (!(hidden > 0.0f)) continue;
+                if (!(hidden > 0.0f)) return;
                 rows[static_cast<std::size_t>(y)].push_back(
                     continued(frame, sources, x, y, hidden, rims));
-            }
+            };
+            // Farther from surface no direction meets any.
+            forWhere(
+                distances.row(y), [&](std::uint8_t d) { return d > 0 && d <= reach; }, look);
         }
     });
     putIn(frame, rows);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -9,27 +8,12 @@
 #include <glm/vec2.hpp>
 
 #include "lib/render/finish/extent.hpp"
+#include "lib/render/finish/for_where.hpp"
 #include "lib/render/finish/outline_points.hpp"
 #include "lib/render/frame.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {
-
-/// Calls call(x) for each value of a row that `test` is true of, from the left. Rows where few are
-/// cost little.
-template <class Test, class Call>
-void forWhere(std::span<const float> row, const Test& test, const Call& call) {
-    constexpr std::size_t kAtOnce = 32;
-    for (std::size_t first = 0; first < row.size(); first += kAtOnce) {
-        const std::size_t end = std::min(row.size(), first + kAtOnce);
-        // Without branches, so that compilers make vectors of it.
-        unsigned any = 0;
-        for (std::size_t x = first; x < end; ++x) any |= test(row[x]) ? 1u : 0u;
-        if (!any) continue;
-        for (std::size_t x = first; x < end; ++x)
-            if (test(row[x])) call(static_cast<int>(x));
-    }
-}
 
 /// Which way is out of the object at a pixel near the background, which is where `depth` has no
 /// point; length 1, or zero where what is around has no direction.
