@@ -20,6 +20,9 @@ constexpr int kTile = 4;
 constexpr int kAround = 2;
 /// So many of them must be there.
 constexpr float kEnoughPoints = 12.0f;
+/// So many views are asked in a frame, of more by as many parts of the outline in turn. The
+/// outermost of the points of more views lie beyond it, by what their pixels cover in part.
+constexpr std::size_t kMostViews = 16, kSides = 8;
 /// The outline of less even surroundings has no direction; of the sum of weights.
 constexpr float kLeastDirection = 0.15f;
 
@@ -56,6 +59,26 @@ glm::vec2 outwardAt(const Image<float>& depth, int x, int y) {
     return length > kLeastDirection * all ? out / length : glm::vec2(0.0f);
 }
 
+namespace {
+
+/// The pixels that are asked for on one side of an object, one of eight.
+struct Side {
+    glm::dvec3 at{0}, out{0};  ///< sums of their places and of the ways out, as the camera has them
+    double count = 0;
+
+    static std::size_t of(glm::vec2 out) {
+        return (out.x < 0 ? 4u : 0u) + (out.y < 0 ? 2u : 0u) +
+               (std::abs(out.x) < std::abs(out.y) ? 1u : 0u);
+    }
+    void add(const Side& other) {
+        at += other.at;
+        out += other.out;
+        count += other.count;
+    }
+};
+
+}  // namespace
+
 /// Rows of the picture that one thread owns, as OutlineRows tells. Its memory serves for all
 /// frames.
 struct Outlines::Band {
@@ -66,6 +89,7 @@ struct Outlines::Band {
     std::vector<float> high, low;    ///< outermost and innermost point along that, pixels
     std::vector<float> count;        ///< of points
     std::vector<std::uint32_t> blocks;
+    std::array<Side, kSides> sides;
 
     void make() {
         constexpr float kFar = std::numeric_limits<float>::infinity();
@@ -126,6 +150,46 @@ Outlines::Outlines(PageSet set) : set_(std::move(set)) {
     for (const auto& f : found) blocks_.insert(blocks_.end(), f.begin(), f.end());
 }
 
+std::vector<std::uint8_t> Outlines::askedViews(const Camera& camera) const {
+    const auto views = set_.views();
+    std::array<Side, kSides> sides{};
+    for (const Band& band : bands_)
+        for (std::size_t s = 0; s < kSides; ++s) sides[s].add(band.sides[s]);
+    constexpr double kUnseen = -std::numeric_limits<double>::infinity();
+    // By side and view: how much it looks at that side from in front, if it shows it at all.
+    std::array<std::vector<double>, kSides> looks;
+    for (std::size_t s = 0; s < kSides; ++s) {
+        if (sides[s].count == 0) continue;
+        const glm::dvec3 at = camera.position + camera.orientation * (sides[s].at / sides[s].count);
+        const glm::dvec3 out = camera.orientation * sides[s].out;
+        for (const PageView& view : views) {
+            const Camera& c = view.camera;
+            const glm::dvec3 from = c.orthographic ? -c.forward() : c.position - at;
+            const glm::dvec3 seen = c.project(glm::conjugate(c.orientation) * (at - c.position));
+            const bool shows = (c.orthographic || seen.z > 0) && seen.x >= 0 && seen.y >= 0 &&
+                               seen.x < c.width && seen.y < c.height;
+            looks[s].push_back(shows ? glm::dot(from, out) / glm::length(from) : kUnseen);
+        }
+    }
+    std::vector<std::uint8_t> asked(views.size(), 0);
+    std::size_t count = 0;
+    for (bool any = true; any && count < kMostViews;) {
+        any = false;
+        for (const std::vector<double>& of : looks) {
+            if (of.empty() || count == kMostViews) continue;
+            std::size_t best = views.size();
+            for (std::size_t i = 0; i < views.size(); ++i)
+                if (!asked[i] && of[i] > kUnseen && (best == views.size() || of[i] > of[best]))
+                    best = i;
+            if (best == views.size()) continue;
+            asked[best] = 1;
+            ++count;
+            any = true;
+        }
+    }
+    return asked;
+}
+
 OutlineDepths Outlines::depthsOf(const OutlineBlock& block) const {
     const PageRectangle& r = set_.rectangles()[block.rectangle];
     const Page& page = set_.pages()[static_cast<std::size_t>(r.page)];
@@ -134,13 +198,15 @@ OutlineDepths Outlines::depthsOf(const OutlineBlock& block) const {
 }
 
 void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& covered,
-                       const Extent& asked) {
+                       const Extent& within) {
     const int w = frame.depth.width(), h = frame.depth.height();
-    const Extent part = asked.grown(0, w, h);
+    const Extent part = within.grown(0, w, h);
     const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
     static_assert(kBandRows % kTile == 0);
     Image<std::uint8_t> tiles(tilesX, tilesY);
     bands_.resize(static_cast<std::size_t>((h + kBandRows - 1) / kBandRows));
+    // Pruned views share the surface among them: all are needed.
+    const bool choose = set_.views().size() > kMostViews && !set_.pruned();
     // Points beside the part tell of what is in it, too.
     const Extent around = part.grown(1, w, h);
     parallelFor(0, static_cast<std::int64_t>(bands_.size()), [&](std::int64_t n) {
@@ -151,6 +217,7 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         band.width = around.x1 - around.x0;
         band.any = false;
         band.blocks.clear();
+        band.sides = {};
         const int last = std::min(part.y1, band.top + band.rows);
         for (int y = std::max(part.y0, band.top); y < last; ++y) {
             const auto prepare = [&](int column) {
@@ -158,6 +225,10 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
                 const glm::vec2 out = outwardAt(frame.depth, x, y);
                 if (out == glm::vec2(0.0f)) return;
                 if (!band.any) band.make();
+                if (const float dist = frame.depth.at(x, y); choose && hasPoint(dist)) {
+                    const glm::dvec3 place = camera.unproject(x + 0.5, y + 0.5, dist);
+                    band.sides[Side::of(out)].add({place, {out.x, -out.y, 0}, 1});
+                }
                 const std::size_t at = band.element(x, y);
                 band.outX[at] = out.x;
                 band.outY[at] = out.y;
@@ -190,6 +261,8 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
             before.at(x + 1, y + 1) = before.at(x + 1, y) + row;
         }
     }
+    std::vector<std::uint8_t> asked;
+    if (choose) asked = askedViews(camera);
     // Which blocks have points there.
     struct Rows {
         int from = 0, to = -1;  // inclusive
@@ -199,6 +272,8 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         0, static_cast<std::int64_t>(blocks_.size()), 512, [&](std::int64_t from, std::int64_t to) {
             for (auto n = static_cast<std::size_t>(from); n < static_cast<std::size_t>(to); ++n) {
                 const OutlineBlock& b = blocks_[n];
+                const PageRectangle& r = set_.rectangles()[b.rectangle];
+                if (choose && !asked[static_cast<std::size_t>(r.view)]) continue;
                 const auto& [a0, au, av, b0, bu, bv] = coarseMaps[b.rectangle];
                 // Eight corners side by side, so that compilers make vectors of it.
                 std::array<float, 8> x, y, along;

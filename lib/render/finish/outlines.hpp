@@ -45,6 +45,8 @@ class Outlines {
     struct Band;
 
     [[nodiscard]] OutlineDepths depthsOf(const OutlineBlock& block) const;
+    /// By view: 1 for those whose points are asked about what bands_ have.
+    [[nodiscard]] std::vector<std::uint8_t> askedViews(const Camera& camera) const;
 
     PageSet set_;
     std::vector<OutlineBlock> blocks_;
