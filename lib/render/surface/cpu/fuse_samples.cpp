@@ -30,14 +30,12 @@ struct PixelSamples {
                                 static_cast<std::ptrdiff_t>(row) * side * stride + column * side;
             float* to = q[count];
             float most = 0.0f;
-            std::memset(to, 0, sizeof(q[0]));
             for (int j = 0; j < side; ++j) {
-                for (int i = 0; i < side; ++i) {
-                    const float value = from[j * stride + i];
-                    to[j * side + i] = value;
-                    most = value > most ? value : most;
-                }
+                // Rows of four floats are there, whatever the side; the next row covers the rest.
+                std::memcpy(to + j * side, from + j * stride, 4 * sizeof(float));
+                for (int i = 0; i < side; ++i) most = std::max(most, from[j * stride + i]);
             }
+            std::fill(to + side * side, to + kMostSamples, 0.0f);
             if (most > 0.0f) owner[count++] = k;
         }
     }
@@ -88,7 +86,7 @@ struct SampleFuser {
             const VotingSource from(votes.at(s));
             Points alpha;
             if (from.colour) {
-                alpha = alphaOf(from.colour, FourTexels(*from.source, p, mine), p);
+                alpha = alphaOf(from.colour, *from.source, p, mine, Window(*from.source, p, mine));
             } else {
                 alignas(64) float u[kMostPoints], v[kMostPoints], each[kMostPoints] = {};
                 hn::Store(p.u, d, u);
@@ -99,7 +97,7 @@ struct SampleFuser {
                 }
                 alpha = hn::Load(d, each);
             }
-            out = hn::Or(out, areBackground(votes, s, p, alpha, mine));
+            out = hn::Or(out, areBackground(votes, s, from.colour, p, alpha, mine));
             silhouette = hn::Or(silhouette, hn::And(mine, hn::Lt(alpha, hn::Set(d, kSolidAlpha))));
         }
         asked = hn::AndNot(out, asked);

@@ -16,6 +16,10 @@
 
 #include "lib/render/surface/votes.hpp"
 
+// Vectors of 16 points are lookups of 4x4 texels, too.
+#undef STX_VOTES_WINDOWS
+#define STX_VOTES_WINDOWS (HWY_MAX_BYTES >= 64 && !HWY_HAVE_SCALABLE)
+
 HWY_BEFORE_NAMESPACE();
 namespace stx::surface::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -132,26 +136,115 @@ struct FourTexels {
     }
 };
 
-HWY_INLINE Points alphaOf(const glm::u8vec4* colour, const FourTexels& texels,
-                          const SourcePoints& p) {
+/// 4x4 texels of a whole source that hold all that some of its points lie between, and those
+/// around: gathering costs many times what looking up in a register does. Only where that takes
+/// them all.
+struct Window {
+    bool holds = false;
+    std::ptrdiff_t first = 0;  ///< texel
+    Counts index;              ///< of the upper left of the pixels around each point
+
+    HWY_INLINE Window(const Source& s, const SourcePoints& p, PointMask wanted) {
+#if STX_VOTES_WINDOWS
+        const CountTag di;
+        const auto asks = hn::RebindMask(di, wanted);
+        const auto firstOf = [&](Counts at) HWY_ATTR {
+            return hn::GetLane(hn::MinOfLanes(di, hn::IfThenElse(asks, at, hn::Set(di, 1 << 30)))) -
+                   1;
+        };
+        const std::int32_t x = firstOf(p.column), y = firstOf(p.row);
+        if (x < 0 || y < 0 || x > s.width - kSide || y > s.height - kSide) return;
+        const Counts alongX = hn::Sub(p.column, hn::Set(di, x));
+        const Counts alongY = hn::Sub(p.row, hn::Set(di, y));
+        const auto beyond = hn::Gt(hn::Max(alongX, alongY), hn::Set(di, kSide - 2));
+        if (!hn::AllFalse(di, hn::And(asks, beyond))) return;
+        holds = true;
+        first = static_cast<std::ptrdiff_t>(y) * s.width + x;
+        index = hn::IfThenElseZero(asks, hn::Add(hn::ShiftLeft<2>(alongY), alongX));
+#else
+        (void)s, (void)p, (void)wanted;
+#endif
+    }
+
+#if STX_VOTES_WINDOWS
+    static constexpr int kSide = 4;
+
+    template <class T>
+    HWY_INLINE auto read(const T* from, std::ptrdiff_t width) const {
+        const hn::FixedTag<T, 4> d4;
+        const hn::FixedTag<T, 8> d8;
+        const auto row = [&](int j) HWY_ATTR { return hn::LoadU(d4, from + first + j * width); };
+        return hn::Combine(hn::FixedTag<T, 16>(), hn::Combine(d8, row(3), row(2)),
+                           hn::Combine(d8, row(1), row(0)));
+    }
+    HWY_INLINE Counts read(const std::uint8_t* from, std::ptrdiff_t width) const {
+        const hn::FixedTag<std::uint32_t, 4> rows;
+        const auto row = [&](int j) HWY_ATTR {
+            std::uint32_t four = 0;
+            std::memcpy(&four, from + first + j * width, sizeof(four));
+            return hn::Set(rows, four);
+        };
+        const auto bytes = hn::ConcatLowerLower(rows, hn::InterleaveLower(rows, row(2), row(3)),
+                                                hn::InterleaveLower(rows, row(0), row(1)));
+        return hn::PromoteTo(CountTag(), hn::BitCast(hn::FixedTag<std::uint8_t, 16>(), bytes));
+    }
+    /// Of what was read, what is (x, y) from the upper left of the pixels around each point, from
+    /// -1 to 1.
+    template <class D, class V = hn::Vec<D>>
+    HWY_INLINE V at(D d, V table, int x, int y) const {
+        const CountTag di;
+        // Points that are not asked for stay within the window.
+        const Counts place = hn::And(hn::Add(index, hn::Set(di, kSide * y + x)), hn::Set(di, 15));
+        return hn::TableLookupLanes(table, hn::IndicesFromVec(d, place));
+    }
+#endif
+};
+
+/// Alpha between the pixels around those points.
+HWY_INLINE Points alphaOf(const glm::u8vec4* colour, const Source& source, const SourcePoints& p,
+                          PointMask wanted, const Window& window) {
     const PointTag d;
     const CountTag di;
     const hn::RebindToUnsigned<PointTag> du;
     const auto* words = reinterpret_cast<const std::int32_t*>(colour);
-    const auto alpha = [&](int j, int i) HWY_ATTR {
-        const auto bits = hn::BitCast(du, hn::GatherIndex(di, words, texels.at[j][i]));
-        return hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<24>(bits))),
-                       hn::Set(d, 1.0f / 255.0f));
+    const auto asAlpha = [&](Counts texel) HWY_ATTR {
+        const auto bits = hn::ShiftRight<24>(hn::BitCast(du, texel));
+        return hn::Mul(hn::ConvertTo(d, hn::BitCast(di, bits)), hn::Set(d, 1.0f / 255.0f));
     };
     const auto mix = [&](Points a, Points b, Points along)
                          HWY_ATTR { return hn::MulAdd(b, along, hn::NegMulAdd(a, along, a)); };
-    return mix(mix(alpha(0, 0), alpha(0, 1), p.alongX), mix(alpha(1, 0), alpha(1, 1), p.alongX),
-               p.alongY);
+    const auto between = [&](const auto& at) HWY_ATTR {
+        return mix(mix(asAlpha(at(0, 0)), asAlpha(at(0, 1)), p.alongX),
+                   mix(asAlpha(at(1, 0)), asAlpha(at(1, 1)), p.alongX), p.alongY);
+    };
+#if STX_VOTES_WINDOWS
+    if (window.holds) {
+        const Counts table = window.read(words, source.width);
+        return between([&](int j, int i) HWY_ATTR { return window.at(di, table, i, j); });
+    }
+#else
+    (void)window;
+#endif
+    const FourTexels texels(source, p, wanted);
+    return between([&](int j, int i)
+                       HWY_ATTR { return hn::GatherIndex(di, words, texels.at[j][i]); });
 }
 
-/// isBackground() of those points, whose alpha is given.
-HWY_INLINE PointMask areBackground(shared::Votes& votes, int s, const SourcePoints& p, Points alpha,
-                                   PointMask wanted) {
+/// Whether the largest alpha of the 4x4 pixels around the 2x2 from (column, row) on is solid; all
+/// of them must be in the picture.
+HWY_INLINE bool isSolidAround(const glm::u8vec4* colour, int width, int column, int row) {
+    const glm::u8vec4* from = colour + static_cast<std::ptrdiff_t>(row - 1) * width + (column - 1);
+    std::uint8_t largest = 0;
+    for (int j = 0; j < 4; ++j, from += width)
+        largest = std::max(std::max(std::max(from[0].a, from[1].a), std::max(from[2].a, from[3].a)),
+                           largest);
+    return !(static_cast<float>(largest) * (1.0f / 255.0f) < kSolidAlpha);
+}
+
+/// isBackground() of those points, whose alpha is given. `colour`: the source's, or null where it
+/// cannot be read at once.
+HWY_INLINE PointMask areBackground(shared::Votes& votes, int s, const glm::u8vec4* colour,
+                                   const SourcePoints& p, Points alpha, PointMask wanted) {
     const PointTag d;
     const CountTag di;
     const PointMask little = hn::And(wanted, hn::Lt(alpha, hn::Set(d, votes.freeAlphaOf(s))));
@@ -163,16 +256,26 @@ HWY_INLINE PointMask areBackground(shared::Votes& votes, int s, const SourcePoin
     hn::Store(p.column, di, column);
     hn::Store(p.row, di, row);
     std::uint32_t background = lanesOf(little) & ~doubtful;
-    for (; doubtful; doubtful &= doubtful - 1) {
+    const Source& source = votes.at(s);
+    // Neighbours mostly lie between the same pixels.
+    for (int before = -1; doubtful; doubtful &= doubtful - 1) {
         const int l = std::countr_zero(doubtful);
-        if (!(votes.largestAlphaAround(s, {column[l], row[l]}) < kSolidAlpha))
-            background |= 1u << l;
+        bool solid = false;
+        if (before >= 0 && column[l] == column[before] && row[l] == row[before])
+            solid = background >> before & 1u;
+        else if (colour && column[l] > 0 && row[l] > 0 && column[l] + 2 < source.width &&
+                 row[l] + 2 < source.height)
+            solid = isSolidAround(colour, source.width, column[l], row[l]);
+        else
+            solid = !(votes.largestAlphaAround(s, {column[l], row[l]}) < kSolidAlpha);
+        if (solid) background |= 1u << l;
+        before = l;
     }
     return maskOf(background);
 }
 
 /// PreparedPage::info at those texels, of an image of so many.
-HWY_INLINE Counts infoAt(const std::uint8_t* info, std::int32_t count, Counts texels) {
+HWY_INLINE Counts gatheredInfo(const std::uint8_t* info, std::int32_t count, Counts texels) {
     const CountTag di;
     const hn::RebindToUnsigned<CountTag> du;
     // Whole words, for that is what vectors gather.
@@ -184,19 +287,21 @@ HWY_INLINE Counts infoAt(const std::uint8_t* info, std::int32_t count, Counts te
 }
 
 /// Of the points of `asked`, those that the upper left of the pixels around them tells to have no
-/// vote of a source, from its depth there and how that changes.
-HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p, Counts texel,
-                                 Counts info, float clearlyBehind, PointMask asked) {
+/// vote of a source, from its depth there and how that changes. `qAt(x, y, lanes)`,
+/// `infoAt(x, y, lanes)`: of the pixel so far from that one.
+template <class Depths, class Infos>
+HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p, const Depths& qAt,
+                                 const Infos& infoAt, Counts info, float clearlyBehind,
+                                 PointMask asked) {
     const PointTag d;
     const CountTag di;
     const DepthAxis& axis = from.source->space.axis;
-    const std::int32_t width = from.source->width;
     const Points zero = hn::Zero(d);
     const Points scale = axis.inverse ? p.q : hn::Set(d, 1.0f);
     const Points perUnit = axis.inverse ? hn::Mul(p.q, p.q) : hn::Set(d, axis.qPerUnit(1.0f));
     const Points margin = hn::MulAdd(hn::Set(d, clearlyBehind), scale,
                                      hn::Mul(hn::Set(d, from.source->step), perUnit));
-    const Points there = hn::GatherIndex(d, from.q, texel);
+    const Points there = qAt(0, 0, asked);
     // The cheap half of the test first: most surfaces are not behind the point at all.
     const Points reach = hn::Set(d, 4.0f * kLinkedSamples);
     const Points nearest =
@@ -206,18 +311,8 @@ HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p
         hn::Or(hn::And(asked, hn::Lt(there, zero)), hn::And(has, hn::Lt(p.q, nearest)));
     const PointMask left = hn::AndNot(hidden, has);
     if (hn::AllFalse(d, left)) return hidden;
-    const auto gather = [&](std::int32_t step) HWY_ATTR {
-        const Counts at =
-            hn::IfThenElseZero(hn::RebindMask(di, left), hn::Add(texel, hn::Set(di, step)));
-        return hn::GatherIndex(d, from.q, at);
-    };
     const auto links = [&](Counts bits, std::uint8_t link) HWY_ATTR {
         return hn::RebindMask(d, hn::TestBit(bits, hn::Set(di, std::int32_t{link})));
-    };
-    const auto infoBeside = [&](std::int32_t step) HWY_ATTR {
-        const Counts at =
-            hn::IfThenElseZero(hn::RebindMask(di, left), hn::Add(texel, hn::Set(di, step)));
-        return infoAt(from.info, width * from.source->height, at);
     };
     /// chooseSlope() of shaders/shared/surface_slope.glsl.
     const auto slopeOf = [&](PointMask before, Points q0, PointMask after, Points q1) HWY_ATTR {
@@ -230,10 +325,10 @@ HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p
         return hn::IfThenElse(hn::And(before, after), both,
                               hn::IfThenElse(before, a, hn::IfThenElseZero(after, b)));
     };
-    const Points gx = slopeOf(links(infoBeside(-1), Info::kLinkRight), gather(-1),
-                              links(info, Info::kLinkRight), gather(1));
-    const Points gy = slopeOf(links(infoBeside(-width), Info::kLinkDown), gather(-width),
-                              links(info, Info::kLinkDown), gather(width));
+    const Points gx = slopeOf(links(infoAt(-1, 0, left), Info::kLinkRight), qAt(-1, 0, left),
+                              links(info, Info::kLinkRight), qAt(1, 0, left));
+    const Points gy = slopeOf(links(infoAt(0, -1, left), Info::kLinkDown), qAt(0, -1, left),
+                              links(info, Info::kLinkDown), qAt(0, 1, left));
     const Points slope = hn::Add(hn::Abs(gx), hn::Abs(gy));
     const Points predicted = hn::MulAdd(gx, p.alongX, hn::MulAdd(gy, p.alongY, there));
     const Points least =
@@ -260,19 +355,44 @@ HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
                        hn::And(hn::Gt(hn::Set(di, source.width - 1), hn::Add(p.column, one)),
                                hn::Gt(hn::Set(di, source.height - 1), hn::Add(p.row, one)))));
         const PointMask asked = hn::And(left, amid);
-        const Counts texel =
-            hn::IfThenElseZero(hn::RebindMask(di, asked),
-                               hn::Add(hn::Mul(p.row, hn::Set(di, source.width)), p.column));
-        const Counts info = infoAt(from.info, source.width * source.height, texel);
-        PointMask hidden = withoutVote(from, p, texel, info, votes.clearlyBehindOf(s), asked);
+        const Window window(source, p, asked);
+        Counts info;
+        PointMask hidden;
+        const auto look = [&](const auto& qAt, const auto& infoAt) HWY_ATTR {
+            info = infoAt(0, 0, asked);
+            hidden = withoutVote(from, p, qAt, infoAt, info, votes.clearlyBehindOf(s), asked);
+        };
+#if STX_VOTES_WINDOWS
+        if (window.holds) {
+            const Points depths = window.read(from.q, source.width);
+            const Counts infos = window.read(from.info, source.width);
+            look([&](int x, int y, PointMask) HWY_ATTR { return window.at(d, depths, x, y); },
+                 [&](int x, int y, PointMask) HWY_ATTR { return window.at(di, infos, x, y); });
+        }
+#endif
+        if (!window.holds) {
+            const Counts texel = hn::Add(hn::Mul(p.row, hn::Set(di, source.width)), p.column);
+            const auto at = [&](int x, int y, PointMask lanes) HWY_ATTR {
+                return hn::IfThenElseZero(hn::RebindMask(di, lanes),
+                                          hn::Add(texel, hn::Set(di, y * source.width + x)));
+            };
+            look([&](int x, int y, PointMask lanes)
+                     HWY_ATTR { return hn::GatherIndex(d, from.q, at(x, y, lanes)); },
+                 [&](int x, int y, PointMask lanes) HWY_ATTR {
+                     return gatheredInfo(from.info, source.width * source.height, at(x, y, lanes));
+                 });
+        }
         if (from.colour) {
             // Background is not hidden: it is never far from an edge.
             const PointMask nearEdge =
                 hn::RebindMask(d, hn::Lt(hn::ShiftRight<4>(info), hn::Set(di, kFarFromEdge - 1)));
             const PointMask doubtful = hn::Or(hn::AndNot(amid, left), hn::And(asked, nearEdge));
             if (!hn::AllFalse(d, doubtful)) {
-                const Points alpha = alphaOf(from.colour, FourTexels(source, p, doubtful), p);
-                const PointMask background = areBackground(votes, s, p, alpha, doubtful);
+                const bool allAmid = hn::AllFalse(d, hn::AndNot(amid, doubtful));
+                const Points alpha = alphaOf(from.colour, source, p, doubtful,
+                                             allAmid ? window : Window(source, p, doubtful));
+                const PointMask background =
+                    areBackground(votes, s, from.colour, p, alpha, doubtful);
                 cast = hn::IfThenElseZero(hn::RebindMask(di, background),
                                           hn::Set(di, votes.backgroundVoteOf(s)));
                 left = hn::AndNot(background, left);
