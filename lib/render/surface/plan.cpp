@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "lib/base/parallel.hpp"
@@ -36,7 +37,7 @@ void addBounds(const Source& s, Bounds& bounds) {
 
 /// Whether all that is drawn of a block is seen from behind. `eye`: that of the frame in the space
 /// of the source's pixels, homogeneous.
-bool isTurnedAway(const Source& s, const SourceBlock& block, int x, int y, const glm::dvec4& eye) {
+bool isTurnedAway(const Source& s, const BlockRange& block, int x, int y, const glm::dvec4& eye) {
     // A plane q = q0 + gx (x - x0) + gy (y - y0) faces the eye where
     // gx (x - x0) + gy (y - y0) < q - q0 there; each term by its range over the block.
     struct Range {
@@ -62,6 +63,62 @@ bool isTurnedAway(const Source& s, const SourceBlock& block, int x, int y, const
            kFacingRounding * (ofX.size() + ofY.size() + depth.size());
 }
 
+/// The corners of the room that a block is drawn in, as a frame has them; side by side, so that
+/// compilers make vectors of it.
+struct Corners {
+    std::array<float, 8> x, y, w;  ///< homogeneous
+    struct Box {
+        float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
+
+        void add(float x, float y) {
+            x0 = std::min(x0, x);
+            x1 = std::max(x1, x);
+            y0 = std::min(y0, y);
+            y1 = std::max(y1, y);
+        }
+    };
+
+    /// Of the block whose first pixel is (bx, by).
+    Corners(const Warp& warp, float bx, float by, float qNear, float qFar) {
+        const auto& m = warp.m;
+        for (std::size_t k = 0; k < 8; ++k) {
+            const float u = (k & 1) ? bx + kBlock + 1.5f : bx - 0.5f;
+            const float v = (k & 2) ? by + kBlock + 1.5f : by - 0.5f;
+            const float q = (k & 4) ? qNear : qFar;
+            x[k] = m[0] * u + m[1] * v + m[2] * q + m[3];
+            y[k] = m[4] * u + m[5] * v + m[6] * q + m[7];
+            w[k] = m[12] * u + m[13] * v + m[14] * q + m[15];
+        }
+    }
+    /// Where they are when all are in front of the camera.
+    [[nodiscard]] Box all() const {
+        std::array<float, 8> u, v;
+        for (std::size_t k = 0; k < 8; ++k) {
+            u[k] = x[k] / w[k];
+            v[k] = y[k] / w[k];
+        }
+        const auto [x0, x1] = std::ranges::minmax(u);
+        const auto [y0, y1] = std::ranges::minmax(v);
+        return {x0, y0, x1, y1};
+    }
+    /// Where what is before the camera is: what is behind is cut off, and what is next to nothing
+    /// before it, nearer than `cut`.
+    [[nodiscard]] Box inFront(float cut) const {
+        Box box;
+        for (std::size_t k = 0; k < 8; ++k) {
+            if (w[k] > 0) box.add(x[k] / w[k], y[k] / w[k]);
+            for (const std::size_t bit : {1u, 2u, 4u}) {
+                const std::size_t to = k ^ bit;
+                if (!(w[k] > cut && w[to] < cut)) continue;
+                const float along = (w[k] - cut) / (w[k] - w[to]);
+                const float at = w[k] + (w[to] - w[k]) * along;
+                box.add((x[k] + (x[to] - x[k]) * along) / at, (y[k] + (y[to] - y[k]) * along) / at);
+            }
+        }
+        return box;
+    }
+};
+
 FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, int tilesY) {
     FrameSource f;
     f.source = &s;
@@ -80,44 +137,18 @@ FrameSource placeSource(const Source& s, const PixelSpace& space, int tilesX, in
     };
     std::vector<Range> ranges;
     f.tileBegin.assign(static_cast<std::size_t>(tilesX) * tilesY + 1, 0);
-    for (std::uint32_t index = 0; index < s.blocks.size(); ++index) {
-        const SourceBlock& block = s.blocks[index];
-        if (!(block.qMax > 0)) continue;
+    for (const Source::PlannedBlock& block : s.planned) {
+        const std::uint32_t index = block.number;
         const auto bx = static_cast<float>(index % s.blocksX * kBlock);
         const auto by = static_cast<float>(index / s.blocksX * kBlock);
         const float margin =
             kBlockMargin * block.reach + kBlockRounding * s.space.axis.relativeScale(block.qMax);
-        float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
-        const auto add = [&](glm::vec4 h) {
-            x0 = std::min(x0, h.x / h.w);
-            x1 = std::max(x1, h.x / h.w);
-            y0 = std::min(y0, h.y / h.w);
-            y1 = std::max(y1, h.y / h.w);
-        };
-        std::array<glm::vec4, 8> corners;
-        float most = 0, least = std::numeric_limits<float>::max();
-        for (int corner = 0; corner < 8; ++corner) {
-            const float x = (corner & 1) ? bx + kBlock + 1.5f : bx - 0.5f;
-            const float y = (corner & 2) ? by + kBlock + 1.5f : by - 0.5f;
-            const float q = (corner & 4) ? block.qMax + margin
-                                         : std::max(block.qMin - margin, 0.5f * block.qMin);
-            const glm::vec4 h = corners[static_cast<std::size_t>(corner)] =
-                warp.homogeneous(x, y, q);
-            most = std::max(most, h.w);
-            least = std::min(least, h.w);
-            if (h.w > 0) add(h);
-        }
+        const Corners corners(warp, bx, by, block.qMax + margin,
+                              std::max(block.qMin - margin, 0.5f * block.qMin));
+        const auto [least, most] = std::ranges::minmax(corners.w);
         if (!(most > 0)) continue;
         const bool behind = !(least > 0);
-        // Cut off what is behind, and what is next to nothing before the camera.
-        const float cut = kNearestShare * most;
-        for (std::size_t corner = 0; behind && corner < 8; ++corner) {
-            for (const std::size_t bit : {1u, 2u, 4u}) {
-                const glm::vec4 from = corners[corner], to = corners[corner ^ bit];
-                if (from.w > cut && to.w < cut)
-                    add(from + (to - from) * ((from.w - cut) / (from.w - to.w)));
-            }
-        }
+        auto [x0, y0, x1, y1] = behind ? corners.inFront(kNearestShare * most) : corners.all();
         const auto limitX = static_cast<float>(space.camera.width),
                    limitY = static_cast<float>(space.camera.height);
         x0 = std::max(x0 - 0.5f, 0.0f);
@@ -210,24 +241,10 @@ std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
         for (int i = 0; i < count; ++i) chosen.push_back(i);
         return chosen;
     }
-    // A point of the scene in the middle of the tile: where the blocks that fall in it are.
-    double q = 0;
-    int blocks = 0;
-    // Where some of a block is behind the camera, its middle may be anywhere: only without others.
-    for (const double sign : {1.0, -1.0}) {
-        for (const FrameSource& f : sources) {
-            for (const double middle : f.middlesOf(tile)) {
-                if (!(sign * middle > 0)) continue;
-                q += sign * middle;
-                ++blocks;
-            }
-        }
-        if (blocks) break;
-    }
-    if (!blocks) return chosen;
-    const glm::dvec4 h =
-        space.worldFromPixel *
-        glm::dvec4(tileX(tile) + kTile * 0.5, tileY(tile) + kTile * 0.5, q / blocks, 1.0);
+    const double q = middles[static_cast<std::size_t>(tile)];
+    if (!(q > 0)) return chosen;
+    const glm::dvec4 h = space.worldFromPixel *
+                         glm::dvec4(tileX(tile) + kTile * 0.5, tileY(tile) + kTile * 0.5, q, 1.0);
     const glm::dvec3 point = glm::dvec3(h) / h.w;
     const auto towards = [&](const Camera& c) {
         return c.orthographic ? c.forward() : glm::normalize(point - c.position);
@@ -239,17 +256,27 @@ std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
         return at.w > 0 && at.x >= 0 && at.y >= 0 && at.x <= at.w * s.width &&
                at.y <= at.w * s.height;
     };
-    std::vector<std::pair<double, int>> ranked;
-    for (int i = 0; i < count; ++i) {
+    // The first of what is left, by rank; those that show nothing there come last, by theirs.
+    using Ranked = std::pair<double, int>;
+    std::vector<Ranked> left, idle;
+    left.reserve(sources.size());
+    for (int i = 0; i < count; ++i)
+        left.emplace_back(
+            -glm::dot(look, towards(sources[static_cast<std::size_t>(i)].source->space.camera)), i);
+    std::make_heap(left.begin(), left.end(), std::greater<>());
+    const auto most = static_cast<std::size_t>(effort.mostGeometry);
+    while (!left.empty() && chosen.size() < most) {
+        std::pop_heap(left.begin(), left.end(), std::greater<>());
+        const auto [rank, i] = left.back();
+        left.pop_back();
         const FrameSource& f = sources[static_cast<std::size_t>(i)];
-        const bool shows =
-            inPicture(*f.source) && !(effort.preferShown && f.blocksOf(tile).empty());
-        const double idle = shows ? 0.0 : 2.0;
-        ranked.emplace_back(idle - glm::dot(look, towards(f.source->space.camera)), i);
+        if (inPicture(*f.source) && !(effort.preferShown && f.blocksOf(tile).empty()))
+            chosen.push_back(i);
+        else
+            idle.emplace_back(2.0 + rank, i);
     }
-    std::nth_element(ranked.begin(), ranked.begin() + effort.mostGeometry - 1, ranked.end());
-    for (int i = 0; i < effort.mostGeometry; ++i)
-        chosen.push_back(ranked[static_cast<std::size_t>(i)].second);
+    std::sort(idle.begin(), idle.end());
+    for (std::size_t k = 0; chosen.size() < most; ++k) chosen.push_back(idle[k].second);
     std::sort(chosen.begin(), chosen.end());
     return chosen;
 }
@@ -268,6 +295,8 @@ float SurfaceFrame::qLimit() const {
 }
 
 void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted) {
+    for (std::size_t t = 0; t < frame.middles.size(); ++t)
+        if (!wanted[t]) frame.middles[t] = 0;
     for (FrameSource& f : frame.sources) {
         std::uint32_t kept = 0, begin = 0;
         for (std::size_t t = 0; t < wanted.size(); ++t) {
@@ -275,14 +304,39 @@ void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted) {
             if (wanted[t])
                 for (std::uint32_t b = begin; b < end; ++b, ++kept) {
                     f.blocks[kept] = f.blocks[b];
-                    f.middles[kept] = f.middles[b];
                 }
             begin = end;
             f.tileBegin[t + 1] = kept;
         }
         f.blocks.resize(kept);
-        f.middles.resize(kept);
     }
+}
+
+/// By tile: q in the middle of the blocks that fall in it, 0 = none.
+std::vector<double> middlesOf(const SurfaceFrame& frame) {
+    struct Sum {
+        double q = 0;
+        int blocks = 0;
+    };
+    // Where some of a block is behind the camera, its middle may be anywhere: only without others.
+    const std::size_t tiles = static_cast<std::size_t>(frame.tilesX) * frame.tilesY;
+    std::vector<std::array<Sum, 2>> sums(tiles);
+    for (const FrameSource& f : frame.sources) {
+        for (std::size_t t = 0; t < tiles; ++t) {
+            for (std::uint32_t b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
+                const double middle = f.middles[b];
+                if (!(std::abs(middle) > 0)) continue;
+                Sum& sum = sums[t][middle > 0 ? 0 : 1];
+                sum.q += std::abs(middle);
+                ++sum.blocks;
+            }
+        }
+    }
+    std::vector<double> middles(tiles, 0.0);
+    for (std::size_t t = 0; t < tiles; ++t)
+        if (const Sum& sum = sums[t][sums[t][0].blocks ? 0 : 1]; sum.blocks)
+            middles[t] = sum.q / sum.blocks;
+    return middles;
 }
 
 Bounds boundsOf(const SurfaceScene& scene) {
@@ -308,6 +362,7 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
         const auto k = static_cast<std::size_t>(i);
         f.sources[k] = placeSource(scene.sources[k], f.space, f.tilesX, f.tilesY);
     });
+    if (static_cast<int>(f.sources.size()) > effort.mostGeometry) f.middles = middlesOf(f);
     return f;
 }
 

@@ -55,10 +55,6 @@ struct FrameSource {
         const auto t = static_cast<std::size_t>(tile);
         return {blocks.data() + tileBegin[t], tileBegin[t + 1] - tileBegin[t]};
     }
-    [[nodiscard]] std::span<const double> middlesOf(int tile) const {
-        const auto t = static_cast<std::size_t>(tile);
-        return {middles.data() + tileBegin[t], tileBegin[t + 1] - tileBegin[t]};
-    }
 };
 
 /// A frame to draw: tiles of kTile x kTile pixels, row by row.
@@ -66,6 +62,9 @@ struct SurfaceFrame {
     PixelSpace space;
     std::vector<FrameSource> sources;
     int tilesX = 0, tilesY = 0;
+    /// By tile: q in the middle of the blocks of all sources that fall in it, 0 = none; empty where
+    /// tiles are built from all sources.
+    std::vector<double> middles;
     Effort effort;
     bool wantOrigin = false;  ///< see DrawnFrame::origin
 

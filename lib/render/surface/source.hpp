@@ -70,12 +70,16 @@ struct Leaf {
     float q0, qx, qy;
 };
 
-/// What one 16x16 block of a source holds.
-struct SourceBlock {
+/// Where what is drawn of a block may be.
+struct BlockRange {
     float qMin = 0, qMax = 0;  ///< over the block and one pixel around; 0, 0 = nothing here
     float reach = 0;           ///< by which what is drawn may leave that range, in q
     /// dq/dx and dq/dy of all that is drawn of it are between these.
     glm::vec2 leastSlope{0}, mostSlope{0};
+};
+
+/// What one 16x16 block of a source holds.
+struct SourceBlock : BlockRange {
     std::uint32_t leafBegin = 0, leafEnd = 0;
     std::array<std::uint16_t, kBlock> cells{};  ///< 2x2 quads, by upper left pixel, in no leaf
     std::array<std::uint16_t, kBlock> edges{};  ///< pixels that lay out an extension
@@ -132,6 +136,11 @@ struct Source {
     int blocksX = 0, blocksY = 0;
     std::vector<SourceBlock> blocks;
     std::vector<Leaf> leaves;
+    /// The ranges of the blocks that hold something, side by side: plans read those of all views.
+    struct PlannedBlock : BlockRange {
+        std::uint32_t number = 0;  ///< in `blocks`
+    };
+    std::vector<PlannedBlock> planned;
 
     const PageSet* set = nullptr;
     const PreparedPage* pages = nullptr;  ///< by number

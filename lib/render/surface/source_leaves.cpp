@@ -266,6 +266,7 @@ void findLeaves(Source& s, const Draft& d) {
                        block, x0, y0);
         }
     });
+    s.planned.clear();
     for (int by = 0; by < s.blocksY; ++by) {
         const auto base = static_cast<std::uint32_t>(s.leaves.size());
         const auto& leaves = rows[static_cast<std::size_t>(by)];
@@ -274,6 +275,10 @@ void findLeaves(Source& s, const Draft& d) {
             auto& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
             block.leafBegin += base;
             block.leafEnd += base;
+            if (block.qMax > 0)
+                s.planned.push_back(
+                    {block, static_cast<std::uint32_t>(by) * static_cast<std::uint32_t>(s.blocksX) +
+                                static_cast<std::uint32_t>(bx)});
         }
     }
 }
