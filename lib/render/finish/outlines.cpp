@@ -20,9 +20,9 @@ constexpr int kTile = 4;
 constexpr int kAround = 2;
 /// So many of them must be there.
 constexpr float kEnoughPoints = 12.0f;
-/// So many views are asked in a frame, of more by as many parts of the outline in turn. The
-/// outermost of the points of more views lie beyond it, by what their pixels cover in part.
-constexpr std::size_t kMostViews = 16, kSides = 8;
+/// So many views are asked in a frame. The outermost of the points of more lie beyond the outline,
+/// by what their pixels cover in part. Sides are those of the outline.
+constexpr std::size_t kMostViews = 24, kSides = 8;
 /// The outline of less even surroundings has no direction; of the sum of weights.
 constexpr float kLeastDirection = 0.15f;
 
@@ -171,22 +171,28 @@ std::vector<std::uint8_t> Outlines::askedViews(const Camera& camera) const {
             looks[s].push_back(shows ? glm::dot(from, out) / glm::length(from) : kUnseen);
         }
     }
+    // The best of each side first; then evenly of the others: where none looks from in front, as on
+    // top of what stands on a turntable, many that graze it tell more than a few.
     std::vector<std::uint8_t> asked(views.size(), 0);
     std::size_t count = 0;
-    for (bool any = true; any && count < kMostViews;) {
-        any = false;
-        for (const std::vector<double>& of : looks) {
-            if (of.empty() || count == kMostViews) continue;
-            std::size_t best = views.size();
-            for (std::size_t i = 0; i < views.size(); ++i)
-                if (!asked[i] && of[i] > kUnseen && (best == views.size() || of[i] > of[best]))
-                    best = i;
-            if (best == views.size()) continue;
-            asked[best] = 1;
-            ++count;
-            any = true;
-        }
+    for (const std::vector<double>& of : looks) {
+        std::size_t best = views.size();
+        for (std::size_t i = 0; i < of.size(); ++i)
+            if (!asked[i] && of[i] > kUnseen && (best == views.size() || of[i] > of[best]))
+                best = i;
+        if (best == views.size()) continue;
+        asked[best] = 1;
+        ++count;
     }
+    std::vector<std::size_t> others;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const auto shows = [&](const std::vector<double>& of) {
+            return !of.empty() && of[i] > kUnseen;
+        };
+        if (!asked[i] && std::ranges::any_of(looks, shows)) others.push_back(i);
+    }
+    const std::size_t more = std::min(kMostViews - count, others.size());
+    for (std::size_t k = 0; k < more; ++k) asked[others[k * others.size() / more]] = 1;
     return asked;
 }
 

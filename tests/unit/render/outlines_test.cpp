@@ -12,11 +12,11 @@
 namespace stx {
 namespace {
 
-/// A ball of radius 1 as twelve views see it from around, with a point wherever a ray meets it.
-Bundle ballFromAround() {
+/// A ball of radius 1 as some views see it from around, with a point wherever a ray meets it.
+Bundle ballFromAround(int views = 12) {
     Bundle bundle;
-    for (int n = 0; n < 12; ++n) {
-        const double angle = n * 0.5235987755982988;
+    for (int n = 0; n < views; ++n) {
+        const double angle = n * (6.283185307179586 / views);
         ReferenceView view;
         view.camera = Camera::fromFieldOfView({6 * std::sin(angle), 0, 6 * std::cos(angle)},
                                               glm::angleAxis(angle, glm::dvec3(0, 1, 0)),
@@ -85,8 +85,11 @@ Image<float> allAsked(const Frame& frame) {
     return covered;
 }
 
-TEST(Outlines, RunWhereTheOutermostPointsAre) {
-    const Bundle bundle = ballFromAround();
+class OutlinesOf : public testing::TestWithParam<int> {};
+
+/// Of more than sixteen views some are asked.
+TEST_P(OutlinesOf, RunWhereTheOutermostPointsAre) {
+    const Bundle bundle = ballFromAround(GetParam());
     const Camera camera = novelCamera(64);
     const Frame frame = fatBall(camera);
     Image<float> covered = allAsked(frame);
@@ -120,6 +123,28 @@ TEST(Outlines, RunWhereTheOutermostPointsAre) {
     EXPECT_LT(std::abs(sum / count), 0.03);
 }
 
+INSTANTIATE_TEST_SUITE_P(Views, OutlinesOf, testing::Values(12, 40));
+
+TEST(Outlines, AskNoViewThatLooksElsewhere) {
+    Bundle bundle = ballFromAround();
+    const Camera camera = novelCamera(64);
+    const Frame frame = fatBall(camera);
+    Image<float> alone = allAsked(frame), among = alone;
+    Outlines(bundle).measure(frame, camera, alone);
+    // As many and more in the same places, before the others.
+    const std::vector<ReferenceView> views = bundle.views;
+    for (const ReferenceView& view : views) {
+        for (const double turn : {1.5, 3.0}) {
+            ReferenceView other = view;
+            other.camera.orientation *= glm::angleAxis(turn, glm::dvec3(0, 1, 0));
+            other.depth = Image<float>(128, 128, kNoDepth);
+            bundle.views.insert(bundle.views.begin(), other);
+        }
+    }
+    Outlines(bundle).measure(frame, camera, among);
+    EXPECT_EQ(among, alone);
+}
+
 TEST(Outlines, SayNothingWherePointsAreFew) {
     const Bundle bundle = ballFromAround();
     const Camera camera = novelCamera(512);
@@ -133,7 +158,7 @@ TEST(Outlines, SayNothingWherePointsAreFew) {
 }
 
 TEST(Outlines, TheSameOnAnyNumberOfThreads) {
-    const Bundle bundle = ballFromAround();
+    const Bundle bundle = ballFromAround(20);
     const Camera camera = novelCamera(200);
     const Frame frame = fatBall(camera);
     Image<float> first;
