@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "lib/base/parallel.hpp"
@@ -49,6 +50,16 @@ Image<std::uint8_t> alphaOf(const PageSet& set, std::size_t number) {
     return alpha;
 }
 
+/// What happens between kReach pixels before a row of bytes' element and kReach after it, for all
+/// but the first and last kReach. Without branches, so that compilers make vectors of it.
+template <class F>
+void overReach(std::span<const std::uint8_t> row, std::span<std::uint8_t> to, const F& joined) {
+    static_assert(kReach == 2);
+    for (std::size_t x = kReach; x + kReach < row.size(); ++x)
+        to[x] = joined(joined(joined(row[x - 2], row[x - 1]), joined(row[x], row[x + 1])),
+                       row[x + 2]);
+}
+
 /// 1 where one of the `count` pixels of a row lies within kReach of an empty one, in the row.
 /// `empty` holds kReach elements more on either side, which are 0. Without branches, so that
 /// compilers make vectors of it.
@@ -60,6 +71,36 @@ void markRow(const float* depth, int count, std::uint8_t* empty, std::uint8_t* n
 }
 
 }  // namespace
+
+/// Coverage within kReach of each pixel; mixed where that leaves the picture.
+Image<Silhouettes::Around> Silhouettes::aroundOf(const Image<std::uint8_t>& alpha) {
+    const int w = alpha.width(), h = alpha.height();
+    Image<Around> around(w, h, Around::mixed);
+    const auto lesser = [](std::uint8_t a, std::uint8_t b) { return a < b ? a : b; };
+    const auto greater = [](std::uint8_t a, std::uint8_t b) { return a > b ? a : b; };
+    Image<std::uint8_t> least(w, h), most(w, h);  // of each row
+    for (int y = 0; y < h; ++y) {
+        overReach(alpha.row(y), least.row(y), lesser);
+        overReach(alpha.row(y), most.row(y), greater);
+    }
+    for (int y = kReach; y + kReach < h; ++y) {
+        Around* to = around.row(y).data();
+        const std::uint8_t *low[2 * kReach + 1], *high[2 * kReach + 1];
+        for (int j = 0; j <= 2 * kReach; ++j) {
+            low[j] = least.row(y + j - kReach).data();
+            high[j] = most.row(y + j - kReach).data();
+        }
+        for (int x = kReach; x < w - kReach; ++x) {
+            std::uint8_t a = low[0][x], b = high[0][x];
+            for (int j = 1; j <= 2 * kReach; ++j) {
+                a = lesser(a, low[j][x]);
+                b = greater(b, high[j][x]);
+            }
+            to[x] = a == 255 ? Around::full : b == 0 ? Around::empty : Around::mixed;
+        }
+    }
+    return around;
+}
 
 /// Bilinear coverage at a pixel position; full outside the image, where nothing is known.
 float Silhouettes::alphaBilinear(const View& view, double x, double y) const {
@@ -98,21 +139,7 @@ Silhouettes::Silhouettes(PageSet set) : set_(std::move(set)) {
                         [](std::uint8_t a) { return a == 255; }))
             return;
         View view{number, camera, {}, {}};
-        view.around = Image<Around>(w, h, Around::mixed);
-        for (int y = kReach; y + kReach < h; ++y) {
-            for (int x = kReach; x + kReach < w; ++x) {
-                std::uint8_t least = 255, most = 0;
-                for (int j = -kReach; j <= kReach; ++j) {
-                    for (int i = -kReach; i <= kReach; ++i) {
-                        least = std::min(least, alpha.at(x + i, y + j));
-                        most = std::max(most, alpha.at(x + i, y + j));
-                    }
-                }
-                view.around.at(x, y) = least == 255 ? Around::full
-                                       : most == 0  ? Around::empty
-                                                    : Around::mixed;
-            }
-        }
+        view.around = aroundOf(alpha);
         if (set_.find(number, 0, 0, w - 1, h - 1)) view.alpha = std::move(alpha);
         all[number] = std::move(view);
     });

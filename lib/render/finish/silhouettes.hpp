@@ -40,6 +40,7 @@ class Silhouettes {
     /// Where the pixels of a picture are in each view.
     using Maps = std::vector<splat::PixelMap>;
 
+    [[nodiscard]] static Image<Around> aroundOf(const Image<std::uint8_t>& alpha);
     [[nodiscard]] float alphaBilinear(const View& view, double x, double y) const;
     [[nodiscard]] std::uint32_t freeSamples(const Maps& maps, int x, int y, double depth,
                                             std::uint32_t wanted, std::size_t& first) const;
