@@ -56,8 +56,8 @@ template <class F>
 void overReach(std::span<const std::uint8_t> row, std::span<std::uint8_t> to, const F& joined) {
     static_assert(kReach == 2);
     for (std::size_t x = kReach; x + kReach < row.size(); ++x)
-        to[x] = joined(joined(joined(row[x - 2], row[x - 1]), joined(row[x], row[x + 1])),
-                       row[x + 2]);
+        to[x] =
+            joined(joined(joined(row[x - 2], row[x - 1]), joined(row[x], row[x + 1])), row[x + 2]);
 }
 
 /// 1 where one of the `count` pixels of a row lies within kReach of an empty one, in the row.

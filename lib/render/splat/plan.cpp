@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "lib/render/splat/others.hpp"
+
 namespace stx::splat {
 namespace {
 
@@ -21,8 +23,6 @@ constexpr double kLeastCore2 = 0.5;
 constexpr double kCrossing = 1e-6;
 // A plane seen this nearly edge-on (area over squared length of a cell) gives no slope.
 constexpr double kEdgeOn = 1e-3;
-// Weight of a view that looks from the other side; others weigh the fourth power of the cosine.
-constexpr double kLeastQuality = 0.01;
 // Splats of a block reach this many pixels beyond its points: those of 2x2 pixels, and large ones,
 // in parts of the radius that closes the lattice. A large splat ends at sqrt(kReach2) *
 // kSigmaSource = 1.12 sample spacings, 1.6 such radii; the rest is room for the filter and for
@@ -192,9 +192,9 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     const auto directionFrom = [&](const Camera& camera) {
         return camera.orthographic ? camera.forward() : glm::normalize(point - camera.position);
     };
-    const double cosAngle = glm::dot(directionFrom(c), directionFrom(novel));
-    const double angle = std::max(0.0, cosAngle);
-    task.quality = static_cast<float>(kLeastQuality + angle * angle * angle * angle);
+    task.quality = static_cast<float>(qualityOf(glm::dot(directionFrom(c), directionFrom(novel))));
+    task.quarters = cullBackFaces ? neededQuarters(rectangle, block, novel, task.quality) : 15;
+    if (task.quarters == 0) return false;
 
     // The plane of a splat comes nearer than its point: by its slope over a pixel either way if
     // small, else down to half (see the kernels). A little less for rounding.

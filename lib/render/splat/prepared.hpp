@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -31,6 +32,34 @@ struct BlockInfo {
     float size = 1;      ///< largest size of its splats, relative to what closes the lattice
     bool linked = true;  ///< all its points are linked
     bool opaque = true;  ///< all its points have full alpha
+    /// Of each quarter (upper left, upper right, lower left, lower right), a bit for each view of
+    /// PreparedRectangle::others that shows all its points, too. Of findOthers().
+    std::array<std::uint16_t, 4> shownBy{};
+    std::uint8_t edges =
+        0;  ///< a bit for each quarter with points that are not linked; of findOthers()
+    glm::vec3 middle{0.0f};  ///< in the world; of findOthers()
+};
+
+/// Views that may show what a rectangle shows: their directions from a point of the world are
+/// `at` * point - (x, y, z), of no certain length.
+struct Others {
+    static constexpr std::size_t kMost = 16;
+    /// Those that are not there are at (1, 0, 0), in all directions.
+    std::array<float, kMost> x = filled(1.0f), y{}, z{}, at{};
+
+    void set(std::size_t number, glm::vec4 view) {
+        x[number] = view.x;
+        y[number] = view.y;
+        z[number] = view.z;
+        at[number] = view.w;
+    }
+
+  private:
+    static std::array<float, kMost> filled(float value) {
+        std::array<float, kMost> out{};
+        out.fill(value);
+        return out;
+    }
 };
 
 /// What is known of each texel of a page before any camera is. Arrays of one value per texel.
@@ -45,6 +74,7 @@ struct PreparedPage {
 struct PreparedRectangle {
     const PageRectangle* rectangle = nullptr;
     std::vector<BlockInfo> blocks;  ///< those that hold points
+    Others others;                  ///< of findOthers()
 
     [[nodiscard]] const Camera& camera() const { return rectangle->window; }
 };

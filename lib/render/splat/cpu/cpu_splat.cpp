@@ -13,6 +13,7 @@
 #include "lib/render/finish/pinholes.hpp"
 #include "lib/render/finish/silhouettes.hpp"
 #include "lib/render/splat/cpu/kernels.hpp"
+#include "lib/render/splat/others.hpp"
 #include "lib/render/splat/paper_rule.hpp"
 #include "lib/render/splat/plan.hpp"
 #include "lib/render/splat/prepared.hpp"
@@ -43,6 +44,7 @@ class CpuSplatRenderer final : public Renderer {
           wantNormals_(settings.wantNormals()),
           prepared_(preparePages(set_, wantNormals_)),
           silhouettes_(set_) {
+        if (settings.splat == SplatRule::data) findOthers(set_, prepared_);
         for (const auto& r : prepared_.rectangles) {
             for (const auto& b : r.blocks) opaque_ = opaque_ && b.opaque;
             blockCount_ += r.blocks.size();

@@ -115,10 +115,11 @@ void depthBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahead
     RowMap map(s.map, t.u0, t.v0);
     for (int v = t.v0; v < t.v1; ++v, map.next()) {
         fetchRow(ahead, v - t.v0, false);
+        if (!halvesOf(t, v - t.v0)) continue;
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Splats p = splatsOf<kUniform, false>(d, s, t, map, i, pixel, count, region);
+            Splats p = splatsOf<kUniform, false>(d, s, t, map, v - t.v0, i, pixel, count, region);
             if (!t.opaque) {
                 const auto solid = alphaAbove(d, s, pixel, count, 127);
                 p.small = hn::And(p.small, solid);
@@ -197,10 +198,11 @@ void colourBlock(const RectangleImages& s, const BlockTask& t, const Ahead& ahea
     RowMap map(s.map, t.u0, t.v0);
     for (int v = t.v0; v < t.v1; ++v, map.next()) {
         fetchRow(ahead, v - t.v0, true);
+        if (!halvesOf(t, v - t.v0)) continue;
         for (int i = 0; i < t.u1 - t.u0; i += lanes) {
             const std::size_t pixel = static_cast<std::size_t>(v) * s.stride + t.u0 + i;
             const int count = t.u1 - t.u0 - i;
-            Splats p = splatsOf<kUniform, true>(d, s, t, map, i, pixel, count, region);
+            Splats p = splatsOf<kUniform, true>(d, s, t, map, v - t.v0, i, pixel, count, region);
             if (!kOpaque) {
                 const auto any = alphaAbove(d, s, pixel, count, 0);
                 p.small = hn::And(p.small, any);

@@ -37,9 +37,10 @@ struct RectangleImages {
 /// A block of source pixels in one frame.
 struct BlockTask {
     std::uint16_t u0 = 0, v0 = 0, u1 = 0, v1 = 0;
-    std::uint32_t source = 0;  ///< number of its rectangle
-    bool small = true;         ///< every splat closes its gaps within 2x2 pixels
-    bool uniform = true;       ///< small, and all share a tilt and go on in colour
+    std::uint32_t source = 0;    ///< number of its rectangle
+    std::uint8_t quarters = 15;  ///< to be drawn, as BlockInfo::shownBy counts them, a bit for each
+    bool small = true;           ///< every splat closes its gaps within 2x2 pixels
+    bool uniform = true;         ///< small, and all share a tilt and go on in colour
     bool opaque = true;
     float slopeX = 0,
           slopeY = 0;         ///< relative change of novel depth per output pixel; 0 if not smooth

@@ -68,14 +68,32 @@ HWY_INLINE bool reachesRegion(DF d, const Projection& at, float reach, const Reg
                                                         within(at.y, region.top, region.rows))));
 }
 
+// Which halves of a block's row are drawn: a bit for the left one and one for the right one.
+HWY_INLINE unsigned halvesOf(const BlockTask& t, int row) {
+    return (row < kBlock / 2 ? t.quarters : t.quarters >> 2) & 3u;
+}
+
+// The lanes of those halves, from pixel `i` of the row on.
+HWY_INLINE hn::Mask<DF> lanesOf(DF d, unsigned halves, int i) {
+    const VF index = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(i)));
+    constexpr float kHalf = kBlock / 2;
+    return hn::And(hn::Ge(index, hn::Set(d, halves & 1 ? 0.0f : kHalf)),
+                   hn::Lt(index, hn::Set(d, halves & 2 ? 2 * kHalf : kHalf)));
+}
+
 // kUniform: all points of the block are small and share its tilt. kColour: weights and the steps of
 // colours are wanted.
 template <bool kUniform, bool kColour>
 HWY_INLINE Splats splatsOf(DF d, const RectangleImages& s, const BlockTask& t, const RowMap& map,
-                           int i, std::size_t pixel, int count, const Region& region) {
+                           int row, int i, std::size_t pixel, int count, const Region& region) {
     Splats out;
     const VF depth = loadDepth(d, s.depth + pixel, count);
     out.at = project(d, map, i, depth, region);
+    if (const unsigned halves = halvesOf(t, row); halves != 3) {
+        const auto needed = lanesOf(d, halves, i);
+        out.at.inside = hn::And(out.at.inside, needed);
+        out.at.inFront = hn::And(out.at.inFront, needed);
+    }
     const VF one = hn::Set(d, 1.0f);
     if (kUniform) {
         out.small = out.at.inside;

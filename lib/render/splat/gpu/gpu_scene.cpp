@@ -1,5 +1,7 @@
 #include "lib/render/splat/gpu/gpu_scene.hpp"
 
+#include "lib/render/splat/others.hpp"
+
 namespace stx::gpu {
 namespace {
 
@@ -60,7 +62,7 @@ GlTexture makeTexture(GLenum format, GLenum pixels, GLenum type, const Layout& l
 }  // namespace
 
 Result<GpuScene> GpuScene::upload(const PageSet& set, const EglContext& context, bool withNormals,
-                                  Job& job) {
+                                  bool leaveOut, Job& job) {
     STX_TRY(const Layout layout, layOut(set, context));
     GpuScene scene;
     scene.linear = set.linear();
@@ -84,6 +86,7 @@ Result<GpuScene> GpuScene::upload(const PageSet& set, const EglContext& context,
     STX_CHECK(context.check("making the textures of the reference views"));
 
     splat::PreparedPages prepared = splat::preparePages(set, withNormals);
+    if (leaveOut) splat::findOthers(set, prepared);
     const int perLayer = layout.grid.x * layout.grid.y;
     const int count = static_cast<int>(set.pages().size());
     std::vector<glm::ivec3> cells;

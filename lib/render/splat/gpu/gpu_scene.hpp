@@ -29,10 +29,11 @@ struct GpuScene {
     std::int64_t points = 0;
     std::int64_t textureBytes = 0;
 
-    /// Uploads the pages, which must outlive this; the context must be current. Errors: a page
-    /// larger than the device's textures, memory.
+    /// Uploads the pages, which must outlive this; the context must be current. `leaveOut`: finds
+    /// out which parts of blocks other views show, too (splat::findOthers()). Errors: a page larger
+    /// than the device's textures, memory.
     [[nodiscard]] static Result<GpuScene> upload(const PageSet& set, const EglContext& context,
-                                                 bool withNormals, Job& job);
+                                                 bool withNormals, bool leaveOut, Job& job);
 };
 
 }  // namespace stx::gpu

@@ -83,7 +83,8 @@ Result<void> GpuSplatRenderer::prepare(Job& job) {
         pipeline = choosePipeline(context_->device(), context_->abilities()).pipeline;
     STX_TRY(auto current, context_->makeCurrent());
     resources_ = std::make_unique<Resources>();
-    STX_TRY(resources_->scene, GpuScene::upload(set_, *context_, settings_.wantNormals(), job));
+    STX_TRY(resources_->scene, GpuScene::upload(set_, *context_, settings_.wantNormals(),
+                                                settings_.splat == SplatRule::data, job));
     const auto make = pipeline == GpuPipeline::compute ? makeComputeSplats : makeRasterSplats;
     STX_TRY(resources_->pipeline, make(*context_, resources_->scene, settings_, job));
     return {};

@@ -2,6 +2,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/splat/gpu/splat_shaders.hpp"
+#include "lib/render/splat/others.hpp"
 #include "lib/render/splat/paper_rule.hpp"
 #include "lib/render/splat/plan.hpp"
 
@@ -91,27 +92,29 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
             if (!p.seen) continue;
             const splat::BlockTask& t = p.task;
             densest = std::max(densest, p.density);
-            const TaskEntry entry{
-                static_cast<std::uint32_t>(t.u0) | static_cast<std::uint32_t>(t.v0) << 16,
-                static_cast<std::uint32_t>(t.u1 - t.u0) | static_cast<std::uint32_t>(t.v1 - t.v0)
-                                                              << 16,
-                static_cast<std::uint32_t>(place.x + t.u0) |
-                    static_cast<std::uint32_t>(place.y + t.v0) << 16,
-                static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(place.z) << 20,
-                t.slopeX,
-                t.slopeY,
-                t.core2,
-                t.tolerance,
-                t.quality * (t.uniform ? t.density : 1.0f),
-                t.uAcross,
-                t.vAcross,
-                t.uDown,
-                t.vDown,
-                tileOf(t.x0, t.y0),
-                tileOf(t.x1, t.y1),
-                t.nearest};
-            const bool own = settings.splat == SplatRule::data && !t.uniform;
-            (!own ? frame.tasks : t.small ? small : large).push_back(entry);
+            const auto add = [&](int u0, int v0, int u1, int v1) {
+                const TaskEntry entry{
+                    static_cast<std::uint32_t>(u0) | static_cast<std::uint32_t>(v0) << 16,
+                    static_cast<std::uint32_t>(u1 - u0) | static_cast<std::uint32_t>(v1 - v0) << 16,
+                    static_cast<std::uint32_t>(place.x + u0) |
+                        static_cast<std::uint32_t>(place.y + v0) << 16,
+                    static_cast<std::uint32_t>(k) | static_cast<std::uint32_t>(place.z) << 20,
+                    t.slopeX,
+                    t.slopeY,
+                    t.core2,
+                    t.tolerance,
+                    t.quality * (t.uniform ? t.density : 1.0f),
+                    t.uAcross,
+                    t.vAcross,
+                    t.uDown,
+                    t.vDown,
+                    tileOf(t.x0, t.y0),
+                    tileOf(t.x1, t.y1),
+                    t.nearest};
+                const bool own = settings.splat == SplatRule::data && !t.uniform;
+                (!own ? frame.tasks : t.small ? small : large).push_back(entry);
+            };
+            splat::forNeeded(t, add);
         }
         crowd += std::max(1.0, densest);
     }
