@@ -210,7 +210,7 @@ void findOthers(const PageSet& set, PreparedPages& prepared) {
 }
 
 std::uint8_t neededQuarters(const PreparedRectangle& rectangle, const BlockInfo& block,
-                            const Camera& novel, float quality) {
+                            const Camera& novel, float quality, bool faces) {
     constexpr std::uint8_t kAll = 15;
     const unsigned some = block.shownBy[0] | block.shownBy[1] | block.shownBy[2] | block.shownBy[3];
     if (!some) return kAll;
@@ -227,11 +227,14 @@ std::uint8_t neededQuarters(const PreparedRectangle& rectangle, const BlockInfo&
     }
     std::uint8_t needed = kAll;
     for (std::size_t q = 0; q < kQuarters; ++q) {
+        const bool edges = block.edges >> q & 1;
+        // Splats that stick out cover the pixels of an outline in part: without them it flickers.
+        if (edges && !faces) continue;
         float better = 0;
         for (std::size_t n = 0; n < Others::kMost; ++n)
             better += block.shownBy[q] >> n & 1 ? weights[n] : 0.0f;
-        const float share = block.edges >> q & 1 ? kNeedlessEdges : kNeedless;
-        if (quality < share * better) needed &= static_cast<std::uint8_t>(~(1u << q));
+        if (quality < (edges ? kNeedlessEdges : kNeedless) * better)
+            needed &= static_cast<std::uint8_t>(~(1u << q));
     }
     return needed;
 }

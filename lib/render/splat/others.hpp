@@ -16,11 +16,12 @@ void findOthers(const PageSet& set, PreparedPages& prepared);
 
 /// The quarters of a block that a frame needs, a bit for each: not those that other views show from
 /// so much nearer to where the novel camera looks from that the block's own points would hardly
-/// count. `quality` is the weight of its own view by that angle, BlockTask::quality. What is left
-/// out depends on no other block, and the views that count most are never left out: nothing opens.
+/// count. `quality` is the weight of its own view by that angle, BlockTask::quality; `faces`: all
+/// of it faces the novel camera. What is left out depends on no other block, and the views that
+/// count most are never left out: nothing opens.
 [[nodiscard]] std::uint8_t neededQuarters(const PreparedRectangle& rectangle,
                                           const BlockInfo& block, const Camera& novel,
-                                          float quality);
+                                          float quality, bool faces);
 
 /// Weight of a view by the cosine of the angle between it and the novel one, seen from a point.
 template <class T>
