@@ -63,13 +63,12 @@ Samples samplesOf(const PageRectangle& r, const Page& page, const std::vector<Sl
         for (int x = x0; x < x1; ++x)
             out.edges = out.edges || !(hasPoint(page.depth->data()[texelOf(x, y)]) &&
                                        slopes[texelOf(x, y)].u & Slope::kLinked);
-    const int step = out.edges ? 2 : 4;
-    for (int y = y0; y < y1; y += step) {
-        for (int x = x0; x < x1; x += step) {
+    for (int y = y0; y < y1; y += 2) {
+        for (int x = x0; x < x1; x += 2) {
             // The first of four that is drawn, another one first each time.
             for (int k = 0; k < 4; ++k) {
                 const int turn = k ^ ((x / 2 + y) & 3);
-                const int i = x + (turn & 1) + step / 2 - 1, j = y + (turn >> 1) + step / 2 - 1;
+                const int i = x + (turn & 1), j = y + (turn >> 1);
                 if (i >= x1 || j >= y1 || !isDrawn(texelOf(i, j))) continue;
                 const auto n = static_cast<std::size_t>(out.count++);
                 out.u[n] = static_cast<float>(i - b.u0);

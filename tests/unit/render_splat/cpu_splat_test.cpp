@@ -9,6 +9,8 @@
 #include "lib/base/parallel.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/splat/others.hpp"
+#include "lib/render/splat/plan.hpp"
 
 namespace stx {
 namespace {
@@ -186,6 +188,58 @@ TEST(CpuSplat, TheFrontHidesTheBack) {
             EXPECT_GT(blues, 0);
         else
             EXPECT_EQ(blues, 0);
+    }
+}
+
+// What share of the quarters of each view's blocks a picture needs.
+std::vector<double> neededOf(const Bundle& bundle, const Camera& novel) {
+    const PageSet set(bundle);
+    splat::PreparedPages prepared = splat::preparePages(set, false);
+    splat::findOthers(set, prepared);
+    std::vector<double> out;
+    for (const splat::PreparedRectangle& r : prepared.rectangles) {
+        splat::RectangleImages source;
+        source.fx = static_cast<float>(r.camera().fx);
+        source.fy = static_cast<float>(r.camera().fy);
+        source.map = splat::pixelMap(r.camera(), novel);
+        int needed = 0;
+        for (const splat::BlockInfo& block : r.blocks) {
+            splat::BlockTask task;
+            if (!splat::planBlock(r, block, source, novel, true, task)) continue;
+            splat::forNeeded(
+                task, [&](int u0, int v0, int u1, int v1) { needed += (u1 - u0) * (v1 - v0); });
+        }
+        out.push_back(needed / (256.0 * static_cast<double>(r.blocks.size())));
+    }
+    return out;
+}
+
+// Two views see a plane, 70 degrees apart.
+TEST(CpuSplat, LeavesOutWhatAnotherViewShowsBetter) {
+    const auto of = [](const Camera& camera) { return planeView(camera, 2.0, 0.0, kGrey); };
+    Bundle bundle;
+    bundle.views.push_back(of(cameraAt({0, 0, 0}, {0, 0, -2}, 128, 0.9)));
+    bundle.views.push_back(of(cameraAt({5.5, 0, 0}, {0, 0, -2}, 128, 0.3)));
+    const auto alone = [&](std::size_t k, const Camera& novel) {
+        Bundle one;
+        one.views.push_back(bundle.views[k]);
+        return neededOf(one, novel)[0];
+    };
+    const Camera nearFirst = cameraAt({0.1, 0, 0.05}, {0, 0, -2}, 200, 0.4);
+    const auto first = neededOf(bundle, nearFirst);
+    EXPECT_EQ(first[0], alone(0, nearFirst));
+    EXPECT_LT(first[1], 0.25 * alone(1, nearFirst));
+    // From between them both are needed.
+    const Camera between = cameraAt({1.4, 0, 0}, {0, 0, -2}, 200, 0.4);
+    const auto both = neededOf(bundle, between);
+    for (std::size_t k = 0; k < 2; ++k) EXPECT_EQ(both[k], alone(k, between)) << k;
+    // What the first does not show is drawn from the second.
+    for (const int size : {8, 20}) {
+        for (int y = 60; y < 60 + size; ++y)
+            for (int x = 60; x < 60 + size; ++x) bundle.views[0].depth.at(x, y) = kNoDepth;
+        EXPECT_GT(neededOf(bundle, nearFirst)[1], first[1]) << size;
+        const Frame frame = drawn(bundle, nearFirst, splatSettings());
+        for (const auto& c : frame.colour.pixels()) ASSERT_FLOAT_EQ(c.a, 1.0f) << size;
     }
 }
 
