@@ -167,8 +167,8 @@ TEST(Textures, StaySharpWhereTheyAreAsFineAsThePixels) {
 INSTANTIATE_TEST_SUITE_P(
     Models, ModelGolden,
     testing::Values(
-        Model{"amphora", "", {41.55, 41.85, 37.0}},
-        Model{"spot", "data/meshes/obj/spot/spot_triangulated.obj", {52.55, 52.65, 45.6}},
+        Model{"amphora", "", {41.55, 41.85, 37.4}},
+        Model{"spot", "data/meshes/obj/spot/spot_triangulated.obj", {52.55, 52.65, 47.2}},
         Model{"Fox", "data/meshes/gltf/draco-repo/Fox/glTF/Fox.gltf", {50.15, 50.4, 42.95}},
         Model{"CesiumMilkTruck",
               "data/meshes/gltf/draco-repo/CesiumMilkTruck/glTF/CesiumMilkTruck.gltf",
@@ -213,7 +213,7 @@ TEST(Silhouettes, StayPutWhileTheCameraMoves) {
     const double bad = flicker(jagged, expected);
     RecordProperty("jagged", fmt::format("{:.3f}", bad));
     EXPECT_GT(bad, 0.2);
-    // Reached: 0.073, 0.066, 0.050.
+    // Reached: 0.073, 0.066, 0.0546.
     const std::array<double, 3> most{0.078, 0.071, 0.055};
     for (std::size_t w = 0; w < kWays.size(); ++w) {
         const auto renderer = makeRenderer(Backend::cpu, bundle, kWays[w].settings, -1, job);
