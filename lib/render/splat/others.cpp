@@ -21,6 +21,8 @@ constexpr double kSameSide = 0.97;  // cosine, 14 degrees
 constexpr double kOtherSide = -0.2;
 /// A view whose samples lie farther apart than this many times those of the block does not do.
 constexpr float kCoarsest = 1.5f;
+/// Nor one from which the surface is steeper (Slope, both ways together): its splats leave gaps.
+constexpr float kSteepestShown = 2.0f;
 /// Depths of one surface differ by no more than this share and this many sample spacings.
 constexpr float kSameDepth = 0.002f, kSameSpacings = 1.0f;
 /// What weighs less than this share of what shows it better is left out; and of quarters with
@@ -132,10 +134,12 @@ class Lookup {
         if (!hasPoint(found)) return false;
         const Slope slope = prepared_.pages[page].slopes[texel];
         if (!(slope.u & Slope::kLinked)) return false;
+        const auto steepness =
+            static_cast<float>(std::abs(int{slope.u}) + std::abs(int{slope.v})) / kSlopeScale;
+        if (steepness > kSteepestShown) return false;
         // Up to half a pixel beside.
-        const auto steepness = static_cast<float>(std::abs(int{slope.u}) + std::abs(int{slope.v})) *
-                               (0.5f / kSlopeScale);
-        return std::abs(depth - found) < kSameDepth * depth + (kSameSpacings + steepness) * spacing;
+        return std::abs(depth - found) <
+               kSameDepth * depth + (kSameSpacings + 0.5f * steepness) * spacing;
     }
 
     const PageSet& set_;

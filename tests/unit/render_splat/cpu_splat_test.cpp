@@ -233,6 +233,9 @@ TEST(CpuSplat, LeavesOutWhatAnotherViewShowsBetter) {
     const Camera between = cameraAt({1.4, 0, 0}, {0, 0, -2}, 200, 0.4);
     const auto both = neededOf(bundle, between);
     for (std::size_t k = 0; k < 2; ++k) EXPECT_EQ(both[k], alone(k, between)) << k;
+    // The second sees the plane so steeply that its splats alone could leave gaps.
+    const Camera nearSecond = cameraAt({5.4, 0, 0.05}, {0, 0, -2}, 200, 0.4);
+    EXPECT_EQ(neededOf(bundle, nearSecond)[0], alone(0, nearSecond));
     // What the first does not show is drawn from the second.
     for (const int size : {8, 20}) {
         for (int y = 60; y < 60 + size; ++y)
