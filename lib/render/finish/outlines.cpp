@@ -59,10 +59,8 @@ glm::vec2 outwardAt(const Image<float>& depth, int x, int y) {
     return length > kLeastDirection * all ? out / length : glm::vec2(0.0f);
 }
 
-namespace {
-
 /// The pixels that are asked for on one side of an object, one of eight.
-struct Side {
+struct Outlines::Side {
     glm::dvec3 at{0}, out{0};  ///< sums of their places and of the ways out, as the camera has them
     double count = 0;
 
@@ -76,8 +74,6 @@ struct Side {
         count += other.count;
     }
 };
-
-}  // namespace
 
 /// Rows of the picture that one thread owns, as OutlineRows tells. Its memory serves for all
 /// frames.
@@ -171,8 +167,9 @@ std::vector<std::uint8_t> Outlines::askedViews(const Camera& camera) const {
             looks[s].push_back(shows ? glm::dot(from, out) / glm::length(from) : kUnseen);
         }
     }
-    // The best of each side first; then evenly of the others: where none looks from in front, as on
-    // top of what stands on a turntable, many that graze it tell more than a few.
+    // The best of each side first, then some of the others, evenly spread. No view on a turntable
+    // looks from in front at the top of the object, and many views that see it flat tell more than
+    // few.
     std::vector<std::uint8_t> asked(views.size(), 0);
     std::size_t count = 0;
     for (const std::vector<double>& of : looks) {

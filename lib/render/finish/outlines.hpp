@@ -42,6 +42,7 @@ class Outlines {
                  const Extent& part = {});
 
   private:
+    struct Side;
     struct Band;
 
     [[nodiscard]] OutlineDepths depthsOf(const OutlineBlock& block) const;

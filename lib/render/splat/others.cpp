@@ -25,9 +25,8 @@ constexpr float kCoarsest = 1.5f;
 constexpr float kSteepestShown = 2.0f;
 /// Depths of one surface differ by no more than this share and this many sample spacings.
 constexpr float kSameDepth = 0.002f, kSameSpacings = 1.0f;
-/// What weighs less than this share of what shows it better is left out; and of quarters with
-/// edges, where splats stick out and colours are mixed.
-constexpr float kNeedless = 0.15f, kNeedlessEdges = 0.3f;
+/// What weighs less than this share of what shows it better is left out.
+constexpr float kNeedless = 0.15f;
 /// Only views that weigh so much more count as showing it better: the order of views that weigh
 /// about the same may differ from block to block, and none may go because of a view that goes too.
 constexpr float kClearly = 1.2f;
@@ -198,12 +197,14 @@ void findOthers(const PageSet& set, PreparedPages& prepared) {
                 std::array<Samples, kQuarters> samples;
                 for (std::size_t q = 0; q < kQuarters; ++q) {
                     samples[q] = samplesOf(r, page, slopes, b, static_cast<int>(q));
-                    if (samples[q].edges) b.edges |= static_cast<std::uint8_t>(1u << q);
                 }
                 for (std::size_t n = 0; n < views.size(); ++n) {
                     const BlockMap map(maps[n], b);
                     for (std::size_t q = 0; q < kQuarters; ++q)
-                        if (lookups[n].shows(map, samples[q], spacing, own.orthographic))
+                        // Splats that stick out cover the pixels of an outline in part: without
+                        // them it flickers.
+                        if (!samples[q].edges &&
+                            lookups[n].shows(map, samples[q], spacing, own.orthographic))
                             b.shownBy[q] |= static_cast<std::uint16_t>(1u << n);
                 }
             }
@@ -213,7 +214,7 @@ void findOthers(const PageSet& set, PreparedPages& prepared) {
 }
 
 std::uint8_t neededQuarters(const PreparedRectangle& rectangle, const BlockInfo& block,
-                            const Camera& novel, float quality, bool faces) {
+                            const Camera& novel, float quality) {
     constexpr std::uint8_t kAll = 15;
     const unsigned some = block.shownBy[0] | block.shownBy[1] | block.shownBy[2] | block.shownBy[3];
     if (!some) return kAll;
@@ -230,14 +231,10 @@ std::uint8_t neededQuarters(const PreparedRectangle& rectangle, const BlockInfo&
     }
     std::uint8_t needed = kAll;
     for (std::size_t q = 0; q < kQuarters; ++q) {
-        const bool edges = block.edges >> q & 1;
-        // Splats that stick out cover the pixels of an outline in part: without them it flickers.
-        if (edges && !faces) continue;
         float better = 0;
         for (std::size_t n = 0; n < Others::kMost; ++n)
             better += block.shownBy[q] >> n & 1 ? weights[n] : 0.0f;
-        if (quality < (edges ? kNeedlessEdges : kNeedless) * better)
-            needed &= static_cast<std::uint8_t>(~(1u << q));
+        if (quality < kNeedless * better) needed &= static_cast<std::uint8_t>(~(1u << q));
     }
     return needed;
 }

@@ -9,19 +9,18 @@
 
 namespace stx::splat {
 
-/// Finds for each quarter of each block which other views show all of it, inside of a surface
-/// (BlockInfo::shownBy, PreparedRectangle::others). Costs nothing where all views look from about
-/// the same place. `prepared` must hold the slopes of `set`.
+/// Finds for each quarter of each block without edges which other views show all of it, inside of a
+/// surface (BlockInfo::shownBy, PreparedRectangle::others). Costs nothing where all views look from
+/// about the same place. `prepared` must hold the slopes of `set`.
 void findOthers(const PageSet& set, PreparedPages& prepared);
 
 /// The quarters of a block that a frame needs, a bit for each: not those that other views show from
 /// so much nearer to where the novel camera looks from that the block's own points would hardly
-/// count. `quality` is the weight of its own view by that angle, BlockTask::quality; `faces`: all
-/// of it faces the novel camera. What is left out depends on no other block, and the views that
-/// count most are never left out: nothing opens.
+/// count. `quality` is the weight of its own view by that angle, BlockTask::quality. What is left
+/// out depends on no other block, and the views that count most are never left out: nothing opens.
 [[nodiscard]] std::uint8_t neededQuarters(const PreparedRectangle& rectangle,
                                           const BlockInfo& block, const Camera& novel,
-                                          float quality, bool faces);
+                                          float quality);
 
 /// Weight of a view by the cosine of the angle between it and the novel one, seen from a point.
 template <class T>

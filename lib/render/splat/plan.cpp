@@ -135,7 +135,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
     const float sv0 = block.slopeMin.v * unit, sv1 = block.slopeMax.v * unit;
     const bool smooth = su1 - su0 < kSmoothSlopes && sv1 - sv0 < kSmoothSlopes &&
                         block.zMax < kSmoothDepths * block.zMin;
-    double cover2 = 0, det = -1e300, leastDet = 1e300, stretch2 = 0;
+    double cover2 = 0, det = -1e300, stretch2 = 0;
     Cell middle = cellAt(s, uc, vc, 0.5 * (block.zMin + block.zMax), 0.5 * (su0 + su1),
                          0.5 * (sv0 + sv1), novel.orthographic);
     if (crossing) {
@@ -146,7 +146,6 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
         const auto consider = [&](const Cell& c) {
             cover2 = std::max(cover2, c.cover2());
             det = std::max(det, c.det());
-            leastDet = std::min(leastDet, c.det());
             stretch2 = std::max({stretch2, glm::dot(c.u, c.u), glm::dot(c.v, c.v)});
         };
         for (int corner = 0; corner < 4; ++corner) {
@@ -194,8 +193,7 @@ bool planBlock(const PreparedRectangle& rectangle, const BlockInfo& block, const
         return camera.orthographic ? camera.forward() : glm::normalize(point - camera.position);
     };
     task.quality = static_cast<float>(qualityOf(glm::dot(directionFrom(c), directionFrom(novel))));
-    task.quarters =
-        cullBackFaces ? neededQuarters(rectangle, block, novel, task.quality, leastDet > 0) : 15;
+    task.quarters = cullBackFaces ? neededQuarters(rectangle, block, novel, task.quality) : 15;
     if (task.quarters == 0) return false;
 
     // The plane of a splat comes nearer than its point: by its slope over a pixel either way if

@@ -35,8 +35,6 @@ struct BlockInfo {
     /// Of each quarter (upper left, upper right, lower left, lower right), a bit for each view of
     /// PreparedRectangle::others that shows all its points, too. Of findOthers().
     std::array<std::uint16_t, 4> shownBy{};
-    std::uint8_t edges =
-        0;  ///< a bit for each quarter with points that are not linked; of findOthers()
     glm::vec3 middle{0.0f};  ///< in the world; of findOthers()
 };
 

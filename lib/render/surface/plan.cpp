@@ -273,7 +273,7 @@ std::vector<int> SurfaceFrame::sourcesOf(int tile) const {
         if (inPicture(*f.source) && !(effort.preferShown && f.blocksOf(tile).empty()))
             chosen.push_back(i);
         else
-            idle.emplace_back(2.0 + rank, i);
+            idle.emplace_back(rank, i);
     }
     std::sort(idle.begin(), idle.end());
     for (std::size_t k = 0; chosen.size() < most; ++k) chosen.push_back(idle[k].second);

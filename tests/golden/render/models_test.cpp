@@ -213,8 +213,8 @@ TEST(Silhouettes, StayPutWhileTheCameraMoves) {
     const double bad = flicker(jagged, expected);
     RecordProperty("jagged", fmt::format("{:.3f}", bad));
     EXPECT_GT(bad, 0.2);
-    // Reached: 0.073, 0.066, 0.0546.
-    const std::array<double, 3> most{0.078, 0.071, 0.058};
+    // Reached: 0.073, 0.066, 0.051.
+    const std::array<double, 3> most{0.078, 0.071, 0.055};
     for (std::size_t w = 0; w < kWays.size(); ++w) {
         const auto renderer = makeRenderer(Backend::cpu, bundle, kWays[w].settings, -1, job);
         ASSERT_TRUE(renderer);

@@ -225,7 +225,9 @@ TEST(RoundOutlines, AreCutWhereASurfaceTurnsAway) {
     for (std::size_t k = 0; k < ball.colour.count(); ++k) {
         const glm::vec4 c = ball.colour.pixels()[k];
         EXPECT_EQ(c.x, c.w) << "premultiplied";
-        if (c.w == 0.0f) EXPECT_FALSE(hasPoint(ball.depth.pixels()[k]));
+        if (c.w == 0.0f) {
+            EXPECT_FALSE(hasPoint(ball.depth.pixels()[k]));
+        }
     }
 }
 

@@ -109,11 +109,10 @@ TEST_P(PageSets, AreDrawnLikeTheViews) {
         RenderMode mode;
         SplatRule splat;
         bool lit;
-        double least;  ///< dB; splats are planned, and left out, in blocks of a rectangle, not of
-                       ///< the view
+        double least;  ///< dB; splats are planned in blocks of a rectangle, not of the view
     };
     for (const Way way : {Way{RenderMode::splat, SplatRule::point, false, 80},
-                          Way{RenderMode::splat, SplatRule::data, false, 42},
+                          Way{RenderMode::splat, SplatRule::data, false, 44},
                           Way{RenderMode::splat, SplatRule::paper, false, 55},
                           Way{RenderMode::surface, SplatRule::data, false, 60},
                           Way{RenderMode::surface, SplatRule::data, true, 60}}) {
