@@ -82,6 +82,10 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     return votes >= enough;
 }
 
+// Whether sources that show the same are enough to need no votes: two far from their edges, or one and
+// two others that are no extensions.
+bool agreed(int sure, int mesh) { return sure > 1 || (sure > 0 && mesh > 2); }
+
 // The first surface at a sample that is not rejected: its q and who sees it.
 bool fuseSample(int i, int j, OUT(float) q, OUT(uint) seenBy) {
     // Nearest first; equal ones in the order of the sources.
@@ -106,13 +110,12 @@ bool fuseSample(int i, int j, OUT(float) q, OUT(uint) seenBy) {
     float y = float(tile.y) + (float(j) + 0.5f) * scale;
     for (int c = 0; c < count; ++c) {
         float front = uintBitsToFloat(values[c]), behind = front - sameWithin(front);
-        uint flags = values[c] & kSampleFlags;
-        // Two that agree far from their edges need no votes.
-        bool sure = false;
-        if (flags == 0u)
-            for (int o = c + 1; o < count && uintBitsToFloat(values[o]) > behind; ++o)
-                sure = sure || (values[o] & kSampleFlags) == 0u;
-        if (!sure && rejected(front, flags, owners[c], x, y, i, j)) continue;
+        int sure = 0, mesh = 0;  // sources that show it far from their edges, and not by an extension
+        for (int o = c; o < count && uintBitsToFloat(values[o]) > behind; ++o) {
+            sure += (values[o] & kSampleFlags) == 0u ? 1 : 0;
+            mesh += (values[o] & kExtensionBit) == 0u ? 1 : 0;
+        }
+        if (!agreed(sure, mesh) && rejected(front, values[c] & kSampleFlags, owners[c], x, y, i, j)) continue;
         float sum = 0.0f, weights = 0.0f;
         uint meshes = 0u, extensions = 0u;
         for (int o = c; o < count && uintBitsToFloat(values[o]) > behind; ++o) {

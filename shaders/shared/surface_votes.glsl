@@ -62,21 +62,10 @@ bool isBackground(int s, ivec2 corner, float alpha) {
     return !(alpha > 0.0f) || !(largestAlphaAround(s, corner) < kSolidAlpha);
 }
 
-// The vote of a source on the point at (x, y, q) of the frame.
-int voteOf(int s, float x, float y, float q) {
-    vec4 h = warp(s, x, y, q);
-    if (!(h.w > 0.0f)) return kNoVote;
-    float inverse = 1.0f / h.w;
-    vec2 at = vec2(h.x * inverse, h.y * inverse);
-    float p = h.z * inverse;
+// The vote of a source on the point `at` in its image, at depth p, where it does not see background.
+int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
     ivec2 size = sizeOf(s);
-    if (!(at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y) && p > 0.0f))
-        return kNoVote;
-    vec2 f = floor(at - 0.5f);
-    ivec2 corner = ivec2(f);
-    Place place = placeOf(s, corner);
-    if (hasAlpha(s) && isBackground(s, corner, alphaAmong(s, place, corner, at - 0.5f - f)))
-        return backgroundVoteOf(s);
+    float margin = clearlyBehindOf(s) * relativeScale(axisOf(s), p) + stepOf(s) * qPerUnit(axisOf(s), p);
     float least = 3.0e38f, most = 0.0f;
     bool gaps = false, doubtful = false;
     for (int j = 0; j < 2; ++j) {
@@ -93,8 +82,6 @@ int voteOf(int s, float x, float y, float q) {
             least = min(least, there);
             most = max(most, there);
             // The cheap half of the test first: most surfaces are not behind the point at all.
-            float margin = clearlyBehindOf(s) * relativeScale(axisOf(s), p) +
-                           stepOf(s) * qPerUnit(axisOf(s), p);
             float reach = 4.0f * kLinkedSamples * relativeScale(axisOf(s), there);
             if (p < there + margin - reach) return kNoVote;
             vec2 g = gradientAt(s, place, i, j);
@@ -107,4 +94,22 @@ int voteOf(int s, float x, float y, float q) {
     if (!(most > 0.0f)) return kNoVote;
     bool linked = !(most - least > kLinkedSamples * relativeScale(axisOf(s), most));
     return linked && !gaps && !doubtful ? kWholeVote : kHalfVote;
+}
+
+// The vote of a source on the point at (x, y, q) of the frame.
+int voteOf(int s, float x, float y, float q) {
+    vec4 h = warp(s, x, y, q);
+    if (!(h.w > 0.0f)) return kNoVote;
+    float inverse = 1.0f / h.w;
+    vec2 at = vec2(h.x * inverse, h.y * inverse);
+    float p = h.z * inverse;
+    ivec2 size = sizeOf(s);
+    if (!(at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y) && p > 0.0f))
+        return kNoVote;
+    vec2 f = floor(at - 0.5f);
+    ivec2 corner = ivec2(f);
+    Place place = placeOf(s, corner);
+    if (hasAlpha(s) && isBackground(s, corner, alphaAmong(s, place, corner, at - 0.5f - f)))
+        return backgroundVoteOf(s);
+    return voteOnDepth(s, place, corner, at, p);
 }

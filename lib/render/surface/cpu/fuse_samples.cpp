@@ -156,11 +156,18 @@ struct SampleFuser {
         return hn::Or(out, hn::AndNot(few, asked));
     }
 
+    /// agreed() of the shared code.
+    static HWY_INLINE PointMask agreed(Points sure, Points mesh) {
+        const PointTag d;
+        const Points one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f);
+        return hn::Or(hn::Gt(sure, one), hn::And(hn::Ge(sure, one), hn::Gt(mesh, two)));
+    }
+
     HWY_INLINE void fuse(ShownSamples& out) const {
         const PointTag d;
         const CountTag di;
         const hn::RebindToUnsigned<PointTag> du;
-        const Points zero = hn::Zero(d);
+        const Points zero = hn::Zero(d), one = hn::Set(d, 1.0f);
         Points shown = zero;
         auto seenBy = hn::Zero(du);
         PointMask open = hn::Eq(zero, zero);
@@ -182,18 +189,17 @@ struct SampleFuser {
             open = hn::And(open, hn::Gt(front, zero));
             if (hn::AllFalse(d, open)) break;
             const Points behind = hn::Sub(front, sameWithin(front));
-            // Two that agree far from their edges need no votes.
-            Points sure = zero, sum = zero, weights = zero;
+            Points sure = zero, meshCount = zero, sum = zero, weights = zero;
             auto meshes = hn::Zero(du), extensions = hn::Zero(du);
             for (int i = 0; i < pixel.count; ++i) {
                 const Points q = leftOf(i);
                 const PointMask joins = hn::And(hn::Gt(q, behind), hn::Gt(q, zero));
                 const PointMask extension = hn::And(joins, flagged(q, kExtensionBit));
                 const PointMask mesh = hn::AndNot(extension, joins);
-                const Points weight =
-                    hn::IfThenElse(extension, hn::Set(d, kExtensionWeight), hn::Set(d, 1.0f));
-                sure = hn::Add(sure, hn::IfThenElseZero(hn::AndNot(flagged(q, kSampleFlags), joins),
-                                                        hn::Set(d, 1.0f)));
+                meshCount = hn::Add(meshCount, hn::IfThenElseZero(mesh, one));
+                const Points weight = hn::IfThenElse(extension, hn::Set(d, kExtensionWeight), one);
+                sure = hn::Add(
+                    sure, hn::IfThenElseZero(hn::AndNot(flagged(q, kSampleFlags), joins), one));
                 const Points counts = hn::IfThenElseZero(joins, weight);
                 sum = hn::MulAdd(counts, hn::Sub(q, front), sum);
                 weights = hn::Add(weights, counts);
@@ -202,9 +208,7 @@ struct SampleFuser {
                 extensions =
                     hn::Or(extensions, hn::IfThenElseZero(hn::RebindMask(du, extension), bit));
             }
-            const PointMask clean = hn::AndNot(flagged(front, kSampleFlags), open);
-            const PointMask isSure = hn::And(clean, hn::Ge(sure, hn::Set(d, 2.0f)));
-            const PointMask asked = hn::AndNot(isSure, open);
+            const PointMask asked = hn::AndNot(agreed(sure, meshCount), open);
             PointMask against = asked;
             if (!hn::AllFalse(d, asked)) against = rejected(front, owner, asked);
             const PointMask taken = hn::AndNot(against, open);

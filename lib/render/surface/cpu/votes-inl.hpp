@@ -336,83 +336,96 @@ HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p
     return hn::Or(hidden, hn::And(left, hn::Lt(p.q, least)));
 }
 
+/// `cast`, but for the points of `wanted` voteOne(lane, x, y, q).
+template <class VoteOne>
+HWY_INLINE Counts withVotes(Counts cast, Points x, Points y, Points q, PointMask wanted,
+                            const VoteOne& voteOne) {
+    const PointTag d;
+    const CountTag di;
+    alignas(64) float xs[kMostPoints], ys[kMostPoints], qs[kMostPoints];
+    alignas(64) std::int32_t vote[kMostPoints];
+    hn::Store(x, d, xs);
+    hn::Store(y, d, ys);
+    hn::Store(q, d, qs);
+    hn::Store(cast, di, vote);
+    for (std::uint32_t left = lanesOf(wanted); left; left &= left - 1) {
+        const int l = std::countr_zero(left);
+        vote[l] = voteOne(l, xs[l], ys[l], qs[l]);
+    }
+    return hn::Load(di, vote);
+}
+
 /// voteOf() of source `s` on the points of `wanted`, 0 on others.
 HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
                           const FramePoints& points, PointMask wanted) {
     const PointTag d;
     const CountTag di;
-    PointMask left = wanted;
     Counts cast = hn::Zero(di);
-    if (from.q) {
-        const Source& source = *from.source;
-        const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, false);
-        left = hn::And(left, p.inside);
-        if (hn::AllFalse(d, left)) return cast;
-        // With pixels all around; few others are asked for.
-        const Counts zero = hn::Zero(di), one = hn::Set(di, 1);
-        const PointMask amid = hn::RebindMask(
-            d, hn::And(hn::And(hn::Gt(p.column, zero), hn::Gt(p.row, zero)),
-                       hn::And(hn::Gt(hn::Set(di, source.width - 1), hn::Add(p.column, one)),
-                               hn::Gt(hn::Set(di, source.height - 1), hn::Add(p.row, one)))));
-        const PointMask asked = hn::And(left, amid);
-        const Window window(source, p, asked);
-        Counts info;
-        PointMask hidden;
-        const auto look = [&](const auto& qAt, const auto& infoAt) HWY_ATTR {
-            info = infoAt(0, 0, asked);
-            hidden = withoutVote(from, p, qAt, infoAt, info, votes.clearlyBehindOf(s), asked);
-        };
+    if (!from.q)
+        return withVotes(cast, points.x, points.y, points.q, wanted,
+                         [&](int, float x, float y, float q) { return votes.voteOf(s, x, y, q); });
+    const Source& source = *from.source;
+    const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, false);
+    PointMask left = hn::And(wanted, p.inside);
+    if (hn::AllFalse(d, left)) return cast;
+    // With pixels all around; few others are asked for.
+    const Counts zero = hn::Zero(di), one = hn::Set(di, 1);
+    const PointMask amid = hn::RebindMask(
+        d, hn::And(hn::And(hn::Gt(p.column, zero), hn::Gt(p.row, zero)),
+                   hn::And(hn::Gt(hn::Set(di, source.width - 1), hn::Add(p.column, one)),
+                           hn::Gt(hn::Set(di, source.height - 1), hn::Add(p.row, one)))));
+    const PointMask asked = hn::And(left, amid);
+    const Window window(source, p, asked);
+    Counts info;
+    PointMask hidden;
+    const auto look = [&](const auto& qAt, const auto& infoAt) HWY_ATTR {
+        info = infoAt(0, 0, asked);
+        hidden = withoutVote(from, p, qAt, infoAt, info, votes.clearlyBehindOf(s), asked);
+    };
 #if STX_VOTES_WINDOWS
-        if (window.holds) {
-            const Points depths = window.read(from.q, source.width);
-            const Counts infos = window.read(from.info, source.width);
-            look([&](int x, int y, PointMask) HWY_ATTR { return window.at(d, depths, x, y); },
-                 [&](int x, int y, PointMask) HWY_ATTR { return window.at(di, infos, x, y); });
-        }
+    if (window.holds) {
+        const Points depths = window.read(from.q, source.width);
+        const Counts infos = window.read(from.info, source.width);
+        look([&](int x, int y, PointMask) HWY_ATTR { return window.at(d, depths, x, y); },
+             [&](int x, int y, PointMask) HWY_ATTR { return window.at(di, infos, x, y); });
+    }
 #endif
-        if (!window.holds) {
-            const Counts texel = hn::Add(hn::Mul(p.row, hn::Set(di, source.width)), p.column);
-            const auto at = [&](int x, int y, PointMask lanes) HWY_ATTR {
-                return hn::IfThenElseZero(hn::RebindMask(di, lanes),
-                                          hn::Add(texel, hn::Set(di, y * source.width + x)));
-            };
-            look([&](int x, int y, PointMask lanes)
-                     HWY_ATTR { return hn::GatherIndex(d, from.q, at(x, y, lanes)); },
-                 [&](int x, int y, PointMask lanes) HWY_ATTR {
-                     return gatheredInfo(from.info, source.width * source.height, at(x, y, lanes));
-                 });
-        }
-        if (from.colour) {
-            // Background is not hidden: it is never far from an edge.
-            const PointMask nearEdge =
-                hn::RebindMask(d, hn::Lt(hn::ShiftRight<4>(info), hn::Set(di, kFarFromEdge - 1)));
-            const PointMask doubtful = hn::Or(hn::AndNot(amid, left), hn::And(asked, nearEdge));
-            if (!hn::AllFalse(d, doubtful)) {
-                const bool allAmid = hn::AllFalse(d, hn::AndNot(amid, doubtful));
-                const Points alpha = alphaOf(from.colour, source, p, doubtful,
-                                             allAmid ? window : Window(source, p, doubtful));
-                const PointMask background =
-                    areBackground(votes, s, from.colour, p, alpha, doubtful);
-                cast = hn::IfThenElseZero(hn::RebindMask(di, background),
-                                          hn::Set(di, votes.backgroundVoteOf(s)));
-                left = hn::AndNot(background, left);
-            }
-        }
-        left = hn::AndNot(hidden, left);
+    if (!window.holds) {
+        const Counts texel = hn::Add(hn::Mul(p.row, hn::Set(di, source.width)), p.column);
+        const auto at = [&](int x, int y, PointMask lanes) HWY_ATTR {
+            return hn::IfThenElseZero(hn::RebindMask(di, lanes),
+                                      hn::Add(texel, hn::Set(di, y * source.width + x)));
+        };
+        look([&](int x, int y, PointMask lanes)
+                 HWY_ATTR { return hn::GatherIndex(d, from.q, at(x, y, lanes)); },
+             [&](int x, int y, PointMask lanes) HWY_ATTR {
+                 return gatheredInfo(from.info, source.width * source.height, at(x, y, lanes));
+             });
     }
-    std::uint32_t one = lanesOf(left);
-    if (!one) return cast;
-    alignas(64) float x[kMostPoints], y[kMostPoints], q[kMostPoints];
-    alignas(64) std::int32_t vote[kMostPoints];
-    hn::Store(points.x, d, x);
-    hn::Store(points.y, d, y);
-    hn::Store(points.q, d, q);
-    hn::Store(cast, di, vote);
-    for (; one; one &= one - 1) {
-        const int l = std::countr_zero(one);
-        vote[l] = votes.voteOf(s, x[l], y[l], q[l]);
+    if (from.colour) {
+        // Background is not hidden: it is never far from an edge.
+        const PointMask nearEdge =
+            hn::RebindMask(d, hn::Lt(hn::ShiftRight<4>(info), hn::Set(di, kFarFromEdge - 1)));
+        const PointMask doubtful = hn::Or(hn::AndNot(amid, left), hn::And(asked, nearEdge));
+        if (!hn::AllFalse(d, doubtful)) {
+            const bool allAmid = hn::AllFalse(d, hn::AndNot(amid, doubtful));
+            const Points alpha = alphaOf(from.colour, source, p, doubtful,
+                                         allAmid ? window : Window(source, p, doubtful));
+            const PointMask background = areBackground(votes, s, from.colour, p, alpha, doubtful);
+            cast = hn::IfThenElseZero(hn::RebindMask(di, background),
+                                      hn::Set(di, votes.backgroundVoteOf(s)));
+            left = hn::AndNot(background, left);
+        }
     }
-    return hn::Load(di, vote);
+    left = hn::AndNot(hidden, left);
+    if (hn::AllFalse(d, left)) return cast;
+    alignas(64) std::int32_t column[kMostPoints], row[kMostPoints];
+    hn::Store(p.column, di, column);
+    hn::Store(p.row, di, row);
+    return withVotes(cast, p.u, p.v, p.q, left, [&](int l, float u, float v, float q) {
+        const glm::ivec2 corner(column[l], row[l]);
+        return votes.voteOnDepth(s, votes.placeOf(s, corner), corner, {u, v}, q);
+    });
 }
 
 }  // namespace stx::surface::HWY_NAMESPACE
