@@ -37,21 +37,21 @@ struct Effort {
 };
 [[nodiscard]] Effort effortOf(Quality quality, const SurfaceScene& scene);
 
-/// One source in one frame: its maps, and which of its blocks may show in which tile.
+/// One source in one frame: its maps and, of sources that tiles are built from, which blocks may
+/// show in which tile.
 struct FrameSource {
     const Source* source = nullptr;
     Warp sourceFromPixel;
     glm::dmat4 pixelFromSource{1.0};
     Ray fromEye{};
-    std::vector<std::uint32_t> tileBegin;  ///< tile t has blocks[tileBegin[t] .. tileBegin[t + 1])
+    /// Tile t has blocks[tileBegin[t] .. tileBegin[t + 1]); empty when no tile is built from it.
+    std::vector<std::uint32_t> tileBegin;
     std::vector<std::uint32_t> blocks;
     /// By block of the source: not 0 where all of it is seen from behind, which draws nothing.
     std::vector<std::uint8_t> turnedAway;
-    /// Of each of them: q in the frame of its middle, 0 = behind; negative where some of the block
-    /// is behind.
-    std::vector<double> middles;
 
     [[nodiscard]] std::span<const std::uint32_t> blocksOf(int tile) const {
+        if (tileBegin.empty()) return {};
         const auto t = static_cast<std::size_t>(tile);
         return {blocks.data() + tileBegin[t], tileBegin[t + 1] - tileBegin[t]};
     }
@@ -62,16 +62,17 @@ struct SurfaceFrame {
     PixelSpace space;
     std::vector<FrameSource> sources;
     int tilesX = 0, tilesY = 0;
-    /// By tile: q in the middle of the blocks of all sources that fall in it, 0 = none; empty where
-    /// tiles are built from all sources.
-    std::vector<double> middles;
+    /// By tile: the sources that it is built from, at most kMostTileSources, in order; none where
+    /// no source has anything.
+    std::vector<std::vector<int>> tileSources;
     Effort effort;
     bool wantOrigin = false;  ///< see DrawnFrame::origin
 
     [[nodiscard]] int tileX(int tile) const { return tile % tilesX * kTile; }
     [[nodiscard]] int tileY(int tile) const { return tile / tilesX * kTile; }
-    /// The sources that a tile is built from, at most kMostTileSources, in order.
-    [[nodiscard]] std::vector<int> sourcesOf(int tile) const;
+    [[nodiscard]] const std::vector<int>& sourcesOf(int tile) const {
+        return tileSources[static_cast<std::size_t>(tile)];
+    }
     /// Samples of a tile from pixels of the frame: what is `apron` pixels before the tile's corner
     /// to the origin, `perPixel` to the pixel, the first sample at ½.
     [[nodiscard]] glm::dmat4 sampleFromPixel(int tile, int perPixel, int apron = 0) const;

@@ -60,6 +60,8 @@ struct PixelSpace {
 
 /// Side of the blocks that sources are prepared in, pixels.
 inline constexpr int kBlock = kSourceBlock;
+/// Blocks along a side of the regions that plans look at first.
+inline constexpr int kRegion = 2;
 static_assert(kBlock == PageSet::kBlock);
 /// Edge distances are counted up to this.
 inline constexpr int kFarFromEdge = 4;
@@ -136,11 +138,19 @@ struct Source {
     int blocksX = 0, blocksY = 0;
     std::vector<SourceBlock> blocks;
     std::vector<Leaf> leaves;
-    /// The ranges of the blocks that hold something, side by side: plans read those of all views.
+    /// The ranges of the blocks that hold something, side by side, region by region.
     struct PlannedBlock : BlockRange {
         std::uint32_t number = 0;  ///< in `blocks`
     };
     std::vector<PlannedBlock> planned;
+    /// Regions of kRegion x kRegion blocks that hold something: plans look at those of all views,
+    /// and at the blocks of the views that are drawn.
+    struct PlannedRegion : BlockRange {
+        int x = 0, y = 0;                  ///< of its first pixel
+        std::uint32_t begin = 0, end = 0;  ///< its blocks in `planned`
+        glm::vec3 middle{0};               ///< mean of the middles of its blocks: pixels, q
+    };
+    std::vector<PlannedRegion> regions;
 
     const PageSet* set = nullptr;
     const PreparedPage* pages = nullptr;  ///< by number

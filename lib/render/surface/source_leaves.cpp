@@ -240,6 +240,40 @@ void findSlopes(const Source& s, const Draft& d, std::span<const Leaf> leaves, S
     block.mostSlope = most;
 }
 
+/// Fills Source::planned and Source::regions.
+void listPlanned(Source& s) {
+    s.planned.clear();
+    s.regions.clear();
+    for (int by = 0; by < s.blocksY; by += kRegion) {
+        for (int bx = 0; bx < s.blocksX; bx += kRegion) {
+            Source::PlannedRegion region;
+            region.x = bx * kBlock;
+            region.y = by * kBlock;
+            region.begin = static_cast<std::uint32_t>(s.planned.size());
+            const int endX = std::min(bx + kRegion, s.blocksX);
+            for (int y = by; y < std::min(by + kRegion, s.blocksY); ++y) {
+                for (int x = bx; x < endX; ++x) {
+                    const auto number = static_cast<std::uint32_t>(y * s.blocksX + x);
+                    const BlockRange& block = s.blocks[number];
+                    if (!(block.qMax > 0)) continue;
+                    const bool first = s.planned.size() == region.begin;
+                    region.qMin = first ? block.qMin : std::min(region.qMin, block.qMin);
+                    region.qMax = std::max(region.qMax, block.qMax);
+                    region.reach = std::max(region.reach, block.reach);
+                    region.middle += glm::vec3((static_cast<float>(x) + 0.5f) * kBlock,
+                                               (static_cast<float>(y) + 0.5f) * kBlock,
+                                               0.5f * (block.qMin + block.qMax));
+                    s.planned.push_back({block, number});
+                }
+            }
+            region.end = static_cast<std::uint32_t>(s.planned.size());
+            if (region.end == region.begin) continue;
+            region.middle /= static_cast<float>(region.end - region.begin);
+            s.regions.push_back(region);
+        }
+    }
+}
+
 }  // namespace
 
 void findLeaves(Source& s, const Draft& d) {
@@ -266,7 +300,6 @@ void findLeaves(Source& s, const Draft& d) {
                        block, x0, y0);
         }
     });
-    s.planned.clear();
     for (int by = 0; by < s.blocksY; ++by) {
         const auto base = static_cast<std::uint32_t>(s.leaves.size());
         const auto& leaves = rows[static_cast<std::size_t>(by)];
@@ -275,12 +308,9 @@ void findLeaves(Source& s, const Draft& d) {
             auto& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
             block.leafBegin += base;
             block.leafEnd += base;
-            if (block.qMax > 0)
-                s.planned.push_back(
-                    {block, static_cast<std::uint32_t>(by) * static_cast<std::uint32_t>(s.blocksX) +
-                                static_cast<std::uint32_t>(bx)});
         }
     }
+    listPlanned(s);
 }
 
 }  // namespace stx::surface

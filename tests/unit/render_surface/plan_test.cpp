@@ -1,9 +1,12 @@
 #include "lib/render/surface/plan.hpp"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/surface/cpu/raster.hpp"
+#include "lib/render/surface/placement.hpp"
 
 namespace stx::surface {
 namespace {
@@ -78,6 +81,73 @@ TEST(TurnedAwayBlocks, DrawNothing) {
             }
         }
         EXPECT_GT(away, blocks / 20) << (orthographic ? "orthographic" : "perspective");
+    }
+}
+
+/// Where any view has a block, the tile is built from some; views that no tile is built from are
+/// not placed, the others in full.
+TEST_P(PlannedBlocks, AreChosenFromFewViews) {
+    const Bundle bundle = analyticBundle(GetParam(), 6);
+    const SurfaceScene scene(bundle);
+    Effort effort;
+    effort.mostGeometry = 2;
+    std::size_t placed = 0;
+    for (const double angle : {0.4, 2.0}) {
+        const Camera camera = analyticCamera(GetParam(), angle, 6);
+        const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
+        const int tiles = frame.tilesX * frame.tilesY;
+        std::vector<char> used(frame.sources.size(), 0);
+        for (int tile = 0; tile < tiles; ++tile) {
+            EXPECT_LE(frame.sourcesOf(tile).size(), 2u);
+            for (const int k : frame.sourcesOf(tile)) used[static_cast<std::size_t>(k)] = 1;
+        }
+        for (std::size_t k = 0; k < used.size(); ++k) {
+            FrameSource whole = frame.sources[k];
+            placeBlocks(whole, frame.space, frame.tilesX, frame.tilesY);
+            for (int tile = 0; tile < tiles; ++tile) {
+                const auto own = frame.sources[k].blocksOf(tile), all = whole.blocksOf(tile);
+                const bool same = std::equal(own.begin(), own.end(), all.begin(), all.end());
+                ASSERT_TRUE(used[k] ? same : own.empty()) << "source " << k << ", tile " << tile;
+                ASSERT_TRUE(all.empty() || !frame.sourcesOf(tile).empty())
+                    << "source " << k << ", tile " << tile;
+            }
+        }
+        placed += static_cast<std::size_t>(std::count(used.begin(), used.end(), 1));
+    }
+    EXPECT_LT(placed, 2 * scene.sources.size());
+}
+
+/// A camera amid the object: blocks on both sides of its plane.
+TEST(PlannedTiles, AreChosenWhereBlocksAreBehindTheCamera) {
+    const Bundle bundle = analyticBundle(AnalyticScene::object, 8);
+    const SurfaceScene scene(bundle);
+    Effort effort;
+    effort.mostGeometry = 3;
+    Camera camera = analyticCamera(AnalyticScene::object, 0.4, 8);
+    camera.position = boundsOf(scene).centre() + 0.4 * boundsOf(scene).radius() * camera.forward();
+    const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
+    int filled = 0;
+    for (const FrameSource& f : frame.sources) {
+        FrameSource whole = f;
+        placeBlocks(whole, frame.space, frame.tilesX, frame.tilesY);
+        for (int tile = 0; tile < frame.tilesX * frame.tilesY; ++tile) {
+            if (whole.blocksOf(tile).empty()) continue;
+            ++filled;
+            EXPECT_FALSE(frame.sourcesOf(tile).empty()) << "tile " << tile;
+        }
+    }
+    EXPECT_GT(filled, 0);
+}
+
+/// Sums of shares that are all 1 are rounded.
+TEST(PlannedEffort, TakesNoMoreSourcesForRounding) {
+    for (const int views : {3, 6, 10, 49}) {
+        Bundle bundle;
+        for (int i = 0; i < views; ++i)
+            bundle.views.push_back(
+                viewOfAnalyticScene(AnalyticScene::room,
+                                    analyticCamera(AnalyticScene::room, i, views).resized(32, 24)));
+        EXPECT_EQ(effortOf(Quality::normal, SurfaceScene(bundle)).mostGeometry, 8) << views;
     }
 }
 

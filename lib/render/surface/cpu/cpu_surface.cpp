@@ -58,8 +58,10 @@ Squares squaresOf(const TilePixels& pixels) {
 }
 
 void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame out) {
-    if (std::all_of(frame.sources.begin(), frame.sources.end(),
-                    [&](const FrameSource& f) { return f.blocksOf(tile).empty(); }))
+    const std::vector<int>& chosen = frame.sourcesOf(tile);
+    if (std::all_of(chosen.begin(), chosen.end(), [&](int k) {
+            return frame.sources[static_cast<std::size_t>(k)].blocksOf(tile).empty();
+        }))
         return;
     const PixelSpace& space = frame.space;
     const int tileX = frame.tileX(tile), tileY = frame.tileY(tile);
@@ -73,7 +75,6 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
     static thread_local std::vector<std::int8_t> best;
     static thread_local std::vector<LocalSource> local;
     static thread_local std::vector<ShadeSource> shade;
-    const std::vector<int> chosen = frame.sourcesOf(tile);
     const std::size_t room = std::max(grid.count(), kMiddles.count());
     samples.resize(std::max(samples.size(), room * chosen.size()));
     local.clear();

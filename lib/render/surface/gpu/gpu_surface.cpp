@@ -156,18 +156,15 @@ Result<void> GpuSurfaceBackend::prepare(const SurfaceScene& scene, const surface
 std::vector<TilePlan> GpuSurfaceBackend::planTiles(const SurfaceFrame& work) const {
     std::vector<TilePlan> plans(static_cast<std::size_t>(work.tilesX) * work.tilesY);
     parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
-        const auto t = static_cast<std::size_t>(i);
-        TilePlan& plan = plans[t];
+        TilePlan& plan = plans[static_cast<std::size_t>(i)];
         plan.tile = static_cast<int>(i);
-        if (std::all_of(work.sources.begin(), work.sources.end(),
-                        [&](const FrameSource& f) { return f.tileBegin[t] == f.tileBegin[t + 1]; }))
-            return;
         plan.sources = work.sourcesOf(plan.tile);
         for (const int k : plan.sources) {
             const FrameSource& f = work.sources[static_cast<std::size_t>(k)];
-            plan.slots += f.tileBegin[t] < f.tileBegin[t + 1];
-            for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
-                const surface::SourceBlock& block = f.source->blocks[f.blocks[b]];
+            const auto blocks = f.blocksOf(plan.tile);
+            plan.slots += !blocks.empty();
+            for (const std::uint32_t b : blocks) {
+                const surface::SourceBlock& block = f.source->blocks[b];
                 plan.meshes += hasCells(block);
                 plan.edges += block.anyEdge;
             }
@@ -207,7 +204,6 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
     batch.edges.resize(last.firstEdge + last.edges);
     parallelFor(0, static_cast<std::int64_t>(plans.size()), [&](std::int64_t i) {
         const TilePlan& plan = plans[static_cast<std::size_t>(i)];
-        const auto t = static_cast<std::size_t>(plan.tile);
         const glm::dmat4 sampleFromPixel =
             work.sampleFromPixel(plan.tile, work.effort.samplesPerPixel);
         std::uint32_t local = plan.firstLocal, slot = plan.firstSlot;
@@ -216,16 +212,17 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
         for (const int k : plan.sources) {
             const FrameSource& f = work.sources[static_cast<std::size_t>(k)];
             step = std::max(step, f.source->step);
-            const bool any = f.tileBegin[t] < f.tileBegin[t + 1];
+            const auto blocks = f.blocksOf(plan.tile);
+            const bool any = !blocks.empty();
             batch.locals[local++] = {static_cast<std::uint32_t>(k), any ? slot : kNoSlot};
             if (!any) continue;
             const Rows warp(surface::warpFrom(sampleFromPixel * f.pixelFromSource));
             batch.slots[slot] = {warp.x, warp.y, warp.q, warp.w, glm::ivec4(k, 0, 0, 0)};
             const std::uint32_t firstLeaf =
                 resources_->scene.firstLeaf[static_cast<std::size_t>(k)];
-            for (auto b = f.tileBegin[t]; b < f.tileBegin[t + 1]; ++b) {
-                const surface::SourceBlock& block = f.source->blocks[f.blocks[b]];
-                const glm::uvec4 task(slot, f.blocks[b], firstLeaf + block.leafBegin, 0);
+            for (const std::uint32_t b : blocks) {
+                const surface::SourceBlock& block = f.source->blocks[b];
+                const glm::uvec4 task(slot, b, firstLeaf + block.leafBegin, 0);
                 if (hasCells(block)) batch.meshes[mesh++] = task;
                 if (block.anyEdge) batch.edges[edge++] = task;
             }
