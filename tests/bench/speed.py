@@ -315,13 +315,17 @@ class Measurement:
         # 65, 100 and 30 ms of 1.6 million points on the reference machine.
         yield from self.drawing("spot, 16 views", lambda: self.spot("spot.exr"), lambda: "orbit:60",
                                 {"normal": 0.25, "best": 0.16, "splat": 0.52}, 30)
-        job = "drawing spot, 64 views against 16, normal"
-        if not self.wanted(job) or self.missing(self.tests / "bench_spheres", job):
+        jobs = {views: f"drawing spot, {views} views against 16, normal" for views in (64, 256)}
+        jobs = {views: job for views, job in jobs.items() if self.wanted(job)}
+        if not jobs or self.missing(self.tests / "bench_spheres", *jobs.values()):
             return
-        few, many = (self.drawn(self.spot(name, *views), "orbit:60", ["normal"], 20)[0]
-                     for name, views in (("spot.exr", []), ("spot64.exr", ["--views", "sphere:64"])))
-        yield Row(job, "peer", many["milliseconds"] / few["milliseconds"], 1.1, many["milliseconds"] / 1000,
-                  many["processor"] / 1000, many["yardstick"], "16 views")
+        few = self.drawn(self.spot("spot.exr"), "orbit:60", ["normal"], 20)[0]
+        for views, job in jobs.items():
+            bundle = self.spot(f"spot{views}.exr", "--views", f"sphere:{views}")
+            many = self.drawn(bundle, "orbit:60", ["normal"], 20)[0]
+            bundle.unlink()
+            yield Row(job, "peer", many["milliseconds"] / few["milliseconds"], 1.1, many["milliseconds"] / 1000,
+                      many["processor"] / 1000, many["yardstick"], "16 views")
 
     def conversions(self):
         job = "convert spot → 16 views, mp4"
