@@ -136,11 +136,10 @@ struct Placer {
                        static_cast<int>(x1) / kTile, static_cast<int>(y1) / kTile},
                       behind};
     }
-    [[nodiscard]] int xOf(const Source::PlannedBlock& block) const {
-        return static_cast<int>(block.number) % source.blocksX * kBlock;
-    }
-    [[nodiscard]] int yOf(const Source::PlannedBlock& block) const {
-        return static_cast<int>(block.number) / source.blocksX * kBlock;
+    /// First pixel of a block of the source.
+    [[nodiscard]] glm::ivec2 firstOf(std::uint32_t block) const {
+        const int number = static_cast<int>(block);
+        return kBlock * glm::ivec2(number % source.blocksX, number / source.blocksX);
     }
 };
 
@@ -178,10 +177,11 @@ std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& s
         }
         // It may be large in the frame, and its middle tells little.
         for (std::uint32_t i = region.begin; i < region.end; ++i) {
-            const Source::PlannedBlock& block = f.source->planned[i];
-            const int x = placer.xOf(block), y = placer.yOf(block);
-            if (const auto own = placer.place(block, x, y, kBlock))
-                add(*own, middleOrFarthest(f.pixelFromSource, block, x, y), 1);
+            const std::uint32_t number = f.source->planned[i];
+            const BlockRange& block = f.source->blocks[number];
+            const glm::ivec2 first = placer.firstOf(number);
+            if (const auto own = placer.place(block, first.x, first.y, kBlock))
+                add(*own, middleOrFarthest(f.pixelFromSource, block, first.x, first.y), 1);
         }
     }
     return all;
@@ -204,12 +204,13 @@ void placeBlocks(FrameSource& f, const PixelSpace& space, int tilesX, int tilesY
         for (int y = r.y0; y <= r.y1; ++y)
             for (int x = r.x0; x <= r.x1; ++x) visit(static_cast<std::size_t>(y * tilesX + x));
     };
-    for (const Source::PlannedBlock& block : s.planned) {
-        const int x = placer.xOf(block), y = placer.yOf(block);
-        const auto at = placer.place(block, x, y, kBlock);
+    for (const std::uint32_t number : s.planned) {
+        const BlockRange& block = s.blocks[number];
+        const glm::ivec2 first = placer.firstOf(number);
+        const auto at = placer.place(block, first.x, first.y, kBlock);
         if (!at) continue;
-        ranges.push_back({block.number, at->tiles});
-        f.turnedAway[block.number] = isTurnedAway(s, block, x, y, eye);
+        ranges.push_back({number, at->tiles});
+        f.turnedAway[number] = isTurnedAway(s, block, first.x, first.y, eye);
         forTiles(at->tiles, [&](std::size_t t) { ++f.tileBegin[t + 1]; });
     }
     for (std::size_t t = 1; t < f.tileBegin.size(); ++t) f.tileBegin[t] += f.tileBegin[t - 1];

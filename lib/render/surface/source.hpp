@@ -138,11 +138,8 @@ struct Source {
     int blocksX = 0, blocksY = 0;
     std::vector<SourceBlock> blocks;
     std::vector<Leaf> leaves;
-    /// The ranges of the blocks that hold something, side by side, region by region.
-    struct PlannedBlock : BlockRange {
-        std::uint32_t number = 0;  ///< in `blocks`
-    };
-    std::vector<PlannedBlock> planned;
+    /// The blocks that hold something, by number, region by region.
+    std::vector<std::uint32_t> planned;
     /// Regions of kRegion x kRegion blocks that hold something: plans look at those of all views,
     /// and at the blocks of the views that are drawn.
     struct PlannedRegion : BlockRange {

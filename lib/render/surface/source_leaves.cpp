@@ -263,7 +263,7 @@ void listPlanned(Source& s) {
                     region.middle += glm::vec3((static_cast<float>(x) + 0.5f) * kBlock,
                                                (static_cast<float>(y) + 0.5f) * kBlock,
                                                0.5f * (block.qMin + block.qMax));
-                    s.planned.push_back({block, number});
+                    s.planned.push_back(number);
                 }
             }
             region.end = static_cast<std::uint32_t>(s.planned.size());
