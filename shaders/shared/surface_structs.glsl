@@ -10,7 +10,7 @@ struct SourceEntry {
     // Layer of a source that fills one, else -1; then, in the table of places: its blocks; its bits of
     // pixels outside of all rectangles, -1 = none are set; 1 = its views were pruned.
     ivec4 place;
-    vec4 doubt;  // how far to the side noise may put points, pixels; nothing in the others
+    vec4 doubt;  // how far to the side noise may put points, pixels; q at its camera; nothing in the others
 };
 struct FrameEntry {
     vec4 axis;              // 1 = q is 1/dist, 1/unit, largest q

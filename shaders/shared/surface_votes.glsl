@@ -3,6 +3,7 @@
 // float qPerUnit(Axis, q) (how much q changes over one scene unit); of source s:
 //   vec4 warp(s, x, y, q)      the point in the source, homogeneous
 //   ivec2 sizeOf(s), bool hasAlpha(s), float freeAlphaOf(s), Axis axisOf(s)
+//   float nearestOf(s)         q at its camera: what is beyond is behind it
 //   float clearlyBehindOf(s)   share of q by which a surface must be behind a point, with its noise
 //   float stepOf(s)            of its depth code, scene units
 //   float besideOf(s)          how far to the side its points and those of others may be off, pixels
@@ -104,7 +105,8 @@ int voteOf(int s, float x, float y, float q) {
     vec2 at = vec2(h.x * inverse, h.y * inverse);
     float p = h.z * inverse;
     ivec2 size = sizeOf(s);
-    if (!(at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y) && p > 0.0f))
+    if (!(at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y) && p > 0.0f &&
+          p < nearestOf(s)))
         return kNoVote;
     vec2 f = floor(at - 0.5f);
     ivec2 corner = ivec2(f);

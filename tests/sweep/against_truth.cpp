@@ -16,9 +16,6 @@ constexpr std::array kWayNames{"normal", "draft", "best", "splat"};
 /// Fewer pixels than this say nothing about a share of them.
 constexpr std::int64_t kFewest = 100;
 
-/// Errors that nobody sees are not compared: pictures of more dB than this count as this good.
-constexpr double kGood = 48;
-
 std::int64_t coveredCount(const Frame& frame, const Image<std::uint8_t>& seen, int least) {
     std::int64_t count = 0;
     for (std::size_t i = 0; i < seen.count(); ++i)
@@ -92,7 +89,7 @@ Outcome betterQualityIsWorse(Pictures& pictures) {
          {std::pair(kDraft, "draft"), {kNormal, "normal"}, {kBest, "best"}}) {
         STX_TRY(const Frame* frame, pictures.of(how));
         const double psnr = pictures.psnr(*frame);
-        out.found = std::max(out.found, std::min(before, kGood) - psnr);
+        out.found = std::max(out.found, worseBy(psnr, before));
         out.what += fmt::format("{}{} {:.2f} dB", out.what.empty() ? "" : ", ", name, psnr);
         before = std::max(before, psnr);
     }
@@ -104,7 +101,7 @@ Outcome surfaceBelowSplats(Pictures& pictures) {
     STX_TRY(const Frame* surface, pictures.of(kNormal));
     STX_TRY(const Frame* splats, pictures.of(kSplat));
     const double a = pictures.psnr(*surface), b = pictures.psnr(*splats);
-    return Measure{std::min(b, kGood) - a, fmt::format("surface {:.2f} dB, splat {:.2f} dB", a, b)};
+    return Measure{worseBy(a, b), fmt::format("surface {:.2f} dB, splat {:.2f} dB", a, b)};
 }
 
 }  // namespace measures

@@ -43,9 +43,8 @@ measures::Outcome drawnFrom(Pictures& pictures, Model model, const std::string& 
     STX_TRY(const auto renderer, rendererOf(std::move(model), settings, job, Backend::cpu));
     STX_TRY(const Frame changed, renderer->render(pictures.stage().novel));
     STX_TRY(const Frame* frame, pictures.of(how));
-    constexpr double kGood = 48;
     const double before = pictures.psnr(*frame), after = pictures.psnr(changed);
-    return Measure{std::min(before, kGood) - after,
+    return Measure{worseBy(after, before),
                    fmt::format("{}, {}: views {:.2f} dB, from the file {:.2f} dB", name,
                                how.mode == RenderMode::splat ? "splat" : "surface", before, after)};
 }

@@ -70,19 +70,12 @@ stx::Result<void> keep(const Stage& stage, const std::filesystem::path& folder) 
     truth.views = {stage.truth};
     truth.views[0].name = "truth";
     STX_CHECK(save(truth, folder / "truth.exr", {}, job));
-    Frame frame;
-    frame.colour = Image<glm::vec4>(stage.novel.width, stage.novel.height);
-    for (std::size_t i = 0; i < frame.colour.count(); ++i) {
-        const glm::vec4 straight = stage.truth.texture.at(i);
-        frame.colour.data()[i] = glm::vec4(glm::vec3(straight) * straight.a, straight.a);
-    }
-    frame.depth = stage.truth.depth;
-    STX_CHECK(save(frame, folder / "truth.png", {}, job));
-    const std::string at = folder.string();
     fmt::print(
-        "  stx render {0}/case.exr -o {0}/picture.png --cameras {0}/truth.exr\n"
-        "  stx compare {0}/picture.png {0}/truth.png\n",
-        at);
+        "  stx extract {0}/truth.exr -o {0}/truth\n"
+        "  stx render {0}/case.exr -o {0}/picture.png --cameras {0}/truth/transforms.json --fill "
+        "none\n"
+        "  stx compare {0}/picture.png {0}/truth/images/truth.png\n",
+        folder.string());
     return {};
 }
 

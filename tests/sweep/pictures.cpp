@@ -94,15 +94,17 @@ std::int64_t Pictures::seenCount(int least) const {
     return count;
 }
 
-double Pictures::psnr(const Frame& frame) const {
+double Pictures::psnr(const Frame& frame, glm::ivec2 first) const {
     const Rgba8Image& truth = *stage_.truth.texture.rgba8();
     double squared = 0;
-    for (std::size_t i = 0; i < truth.count(); ++i) {
-        const glm::vec4 t = glm::vec4(truth.data()[i]) / 255.0f;
-        const glm::vec3 d = glm::vec3(frame.colour.data()[i]) - glm::vec3(t) * t.a;
-        squared += glm::dot(d, d);
+    for (int y = 0; y < frame.colour.height(); ++y) {
+        for (int x = 0; x < frame.colour.width(); ++x) {
+            const glm::vec4 t = glm::vec4(truth.at(x + first.x, y + first.y)) / 255.0f;
+            const glm::vec3 d = glm::vec3(frame.colour.at(x, y)) - glm::vec3(t) * t.a;
+            squared += glm::dot(d, d);
+        }
     }
-    return decibels(squared, 3.0 * double(truth.count()));
+    return decibels(squared, 3.0 * double(frame.colour.count()));
 }
 
 double psnrBetween(const Frame& a, const Frame& b) {
@@ -113,4 +115,9 @@ double psnrBetween(const Frame& a, const Frame& b) {
         squared += glm::dot(glm::vec3(d), glm::vec3(d));
     }
     return decibels(squared, 3.0 * double(a.colour.count()));
+}
+
+double worseBy(double psnr, double than) {
+    constexpr double kGood = 48;
+    return std::min(than, kGood) - std::min(psnr, kGood);
 }

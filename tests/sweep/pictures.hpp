@@ -38,8 +38,9 @@ class Pictures {
     [[nodiscard]] const stx::Image<std::uint8_t>& empty() const { return empty_; }
     /// Pixels of seenBy() that count at least `least`.
     [[nodiscard]] std::int64_t seenCount(int least) const;
-    /// PSNR of a frame against the truth, over the whole frame, before black.
-    [[nodiscard]] double psnr(const stx::Frame& frame) const;
+    /// PSNR of a frame against the truth, before black. `frame` may be a part of the picture whose
+    /// pixel (0, 0) is at `first`.
+    [[nodiscard]] double psnr(const stx::Frame& frame, glm::ivec2 first = {0, 0}) const;
 
   private:
     const Stage& stage_;
@@ -47,6 +48,9 @@ class Pictures {
     std::map<Drawn, stx::Frame> drawn_;
 };
 
-/// PSNR over R, G and B of two frames before black, 8-bit steps rounded away; 99 when they are the
-/// same.
+/// PSNR over R, G and B of two frames before black; 99 when they are the same.
 [[nodiscard]] double psnrBetween(const stx::Frame& a, const stx::Frame& b);
+
+/// By how many dB a picture is worse than another, both against the truth. Nobody sees an error of
+/// less than one step of 8 bits (48 dB): what is better than that counts as that good.
+[[nodiscard]] double worseBy(double psnr, double than);

@@ -53,7 +53,7 @@ Outcome unknownDepth(Pictures& pictures) {
     STX_TRY(const Frame b, drawBundle(without, stage.novel, how));
     const double psnrWith = pictures.psnr(a), psnrWithout = pictures.psnr(b);
     return Measure{
-        std::min(psnrWithout, 48.0) - psnrWith,
+        worseBy(psnrWith, psnrWithout),
         fmt::format("{}: without the view {:.2f} dB, with it {:.2f} dB",
                     how.mode == RenderMode::splat ? "splat" : "surface", psnrWithout, psnrWith)};
 }

@@ -180,8 +180,7 @@ glm::dmat4 SurfaceFrame::sampleFromPixel(int tile, int perPixel, int apron) cons
 }
 
 float SurfaceFrame::qLimit() const {
-    return space.axis.inverse ? std::numeric_limits<float>::max()
-                              : static_cast<float>(space.axis.q(0.0));
+    return space.axis.nearest();
 }
 
 void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -26,6 +27,10 @@ struct DepthAxis {
         return inverse ? 1.0 / dist : (origin - dist) / unit;
     }
     [[nodiscard]] double dist(double q) const { return inverse ? 1.0 / q : origin - unit * q; }
+    /// q at the camera, which sees nothing beyond; an orthographic one has points behind it, too.
+    [[nodiscard]] float nearest() const {
+        return inverse ? std::numeric_limits<float>::max() : static_cast<float>(q(0.0));
+    }
     /// What a relative depth difference of 1 is in q: q itself, or 1 when orthographic.
     [[nodiscard]] float relativeScale(float q) const { return inverse ? q : 1.0f; }
     /// How much q changes over one scene unit of distance.

@@ -80,7 +80,8 @@ struct SourcePoints {
         const auto within = [&](Points at, Points end)
                                 HWY_ATTR { return hn::And(hn::Ge(at, zero), hn::Lt(at, end)); };
         inside = hn::And(hn::And(within(u, width), within(v, height)),
-                         hn::And(hn::Gt(w, zero), hn::Gt(q, zero)));
+                         hn::And(hn::And(hn::Gt(w, zero), hn::Gt(q, zero)),
+                                 hn::Lt(q, hn::Set(d, local.source->space.axis.nearest()))));
         const Points fromX = hn::Sub(u, half), fromY = hn::Sub(v, half);
         const Points left = hn::Floor(fromX), top = hn::Floor(fromY);
         alongX = hn::Sub(fromX, left);

@@ -251,7 +251,8 @@ void GpuSurfaceBackend::uploadSources(const SurfaceFrame& work) {
                            glm::ivec4(s.width, s.height, s.hasAlpha ? 1 : 0, s.blocksX),
                            glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, s.step,
                                      surface::kClearlyBehind + s.noise),
-                           resources_->scene.places[s.number], glm::vec4(s.beside, 0, 0, 0)});
+                           resources_->scene.places[s.number],
+                           glm::vec4(s.beside, s.space.axis.nearest(), 0, 0)});
     }
     resources_->sources.upload(entries);
 }
