@@ -71,7 +71,7 @@ uint tapsOnSurface(int s, Piece piece, SourceView view) {
     float px = (mq.x + mq.z * piece.qx - p * wx) * inverse;
     float py = (mq.y + mq.z * piece.qy - p * wy) * inverse;
     float pu = px * view.xu + py * view.yu, pv = px * view.xv + py * view.yv;
-    float all = relativeScale(axisOf(s), p);
+    float all = coarseOf(s) * relativeScale(axisOf(s), p);
     float allowed = kOnSurface * all + kOnSlope * min(abs(pu) + abs(pv), kSteepestTap * all);
     ivec2 base = firstTap(view);
     Taps place = tapPlaceOf(s, base);

@@ -5,6 +5,7 @@
 //   ivec2 sizeOf(s), bool hasAlpha(s), float freeAlphaOf(s), Axis axisOf(s)
 //   float nearestOf(s)         q at its camera: what is beyond is behind it
 //   float clearlyBehindOf(s)   share of q by which a surface must be behind a point, with its noise
+//   float coarseOf(s)          what its pixels are, in parts of kFinePixel
 //   float stepOf(s)            of its depth code, scene units
 //   float besideOf(s)          how far to the side its points and those of others may be off, pixels
 //   Place placeOf(s, corner)   where the 2x2 pixels from `corner` on are kept, and in that place
@@ -66,7 +67,7 @@ bool isBackground(int s, ivec2 corner, float alpha) {
 // The vote of a source on the point `at` in its image, at depth p, where it does not see background.
 int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
     ivec2 size = sizeOf(s);
-    float margin = clearlyBehindOf(s) * relativeScale(axisOf(s), p) + stepOf(s) * qPerUnit(axisOf(s), p);
+    float margin = clearlyBehindOf(s) * coarseOf(s) * relativeScale(axisOf(s), p) + stepOf(s) * qPerUnit(axisOf(s), p);
     float least = 3.0e38f, most = 0.0f;
     bool gaps = false, doubtful = false;
     for (int j = 0; j < 2; ++j) {
@@ -83,7 +84,7 @@ int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
             least = min(least, there);
             most = max(most, there);
             // The cheap half of the test first: most surfaces are not behind the point at all.
-            float reach = 4.0f * kLinkedSamples * relativeScale(axisOf(s), there);
+            float reach = 4.0f * kLinkedSamples * coarseOf(s) * relativeScale(axisOf(s), there);
             if (p < there + margin - reach) return kNoVote;
             vec2 g = gradientAt(s, place, i, j);
             float predicted = there + g.x * (at.x - 0.5f - float(c.x)) + g.y * (at.y - 0.5f - float(c.y));
@@ -93,7 +94,7 @@ int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
         }
     }
     if (!(most > 0.0f)) return kNoVote;
-    bool linked = !(most - least > kLinkedSamples * relativeScale(axisOf(s), most));
+    bool linked = !(most - least > kLinkedSamples * coarseOf(s) * relativeScale(axisOf(s), most));
     return linked && !gaps && !doubtful ? kWholeVote : kHalfVote;
 }
 

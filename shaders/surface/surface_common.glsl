@@ -109,6 +109,7 @@ bool hasAlpha(int s) { return sources[s].size.z != 0; }
 float freeAlphaOf(int s) { return FREE_ALPHA; }
 float stepOf(int s) { return sources[s].axis.z; }
 float besideOf(int s) { return sources[s].doubt.x; }
+float coarseOf(int s) { return sources[s].doubt.z; }
 float nearestOf(int s) { return sources[s].doubt.y; }
 float clearlyBehindOf(int s) { return sources[s].axis.w; }
 vec4 warp(int s, float x, float y, float q) {

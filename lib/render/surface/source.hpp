@@ -22,6 +22,7 @@ struct DepthAxis {
     bool inverse = true;
     double origin = 0.0;  ///< scene units, orthographic only
     double unit = 1.0;    ///< scene units, orthographic only
+    double coarse = 1.0;  ///< what a pixel is as a share of q, in parts of kFinePixel; at least 1
 
     [[nodiscard]] double q(double dist) const {
         return inverse ? 1.0 / dist : (origin - dist) / unit;
@@ -33,6 +34,10 @@ struct DepthAxis {
     }
     /// What a relative depth difference of 1 is in q: q itself, or 1 when orthographic.
     [[nodiscard]] float relativeScale(float q) const { return inverse ? q : 1.0f; }
+    /// What shares of q from pixel to pixel are shares of: they grow with the pixels.
+    [[nodiscard]] float stepScale(float q) const {
+        return static_cast<float>(coarse) * relativeScale(q);
+    }
     /// How much q changes over one scene unit of distance.
     [[nodiscard]] float qPerUnit(float q) const {
         return inverse ? q * q : static_cast<float>(1.0 / unit);

@@ -198,7 +198,7 @@ float reachOf(const Source& s, const Draft& d, const SourceBlock& block, int x0,
                 gradientFrom(&d.q.at(x, y), &d.info.at(x, y), 1, s.width, x > 0, y > 0);
             reach =
                 std::max(reach, std::min(kHalfBesideBackground * (std::abs(g.x) + std::abs(g.y)),
-                                         kExtensionReach * scale));
+                                         kExtensionReach * s.space.axis.stepScale(block.qMax)));
         }
     }
     return reach;
@@ -228,7 +228,7 @@ void findSlopes(const Source& s, const Draft& d, std::span<const Leaf> leaves, S
             const float q = d.q.at(x, y);
             const glm::vec2 g =
                 gradientFrom(&d.q.at(x, y), &d.info.at(x, y), 1, s.width, x > 0, y > 0);
-            const float limit = kExtensionReach * s.space.axis.relativeScale(q);
+            const float limit = kExtensionReach * s.space.axis.stepScale(q);
             for (const float half : {kHalfInside, kHalfBesideBackground}) {
                 const float sum = std::clamp(half * (g.x + g.y), -limit, limit);
                 const float difference = std::clamp(half * (g.x - g.y), -limit, limit);

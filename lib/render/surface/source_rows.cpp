@@ -88,7 +88,8 @@ struct Linker {
         const DF d;
         const VF zero = hn::Zero(d), change = hn::Sub(c, b), size = hn::Abs(change);
         const VF nearer = hn::Max(b, c);
-        const VF scale = axis.inverse ? nearer : hn::Set(d, 1.0f);
+        const VF coarse = hn::Set(d, static_cast<float>(axis.coarse));
+        const VF scale = axis.inverse ? hn::Mul(nearer, coarse) : coarse;
         const VF perUnit = axis.inverse ? hn::Mul(nearer, nearer) : hn::Set(d, axis.qPerUnit(1.0f));
         const MF small = hn::Lt(size, hn::Add(hn::Mul(hn::Set(d, kLinkAlways), scale),
                                               hn::Mul(hn::Set(d, kLinkSteps * step), perUnit)));

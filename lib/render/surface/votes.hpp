@@ -45,6 +45,9 @@ struct SourcePixels {
     [[nodiscard]] bool hasAlpha(int s) const { return at(s).hasAlpha; }
     [[nodiscard]] float freeAlphaOf(int s) const { return at(s).freeAlpha; }
     [[nodiscard]] Axis axisOf(int s) const { return at(s).space.axis; }
+    [[nodiscard]] float coarseOf(int s) const {
+        return static_cast<float>(at(s).space.axis.coarse);
+    }
     [[nodiscard]] float nearestOf(int s) const { return at(s).space.axis.nearest(); }
     [[nodiscard]] float clearlyBehindOf(int s) const { return kClearlyBehind + at(s).noise; }
     [[nodiscard]] float besideOf(int s) const { return at(s).beside; }

@@ -219,7 +219,7 @@ struct Inputs {
                            row(r + 8), glm::ivec4(s.width, s.height, s.hasAlpha, s.blocksX),
                            glm::vec4(1.0f, 1.0f, s.step, kClearlyBehind + s.noise),
                            places.empty() ? glm::ivec4(0) : places[i],
-                           glm::vec4(s.beside, s.space.axis.nearest(), 0, 0)});
+                           glm::vec4(s.beside, s.space.axis.nearest(), s.space.axis.coarse, 0)});
         }
         return out;
     }

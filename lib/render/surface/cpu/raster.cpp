@@ -297,7 +297,7 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
             halves[count] = half;
             gx[count] = g.x;
             gy[count] = g.y;
-            reaches[count] = kExtensionReach * s.space.axis.relativeScale(*at);
+            reaches[count] = kExtensionReach * s.space.axis.stepScale(*at);
             if (++count == n) flush();
         }
     }

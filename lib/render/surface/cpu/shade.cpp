@@ -160,7 +160,7 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const float py = (m[9] + m[10] * g.qy[lane] - p * wy) * inverse;
     const float pu = px * view.xu[lane] + py * view.yu[lane];
     const float pv = px * view.xv[lane] + py * view.yv[lane];
-    const float scale = source.space.axis.relativeScale(p);
+    const float scale = source.space.axis.stepScale(p);
     const float allowed =
         kOnSurface * scale + kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * scale);
     const TapPlace taps = view.tapsOf(source, lane, baseU, baseV);

@@ -298,13 +298,14 @@ HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p
     const CountTag di;
     const DepthAxis& axis = from.source->space.axis;
     const Points zero = hn::Zero(d);
-    const Points scale = axis.inverse ? p.q : hn::Set(d, 1.0f);
+    const Points coarse = hn::Set(d, static_cast<float>(axis.coarse));
+    const Points scale = axis.inverse ? hn::Mul(p.q, coarse) : coarse;
     const Points perUnit = axis.inverse ? hn::Mul(p.q, p.q) : hn::Set(d, axis.qPerUnit(1.0f));
     const Points margin = hn::MulAdd(hn::Set(d, clearlyBehind), scale,
                                      hn::Mul(hn::Set(d, from.source->step), perUnit));
     const Points there = qAt(0, 0, asked);
     // The cheap half of the test first: most surfaces are not behind the point at all.
-    const Points reach = hn::Set(d, 4.0f * kLinkedSamples);
+    const Points reach = hn::Mul(hn::Set(d, 4.0f * kLinkedSamples), coarse);
     const Points nearest =
         hn::Sub(hn::Add(there, margin), axis.inverse ? hn::Mul(reach, there) : reach);
     const PointMask has = hn::And(asked, hn::Gt(there, zero));

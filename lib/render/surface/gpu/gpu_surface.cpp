@@ -252,7 +252,7 @@ void GpuSurfaceBackend::uploadSources(const SurfaceFrame& work) {
                            glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, s.step,
                                      surface::kClearlyBehind + s.noise),
                            resources_->scene.places[s.number],
-                           glm::vec4(s.beside, s.space.axis.nearest(), 0, 0)});
+                           glm::vec4(s.beside, s.space.axis.nearest(), s.space.axis.coarse, 0)});
     }
     resources_->sources.upload(entries);
 }
