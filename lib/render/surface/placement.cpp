@@ -162,17 +162,23 @@ glm::dvec4 middleOrFarthest(const glm::dmat4& pixelFromSource, const BlockRange&
 
 }  // namespace
 
+glm::dvec4 eyeIn(const Source& s, const Camera& camera) {
+    return s.space.pixelFromWorld * (camera.orthographic ? glm::dvec4(-camera.forward(), 0.0)
+                                                         : glm::dvec4(camera.position, 1.0));
+}
+
 std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& space) {
     const Placer placer(f, space);
     std::vector<PlacedBlocks> all;
-    const auto add = [&](const Placer::Placed& at, const glm::dvec4& h, std::uint32_t count) {
-        if (h.w > 0) all.push_back({at.tiles, h.z / h.w, static_cast<int>(count), at.partlyBehind});
+    const auto add = [&](const Placer::Placed& at, const glm::dvec4& h, std::uint32_t begin,
+                         std::uint32_t end) {
+        if (h.w > 0) all.push_back({at.tiles, h.z / h.w, begin, end, at.partlyBehind});
     };
     for (const Source::PlannedRegion& region : f.source->regions) {
         const auto at = placer.place(region, region.x, region.y, kRegion * kBlock);
         if (!at) continue;
         if (!at->partlyBehind) {
-            add(*at, f.pixelFromSource * glm::dvec4(region.middle, 1.0), region.end - region.begin);
+            add(*at, f.pixelFromSource * glm::dvec4(region.middle, 1.0), region.begin, region.end);
             continue;
         }
         // It may be large in the frame, and its middle tells little.
@@ -181,7 +187,7 @@ std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& s
             const BlockRange& block = f.source->blocks[number];
             const glm::ivec2 first = placer.firstOf(number);
             if (const auto own = placer.place(block, first.x, first.y, kBlock))
-                add(*own, middleOrFarthest(f.pixelFromSource, block, first.x, first.y), 1);
+                add(*own, middleOrFarthest(f.pixelFromSource, block, first.x, first.y), i, i + 1);
         }
     }
     return all;
@@ -190,9 +196,7 @@ std::vector<PlacedBlocks> placedBlocks(const FrameSource& f, const PixelSpace& s
 void placeBlocks(FrameSource& f, const PixelSpace& space, int tilesX, int tilesY) {
     const Source& s = *f.source;
     const Placer placer(f, space);
-    const glm::dvec4 eye = s.space.pixelFromWorld * (space.camera.orthographic
-                                                         ? glm::dvec4(-space.camera.forward(), 0.0)
-                                                         : glm::dvec4(space.camera.position, 1.0));
+    const glm::dvec4 eye = eyeIn(s, space.camera);
     f.turnedAway.assign(s.blocks.size(), 0);
     struct Range {
         std::uint32_t block;

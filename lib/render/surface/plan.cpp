@@ -9,6 +9,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/surface/placement.hpp"
+#include "lib/render/surface/places.hpp"
 
 namespace stx::surface {
 namespace {
@@ -30,12 +31,8 @@ void addBounds(const Source& s, Bounds& bounds) {
 }
 
 /// By tile: q in the middle of the blocks of all sources that fall in it, 0 = none.
-std::vector<double> middlesOf(const SurfaceFrame& frame) {
-    std::vector<std::vector<PlacedBlocks>> placed(frame.sources.size());
-    parallelFor(0, static_cast<std::int64_t>(placed.size()), [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
-        placed[k] = placedBlocks(frame.sources[k], frame.space);
-    });
+std::vector<double> middlesOf(const SurfaceFrame& frame,
+                              std::span<const std::vector<PlacedBlocks>> placed) {
     struct Sum {
         double q = 0;
         int blocks = 0;
@@ -48,8 +45,9 @@ std::vector<double> middlesOf(const SurfaceFrame& frame) {
             for (int y = p.tiles.y0; y <= p.tiles.y1; ++y) {
                 for (int x = p.tiles.x0; x <= p.tiles.x1; ++x) {
                     Sum& sum = sums[static_cast<std::size_t>(y * frame.tilesX + x)][p.partlyBehind];
-                    sum.q += p.q * p.count;
-                    sum.blocks += p.count;
+                    const auto count = static_cast<int>(p.end - p.begin);
+                    sum.q += p.q * count;
+                    sum.blocks += count;
                 }
             }
         }
@@ -221,11 +219,17 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
                 f.tileSources[t] = every;
         return f;
     }
-    const std::vector<double> middles = middlesOf(f);
+    std::vector<std::vector<PlacedBlocks>> placed(f.sources.size());
+    parallelFor(0, static_cast<std::int64_t>(placed.size()), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        placed[k] = placedBlocks(f.sources[k], f.space);
+    });
+    const std::vector<double> middles = middlesOf(f, placed);
     parallelFor(0, static_cast<std::int64_t>(tiles), [&](std::int64_t i) {
         const auto t = static_cast<std::size_t>(i);
         if (middles[t] > 0) f.tileSources[t] = chooseSources(f, static_cast<int>(i), middles[t]);
     });
+    addSourcesOfPlaces(f, placed);
     if (!effort.preferShown) {
         std::vector<char> wanted(f.sources.size(), 0);
         for (const auto& chosen : f.tileSources)

@@ -93,14 +93,16 @@ TEST_P(PlannedBlocks, AreChosenFromFewViews) {
     effort.mostGeometry = 2;
     std::size_t placed = 0;
     for (const double angle : {0.4, 2.0}) {
-        const Camera camera = analyticCamera(GetParam(), angle, 6);
+        Camera camera = analyticCamera(GetParam(), angle, 6);
+        // A side of what the views show, close.
+        camera.fx *= 8;
+        camera.fy *= 8;
+        camera.cx = -2.0 * camera.width;
         const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
         const int tiles = frame.tilesX * frame.tilesY;
         std::vector<char> used(frame.sources.size(), 0);
-        for (int tile = 0; tile < tiles; ++tile) {
-            EXPECT_LE(frame.sourcesOf(tile).size(), 2u);
+        for (int tile = 0; tile < tiles; ++tile)
             for (const int k : frame.sourcesOf(tile)) used[static_cast<std::size_t>(k)] = 1;
-        }
         for (std::size_t k = 0; k < used.size(); ++k) {
             FrameSource whole = frame.sources[k];
             placeBlocks(whole, frame.space, frame.tilesX, frame.tilesY);
@@ -115,6 +117,52 @@ TEST_P(PlannedBlocks, AreChosenFromFewViews) {
         placed += static_cast<std::size_t>(std::count(used.begin(), used.end(), 1));
     }
     EXPECT_LT(placed, 2 * scene.sources.size());
+}
+
+/// What is nearest of all views is nearest of those that a tile is built from.
+TEST_P(PlannedBlocks, AreOfViewsThatShowAllThatAnyShows) {
+    const Bundle bundle = analyticBundle(GetParam(), 8);
+    const SurfaceScene scene(bundle);
+    Effort effort;
+    effort.mostGeometry = 1;
+    const SampleGrid grid{1};
+    std::vector<float> samples(grid.count()), chosen(grid.count()), all(grid.count());
+    std::int64_t there = 0, lost = 0, sources = 0, tiles = 0;
+    for (const double angle : {0.4, 2.5}) {
+        const Camera camera = analyticCamera(GetParam(), angle, 8);
+        const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
+        std::vector<FrameSource> placed = frame.sources;
+        for (FrameSource& f : placed) placeBlocks(f, frame.space, frame.tilesX, frame.tilesY);
+        for (int tile = 0; tile < frame.tilesX * frame.tilesY; tile += 3) {
+            std::fill(chosen.begin(), chosen.end(), 0.0f);
+            std::fill(all.begin(), all.end(), 0.0f);
+            const std::vector<int>& some = frame.sourcesOf(tile);
+            tiles += !some.empty();
+            sources += static_cast<std::int64_t>(some.size());
+            for (std::size_t k = 0; k < placed.size(); ++k) {
+                const FrameSource& f = placed[k];
+                std::vector<std::uint32_t> facing;
+                for (const std::uint32_t block : f.blocksOf(tile))
+                    if (!f.turnedAway[block]) facing.push_back(block);
+                const Warp warp = warpFrom(frame.sampleFromPixel(tile, 1) * f.pixelFromSource);
+                if (!rasteriseSource(*f.source, warp, facing, grid, frame.qLimit(), samples.data()))
+                    continue;
+                const bool isChosen =
+                    std::find(some.begin(), some.end(), static_cast<int>(k)) != some.end();
+                for (std::size_t i = 0; i < samples.size(); ++i) {
+                    all[i] = std::max(all[i], samples[i]);
+                    if (isChosen) chosen[i] = std::max(chosen[i], samples[i]);
+                }
+            }
+            for (std::size_t i = 0; i < all.size(); ++i) {
+                there += all[i] > 0;
+                lost += chosen[i] < 0.97f * all[i];
+            }
+        }
+    }
+    EXPECT_GT(there, 5000);
+    EXPECT_LT(static_cast<double>(lost), 0.005 * static_cast<double>(there));
+    EXPECT_LT(sources, 6 * tiles);
 }
 
 /// A camera amid the object: blocks on both sides of its plane.
