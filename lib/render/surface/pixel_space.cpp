@@ -7,6 +7,11 @@ namespace {
 
 /// Of orthographic cameras: depth range in parts of the window's larger side.
 constexpr double kOrthographicRange = 1.2;
+/// Shares of q that neighbouring pixels may differ by were chosen on views whose pixels are this
+/// share of their distance (512 pixels for 46 degrees). Without it a ball in 48x48 pixels falls
+/// apart where it is steeper than 21 degrees. Random captures of tests/sweep: 0.4 dB in the mean; a
+/// third and three times of it are 0.1 worse.
+constexpr double kFinePixel = 1.0 / 600.0;
 
 }  // namespace
 
@@ -17,8 +22,8 @@ PixelSpace::PixelSpace(const Camera& c, double farthest) : camera(c) {
         axis.unit = kOrthographicRange * std::max(c.width / c.fx, c.height / c.fy);
         axis.origin = farthest + axis.unit;
     }
-    static const double fine = getenv("STX_FINE") ? atof(getenv("STX_FINE")) : 0.00167;
-    axis.coarse = std::max(1.0, 1.0 / (std::max(c.fx, c.fy) * (axis.inverse ? 1.0 : axis.unit)) / fine);
+    const double pixel = 1.0 / (std::max(c.fx, c.fy) * (axis.inverse ? 1.0 : axis.unit));
+    axis.coarse = std::max(1.0, pixel / kFinePixel);
     // Columns of camera points (X, Y, Z, 1) up to scale over (x, y, q, 1), and back.
     glm::dmat4 cameraFromPixel(0.0), pixelFromCamera(0.0);
     cameraFromPixel[0][0] = 1.0 / c.fx;

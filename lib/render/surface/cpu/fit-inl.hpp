@@ -8,7 +8,6 @@
 #define STX_SURFACE_FIT_INL_HPP
 #endif
 
-#include <cstdlib>
 #include <hwy/highway.h>
 
 #include "lib/render/surface/constants.hpp"
@@ -57,13 +56,9 @@ struct Taps {
     /// The kernel: r² = uu du² + uv du dv + vv dv², 1 where it ends.
     HWY_INLINE void metric(D d, float inverseRadius, V& uu, V& uv, V& vv) const {
         // (1-h) I + h J Jt, inverted.
-        static const float h0 = getenv("H0") ? atof(getenv("H0")) : 1e9f, h1 = getenv("H1") ? atof(getenv("H1")) : 2e9f;
-        const V jxx = hn::MulAdd(xu, xu, hn::Mul(xv, xv)), jyy = hn::MulAdd(yu, yu, hn::Mul(yv, yv));
-        const V t = hn::Mul(hn::Set(d, 0.5f), hn::Add(jxx, jyy));
-        const V ramp = hn::Min(hn::Max(hn::Mul(hn::Sub(t, hn::Set(d, h0)), hn::Set(d, 1.0f / (h1 - h0))), hn::Zero(d)), hn::Set(d, 1.0f));
-        const V h = hn::MulAdd(ramp, hn::Set(d, 1.0f - kOwn), hn::Set(d, kOwn)), rest = hn::Sub(hn::Set(d, 1.0f), h);
-        const V sxx = hn::MulAdd(h, jxx, rest);
-        const V syy = hn::MulAdd(h, jyy, rest);
+        const V h = hn::Set(d, kOwn), rest = hn::Set(d, 1.0f - kOwn);
+        const V sxx = hn::MulAdd(h, hn::MulAdd(xu, xu, hn::Mul(xv, xv)), rest);
+        const V syy = hn::MulAdd(h, hn::MulAdd(yu, yu, hn::Mul(yv, yv)), rest);
         const V sxy = hn::Mul(h, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
         const V scale =
             hn::Div(hn::Set(d, inverseRadius),
