@@ -73,7 +73,8 @@ CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.01f;
 // pixel in the frame moves that position by more than the root of kNarrowStep pixels along either axis: the
 // kernel has fallen to 1/400 there.
 CONSTANT float kNarrowStep = 1.3f, kNarrowReach = 1.5f;
-// A sample covers its own pixel, so a coarse source spreads by this share of its Jacobian.
+// A sample covers its own pixel, so a source as fine as the frame spreads by this share of its Jacobian,
+// a coarser one by more (metricOf).
 CONSTANT float kOwn = 0.15f;
 // A tap is on the surface of the piece within this share of q, and this share of the slope, which
 // counts up to kSteepestTap; predictions go no further than kFarthestTap.

@@ -87,12 +87,16 @@ uint tapsOnSurface(int s, Piece piece, SourceView view) {
     return taps;
 }
 
-// r² = x dx² + y dx dy + z dy² of offsets in the frame, 1 where the kernel ends: a coarse source
-// spreads by kOwn.
+// r² = x dx² + y dx dy + z dy² of offsets in the frame, 1 where the kernel ends. Its size is that of a
+// pixel of the frame, and by a share of kOwn that of a pixel of the source as the frame has it. The larger
+// that is even where it is narrowest, the more it decides: there the taps lie so far apart that a pixel of
+// the frame holds none, and each would colour what is nearest to it.
 vec3 metricOf(SourceView v) {
-    float sxx = kOwn * (v.xu * v.xu + v.xv * v.xv) + (1.0f - kOwn);
-    float syy = kOwn * (v.yu * v.yu + v.yv * v.yv) + (1.0f - kOwn);
-    float sxy = kOwn * (v.xu * v.yu + v.xv * v.yv);
+    float jxx = v.xu * v.xu + v.xv * v.xv, jyy = v.yu * v.yu + v.yv * v.yv;
+    float jxy = v.xu * v.yu + v.xv * v.yv, apart = 0.5f * (jxx - jyy);
+    float least = 0.5f * (jxx + jyy) - sqrt(apart * apart + jxy * jxy);
+    float rest = (1.0f - kOwn) / max(least, 1.0f), own = 1.0f - rest;
+    float sxx = own * jxx + rest, syy = own * jyy + rest, sxy = own * jxy;
     float scale = 1.0f / (frame.fit.x * max(sxx * syy - sxy * sxy, 1e-6f));
     return vec3(syy * scale, -2.0f * sxy * scale, sxx * scale);
 }

@@ -55,11 +55,18 @@ struct Taps {
 
     /// The kernel: r² = uu du² + uv du dv + vv dv², 1 where it ends.
     HWY_INLINE void metric(D d, float inverseRadius, V& uu, V& uv, V& vv) const {
-        // (1-h) I + h J Jt, inverted.
-        const V h = hn::Set(d, kOwn), rest = hn::Set(d, 1.0f - kOwn);
-        const V sxx = hn::MulAdd(h, hn::MulAdd(xu, xu, hn::Mul(xv, xv)), rest);
-        const V syy = hn::MulAdd(h, hn::MulAdd(yu, yu, hn::Mul(yv, yv)), rest);
-        const V sxy = hn::Mul(h, hn::MulAdd(xu, yu, hn::Mul(xv, yv)));
+        // (1-h) I + h J Jt, inverted; see metricOf() in shaders/shared/surface_shade.glsl.
+        const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
+        const V jxx = hn::MulAdd(xu, xu, hn::Mul(xv, xv));
+        const V jyy = hn::MulAdd(yu, yu, hn::Mul(yv, yv));
+        const V jxy = hn::MulAdd(xu, yu, hn::Mul(xv, yv));
+        const V apart = hn::Mul(half, hn::Sub(jxx, jyy));
+        const V least = hn::Sub(hn::Mul(half, hn::Add(jxx, jyy)),
+                                hn::Sqrt(hn::MulAdd(apart, apart, hn::Mul(jxy, jxy))));
+        const V rest = hn::Div(hn::Set(d, 1.0f - kOwn), hn::Max(least, one));
+        const V h = hn::Sub(one, rest);
+        const V sxx = hn::MulAdd(h, jxx, rest), syy = hn::MulAdd(h, jyy, rest);
+        const V sxy = hn::Mul(h, jxy);
         const V scale =
             hn::Div(hn::Set(d, inverseRadius),
                     hn::Max(hn::NegMulAdd(sxy, sxy, hn::Mul(sxx, syy)), hn::Set(d, 1e-6f)));

@@ -1,0 +1,140 @@
+// A ball from coarse views against the mesh itself: no quality leaves out what another covers, and
+// close by surfaces are as good as splats.
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "lib/capture/capture.hpp"
+#include "lib/geometry/view_layout.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
+#include "lib/render/renderer.hpp"
+
+namespace stx {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// A UV sphere of 24 x 48.
+Mesh ball() {
+    constexpr int kAround = 48, kUp = 24;
+    Mesh mesh;
+    mesh.materials.emplace_back();
+    for (int i = 0; i <= kAround; ++i) {
+        for (int j = 0; j <= kUp; ++j) {
+            const double a = 2 * std::numbers::pi * i / kAround;
+            const double b = std::numbers::pi * (static_cast<double>(j) / kUp - 0.5);
+            mesh.positions.emplace_back(std::cos(b) * std::cos(a), std::sin(b),
+                                        -std::cos(b) * std::sin(a));
+            mesh.colours.emplace_back(0.5 + 0.4 * std::sin(3 * a), 0.5 + 0.4 * std::sin(5 * b),
+                                      0.5 + 0.4 * std::cos(2 * a + 3 * b), 1);
+        }
+    }
+    for (int i = 0; i < kAround; ++i) {
+        for (int j = 0; j < kUp; ++j) {
+            const int k = i * (kUp + 1) + j, next = k + kUp + 1;
+            mesh.triangles.emplace_back(k, k + 1, next + 1);
+            mesh.triangles.emplace_back(k, next + 1, next);
+        }
+    }
+    mesh.triangleMaterial.assign(mesh.triangles.size(), 0);
+    return mesh;
+}
+
+struct Coarse {
+    const char *name, *views;
+    int side;
+};
+
+Bundle viewsOf(const Mesh& mesh, const char* views, int side, bool orthographic) {
+    Job job;
+    const auto cameras = layoutCameras(
+        *parseViewLayout(views),
+        {.width = side, .height = side, .orthographic = orthographic, .fovRad = 35 * kDegree},
+        mesh.positions);
+    EXPECT_TRUE(cameras);
+    auto bundle = captureBundle(mesh, *cameras, {}, job);
+    EXPECT_TRUE(bundle);
+    return std::move(*bundle);
+}
+
+/// 15 degrees above the horizon, from where a field of view of 40 degrees holds the ball.
+Camera cameraAt(const Mesh& mesh, double fovDegrees, int side) {
+    const double fov = fovDegrees * kDegree, up = 15 * kDegree;
+    const Bounds bounds = mesh.bounds();
+    const glm::dvec3 eye = bounds.centre() + glm::dvec3(0, std::sin(up), std::cos(up)) *
+                                                 (1.02 * bounds.radius() / std::sin(20 * kDegree));
+    return Camera::fromFieldOfView(eye, *lookAt(eye, bounds.centre(), {0, 1, 0}), {fov, fov}, false,
+                                   side, side);
+}
+
+class CoarseViews : public testing::TestWithParam<Coarse> {};
+
+TEST_P(CoarseViews, AreDrawnWhole) {
+    const Coarse& c = GetParam();
+    const Mesh mesh = ball();
+    Job job;
+    const Bundle bundle = viewsOf(mesh, c.views, c.side, false);
+    const Camera camera = cameraAt(mesh, 40, 100);
+    const Frame truth = *makeMeshRenderer(mesh, {}, job)->render(camera);
+    for (const Quality quality : {Quality::draft, Quality::normal, Quality::best}) {
+        RenderSettings settings;
+        settings.quality = quality;
+        const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
+        ASSERT_TRUE(renderer);
+        const auto frame = (*renderer)->render(camera);
+        ASSERT_TRUE(frame);
+        int solid = 0, open = 0;
+        for (std::size_t i = 0; i < truth.colour.count(); ++i) {
+            if (truth.colour.data()[i].a < 0.99f) continue;
+            ++solid;
+            open += frame->colour.data()[i].a < 0.5f;
+        }
+        EXPECT_LE(open, 0.001 * solid) << "quality " << static_cast<int>(quality);
+    }
+}
+
+// Before tiles got the sources of their places 20 % was open in draft and 11 % in normal, then 12 %
+// and 10 %.
+INSTANTIATE_TEST_SUITE_P(Kinds, CoarseViews,
+                         testing::Values(Coarse{"octahedral", "octahedral:4", 48},
+                                         Coarse{"hemiOctahedral", "hemi-octahedral:4", 64}),
+                         [](const auto& coarse) { return std::string(coarse.param.name); });
+
+/// Mean squared difference of the colours of two frames.
+double difference(const Frame& a, const Frame& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.colour.count(); ++i) {
+        const glm::dvec3 d(glm::vec3(a.colour.data()[i]) - glm::vec3(b.colour.data()[i]));
+        sum += glm::dot(d, d);
+    }
+    return sum / static_cast<double>(a.colour.count());
+}
+
+// With the size of one pixel of the frame alone each tap made a facet: 16 dB below splats.
+TEST(CloserThanTheReferences, SurfacesAreAsSmoothAsSplats) {
+    const Mesh mesh = ball();
+    Job job;
+    const Bundle bundle = viewsOf(mesh, "ring:6", 64, true);
+    for (const double fov : {22.0, 13.0}) {
+        const Camera camera = cameraAt(mesh, fov, 200);
+        const Frame truth = *makeMeshRenderer(mesh, {}, job)->render(camera);
+        RenderSettings splat;
+        splat.mode = RenderMode::splat;
+        const auto splats = makeRenderer(Backend::cpu, bundle, splat, -1, job);
+        ASSERT_TRUE(splats);
+        const double ofSplats = difference(*(*splats)->render(camera), truth);
+        for (const Quality quality : {Quality::normal, Quality::best}) {
+            RenderSettings settings;
+            settings.quality = quality;
+            const auto surfaces = makeRenderer(Backend::cpu, bundle, settings, -1, job);
+            ASSERT_TRUE(surfaces);
+            const double ofSurfaces = difference(*(*surfaces)->render(camera), truth);
+            // Half a decibel.
+            EXPECT_LT(ofSurfaces, std::pow(10.0, 0.05) * ofSplats) << fov;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace stx
