@@ -1,5 +1,6 @@
 #include "lib/geometry/origin.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace stx {
