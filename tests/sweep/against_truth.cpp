@@ -1,0 +1,110 @@
+#include <fmt/format.h>
+
+#include "tests/sweep/measures.hpp"
+#include "tests/sweep/random.hpp"
+
+using namespace stx;
+
+namespace {
+
+constexpr Drawn kDraft{RenderMode::surface, Quality::draft},
+    kNormal{RenderMode::surface, Quality::normal}, kBest{RenderMode::surface, Quality::best},
+    kSplat{RenderMode::splat, Quality::normal};
+constexpr std::array kWays{kNormal, kDraft, kBest, kSplat};
+constexpr std::array kWayNames{"normal", "draft", "best", "splat"};
+
+/// Fewer pixels than this say nothing about a share of them.
+constexpr std::int64_t kFewest = 100;
+
+/// Errors that nobody sees are not compared: pictures of more dB than this count as this good.
+constexpr double kGood = 48;
+
+std::int64_t coveredCount(const Frame& frame, const Image<std::uint8_t>& seen, int least) {
+    std::int64_t count = 0;
+    for (std::size_t i = 0; i < seen.count(); ++i)
+        count += seen.data()[i] >= least && frame.colour.data()[i].a >= 0.5f;
+    return count;
+}
+
+}  // namespace
+
+namespace measures {
+
+int pick(const Pictures& pictures, int salt, int below) {
+    const SweepCase& c = pictures.stage().from;
+    Random random(c.seed * 6151 + static_cast<std::uint64_t>(c.number) * 31 +
+                  static_cast<std::uint64_t>(salt));
+    return random.whole(0, below - 1);
+}
+
+Outcome openWhereSeen(Pictures& pictures) {
+    const std::int64_t seen = pictures.seenCount(2);
+    if (seen < kFewest) return std::nullopt;
+    Measure out;
+    for (std::size_t i = 0; i < kWays.size(); ++i) {
+        STX_TRY(const Frame* frame, pictures.of(kWays[i]));
+        const double open =
+            100.0 * double(seen - coveredCount(*frame, pictures.seenBy(), 2)) / double(seen);
+        out.found = std::max(out.found, open);
+        out.what += fmt::format("{}{} {:.2f} %", i ? ", " : "open: ", kWayNames[i], open);
+    }
+    return out;
+}
+
+Outcome drawnWhereEmpty(Pictures& pictures) {
+    std::int64_t empty = 0;
+    for (const std::uint8_t e : pictures.empty().pixels()) empty += e != 0;
+    if (empty < kFewest) return std::nullopt;
+    Measure out;
+    for (std::size_t i = 0; i < kWays.size(); ++i) {
+        STX_TRY(const Frame* frame, pictures.of(kWays[i]));
+        const double drawn =
+            100.0 * double(coveredCount(*frame, pictures.empty(), 255)) / double(empty);
+        out.found = std::max(out.found, drawn);
+        out.what += fmt::format("{}{} {:.2f} %", i ? ", " : "drawn: ", kWayNames[i], drawn);
+    }
+    return out;
+}
+
+Outcome betterQualityCoversLess(Pictures& pictures) {
+    const std::int64_t seen = pictures.seenCount(1);
+    if (seen < kFewest) return std::nullopt;
+    Measure out;
+    double before = 0;
+    for (const auto& [how, name] :
+         {std::pair(kDraft, "draft"), {kNormal, "normal"}, {kBest, "best"}}) {
+        STX_TRY(const Frame* frame, pictures.of(how));
+        const double covered =
+            100.0 * double(coveredCount(*frame, pictures.seenBy(), 1)) / double(seen);
+        out.found = std::max(out.found, before - covered);
+        out.what +=
+            fmt::format("{}{} {:.2f} %", out.what.empty() ? "covered: " : ", ", name, covered);
+        before = covered;
+    }
+    return out;
+}
+
+Outcome betterQualityIsWorse(Pictures& pictures) {
+    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+    Measure out;
+    double before = 0;
+    for (const auto& [how, name] :
+         {std::pair(kDraft, "draft"), {kNormal, "normal"}, {kBest, "best"}}) {
+        STX_TRY(const Frame* frame, pictures.of(how));
+        const double psnr = pictures.psnr(*frame);
+        out.found = std::max(out.found, std::min(before, kGood) - psnr);
+        out.what += fmt::format("{}{} {:.2f} dB", out.what.empty() ? "" : ", ", name, psnr);
+        before = std::max(before, psnr);
+    }
+    return out;
+}
+
+Outcome surfaceBelowSplats(Pictures& pictures) {
+    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+    STX_TRY(const Frame* surface, pictures.of(kNormal));
+    STX_TRY(const Frame* splats, pictures.of(kSplat));
+    const double a = pictures.psnr(*surface), b = pictures.psnr(*splats);
+    return Measure{std::min(b, kGood) - a, fmt::format("surface {:.2f} dB, splat {:.2f} dB", a, b)};
+}
+
+}  // namespace measures

@@ -1,0 +1,164 @@
+// Checks rules on random cases; tests/sweep/run calls it, and tests/README.md says what the rules
+// are.
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "formats/stx/stx.hpp"
+#include "tests/sweep/random.hpp"
+#include "tests/sweep/rules.hpp"
+
+namespace {
+
+struct Options {
+    std::uint64_t seed = 1;
+    int first = 0, cases = 1;
+    std::string set;   ///< changes of fields
+    std::string rule;  ///< only this one, in every case
+    std::string keep;  ///< folder for the files of a case
+    bool measure = false;
+    bool reduce = true;
+};
+
+/// What a rule found in a case; nothing when it holds.
+std::optional<Measure> findingOf(const Rule& rule, Pictures& pictures) {
+    const auto measured = rule.measure(pictures);
+    if (!measured) return Measure{1e9, "error: " + measured.error().message};
+    if (!*measured || (*measured)->found <= rule.allowed) return std::nullopt;
+    return *measured;
+}
+
+/// The simplest case of its kind in which the rule still finds something.
+SweepCase reduced(const SweepCase& found, const Rule& rule) {
+    SweepCase current = found;
+    constexpr int kTries = 40;
+    int tries = 0;
+    for (bool simpler = true; simpler && tries < kTries;) {
+        simpler = false;
+        for (const SweepCase& candidate : current.simpler()) {
+            if (++tries > kTries) break;
+            const auto stage = stageOf(candidate);
+            if (!stage) continue;
+            Pictures pictures(*stage);
+            if (!findingOf(rule, pictures)) continue;
+            current = candidate;
+            simpler = true;
+            break;
+        }
+    }
+    return current;
+}
+
+std::string repeatOf(const SweepCase& c, const Rule& rule) {
+    const std::string changes = c.changes();
+    return fmt::format("tests/sweep/run --seed {} --first {} --cases 1 --rule {}{}", c.seed,
+                       c.number, rule.name, changes.empty() ? "" : " --set " + changes);
+}
+
+/// The bundle, the truth and the camera of a case as files, and what draws it.
+stx::Result<void> keep(const Stage& stage, const std::filesystem::path& folder) {
+    using namespace stx;
+    Job job;
+    std::filesystem::create_directories(folder);
+    STX_CHECK(save(stage.bundle, folder / "case.exr", {}, job));
+    Bundle truth;
+    truth.views = {stage.truth};
+    truth.views[0].name = "truth";
+    STX_CHECK(save(truth, folder / "truth.exr", {}, job));
+    Frame frame;
+    frame.colour = Image<glm::vec4>(stage.novel.width, stage.novel.height);
+    for (std::size_t i = 0; i < frame.colour.count(); ++i) {
+        const glm::vec4 straight = stage.truth.texture.at(i);
+        frame.colour.data()[i] = glm::vec4(glm::vec3(straight) * straight.a, straight.a);
+    }
+    frame.depth = stage.truth.depth;
+    STX_CHECK(save(frame, folder / "truth.png", {}, job));
+    const std::string at = folder.string();
+    fmt::print(
+        "  stx render {0}/case.exr -o {0}/picture.png --cameras {0}/truth.exr\n"
+        "  stx compare {0}/picture.png {0}/truth.png\n",
+        at);
+    return {};
+}
+
+int check(const Options& options) {
+    int findings = 0;
+    for (int number = options.first; number < options.first + options.cases; ++number) {
+        SweepCase c = SweepCase::draw(options.seed, number);
+        for (std::size_t from = 0; from < options.set.size();) {
+            const std::size_t to = std::min(options.set.find(',', from), options.set.size());
+            if (const auto set = c.set(options.set.substr(from, to - from)); !set) {
+                fmt::print(stderr, "sweep: {}\n", set.error().message);
+                return 1;
+            }
+            from = to + 1;
+        }
+        // Before anything is drawn: who stops here is named by `run`.
+        fmt::print("case {}:{} {}\n", options.seed, number, c.describe());
+        std::fflush(stdout);
+        const auto stage = stageOf(c);
+        if (!stage) {
+            fmt::print("  skipped: {}\n", stage.error().message);
+            continue;
+        }
+        if (!options.keep.empty()) {
+            if (const auto kept = keep(*stage, options.keep); !kept)
+                fmt::print("  {}\n", kept.error().message);
+        }
+        Pictures pictures(*stage);
+        Random random(options.seed * 9176 + static_cast<std::uint64_t>(number) * 13 + 1);
+        for (const Rule& rule : rules()) {
+            const bool asked = random.chance(rule.share);
+            if (options.rule.empty() ? !asked : options.rule != rule.name) continue;
+            if (options.measure) {
+                const auto start = std::chrono::steady_clock::now();
+                const auto measured = rule.measure(pictures);
+                const double ms = std::chrono::duration<double, std::milli>(
+                                      std::chrono::steady_clock::now() - start)
+                                      .count();
+                if (!measured)
+                    fmt::print("  {} error {}\n", rule.name, measured.error().message);
+                else if (*measured)
+                    fmt::print("  {} {:.3f} {} ({}; {:.0f} ms)\n", rule.name, (*measured)->found,
+                               rule.unit, (*measured)->what, ms);
+                continue;
+            }
+            const auto finding = findingOf(rule, pictures);
+            if (!finding) continue;
+            ++findings;
+            fmt::print("FINDING {}: {}; {:.2f} {}, allowed {} ({})\n  {}\n  {}\n", rule.name,
+                       rule.sentence, finding->found, rule.unit, rule.allowed, finding->what,
+                       c.describe(), repeatOf(c, rule));
+            std::fflush(stdout);
+            if (!options.reduce) continue;
+            const SweepCase small = reduced(c, rule);
+            if (small.changes() != c.changes())
+                fmt::print("  reduced: {}\n  {}\n", small.describe(), repeatOf(small, rule));
+            std::fflush(stdout);
+        }
+    }
+    return findings > 0 ? 7 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    Options options;
+    CLI::App app("Checks rules on random scenes, captures and cameras");
+    app.add_option("--seed", options.seed, "of all cases");
+    app.add_option("--first", options.first, "number of the first case");
+    app.add_option("--cases", options.cases, "how many");
+    app.add_option("--set", options.set, "fields to change, as in views=3,width=24");
+    app.add_option("--rule", options.rule, "only this rule, in every case");
+    app.add_option("--keep", options.keep, "folder for the files of a case");
+    app.add_flag("--measure", options.measure, "prints what the rules measure, judges nothing");
+    app.add_flag("--reduce,!--no-reduce", options.reduce,
+                 "looks for the simplest case of a finding");
+    CLI11_PARSE(app, argc, argv);
+    return check(options);
+}

@@ -1,0 +1,41 @@
+#pragma once
+
+#include "tests/sweep/rules.hpp"
+
+/// The measures behind rules(), by what they need. Each returns nothing where it cannot judge.
+namespace measures {
+
+using Outcome = stx::Result<std::optional<Measure>>;
+
+// against_truth.cpp: one picture against the formulas, or two ways of drawing against each other.
+Outcome openWhereSeen(Pictures& pictures);
+Outcome drawnWhereEmpty(Pictures& pictures);
+Outcome betterQualityCoversLess(Pictures& pictures);
+Outcome betterQualityIsWorse(Pictures& pictures);
+Outcome surfaceBelowSplats(Pictures& pictures);
+
+// same_scene.cpp: the same scene, asked in another way.
+Outcome crop(Pictures& pictures);
+Outcome otherOrder(Pictures& pictures);
+Outcome viewTwice(Pictures& pictures);
+Outcome viewOfNothing(Pictures& pictures);
+Outcome turned(Pictures& pictures);
+Outcome scaled(Pictures& pictures);
+Outcome movedFar(Pictures& pictures);
+Outcome mirrored(Pictures& pictures);
+Outcome threads(Pictures& pictures);
+Outcome gpu(Pictures& pictures);
+
+// files.cpp: the same scene, through a file.
+Outcome container(Pictures& pictures);
+Outcome atlas(Pictures& pictures);
+Outcome prunedAtlas(Pictures& pictures);
+Outcome clock(Pictures& pictures);
+
+// unknown_depth.cpp: pixels that a sensor missed.
+Outcome unknownDepth(Pictures& pictures);
+
+/// A number that follows from the case, to choose among variants: 0 <= number < below.
+[[nodiscard]] int pick(const Pictures& pictures, int salt, int below);
+
+}  // namespace measures

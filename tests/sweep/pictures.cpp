@@ -1,0 +1,116 @@
+#include "tests/sweep/pictures.hpp"
+
+using namespace stx;
+
+namespace {
+
+constexpr double kSame = 99;  ///< dB of pictures without a difference
+
+double decibels(double squared, double values) {
+    return squared > 0 ? std::min(kSame, -10 * std::log10(squared / values)) : kSame;
+}
+
+/// The nine pixels around a point in a view are all on the plane through it.
+bool showsPlane(const ReferenceView& view, glm::dvec3 point, glm::dvec3 normal) {
+    const Camera& camera = view.camera;
+    const glm::dvec3 local = glm::dvec3(camera.cameraFromWorld() * glm::dvec4(point, 1));
+    if (!(local.z < 0)) return false;
+    const glm::dvec3 at = camera.project(local);
+    const int x = static_cast<int>(std::floor(at.x)), y = static_cast<int>(std::floor(at.y));
+    if (x < 2 || y < 2 || x >= camera.width - 2 || y >= camera.height - 2) return false;
+    // Steeper than this (72 degrees), a texel is more than three times as deep as wide.
+    constexpr double kGrazing = 0.3;
+    if (-glm::dot(camera.viewDirection(at.x, at.y), normal) < kGrazing) return false;
+    const double near = 0.5 * camera.sampleSpacing(at.z).x;
+    for (int v = y - 1; v <= y + 1; ++v) {
+        for (int u = x - 1; u <= x + 1; ++u) {
+            if (!hasPoint(view.depth.at(u, v))) return false;
+            if (std::abs(glm::dot(view.worldPoint(u, v) - point, normal)) > near) return false;
+        }
+    }
+    return true;
+}
+
+}  // namespace
+
+Result<Frame> drawBundle(const Bundle& bundle, const Camera& camera, const Drawn& how,
+                         bool filled) {
+    RenderSettings settings;
+    settings.mode = how.mode;
+    settings.quality = how.quality;
+    if (!filled) settings.fill = Fill::none;
+    Job job;
+    STX_TRY(const auto renderer, makeRenderer(how.backend, bundle, settings, -1, job));
+    return renderer->render(camera);
+}
+
+Pictures::Pictures(const Stage& stage)
+    : stage_(stage),
+      seenBy_(stage.novel.width, stage.novel.height, 0),
+      empty_(stage.novel.width, stage.novel.height, 0) {
+    const Camera& novel = stage.novel;
+    const Rgba8Image& truth = *stage.truth.texture.rgba8();
+    // A texel is so many novel pixels wide, at half of it outlines may be drawn too large.
+    const int margin = 2 + static_cast<int>(std::ceil(stage.from.magnification));
+    Image<std::uint8_t> touched(novel.width, novel.height, 0);
+    for (int y = 0; y < novel.height; ++y) {
+        for (int x = 0; x < novel.width; ++x) {
+            if (truth.at(x, y).a == 0) continue;
+            for (int v = std::max(0, y - margin); v <= std::min(novel.height - 1, y + margin); ++v)
+                for (int u = std::max(0, x - margin); u <= std::min(novel.width - 1, x + margin);
+                     ++u)
+                    touched.at(u, v) = 1;
+        }
+    }
+    for (int y = 1; y + 1 < novel.height; ++y) {
+        for (int x = 1; x + 1 < novel.width; ++x) {
+            if (!touched.at(x, y)) empty_.at(x, y) = 255;
+            if (truth.at(x, y).a < 255) continue;
+            const Hit hit = stage.scene.trace(novel, x + 0.5, y + 0.5);
+            if (!hit.any()) continue;
+            bool solid = true;
+            for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}})
+                solid = solid &&
+                        stage.scene.trace(novel, x + dx + 0.5, y + dy + 0.5).surface == hit.surface;
+            if (!solid) continue;
+            int count = 0;
+            for (const ReferenceView& view : stage.bundle.views)
+                count += showsPlane(view, hit.point, hit.normal);
+            seenBy_.at(x, y) = static_cast<std::uint8_t>(count);
+        }
+    }
+}
+
+Result<const Frame*> Pictures::of(const Drawn& how) {
+    const auto found = drawn_.find(how);
+    if (found != drawn_.end()) return &found->second;
+    STX_TRY(Frame frame, drawBundle(stage_.bundle, stage_.novel, how));
+    return &(drawn_[how] = std::move(frame));
+}
+
+std::int64_t Pictures::seenCount(int least) const {
+    std::int64_t count = 0;
+    for (const std::uint8_t seen : seenBy_.pixels()) count += seen >= least;
+    return count;
+}
+
+double Pictures::psnr(const Frame& frame) const {
+    const Rgba8Image& truth = *stage_.truth.texture.rgba8();
+    double squared = 0;
+    for (std::size_t i = 0; i < truth.count(); ++i) {
+        const glm::vec4 t = glm::vec4(truth.data()[i]) / 255.0f;
+        const glm::vec3 d = glm::vec3(frame.colour.data()[i]) - glm::vec3(t) * t.a;
+        squared += glm::dot(d, d);
+    }
+    return decibels(squared, 3.0 * double(truth.count()));
+}
+
+double psnrBetween(const Frame& a, const Frame& b) {
+    if (a.colour.size() != b.colour.size()) return 0;
+    double squared = 0;
+    for (std::size_t i = 0; i < a.colour.count(); ++i) {
+        const glm::vec4 d = a.colour.data()[i] - b.colour.data()[i];
+        squared += glm::dot(glm::vec3(d), glm::vec3(d));
+    }
+    return decibels(squared, 3.0 * double(a.colour.count()));
+}

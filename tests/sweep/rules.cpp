@@ -1,0 +1,48 @@
+#include "tests/sweep/rules.hpp"
+
+#include "tests/sweep/measures.hpp"
+
+const std::vector<Rule>& rules() {
+    static const std::vector<Rule> kRules{
+        {"open", "no mode or quality leaves a place open that two views see", 0.5, "%",
+         "half a percent of them: pixels beside outlines that nine pixels of a view do not tell", 1,
+         measures::openWhereSeen},
+        {"empty", "nothing is drawn where nothing is", 0.5, "%", "as for open places", 1,
+         measures::drawnWhereEmpty},
+        {"quality-covers", "no quality covers less than the one below", 0.5, "%", "as asked", 1,
+         measures::betterQualityCoversLess},
+        {"quality-picture", "no quality is worse than the one below", 0.3, "dB", "as asked", 1,
+         measures::betterQualityIsWorse},
+        {"surface-splat", "surface mode is not worse than splats", 0.5, "dB", "as asked", 1,
+         measures::surfaceBelowSplats},
+        {"crop", "a part of a frame is drawn as in the whole", 54, "dB below 99", "", 0.15,
+         measures::crop},
+        {"order", "views in another order give the same picture", 49, "dB below 99", "", 0.15,
+         measures::otherOrder},
+        {"twice", "a view that is there twice makes no picture worse", 0.5, "dB", "", 0.1,
+         measures::viewTwice},
+        {"nothing", "a view that shows nothing changes nothing", 49, "dB below 99", "", 0.1,
+         measures::viewOfNothing},
+        {"turned", "the world turned by a quarter gives the same picture", 49, "dB below 99", "",
+         0.1, measures::turned},
+        {"scaled", "the world scaled gives the same picture", 49, "dB below 99", "", 0.1,
+         measures::scaled},
+        {"moved", "the world moved far away gives the same picture", 49, "dB below 99", "", 0.1,
+         measures::movedFar},
+        {"mirrored", "the mirrored world gives the mirrored picture", 49, "dB below 99", "", 0.1,
+         measures::mirrored},
+        {"threads", "one thread and two draw the same bytes", 0, "pixels", "as promised", 0.1,
+         measures::threads},
+        {"gpu", "a GPU draws what the processor draws", 0.3, "dB", "", 0.05, measures::gpu},
+        {"container", "a file keeps what is drawn", 0.3, "dB", "16 bits of depth", 0.15,
+         measures::container},
+        {"atlas", "an atlas is drawn like its views", 0.3, "dB", "", 0.15, measures::atlas},
+        {"pruned", "a pruned atlas is drawn almost like its views", 2, "dB", "", 0.1,
+         measures::prunedAtlas},
+        {"clock", "each frame of a film is shown at its time", 0, "frames", "as asked", 0.1,
+         measures::clock},
+        {"unknown", "a view whose depth is not known everywhere makes no picture worse", 0.3, "dB",
+         "", 0.5, measures::unknownDepth},
+    };
+    return kRules;
+}

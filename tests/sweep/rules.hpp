@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "tests/sweep/pictures.hpp"
+
+/// What a rule measured in a case. `found` must not be above `allowed`.
+struct Measure {
+    double found = 0;
+    std::string what;  ///< for people: what was compared, "normal 41.20 dB, splat 44.10 dB"
+};
+
+/// Something that must hold for every case.
+struct Rule {
+    const char* name;
+    const char* sentence;  ///< what must hold
+    double allowed;        ///< the largest `found` that is no finding
+    const char* unit;
+    const char* reason;  ///< for the bound
+    /// The share of cases that are asked.
+    double share;
+    /// Nothing where the rule says nothing about this case. Errors are findings, too.
+    stx::Result<std::optional<Measure>> (*measure)(Pictures& pictures);
+};
+
+[[nodiscard]] const std::vector<Rule>& rules();
