@@ -152,6 +152,25 @@ TEST(NoDepth, MasksOfTheSetAreRead) {
     expectError(readSet(folder.path(), strict), {"masks/m.png"});
 }
 
+/// COLMAP appends .png to the picture's name; others replace its ending.
+TEST(NoDepth, ColmapsMasksAreRead) {
+    for (const char* name : {"masks/a.exr.png", "masks/a.png"}) {
+        const TemporaryFolder folder;
+        writeText(folder / "sparse/cameras.txt", "1 PINHOLE 96 64 100 100 48 32\n");
+        writeText(folder / "sparse/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");
+        writePositions(folder / "images/a.exr", kWidth, kHeight);
+        std::string depth = "96&64&1&";
+        for (int i = 0; i < kWidth * kHeight; ++i) depth += floatBytes(2.0f);
+        writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
+        std::filesystem::create_directories(folder / "masks");
+        writeCodes(folder / name, kWidth, kHeight, 8, [](int x, int) { return x < 60 ? 255 : 0; });
+        const auto read = readSet(folder.path());
+        ASSERT_TRUE(read) << read.error().text();
+        EXPECT_EQ(read->views[0].pointCount(), 60 * kHeight) << name;
+        EXPECT_EQ(read->views[0].noDepth, NoDepth::empty);
+    }
+}
+
 /// Pixels that are open in a picture though the points of two views or more fall there.
 int openPixels(const Bundle& bundle, const Camera& camera, RenderMode mode,
                const Image<std::uint8_t>& seen) {
