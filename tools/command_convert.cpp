@@ -480,6 +480,14 @@ void addConvert(CommandLine& line, Program& program) {
              "file or {name} in them; 'stx background --mask-of all' makes such masks")
         .takes("PATTERN")
         .group(sets);
+    c.choice<std::optional<NoDepth>>(
+         "--no-depth", set.noDepth,
+         {{"auto", std::nullopt}, {"unknown", NoDepth::unknown}, {"empty", NoDepth::empty}},
+         "What pixels without depth are: empty (nothing is there: seen past) or unknown (a "
+         "surface that the sensor missed). auto: as the depth says (infinity or 1e9 and more is "
+         "empty), else empty where a picture has transparent pixels or a mask, and unknown where "
+         "not")
+        .group(sets);
     c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels")
         .positive()
         .group(sets);

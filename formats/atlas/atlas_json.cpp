@@ -41,6 +41,7 @@ Json jsonOf(const ReferenceView& v) {
     j["nearPlane"] = v.nearPlane;
     j["farPlane"] = v.farPlane;
     j["depthBits"] = v.depthBits;
+    if (v.noDepth == NoDepth::unknown) j["noDepth"] = nameOf(v.noDepth);
     j["pruned"] = v.pruned;
     if (v.background) j["background"] = true;
     return j;
@@ -190,6 +191,11 @@ Result<void> readView(const Reader& r, const Limits& limits, int version, bool p
     STX_CHECK(r.number("depthBits", v.depthBits, 8, 32));
     if (r.checksRules() && v.depthBits != 8 && v.depthBits != 16 && v.depthBits != 32)
         return r.wrong("depthBits", "must be 8, 16 or 32");
+    std::string noDepth = nameOf(v.noDepth);
+    STX_CHECK(r.text("noDepth", noDepth, false));
+    const auto named = noDepthNamed(noDepth);
+    if (!named) return r.wrong("noDepth", "must be empty or unknown");
+    v.noDepth = *named;
     // Older versions did not write it: there fewer pixels than before meant that all were pruned.
     v.pruned = prunedByCount;
     STX_CHECK(r.flag("pruned", v.pruned, false));

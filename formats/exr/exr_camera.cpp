@@ -112,6 +112,7 @@ void setExrCamera(ExrPart& part, const ReferenceView& view) {
     a["stx:nearPlane"] = view.nearPlane;
     a["stx:farPlane"] = view.farPlane;
     a["stx:depthBits"] = std::int64_t{view.depthBits};
+    if (view.noDepth == NoDepth::unknown) a["stx:noDepth"] = std::string(nameOf(view.noDepth));
     if (view.pruned) a["stx:pruned"] = std::int64_t{1};
     if (view.background) a["stx:background"] = std::int64_t{1};
 }
@@ -165,6 +166,14 @@ Result<ReferenceView> exrCamera(const ExrPart& part) {
     if (!bits) return missing("stx:depthBits");
     c.orthographic = *orthographic != 0;
     view.depthBits = static_cast<int>(*bits);
+    if (const auto* noDepth = part.attribute<std::string>("stx:noDepth")) {
+        const auto named = noDepthNamed(*noDepth);
+        if (!named)
+            return fail(ErrorCode::invalidInput,
+                        "part '{}': stx:noDepth is '{}'; 'empty' or 'unknown' is expected",
+                        part.name, noDepth->substr(0, 100));
+        view.noDepth = *named;
+    }
     const auto* pruned = part.attribute<std::int64_t>("stx:pruned");
     view.pruned = pruned && *pruned != 0;
     const auto* background = part.attribute<std::int64_t>("stx:background");

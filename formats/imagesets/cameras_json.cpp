@@ -124,7 +124,7 @@ Result<void> setDepth(const Json& c, const std::string& where, SetView& view) {
         if (unit) return scaledIntegers(*unit)(values, camera, bits, job);
         const double last = bits == 8 ? 254 : 65534;
         for (float& v : values.pixels())
-            v = v == 0 ? kNoDepth
+            v = v == 0 ? 0.0f
                        : static_cast<float>(*nearPlane +
                                             (1 - (v - 1) / last) * (*farPlane - *nearPlane));
         return {};

@@ -353,6 +353,12 @@ Result<SetDescription> describeColmap(const path& given, const ImageSetOptions&,
         STX_TRY(view.texture, sourceInside(m.base, "images/" + image.name, place, job.limits));
         STX_TRY(view.depth, sourceInside(m.base, depth, place, job.limits));
         view.depth.colmap = true;
+        // COLMAP appends .png to the whole name; others replace the ending.
+        const std::string mask = firstThere(m.base, {fmt::format("masks/{}.png", image.name),
+                                                     fmt::format("masks/{}.png", view.name)});
+        if (!mask.empty()) {
+            STX_TRY(view.mask, sourceInside(m.base, mask, place, job.limits));
+        }
         view.sensor = !m.ours;
         set.views.push_back(std::move(view));
     }

@@ -68,7 +68,12 @@ const char* colourEnding(const ReferenceView& view) {
 }
 
 Result<void> writeFloatDepth(const ReferenceView& view, const path& file) {
-    return writeExr(file, view.depth.width(), view.depth.height(), {{"Z", view.depth.data(), 1}});
+    Image<float> depth = view.depth;
+    // Infinity is nothing, for everybody; 0 is not known.
+    if (view.depthMayBeUnknown())
+        for (std::size_t i = 0; i < depth.count(); ++i)
+            if (!hasPoint(depth.data()[i]) && view.texture.at(i).a >= 1.0f) depth.data()[i] = 0;
+    return writeExr(file, depth.width(), depth.height(), {{"Z", depth.data(), 1}});
 }
 
 Result<void> writeIntegerDepth(const ReferenceView& view, const path& file,
@@ -95,6 +100,7 @@ void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin) 
     json["nearPlane"] = view.nearPlane;
     json["farPlane"] = view.farPlane;
     json["depthBits"] = view.depthBits;
+    if (view.noDepth == NoDepth::unknown) json["stx:noDepth"] = nameOf(view.noDepth);
     if (view.pruned) json["stx:pruned"] = true;
     if (view.background) json["stx:background"] = true;
 }

@@ -78,6 +78,13 @@ Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
             job.note("the poses stay as they are: no two views overlap");
             return {};
         }
+        if (!done.kept) {
+            job.note(fmt::format(
+                "the poses stay as they are: overlapping views disagree by {:.2g} % of the "
+                "distance, and refined they would by {:.2g} %",
+                100 * done.before.relative, 100 * done.after.relative));
+            return {};
+        }
         job.note(fmt::format(
             "poses refined: viewpoints moved by up to {:.3g} scene units, turned by up to {:.3g} "
             "degrees; overlapping views disagreed by {:.2g} % of the distance, now by {:.2g} %",

@@ -69,6 +69,10 @@ struct ImageSetOptions {
     /// Pictures of what belongs to the object, white on black, as large as the colour pictures:
     /// file names with {stem} (of the colour picture's file) and {name} in them; empty: none.
     std::string maskPattern;
+    /// What pixels without depth are. Without a value: what the depth itself says (1e9 and more or
+    /// infinity somewhere: nothing is there, 0 and NaN are not known), else empty where the picture
+    /// has transparent pixels or a mask, and unknown where it has none.
+    std::optional<NoDepth> noDepth;
     /// Older Middlebury sets: focal length in pixels, scene units from the first to the last view,
     /// and what is added to a disparity (dmin of 2006); 0 = not given.
     double focal = 0, baseline = 0, disparityOffset = 0;
@@ -103,10 +107,10 @@ struct ImageSetKind {
 
 /// Reads one frame of a set; of a set that moves frame 0, with a note, when none is asked for.
 /// Cameras are exact; lens distortion and skew are undone and rotations
-/// repaired, with a note of their size in pixels. Pixels of unknown depth do not belong to the
-/// object; nearPlane and farPlane of each view are fitted. Several views at a time, in the memory
-/// of one per thread beside the bundle. Errors: io, usage (an option that this kind needs or does
-/// not have), invalidInput with file and line or key.
+/// repaired, with a note of their size in pixels. Pixels without depth are what
+/// ImageSetOptions::noDepth says; nearPlane and farPlane of each view are fitted. Several views at
+/// a time, in the memory of one per thread beside the bundle. Errors: io, usage (an option that
+/// this kind needs or does not have), invalidInput with file and line or key.
 [[nodiscard]] Result<Bundle> readImageSet(const std::filesystem::path& path,
                                           const ImageSetOptions& options, Job& job);
 

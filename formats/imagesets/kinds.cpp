@@ -40,6 +40,13 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
             return failAt(where, ErrorCode::invalidInput, "'{}' must be true or false", key);
         *to = it->get<bool>();
     }
+    STX_TRY(const auto noDepth, findText(camera, "stx:noDepth", where));
+    if (noDepth) {
+        view.noDepth = noDepthNamed(*noDepth);
+        if (!view.noDepth)
+            return failAt(where, ErrorCode::invalidInput,
+                          "'stx:noDepth' is '{}'; 'empty' or 'unknown' is expected", *noDepth);
+    }
     STX_TRY(const auto q, findNumbers(camera, "stx:quaternion", 4, where));
     if (q) {
         const glm::dquat exact((*q)[3], (*q)[0], (*q)[1], (*q)[2]);

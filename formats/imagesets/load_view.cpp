@@ -49,21 +49,69 @@ Result<Camera> cameraOfSize(const SetView& set, int width, int height) {
     return c;
 }
 
-/// Where there is no point there is no object, unless the view was pruned. Partly covered pixels of
-/// the set's own alpha stay: they are the silhouette of points beside them.
-void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool pruned) {
-    const auto work = [&](auto& image, auto full) {
-        for (std::size_t i = 0; i < depth.count(); ++i) {
-            auto& alpha = image.data()[i].a;
-            if (!ownAlpha) alpha = full;
-            if (alpha == 0) depth.data()[i] = kNoDepth;
-            if (!hasPoint(depth.data()[i]) && alpha == full && !pruned) alpha = 0;
-        }
-    };
+/// Calls work(image, full) with the pixels of a texture and the alpha of what is covered in full.
+template <class Work>
+void withPixels(Texture& texture, const Work& work) {
     if (auto* bytes = texture.rgba8())
         work(*bytes, std::uint8_t{255});
     else
         work(*texture.rgbaFloat(), 1.0f);
+}
+
+/// Where there is no point there is no object, unless its distance may be unknown. Partly covered
+/// pixels of the set's own alpha stay: they are the silhouette of points beside them.
+void coverOnlyPoints(Texture& texture, Image<float>& depth, bool ownAlpha, bool mayBeUnknown) {
+    withPixels(texture, [&](auto& image, auto full) {
+        for (std::size_t i = 0; i < depth.count(); ++i) {
+            auto& alpha = image.data()[i].a;
+            if (!ownAlpha) alpha = full;
+            if (alpha == 0) depth.data()[i] = kNoDepth;
+            if (!hasPoint(depth.data()[i]) && alpha == full && !mayBeUnknown) alpha = 0;
+        }
+    });
+}
+
+/// Distances from here on are those of nothing: Blender's is 1e10, others' infinity.
+constexpr float kNothing = 1e9f;
+
+/// Makes a picture transparent where its depth, which may be smaller, has the distance of nothing.
+/// Whether there was such a pixel.
+bool clearNothing(StoredView& stored) {
+    const Image<float>& depth = stored.depth;
+    const auto nothing = [](float d) { return d >= kNothing; };
+    if (std::ranges::none_of(depth.pixels(), nothing)) return false;
+    withPixels(stored.texture, [&](auto& image, auto full) {
+        for (int y = 0; y < image.height(); ++y) {
+            for (int x = 0; x < image.width(); ++x) {
+                auto& alpha = image.at(x, y).a;
+                if (!stored.alpha) alpha = full;
+                const auto in = [](int at, int size, int of) {
+                    return static_cast<int>(static_cast<std::int64_t>(at) * of / size);
+                };
+                if (nothing(depth.at(in(x, image.width(), depth.width()),
+                                     in(y, image.height(), depth.height()))))
+                    alpha = 0;
+            }
+        }
+    });
+    stored.alpha = true;
+    return true;
+}
+
+/// What pixels without a distance are. Depth that holds the distance of nothing somewhere, which
+/// becomes transparent, means something else by 0 and NaN; a picture that has alpha or a mask says
+/// where nothing is.
+NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options, StoredView& stored) {
+    if (options.noDepth) return *options.noDepth;
+    // An export of ours.
+    if (set.planes || set.noDepth || set.pruned) return set.noDepth.value_or(NoDepth::empty);
+    bool open = false;
+    if (stored.alpha)
+        withPixels(stored.texture, [&](auto& image, auto full) {
+            open = std::ranges::any_of(image.pixels(), [&](const auto& p) { return p.a < full; });
+        });
+    if (clearNothing(stored)) return NoDepth::unknown;
+    return open ? NoDepth::empty : NoDepth::unknown;
 }
 
 bool anyPoint(const Image<float>& depth) {
@@ -71,15 +119,21 @@ bool anyPoint(const Image<float>& depth) {
                        [](float d) { return hasPoint(d); });
 }
 
-/// Takes away what a mask does not show: its grey is the share of a pixel that belongs to the
-/// object.
-Result<void> applyMask(const SetView& set, const std::string& pattern, StoredView& stored,
-                       Job& job) {
+/// The file of a view's mask, of a pattern or as the set names it; empty: none.
+std::filesystem::path maskOf(const SetView& set, const std::string& pattern) {
+    if (pattern.empty()) return set.mask.path;
     std::string name = filled(pattern, {set.name, 0, 0, 0});
     if (const auto at = name.find("{stem}"); at != std::string::npos)
         name.replace(at, 6, std::filesystem::path(set.texture.name).stem().string());
-    const std::string where = fmt::format("'{}'", name);
-    STX_TRY(const auto bytes, readFile(name, job.limits));
+    return name;
+}
+
+/// Takes away what a mask does not show: its grey is the share of a pixel that belongs to the
+/// object.
+Result<void> applyMask(const SetView& set, const std::filesystem::path& file, StoredView& stored,
+                       Job& job) {
+    const std::string name = file.string(), where = fmt::format("'{}'", name);
+    STX_TRY(const auto bytes, readFile(file, job.limits));
     STX_TRY(const auto mask, decodeRgba8(bytes, name, job.limits));
     if (mask.width() != stored.texture.width() || mask.height() != stored.texture.height())
         return failAt(where, ErrorCode::invalidInput,
@@ -115,7 +169,8 @@ Result<StoredView> readStored(const SetView& set, const ImageSetOptions& options
 
 Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options, Job& job) {
     STX_TRY(auto stored, readStored(set, options, job));
-    if (!options.maskPattern.empty()) STX_CHECK(applyMask(set, options.maskPattern, stored, job));
+    if (const auto mask = maskOf(set, options.maskPattern); !mask.empty())
+        STX_CHECK(applyMask(set, mask, stored, job));
     return stored;
 }
 
@@ -148,13 +203,13 @@ void setPlanes(ReferenceView& view, const SetView& set, const ImageSetOptions& o
 }
 
 Result<ReferenceView> finish(const SetView& set, std::string name, const Camera& camera,
-                             Texture texture, Image<float> depth, bool ownAlpha,
+                             Texture texture, Image<float> depth, bool ownAlpha, NoDepth noDepth,
                              const ImageSetOptions& options, Job& job) {
-    // Without alpha of its own, a picture does not say where points were pruned.
-    const bool pruned = set.pruned && ownAlpha;
-    coverOnlyPoints(texture, depth, ownAlpha, pruned);
     ReferenceView view;
-    view.pruned = pruned;
+    view.noDepth = noDepth;
+    // Without alpha of its own, a picture does not say where points were pruned.
+    view.pruned = set.pruned && ownAlpha;
+    coverOnlyPoints(texture, depth, ownAlpha, view.depthMayBeUnknown());
     view.background = set.background;
     view.name = std::move(name);
     view.camera = camera;
@@ -170,7 +225,7 @@ Result<ReferenceView> finish(const SetView& set, std::string name, const Camera&
 
 void dropImpossible(Image<float>& distances) {
     for (float& d : distances.pixels())
-        if (!(d > 0 && d < 1e9f)) d = kNoDepth;
+        if (!(d > 0 && d < kNothing)) d = kNoDepth;
 }
 
 namespace {
@@ -195,9 +250,10 @@ Result<void> shiftTogether(const SetView& set, const Camera& camera, const Image
     return {};
 }
 
-/// Makes distances of the stored values, and smooths the stairs of coarse ones.
+/// Makes distances of the stored values, and smooths the stairs of coarse ones. `noDepth`: what
+/// pixels without one are; those of nothing are made transparent.
 Result<void> toDistances(const SetView& set, const ImageSetOptions& options, const Camera& camera,
-                         StoredView& stored, Job& job) {
+                         StoredView& stored, NoDepth& noDepth, Job& job) {
     const int bits = stored.depthBits;
     // What we exported ourselves comes back as it was.
     const bool smooth = set.distances && bits < 32 &&
@@ -205,6 +261,7 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, con
                          (options.dequantise == Dequantise::automatic && bits == 8 && !set.planes));
     Image<float> codes = smooth ? stored.depth : Image<float>();
     if (set.distances) STX_CHECK(set.distances(stored.depth, camera, bits, job));
+    noDepth = noDepthOf(set, options, stored);
     dropImpossible(stored.depth);
     if (!smooth) return {};
 
@@ -264,7 +321,7 @@ Distances scaledIntegers(double unit, float alsoNone) {
             // No branch: compilers make vectors of it.
             const auto dist = static_cast<float>(v * unit);
             const bool none = static_cast<int>(v == 0) | static_cast<int>(v == alsoNone);
-            v = none ? kNoDepth : dist;
+            v = none ? 0.0f : dist;
         }
         return {};
     };
@@ -277,10 +334,7 @@ Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone) 
         const bool endless = std::isinf(farthest);
         bool atInfinity = false;
         for (float& v : values.pixels()) {
-            if (v == 0 && zeroIsNone) {
-                v = kNoDepth;
-                continue;
-            }
+            if (v == 0 && zeroIsNone) continue;
             double s = v / largest;
             if (endless && s == 0) {
                 // The nearest distance that has this code.
@@ -323,9 +377,10 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
             camera = camera.resized(dw, dh);
         }
     }
-    STX_CHECK(
-        within(fmt::format("'{}'", set.depth.name),
-               toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored, job)));
+    NoDepth noDepth = NoDepth::empty;
+    STX_CHECK(within(
+        fmt::format("'{}'", set.depth.name),
+        toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored, noDepth, job)));
     if (!anyPoint(stored.depth))
         return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                       "not one of its {}x{} pixels has a valid depth; at least one is needed", dw,
@@ -358,8 +413,9 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
         for (std::size_t i = 0; i < faces.size(); ++i) {
             auto [texture, depth] =
                 faceOfPanorama(stored.texture, stored.depth, faces[i], camera, *set.panorama);
-            STX_TRY(auto view, finish(set, fmt::format("{}_{}", set.name, kFaces[i]), faces[i],
-                                      std::move(texture), std::move(depth), true, options, job));
+            STX_TRY(auto view,
+                    finish(set, fmt::format("{}_{}", set.name, kFaces[i]), faces[i],
+                           std::move(texture), std::move(depth), true, noDepth, options, job));
             if (anyPoint(view.depth)) views.push_back(std::move(view));
         }
         if (views.empty())
@@ -391,7 +447,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
         stored.alpha = true;  // what lies outside the real picture is transparent
     }
     STX_TRY(auto view, finish(set, set.name, camera, std::move(stored.texture),
-                              std::move(stored.depth), stored.alpha, options, job));
+                              std::move(stored.depth), stored.alpha, noDepth, options, job));
     if (!anyPoint(view.depth))
         return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
                       "every pixel with a valid depth is transparent or outside the picture");

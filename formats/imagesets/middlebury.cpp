@@ -23,8 +23,7 @@ auto distancesOf(double baselineTimesFocal, double scale, double offset) {
         for (float& v : values.pixels()) {
             const bool known = bits == 32 ? std::isfinite(v) : v != 0;
             const double disparity = v / scale + offset;
-            v = known && disparity > 0 ? static_cast<float>(baselineTimesFocal / disparity)
-                                       : kNoDepth;
+            v = known && disparity > 0 ? static_cast<float>(baselineTimesFocal / disparity) : 0.0f;
         }
         return {};
     };

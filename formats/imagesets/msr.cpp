@@ -77,7 +77,7 @@ auto distancesOf(Placed placed, double minZ, double maxZ) {
                 const double perUnit = (v.worldFromCamera * ray).z;
                 const double z = msrWorldZ(values.at(x, y), minZ, maxZ);
                 const double dist = (z - v.centre.z) / perUnit;
-                values.at(x, y) = dist > 0 ? static_cast<float>(dist) : kNoDepth;
+                values.at(x, y) = dist > 0 ? static_cast<float>(dist) : 0.0f;
             }
         }
         return {};

@@ -42,8 +42,9 @@ struct StoredView {
     int depthBits = 32;  ///< of the stored values: 8, 16, or 32 for floats
 };
 
-/// Turns stored values into planar distances (panoramas: ray lengths) in scene units, kNoDepth
-/// where unknown. The camera has the size of the image. Stored integers may come with a fraction.
+/// Turns stored values into planar distances (panoramas: ray lengths) in scene units, 0 where not
+/// known, kNoDepth (or 1e9 and more) where nothing is there. The camera has the size of the image.
+/// Stored integers may come with a fraction.
 using Distances =
     std::function<Result<void>(Image<float>& values, const Camera& camera, int bits, Job& job)>;
 
@@ -58,6 +59,8 @@ struct SetView {
     std::optional<Panorama> panorama;  ///< then `camera` has position and orientation only
 
     PictureSource texture, depth;
+    /// A picture of what belongs to the object, as ImageSetOptions::maskPattern; name empty: none.
+    PictureSource mask;
     /// Reads both, for kinds whose images are not files of their own.
     std::function<Result<StoredView>(const SetView&, Job&)> load;
 
@@ -80,6 +83,7 @@ struct SetView {
     std::optional<DepthCode> planes;
     int depthBits = 0;                        ///< with planes: 8, 16, 32
     std::optional<glm::dvec3> localPosition;  ///< of an export of ours that has an origin
+    std::optional<NoDepth> noDepth;           ///< of an export of ours; see ReferenceView::noDepth
     bool pruned = false;                      ///< see ReferenceView::pruned
     bool background = false;                  ///< see ReferenceView::background
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
@@ -106,16 +110,16 @@ struct SetDescription {
                                                              const ImageSetOptions& options,
                                                              Job& job);
 
-/// Distances that are floats in scene units: NaN, infinities, 0, negative and huge values (1e9 and
-/// more, Blender's "nothing") are none.
+/// Distances that are floats in scene units: NaN, 0 and negative values (not known), infinity and
+/// huge values (1e9 and more: nothing is there) are none.
 void dropImpossible(Image<float>& distances);
 
-/// Distances of integers in steps of `unit`; 0 and `alsoNone` are none.
+/// Distances of integers in steps of `unit`; 0 and `alsoNone` are not known.
 [[nodiscard]] Distances scaledIntegers(double unit, float alsoNone = 0);
 
 /// Distances of normalised disparity: s = code / (2^bits - 1), 1 at `nearest` and 0 at `farthest`
-/// (scene units; infinity: 1 / distance from 0). 0 is none where `zeroIsNone`. Floats are distances
-/// already.
+/// (scene units; infinity: 1 / distance from 0). 0 is not known where `zeroIsNone`. Floats are
+/// distances already.
 [[nodiscard]] Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone);
 
 }  // namespace stx::imagesets

@@ -282,6 +282,11 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
                           "'depth_file_path' is missing; each frame needs its depth");
         STX_CHECK(findPictures(folder, textureFile, withImageEnding(folder, *depth), place,
                                job.limits, view));
+        STX_TRY(const auto mask, findText(frames[i], "mask_path", place));
+        if (mask) {
+            STX_TRY(view.mask, sourceInside(folder, *mask, place, job.limits));
+            if (!view.missing) view.missing = view.mask.missing;
+        }
         view.distances = coded ? *coded : distancesOf(unit);
         return {};
     };

@@ -154,6 +154,7 @@ Result<PageScene> pageScene(const Atlas& atlas, Job& job) {
         if (view.depthBits == 32)
             return fail(ErrorCode::invalidInput, "the depth of a page has 8 or 16 bits, not 32");
         Json v = pageCamera(view.camera, view.name);
+        v["noDepth"] = nameOf(view.noDepth);
         v["nearPlane"] = view.nearPlane;
         v["farPlane"] = view.farPlane;
         v["dmax"] = view.depthCode().dmax;

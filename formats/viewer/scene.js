@@ -161,7 +161,9 @@ class Scene {
         const gl = this.gl, views = this.views;
         const width = Math.max(...views.map((v) => v.width)), height = Math.max(...views.map((v) => v.height));
         const most = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(256e6 / (width * height)));
-        const covers = views.slice(0, most).map(() => new Uint8Array(width * height));
+        // Where nothing is known there is no background either.
+        const covers = views.slice(0, most).map((v) =>
+            new Uint8Array(width * height).fill(v.noDepth === "unknown" ? 255 : 0));
         const eachTexel = (visit) => this.rectangles.forEach((r) => {
             for (let j = 0; j < r.height; ++j) {
                 for (let i = 0; i < r.width; ++i) {

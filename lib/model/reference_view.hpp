@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <glm/glm.hpp>
 
@@ -19,6 +21,23 @@ namespace stx {
     return fail(ErrorCode::invalidInput, "depth holds {}; distances are 0 or more", depth);
 }
 
+/// What a pixel without a depth is.
+enum class NoDepth : std::uint8_t {
+    empty,    ///< nothing is there: one sees past all that others put in front
+    unknown,  ///< with full alpha a surface whose distance is not known; with none, nothing
+};
+
+/// "empty" or "unknown".
+[[nodiscard]] inline const char* nameOf(NoDepth noDepth) {
+    return noDepth == NoDepth::unknown ? "unknown" : "empty";
+}
+/// What a name says; none for other names.
+[[nodiscard]] inline std::optional<NoDepth> noDepthNamed(std::string_view name) {
+    for (const NoDepth value : {NoDepth::empty, NoDepth::unknown})
+        if (name == nameOf(value)) return value;
+    return std::nullopt;
+}
+
 /// One reference image of an object: a DepthImage with its SimpleTexture or SimpleTextureV2
 /// (ISO/IEC 14496-16, 4.5.4). All images of a view have the camera's width and height.
 struct ReferenceView {
@@ -29,8 +48,10 @@ struct ReferenceView {
     double farPlane = 100.0;
     /// How the depth is coded in MPEG-4 files: 8 or 16 bits; 32 = float distances, only in .exr.
     int depthBits = 16;
-    /// Pixels of full alpha without a depth were pruned: the object is there, other views give its
-    /// distance. In other views they are what a sensor missed.
+    /// Of a mesh: empty; of a photograph whose depth was measured: mostly unknown.
+    NoDepth noDepth = NoDepth::empty;
+    /// Depth was taken away where other views show the same (see prune()). Those pixels have full
+    /// alpha and are unknown, whatever noDepth says.
     bool pruned = false;
     /// What is behind everything that moves, remembered from other times (TemporalBackground).
     /// Renderers use it only where no other view shows a surface.
@@ -52,6 +73,8 @@ struct ReferenceView {
     [[nodiscard]] bool hasMaterial() const {
         return !metallicRoughness.empty() || !emissive.empty();
     }
+    /// Whether a pixel of full alpha without a depth is a surface whose distance is not known.
+    [[nodiscard]] bool depthMayBeUnknown() const { return pruned || noDepth == NoDepth::unknown; }
     [[nodiscard]] bool hasNormals() const { return !normal.empty(); }
     [[nodiscard]] bool hasSplats() const { return !splatU.empty() && !splatV.empty(); }
 

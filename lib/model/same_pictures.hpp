@@ -13,7 +13,9 @@ namespace stx {
         return x.size() == y.size() &&
                (x.empty() || std::memcmp(x.data(), y.data(), x.count() * sizeof(*x.data())) == 0);
     };
-    if (a.pruned != b.pruned || a.texture.isLinear() != b.texture.isLinear()) return false;
+    if (a.pruned != b.pruned || a.noDepth != b.noDepth ||
+        a.texture.isLinear() != b.texture.isLinear())
+        return false;
     const bool colour = a.texture.isLinear() ? same(*a.texture.rgbaFloat(), *b.texture.rgbaFloat())
                                              : same(*a.texture.rgba8(), *b.texture.rgba8());
     return colour && same(a.depth, b.depth) && same(a.normal, b.normal) &&

@@ -88,6 +88,7 @@ ReferenceView withoutImages(const ReferenceView& view) {
     v.nearPlane = view.nearPlane;
     v.farPlane = view.farPlane;
     v.depthBits = view.depthBits;
+    v.noDepth = view.noDepth;
     v.pruned = view.pruned;
     v.background = view.background;
     return v;
@@ -107,7 +108,7 @@ std::int64_t objectPixels(const ReferenceView& view) {
 /// something, else background.
 void fillOutside(const Atlas& atlas, const Image<std::uint8_t>& given, std::size_t view,
                  Texture& texture) {
-    const auto shown = shownByOthers(atlas, view);
+    const auto shown = outsideBits(atlas, view);
     for (std::size_t i = 0; i < given.count(); ++i) {
         if (given.data()[i] || !(shown[i / 64] >> (i % 64) & 1)) continue;
         if (auto* image = texture.rgba8()) image->data()[i].a = 255;
@@ -219,11 +220,16 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     return atlas;
 }
 
-std::vector<std::uint64_t> shownByOthers(const Atlas& atlas, std::size_t of) {
+std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t of) {
     constexpr int kMostReach = 6;  // pixels
     const Camera& camera = atlas.views[of].camera;
     std::vector<std::uint64_t> bits(
         (static_cast<std::size_t>(camera.width) * camera.height + 63) / 64, 0);
+    // Nothing is known there, wherever others look.
+    if (atlas.views[of].noDepth == NoDepth::unknown) {
+        std::ranges::fill(bits, ~std::uint64_t{0});
+        return bits;
+    }
     const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
     for (const AtlasRectangle& r : atlas.rectangles) {
         if (r.view == static_cast<int>(of)) continue;

@@ -43,9 +43,10 @@ struct PackSettings {
 /// the limit.
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
 
-/// A bit for each pixel of a view, row by row: set where points of other views fall, a little
-/// generously. The object is there even where no rectangle shows it. The atlas must pass check().
-[[nodiscard]] std::vector<std::uint64_t> shownByOthers(const Atlas& atlas, std::size_t view);
+/// A bit for each pixel of a view, row by row: set where the object is, or may be, even where no
+/// rectangle shows it. That is where points of other views fall, a little generously, and
+/// everywhere in a view whose missing depth is unknown. The atlas must pass check().
+[[nodiscard]] std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t view);
 
 /// The bundle of an atlas: every pixel of every rectangle back in its view. Pixels in no rectangle
 /// are coloured from the nearest covered ones and are background (alpha 0). When the atlas lacks

@@ -199,6 +199,12 @@ Result<PoseRefinement> refinePoses(Bundle& bundle, const PoseRefinementSettings&
         }
     }
     result.after = disagreement(bundle, pairs, settings);
+    // Colours that do not fit the depth can draw the poses away from where the depth agrees.
+    result.kept = !(result.after.relative > result.before.relative);
+    if (!result.kept) {
+        for (std::size_t i = 0; i < given.size(); ++i) bundle.views[i].camera = given[i];
+        return result;
+    }
     for (std::size_t i = 0; i < given.size(); ++i) {
         const Camera& now = bundle.views[i].camera;
         result.maxShift = std::max(result.maxShift, glm::length(now.position - given[i].position));

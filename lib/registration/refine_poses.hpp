@@ -30,6 +30,8 @@ struct DepthDisagreement {
 
 struct PoseRefinement {
     DepthDisagreement before, after;
+    /// False: the views would disagree more than before, so all poses stayed as they were.
+    bool kept = true;
     double maxShift = 0;  ///< of a viewpoint, scene units
     double maxTurn = 0;   ///< of an orientation, radians
 };
@@ -42,7 +44,8 @@ struct PoseRefinement {
 /// poses together on both differences, from coarse to fine, robust against what only one view sees
 /// (projective data association as in Newcombe et al., KinectFusion, 2011; colour as in Kerl et
 /// al., Dense visual SLAM, 2013). The correction is the least that does it: views that overlap with
-/// none, and the frame of the whole, stay. Intrinsics and images stay. The same result on any
+/// none, and the frame of the whole, stay. Intrinsics and images stay. Poses that
+/// would make the views disagree more are not kept. The same result on any
 /// number of threads. Errors: cancelled.
 [[nodiscard]] Result<PoseRefinement> refinePoses(Bundle& bundle,
                                                  const PoseRefinementSettings& settings, Job& job);

@@ -91,8 +91,8 @@ bool canRead(Place p, ivec2 pixel) {
 ivec3 texelOf(Place p, int i, int j) { return p.texel + ivec3(i * p.stepX + j * p.stepY, 0); }
 uvec4 surfaceAt(int s, Place p, int i, int j) {
     if (p.texel.z >= 0) return texelFetch(surfaces, texelOf(p, i, j), 0);
-    bool pruned = sources[s].place.w != 0 && (p.outside >> (i + 2 * j) & 1u) != 0u;
-    return uvec4(pruned ? floatBitsToUint(-1.0) : 0u, 0u, 0u, 0u);
+    bool unknown = sources[s].place.w != 0 && (p.outside >> (i + 2 * j) & 1u) != 0u;
+    return uvec4(unknown ? floatBitsToUint(-1.0) : 0u, 0u, 0u, 0u);
 }
 vec4 colourOf(int s, Place p, int i, int j) {
     if (p.texel.z >= 0) return texelFetch(colours, texelOf(p, i, j), 0);

@@ -46,7 +46,7 @@ Outcome unknownDepth(Pictures& pictures) {
     Random random(stage.from.seed * 77 + std::uint64_t(stage.from.number));
     Bundle with = stage.bundle, without = stage.bundle;
     forget(with.views[which], random);
-    with.views[which].pruned = true;
+    with.views[which].noDepth = NoDepth::unknown;
     without.views.erase(without.views.begin() + std::ptrdiff_t(which));
     const Drawn how{pick(pictures, 302, 3) == 0 ? RenderMode::splat : RenderMode::surface};
     STX_TRY(const Frame a, drawBundle(with, stage.novel, how));

@@ -81,8 +81,11 @@ class BundleReader {
                 ReferenceView& view = (*read[i])[layer];
                 const auto pad = notes.paddings.find(plans[i].defName);
                 if (pad != notes.paddings.end()) removePadding(view, pad->second);
-                const auto pruned = notes.pruned.find({plans[i].defName, static_cast<int>(layer)});
-                if (pruned != notes.pruned.end()) markPruned(view, plans[i], pruned->second);
+                const std::pair key{plans[i].defName, static_cast<int>(layer)};
+                if (const auto at = notes.unknown.find(key); at != notes.unknown.end())
+                    if (markUnknown(view, plans[i], at->second)) view.noDepth = NoDepth::unknown;
+                if (const auto at = notes.pruned.find(key); at != notes.pruned.end())
+                    view.pruned = markUnknown(view, plans[i], at->second);
                 view.background =
                     notes.backgrounds.contains({plans[i].defName, static_cast<int>(layer)});
                 applySimilarity(view, plans[i].worldFromLocal);
@@ -112,6 +115,7 @@ class BundleReader {
             all.names.merge(notes.names);
             all.paddings.merge(notes.paddings);
             all.pruned.merge(notes.pruned);
+            all.unknown.merge(notes.unknown);
             all.backgrounds.merge(notes.backgrounds);
             if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
             if (!notes.bounds) continue;
@@ -136,17 +140,17 @@ class BundleReader {
         }
         return all;
     }
-    /// A mask that is damaged costs quality only, so that it is a note.
-    void markPruned(ReferenceView& view, const Plan& plan, const std::string& where) {
-        if (where == kPrunedInAlpha || !options_.pixels) {
-            view.pruned = true;
-            return;
-        }
-        // The list of a PointTexture has no colours for pruned pixels; neighbours' serve.
+    /// Gives a view full alpha where its depth is unknown. A mask that is damaged costs quality
+    /// only, so that it is a note, and false.
+    bool markUnknown(ReferenceView& view, const Plan& plan, const std::string& where) {
+        if (where == kUnknownInAlpha || !options_.pixels) return true;
+        // The list of a PointTexture has no colours for pixels without depth; neighbours' serve.
         if (plan.texture->info->find("depthNbBits") >= 0) bleedColour(view.texture);
-        if (const auto ok = applyPrunedMask(view, where, job_.limits); !ok)
-            job_.note(fmt::format("view '{}': {}; borders of what was pruned may show", view.name,
+        const auto ok = applyUnknownMask(view, where, job_.limits);
+        if (!ok)
+            job_.note(fmt::format("view '{}': {}; borders of what has no depth may show", view.name,
                                   ok.error().text()));
+        return ok.has_value();
     }
 
     /// Says what would change the views in time, besides commands.

@@ -74,10 +74,12 @@ class SceneWriter {
                 if (!images[i + k])
                     return tl::unexpected(images[i + k].error().at(viewName(i + k)));
             children.push_back(depthImage(i, layers, *images[i], notes));
-            for (std::size_t k = 0; k < layers; ++k)
-                if (!images[i + k]->pruned.empty())
-                    notes.pruned[{children.back()->defName, static_cast<int>(k)}] =
-                        std::move(images[i + k]->pruned);
+            for (std::size_t k = 0; k < layers; ++k) {
+                const ReferenceView& view = bundle_.views[i + k];
+                const std::pair key{children.back()->defName, static_cast<int>(k)};
+                if (view.pruned) notes.pruned[key] = images[i + k]->unknown;
+                if (view.noDepth == NoDepth::unknown) notes.unknown[key] = images[i + k]->unknown;
+            }
             for (std::size_t k = 0; k < layers; ++k)
                 if (bundle_.views[i + k].background)
                     notes.backgrounds.emplace(children.back()->defName, static_cast<int>(k));

@@ -260,7 +260,7 @@ class SequenceWriter {
         STX_TRY(images.depth, depthPlane(view.depth, code, images.padding, images.worstDepth));
         bool clamped = false;
         const Rgba8Image colour = rgba8FromTexture(view.texture, clamped);
-        images.coverageLost = !alphaFollowsDepth(colour, view.depth);
+        images.coverageLost = !alphaFollowsDepth(colour, view.depth, view.depthMayBeUnknown());
         images.texture = yuvPlanes(padded(colour, images.padding));
         return images;
     }

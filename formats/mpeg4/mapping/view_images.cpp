@@ -51,6 +51,7 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
                     view.farPlane);
     const DepthCode code{out.nearPlane, out.farPlane,
                          writtenDepthBits(view, options) == 8 ? 255u : 65535u};
+    const bool mayBeUnknown = view.depthMayBeUnknown();
     if (options.pointTexture) {
         for (const float d : view.depth.pixels()) {
             if (!(d >= 0)) return depthError(d);
@@ -59,21 +60,21 @@ Result<ViewImages> encodeView(const ReferenceView& view, const SceneWriteOptions
                     std::max(out.worstDepth, std::abs(code.decode(code.encode(d)) - d));
         }
         const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
-        out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
-        if (view.pruned) {
-            STX_TRY(out.pruned, prunedMask(colour, view.depth));
+        out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
+        if (mayBeUnknown) {
+            STX_TRY(out.unknown, unknownMask(colour, view.depth));
         }
         return out;
     }
     STX_TRY(out.depth, depthPng(view.depth, code, out.padding, out.worstDepth));
     const Rgba8Image colour = rgba8FromTexture(view.texture, out.clamped);
     const bool alpha = !alphaFollowsDepth(colour, view.depth);
-    if (view.pruned) out.pruned = kPrunedInAlpha;
+    if (mayBeUnknown) out.unknown = options.h264 >= 0 ? kUnknownAll : kUnknownInAlpha;
     const Rgba8Image wide = padded(colour, out.padding);
     if (options.texture == SceneWriteOptions::Texture::jpeg) {
-        out.coverageLost = !alphaFollowsDepth(colour, view.depth, view.pruned);
-        if (view.pruned) {
-            STX_TRY(out.pruned, prunedMask(colour, view.depth));
+        out.coverageLost = !alphaFollowsDepth(colour, view.depth, mayBeUnknown);
+        if (mayBeUnknown) {
+            STX_TRY(out.unknown, unknownMask(colour, view.depth));
         }
         STX_TRY(out.texture, colourJpeg(wide, options.jpegQuality));
     } else {

@@ -13,7 +13,7 @@ struct ViewImages {
     float nearPlane = 0, farPlane = 0;
     float longestSplat = 0;  ///< scene units; splatMinMax is (-longestSplat, longestSplat)
     Bytes texture, depth, normal, splatU, splatV;  ///< files; empty where the view has none
-    std::string pruned;                            ///< of a pruned view: what its note says
+    std::string unknown;    ///< where its depth is unknown, if that can be: what its note says
     double worstDepth = 0;  ///< largest error of the depth's code, scene units
     bool clamped = false;   ///< linear colour above 1 was cut
     bool coverageLost = false;

@@ -76,11 +76,12 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             pad.cx = *cx;
             pad.cy = *cy;
             notes.paddings[std::string(w[1])] = pad;
-        } else if (line.starts_with("pruned ")) {
+        } else if (line.starts_with("pruned ") || line.starts_with("unknown ")) {
             const auto w = words(line, 4);
             const auto layer = w.size() == 4 ? integerFromText(w[2]) : std::nullopt;
+            auto& where = w[0] == "pruned" ? notes.pruned : notes.unknown;
             if (layer && *layer >= 0 && *layer <= 1 << 20)
-                notes.pruned[{std::string(w[1]), static_cast<int>(*layer)}] = w[3];
+                where[{std::string(w[1]), static_cast<int>(*layer)}] = w[3];
         } else if (line.starts_with("background ")) {
             const auto w = words(line, 4);
             const auto layer = w.size() == 3 ? integerFromText(w[2]) : std::nullopt;
@@ -105,6 +106,8 @@ std::vector<std::string> ViewNotes::text() const {
                                    pad.right, pad.bottom, pad.cx, pad.cy));
     for (const auto& [key, where] : pruned)
         info.push_back(fmt::format("pruned {} {} {}", key.first, key.second, where));
+    for (const auto& [key, where] : unknown)
+        info.push_back(fmt::format("unknown {} {} {}", key.first, key.second, where));
     for (const auto& [defName, layer] : backgrounds)
         info.push_back(fmt::format("background {} {}", defName, layer));
     return info;
@@ -128,7 +131,11 @@ void removePadding(ReferenceView& view, const ViewNotes::Pad& pad) {
     c.cy = pad.cy;
 }
 
-Result<std::string> prunedMask(const Rgba8Image& texture, const Image<float>& depth) {
+Result<std::string> unknownMask(const Rgba8Image& texture, const Image<float>& depth) {
+    bool all = true;
+    for (std::size_t i = 0; i < texture.count() && all; ++i)
+        all = texture.pixels()[i].a == 255 || hasPoint(depth.pixels()[i]);
+    if (all) return kUnknownAll;
     std::vector<std::uint8_t> grey(texture.count());
     for (std::size_t i = 0; i < grey.size(); ++i)
         grey[i] = texture.pixels()[i].a == 255 && !hasPoint(depth.pixels()[i]) ? 255 : 0;
@@ -136,25 +143,32 @@ Result<std::string> prunedMask(const Rgba8Image& texture, const Image<float>& de
     return encodeBase64(png);
 }
 
-Result<void> applyPrunedMask(ReferenceView& view, const std::string& mask, const Limits& limits) {
+Result<void> applyUnknownMask(ReferenceView& view, const std::string& mask, const Limits& limits) {
+    if (Rgba8Image* texture = view.texture.rgba8(); mask == kUnknownAll && texture) {
+        for (std::size_t i = 0; i < texture->count(); ++i)
+            if (!hasPoint(view.depth.pixels()[i])) texture->pixels()[i].a = 255;
+        return {};
+    }
     const auto png = decodeBase64(mask);
-    if (!png) return fail(ErrorCode::invalidInput, "the mask of its pruned pixels is not base64");
+    if (!png)
+        return fail(ErrorCode::invalidInput,
+                    "the mask of its pixels of unknown depth is not base64");
     STX_TRY(const auto header, probeImage(*png));
     if (header.format != "png" || header.channels != 1 || header.bits != 8 ||
         header.width != view.depth.width() || header.height != view.depth.height())
-        return fail(ErrorCode::invalidInput,
-                    "the mask of its pruned pixels is a {} of {}x{}; a grey PNG of {}x{} is "
-                    "expected",
-                    header.format, header.width, header.height, view.depth.width(),
-                    view.depth.height());
-    STX_TRY(const auto image, decodeImage(*png, "the mask of pruned pixels", limits));
+        return fail(
+            ErrorCode::invalidInput,
+            "the mask of its pixels of unknown depth is a {} of {}x{}; a grey PNG of {}x{} is "
+            "expected",
+            header.format, header.width, header.height, view.depth.width(), view.depth.height());
+    STX_TRY(const auto image, decodeImage(*png, "the mask of pixels of unknown depth", limits));
     const auto* grey = std::get_if<std::vector<std::uint8_t>>(&image.values);
     Rgba8Image* texture = view.texture.rgba8();
     if (!grey || !texture || grey->size() != texture->count())
-        return fail(ErrorCode::invalidInput, "the mask of its pruned pixels does not fit it");
+        return fail(ErrorCode::invalidInput,
+                    "the mask of its pixels of unknown depth does not fit it");
     for (std::size_t i = 0; i < grey->size(); ++i)
         if ((*grey)[i] != 0 && !hasPoint(view.depth.pixels()[i])) texture->pixels()[i].a = 255;
-    view.pruned = true;
     return {};
 }
 

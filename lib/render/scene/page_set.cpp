@@ -46,6 +46,7 @@ PageView viewFrom(const ReferenceView& from) {
     v.nearPlane = from.nearPlane;
     v.farPlane = from.farPlane;
     v.depthBits = from.depthBits;
+    v.noDepth = from.noDepth;
     v.pruned = from.pruned;
     v.background = from.background;
     return v;
@@ -147,7 +148,7 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
         std::vector<std::vector<std::uint64_t>> bits(data->views.size());
         parallelFor(0, static_cast<std::int64_t>(bits.size()), [&](std::int64_t i) {
             const auto view = static_cast<std::size_t>(i);
-            bits[view] = shownByOthers(atlas, view);
+            bits[view] = outsideBits(atlas, view);
         });
         for (std::size_t i = 0; i < bits.size(); ++i) data->index[i].outside = std::move(bits[i]);
     }
@@ -242,6 +243,7 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
     view.nearPlane = from.nearPlane;
     view.farPlane = from.farPlane;
     view.depthBits = from.depthBits;
+    view.noDepth = from.noDepth;
     view.pruned = from.pruned;
     view.background = from.background;
     view.texture = textureOfView(number);

@@ -59,8 +59,9 @@ struct PageView {
     Camera camera;
     double nearPlane = 0, farPlane = 0;  ///< scene units
     int depthBits = 16;
-    bool pruned = false;      ///< see ReferenceView::pruned
-    bool background = false;  ///< see ReferenceView::background
+    NoDepth noDepth = NoDepth::empty;  ///< see ReferenceView::noDepth
+    bool pruned = false;               ///< see ReferenceView::pruned
+    bool background = false;           ///< see ReferenceView::background
     bool hasNormals = false, hasSplats = false;
     /// Its rectangles in PageSet::rectangles().
     std::uint32_t firstRectangle = 0, rectangleCount = 0;
@@ -70,6 +71,8 @@ struct PageView {
     [[nodiscard]] DepthCode depthCode() const {
         return {nearPlane, farPlane, depthBits == 8 ? 255u : 65535u};
     }
+    /// See ReferenceView::depthMayBeUnknown().
+    [[nodiscard]] bool depthMayBeUnknown() const { return pruned || noDepth == NoDepth::unknown; }
 };
 
 /// What renderers draw from: texture pages, rectangles on them, cameras (Lee & Park, section 3.1:

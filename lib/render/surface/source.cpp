@@ -48,12 +48,12 @@ void forEachPixel(const Source& s, const PageRectangle& r, int around, const Vis
 }
 
 Draft draftOf(const Source& s) {
-    const bool pruned = s.view->pruned;
+    const bool unknown = s.view->depthMayBeUnknown();
     Draft d{Image<float>(s.width, s.height, 0.0f), Image<std::uint8_t>(s.width, s.height),
             Image<std::uint8_t>(s.width, s.height, 0)};
     const auto mark = [&](int x, int y, bool covered) {
         d.covered.at(x, y) = covered ? 1 : 0;
-        d.q.at(x, y) = covered && pruned ? -1.0f : 0.0f;
+        d.q.at(x, y) = covered && unknown ? -1.0f : 0.0f;
     };
     const auto rectangles = s.set->rectanglesOf(s.number);
     if (!s.whole) {
@@ -88,13 +88,13 @@ Draft draftOf(const Source& s) {
                                        : PageSet::alphaOf(texture, texel(i)) >= 1.0f;
                 if (axis.inverse && r.stepX == 1) {
                     // 1 / dist in floats is what it is in doubles and rounded then.
-                    invertDistances(depth + first, covered, width, pruned ? -1.0f : 0.0f, q);
+                    invertDistances(depth + first, covered, width, unknown ? -1.0f : 0.0f, q);
                     continue;
                 }
                 for (std::size_t i = 0; i < width; ++i) {
                     const float dist = depth[texel(i)];
                     q[i] = hasPoint(dist) && dist > 0.0f ? static_cast<float>(axis.q(dist))
-                           : covered[i] != 0 && pruned   ? -1.0f
+                           : covered[i] != 0 && unknown  ? -1.0f
                                                          : 0.0f;
                 }
             }

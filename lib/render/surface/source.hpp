@@ -105,7 +105,7 @@ struct Info {
 
 /// What surface mode knows of each texel of a page.
 struct PreparedPage {
-    /// 0 = nothing here; below 0 = pruned: the object is here, other sources give its distance.
+    /// 0 = nothing here; below 0 = unknown: a surface is here, other sources may give its distance.
     Image<float> q;
     Image<std::uint8_t> info;
     const Texture* texture = nullptr;
@@ -180,7 +180,7 @@ struct Source {
     }
     [[nodiscard]] float qAt(const Place& p, int i, int j) const {
         if (p.page) return p.page->q.data()[p.texel(i, j)];
-        return view->pruned && (p.outside >> (i + 2 * j) & 1) ? -1.0f : 0.0f;
+        return view->depthMayBeUnknown() && (p.outside >> (i + 2 * j) & 1) ? -1.0f : 0.0f;
     }
     [[nodiscard]] int infoAt(const Place& p, int i, int j) const {
         return p.page ? p.page->info.data()[p.texel(i, j)] : 0;

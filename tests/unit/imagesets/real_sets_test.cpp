@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/images/images.hpp"
+#include "formats/imagesets/camera_file.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/render/renderer.hpp"
@@ -107,6 +108,38 @@ std::unique_ptr<TemporaryFolder> partOf(const std::filesystem::path& set,
     for (const auto& name : names)
         std::filesystem::copy_file(set / (name + ".png"), *part / (name + ".png"));
     return part;
+}
+
+/// An RGB-D camera that registers its depth to its colour, with none at borders, edges and dark or
+/// shiny parts: the frame between four others. Made transparent, those pixels cost 20 dB.
+TEST(Open3dRgbd, WhatSensorsMissTakesNothingAway) {
+    REQUIRE_SHARED(set, "data/imagesets/open3d-rgbd");
+    Job job;
+    const auto bundle = readImageSet(set / "transforms.json", {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    const auto cameras = readCameraFile(set / "transforms_test.json", job);
+    ASSERT_TRUE(cameras) << cameras.error().text();
+    const Camera& to = cameras->front().camera;
+    const Rgba8Image truth = picture(set / "color/00002.jpg");
+    const auto [naive, covered] = naiveWarp(bundle->views[1], to);
+    for (const RenderMode mode : {RenderMode::surface, RenderMode::splat}) {
+        RenderSettings settings;
+        settings.mode = mode;
+        const auto renderer = makeRenderer(Backend::cpu, *bundle, settings, -1, job);
+        ASSERT_TRUE(renderer);
+        const auto frame = (*renderer)->render(to);
+        ASSERT_TRUE(frame);
+        Rgba8Image out(to.width, to.height);
+        for (std::size_t i = 0; i < out.count(); ++i)
+            out.data()[i] =
+                glm::u8vec4(glm::clamp(frame->colour.data()[i], 0.0f, 1.0f) * 255.0f + 0.5f);
+        CompareSettings comparing;
+        comparing.mask = &covered;
+        const auto result = compare(opaque(out), truth, comparing);
+        ASSERT_TRUE(result);
+        std::printf("open3d-rgbd: %.2f dB of Y\n", *result->psnrY);
+        EXPECT_GE(*result->psnrY, 36.3);
+    }
 }
 
 TEST(IclNuim, NeighboursAreDrawnBetterThanByTheNaiveWarp) {

@@ -216,10 +216,8 @@ TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
         int checked = 0, unknown = 0;
         for (int y = 0; y < 64; ++y)
             for (int x = 0; x < 96; ++x) {
-                if (v.texture.at(x, y).a < 1) {
-                    ++unknown;
-                    continue;
-                }
+                unknown += hasPoint(v.depth.at(x, y)) ? 0 : 1;
+                if (v.texture.at(x, y).a < 1) continue;
                 const auto at =
                     distorted({x + 0.5, y + 0.5}, m.f, {50, 30}, m.k1, m.k2, m.p1, m.p2);
                 // Beyond the outermost pixel centres there is nothing to interpolate between.

@@ -174,3 +174,27 @@ TEST(RefinePoses, CancelledIsAnError) {
 }
 
 }  // namespace
+
+/// Colour from a second camera beside the one of the depth fits no pose of it.
+TEST(RefinePoses, WhatWouldBeWorseIsNotKept) {
+    Bundle bundle = wall();
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        const Rgba8Image colour = *bundle.views[i].texture.rgba8();
+        Rgba8Image& moved = *bundle.views[i].texture.rgba8();
+        const int shift = i % 2 ? 4 : -4;
+        for (int y = 0; y < colour.height(); ++y)
+            for (int x = 0; x < colour.width(); ++x)
+                moved.at(x, y) = colour.at(std::clamp(x + shift, 0, colour.width() - 1), y);
+    }
+    const Bundle given = bundle;
+    Job job;
+    const auto done = refinePoses(bundle, {}, job);
+    ASSERT_TRUE(done);
+    EXPECT_GT(done->after.relative, done->before.relative) << "the case is of no use";
+    EXPECT_FALSE(done->kept);
+    for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+        EXPECT_EQ(bundle.views[i].camera.position, given.views[i].camera.position);
+        EXPECT_EQ(bundle.views[i].camera.orientation, given.views[i].camera.orientation);
+    }
+    EXPECT_LE(measureDepthDisagreement(bundle).relative, done->before.relative * (1 + 1e-9));
+}

@@ -1,12 +1,14 @@
-// The mark of pruned views ("full alpha without a depth: the object is here, another view gives its
-// distance") in every container that a bundle can be written to.
+// Pixels of full alpha without a depth (pruned, or of unknown depth) in every container that a
+// bundle can be written to.
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/save.hpp"
+#include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
 #include "lib/quality/view_quality.hpp"
 #include "tests/temporary_folder.hpp"
@@ -100,6 +102,77 @@ TEST(Pruned, ComesBackFromEveryContainer) {
     }
 }
 
+/// Opaque photographs whose sensors missed some pixels; one has a hole that is empty, too.
+Bundle photographs(bool someEmpty) {
+    Bundle bundle = torusViews(48);
+    for (ReferenceView& view : bundle.views) {
+        view.noDepth = NoDepth::unknown;
+        int x = 0;
+        for (std::size_t i = 0; i < view.depth.count(); ++i) {
+            auto& pixel = view.texture.rgba8()->pixels()[i];
+            const bool point = hasPoint(view.depth.pixels()[i]);
+            if (!point) pixel = glm::u8vec4(90, 120, 30, 255);
+            if (someEmpty && !point && ++x % 2) pixel.a = 0;
+            if (point) pixel.a = 255;
+        }
+    }
+    bundle.views[1].noDepth = NoDepth::empty;
+    for (std::size_t i = 0; i < bundle.views[1].depth.count(); ++i)
+        if (!hasPoint(bundle.views[1].depth.pixels()[i]))
+            bundle.views[1].texture.rgba8()->pixels()[i].a = 0;
+    return bundle;
+}
+
+TEST(UnknownDepth, ComesBackFromEveryContainer) {
+    SaveOptions plain, jpeg, points;
+    jpeg.jpegQuality = 90;
+    points.pointTexture = true;
+    for (const bool someEmpty : {false, true}) {
+        const Bundle bundle = photographs(someEmpty);
+        const TemporaryFolder folder;
+        for (const auto& [name, options] : {std::pair<const char*, SaveOptions>{"a.exr", plain},
+                                            {"a.mp4", plain},
+                                            {"jpeg.mp4", jpeg},
+                                            {"points.mp4", points},
+                                            {"a.bt", plain},
+                                            {"jpeg.xmt", jpeg},
+                                            {"transforms", plain},
+                                            {"miv", plain},
+                                            {"atlas", plain}}) {
+            SCOPED_TRACE(fmt::format("{}, {}", name, someEmpty));
+            const auto path = folder / name;
+            Job job;
+            if (path.has_extension()) {
+                const auto saved = saveBundle(bundle, path, options, job);
+                ASSERT_TRUE(saved) << saved.error().text();
+            } else if (path.filename() == "atlas") {
+                const auto atlas = pack(bundle, {}, job);
+                ASSERT_TRUE(atlas);
+                ASSERT_TRUE(writeAtlas(*atlas, path, job));
+            } else {
+                ExportOptions how;
+                if (path.filename() == "miv") how.kind = ExportOptions::Kind::miv;
+                ASSERT_TRUE(exportImages(bundle, path, how, job));
+            }
+            auto back = path.filename() == "atlas"
+                            ? readAtlas(path, job).and_then(
+                                  [&](const Atlas& atlas) { return unpack(atlas, job); })
+                            : openBundle(path, {}, job);
+            ASSERT_TRUE(back) << back.error().text();
+            ASSERT_EQ(back->views.size(), bundle.views.size());
+            for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+                const ReferenceView &was = bundle.views[i], &now = back->views[i];
+                EXPECT_EQ(now.noDepth, was.noDepth) << i;
+                EXPECT_FALSE(now.pruned);
+                int wrong = 0;
+                for (std::size_t k = 0; k < was.depth.count(); ++k)
+                    wrong += now.texture.at(k).a != was.texture.at(k).a ? 1 : 0;
+                EXPECT_EQ(wrong, 0) << i;
+            }
+        }
+    }
+}
+
 TEST(Pruned, OtherViewsGetNoMark) {
     const Bundle bundle = torusViews(48);
     const TemporaryFolder folder;
@@ -137,7 +210,7 @@ TEST(Pruned, ADamagedMaskIsANote) {
 TEST(Pruned, MasksWithChangedBytesCostNothingButTheMark) {
     const Bundle bundle = prunedTorus();
     ReferenceView view = bundle.views[0];
-    const auto mask = mpeg4::prunedMask(*view.texture.rgba8(), view.depth);
+    const auto mask = mpeg4::unknownMask(*view.texture.rgba8(), view.depth);
     ASSERT_TRUE(mask);
     std::mt19937 random(3);
     int applied = 0;
@@ -147,9 +220,7 @@ TEST(Pruned, MasksWithChangedBytesCostNothingButTheMark) {
             changed[random() % changed.size()] = static_cast<char>(random() % 128);
         if (i % 4 == 0) changed.resize(random() % changed.size());
         ReferenceView marked = view;
-        marked.pruned = false;
-        if (!mpeg4::applyPrunedMask(marked, changed, Limits())) {
-            EXPECT_FALSE(marked.pruned);
+        if (!mpeg4::applyUnknownMask(marked, changed, Limits())) {
             EXPECT_EQ(marked.texture, view.texture);
         } else {
             ++applied;

@@ -104,7 +104,7 @@ PlaceTable::PlaceTable(const surface::SurfaceScene& scene) {
     const auto put = [&](int value) { words.push_back(static_cast<std::uint32_t>(value)); };
     for (const Source& s : scene.sources) {
         glm::ivec4 place(s.whole ? static_cast<int>(s.whole - scene.pages.data()) : -1, 0, -1,
-                         s.view->pruned ? 1 : 0);
+                         s.view->depthMayBeUnknown() ? 1 : 0);
         if (!s.whole) {
             const auto firstWord = static_cast<int>(words.size());
             for (const PageRectangle& r : set.rectanglesOf(s.number)) {
