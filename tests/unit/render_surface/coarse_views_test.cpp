@@ -1,5 +1,6 @@
 // A ball from coarse views against the mesh itself: no quality leaves out what another covers, and
 // close by surfaces are as good as splats.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -9,6 +10,7 @@
 #include "lib/geometry/view_layout.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
+#include "lib/render/surface/source.hpp"
 
 namespace stx {
 namespace {
@@ -100,6 +102,46 @@ INSTANTIATE_TEST_SUITE_P(Kinds, CoarseViews,
                          testing::Values(Coarse{"octahedral", "octahedral:4", 48},
                                          Coarse{"hemiOctahedral", "hemi-octahedral:4", 64}),
                          [](const auto& coarse) { return std::string(coarse.param.name); });
+
+// Where links were shares of the distance for any size of pixels, a third of these were none.
+TEST(CoarseViews, OneSurfaceIsLinked) {
+    const Bundle bundle = viewsOf(ball(), "ring:3", 32, false);
+    const PageSet set(bundle);
+    const surface::SurfaceScene scene(set);
+    const surface::Source& s = scene.sources[0];
+    int pairs = 0, linked = 0;
+    for (int y = 0; y < s.height; ++y) {
+        for (int x = 0; x + 1 < s.width; ++x) {
+            // Within 60 degrees of the middle of the ball, whose radius is some 14 pixels.
+            if (std::hypot(x + 1.0 - 16, y + 0.5 - 16) > 12) continue;
+            ++pairs;
+            linked += s.infoAt(s.placeOf(x, y), 0, 0) & surface::Info::kLinkRight ? 1 : 0;
+        }
+    }
+    EXPECT_EQ(linked, pairs);
+}
+
+// An orthographic camera has pixels for what is behind it, too, but does not see that.
+TEST(CoarseViews, WhatIsBehindAnOrthographicCameraIsNotFree) {
+    const Mesh mesh = ball();
+    Bundle bundle = viewsOf(mesh, "ring:3", 48, true);
+    const Camera camera = cameraAt(mesh, 40, 100);
+    const auto draw = [&] {
+        Job job;
+        const auto renderer = makeRenderer(Backend::cpu, bundle, {}, -1, job);
+        EXPECT_TRUE(renderer);
+        return *(*renderer)->render(camera);
+    };
+    const Frame before = draw();
+    // It turns its back to the ball and sees nothing.
+    ReferenceView away = bundle.views[0];
+    away.name = "away";
+    away.camera.orientation = away.camera.orientation * glm::dquat(0, 0, 1, 0);
+    std::ranges::fill(away.depth.pixels(), kNoDepth);
+    std::ranges::fill(away.texture.rgba8()->pixels(), glm::u8vec4(0));
+    bundle.views.push_back(std::move(away));
+    EXPECT_EQ(draw().colour, before.colour);
+}
 
 /// Mean squared difference of the colours of two frames.
 double difference(const Frame& a, const Frame& b) {
