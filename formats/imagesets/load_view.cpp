@@ -88,8 +88,9 @@ bool clearNothing(StoredView& stored) {
                 const auto in = [](int at, int size, int of) {
                     return static_cast<int>(static_cast<std::int64_t>(at) * of / size);
                 };
-                if (nothing(depth.at(in(x, image.width(), depth.width()),
-                                     in(y, image.height(), depth.height()))))
+                // Pixels that are covered in part are the silhouette of points beside them.
+                if (alpha == full && nothing(depth.at(in(x, image.width(), depth.width()),
+                                                      in(y, image.height(), depth.height()))))
                     alpha = 0;
             }
         }
