@@ -163,7 +163,8 @@ Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
 void addTime(Json& out, const Timeline& timeline) {
     if (!timeline.moves()) return;
     out["frames"] = timeline.count();
-    out["duration"] = timeline.duration;
+    if (timeline.start() != 0) out["start"] = timeline.start();
+    out["duration"] = timeline.duration();
     if (const double rate = timeline.rate(); rate > 0) out["rate"] = rate;
 }
 
@@ -404,7 +405,10 @@ std::string describeAsText(const Json& info) {
             out += fmt::format("{}: {}\n", key, text(info[key]));
     }
     if (info.contains("duration"))
-        out += fmt::format("duration: {:.6g} s{}\n", info["duration"].get<double>(),
+        out += fmt::format("duration: {:.6g} s{}{}\n", info["duration"].get<double>(),
+                           info.contains("start")
+                               ? fmt::format(" from {:.12g} s", info["start"].get<double>())
+                               : "",
                            info.contains("rate")
                                ? fmt::format(", {:.6g} frames a second", info["rate"].get<double>())
                                : "");

@@ -31,7 +31,7 @@ class NumberedSequence : public Sequence {
     Result<Bundle> frame(std::size_t index, Job& job) override {
         const auto& path = files_[index].path;
         STX_TRY(auto bundle, atlases_ ? openBundle(path, {}, job) : readExrBundle(path, job));
-        bundle.time = timeline_.times[index];
+        setTime(bundle, index);
         return bundle;
     }
 
@@ -40,13 +40,17 @@ class NumberedSequence : public Sequence {
     bool atlases_;
 };
 
-Result<std::optional<double>> timeOf(const fs::path& path, bool atlas, const Limits& limits) {
+/// When a file's moment is, and how long it is shown, where it tells.
+struct Shown {
+    std::optional<double> time, duration;
+};
+Result<Shown> shownOf(const fs::path& path, bool atlas, const Limits& limits) {
     if (!atlas) {
         STX_TRY(const auto header, readExrBundleHeader(path, limits));
-        return header.time;
+        return Shown{header.time, header.duration};
     }
     STX_TRY(const auto header, readAtlasHeader(path, limits));
-    return header.atlas.time;
+    return Shown{header.atlas.time, header.atlas.duration};
 }
 
 Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> files,
@@ -56,10 +60,13 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> files,
     Timeline line;
     line.times.clear();
     std::vector<double> told;
+    std::optional<double> last;
     for (const NumberedFile& file : files) {
         STX_CHECK(job.checkCancelled());
-        STX_TRY(const auto time, timeOf(file.path, atlases, job.limits));
+        STX_TRY(const auto shown, shownOf(file.path, atlases, job.limits));
+        const auto& time = shown.time;
         if (!time) break;
+        last = shown.duration;
         if (!told.empty() && !(*time > told.back()))
             return failAt(fmt::format("'{}'", file.path.string()), ErrorCode::invalidInput,
                           "its time is {:g} s, but the file before it is of {:g} s", *time,
@@ -67,16 +74,21 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> files,
         told.push_back(*time);
     }
     if (told.size() == files.size()) {
-        for (const double time : told) line.times.push_back(time - told.front());
+        line.times = std::move(told);
     } else {
+        last.reset();
         for (const NumberedFile& file : files)
             line.times.push_back(static_cast<double>(file.number - files.front().number) /
                                  kUsualRate);
         job.note(fmt::format("the files of '{}' do not all tell their time: {} frames a second",
                              pattern.string(), kUsualRate));
     }
-    if (line.moves()) line.duration = 2 * line.times.back() - line.times[line.count() - 2];
-    // Times far apart or near each other may not be so when they are counted from the first.
+    line.end = line.times.back();
+    if (last)
+        line.end += *last;
+    else if (line.moves())
+        line.end += line.times.back() - line.times[line.count() - 2];
+    line.findTick();
     if (const auto sound = line.check(); !sound)
         return tl::unexpected(sound.error().at(fmt::format("'{}'", pattern.string())));
     return std::make_unique<NumberedSequence>(std::move(files), atlases, std::move(line));

@@ -217,7 +217,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
         sizes = fmt::format(", {} {}x{}", counted(done->views, "view"), done->size.x, done->size.y);
     if (timeline.moves())
         sizes += fmt::format(", {} over {:.4g} s", counted(timeline.count(), "frame"),
-                             timeline.duration);
+                             timeline.duration());
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
@@ -230,7 +230,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                                  {"bytes", bytesOf(target)}, {"seconds", seconds}};
     if (timeline.moves()) {
         entry["frames"] = timeline.count();
-        entry["duration"] = timeline.duration;
+        entry["duration"] = timeline.duration();
     }
     return entry;
 }

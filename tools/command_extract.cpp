@@ -88,7 +88,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
     const Timeline timeline = frames->timeline();
     STX_TRY(const std::size_t moment,
-            momentOf(o.time, timeline, points ? "points are" : nullptr, o.input));
+            momentOf(o.time, timeline, points ? "points are" : nullptr, o.input, program.job));
     std::string what;
     std::size_t views = 0;
     std::int64_t pointCount = 0;
@@ -173,7 +173,7 @@ void addExtract(CommandLine& line, Program& program) {
     c.option("--depth", o->depth,
              "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
         .oneOf({"exr", "png"});
-    c.option("--time", o->time, "Of a film: the moment, in seconds from its start (default: all)")
+    c.option("--time", o->time, "Of a film: the moment, in seconds by its own clock (default: all)")
         .takes("T");
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);

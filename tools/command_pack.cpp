@@ -184,8 +184,8 @@ Result<int> packInput(const PackOptions& options, Program& program) {
                         "'{}' has {} frames, and an atlas holds one; give --time T, in seconds, or "
                         "a numbered name for one atlas each, as in -o 'atlas_%04d'",
                         o.input, count);
-        return packBundle(o, frames->frame(timeline.frameAt(o.time.value_or(0)), program.job),
-                          nullptr, program);
+        STX_TRY(const auto moment, momentOf(o.time, timeline, nullptr, o.input, program.job));
+        return packBundle(o, frames->frame(moment, program.job), nullptr, program);
     }
     if (!program.common.report.empty() && count > 1)
         return fail(ErrorCode::usage,
@@ -215,7 +215,7 @@ void addPack(CommandLine& line, Program& program) {
     c.option("-o,--output", o->output, "Folder, or one .exr file; of a film a numbered name")
         .required()
         .takes("ATLAS");
-    c.option("--time", o->time, "Of a film: the moment to pack, in seconds from its start")
+    c.option("--time", o->time, "Of a film: the moment to pack, in seconds by its own clock")
         .takes("T");
     c.option("--period", o->period,
              "Of a film: so many frames have the same rectangles, and what pruning keeps in one of "

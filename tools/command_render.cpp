@@ -242,11 +242,17 @@ Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnS
                                             Program& program) {
     STX_TRY(auto cameras, makeCameras(o.camera, scene.context, program));
     if (!scene.moving) return cameras;
+    const auto noted = [&](std::vector<NovelCamera> pictures) {
+        std::vector<double> times;
+        for (const NovelCamera& picture : pictures) times.push_back(*picture.time);
+        noteOutside(times, scene.moving->timeline(), program.job);
+        return pictures;
+    };
     const bool timed =
         std::ranges::all_of(cameras, [](const auto& c) { return c.time.has_value(); });
     // `--times cameras`: a file of cameras may say when.
     if (o.time.times == "cameras") {
-        if (timed) return cameras;
+        if (timed) return noted(std::move(cameras));
         return fail(ErrorCode::usage, "--times cameras: the cameras have no times of their own");
     }
     STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
@@ -260,23 +266,13 @@ Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnS
         pictures.push_back(cameras[cameras.size() == 1 ? 0 : i]);
         pictures.back().time = times[times.size() == 1 ? 0 : i];
     }
-    return pictures;
+    return noted(std::move(pictures));
 }
 
 /// The camera of a reference view, which may move, in a picture as large as `picture`.
 Camera ofView(const std::vector<Camera>& views, const RenderOptions& o, const Camera& picture) {
     return inPicture(views[static_cast<std::size_t>(o.camera.view)],
                      glm::ivec2(picture.width, picture.height));
-}
-
-/// A rate as the nearest fraction that films have.
-std::pair<int, int> rateOf(double rate) {
-    for (const int denominator : {1, 1001, 1000}) {
-        const double numerator = rate * denominator;
-        if (std::abs(numerator - std::round(numerator)) < 1e-4 * numerator)
-            return {static_cast<int>(std::round(numerator)), denominator};
-    }
-    return {static_cast<int>(std::round(rate * 1000)), 1000};
 }
 
 /// Lights by an environment: the one that is shown, else the model's own.
@@ -367,9 +363,9 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
         STX_CHECK(program.job.limits.checkAllocation(
             static_cast<std::uint64_t>(camera.width) * camera.height, 64, "the picture"));
     }
-    if (scene.moving && o.framesPerSecond.empty())
-        if (const double rate = scene.moving->timeline().rate(); rate > 0 && o.time.times == "all")
-            writing.rate = rateOf(rate);
+    if (scene.moving && scene.moving->timeline().moves() && o.output == "-" &&
+        o.framesPerSecond.empty() && o.time.times == "all")
+        writing.rate = streamRateOf(scene.moving->timeline(), program.job);
     if (!scene.moving) {
         STX_TRY(scene.still,
                 rendererOf(std::move(scene.model), settings, program.job, o.backend, o.device));
@@ -476,7 +472,8 @@ void addRender(CommandLine& line, Program& program) {
                    "camera is)")
         .group("Camera");
     c.option("--time", o->time.time,
-             "The moment of an input that moves, in seconds from its start (default 0)")
+             "The moment of an input that moves, in seconds by its own clock, which stx info "
+             "tells (default: its first)")
         .takes("T")
         .group("Time");
     c.option(

@@ -124,9 +124,7 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
     if (timeline.moves()) {
         bundle = {};
         frames = changed(std::move(frames), [&](Bundle& frame, Job&) -> Result<void> {
-            const auto time = frame.time;
             frame = keepViews(frame, selection.views);
-            frame.time = time;
             return {};
         });
         STX_CHECK(saveSequence(*frames, o.output, save, program.job));

@@ -48,7 +48,8 @@ Result<Shown> writePage(const std::string& input, const std::string& output, Pro
 Result<Shown> writeModel(const std::string& input, const std::string& output,
                          const std::optional<double>& time, Program& program) {
     STX_TRY(const auto frames, openSequence(input, {}, program.job));
-    STX_TRY(const auto moment, momentOf(time, frames->timeline(), "a model is", input));
+    STX_TRY(const auto moment,
+            momentOf(time, frames->timeline(), "a model is", input, program.job));
     STX_TRY(auto bundle, frames->frame(moment, program.job));
     Shown out{"", bundle.views.size(), bundle.pointCount()};
     STX_TRY(const auto report,

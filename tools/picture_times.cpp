@@ -9,7 +9,7 @@ namespace stx::tools {
 namespace {
 
 constexpr double kMostPictures = 1e6;
-constexpr double kSameTime = 1e-9;  ///< seconds: sums of steps
+constexpr double kWholeSteps = 1e-9;  ///< of a step: what a division of two times loses
 
 Result<std::vector<double>> parseTimes(const std::string& text) {
     std::vector<double> numbers;
@@ -21,30 +21,57 @@ Result<std::vector<double>> parseTimes(const std::string& text) {
         numbers.push_back((*number)[0]);
         from = colon + 1;
     }
-    const bool fine = from > text.size() && numbers.size() >= 2 && numbers[0] >= 0 &&
-                      numbers[1] >= numbers[0] && (numbers.size() < 3 || numbers[2] > 0);
+    const bool fine = from > text.size() && numbers.size() >= 2 && numbers[1] >= numbers[0] &&
+                      (numbers.size() < 3 || numbers[2] > 0);
     if (fine) return numbers;
     return fail(ErrorCode::usage,
-                "--times is '{}'; all, or A:B or A:B:STEP in seconds with 0 <= A <= B and STEP "
-                "above 0 is expected",
+                "--times is '{}'; all, or A:B or A:B:STEP in seconds with A <= B and STEP above "
+                "0 is expected",
                 text);
+}
+
+/// A rate as the nearest fraction that films have.
+std::pair<int, int> rateOf(double rate) {
+    for (const int denominator : {1, 1001, 1000}) {
+        const double numerator = rate * denominator;
+        if (std::abs(numerator - std::round(numerator)) < 1e-4 * numerator)
+            return {static_cast<int>(std::round(numerator)), denominator};
+    }
+    return {static_cast<int>(std::clamp(std::round(rate * 1000), 1.0, 1e6)), 1000};
 }
 
 }  // namespace
 
 Result<void> checkTime(const std::optional<double>& time) {
-    if (!time || (*time >= 0 && std::isfinite(*time))) return {};
-    return fail(ErrorCode::usage, "--time is {}; 0 s or more is expected", *time);
+    if (!time || std::isfinite(*time)) return {};
+    return fail(ErrorCode::usage, "--time is {}; a finite number of seconds is expected", *time);
 }
 
 Result<std::size_t> momentOf(const std::optional<double>& time, const Timeline& timeline,
-                             const char* whatIs, const std::string& input) {
+                             const char* whatIs, const std::string& input, Job& job) {
     STX_CHECK(checkTime(time));
     if (whatIs && !time && timeline.moves())
         return fail(ErrorCode::usage,
                     "'{}' has {} frames, and {} of one moment; give --time T, in seconds", input,
                     timeline.count(), whatIs);
-    return timeline.frameAt(time.value_or(0));
+    if (!time) return std::size_t{0};
+    noteOutside({*time}, timeline, job);
+    return timeline.frameAt(*time);
+}
+
+void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job& job) {
+    if (!timeline.moves()) return;
+    const auto outside = static_cast<std::size_t>(
+        std::ranges::count_if(times, [&](double time) { return timeline.outside(time); }));
+    if (outside == 0) return;
+    job.note(fmt::format(
+        "{} outside the film, which is from {:.12g} to {:.12g} s by its own clock: the frame "
+        "nearest "
+        "in time is shown",
+        times.size() == 1
+            ? fmt::format("the time {:.12g} s is", times[0])
+            : fmt::format("{} of {} times {}", outside, times.size(), outside == 1 ? "is" : "are"),
+        timeline.start(), timeline.end));
 }
 
 Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeline) {
@@ -57,12 +84,13 @@ Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeli
     std::vector<double> times;
     if (numbers.size() == 2) {
         for (const double time : timeline.times)
-            if (time >= numbers[0] - kSameTime && time <= numbers[1] + kSameTime)
+            if (time >= numbers[0] - timeline.slack(time) &&
+                time <= numbers[1] + timeline.slack(time))
                 times.push_back(time);
         if (times.empty())
             return fail(ErrorCode::usage,
-                        "--times is '{}', but no frame begins between; they begin between {:g} and "
-                        "{:g} s (A:B:STEP takes what is shown then)",
+                        "--times is '{}', but no frame begins between; they begin between {:.12g} "
+                        "and {:.12g} s (A:B:STEP takes what is shown then)",
                         o.times, timeline.times.front(), timeline.times.back());
         return times;
     }
@@ -70,10 +98,27 @@ Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeli
         return fail(ErrorCode::usage, "--times is '{}', which are more than {:g} pictures", o.times,
                     kMostPictures);
     const auto steps =
-        static_cast<std::int64_t>(std::floor((numbers[1] - numbers[0]) / numbers[2] + kSameTime));
+        static_cast<std::int64_t>(std::floor((numbers[1] - numbers[0]) / numbers[2] + kWholeSteps));
     for (std::int64_t i = 0; i <= steps; ++i)
         times.push_back(numbers[0] + static_cast<double>(i) * numbers[2]);
     return times;
+}
+
+std::pair<int, int> streamRateOf(const Timeline& line, Job& job) {
+    if (const double rate = line.rate(); rate > 0) return rateOf(rate);
+    const double mean =
+        static_cast<double>(line.count() - 1) / (line.times.back() - line.times.front());
+    double shortest = mean > 0 ? 1 / mean : 0, longest = shortest;
+    for (std::size_t i = 0; i + 1 < line.count(); ++i) {
+        shortest = std::min(shortest, line.durationOf(i));
+        longest = std::max(longest, line.durationOf(i));
+    }
+    const auto written = rateOf(mean);
+    job.note(
+        fmt::format("frames of the film last {:.4g} to {:.4g} s, and a stream has one rate: "
+                    "the mean, {:.6g} frames a second, is written; --fps gives another",
+                    shortest, longest, static_cast<double>(written.first) / written.second));
+    return written;
 }
 
 MovingPictures::MovingPictures(std::unique_ptr<Sequence> frames, RenderSettings settings,

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "formats/stx/stx.hpp"
@@ -13,26 +14,33 @@ namespace stx::tools {
 
 /// When the pictures of `stx render` are taken, as the command line says it.
 struct TimeOptions {
-    std::optional<double> time;  ///< seconds
-    std::string times;           ///< "A:B[:STEP]" in seconds, "all", or "cameras"
+    std::optional<double> time;  ///< seconds by the input's clock
+    std::string times;           ///< "A:B[:STEP]" in such seconds, "all", or "cameras"
 
     [[nodiscard]] bool any() const { return time.has_value() || !times.empty(); }
 };
 
-/// Errors (usage): a time before the start, or none at all (NaN).
+/// Errors (usage): a time that is none (NaN, infinity).
 [[nodiscard]] Result<void> checkTime(const std::optional<double>& time);
-/// The frame of --time, the first where it is not given. Errors (usage): a time before the start;
-/// none of a film for what is of one moment only: `whatIs`, as in "points are", else null.
+/// The frame of --time, the first where it is not given; a time outside the film is noted. Errors
+/// (usage): as checkTime(); none of a film for what is of one moment only: `whatIs`, as in "points
+/// are", else null.
 [[nodiscard]] Result<std::size_t> momentOf(const std::optional<double>& time,
                                            const Timeline& timeline, const char* whatIs,
-                                           const std::string& input);
+                                           const std::string& input, Job& job);
+/// Notes how many of the times are outside a film, and when it is.
+void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job& job);
 
 /// The times that are asked for, ascending; at least one. `all` (and `cameras`, whose
 /// times are elsewhere): every frame; A:B without STEP:
 /// every frame from A to B; with it: A, A + STEP, … up to B. Errors (usage): a text of another
-/// form, negative times, a step of 0 or less, more than a million pictures, no frame between.
+/// form, a step of 0 or less, more than a million pictures, no frame between.
 [[nodiscard]] Result<std::vector<double>> timesOf(const TimeOptions& options,
                                                   const Timeline& timeline);
+
+/// The rate of a stream of all frames, as a fraction. A stream has one rate: where frames do not
+/// last equally long it is the mean, with a note.
+[[nodiscard]] std::pair<int, int> streamRateOf(const Timeline& line, Job& job);
 
 /// Renderers of the frames of a sequence, one after another; the next frame is read while one is
 /// drawn.

@@ -57,6 +57,7 @@ AtlasHeader headerOf(const Atlas& atlas, bool inOneExr, bool jpeg = false) {
     a.title = atlas.title;
     if (atlas.environment && !inOneExr) header.environmentFile = kEnvironmentFile;
     a.time = atlas.time;
+    a.duration = atlas.duration;
     a.sourcePixels = atlas.sourcePixels;
     a.keptPixels = atlas.keptPixels;
     header.pages = static_cast<int>(atlas.pages.size());

@@ -328,6 +328,7 @@ std::string atlasJson(const AtlasHeader& header) {
     if (atlas.origin != glm::dvec3(0.0)) top["origin"] = arrayOf(atlas.origin);
     if (!header.environmentFile.empty()) top["environment"] = header.environmentFile;
     if (atlas.time) top["time"] = *atlas.time;
+    if (atlas.duration) top["duration"] = *atlas.duration;
     top["pixels"] = {{"source", atlas.sourcePixels}, {"kept", atlas.keptPixels}};
     std::string text = "{\n";
     for (const auto& [key, value] : top.items())
@@ -380,6 +381,10 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     if (json.contains("environment"))
         STX_CHECK(top.text("environment", header.environmentFile, false));
     if (top.has("time")) STX_CHECK(top.finite("time", atlas.time.emplace()));
+    if (top.has("duration"))
+        STX_CHECK(top.number("duration", atlas.duration.emplace(),
+                             std::numeric_limits<double>::min(),
+                             std::numeric_limits<double>::max()));
     if (const auto pixels = top.object("pixels")) {
         STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));
         STX_CHECK(pixels->number("kept", atlas.keptPixels, 0, 1e15));

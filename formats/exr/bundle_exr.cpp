@@ -19,7 +19,8 @@
 //   part 0:    stx:version (int) · stx:kind ("bundle") · stx:colour ("sRGB8" or "linear") ·
 //              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d) · stx:origin (v3d; where it
 //              is not 0: added to positions and bounds, gives the world's) · stx:time (double,
-//              seconds; of a frame of a sequence)
+//              seconds by the sequence's clock; of a frame of a sequence) · stx:duration (double,
+//              seconds that it is shown)
 //   A view's further channels: surface.metallic, surface.roughness; emissive.R to emissive.B
 //   the last:  the environment, where there is one: environment_exr.hpp
 namespace stx {
@@ -124,6 +125,7 @@ Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
     if (!bundle.title.empty()) first["stx:title"] = bundle.title;
     if (bundle.origin != glm::dvec3(0.0)) first["stx:origin"] = bundle.origin;
     if (bundle.time) first["stx:time"] = *bundle.time;
+    if (bundle.duration) first["stx:duration"] = *bundle.duration;
     const Bounds bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
     if (!bounds.empty()) {
         first["stx:boundsMin"] = bounds.min;
@@ -324,6 +326,9 @@ Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
         header.origin = *origin;
     if (const auto* time = first.attribute<double>("stx:time"); time && std::isfinite(*time))
         header.time = *time;
+    if (const auto* shown = first.attribute<double>("stx:duration");
+        shown && std::isfinite(*shown) && *shown > 0)
+        header.duration = *shown;
     header.linear = isLinearExr(reader);
     for (const int i : exrViewParts(reader)) {
         const ExrPart& part = reader.parts()[i];
@@ -380,6 +385,7 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     bundle.bounds = header.bounds;
     bundle.origin = header.origin;
     bundle.time = header.time;
+    bundle.duration = header.duration;
     for (auto& view : header.views) bundle.views.push_back(std::move(view.view));
 
     const auto count = static_cast<std::int64_t>(parts.size());

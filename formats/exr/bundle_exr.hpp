@@ -28,9 +28,9 @@ struct ExrViewHeader {
 struct ExrBundleHeader {
     std::string title;
     std::optional<Bounds> bounds;
-    glm::dvec3 origin{0.0};      ///< as Bundle::origin
-    std::optional<double> time;  ///< as Bundle::time
-    bool linear = false;         ///< colour is linear floats, not 8-bit sRGB
+    glm::dvec3 origin{0.0};                ///< as Bundle::origin
+    std::optional<double> time, duration;  ///< as those of Bundle
+    bool linear = false;                   ///< colour is linear floats, not 8-bit sRGB
     std::vector<ExrViewHeader> views;
     std::optional<ExrEnvironmentHeader> environment;
 

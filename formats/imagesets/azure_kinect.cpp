@@ -270,6 +270,7 @@ Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOpti
     SetDescription set;
     set.title = given.stem().string();
     set.film = true;
+    extendTo(set.end, pairs, *depth);
     for (const FramePair& pair : pairs) {
         SetView view;
         view.name = view.taker = "kinect";

@@ -41,6 +41,7 @@ class FrameExporter {
                 return failAt(inQuotes(folder.string()), ErrorCode::io, "cannot be written: {}",
                               ec.message());
         }
+        json_["stx:end"] = frames_.timeline().end;
         for (std::size_t i = 0; i < count; ++i) {
             job_.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(count),
                           "writing frames");

@@ -10,12 +10,10 @@
 #include "formats/imagesets/patterns.hpp"
 #include "formats/video/film.hpp"
 #include "lib/base/counted.hpp"
+#include "lib/model/sequence.hpp"
 
 namespace stx::imagesets {
 namespace {
-
-/// Times of two clocks that mean one moment differ by less than rounding to milliseconds.
-constexpr double kRounding = 0.001;
 
 bool isFilmName(const std::string& name) {
     std::string ending = path(name).extension().string();
@@ -99,7 +97,27 @@ struct FilmPair {
     std::vector<std::size_t> views;  ///< of the cameras' file: one, or the poses of one that moves
 };
 
-/// The pose of a frame: one for all, one for each, or by its time from the film's start.
+double firstPose(const FilmPair& pair, const std::vector<SetView>& views) {
+    double first = std::numeric_limits<double>::infinity();
+    for (const std::size_t v : pair.views) first = std::min(first, *views[v].time);
+    return first;
+}
+
+/// Whether poses and frames are of one time. Poses that are all elsewhere are of another clock, and
+/// count from the film's start.
+bool sameClock(const FilmPair& pair, const std::vector<SetView>& views,
+               const std::vector<FramePair>& frames) {
+    double last = -std::numeric_limits<double>::infinity();
+    for (const std::size_t v : pair.views) {
+        if (!views[v].time) return true;
+        last = std::max(last, *views[v].time);
+    }
+    const double slack = halfTick(0.001, last);
+    return firstPose(pair, views) <= frames.back().time + slack &&
+           last >= frames.front().time - slack;
+}
+
+/// The pose of a frame: one for all, one for each, or by its time, of the poses' clock.
 Result<std::size_t> poseOf(const FilmPair& pair, const std::vector<SetView>& views,
                            std::size_t frame, std::size_t frames, double time,
                            const std::string& where) {
@@ -142,7 +160,8 @@ PictureSource frameOf(const std::shared_ptr<Film>& film, int frame) {
 Result<std::vector<FramePair>> pairFrames(const Film& colour, const Film& depth,
                                           const std::string& where, Job& job) {
     const auto &ct = colour.times(), &dt = depth.times();
-    const double slack = std::max(stepOf(ct), stepOf(dt)) / 2 + kRounding;
+    // Both may be rounded, to milliseconds as a rule.
+    const double slack = std::max(stepOf(ct), stepOf(dt)) / 2 + 2 * halfTick(0.001, dt.back());
     std::vector<FramePair> pairs;
     for (int i = 0; i < depth.count(); ++i) {
         const double time = dt[static_cast<std::size_t>(i)];
@@ -170,6 +189,11 @@ Result<std::vector<FramePair>> pairFrames(const Film& colour, const Film& depth,
                         "of their time",
                         where, dt.size() - pairs.size(), dt.size()));
     return pairs;
+}
+
+void extendTo(std::optional<double>& end, const std::vector<FramePair>& frames, const Film& depth) {
+    const double last = frames.back().time;
+    if (depth.lastDuration() > 0) end = std::max(end.value_or(last), last + depth.lastDuration());
 }
 
 Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& options, Job& job) {
@@ -233,9 +257,18 @@ Result<SetDescription> describeFilms(const path& given, const ImageSetOptions& o
         const std::string films = fmt::format("{} and {}", inQuotes(pair.colour->path().string()),
                                               inQuotes(pair.depth->path().string()));
         STX_TRY(const auto frames, pairFrames(*pair.colour, *pair.depth, films, job));
+        extendTo(set.end, frames, *pair.depth);
+        double away = 0;
+        if (pair.views.size() > 1 && !sameClock(pair, views, frames)) {
+            away = frames.front().time - firstPose(pair, views);
+            job.note(
+                fmt::format("{}: the poses are not of the films' time, which begins at {:.12g} "
+                            "s: they count from the first frame",
+                            films, frames.front().time));
+        }
         for (std::size_t k = 0; k < frames.size(); ++k) {
             STX_TRY(const std::size_t pose,
-                    poseOf(pair, views, k, frames.size(), frames[k].time - frames[0].time, where));
+                    poseOf(pair, views, k, frames.size(), frames[k].time - away, where));
             SetView view = views[pose];
             view.name = pair.name;
             view.taker = pair.name;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "formats/imagesets/set_view.hpp"
@@ -19,6 +20,10 @@ struct FramePair {
 /// no pair.
 [[nodiscard]] Result<std::vector<FramePair>> pairFrames(const Film& colour, const Film& depth,
                                                         const std::string& where, Job& job);
+
+/// The end of a set whose last picture is the last of these, where the film tells how long that is
+/// shown.
+void extendTo(std::optional<double>& end, const std::vector<FramePair>& frames, const Film& depth);
 
 /// A picture of a film, to be read later.
 [[nodiscard]] PictureSource frameOf(const std::shared_ptr<Film>& film, int frame);

@@ -273,7 +273,7 @@ class SetSequence : public Sequence {
         STX_TRY(auto bundle, readViews(std::move(now), inQuotes(path_.string()), options_, job));
         if (!environment_) environment_ = bundle.environment;
         bundle.environment = environment_;
-        bundle.time = timeline_.times[index];
+        setTime(bundle, index);
         return bundle;
     }
 
@@ -322,7 +322,7 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     if (!motion.moves()) return readViews(std::move(set), where, options, job);
     if (options.frame == 0)
         job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
-                             motion.times.size(), motion.times.back()));
+                             motion.times.size(), motion.timeline().duration()));
     STX_TRY(auto bundle, readViews(motion.moment(set, static_cast<std::size_t>(options.frame)),
                                    where, options, job));
     bundle.time = motion.times[static_cast<std::size_t>(options.frame)];

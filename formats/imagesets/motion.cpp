@@ -13,6 +13,10 @@ namespace {
 /// A set in time lasts no longer, in seconds: nanoseconds that are taken for seconds still pass.
 constexpr double kLongest = 1e15;
 
+/// Times nearer than half of that are one moment: they are texts of six digits behind the point as
+/// a rule, in seconds.
+constexpr double kTick = 1e-6;
+
 using Pose = std::tuple<double, double, double, double, double, double, double>;
 
 Pose poseOf(const Camera& c) {
@@ -51,9 +55,8 @@ std::vector<std::string> takersOf(const SetDescription& set) {
 Timeline Motion::timeline() const {
     Timeline line;
     line.times = times;
-    // The last picture is shown as long as pictures are on average.
-    const auto steps = static_cast<double>(times.size() - 1);
-    line.duration = times.back() + (times.back() - times.front()) / steps;
+    line.end = end;
+    line.findTick();
     return line;
 }
 
@@ -62,9 +65,11 @@ SetDescription Motion::moment(const SetDescription& set, std::size_t frame) cons
     now.title = set.title;
     now.origin = set.origin;
     for (const Track& track : tracks) {
-        const auto next = std::upper_bound(
-            track.views.begin(), track.views.end(), times[frame],
-            [&](double time, std::size_t view) { return time < *set.views[view].time - start; });
+        const auto next =
+            std::upper_bound(track.views.begin(), track.views.end(), times[frame],
+                             [&](double time, std::size_t view) {
+                                 return time + halfTick(kTick, time) < *set.views[view].time;
+                             });
         const std::size_t index = next == track.views.begin() ? *next : *std::prev(next);
         SetView view = set.views[index];
         view.name = track.name;
@@ -98,17 +103,19 @@ Result<Motion> motionOf(const SetDescription& set, const ImageSetOptions& option
         times.push_back(*view.time);
     }
     std::ranges::sort(times);
-    times.erase(std::unique(times.begin(), times.end()), times.end());
+    const auto oneMoment = [](double a, double b) { return b - a <= halfTick(kTick, b); };
+    times.erase(std::unique(times.begin(), times.end(), oneMoment), times.end());
     if (times.size() < 2) return motion;
-    motion.start = times.front();
-    for (double& time : times) time -= motion.start;
-    if (!(times.back() <= kLongest))
+    const double span = times.back() - times.front();
+    if (!(span <= kLongest))
         return fail(ErrorCode::invalidInput,
                     "the times of the pictures span {:g}; seconds are expected, or take all as "
                     "views of one moment (--still)",
-                    times.back());
-    // Counted from the first, times can round to one.
-    times.erase(std::unique(times.begin(), times.end()), times.end());
+                    span);
+    // Where the set does not tell, the last picture is shown as long as pictures are on average.
+    motion.end = set.end && *set.end > times.back()
+                     ? *set.end
+                     : times.back() + span / static_cast<double>(times.size() - 1);
     motion.times = std::move(times);
 
     const auto takers = takersOf(set);

@@ -16,8 +16,9 @@ struct Motion {
         std::vector<std::size_t> views;
     };
     std::vector<Track> tracks;
-    std::vector<double> times;  ///< seconds, the first 0, ascending: when any track changes
-    double start = 0;           ///< what the set counts the first of them as
+    std::vector<double> times;  ///< seconds by the set's clock, ascending: when any track changes
+                                ///< (pictures of one moment may be half a microsecond apart)
+    double end = 0;             ///< when the last picture ends
 
     [[nodiscard]] bool moves() const { return times.size() > 1; }
     [[nodiscard]] Timeline timeline() const;

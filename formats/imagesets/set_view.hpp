@@ -101,7 +101,8 @@ struct SetDescription {
     std::filesystem::path environment;
     /// Of sets whose views are those of ImageSetOptions::frame; of others, motionOf() finds them.
     int frames = 1;
-    double rate = 25;  ///< frames a second, where the set has frames without times
+    std::optional<double> end;  ///< when its last picture ends, by the clock of the views' times
+    double rate = 25;           ///< frames a second, where the set has frames without times
     /// Its cameras stand still or are given, so that its pictures are of a scene that moves even
     /// where a sensor took them.
     bool film = false;

@@ -256,6 +256,7 @@ Result<SetDescription> describeTransforms(const path& given, const ImageSetOptio
     STX_TRY(const auto title, within(where, findText(json, "stx:title", "")));
     set.title = title.value_or("");
     STX_TRY(set.origin, originOf(json, where));
+    STX_TRY(set.end, within(where, findNumber(json, "stx:end", "")));
     STX_TRY(set.environment, environmentOf(json, folder, where, job.limits));
     STX_TRY(auto scale, within(where, findNumber(json, "integer_depth_scale", "")));
     if (!scale) {

@@ -81,11 +81,12 @@ void checkMovie(const Movie& movie, const StreamImages& images, const std::strin
 }
 
 bool sameTimes(const Presentation& a, const Presentation& b) {
-    constexpr double kSameTime = 1e-6;
-    if (a.shown.size() != b.shown.size() || std::abs(a.duration - b.duration) > kSameTime)
-        return false;
+    const auto differ = [tick = std::max(a.tick, b.tick)](double one, double other) {
+        return std::abs(one - other) > halfTick(tick, one);
+    };
+    if (a.shown.size() != b.shown.size() || differ(a.duration, b.duration)) return false;
     for (std::size_t i = 0; i < a.shown.size(); ++i)
-        if (std::abs(a.shown[i].time - b.shown[i].time) > kSameTime) return false;
+        if (differ(a.shown[i].time, b.shown[i].time)) return false;
     return true;
 }
 

@@ -75,7 +75,7 @@ class Viewer {
 
     frameAt(time) {
         let frame = 0;
-        while (frame + 1 < this.data.times.length && this.data.times[frame + 1] <= time + 1e-9) ++frame;
+        while (frame + 1 < this.data.times.length && this.data.times[frame + 1] <= time + this.data.slack) ++frame;
         return frame;
     }
 
@@ -85,10 +85,11 @@ class Viewer {
         button.textContent = this.playing ? "Stop" : "Play";
         button.setAttribute("aria-pressed", String(this.playing));
         if (!this.playing) return;
-        const begun = performance.now() - this.data.times[this.frame] * 1000;
+        const first = this.data.times[0], length = this.data.end - first;
+        const begun = performance.now() - (this.data.times[this.frame] - first) * 1000;
         const step = async () => {
             if (!this.playing) return;
-            const wanted = this.frameAt((performance.now() - begun) / 1000 % this.data.duration);
+            const wanted = this.frameAt(first + (performance.now() - begun) / 1000 % length);
             if (wanted !== this.frame) await this.showFrame(wanted);
             requestAnimationFrame(step);
         };

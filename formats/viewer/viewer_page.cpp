@@ -238,7 +238,8 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bound
     STX_TRY(j["start"], startOf(cameras, bounds));
     j["cameras"] = std::move(listed);
     j["times"] = line.times;
-    j["duration"] = line.duration;
+    j["end"] = line.end;
+    j["slack"] = line.slack(line.end);
     return j;
 }
 

@@ -66,7 +66,7 @@ struct Atlas {
     glm::dvec3 origin{0.0};                          ///< as Bundle::origin
     std::shared_ptr<const Environment> environment;  ///< as Bundle::environment
     std::string title;
-    std::optional<double> time;  ///< as Bundle::time
+    std::optional<double> time, duration;  ///< as those of Bundle
     /// Object pixels before and after pruning.
     std::int64_t sourcePixels = 0;
     std::int64_t keptPixels = 0;

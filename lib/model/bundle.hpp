@@ -21,8 +21,9 @@ struct Bundle {
     std::optional<Bounds> bounds;
     /// What stands far behind the object in all directions (Background); null: nothing.
     std::shared_ptr<const Environment> environment;
-    /// Of a moment of a sequence: seconds from the sequence's start (Sequence).
-    std::optional<double> time;
+    /// Of a moment of a sequence: seconds by the sequence's clock (Timeline), and how long it is
+    /// shown.
+    std::optional<double> time, duration;
 
     /// "SimpleTextureV2" when a view carries normals or splats, else "SimpleTexture".
     [[nodiscard]] const char* nodeKind() const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace stx {
 namespace {
@@ -37,15 +38,14 @@ class Chosen : public Sequence {
     Chosen(std::unique_ptr<Sequence> frames, std::vector<std::size_t> numbers)
         : frames_(std::move(frames)), numbers_(std::move(numbers)) {
         const Timeline& all = frames_->timeline();
-        const double start = all.times[numbers_.front()];
         timeline_.times.clear();
-        for (const std::size_t number : numbers_)
-            timeline_.times.push_back(all.times[number] - start);
-        timeline_.duration = timeline_.times.back() + all.durationOf(numbers_.back());
+        for (const std::size_t number : numbers_) timeline_.times.push_back(all.times[number]);
+        timeline_.end = timeline_.times.back() + all.durationOf(numbers_.back());
+        timeline_.tick = all.tick;
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
         STX_TRY(auto bundle, frames_->frame(numbers_[index], job));
-        bundle.time = timeline_.times[index];
+        setTime(bundle, index);
         return bundle;
     }
 
@@ -58,52 +58,75 @@ class Chosen : public Sequence {
 constexpr std::uint32_t kTimescales[] = {1000,  24000, 25000, 30000,  15000, 12000,
                                          50000, 60000, 90000, 120000, 600000};
 constexpr std::uint32_t kMicroseconds = 1'000'000;
-constexpr double kSameTime = 1e-7;  ///< seconds
+/// Seconds: times are written with six digits behind the point at least, and doubles lose less.
+constexpr double kSameTime = 1e-7;
+
+/// What doubles lose where two of such a size are subtracted, in seconds.
+double lostAt(double time) {
+    return 4 * std::numeric_limits<double>::epsilon() * std::max(1.0, std::abs(time));
+}
 
 }  // namespace
 
+double halfTick(double tick, double time) {
+    constexpr double kCoarsest = 0.001;
+    return std::min(tick, kCoarsest) / 2 + lostAt(time);
+}
+
 std::size_t Timeline::frameAt(double time) const {
-    // Times that went through a file's ticks are off by less than that.
-    const auto next = std::upper_bound(times.begin(), times.end(), time + kSameTime);
+    const auto next = std::upper_bound(times.begin(), times.end(), time + slack(time));
     return next == times.begin() ? 0 : static_cast<std::size_t>(next - times.begin()) - 1;
 }
 
 double Timeline::durationOf(std::size_t frame) const {
-    return (frame + 1 < times.size() ? times[frame + 1] : std::max(duration, times.back())) -
+    return (frame + 1 < times.size() ? times[frame + 1] : std::max(end, times.back())) -
            times[frame];
+}
+
+bool Timeline::outside(double time) const {
+    return time < times.front() - slack(time) || time >= std::max(end, times.back()) + slack(time);
 }
 
 double Timeline::rate() const {
     if (!moves()) return 0;
     const double step = (times.back() - times.front()) / static_cast<double>(times.size() - 1);
     for (std::size_t i = 0; i < times.size(); ++i)
-        if (std::abs(times[i] - times.front() - step * static_cast<double>(i)) > 1e-6) return 0;
+        if (std::abs(times[i] - times.front() - step * static_cast<double>(i)) >
+            2 * slack(times[i]))
+            return 0;
     return 1 / step;
 }
 
 std::uint32_t Timeline::timescale() const {
-    for (const std::uint32_t ticks : kTimescales) {
+    const double same = std::max(kSameTime, lostAt(times.front()));
+    const auto fits = [&](std::uint32_t ticks) {
         const auto whole = [&](double time) {
-            return std::abs(time * ticks - std::round(time * ticks)) <= kSameTime * ticks;
+            const double at = (time - times.front()) * ticks;
+            return std::abs(at - std::round(at)) <= same * ticks;
         };
-        if (whole(duration) && std::ranges::all_of(times, whole)) return ticks;
-    }
+        return std::ranges::all_of(times, whole) && (end <= times.back() || whole(end));
+    };
+    for (const std::uint32_t ticks : kTimescales)
+        if (fits(ticks)) return ticks;
+    if (const double ticks = std::round(1000 * rate()); ticks >= 1000 && ticks < kMicroseconds)
+        if (fits(static_cast<std::uint32_t>(ticks))) return static_cast<std::uint32_t>(ticks);
     return kMicroseconds;
 }
 
 Result<void> Timeline::check() const {
     if (times.empty()) return fail(ErrorCode::invalidInput, "a sequence has no frame");
-    double last = -1;
+    double last = -std::numeric_limits<double>::infinity();
     for (const double time : times) {
-        if (!std::isfinite(time) || time < 0)
-            return fail(ErrorCode::invalidInput, "a frame is at {} s; times are 0 or more", time);
+        if (!std::isfinite(time))
+            return fail(ErrorCode::invalidInput, "a frame is at {} s; a finite time is expected",
+                        time);
         if (!(time > last))
             return fail(ErrorCode::invalidInput, "frames are at {} s and then at {} s", last, time);
         last = time;
     }
-    if (!std::isfinite(duration) || (duration < last && moves()))
+    if (!std::isfinite(end) || (end < last && moves()))
         return fail(ErrorCode::invalidInput, "the sequence ends at {} s, before its last frame, {}",
-                    duration, last);
+                    end, last);
     return {};
 }
 
@@ -111,8 +134,15 @@ Timeline steadyTimeline(int count, double rate) {
     Timeline line;
     line.times.clear();
     for (int i = 0; i < count; ++i) line.times.push_back(i / rate);
-    line.duration = count > 1 ? count / rate : 0;
+    line.end = count > 1 ? count / rate : 0;
+    line.findTick();
     return line;
+}
+
+void Sequence::setTime(Bundle& bundle, std::size_t index) const {
+    bundle.time = timeline_.times[index];
+    bundle.duration.reset();
+    if (const double shown = timeline_.durationOf(index); shown > 0) bundle.duration = shown;
 }
 
 std::unique_ptr<Sequence> sequenceOf(Bundle still) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -11,24 +12,45 @@
 
 namespace stx {
 
-/// When the pictures of a sequence are shown.
+/// Half a tick of a clock, in seconds, and what doubles lose at such a time: as far can two texts
+/// or files of one moment be apart that were rounded to such ticks. Ticks longer than a millisecond
+/// count as one: that is the coarsest clock to which the times of films are rounded (Matroska's);
+/// on coarser ones they are exact.
+[[nodiscard]] double halfTick(double tick, double time);
+
+/// When the pictures of a sequence are shown, by its own clock: seconds, which need not begin at 0
+/// (recordings often have Unix time). All times that a person or a file names are of this clock.
 struct Timeline {
-    /// Seconds from the start of the sequence, ascending, each once; the first is 0 or more. At
-    /// least one. Frame i is shown from times[i] until times[i + 1].
+    /// Seconds, ascending, each once. At least one. Frame i is shown from times[i] until
+    /// times[i + 1].
     std::vector<double> times{0.0};
-    /// When the last frame ends, in seconds; at least the last time. 0 of what stands still.
-    double duration = 0;
+    /// When the last frame ends, by the same clock; at least the last time. Of what stands still:
+    /// its time.
+    double end = 0;
+    /// Seconds of the ticks that the times may be rounded to; see findTick().
+    double tick = 1e-6;
+
+    [[nodiscard]] double start() const { return times.front(); }
+    [[nodiscard]] double duration() const { return std::max(0.0, end - times.front()); }
+    /// The slack of a time that is compared with these.
+    [[nodiscard]] double slack(double time) const { return halfTick(tick, time); }
+    /// Takes as the tick that of timescale().
+    void findTick() { tick = 1.0 / timescale(); }
 
     [[nodiscard]] std::size_t count() const { return times.size(); }
     [[nodiscard]] bool moves() const { return times.size() > 1; }
-    /// The frame that is shown at a time: the last that has begun, or the first before that.
+    /// The frame that is shown at a time: the last that has begun half a tick later, or the first
+    /// before that.
     [[nodiscard]] std::size_t frameAt(double time) const;
     /// How long a frame is shown, in seconds.
     [[nodiscard]] double durationOf(std::size_t frame) const;
-    /// Frames a second when all frames last equally long (to a millionth); else 0.
+    /// Whether a time is before the first frame or when the last has ended.
+    [[nodiscard]] bool outside(double time) const;
+    /// Frames a second when all frames last equally long (to a tick); else 0.
     [[nodiscard]] double rate() const;
-    /// Ticks a second in which all times are whole numbers, to a tenth of a microsecond: the
-    /// least of the usual ones of MP4 files, or 1,000,000 where the times are irregular.
+    /// Ticks a second in which all times, counted from the first, are whole numbers, to a tenth of
+    /// a microsecond: the least of the usual ones of MP4 files, a thousand times the rate, or
+    /// 1,000,000 where the times are irregular.
     [[nodiscard]] std::uint32_t timescale() const;
     /// Errors (invalidInput) when the promises above do not hold.
     [[nodiscard]] Result<void> check() const;
@@ -52,6 +74,9 @@ class Sequence {
     [[nodiscard]] virtual Result<Bundle> frame(std::size_t index, Job& job) = 0;
 
   protected:
+    /// Tells a frame when it is shown, and for how long.
+    void setTime(Bundle& bundle, std::size_t index) const;
+
     Timeline timeline_;
 };
 
@@ -62,7 +87,7 @@ class Sequence {
 [[nodiscard]] std::unique_ptr<Sequence> changed(
     std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle& frame, Job& job)> change);
 
-/// Some of the frames, in ascending order of their numbers, their times counted from the first.
+/// Some of the frames, in ascending order of their numbers, at their times.
 /// Errors (usage): no frame, or numbers that are not in the sequence or do not ascend.
 [[nodiscard]] Result<std::unique_ptr<Sequence>> someFrames(std::unique_ptr<Sequence> frames,
                                                            std::vector<std::size_t> numbers);

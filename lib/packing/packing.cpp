@@ -199,6 +199,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     atlas.environment = bundle.environment;
     atlas.title = bundle.title;
     atlas.time = bundle.time;
+    atlas.duration = bundle.duration;
     const std::vector<int> source = keptViews(bundle, tight, layout.rectangles, job);
     for (const int i : source) atlas.views.push_back(withoutImages(bundle.views[i]));
     atlas.rectangles = std::move(layout.rectangles);
@@ -290,6 +291,7 @@ Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     bundle.origin = atlas.origin;
     bundle.environment = atlas.environment;
     bundle.time = atlas.time;
+    bundle.duration = atlas.duration;
     bundle.views.resize(atlas.views.size());
     std::vector<Image<std::uint8_t>> givenOf(atlas.views.size());
     parallelFor(0, static_cast<std::int64_t>(atlas.views.size()), [&](std::int64_t i) {

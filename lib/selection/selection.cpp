@@ -99,6 +99,8 @@ Bundle keepViews(const Bundle& bundle, const std::vector<int>& views) {
     kept.bounds = bundle.bounds;
     kept.origin = bundle.origin;
     kept.environment = bundle.environment;
+    kept.time = bundle.time;
+    kept.duration = bundle.duration;
     for (const int v : sorted) kept.views.push_back(bundle.views[v]);
     return kept;
 }

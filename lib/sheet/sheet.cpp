@@ -237,7 +237,7 @@ Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job)
         plan, settings,
         fmt::format("{} of {} over {:.4g} s, {}, {} in the first",
                     counted(static_cast<std::size_t>(moments), "moment"),
-                    counted(timeline.count(), "frame"), timeline.duration, counted(views, "view"),
+                    counted(timeline.count(), "frame"), timeline.duration(), counted(views, "view"),
                     counted(static_cast<std::size_t>(points), "point")));
     return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
 }

@@ -73,6 +73,7 @@ class BundleReader {
         bundle.title = shown.title;
         bundle.bounds = notes.bounds;
         bundle.origin = notes.origin;
+        bundle.time = notes.start;
         for (std::size_t i = 0; i < plans.size(); ++i) {
             if (!read[i])
                 return tl::unexpected(
@@ -118,6 +119,7 @@ class BundleReader {
             all.unknown.merge(notes.unknown);
             all.backgrounds.merge(notes.backgrounds);
             if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
+            if (!all.start) all.start = notes.start;
             if (!notes.bounds) continue;
             places.push_back(info.worldFromLocal);
             if (!all.bounds) all.bounds.emplace();

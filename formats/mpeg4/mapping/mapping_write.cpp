@@ -24,6 +24,9 @@ class SceneWriter {
         STX_CHECK(checkRequest());
         ViewNotes notes;
         notes.origin = bundle_.origin;
+        // A presentation begins at 0: players would wait for 40 years where a film begins at Unix
+        // time, edit lists cannot begin before 0, and texts have none.
+        if (bundle_.time.value_or(0) != 0) notes.start = bundle_.time;
         bounds_ = bundle_.bounds ? *bundle_.bounds : bundle_.computeBounds();
         notes.bounds = bounds_;
         NodePtr root;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "lib/model/sequence.hpp"
+
 namespace stx::mpeg4 {
 namespace {
 
@@ -26,9 +28,6 @@ Run runOf(const Node& texture) {
     return run;
 }
 
-/// Times that went through ticks of two clocks differ by less.
-constexpr double kSameTime = 1e-6;
-
 }  // namespace
 
 std::uint64_t ticksAt(double seconds, std::uint32_t timescale) {
@@ -38,8 +37,14 @@ std::uint64_t ticksAt(double seconds, std::uint32_t timescale) {
     return ticks < static_cast<double>(kLast) ? static_cast<std::uint64_t>(ticks) : kLast;
 }
 
-std::size_t Presentation::sampleAt(double time) const {
-    const auto next = std::upper_bound(shown.begin(), shown.end(), time + kSameTime,
+std::uint64_t ticksBegun(double seconds, std::uint32_t timescale, double slack) {
+    // Half a tick at most, so that a time that is a tick is not taken for the next.
+    const double most = std::min(slack * timescale, 0.499);
+    return ticksAt(std::floor(seconds * timescale + most) / timescale, timescale);
+}
+
+std::size_t Presentation::sampleAt(double time, double slack) const {
+    const auto next = std::upper_bound(shown.begin(), shown.end(), time + slack,
                                        [](double t, const Shown& entry) { return t < entry.time; });
     return next == shown.begin() ? next->sample : std::prev(next)->sample;
 }
@@ -47,6 +52,7 @@ std::size_t Presentation::sampleAt(double time) const {
 Presentation presentationOf(const ElementaryStream& stream) {
     Presentation all;
     const double tick = 1.0 / std::max<std::uint32_t>(stream.timescale, 1);
+    all.tick = tick;
     for (std::size_t i = 0; i < stream.samples.size(); ++i) {
         const Sample& sample = stream.samples[i];
         const double time = (static_cast<double>(sample.time) + sample.compositionOffset) * tick;
@@ -58,19 +64,21 @@ Presentation presentationOf(const ElementaryStream& stream) {
 
     Presentation edited;
     const double editTick = 1.0 / std::max<std::uint32_t>(stream.edits.timescale, 1);
+    edited.tick = std::max(tick, editTick);
     for (const Edit& edit : stream.edits.edits) {
         const double from = edited.duration;
         const double length = static_cast<double>(edit.duration) * editTick;
         edited.duration += length;
         if (edit.mediaTime < 0) continue;
         const double media = static_cast<double>(edit.mediaTime) * tick;
+        const double slack = halfTick(edited.tick, media);
         // The picture under way when the edit begins, and those that begin in it.
         const auto begun =
-            std::ranges::upper_bound(all.shown, media + kSameTime, {}, &Presentation::Shown::time);
+            std::ranges::upper_bound(all.shown, media + slack, {}, &Presentation::Shown::time);
         auto entry = begun == all.shown.begin() ? begun : std::prev(begun);
-        if (begun == all.shown.end() && all.duration <= media + kSameTime) continue;
-        for (bool first = true;
-             entry != all.shown.end() && entry->time < media + length - kSameTime; ++entry) {
+        if (begun == all.shown.end() && all.duration <= media + slack) continue;
+        for (bool first = true; entry != all.shown.end() && entry->time < media + length - slack;
+             ++entry) {
             if (edited.shown.size() == kMostMoments) return all;
             edited.shown.push_back(
                 {first ? from : from + std::max(0.0, entry->time - media), entry->sample});
@@ -80,7 +88,7 @@ Presentation presentationOf(const ElementaryStream& stream) {
     return edited.shown.empty() ? all : edited;
 }
 
-double mediaTimeOf(const Node& texture, double duration, double now) {
+double mediaTimeOf(const Node& texture, double duration, double now, double slack) {
     const Run run = runOf(texture);
     const double speed = std::abs(run.speed);
     const bool backwards = run.speed < 0;
@@ -91,7 +99,7 @@ double mediaTimeOf(const Node& texture, double duration, double now) {
     const double cycle = duration / speed;
     if (run.loop) {
         passed = std::fmod(passed, cycle);
-        if (cycle - passed < kSameTime) passed = 0;
+        if (cycle - passed < slack) passed = 0;
     } else {
         passed = std::min(passed, cycle);
     }
@@ -110,7 +118,7 @@ std::vector<double> changesOf(const Node& texture, const Presentation& stream, d
             i + 1 < stream.shown.size() ? stream.shown[i + 1].time : stream.duration;
         const double at = run.speed < 0 ? (stream.duration - until) : stream.shown[i].time;
         const double time = run.start + at / speed;
-        if (time >= 0 && time < last - kSameTime) times.push_back(time);
+        if (time >= 0 && time < last - halfTick(stream.tick, last)) times.push_back(time);
     }
     std::ranges::sort(times);
     end = std::max(end, last);

@@ -18,6 +18,9 @@ inline constexpr double kLatestMoment = 1e12;
 /// it cannot count.
 [[nodiscard]] std::uint64_t ticksAt(double seconds, std::uint32_t timescale);
 
+/// The last tick that has begun at a time, or begins no later than `slack` seconds after it.
+[[nodiscard]] std::uint64_t ticksBegun(double seconds, std::uint32_t timescale, double slack);
+
 /// When the samples of a stream are shown, counted from the stream's start: decoding time plus
 /// composition offset, through the edit list (ISO/IEC 14496-12, 8.6).
 struct Presentation {
@@ -27,10 +30,11 @@ struct Presentation {
     };
     std::vector<Shown> shown;
     double duration = 0;  ///< seconds: of one cycle at speed 1
+    double tick = 0;      ///< seconds: of the coarser of its clock and its edit list's
 
-    /// The sample that is shown at a time of the stream; the first one before that. There must be
-    /// one.
-    [[nodiscard]] std::size_t sampleAt(double time) const;
+    /// The sample that is shown at a time of the stream, or no later than `slack` seconds after it;
+    /// the first one before that. There must be one.
+    [[nodiscard]] std::size_t sampleAt(double time, double slack) const;
 };
 /// Samples that the edit list leaves out are never shown; an edit list that leaves out all, or that
 /// shows more than kMostMoments pictures, is passed over.
@@ -40,7 +44,8 @@ struct Presentation {
 /// by startTime, stopTime, speed and loop, shows its first picture before it begins (its last when
 /// it runs backwards), and holds the last one when it has ended (ISO/IEC 14772-1, 6.28). Other
 /// textures run with the scene.
-[[nodiscard]] double mediaTimeOf(const Node& texture, double duration, double now);
+/// A cycle that ends within `slack` seconds has ended.
+[[nodiscard]] double mediaTimeOf(const Node& texture, double duration, double now, double slack);
 
 /// The moments of the scene at which a texture of a stream changes, within its first cycle;
 /// seconds, ascending. `end` becomes the end of that cycle when it is later.

@@ -5,13 +5,14 @@
 #include <unordered_set>
 
 #include "formats/mpeg4/mapping/background.hpp"
+#include "formats/mpeg4/mapping/media_clock.hpp"
+#include "formats/mpeg4/mapping/view_notes.hpp"
 #include "formats/mpeg4/scene/interpolators.hpp"
+#include "formats/mpeg4/scene/scene_walk.hpp"
 
 namespace stx::mpeg4 {
 namespace {
 
-/// Moments nearer than this are one: ticks of two clocks.
-constexpr double kSameMoment = 1e-6;
 /// Moments a second where only interpolators move.
 constexpr double kSmoothRate = 25;
 /// Decoded pictures that are kept, at most.
@@ -35,6 +36,15 @@ std::vector<NodePtr> texturesOf(const Document& document) {
     return textures;
 }
 
+/// What a film's own clock shows when the presentation begins.
+double startOf(const Scene& scene, const Limits& limits) {
+    const auto shown = shownScene(scene.root, limits);
+    if (!shown) return 0;  // what is wrong is told when a frame is read
+    for (const ShownInfo& info : shown->infos)
+        if (const auto start = ViewNotes::parse(info.text).start) return *start;
+    return 0;
+}
+
 class SceneSequence : public Sequence {
   public:
     SceneSequence(Document document, SceneReadOptions options)
@@ -46,6 +56,8 @@ class SceneSequence : public Sequence {
         STX_TRY(images_, StreamImages::make(document_, options_.folder, job.limits));
         images_.keepPictures(std::min<std::uint64_t>(kCacheBytes, job.limits.maxMemoryBytes / 4));
         STX_TRY(timeline_, timelineOf(document_, images_));
+        STX_TRY(const auto scene, composeScene(document_.frames, document_.frames.front().time));
+        start_ = startOf(scene, job.limits);
         // Once for all frames: it is what stands still.
         if (options_.pixels && options_.environment) {
             STX_TRY(environment_, environmentFromScene(document_, options_, job));
@@ -55,12 +67,14 @@ class SceneSequence : public Sequence {
     }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
-        const double now = timeline_.times[index];
-        STX_TRY(Scene * scene, moments_.at(ticksAt(now, document_.sceneStream.timescale)));
+        const double now = timeline_.times[index] - start_;
+        const double slack = timeline_.slack(timeline_.times[index]);
+        STX_TRY(Scene * scene,
+                moments_.at(ticksBegun(now, document_.sceneStream.timescale, slack)));
         applyInterpolators(*scene, now);
-        images_.setTime(now);
+        images_.setTime(now, slack);
         STX_TRY(auto bundle, bundleOfMoment(document_, *scene, images_, options_, job));
-        bundle.time = now;
+        setTime(bundle, index);
         bundle.environment = environment_;
         return bundle;
     }
@@ -71,6 +85,7 @@ class SceneSequence : public Sequence {
     SceneReadOptions options_;
     SceneInTime moments_;
     StreamImages images_;
+    double start_ = 0;  ///< of the film's clock
 };
 
 }  // namespace
@@ -80,12 +95,14 @@ class SceneSequence : public Sequence {
 Result<Timeline> timelineOf(const Document& document, const StreamImages& images) {
     Timeline line;
     std::vector<double>& times = line.times;
-    double end = 0;
+    double end = 0, coarsest = 0;
     std::uint64_t most = document.frames.size();
     for (const NodePtr& texture : texturesOf(document)) {
         const ElementaryStream* stream = images.stream(*texture);
         if (!stream || stream->samples.size() < 2) continue;
-        const auto changes = changesOf(*texture, images.presentation(*stream), end);
+        const Presentation& shown = images.presentation(*stream);
+        const auto changes = changesOf(*texture, shown, end);
+        coarsest = std::max(coarsest, shown.tick);
         most += changes.size();
         if (most > kMostMoments)
             return fail(ErrorCode::unsupported, "the presentation has more than {} moments",
@@ -94,7 +111,9 @@ Result<Timeline> timelineOf(const Document& document, const StreamImages& images
     }
     for (const CommandFrame& frame : document.frames)
         times.push_back(static_cast<double>(frame.time) / document.sceneStream.timescale);
-    const double start =
+    if (document.frames.size() > 1 || coarsest == 0)
+        coarsest = std::max(coarsest, 1.0 / document.sceneStream.timescale);
+    const double begin =
         static_cast<double>(document.frames.front().time) / document.sceneStream.timescale;
     const bool pictures = end > 0;
     STX_TRY(const auto scene, composeScene(document.frames, document.frames.front().time));
@@ -111,15 +130,25 @@ Result<Timeline> timelineOf(const Document& document, const StreamImages& images
         end = std::max(end, pictures ? end : span.end);
     }
     if (end > kLatestMoment) end = 0;
-    std::erase_if(times, [&](double t) { return !(t >= start && t <= kLatestMoment); });
+    std::erase_if(times, [&](double t) { return !(t >= begin && t <= kLatestMoment); });
     std::ranges::sort(times);
     times.erase(std::unique(times.begin(), times.end(),
-                            [](double a, double b) { return b - a <= kSameMoment; }),
+                            [&](double a, double b) { return b - a <= halfTick(coarsest, b); }),
                 times.end());
-    if (times.empty() || times.front() > start + kSameMoment) times.insert(times.begin(), start);
+    if (times.empty() || times.front() > begin + halfTick(coarsest, begin))
+        times.insert(times.begin(), begin);
+    line.end = times.back();
     if (times.size() > 1) {
         const double step = times[times.size() - 1] - times[times.size() - 2];
-        line.duration = end > times.back() ? end : times.back() + step;
+        line.end = end > times.back() ? end : times.back() + step;
+    }
+    line.findTick();
+    line.tick = std::max(line.tick, coarsest);
+    if (const double own = startOf(scene, images.limits()); own != 0) {
+        for (double& time : times) time += own;
+        line.end += own;
+        // Where doubles are that coarse, neighbours may round to one.
+        times.erase(std::unique(times.begin(), times.end()), times.end());
     }
     return line;
 }

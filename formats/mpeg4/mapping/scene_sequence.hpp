@@ -18,7 +18,9 @@ namespace stx::mpeg4 {
                                                                   const SceneReadOptions& options,
                                                                   Job& job);
 
-/// When such a sequence changes: at least one moment. Errors: (unsupported) more than four million.
+/// When such a sequence changes, by the film's own clock where a note tells how that begins: at
+/// least one moment. Moments of two streams within half a tick of the coarser clock are one.
+/// Errors: (unsupported) more than four million.
 [[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images);
 
 /// The object of a presentation in a scene as it is at the moment of `images`; see

@@ -85,7 +85,10 @@ class SequenceWriter {
     [[nodiscard]] std::string placeOf(std::size_t i) const {
         return fmt::format("frame {} ({:g} s)", i, frames_.timeline().times[i]);
     }
-    [[nodiscard]] std::uint64_t ticks(double seconds) const { return ticksAt(seconds, scale_); }
+    /// The presentation's time; see ViewNotes::start for the film's.
+    [[nodiscard]] std::uint64_t ticks(double seconds) const {
+        return ticksAt(seconds - frames_.timeline().start(), scale_);
+    }
 
     /// A frame with the ranges of the sequence. Its notes are said once, of the first frame.
     Result<Bundle> frame(std::size_t i) {
@@ -401,7 +404,7 @@ class SequenceWriter {
             for (ElementaryStream* stream : track.streams)
                 if (stream)
                     for (Sample& sample : stream->samples) sample.data.source = source;
-        const std::uint64_t end = ticks(frames_.timeline().duration);
+        const std::uint64_t end = ticks(frames_.timeline().end);
         for (ViewTrack& track : tracks_) {
             const NodePtr texture = track.node->get<NodePtr>("diTexture");
             for (std::size_t r = 0; r < kRoles.size(); ++r) {

@@ -55,13 +55,14 @@ Result<StreamImages> StreamImages::make(const Document& document,
     return images;
 }
 
-void StreamImages::setTime(double now) {
+void StreamImages::setTime(double now, double slack) {
     now_ = now;
+    slack_ = slack;
     const Document& document = *document_;
     if (!byId_.empty() && document.odFrames.size() <= 1) return;
     for (const ObjectDescriptor* od : document.objectDescriptors()) byId_[od->id] = od;
     if (document.odFrames.empty()) return;
-    const auto ticks = ticksAt(now, document.odStream.timescale);
+    const auto ticks = ticksBegun(now, document.odStream.timescale, slack);
     for (const ObjectDescriptor* od : document.objectDescriptors(ticks)) byId_[od->id] = od;
 }
 
@@ -74,7 +75,9 @@ const Presentation& StreamImages::presentation(const ElementaryStream& stream) c
 std::size_t StreamImages::sampleAt(const Node& texture, const ElementaryStream& stream) const {
     const auto found = presentations_.find(&stream);
     if (stream.samples.size() < 2 || found == presentations_.end()) return 0;
-    return found->second.sampleAt(mediaTimeOf(texture, found->second.duration, now_));
+    const Presentation& shown = found->second;
+    const double slack = std::max(slack_, halfTick(shown.tick, now_));
+    return shown.sampleAt(mediaTimeOf(texture, shown.duration, now_, slack), slack);
 }
 
 const ElementaryStream* StreamImages::stream(const Node& texture) const {

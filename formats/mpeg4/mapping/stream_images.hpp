@@ -25,8 +25,10 @@ class StreamImages {
                                                    const std::filesystem::path& folder,
                                                    const Limits& limits);
 
-    /// The moment of the scene, in seconds: 0 at first.
-    void setTime(double now);
+    /// The moment of the scene, in seconds, and how far times of that moment may be off: 0 at
+    /// first.
+    void setTime(double now, double slack = 0);
+    [[nodiscard]] const Limits& limits() const { return limits_; }
     /// Pictures of streams that were decoded are kept, in so many bytes: for sequences.
     void keepPictures(std::uint64_t bytes) { cache_ = std::make_shared<PictureCache>(bytes); }
 
@@ -56,7 +58,7 @@ class StreamImages {
                                                    const Limits& limits) const;
 
     const Document* document_ = nullptr;
-    double now_ = 0;
+    double now_ = 0, slack_ = 0;
     mutable std::unordered_map<const ElementaryStream*, Presentation> presentations_;
     std::shared_ptr<PictureCache> cache_;
     std::shared_ptr<StreamVideo> video_ = std::make_shared<StreamVideo>();

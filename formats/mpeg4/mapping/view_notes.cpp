@@ -57,6 +57,8 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             notes.bounds = bounds;
         } else if (line.starts_with("origin ")) {
             if (const auto n = numbers(line, 3); !n.empty()) notes.origin = {n[0], n[1], n[2]};
+        } else if (line.starts_with("start ")) {
+            if (const auto n = numbers(line, 1); !n.empty()) notes.start = n[0];
         } else if (line.starts_with("name ")) {
             const auto w = words(line, 3);
             if (w.size() == 3) notes.names[std::string(w[1])] = w[2];
@@ -99,6 +101,7 @@ std::vector<std::string> ViewNotes::text() const {
                                    bounds->min.z, bounds->max.x, bounds->max.y, bounds->max.z));
     if (origin != glm::dvec3(0.0))
         info.push_back(fmt::format("origin {} {} {}", origin.x, origin.y, origin.z));
+    if (start) info.push_back(fmt::format("start {}", *start));
     for (const auto& [defName, own] : names)
         info.push_back(fmt::format("name {} {}", defName, own));
     for (const auto& [defName, pad] : paddings)

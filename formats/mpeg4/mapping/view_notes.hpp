@@ -15,6 +15,7 @@
 /// lost:
 ///
 ///     "bounds minX minY minZ maxX maxY maxZ"
+///     "start seconds" (of the film's own clock, at the presentation's 0; see Timeline)
 ///     "origin x y z" (added to all coordinates here, gives the world's; see Bundle::origin)
 ///     "name DEFNAME the view's own name"
 ///     "padding DEFNAME left top right bottom cx cy"
@@ -33,6 +34,7 @@ namespace stx::mpeg4 {
 struct ViewNotes {
     std::optional<Bounds> bounds;
     glm::dvec3 origin{0.0};
+    std::optional<double> start;
     std::map<std::string, std::string> names;  ///< by DEF name
     struct Pad {
         int left = 0, top = 0, right = 0, bottom = 0;

@@ -61,7 +61,7 @@ TEST(MovingSets, CamerasShowTheirLastPicture) {
         folder, {{"b", 2.5, 1, 4}, {"a", 2.0, 0, 1}, {"a", 3.0, 0, 3}, {"b", 4.0, 1, 5}});
     const auto sequence = opened(set);
     ASSERT_TRUE(sequence);
-    EXPECT_EQ(sequence->timeline().times, (std::vector<double>{0, 0.5, 1, 2}));
+    EXPECT_EQ(sequence->timeline().times, (std::vector<double>{2, 2.5, 3, 4}));
     // b is the first in the file; before its first picture it shows that one.
     EXPECT_NEAR(depthOf(*sequence, 0, 0), 1.004, 1e-4);
     EXPECT_NEAR(depthOf(*sequence, 0, 1), 1.001, 1e-4);

@@ -12,8 +12,9 @@ namespace stx {
 class MovingViews : public Sequence {
   public:
     explicit MovingViews(int count, double rate = 25, bool cameraMoves = true)
-        : cameraMoves_(cameraMoves) {
-        timeline_ = steadyTimeline(count, rate);
+        : MovingViews(steadyTimeline(count, rate), cameraMoves) {}
+    explicit MovingViews(Timeline line, bool cameraMoves = true) : cameraMoves_(cameraMoves) {
+        timeline_ = std::move(line);
     }
 
     Result<Bundle> frame(std::size_t index, Job&) override {
@@ -23,13 +24,13 @@ class MovingViews : public Sequence {
         bundle.views = {mpeg4::makeView(24, 16, 16, 1), mpeg4::makeView(24, 16, 16, 2)};
         const auto step = static_cast<int>(index);
         auto colours = *bundle.views[0].texture.rgba8();
-        colours.at(1, 0).r = static_cast<unsigned char>(10 + step);
+        colours.at(1, 0).r = static_cast<unsigned char>(10 + 20 * step);
         bundle.views[0].texture = Texture(colours);
         const DepthCode code = bundle.views[0].depthCode();
         bundle.views[0].depth.at(1, 0) =
-            static_cast<float>(code.decode(100 + static_cast<unsigned>(step)));
+            static_cast<float>(code.decode(100 + 300 * static_cast<unsigned>(step)));
         if (cameraMoves_) bundle.views[1].camera.position.x += 0.25 * step;
-        bundle.time = timeline_.times[index];
+        setTime(bundle, index);
         return bundle;
     }
 
