@@ -117,19 +117,18 @@ void addFromPixels(Json& out, const Bundle& bundle) {
 }
 
 Result<void> describeExr(const fs::path& path, Json& out, Job& job) {
-    {
-        STX_TRY(const auto reader, ExrReader::open(path, job.limits));
-        const int at = environmentPartOf(reader);
-        if (at >= 0 && exrViewParts(reader).empty()) {
-            auto e = environmentHeader(reader.parts()[static_cast<std::size_t>(at)]);
-            if (!e) return tl::unexpected(e.error().at(reader.where()));
-            out["container"] = "exr";
-            out["views"] = Json::array();
-            out["environment"] = environmentJson(e->environment, e->size, e->faces);
-            return {};
-        }
+    STX_TRY(const auto reader, ExrReader::open(path, job.limits));
+    const int at = environmentPartOf(reader);
+    if (at >= 0 && exrViewParts(reader).empty()) {
+        auto e = environmentHeader(reader.parts()[static_cast<std::size_t>(at)]);
+        if (!e) return tl::unexpected(e.error().at(reader.where()));
+        out["container"] = "exr";
+        out["views"] = Json::array();
+        out["environment"] = environmentJson(e->environment, e->size, e->faces);
+        return {};
     }
-    STX_TRY(const auto header, readExrBundleHeader(path, job.limits));
+    STX_TRY(auto header, readExrBundleHeader(reader));
+    STX_CHECK(measureForeignViews(reader, header));
     out["container"] = "exr";
     out["nodeKind"] = header.nodeKind();
     if (!header.title.empty()) out["title"] = header.title;

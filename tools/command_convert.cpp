@@ -468,8 +468,27 @@ void addConvert(CommandLine& line, Program& program) {
              "the cameras' file says)")
         .positive()
         .group(sets);
-    numbers("--intrinsics", "FX,FY,CX,CY", "Of TUM and 7-Scenes recordings that do not hold them",
+    numbers("--intrinsics", "FX,FY,CX,CY",
+            "Of TUM and 7-Scenes recordings that do not hold them: the colour camera's",
             {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
+    c.option(
+         "--depth-intrinsics",
+         [o](const std::string& text) -> Result<void> {
+             glm::dvec4 k(0);
+             STX_CHECK(setTextOptions("--depth-intrinsics", text, {&k.x, &k.y, &k.z, &k.w}));
+             o->open.set.depthIntrinsics = k;
+             return {};
+         },
+         "Of the depth of TUM and 7-Scenes recordings, where a camera of its own took it (default: "
+         "7-Scenes' known ones)")
+        .takes("FX,FY,CX,CY")
+        .group(sets);
+    c.option("--depth-to-colour", set.depthToColour,
+             "Where that camera is: a text file with rows of R t, a point p of the depth camera "
+             "being R p + t in the colour camera (x right, y down, z forward), or none: depth lies "
+             "on the pixels of its picture (default: 7-Scenes' known one)")
+        .takes("FILE|none")
+        .group(sets);
     c.option("--depth", set.depthPattern,
              "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
              "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN")

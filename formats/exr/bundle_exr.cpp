@@ -177,6 +177,21 @@ bool isExrBundle(const ExrReader& reader) {
     return std::any_of(reader.parts().begin(), reader.parts().end(), isOurView);
 }
 
+Result<void> measureForeignViews(const ExrReader& reader, ExrBundleHeader& header) {
+    std::size_t number = 0;
+    for (const int i : exrViewParts(reader)) {
+        ExrViewHeader& entry = header.views[number++];
+        const ExrPart& part = reader.parts()[i];
+        if (isOurView(part)) continue;
+        entry.view.depth = Image<float>(part.width, part.height);
+        STX_CHECK(reader.readPart(i, {{"Z", entry.view.depth.data(), 1}}));
+        adoptForeignDepth(entry.view);
+        entry.points = static_cast<std::int64_t>(entry.view.pointCount());
+        entry.view.depth = {};
+    }
+    return {};
+}
+
 Result<void> checkExrKind(const ExrReader& reader) {
     const ExrPart& first = reader.parts()[0];
     const auto* version = first.attribute<std::int64_t>("stx:version");

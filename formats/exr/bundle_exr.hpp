@@ -69,6 +69,10 @@ struct ExrBundleHeader {
                                                           const Limits& limits);
 [[nodiscard]] Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader);
 
+/// Views of other programs say nothing of their planes and points: both as readExrBundle() fits
+/// them to the depth, which is read for it.
+[[nodiscard]] Result<void> measureForeignViews(const ExrReader& reader, ExrBundleHeader& header);
+
 /// The steps of readExrBundle(), for those who look at views that break rules (validation).
 /// Error (unsupported) for a file of a newer version, (invalidInput) for another kind of content.
 [[nodiscard]] Result<void> checkExrKind(const ExrReader& reader);

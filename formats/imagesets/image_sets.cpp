@@ -32,6 +32,13 @@ Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
             known += fmt::format("{}{}", known.empty() ? "" : ", ", k.name);
         return fail(ErrorCode::usage, "'{}' is not a kind of image set; known are {}", kind, known);
     }
+    if ((options.depthIntrinsics || !options.depthToColour.empty()) && kind != "tum" &&
+        kind != "7scenes")
+        return failAt(
+            inQuotes(path.string()), ErrorCode::usage,
+            "--depth-intrinsics and --depth-to-colour are of TUM and 7-Scenes recordings; "
+            "this set is '{}'",
+            kind);
     return entry->describe(path, options, job);
 }
 

@@ -81,6 +81,13 @@ struct ImageSetOptions {
     /// fx, fy, cx, cy of TUM and 7-Scenes recordings whose folder does not have them, in pixels as
     /// these sets count them (the first pixel's centre is 0, 0); fx = 0: not given.
     double intrinsics[4] = {0, 0, 0, 0};
+    /// Of TUM and 7-Scenes recordings whose depth comes from a camera of its own: its fx, fy, cx,
+    /// cy, counted as in `intrinsics`. Without a value: 7-Scenes' published ones, TUM's colour.
+    std::optional<glm::dvec4> depthIntrinsics;
+    /// A text file with the rows of R | t: a point of the depth camera is R p + t in the colour
+    /// camera (x right, y down, z forward, scene units). "none": the depth lies on the pixels of
+    /// its picture. Empty: 7-Scenes' published one, where `intrinsics` are not given; else none.
+    std::string depthToColour;
     MixedPixels mixedPixels = MixedPixels::automatic;
     /// Moves the cameras so that views that overlap agree; see lib/registration.
     bool refinePoses = false;

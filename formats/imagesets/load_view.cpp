@@ -88,8 +88,9 @@ bool clearNothing(StoredView& stored) {
                 const auto in = [](int at, int size, int of) {
                     return static_cast<int>(static_cast<std::int64_t>(at) * of / size);
                 };
-                if (nothing(depth.at(in(x, image.width(), depth.width()),
-                                     in(y, image.height(), depth.height()))))
+                // Pixels that are covered in part are the silhouette of points beside them.
+                if (alpha == full && nothing(depth.at(in(x, image.width(), depth.width()),
+                                                      in(y, image.height(), depth.height()))))
                     alpha = 0;
             }
         }
@@ -103,6 +104,8 @@ bool clearNothing(StoredView& stored) {
 /// where nothing is.
 NoDepth noDepthOf(const SetView& set, const ImageSetOptions& options, StoredView& stored) {
     if (options.noDepth) return *options.noDepth;
+    // Its pixels are not the picture's, and each camera sees what the other does not.
+    if (set.depthCamera) return NoDepth::unknown;
     // An export of ours.
     if (set.planes || set.noDepth || set.pruned) return set.noDepth.value_or(NoDepth::empty);
     bool open = false;
@@ -287,6 +290,35 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, con
     return shiftTogether(set, camera, smoothed, stored, job);
 }
 
+Result<void> needDepth(const Image<float>& depth) {
+    if (anyPoint(depth)) return {};
+    return fail(ErrorCode::invalidInput,
+                "not one of its {}x{} pixels has a valid depth; at least one is needed",
+                depth.width(), depth.height());
+}
+
+/// Makes distances of the values of a depth camera, seen by the camera of the picture: on its
+/// pixels, or on fewer and larger ones where the depth has fewer.
+Result<void> takeToPicture(const SetView& set, const ImageSetOptions& options, StoredView& stored,
+                           NoDepth& noDepth, Job& job) {
+    const int tw = stored.texture.width(), th = stored.texture.height();
+    STX_TRY(Camera to, cameraOfSize(set, tw, th));
+    Camera from = *set.depthCamera;
+    from.width = stored.depth.width();
+    from.height = stored.depth.height();
+    STX_CHECK(toDistances(set, options, from, stored, noDepth, job));
+    STX_CHECK(needDepth(stored.depth));
+    if (from.width < tw)
+        to = to.resized(from.width,
+                        std::max(1, static_cast<int>(std::lround(1.0 * th * from.width / tw))));
+    STX_TRY(stored.depth, depthSeenBy(to, set.lens, stored.depth, from, job));
+    if (!anyPoint(stored.depth))
+        return fail(ErrorCode::invalidInput,
+                    "nothing of it is in the picture of the colour camera; see --depth-intrinsics "
+                    "and --depth-to-colour");
+    return {};
+}
+
 /// Closes gaps of the depth along the picture's colours.
 void closeGaps(const SetView& set, const ImageSetOptions& options, StoredView& stored, Job& job) {
     if (options.closeGaps == CloseGaps::off ||
@@ -355,6 +387,10 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
                                                Job& job) {
     STX_CHECK(job.checkCancelled());
     STX_TRY(StoredView stored, readImages(set, options, job));
+    NoDepth noDepth = NoDepth::empty;
+    if (set.depthCamera)
+        STX_CHECK(within(fmt::format("'{}'", set.depth.name),
+                         takeToPicture(set, options, stored, noDepth, job)));
     const int tw = stored.texture.width(), th = stored.texture.height();
     const int dw = stored.depth.width(), dh = stored.depth.height();
     STX_TRY(Camera camera, cameraOfSize(set, tw, th));
@@ -377,14 +413,11 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
             camera = camera.resized(dw, dh);
         }
     }
-    NoDepth noDepth = NoDepth::empty;
-    STX_CHECK(within(
-        fmt::format("'{}'", set.depth.name),
-        toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored, noDepth, job)));
-    if (!anyPoint(stored.depth))
-        return failAt(fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
-                      "not one of its {}x{} pixels has a valid depth; at least one is needed", dw,
-                      dh);
+    if (!set.depthCamera)
+        STX_CHECK(within(fmt::format("'{}'", set.depth.name),
+                         toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored,
+                                     noDepth, job)));
+    STX_CHECK(within(fmt::format("'{}'", set.depth.name), needDepth(stored.depth)));
 
     const bool drop = options.mixedPixels == MixedPixels::drop ||
                       (options.mixedPixels == MixedPixels::automatic && set.sensor);

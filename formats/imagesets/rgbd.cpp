@@ -13,6 +13,7 @@
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/text_lines.hpp"
+#include "formats/imagesets/two_cameras.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -290,6 +291,11 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
     if (k.fx == 0 || k.fy == 0)
         return failAt(where, ErrorCode::invalidInput, "the focal lengths are {:g} and {:g}", k.fx,
                       k.fy);
+    // Published recordings have their depth on the pixels of the pictures.
+    STX_TRY(const auto depth,
+            depthCameraOf(options,
+                          {k.fx, k.fy, k.cx + 0.5, k.cy + 0.5, glm::dmat3(1.0), glm::dvec3(0.0)},
+                          false, where, job));
 
     SetDescription set;
     std::optional<glm::ivec2> size;
@@ -319,6 +325,7 @@ Result<SetDescription> describeRgbd(const path& given, const ImageSetOptions& op
             job.note(
                 "the set's world is left-handed (fx or fy is negative); its z axis is negated");
         view.camera = cameraFromVision(v);
+        if (depth) view.depthCamera = cameraBeside(v, *depth);
         view.lens = k.lens;
         view.distances = scaledIntegers(kMetre);
         view.sensor = true;

@@ -56,6 +56,9 @@ struct SetView {
     Camera camera;
     double angleX = 0, angleY = 0;  ///< radians; angleY 0 = square pixels
     Lens lens;
+    /// Of depth that a camera of its own took, in our axes, without lens; width 0: as large as the
+    /// depth.
+    std::optional<Camera> depthCamera;
     std::optional<Panorama> panorama;  ///< then `camera` has position and orientation only
 
     PictureSource texture, depth;

@@ -1,13 +1,36 @@
 // Microsoft's 7-Scenes: frame-NNNNNN.color.png, .depth.png (16 bits, millimetres; 0 and 65535 are
-// missing) and .pose.txt (camera to world, y down, z forward).
+// missing) and .pose.txt (depth camera to world, y down, z forward). Colour and depth come from the
+// two cameras of a Kinect.
+
+#include <cmath>
 
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/text_lines.hpp"
+#include "formats/imagesets/two_cameras.hpp"
 
 namespace stx::imagesets {
+namespace {
+
+/// The depth camera of the Kinect that took 7-Scenes: the intrinsics that its authors name, and a
+/// calibration of that Kinect's two cameras, metres.
+DepthCamera kinectDepth() {
+    DepthCamera depth;
+    depth.fx = depth.fy = 585;
+    depth.cx = 320;
+    depth.cy = 240;
+    depth.turn = glm::transpose(glm::dmat3(0.99996518, 0.00267651, -0.00790410,   //
+                                           -0.00274093, 0.99996303, -0.00815045,  //
+                                           0.00788199, 0.00817183, 0.99993554));
+    depth.shift = {-0.02555894, 0.00010110, 0.00203183};
+    return depth;
+}
+/// Of its colour camera, likewise.
+constexpr double kColourFocal = 525, kColourX = 320, kColourY = 240;
+
+}  // namespace
 
 Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOptions& options,
                                            Job& job) {
@@ -21,6 +44,17 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             "no frame-NNNNNN.pose.txt was found in it; give the folder of one sequence (seq-01)");
     STX_CHECK(
         checkViewCount(stems.size() / static_cast<std::size_t>(options.every), job.limits, where));
+    const auto* k = options.intrinsics;
+    const bool own = k[0] != 0;
+    if (own && k[1] == 0)
+        return failAt(where, ErrorCode::usage, "the focal lengths are {:g} and {:g}", k[0], k[1]);
+    // Another colour camera is one of another device.
+    DepthCamera known = kinectDepth();
+    if (own) {
+        known.fx = std::copysign(known.fx, k[0]);
+        known.fy = std::copysign(known.fy, k[1]);
+    }
+    STX_TRY(const auto depth, depthCameraOf(options, known, !own, where, job));
     SetDescription set;
     std::optional<glm::ivec2> size;
     for (const std::string& stem : stems) {
@@ -50,14 +84,10 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
         }
         VisionCamera v;
-        const auto* k = options.intrinsics;
-        v.fx = k[0] != 0 ? k[0] : 585;
-        v.fy = k[0] != 0 ? k[1] : 585;
-        v.cx = k[0] != 0 ? k[2] + 0.5 : 320;
-        v.cy = k[0] != 0 ? k[3] + 0.5 : 240;
-        if (v.fx == 0 || v.fy == 0)
-            return failAt(where, ErrorCode::usage, "the focal lengths are {:g} and {:g}", v.fx,
-                          v.fy);
+        v.fx = own ? k[0] : kColourFocal;
+        v.fy = own ? k[1] : kColourFocal;
+        v.cx = own ? k[2] + 0.5 : kColourX;
+        v.cy = own ? k[3] + 0.5 : kColourY;
         v.width = size->x;
         v.height = size->y;
         glm::dmat3 rotation;
@@ -67,16 +97,27 @@ Result<SetDescription> describeSevenScenes(const path& given, const ImageSetOpti
             v.centre[row] = n[static_cast<std::size_t>(row * 4 + 3)];
         }
         STX_TRY(v.worldFromCamera, repairRotation(rotation, v.fx, place, job));
+        if (depth) {
+            // The pose is that of the depth.
+            v.worldFromCamera = v.worldFromCamera * glm::transpose(depth->turn);
+            v.centre -= v.worldFromCamera * depth->shift;
+            view.depthCamera = cameraBeside(v, *depth);
+        }
         view.camera = cameraFromVision(v);
         view.distances = scaledIntegers(0.001, 65535);
         view.sensor = true;
         set.views.push_back(std::move(view));
     }
-    if (options.intrinsics[0] == 0)
+    if (!own)
         job.note(
-            "the set does not tell its intrinsics; 7-Scenes' published ones are used (f 585, "
-            "centre 320, 240); others with --intrinsics");
-    job.note("7-Scenes' colour and depth come from two cameras 25 mm apart and are taken as one");
+            fmt::format("the set does not tell its intrinsics; those known of 7-Scenes' colour "
+                        "camera are used (f {:g}, centre {:g}, {:g}); others with --intrinsics",
+                        kColourFocal, kColourX, kColourY));
+    if (depth)
+        job.note(fmt::format(
+            "depth comes from a camera of its own (f {:g}, {:.3g} mm beside) and is taken into the "
+            "picture of the colour camera; --depth-to-colour none leaves it as it is",
+            depth->fx, 1000 * glm::length(depth->shift)));
     return set;
 }
 

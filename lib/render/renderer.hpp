@@ -32,7 +32,8 @@ enum class GpuPipeline {
 /// What is put where no reference view shows a surface.
 enum class Fill {
     background,  ///< the bundle's background views, and what is around where these have nothing
-    spatial,     ///< what is around only (surface mode, in scenes that fill the frame)
+    spatial,  ///< what is around only (surface mode, in scenes that fill the frame), where a view
+              ///< looked at but something hid
     none,
 };
 

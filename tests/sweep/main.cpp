@@ -26,7 +26,7 @@ struct Options {
 };
 
 /// What a rule found in a case; nothing when it holds.
-std::optional<Measure> findingOf(const Rule& rule, Pictures& pictures) {
+std::optional<Measure> findingOf(const SweepRule& rule, Pictures& pictures) {
     const auto measured = rule.measure(pictures);
     if (!measured) return Measure{1e9, "error: " + measured.error().message};
     if (!*measured || (*measured)->found <= rule.allowed) return std::nullopt;
@@ -34,7 +34,7 @@ std::optional<Measure> findingOf(const Rule& rule, Pictures& pictures) {
 }
 
 /// The simplest case of its kind in which the rule still finds something.
-SweepCase reduced(const SweepCase& found, const Rule& rule) {
+SweepCase reduced(const SweepCase& found, const SweepRule& rule) {
     SweepCase current = found;
     constexpr int kTries = 40;
     int tries = 0;
@@ -54,7 +54,7 @@ SweepCase reduced(const SweepCase& found, const Rule& rule) {
     return current;
 }
 
-std::string repeatOf(const SweepCase& c, const Rule& rule) {
+std::string repeatOf(const SweepCase& c, const SweepRule& rule) {
     const std::string changes = c.changes();
     return fmt::format("tests/sweep/run --seed {} --first {} --cases 1 --rule {}{}", c.seed,
                        c.number, rule.name, changes.empty() ? "" : " --set " + changes);
@@ -105,7 +105,7 @@ int check(const Options& options) {
         }
         Pictures pictures(*stage);
         Random random(options.seed * 9176 + static_cast<std::uint64_t>(number) * 13 + 1);
-        for (const Rule& rule : rules()) {
+        for (const SweepRule& rule : rules()) {
             const bool asked = random.chance(rule.share);
             if (options.rule.empty() ? !asked : options.rule != rule.name) continue;
             if (options.measure) {

@@ -9,8 +9,8 @@ constexpr const char* kAlike =
 
 }  // namespace
 
-const std::vector<Rule>& rules() {
-    static const std::vector<Rule> kRules{
+const std::vector<SweepRule>& rules() {
+    static const std::vector<SweepRule> kRules{
         {"open", "no mode or quality leaves a place open that two views see", 0.5, "%",
          "half a percent of them: pixels beside outlines that nine pixels of a view do not tell", 1,
          measures::openWhereSeen},

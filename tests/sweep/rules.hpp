@@ -12,7 +12,7 @@ struct Measure {
 };
 
 /// Something that must hold for every case.
-struct Rule {
+struct SweepRule {
     const char* name;
     const char* sentence;  ///< what must hold
     double allowed;        ///< the largest `found` that is no finding
@@ -24,4 +24,4 @@ struct Rule {
     stx::Result<std::optional<Measure>> (*measure)(Pictures& pictures);
 };
 
-[[nodiscard]] const std::vector<Rule>& rules();
+[[nodiscard]] const std::vector<SweepRule>& rules();

@@ -294,8 +294,10 @@ std::vector<SweepCase> SweepCase::simpler() const {
         change(simple);
         if (simple.changes() != changes()) out.push_back(simple);
     };
-    with([](SweepCase& c) { c.views = std::max(2, c.views / 2); });
-    with([](SweepCase& c) { c.views = std::max(2, c.views - 1); });
+    if (layout != cube) {
+        with([](SweepCase& c) { c.views = std::max(2, c.views / 2); });
+        with([](SweepCase& c) { c.views = std::max(2, c.views - 1); });
+    }
     with([](SweepCase& c) {
         c.width = std::max(16, c.width / 2);
         c.height = std::max(16, c.height / 2);

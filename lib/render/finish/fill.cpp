@@ -25,6 +25,28 @@ struct WideVotes : SourcePixels {
 #include "shaders/shared/surface_votes.glsl"
 };
 
+/// What sources know of places.
+struct LookedAt : SourcePixels {
+    /// What lies beside the picture of a source by no more than this share of its size, or behind
+    /// its far plane by this share of the distance, continues what it saw.
+    static constexpr float kBorder = 0.05f;
+
+    /// Whether a source looked at a point without seeing past it, or almost looked at it.
+    [[nodiscard]] bool hides(int s, float x, float y, float q) {
+        const vec4 h = warp(s, x, y, q);
+        const auto farthest = static_cast<float>(axisOf(s).q((1 + kBorder) * at(s).view->farPlane));
+        if (!(h.w > 0.0f && h.z >= farthest * h.w)) return false;
+        const auto width = static_cast<float>(sizeOf(s).x),
+                   height = static_cast<float>(sizeOf(s).y);
+        const auto within = [&](float border) {
+            return h.x >= -border * width * h.w && h.x <= (1 + border) * width * h.w &&
+                   h.y >= -border * height * h.w && h.y <= (1 + border) * height * h.w;
+        };
+        return within(kBorder) && (!within(0.0f) || voteOf(s, x, y, q) == kNoVote);
+    }
+#include "shaders/shared/surface_votes.glsl"
+};
+
 }  // namespace shared
 
 namespace {
@@ -58,16 +80,19 @@ constexpr float kFirstChange = 0.02f, kNextChange = 0.005f;
 constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f, kEndedWeight = 0.2f;
 
 // Backgrounds (fillBackground).
+/// Depths behind that of a fill that are looked up in the sources, up to kFarthestShare.
+constexpr int kFarther = 4;
 /// Pixels farther than this from any surface are filled from a picture of half the size, nearer
-/// ones by rays; from half of it on both are mixed.
-constexpr int kNearSurface = 16;
+/// ones by rays; from half of it on both are mixed. Twice as much, and twice as many rays, cost
+/// four times as long and gain 0.05 dB of a whole frame that a camera outside of the rig sees.
+constexpr int kNearSurface = 8;
 /// Pixels no farther than this from surface have a ray that meets it: the rays are no further
 /// apart than a pixel there.
-constexpr int kSurelyMet = 4;
+constexpr int kSurelyMet = 2;
 /// No ray is longer: what is farther weighs next to nothing beside what is near.
 constexpr float kLongestRay = 512;
 /// Directions that surface is looked for in.
-constexpr int kRays = 32;
+constexpr int kRays = 16;
 /// Pixels averaged where a ray meets surface, while they differ by no more than this share of q.
 constexpr int kAveraged = 2;
 constexpr float kSameSurface = 0.03f;
@@ -358,21 +383,46 @@ void halve(const OpenFrame& frame, Image<glm::vec4>& albedo, Image<float>& q) {
     });
 }
 
-/// The filled half of a frame between its pixels, at pixel (x, y) of the frame.
-Fill sampleOf(const Image<glm::vec4>& albedo, const Image<float>& q, int x, int y) {
-    const int lastX = q.width() - 1, lastY = q.height() - 1;
-    const float u = 0.5f * static_cast<float>(x) - 0.25f, v = 0.5f * static_cast<float>(y) - 0.25f;
-    const int x0 = static_cast<int>(std::floor(u)), y0 = static_cast<int>(std::floor(v));
-    const float tu = u - static_cast<float>(x0), tv = v - static_cast<float>(y0);
-    Fill fill{x, y, glm::vec3(0.0f), 0.0f};
-    for (int k = 0; k < 4; ++k) {
-        const int nx = std::clamp(x0 + k % 2, 0, lastX), ny = std::clamp(y0 + k / 2, 0, lastY);
-        const float weight = (k % 2 ? tu : 1 - tu) * (k / 2 ? tv : 1 - tv);
-        fill.colour += weight * glm::vec3(albedo.at(nx, ny));
-        fill.q += weight * q.at(nx, ny);
+/// What a frame of half the size has between its pixels.
+struct Sample {
+    enum Kind { open, filled, mixed } kind = mixed;
+    glm::vec3 colour{0.0f};  ///< of those that are not open
+    float q = 0;             ///< 0 where all are open
+};
+
+/// The filled half of a frame; none: empty.
+struct Half {
+    Image<glm::vec4> albedo;
+    Image<float> q;
+
+    /// At pixel (x, y) of the frame.
+    [[nodiscard]] Sample at(int x, int y) const {
+        Sample sample;
+        if (q.empty()) return sample;
+        const int lastX = q.width() - 1, lastY = q.height() - 1;
+        // Pixels of the half are two wide: those on both sides of the middle of this one.
+        const std::array<int, 2> xs = {std::max((x - 1) >> 1, 0), std::min((x + 1) >> 1, lastX)};
+        const std::array<int, 2> ys = {std::max((y - 1) >> 1, 0), std::min((y + 1) >> 1, lastY)};
+        int filled = 0;
+        for (const int ny : ys)
+            for (const int nx : xs) filled += q.at(nx, ny) > 0.0f;
+        sample.kind = filled == 4 ? Sample::filled : filled == 0 ? Sample::open : Sample::mixed;
+        if (filled == 0) return sample;
+        const float tu = x % 2 ? 0.25f : 0.75f, tv = y % 2 ? 0.25f : 0.75f;
+        float weights = 0;
+        for (std::size_t k = 0; k < 4; ++k) {
+            const int nx = xs[k % 2], ny = ys[k / 2];
+            if (!(q.at(nx, ny) > 0.0f)) continue;
+            const float weight = (k % 2 ? tu : 1 - tu) * (k / 2 ? tv : 1 - tv);
+            sample.colour += weight * glm::vec3(albedo.at(nx, ny));
+            sample.q += weight * q.at(nx, ny);
+            weights += weight;
+        }
+        sample.colour /= weights;
+        sample.q /= weights;
+        return sample;
     }
-    return fill;
-}
+};
 
 /// 0 up to `t` = 0, 1 from `t` = 1 on.
 float smoothStep(float t) {
@@ -400,7 +450,7 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int
     std::array<Hit, kRays> hits;
     int count = 0;
     for (const glm::vec2 ray : rayDirections()) {
-        float along = 1;
+        float along = distances.at(x, y);  // nothing is nearer
         Hit hit;
         int averaged = 0;
         while (averaged < kAveraged && along <= kLongestRay) {
@@ -453,6 +503,75 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int
     return true;
 }
 
+/// fillBackground() of a frame at 1/`scale` of its size. What lies amid what is filled, or amid
+/// what stays open, at half the size is like that; the rest is looked up in the sources.
+void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale) {
+    const int height = frame.q.height();
+    const Image<std::uint8_t> distances = distancesToSurface(frame);
+    int nearest = kFarthestCounted, farthest = 0;
+    for (const std::uint8_t d : distances.pixels()) {
+        nearest = std::min<int>(nearest, d);
+        farthest = std::max<int>(farthest, d);
+    }
+    if (nearest > 0 || farthest == 0) return;
+    Half half;
+    if (farthest > kSurelyMet) {
+        halve(frame, half.albedo, half.q);
+        OpenFrame smaller{half.albedo, half.q, frame.space};
+        fillLevel(smaller, sources, 2 * scale);
+    }
+
+    std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
+    parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
+        shared::LookedAt places{{sources}};
+        int last = 0;  // the source that hid a place, which is likely to hide the next
+        const auto toFill = [&](const Fill& fill) {
+            const float x = (static_cast<float>(fill.x) + 0.5f) * static_cast<float>(scale);
+            const float y = (static_cast<float>(fill.y) + 0.5f) * static_cast<float>(scale);
+            const int count = static_cast<int>(sources.size());
+            // What fills a pixel tells its depth roughly: what is there may be farther away.
+            const float apart = kFarthestShare * frame.space.axis.relativeScale(fill.q) / kFarther;
+            for (int k = 0; k < count; ++k) {
+                const int s = (last + k) % count;
+                for (int step = 0; step <= kFarther; ++step) {
+                    const float q = fill.q - apart * static_cast<float>(step);
+                    if (!(q > 0.0f) || !places.hides(s, x, y, q)) continue;
+                    last = s;
+                    return true;
+                }
+            }
+            return false;
+        };
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            forWhere(
+                distances.row(y), [](std::uint8_t d) { return d > 0; },
+                [&](int x) {
+                    const int distance = distances.at(x, y);
+                    if (frame.albedo.at(x, y).a >= kClosed) return;
+                    const Sample beyond = half.at(x, y);
+                    if (beyond.kind == Sample::open) return;
+                    const float far =
+                        half.q.empty()
+                            ? 0.0f
+                            : smoothStep(2.0f * static_cast<float>(distance) / kNearSurface - 1);
+                    Fill fill{x, y, glm::vec3(0.0f), 0.0f};
+                    const bool met = far < 1.0f && alongRays(frame, distances, x, y, fill);
+                    if (!met) {
+                        if (!(beyond.q > 0.0f)) return;
+                        fill.colour = beyond.colour;
+                        fill.q = beyond.q;
+                    } else if (far > 0.0f && beyond.q > 0.0f) {
+                        fill.colour = glm::mix(fill.colour, beyond.colour, far);
+                        fill.q = glm::mix(fill.q, beyond.q, far);
+                    }
+                    if (beyond.kind == Sample::mixed && !toFill(fill)) return;
+                    rows[static_cast<std::size_t>(y)].push_back(fill);
+                });
+        }
+    });
+    putIn(frame, rows);
+}
+
 }  // namespace
 
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest) {
@@ -494,46 +613,8 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
     putIn(frame, rows);
 }
 
-void fillBackground(OpenFrame frame) {
-    const int width = frame.q.width(), height = frame.q.height();
-    const Image<std::uint8_t> distances = distancesToSurface(frame);
-    int nearest = kFarthestCounted, farthest = 0;
-    for (const std::uint8_t d : distances.pixels()) {
-        nearest = std::min<int>(nearest, d);
-        farthest = std::max<int>(farthest, d);
-    }
-    if (nearest > 0 || farthest == 0) return;
-    Image<glm::vec4> halfAlbedo;
-    Image<float> halfQ;
-    if (farthest > kSurelyMet) {
-        halve(frame, halfAlbedo, halfQ);
-        fillBackground({halfAlbedo, halfQ, frame.space});
-    }
-    std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
-    parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            for (int x = 0; x < width; ++x) {
-                const int distance = distances.at(x, y);
-                if (distance == 0 || frame.albedo.at(x, y).a >= kClosed) continue;
-                const float far =
-                    halfQ.empty()
-                        ? 0.0f
-                        : smoothStep(2.0f * static_cast<float>(distance) / kNearSurface - 1);
-                Fill fill{x, y, glm::vec3(0.0f), 0.0f};
-                const bool met = far < 1.0f && alongRays(frame, distances, x, y, fill);
-                if (!met) {
-                    if (halfQ.empty()) continue;
-                    fill = sampleOf(halfAlbedo, halfQ, x, y);
-                } else if (far > 0.0f) {
-                    const Fill beyond = sampleOf(halfAlbedo, halfQ, x, y);
-                    fill.colour = glm::mix(fill.colour, beyond.colour, far);
-                    fill.q = glm::mix(fill.q, beyond.q, far);
-                }
-                rows[static_cast<std::size_t>(y)].push_back(fill);
-            }
-        }
-    });
-    putIn(frame, rows);
+void fillBackground(OpenFrame frame, std::span<const LocalSource> sources) {
+    fillLevel(frame, sources, 1);
 }
 
 }  // namespace stx::surface

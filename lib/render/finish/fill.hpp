@@ -24,10 +24,12 @@ struct OpenFrame {
 /// begins, and the normal stays as it is.
 void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest);
 
-/// Fills everything that is open from the background around it: for scenes that fill the frame.
-/// Near surface along rays through the picture, beyond from a picture of half the size that was
-/// filled before, so that the time grows with the pixels however large the openings are. Without
-/// any surface nothing is filled.
-void fillBackground(OpenFrame frame);
+/// Fills what is open from the background around it: for scenes that fill the frame. Filled is what
+/// a source looked at but something hid: where a ray, from the depth of the fill to twice that, is
+/// in its frustum, before its far plane, and it does not see past it; with a border of a twentieth
+/// of its picture. The rest stays open. Near surface along rays through the picture, beyond from a
+/// picture of half the size that was filled before, so that the time grows with the pixels however
+/// large the openings are. Without any surface nothing is filled.
+void fillBackground(OpenFrame frame, std::span<const LocalSource> sources);
 
 }  // namespace stx::surface

@@ -283,12 +283,17 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
     Image<float> q;
     STX_CHECK(collect(*work, frame, q));
     if (behind_) STX_CHECK(drawBehind(*work, frame, q));
+    std::vector<LocalSource> all;
+    for (const FrameSource& f : work->sources)
+        all.push_back({f.source, f.sourceFromPixel, nullptr});
     if (fillsFrame_ && settings_.fill != Fill::none) {
-        fillBackground({frame.colour, q, space});
+        // Cameras of the background looked, too.
+        if (behind_)
+            for (const Source& s : behind_->scene_.sources)
+                all.push_back(
+                    {&s, warpFrom(s.space.pixelFromWorld * space.worldFromPixel), nullptr});
+        fillBackground({frame.colour, q, space}, all);
     } else {
-        std::vector<LocalSource> all;
-        for (const FrameSource& f : work->sources)
-            all.push_back({f.source, f.sourceFromPixel, nullptr});
         fillUnseen({frame.colour, q, space, frame.normal.empty() ? nullptr : &frame.normal}, all,
                    settings_.fill == Fill::none ? 0 : kWidestHole);
     }

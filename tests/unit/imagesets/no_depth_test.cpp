@@ -131,6 +131,34 @@ TEST(NoDepth, DepthThatHoldsInfinityTellsBoth) {
     }
 }
 
+// The alpha of a picture is finer than its depth: half a statue's outline was lost.
+TEST(NoDepth, PixelsThatAreCoveredInPartKeepTheirAlpha) {
+    const auto view = roomViews(1)[0];
+    const Camera& c = view.camera;
+    auto depth = view.depth;
+    std::vector<std::uint8_t> pixels(std::size_t{4} * kWidth * kHeight, 255);
+    for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x <= 20; ++x) {
+            depth.at(x, y) = 1e10f;
+            pixels[static_cast<std::size_t>(4 * (y * kWidth + x) + 3)] = x < 20 ? 0 : 100;
+        }
+    }
+    const TemporaryFolder folder;
+    const auto png = encodePng(kWidth, kHeight, 4, 8, pixels.data(), true);
+    ASSERT_TRUE(png);
+    writeBytes(folder / "a.png", *png);
+    writeExr(folder / "d.exr", {{"Z", depth}});
+    writeText(folder / "transforms.json",
+              fmt::format("{{\"w\":96,\"h\":64,\"fl_x\":{},\"fl_y\":{},\"cx\":{},\"cy\":{},"
+                          "\"frames\":[{}]}}",
+                          c.fx, c.fy, c.cx, c.cy,
+                          transformsFrame(c.worldFromCamera(), ",\"depth_file_path\":\"d\"")));
+    const auto read = readSet(folder.path());
+    ASSERT_TRUE(read) << read.error().text();
+    EXPECT_NEAR(read->views[0].texture.at(20, 30).a, 100 / 255.0, 1e-6);
+    EXPECT_EQ(read->views[0].texture.at(10, 30).a, 0.0f);
+}
+
 TEST(NoDepth, MasksOfTheSetAreRead) {
     const TemporaryFolder folder;
     writeSet(folder.path(), roomViews(), nullptr, ",\"mask_path\":\"masks/m.png\"");

@@ -25,7 +25,26 @@ struct Picture {
         albedo.at(x, y) = glm::vec4(colour, 1.0f);
         q.at(x, y) = depth;
     }
-    void fill() { fillBackground({albedo, q, space}); }
+    /// With one source that saw nothing farther than `hider` away, and its own far plane there.
+    void fill(const Camera& source, float hider, double farPlane) {
+        Bundle bundle;
+        ReferenceView view;
+        view.name = "source";
+        view.camera = source;
+        view.depthBits = 32;
+        view.nearPlane = 0.5 * hider;
+        view.farPlane = farPlane;
+        view.texture = Image<glm::u8vec4>(source.width, source.height, glm::u8vec4(255));
+        view.depth = Image<float>(source.width, source.height, hider);
+        bundle.views.push_back(std::move(view));
+        const SurfaceScene scene{PageSet(bundle)};
+        const Source& s = scene.sources[0];
+        const LocalSource local{&s, warpFrom(s.space.pixelFromWorld * space.worldFromPixel),
+                                nullptr};
+        fillBackground({albedo, q, space}, {&local, 1});
+    }
+    /// Everything is hidden from the source.
+    void fill() { fill(space.camera, 0.1f, 1000); }
     [[nodiscard]] int openPixels() const {
         const auto pixels = albedo.pixels();
         return static_cast<int>(std::count_if(pixels.begin(), pixels.end(),
@@ -73,6 +92,39 @@ TEST(FillBackground, OnePixelOfSurfaceFillsThePicture) {
     EXPECT_EQ(p.openPixels(), 0);
     EXPECT_NEAR(p.albedo.at(0, 76).b, 0.75f, 1e-3f);
     EXPECT_NEAR(p.q.at(0, 76), 2.0f, 1e-3f);
+}
+
+// A wall in the left half of the picture, 2 away.
+Picture halfAWall() {
+    Picture p(400, 300);
+    for (int y = 0; y < 300; ++y)
+        for (int x = 0; x < 200; ++x) p.close(x, y, glm::vec3(0.5f), 0.5f);
+    return p;
+}
+
+TEST(FillBackground, WhatNoSourceLookedAtStaysOpen) {
+    // The source is farther to the left. Of what is twice as far away as the wall its picture ends
+    // at x = 325, its border at 345.
+    Picture p = halfAWall();
+    Camera left = p.space.camera;
+    left.position.x -= 2.0 * 150 / left.fx;
+    p.fill(left, 1.0f, 10);
+    EXPECT_EQ(p.albedo.at(341, 150).a, 1.0f);
+    EXPECT_EQ(p.albedo.at(349, 150).a, 0.0f);
+    EXPECT_EQ(p.q.at(349, 150), 0.0f);
+    EXPECT_EQ(p.albedo.at(399, 150).a, 0.0f);
+}
+
+TEST(FillBackground, WhatASourceSeesPastStaysOpen) {
+    Picture p = halfAWall();
+    p.fill(p.space.camera, 8.0f, 10);
+    EXPECT_EQ(p.openPixels(), 200 * 300);
+}
+
+TEST(FillBackground, WhatIsBehindAllThatSourcesShowStaysOpen) {
+    Picture p = halfAWall();
+    p.fill(p.space.camera, 1.0f, 1.5);
+    EXPECT_EQ(p.openPixels(), 200 * 300);
 }
 
 TEST(FillBackground, APictureWithoutSurfaceStaysOpen) {

@@ -1,0 +1,262 @@
+// Colour and depth from two cameras side by side: the depth is taken into the picture.
+
+#include <cmath>
+
+#include "lib/metrics/compare.hpp"
+#include "lib/render/renderer.hpp"
+#include "tests/shared_data.hpp"
+#include "tests/unit/imagesets/set_writer.hpp"
+
+using namespace stx;
+using namespace sets;
+
+namespace {
+
+constexpr int kWidth = 160, kHeight = 120;
+constexpr double kStep = 0.001;
+
+/// A point of the depth camera is kTurn * p + kShift in the colour camera, y down, z forward.
+const glm::dmat3 kTurn = glm::mat3_cast(quatFromAxisAngle({0.2, 1.0, 0.1, 0.02}));
+const glm::dvec3 kShift(-0.06, 0.004, 0.003);
+
+/// A recording of the room: the colour camera's view, and the depth of another camera.
+struct Recording {
+    ReferenceView colour, depth;
+};
+
+Recording recorded(int depthWidth = kWidth, int depthHeight = kHeight) {
+    const Camera camera = analyticCamera(AnalyticScene::room, 1, 4).resized(kWidth, kHeight);
+    Camera other = camera.resized(depthWidth, depthHeight);
+    other.fx *= 1.1;
+    other.fy *= 1.12;
+    other.cx += 2.5;
+    // Between our axes and computer vision's y and z change their signs.
+    const glm::dmat3 flip(1, 0, 0, 0, -1, 0, 0, 0, -1);
+    const glm::dmat3 r = glm::mat3_cast(camera.orientation) * flip;
+    other.position = camera.position + r * kShift;
+    other.orientation = glm::normalize(glm::quat_cast(r * kTurn * flip));
+    Recording out{viewOfAnalyticScene(AnalyticScene::room, camera, 1),
+                  viewOfAnalyticScene(AnalyticScene::room, other, 1)};
+    return out;
+}
+
+std::string numbers(const Camera& c) {
+    return fmt::format("{} {} {} {}\n", c.fx, c.fy, c.cx - 0.5, c.cy - 0.5);
+}
+std::string poseOf(const Camera& c) {
+    const glm::dmat3 r = visionRotation(c);
+    std::string text;
+    for (int row = 0; row < 3; ++row)
+        text += fmt::format("{} {} {} {}\n", r[0][row], r[1][row], r[2][row], c.position[row]);
+    return text + "0 0 0 1\n";
+}
+std::string motion() {
+    std::string text = "# rows of R t\n";
+    for (int row = 0; row < 3; ++row)
+        text +=
+            fmt::format("{} {} {} {}\n", kTurn[0][row], kTurn[1][row], kTurn[2][row], kShift[row]);
+    return text;
+}
+void writeDepth(const std::filesystem::path& file, const ReferenceView& view, double step) {
+    writeCodes(file, view.depth.width(), view.depth.height(), 16, [&](int x, int y) {
+        const float d = view.depth.at(x, y);
+        return hasPoint(d) ? std::lround(d / step) : 0L;
+    });
+}
+
+ImageSetOptions optionsOf(const Recording& r, const std::filesystem::path& folder) {
+    ImageSetOptions options;
+    options.mixedPixels = MixedPixels::keep;
+    const Camera &c = r.colour.camera, &d = r.depth.camera;
+    const double k[4] = {c.fx, c.fy, c.cx - 0.5, c.cy - 0.5};
+    std::copy(k, k + 4, options.intrinsics);
+    options.depthIntrinsics = glm::dvec4(d.fx, d.fy, d.cx - 0.5, d.cy - 0.5);
+    options.depthToColour = (folder / "motion.txt").string();
+    return options;
+}
+
+/// Pixels whose depth is not that of the picture's own camera, as a share of those that have one.
+double offShare(const Recording& r, const ReferenceView& read) {
+    int known = 0, off = 0;
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+            const float d = read.depth.at(x, y), truth = r.colour.depth.at(x, y);
+            if (!hasPoint(d) || !hasPoint(truth)) continue;
+            ++known;
+            off += std::abs(d - truth) > 0.01f * truth;
+        }
+    std::printf("  %d of %d pixels have depth, %d are off\n", known, kWidth * kHeight, off);
+    // The border that the depth camera does not see, and what is hidden from it.
+    EXPECT_GT(known, kWidth * kHeight * 3 / 4);
+    return static_cast<double>(off) / known;
+}
+
+/// The depth lies where the picture's own camera would have it, but at outlines, whose pixels go to
+/// one side or the other.
+void expectTaken(const Recording& r, const ReferenceView& read, double share = 0.012) {
+    EXPECT_EQ(read.noDepth, NoDepth::unknown);
+    ASSERT_EQ(read.depth.size(), r.colour.depth.size());
+    EXPECT_LT(glm::length(read.camera.position - r.colour.camera.position), 1e-9);
+    EXPECT_GT(std::abs(glm::dot(read.camera.orientation, r.colour.camera.orientation)), 1 - 1e-12);
+    EXPECT_LT(offShare(r, read), share);
+}
+
+void writeSevenScenes(const std::filesystem::path& folder, const Recording& r) {
+    writeColour(folder / "frame-000000.color.png", r.colour);
+    writeDepth(folder / "frame-000000.depth.png", r.depth, kStep);
+    // 7-Scenes' poses are those of the depth camera.
+    writeText(folder / "frame-000000.pose.txt", poseOf(r.depth.camera));
+    writeText(folder / "motion.txt", motion());
+}
+
+TEST(TwoCameras, DepthIsTakenIntoThePicture) {
+    const Recording r = recorded();
+    const TemporaryFolder folder;
+    writeSevenScenes(folder.path(), r);
+    const auto read = readSet(folder.path(), optionsOf(r, folder.path()));
+    ASSERT_TRUE(read) << read.error().text();
+    expectTaken(r, read->views[0]);
+    // The test would see it otherwise.
+    ImageSetOptions asOne = optionsOf(r, folder.path());
+    asOne.depthIntrinsics.reset();
+    asOne.depthToColour = "none";
+    const auto one = readSet(folder.path(), asOne);
+    ASSERT_TRUE(one) << one.error().text();
+    EXPECT_GT(offShare(r, one->views[0]), 0.1);
+}
+
+TEST(TwoCameras, OfTumTheColoursPoseIsGiven) {
+    const Recording r = recorded();
+    const TemporaryFolder folder;
+    writeColour(folder / "rgb/1.png", r.colour);
+    writeDepth(folder / "depth/1.png", r.depth, 1.0 / 5000);
+    writeText(folder / "rgb.txt", "1 rgb/1.png\n");
+    writeText(folder / "depth.txt", "1 depth/1.png\n");
+    const glm::dquat q = glm::quat_cast(visionRotation(r.colour.camera));
+    const glm::dvec3 c = r.colour.camera.position;
+    writeText(folder / "groundtruth.txt",
+              fmt::format("1 {} {} {} {} {} {} {}\n", c.x, c.y, c.z, q.x, q.y, q.z, q.w));
+    writeText(folder / "intrinsics.txt", numbers(r.colour.camera));
+    writeText(folder / "motion.txt", motion());
+    ImageSetOptions options = optionsOf(r, folder.path());
+    options.intrinsics[0] = 0;
+    const auto read = readSet(folder.path(), options);
+    ASSERT_TRUE(read) << read.error().text();
+    expectTaken(r, read->views[0]);
+}
+
+TEST(TwoCameras, SizesAndShapesMayDiffer) {
+    const Recording r = recorded(200, 120);
+    const TemporaryFolder folder;
+    writeSevenScenes(folder.path(), r);
+    const auto read = readSet(folder.path(), optionsOf(r, folder.path()));
+    ASSERT_TRUE(read) << read.error().text();
+    expectTaken(r, read->views[0]);
+}
+
+/// Depth with fewer pixels is raised along the picture's edges: as well as depth of that size that
+/// the colour camera itself took.
+TEST(TwoCameras, FewPixelsAreRaised) {
+    const Recording r = recorded(80, 80);
+    const TemporaryFolder folder;
+    writeSevenScenes(folder.path(), r);
+    const auto read = readSet(folder.path(), optionsOf(r, folder.path()));
+    ASSERT_TRUE(read) << read.error().text();
+    Recording own = r;
+    own.depth = viewOfAnalyticScene(AnalyticScene::room, r.colour.camera.resized(80, 60), 1);
+    const TemporaryFolder aligned;
+    writeSevenScenes(aligned.path(), own);
+    ImageSetOptions options = optionsOf(own, aligned.path());
+    options.depthIntrinsics.reset();
+    options.depthToColour = "none";
+    const auto same = readSet(aligned.path(), options);
+    ASSERT_TRUE(same) << same.error().text();
+    expectTaken(r, read->views[0], 1.2 * offShare(r, same->views[0]));
+}
+
+TEST(TwoCameras, WrongNumbersAreErrors) {
+    const Recording r = recorded();
+    const TemporaryFolder folder;
+    writeSevenScenes(folder.path(), r);
+    ImageSetOptions options = optionsOf(r, folder.path());
+    options.depthIntrinsics = glm::dvec4(0, 585, 320, 240);
+    auto read = readSet(folder.path(), options);
+    expectError(read, {"focal lengths", "0 and 585", "above 0"});
+    EXPECT_EQ(read.error().code, ErrorCode::usage);
+    options = optionsOf(r, folder.path());
+    options.depthToColour = "none";
+    read = readSet(folder.path(), options);
+    expectError(read, {"--depth-to-colour none", "--depth-intrinsics"});
+    EXPECT_EQ(read.error().code, ErrorCode::usage);
+    options = optionsOf(r, folder.path());
+    writeText(folder / "motion.txt", "1 0 0\n0 1 0\n0 0 1\n");
+    expectError(readSet(folder.path(), options), {"motion.txt", "9 numbers", "3 or 4 rows of 4"});
+    writeText(folder / "motion.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n");
+    expectError(readSet(folder.path(), options), {"motion.txt", "0 0 1 1", "0 0 0 1"});
+    writeText(folder / "motion.txt", "2 0 0 0\n0 1 0 0\n0 0 1 0\n");
+    expectError(readSet(folder.path(), options), {"motion.txt", "scales or shears"});
+    writeText(folder / "motion.txt", "1 0 0 50\n0 1 0 0\n0 0 1 0\n");
+    expectError(readSet(folder.path(), options), {"nothing of it is in the picture"});
+}
+
+/// A frame of a set drawn from the others, on pixels that both cover.
+struct Drawn {
+    Rgba8Image picture;
+    Image<std::uint8_t> covered;
+};
+Drawn drawnFromOthers(Bundle bundle, std::size_t which) {
+    const Camera to = bundle.views[which].camera;
+    bundle.views.erase(bundle.views.begin() + static_cast<std::ptrdiff_t>(which));
+    Job job;
+    RenderSettings settings;
+    settings.fill = Fill::none;
+    const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
+    EXPECT_TRUE(renderer);
+    const auto frame = (*renderer)->render(to);
+    EXPECT_TRUE(frame);
+    Drawn out{Rgba8Image(to.width, to.height), Image<std::uint8_t>(to.width, to.height)};
+    for (std::size_t i = 0; i < out.picture.count(); ++i) {
+        const glm::vec4 c = frame->colour.data()[i];
+        out.covered.data()[i] = c.a > 0.999f ? 255 : 0;
+        out.picture.data()[i] = glm::u8vec4(glm::clamp(c, 0.0f, 1.0f) * 255.0f + 0.5f);
+        out.picture.data()[i].a = 255;
+    }
+    return out;
+}
+
+/// The known calibration of 7-Scenes' Kinect, beside both cameras taken as one.
+TEST(TwoCameras, SevenScenesAreDrawnBetter) {
+    REQUIRE_SHARED(set, "data/imagesets/7scenes-kitchen");
+    const TemporaryFolder folder;
+    for (const char* frame : {"frame-000186", "frame-000189", "frame-000192"})
+        for (const char* file : {".color.png", ".depth.png", ".pose.txt"})
+            std::filesystem::copy_file(set / (std::string(frame) + file),
+                                       folder / (std::string(frame) + file));
+    const auto two = readSet(folder.path());
+    ASSERT_TRUE(two) << two.error().text();
+    ImageSetOptions asOne;
+    const double k[4] = {585, 585, 319.5, 239.5};
+    std::copy(k, k + 4, asOne.intrinsics);
+    const auto one = readSet(folder.path(), asOne);
+    ASSERT_TRUE(one) << one.error().text();
+    const auto file = readFile(set / "frame-000189.color.png", Job().limits);
+    ASSERT_TRUE(file);
+    const auto truth = decodeRgba8(*file, "truth", Job().limits);
+    ASSERT_TRUE(truth);
+    Drawn better = drawnFromOthers(*two, 1), before = drawnFromOthers(*one, 1);
+    int covered = 0;
+    for (std::size_t i = 0; i < better.covered.count(); ++i) {
+        better.covered.data()[i] &= before.covered.data()[i];
+        covered += better.covered.data()[i] != 0;
+    }
+    EXPECT_GT(covered, 640 * 480 * 3 / 4);
+    CompareSettings settings;
+    settings.mask = &better.covered;
+    const auto now = compare(better.picture, *truth, settings);
+    const auto then = compare(before.picture, *truth, settings);
+    ASSERT_TRUE(now && then);
+    std::printf("  %.2f dB of RGB, as one camera %.2f dB\n", *now->psnrRgb, *then->psnrRgb);
+    EXPECT_GE(*now->psnrRgb, *then->psnrRgb + 1.8);
+}
+
+}  // namespace
