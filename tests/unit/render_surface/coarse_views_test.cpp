@@ -18,7 +18,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// A UV sphere of 24 x 48.
-Mesh ball() {
+Mesh ballMesh() {
     constexpr int kAround = 48, kUp = 24;
     Mesh mesh;
     mesh.materials.emplace_back();
@@ -74,7 +74,7 @@ class CoarseViews : public testing::TestWithParam<Coarse> {};
 
 TEST_P(CoarseViews, AreDrawnWhole) {
     const Coarse& c = GetParam();
-    const Mesh mesh = ball();
+    const Mesh mesh = ballMesh();
     Job job;
     const Bundle bundle = viewsOf(mesh, c.views, c.side, false);
     const Camera camera = cameraAt(mesh, 40, 100);
@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, CoarseViews,
 
 // Where links were shares of the distance for any size of pixels, a third of these were none.
 TEST(CoarseViews, OneSurfaceIsLinked) {
-    const Bundle bundle = viewsOf(ball(), "ring:3", 32, false);
+    const Bundle bundle = viewsOf(ballMesh(), "ring:3", 32, false);
     const PageSet set(bundle);
     const surface::SurfaceScene scene(set);
     const surface::Source& s = scene.sources[0];
@@ -123,7 +123,7 @@ TEST(CoarseViews, OneSurfaceIsLinked) {
 
 // An orthographic camera has pixels for what is behind it, too, but does not see that.
 TEST(CoarseViews, WhatIsBehindAnOrthographicCameraIsNotFree) {
-    const Mesh mesh = ball();
+    const Mesh mesh = ballMesh();
     Bundle bundle = viewsOf(mesh, "ring:3", 48, true);
     const Camera camera = cameraAt(mesh, 40, 100);
     const auto draw = [&] {
@@ -155,7 +155,7 @@ double difference(const Frame& a, const Frame& b) {
 
 // With the size of one pixel of the frame alone each tap made a facet: 16 dB below splats.
 TEST(CloserThanTheReferences, SurfacesAreAsSmoothAsSplats) {
-    const Mesh mesh = ball();
+    const Mesh mesh = ballMesh();
     Job job;
     const Bundle bundle = viewsOf(mesh, "ring:6", 64, true);
     for (const double fov : {22.0, 13.0}) {
