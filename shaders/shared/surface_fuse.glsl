@@ -72,13 +72,13 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         } else {
             // The rims of thin parts are extensions in all sources, which show them where they do not see
             // past them. Extensions inside the object are guesses, which support nothing.
-            int vote = voteOf(sourceOf(k), x, y, q);
+            int vote = voteOf(sourceOf(k), x, y, q, self);
             votes += vote;
             if (vote == kNoVote && silhouette) enough += kWholeVote;
         }
     }
     for (int k = 0; k < int(tile.count) && votes < enough; ++k)
-        if ((others >> k & 1u) != 0u) votes += voteOf(sourceOf(k), x, y, q);
+        if ((others >> k & 1u) != 0u) votes += voteOf(sourceOf(k), x, y, q, self);
     return votes >= enough;
 }
 

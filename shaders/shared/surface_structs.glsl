@@ -10,7 +10,10 @@ struct SourceEntry {
     // Layer of a source that fills one, else -1; then, in the table of places: its blocks; its bits of
     // pixels outside of all rectangles, -1 = none are set; 1 = its views were pruned.
     ivec4 place;
-    vec4 doubt;  // how far to the side noise may put points, pixels; q at its camera; nothing in the others
+    // How far to the side noise may put points, pixels; q at its camera; its pixels in parts of kFinePixel;
+    // their side as a share of the distance, of orthographic ones in scene units.
+    vec4 doubt;
+    vec4 unwarp[3];  // the first columns of pixelFromSource
 };
 struct FrameEntry {
     vec4 axis;              // 1 = q is 1/dist, 1/unit, largest q

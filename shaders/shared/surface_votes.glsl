@@ -2,6 +2,9 @@
 // From outside: Axis, float relativeScale(Axis, q) (what a relative depth difference of 1 is in q),
 // float qPerUnit(Axis, q) (how much q changes over one scene unit); of source s:
 //   vec4 warp(s, x, y, q)      the point in the source, homogeneous
+//   vec4 warpChange(s, d)      the same of a change of homogeneous points of the frame
+//   vec4 unwarpColumn(s, i)    column i of what maps homogeneous points of the source to those of the frame
+//   float texelAt(s, q)        scene units between points of neighbouring pixels
 //   ivec2 sizeOf(s), bool hasAlpha(s), float freeAlphaOf(s), Axis axisOf(s)
 //   float nearestOf(s)         q at its camera: what is beyond is behind it
 //   float clearlyBehindOf(s)   share of q by which a surface must be behind a point, with its noise
@@ -98,9 +101,8 @@ int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
     return linked && !gaps && !doubtful ? kWholeVote : kHalfVote;
 }
 
-// The vote of a source on the point at (x, y, q) of the frame.
-int voteOf(int s, float x, float y, float q) {
-    vec4 h = warp(s, x, y, q);
+// The vote of a source on a point of it, homogeneous.
+int voteAt(int s, vec4 h) {
     if (!(h.w > 0.0f)) return kNoVote;
     float inverse = 1.0f / h.w;
     vec2 at = vec2(h.x * inverse, h.y * inverse);
@@ -115,4 +117,35 @@ int voteOf(int s, float x, float y, float q) {
     if (hasAlpha(s) && isBackground(s, corner, alphaAmong(s, place, corner, at - 0.5f - f)))
         return backgroundVoteOf(s);
     return voteOnDepth(s, place, corner, at, p);
+}
+
+// The vote of a source that votes on the point (x, y, q) of the frame, which source `owner` shows. Of a
+// surface that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it
+// must see past what is so far behind the point, too.
+int voteOnOutline(int s, int owner, float x, float y, float q, int vote) {
+    vec4 own = warp(owner, x, y, q), h = warp(s, x, y, q);
+    float inverse = 1.0f / own.w;
+    vec2 at = vec2(own.x, own.y) * inverse;
+    float p = own.z * inverse;
+    ivec2 size = sizeOf(owner);
+    if (!(own.w > 0.0f && at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y)))
+        return vote;
+    ivec2 pixel = ivec2(min(int(at.x), size.x - 1), min(int(at.y), size.y - 1));
+    vec2 g = gradientAt(owner, placeOf(owner, pixel), 0, 0);
+    // Steps of a pixel of the owner along the surface and into it, homogeneous, in the source.
+    vec4 into = warpChange(s, unwarpColumn(owner, 2)) * own.w;
+    vec4 a = warpChange(s, unwarpColumn(owner, 0)) * own.w + into * g.x;
+    vec4 b = warpChange(s, unwarpColumn(owner, 1)) * own.w + into * g.y;
+    inverse = 1.0f / h.w;
+    float u = h.x * inverse, v = h.y * inverse, texel = texelAt(s, h.z * inverse);
+    float area = ((a.x - u * a.w) * (b.y - v * b.w) - (a.y - v * a.w) * (b.x - u * b.w)) * inverse * inverse;
+    float ratio = texelAt(owner, p) / texel;
+    if (!(abs(area) < kEdgeOn * ratio * ratio)) return vote;
+    return min(vote, voteAt(s, h - into * (kBehindTexel * texel * qPerUnit(axisOf(owner), p))));
+}
+
+// The vote of a source on the point (x, y, q) of the frame, which source `owner` shows; -1: nobody.
+int voteOf(int s, float x, float y, float q, int owner) {
+    int vote = voteAt(s, warp(s, x, y, q));
+    return vote == kNoVote || owner < 0 ? vote : voteOnOutline(s, owner, x, y, q, vote);
 }

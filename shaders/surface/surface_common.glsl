@@ -109,11 +109,13 @@ bool hasAlpha(int s) { return sources[s].size.z != 0; }
 float freeAlphaOf(int s) { return FREE_ALPHA; }
 float stepOf(int s) { return sources[s].axis.z; }
 float besideOf(int s) { return sources[s].doubt.x; }
+vec4 unwarpColumn(int s, int i) { return sources[s].unwarp[i]; }
+float texelAt(int s, float q) { return sources[s].doubt.w / (sources[s].axis.x != 0.0 ? q : 1.0); }
 float coarseOf(int s) { return sources[s].doubt.z; }
 float nearestOf(int s) { return sources[s].doubt.y; }
 float clearlyBehindOf(int s) { return sources[s].axis.w; }
-vec4 warp(int s, float x, float y, float q) {
-    vec4 p = vec4(x, y, q, 1.0);
-    return vec4(dot(sources[s].warpX, p), dot(sources[s].warpY, p), dot(sources[s].warpQ, p),
-                dot(sources[s].warpW, p));
+vec4 warpChange(int s, vec4 d) {
+    return vec4(dot(sources[s].warpX, d), dot(sources[s].warpY, d), dot(sources[s].warpQ, d),
+                dot(sources[s].warpW, d));
 }
+vec4 warp(int s, float x, float y, float q) { return warpChange(s, vec4(x, y, q, 1.0)); }

@@ -23,8 +23,8 @@ PixelSpace::PixelSpace(const Camera& c, double farthest) : camera(c) {
         axis.unit = kOrthographicRange * std::max(c.width / c.fx, c.height / c.fy);
         axis.origin = farthest + axis.unit;
     }
-    const double pixel = 1.0 / (std::max(c.fx, c.fy) * (axis.inverse ? 1.0 : axis.unit));
-    axis.coarse = std::max(1.0, pixel / kFinePixel);
+    axis.pixel = 1.0 / std::max(c.fx, c.fy);
+    axis.coarse = std::max(1.0, axis.pixel / (axis.inverse ? 1.0 : axis.unit) / kFinePixel);
     // Columns of camera points (X, Y, Z, 1) up to scale over (x, y, q, 1), and back.
     glm::dmat4 cameraFromPixel(0.0), pixelFromCamera(0.0);
     cameraFromPixel[0][0] = 1.0 / c.fx;

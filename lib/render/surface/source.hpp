@@ -22,6 +22,7 @@ struct DepthAxis {
     bool inverse = true;
     double origin = 0.0;  ///< scene units, orthographic only
     double unit = 1.0;    ///< scene units, orthographic only
+    double pixel = 0.0;   ///< side of a pixel: share of the distance; orthographic: scene units
     double coarse = 1.0;  ///< what a pixel is as a share of q, in parts of kFinePixel; at least 1
 
     [[nodiscard]] double q(double dist) const {
@@ -38,6 +39,10 @@ struct DepthAxis {
     [[nodiscard]] float stepScale(float q) const {
         return static_cast<float>(coarse) * relativeScale(q);
     }
+    /// Scene units between the points of neighbouring pixels at q, of what faces the camera.
+    [[nodiscard]] float texel(float q) const {
+        return static_cast<float>(pixel) / (inverse ? q : 1.0f);
+    }
     /// How much q changes over one scene unit of distance.
     [[nodiscard]] float qPerUnit(float q) const {
         return inverse ? q * q : static_cast<float>(1.0 / unit);
@@ -51,6 +56,13 @@ struct Warp {
     [[nodiscard]] glm::vec4 homogeneous(float x, float y, float q) const {
         return {m[0] * x + m[1] * y + m[2] * q + m[3], m[4] * x + m[5] * y + m[6] * q + m[7],
                 m[8] * x + m[9] * y + m[10] * q + m[11], m[12] * x + m[13] * y + m[14] * q + m[15]};
+    }
+    /// The same of a change of homogeneous points.
+    [[nodiscard]] glm::vec4 ofChange(const glm::vec4& d) const {
+        return {m[0] * d.x + m[1] * d.y + m[2] * d.z + m[3] * d.w,
+                m[4] * d.x + m[5] * d.y + m[6] * d.z + m[7] * d.w,
+                m[8] * d.x + m[9] * d.y + m[10] * d.z + m[11] * d.w,
+                m[12] * d.x + m[13] * d.y + m[14] * d.z + m[15] * d.w};
     }
 };
 

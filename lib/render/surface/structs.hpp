@@ -19,7 +19,7 @@ using buffers::TileEntry;
 // As std430 and std140 lay them out: vectors of four at multiples of 16, sizes too.
 static_assert(offsetof(SourceEntry, rayX) == 64 && offsetof(SourceEntry, size) == 112 &&
               offsetof(SourceEntry, place) == 144 && offsetof(SourceEntry, doubt) == 160 &&
-              sizeof(SourceEntry) == 176);
+              offsetof(SourceEntry, unwarp) == 176 && sizeof(SourceEntry) == 224);
 static_assert(offsetof(FrameEntry, eyeX) == 16 && offsetof(FrameEntry, fit) == 64 &&
               offsetof(FrameEntry, size) == 80 && sizeof(FrameEntry) == 96);
 static_assert(offsetof(SlotEntry, source) == 64 && sizeof(SlotEntry) == 80);

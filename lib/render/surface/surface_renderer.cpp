@@ -321,7 +321,7 @@ Result<void> SurfaceRenderer::drawBehind(const SurfaceFrame& work, Frame& frame,
     stx::putBehind(frame, background, [&](int x, int y, float depth) {
         const auto at = static_cast<float>(space.axis.q(depth));
         return std::none_of(work.sources.begin(), work.sources.end(), [&](const FrameSource& f) {
-            return seesPast({f.source, f.sourceFromPixel, nullptr}, static_cast<float>(x) + 0.5f,
+            return seesPast({f.source, f.sourceFromPixel}, static_cast<float>(x) + 0.5f,
                             static_cast<float>(y) + 0.5f, at);
         });
     });

@@ -10,8 +10,9 @@ namespace stx::surface {
 /// A source as one tile uses it.
 struct LocalSource {
     const Source* source = nullptr;
-    Warp sourceFromPixel;            ///< from frame pixel positions
-    const float* samples = nullptr;  ///< its own surface in this tile; null = it has none here
+    Warp sourceFromPixel;             ///< from frame pixel positions
+    const float* samples = nullptr;   ///< its own surface in this tile; null = it has none here
+    glm::mat4 frameFromSource{1.0f};  ///< the inverse of sourceFromPixel
 };
 
 /// The processor's side of the code it shares with the shaders.
@@ -41,6 +42,12 @@ struct SourcePixels {
     [[nodiscard]] vec4 warp(int s, float x, float y, float q) const {
         return locals[static_cast<std::size_t>(s)].sourceFromPixel.homogeneous(x, y, q);
     }
+    [[nodiscard]] vec4 warpChange(int s, const vec4& d) const {
+        return locals[static_cast<std::size_t>(s)].sourceFromPixel.ofChange(d);
+    }
+    [[nodiscard]] vec4 unwarpColumn(int s, int column) const {
+        return locals[static_cast<std::size_t>(s)].frameFromSource[column];
+    }
     [[nodiscard]] ivec2 sizeOf(int s) const { return {at(s).width, at(s).height}; }
     [[nodiscard]] bool hasAlpha(int s) const { return at(s).hasAlpha; }
     [[nodiscard]] float freeAlphaOf(int s) const { return at(s).freeAlpha; }
@@ -48,6 +55,7 @@ struct SourcePixels {
     [[nodiscard]] float coarseOf(int s) const {
         return static_cast<float>(at(s).space.axis.coarse);
     }
+    [[nodiscard]] float texelAt(int s, float q) const { return at(s).space.axis.texel(q); }
     [[nodiscard]] float nearestOf(int s) const { return at(s).space.axis.nearest(); }
     [[nodiscard]] float clearlyBehindOf(int s) const { return kClearlyBehind + at(s).noise; }
     [[nodiscard]] float besideOf(int s) const { return at(s).beside; }
@@ -78,7 +86,8 @@ struct SourcePixels {
     [[nodiscard]] static float qPerUnit(Axis axis, float q) { return axis.qPerUnit(q); }
 };
 
-/// Free-space votes: voteOf(source, x, y, q) is kNoVote, kHalfVote, kWholeVote or kTwoVotes.
+/// Free-space votes: voteOf(source, x, y, q, who shows it) is kNoVote, kHalfVote, kWholeVote or
+/// kTwoVotes.
 struct Votes : SourcePixels {
 #include "shaders/shared/surface_votes.glsl"
 };
@@ -87,7 +96,7 @@ struct Votes : SourcePixels {
 
 /// Whether a source sees past the point at (x, y, q) of the novel view.
 [[nodiscard]] inline bool seesPast(const LocalSource& source, float x, float y, float q) {
-    return shared::Votes{{{&source, 1}}}.voteOf(0, x, y, q) != shared::Votes::kNoVote;
+    return shared::Votes{{{&source, 1}}}.voteOf(0, x, y, q, -1) != shared::Votes::kNoVote;
 }
 
 }  // namespace stx::surface

@@ -53,12 +53,12 @@ TEST(Fuse, VotesCountHalfWhereNoiseMayPutASteepSurface) {
         for (int x = 0; x < kTile; ++x)
             bundle.views[0].depth.at(x, y) = 1.0f / (0.5f + kSlope * static_cast<float>(x));
     SurfaceScene scene(bundle);
-    const LocalSource local{&scene.sources[0], warpFrom(glm::dmat4(1.0)), nullptr};
+    const LocalSource local{&scene.sources[0], warpFrom(glm::dmat4(1.0))};
     shared::Votes votes{{{&local, 1}}};
     constexpr int kPixel = kTile / 2;
     const auto voteOn = [&](float pixelsBefore) {
         return votes.voteOf(0, kPixel + 0.5f, kPixel + 0.5f,
-                            0.5f + kSlope * (kPixel + pixelsBefore));
+                            0.5f + kSlope * (kPixel + pixelsBefore), -1);
     };
     EXPECT_EQ(voteOn(1), shared::Votes::kWholeVote);
     scene.sources[0].beside = 2;

@@ -149,6 +149,7 @@ struct Inputs {
     std::unique_ptr<SurfaceScene> scene;
     PixelSpace space;
     std::vector<Warp> warps, sampleWarps;  ///< source from frame, samples of the tile from source
+    std::vector<glm::dmat4> unwarps;       ///< frame from source
     Ray eye{};
     std::vector<Ray> rays;
     SampleGrid grid{kPerPixel};
@@ -184,6 +185,7 @@ struct Inputs {
             warps.push_back(warpFrom(s.space.pixelFromWorld * space.worldFromPixel));
             sampleWarps.push_back(
                 warpFrom(sampleFromPixel * space.pixelFromWorld * s.space.worldFromPixel));
+            unwarps.push_back(space.pixelFromWorld * s.space.worldFromPixel);
             rays.push_back(rayFrom(s.space, space));
             std::vector<std::uint32_t> blocks(s.blocks.size());
             for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b] = static_cast<uint>(b);
@@ -193,7 +195,7 @@ struct Inputs {
                                   std::numeric_limits<float>::max(), samples.back().data());
         }
         for (std::size_t i = 0; i < sources().size(); ++i)
-            locals.push_back({&sources()[i], warps[i], samples[i].data()});
+            locals.push_back({&sources()[i], warps[i], samples[i].data(), unwarps[i]});
         fuseTile(locals, grid, space.axis, corner.x, corner.y, kTile, kTile, pieces);
     }
 
@@ -215,11 +217,19 @@ struct Inputs {
         for (std::size_t i = 0; i < sources().size(); ++i) {
             const Source& s = sources()[i];
             const float *m = warps[i].m.data(), *r = rays[i].data();
-            out.push_back({row(m), row(m + 4), row(m + 8), row(m + 12), row(r), row(r + 4),
-                           row(r + 8), glm::ivec4(s.width, s.height, s.hasAlpha, s.blocksX),
+            out.push_back({row(m),
+                           row(m + 4),
+                           row(m + 8),
+                           row(m + 12),
+                           row(r),
+                           row(r + 4),
+                           row(r + 8),
+                           glm::ivec4(s.width, s.height, s.hasAlpha, s.blocksX),
                            glm::vec4(1.0f, 1.0f, s.step, kClearlyBehind + s.noise),
                            places.empty() ? glm::ivec4(0) : places[i],
-                           glm::vec4(s.beside, s.space.axis.nearest(), s.space.axis.coarse, 0)});
+                           glm::vec4(s.beside, s.space.axis.nearest(), s.space.axis.coarse,
+                                     s.space.axis.pixel),
+                           {unwarps[i][0], unwarps[i][1], unwarps[i][2]}});
         }
         return out;
     }

@@ -81,7 +81,7 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
     shade.clear();
     for (const int k : chosen) {
         const FrameSource& f = frame.sources[static_cast<std::size_t>(k)];
-        local.push_back({f.source, f.sourceFromPixel, nullptr});
+        local.push_back({f.source, f.sourceFromPixel, nullptr, f.pixelFromSource});
         shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
     }
     const float qLimit = frame.qLimit();

@@ -104,6 +104,9 @@ struct SampleFuser {
         if (hn::AllFalse(d, asked)) return out;
 
         using shared::Votes;
+        alignas(64) std::int32_t owners[kMostPoints];
+        hn::Store(owner, di, owners);
+        const auto ownerOf = [&](int lane) { return pixel.owner[owners[lane]]; };
         const Points within = sameWithin(q);
         const Counts whole = hn::Set(di, Votes::kWholeVote);
         Counts against = hn::Zero(di);
@@ -124,7 +127,8 @@ struct SampleFuser {
             const PointMask extension = hn::And(shows, flagged(value, kExtensionBit));
             PointMask supports = hn::AndNot(extension, shows);
             if (!hn::AllFalse(d, extension)) {
-                const Counts vote = votesOf(votes, VotingSource(votes.at(k)), k, points, extension);
+                const Counts vote =
+                    votesOf(votes, VotingSource(votes.at(k)), k, points, ownerOf, extension);
                 against = hn::Add(against, vote);
                 const PointMask none = hn::RebindMask(d, hn::Eq(vote, hn::Zero(di)));
                 supports = hn::Or(supports, hn::And(hn::And(extension, silhouette), none));
@@ -149,8 +153,8 @@ struct SampleFuser {
             most = hn::Sub(most, hn::IfThenElseZero(asCounts(other), each));
             const std::uint32_t asks = lists ? others[k] & open : open;
             if (!asks) continue;
-            against = hn::Add(against,
-                              votesOf(votes, VotingSource(votes.at(k)), k, points, maskOf(asks)));
+            against = hn::Add(against, votesOf(votes, VotingSource(votes.at(k)), k, points, ownerOf,
+                                               maskOf(asks)));
         }
         const PointMask few = hn::RebindMask(d, hn::Gt(enough, against));
         return hn::Or(out, hn::AndNot(few, asked));

@@ -357,15 +357,17 @@ HWY_INLINE Counts withVotes(Counts cast, Points x, Points y, Points q, PointMask
     return hn::Load(di, vote);
 }
 
-/// voteOf() of source `s` on the points of `wanted`, 0 on others.
-HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
+/// voteAt() of source `s` on the points of `wanted`, 0 on others.
+HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
                           const FramePoints& points, PointMask wanted) {
     const PointTag d;
     const CountTag di;
     Counts cast = hn::Zero(di);
     if (!from.q)
         return withVotes(cast, points.x, points.y, points.q, wanted,
-                         [&](int, float x, float y, float q) { return votes.voteOf(s, x, y, q); });
+                         [&](int, float x, float y, float q) {
+                             return votes.voteAt(s, votes.warp(s, x, y, q));
+                         });
     const Source& source = *from.source;
     const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, false);
     PointMask left = hn::And(wanted, p.inside);
@@ -428,6 +430,23 @@ HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
         const glm::ivec2 corner(column[l], row[l]);
         return votes.voteOnDepth(s, votes.placeOf(s, corner), corner, {u, v}, q);
     });
+}
+
+/// voteOf() of source `s` on the points of `wanted`, 0 on others. `ownerOf(lane)`: who shows it.
+template <class OwnerOf>
+HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
+                          const FramePoints& points, const OwnerOf& ownerOf, PointMask wanted) {
+    const PointTag d;
+    const CountTag di;
+    const Counts cast = votesAt(votes, from, s, points, wanted);
+    const PointMask any = hn::RebindMask(d, hn::Gt(cast, hn::Zero(di)));
+    if (hn::AllFalse(d, any)) return cast;
+    alignas(64) std::int32_t vote[kMostPoints];
+    hn::Store(cast, di, vote);
+    return withVotes(cast, points.x, points.y, points.q, any,
+                     [&](int l, float x, float y, float q) {
+                         return votes.voteOnOutline(s, ownerOf(l), x, y, q, vote[l]);
+                     });
 }
 
 }  // namespace stx::surface::HWY_NAMESPACE

@@ -247,12 +247,19 @@ void GpuSurfaceBackend::uploadSources(const SurfaceFrame& work) {
         const surface::DepthAxis& axis = s.space.axis;
         const Rows warp(f.sourceFromPixel);
         const RayRows ray(f.fromEye);
-        entries.push_back({warp.x, warp.y, warp.q, warp.w, ray.x, ray.y, ray.z,
+        entries.push_back({warp.x,
+                           warp.y,
+                           warp.q,
+                           warp.w,
+                           ray.x,
+                           ray.y,
+                           ray.z,
                            glm::ivec4(s.width, s.height, s.hasAlpha ? 1 : 0, s.blocksX),
                            glm::vec4(axis.inverse ? 1.0f : 0.0f, 1.0f / axis.unit, s.step,
                                      surface::kClearlyBehind + s.noise),
                            resources_->scene.places[s.number],
-                           glm::vec4(s.beside, s.space.axis.nearest(), s.space.axis.coarse, 0)});
+                           glm::vec4(s.beside, axis.nearest(), axis.coarse, axis.pixel),
+                           {f.pixelFromSource[0], f.pixelFromSource[1], f.pixelFromSource[2]}});
     }
     resources_->sources.upload(entries);
 }
