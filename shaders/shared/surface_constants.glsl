@@ -45,6 +45,8 @@ CONSTANT float kExtensionWeight = 0.01f;
 CONSTANT float kFreeAlpha = 0.45f, kFreeAlphaOfFew = 0.4625f, kFreeAlphaPruned = 0.36f;
 // Alpha from which on a pixel is covered in full, rounding apart.
 CONSTANT float kSolidAlpha = 0.99f;
+// Distances from edges are counted up to this, pixels.
+CONSTANT int kFarFromEdge = 4;
 // A surface is seen edge on by a source that has no more than this share of the area for it that the source
 // has that shows it. Background must be there so many of its pixels behind that surface, too.
 CONSTANT float kEdgeOn = 0.05f, kBehindTexel = 0.25f;

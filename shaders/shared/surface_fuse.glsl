@@ -59,6 +59,7 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         if (isBackground(self, ivec2(floor(at - 0.5f)), alpha)) return true;
         silhouette = alpha < kSolidAlpha;
     }
+    Facet facet = facetOf(self, x, y, q);
     int votes = 0, enough = kWholeVote * (nearEdge ? kVotesNearEdge : kVotesElsewhere);
     uint others = 0u;  // do not show it
     float within = sameWithin(q);
@@ -72,13 +73,13 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         } else {
             // The rims of thin parts are extensions in all sources, which show them where they do not see
             // past them. Extensions inside the object are guesses, which support nothing.
-            int vote = voteOf(sourceOf(k), x, y, q, self);
+            int vote = voteOf(sourceOf(k), x, y, q, facet);
             votes += vote;
             if (vote == kNoVote && silhouette) enough += kWholeVote;
         }
     }
     for (int k = 0; k < int(tile.count) && votes < enough; ++k)
-        if ((others >> k & 1u) != 0u) votes += voteOf(sourceOf(k), x, y, q, self);
+        if ((others >> k & 1u) != 0u) votes += voteOf(sourceOf(k), x, y, q, facet);
     return votes >= enough;
 }
 

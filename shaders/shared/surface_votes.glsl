@@ -101,8 +101,10 @@ int voteOnDepth(int s, Place place, ivec2 corner, vec2 at, float p) {
     return linked && !gaps && !doubtful ? kWholeVote : kHalfVote;
 }
 
-// The vote of a source on a point of it, homogeneous.
-int voteAt(int s, vec4 h) {
+// The vote of a source on a point of it, homogeneous. `outline`: an outline may be near, and another vote
+// beyond it: not where nothing is around.
+int voteAt(int s, vec4 h, OUT(bool) outline) {
+    outline = true;
     if (!(h.w > 0.0f)) return kNoVote;
     float inverse = 1.0f / h.w;
     vec2 at = vec2(h.x * inverse, h.y * inverse);
@@ -114,38 +116,67 @@ int voteAt(int s, vec4 h) {
     vec2 f = floor(at - 0.5f);
     ivec2 corner = ivec2(f);
     Place place = placeOf(s, corner);
-    if (hasAlpha(s) && isBackground(s, corner, alphaAmong(s, place, corner, at - 0.5f - f)))
-        return backgroundVoteOf(s);
+    if (hasAlpha(s)) {
+        float alpha = alphaAmong(s, place, corner, at - 0.5f - f);
+        outline = alpha > 0.0f;
+        if (isBackground(s, corner, alpha)) return backgroundVoteOf(s);
+    }
+    bool amid = corner.x > 0 && corner.y > 0 && corner.x + 2 < size.x && corner.y + 2 < size.y;
+    if (amid && !(edgeDistanceOf(s, place, 0, 0) < float(kFarFromEdge - 1))) outline = false;
     return voteOnDepth(s, place, corner, at, p);
 }
 
-// The vote of a source that votes on the point (x, y, q) of the frame, which source `owner` shows. Of a
-// surface that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it
-// must see past what is so far behind the point, too.
-int voteOnOutline(int s, int owner, float x, float y, float q, int vote) {
-    vec4 own = warp(owner, x, y, q), h = warp(s, x, y, q);
-    float inverse = 1.0f / own.w;
-    vec2 at = vec2(own.x, own.y) * inverse;
-    float p = own.z * inverse;
-    ivec2 size = sizeOf(owner);
-    if (!(own.w > 0.0f && at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y)))
-        return vote;
+// A pixel of a source as the frame has it: homogeneous steps of that pixel along its surface, and of q.
+struct Facet {
+    bool any;
+    vec4 along, across, into;
+    float area;     // of the pixel, square scene units, if it faced the source
+    float perUnit;  // how much q changes over a scene unit
+};
+
+// The one that a source shows at the point (x, y, q) of the frame.
+Facet facetOf(int s, float x, float y, float q) {
+    vec4 h = warp(s, x, y, q);
+    float inverse = 1.0f / h.w, p = h.z * inverse;
+    vec2 at = vec2(h.x, h.y) * inverse;
+    ivec2 size = sizeOf(s);
+    Facet facet;
+    facet.any = h.w > 0.0f && at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y);
+    if (!facet.any) return facet;
     ivec2 pixel = ivec2(min(int(at.x), size.x - 1), min(int(at.y), size.y - 1));
-    vec2 g = gradientAt(owner, placeOf(owner, pixel), 0, 0);
-    // Steps of a pixel of the owner along the surface and into it, homogeneous, in the source.
-    vec4 into = warpChange(s, unwarpColumn(owner, 2)) * own.w;
-    vec4 a = warpChange(s, unwarpColumn(owner, 0)) * own.w + into * g.x;
-    vec4 b = warpChange(s, unwarpColumn(owner, 1)) * own.w + into * g.y;
-    inverse = 1.0f / h.w;
-    float u = h.x * inverse, v = h.y * inverse, texel = texelAt(s, h.z * inverse);
-    float area = ((a.x - u * a.w) * (b.y - v * b.w) - (a.y - v * a.w) * (b.x - u * b.w)) * inverse * inverse;
-    float ratio = texelAt(owner, p) / texel;
-    if (!(abs(area) < kEdgeOn * ratio * ratio)) return vote;
-    return min(vote, voteAt(s, h - into * (kBehindTexel * texel * qPerUnit(axisOf(owner), p))));
+    vec2 g = gradientAt(s, placeOf(s, pixel), 0, 0);
+    facet.into = unwarpColumn(s, 2) * h.w;
+    facet.along = unwarpColumn(s, 0) * h.w + facet.into * g.x;
+    facet.across = unwarpColumn(s, 1) * h.w + facet.into * g.y;
+    facet.area = texelAt(s, p) * texelAt(s, p);
+    facet.perUnit = qPerUnit(axisOf(s), p);
+    return facet;
 }
 
-// The vote of a source on the point (x, y, q) of the frame, which source `owner` shows; -1: nobody.
-int voteOf(int s, float x, float y, float q, int owner) {
-    int vote = voteAt(s, warp(s, x, y, q));
-    return vote == kNoVote || owner < 0 ? vote : voteOnOutline(s, owner, x, y, q, vote);
+// The vote of a source that votes on the point (x, y, q) of the frame, which is of this facet. Of a surface
+// that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it must see
+// past what is so far behind the point, too.
+int voteOnOutline(int s, Facet facet, float x, float y, float q, int vote) {
+    if (!facet.any) return vote;
+    vec4 h = warp(s, x, y, q), a = warpChange(s, facet.along), b = warpChange(s, facet.across);
+    float inverse = 1.0f / h.w;
+    float u = h.x * inverse, v = h.y * inverse, texel = texelAt(s, h.z * inverse);
+    float area = ((a.x - u * a.w) * (b.y - v * b.w) - (a.y - v * a.w) * (b.x - u * b.w)) * inverse * inverse;
+    if (!(abs(area) * texel * texel < kEdgeOn * facet.area)) return vote;
+    bool outline;
+    float behind = kBehindTexel * texel * facet.perUnit;
+    return min(vote, voteAt(s, h - warpChange(s, facet.into) * behind, outline));
+}
+
+// The vote of a source on the point (x, y, q) of the frame, which is of this facet.
+int voteOf(int s, float x, float y, float q, Facet facet) {
+    bool outline;
+    int vote = voteAt(s, warp(s, x, y, q), outline);
+    return vote == kNoVote || !outline ? vote : voteOnOutline(s, facet, x, y, q, vote);
+}
+
+// The same of a point of which nobody shows a surface.
+int voteOf(int s, float x, float y, float q) {
+    bool outline;
+    return voteAt(s, warp(s, x, y, q), outline);
 }

@@ -42,7 +42,7 @@ struct LookedAt : SourcePixels {
             return h.x >= -border * width * h.w && h.x <= (1 + border) * width * h.w &&
                    h.y >= -border * height * h.w && h.y <= (1 + border) * height * h.w;
         };
-        return within(kBorder) && (!within(0.0f) || voteOf(s, x, y, q, -1) == kNoVote);
+        return within(kBorder) && (!within(0.0f) || voteOf(s, x, y, q) == kNoVote);
     }
 #include "shaders/shared/surface_votes.glsl"
 };
@@ -236,7 +236,7 @@ bool isFree(std::span<const LocalSource> sources, float x, float y, float q) {
         shared::WideVotes votes{{sources}};
         int free = 0;
         for (int s = 0; s < static_cast<int>(sources.size()); ++s) {
-            free += votes.voteOf(s, x, y, q, -1);
+            free += votes.voteOf(s, x, y, q);
             if (free >= shared::WideVotes::kWholeVote) return true;
         }
         return false;

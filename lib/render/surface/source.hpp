@@ -85,8 +85,6 @@ inline constexpr int kBlock = kSourceBlock;
 /// Blocks along a side of the regions that plans look at first.
 inline constexpr int kRegion = 2;
 static_assert(kBlock == PageSet::kBlock);
-/// Edge distances are counted up to this.
-inline constexpr int kFarFromEdge = 4;
 
 /// A square of (size+1)² pixels that lie on one plane: q = q0 + qx * (column - x) + qy * (row - y).
 struct Leaf {

@@ -86,7 +86,7 @@ struct SourcePixels {
     [[nodiscard]] static float qPerUnit(Axis axis, float q) { return axis.qPerUnit(q); }
 };
 
-/// Free-space votes: voteOf(source, x, y, q, who shows it) is kNoVote, kHalfVote, kWholeVote or
+/// Free-space votes: voteOf(source, x, y, q, facet) is kNoVote, kHalfVote, kWholeVote or
 /// kTwoVotes.
 struct Votes : SourcePixels {
 #include "shaders/shared/surface_votes.glsl"
@@ -96,7 +96,7 @@ struct Votes : SourcePixels {
 
 /// Whether a source sees past the point at (x, y, q) of the novel view.
 [[nodiscard]] inline bool seesPast(const LocalSource& source, float x, float y, float q) {
-    return shared::Votes{{{&source, 1}}}.voteOf(0, x, y, q, -1) != shared::Votes::kNoVote;
+    return shared::Votes{{{&source, 1}}}.voteOf(0, x, y, q) != shared::Votes::kNoVote;
 }
 
 }  // namespace stx::surface

@@ -58,7 +58,7 @@ TEST(Fuse, VotesCountHalfWhereNoiseMayPutASteepSurface) {
     constexpr int kPixel = kTile / 2;
     const auto voteOn = [&](float pixelsBefore) {
         return votes.voteOf(0, kPixel + 0.5f, kPixel + 0.5f,
-                            0.5f + kSlope * (kPixel + pixelsBefore), -1);
+                            0.5f + kSlope * (kPixel + pixelsBefore));
     };
     EXPECT_EQ(voteOn(1), shared::Votes::kWholeVote);
     scene.sources[0].beside = 2;

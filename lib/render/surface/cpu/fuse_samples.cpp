@@ -104,9 +104,11 @@ struct SampleFuser {
         if (hn::AllFalse(d, asked)) return out;
 
         using shared::Votes;
-        alignas(64) std::int32_t owners[kMostPoints];
+        alignas(64) std::int32_t owners[kMostPoints] = {};  // by number in the tile
         hn::Store(owner, di, owners);
-        const auto ownerOf = [&](int lane) { return pixel.owner[owners[lane]]; };
+        for (std::int32_t& k : owners) k = pixel.owner[k];
+        Facets facets;
+        facets.owners = owners;
         const Points within = sameWithin(q);
         const Counts whole = hn::Set(di, Votes::kWholeVote);
         Counts against = hn::Zero(di);
@@ -121,14 +123,14 @@ struct SampleFuser {
             listed |= 1u << k;
             const Points value = sampleOf(i);
             const PointMask theirs = hn::AndNot(isOwner(i), asked);
-            const PointMask shows = hn::And(hn::And(theirs, hn::Gt(value, hn::Zero(d))),
-                                            hn::Lt(hn::Abs(hn::Sub(value, q)), within));
-            others[k] = lanesOf(hn::AndNot(shows, theirs));
-            const PointMask extension = hn::And(shows, flagged(value, kExtensionBit));
-            PointMask supports = hn::AndNot(extension, shows);
+            const PointMask same = hn::And(hn::And(theirs, hn::Gt(value, hn::Zero(d))),
+                                           hn::Lt(hn::Abs(hn::Sub(value, q)), within));
+            others[k] = lanesOf(hn::AndNot(same, theirs));
+            const PointMask extension = hn::And(same, flagged(value, kExtensionBit));
+            PointMask supports = hn::AndNot(extension, same);
             if (!hn::AllFalse(d, extension)) {
                 const Counts vote =
-                    votesOf(votes, VotingSource(votes.at(k)), k, points, ownerOf, extension);
+                    votesOf(votes, VotingSource(votes.at(k)), k, points, facets, extension);
                 against = hn::Add(against, vote);
                 const PointMask none = hn::RebindMask(d, hn::Eq(vote, hn::Zero(di)));
                 supports = hn::Or(supports, hn::And(hn::And(extension, silhouette), none));
@@ -153,7 +155,7 @@ struct SampleFuser {
             most = hn::Sub(most, hn::IfThenElseZero(asCounts(other), each));
             const std::uint32_t asks = lists ? others[k] & open : open;
             if (!asks) continue;
-            against = hn::Add(against, votesOf(votes, VotingSource(votes.at(k)), k, points, ownerOf,
+            against = hn::Add(against, votesOf(votes, VotingSource(votes.at(k)), k, points, facets,
                                                maskOf(asks)));
         }
         const PointMask few = hn::RebindMask(d, hn::Gt(enough, against));

@@ -357,17 +357,25 @@ HWY_INLINE Counts withVotes(Counts cast, Points x, Points y, Points q, PointMask
     return hn::Load(di, vote);
 }
 
-/// voteAt() of source `s` on the points of `wanted`, 0 on others.
+/// voteAt() of source `s` on the points of `wanted`, 0 on others; of `outline`, those that have
+/// none near are taken out.
 HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
-                          const FramePoints& points, PointMask wanted) {
+                          const FramePoints& points, PointMask wanted, PointMask& outline) {
     const PointTag d;
     const CountTag di;
     Counts cast = hn::Zero(di);
-    if (!from.q)
-        return withVotes(cast, points.x, points.y, points.q, wanted,
-                         [&](int, float x, float y, float q) {
-                             return votes.voteAt(s, votes.warp(s, x, y, q));
+    if (!from.q) {
+        std::uint32_t lanes = 0;
+        cast = withVotes(cast, points.x, points.y, points.q, wanted,
+                         [&](int l, float x, float y, float q) {
+                             bool near = false;
+                             const int vote = votes.voteAt(s, votes.warp(s, x, y, q), near);
+                             if (near) lanes |= 1u << l;
+                             return vote;
                          });
+        outline = hn::And(outline, maskOf(lanes));
+        return cast;
+    }
     const Source& source = *from.source;
     const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, false);
     PointMask left = hn::And(wanted, p.inside);
@@ -406,10 +414,11 @@ HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
                  return gatheredInfo(from.info, source.width * source.height, at(x, y, lanes));
              });
     }
+    const PointMask nearEdge =
+        hn::RebindMask(d, hn::Lt(hn::ShiftRight<4>(info), hn::Set(di, kFarFromEdge - 1)));
+    outline = hn::AndNot(hn::AndNot(nearEdge, asked), outline);
     if (from.colour) {
         // Background is not hidden: it is never far from an edge.
-        const PointMask nearEdge =
-            hn::RebindMask(d, hn::Lt(hn::ShiftRight<4>(info), hn::Set(di, kFarFromEdge - 1)));
         const PointMask doubtful = hn::Or(hn::AndNot(amid, left), hn::And(asked, nearEdge));
         if (!hn::AllFalse(d, doubtful)) {
             const bool allAmid = hn::AllFalse(d, hn::AndNot(amid, doubtful));
@@ -419,6 +428,7 @@ HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
             cast = hn::IfThenElseZero(hn::RebindMask(di, background),
                                       hn::Set(di, votes.backgroundVoteOf(s)));
             left = hn::AndNot(background, left);
+            outline = hn::AndNot(hn::And(background, hn::Le(alpha, hn::Zero(d))), outline);
         }
     }
     left = hn::AndNot(hidden, left);
@@ -432,21 +442,34 @@ HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
     });
 }
 
-/// voteOf() of source `s` on the points of `wanted`, 0 on others. `ownerOf(lane)`: who shows it.
-template <class OwnerOf>
+/// The facets of points, as far as they were asked for.
+struct Facets {
+    const std::int32_t* owners;  ///< who shows each
+    std::uint32_t known = 0;     ///< lanes
+    shared::Votes::Facet of[kMostPoints];
+
+    const shared::Votes::Facet& at(shared::Votes& votes, int l, float x, float y, float q) {
+        if (!(known >> l & 1u)) of[l] = votes.facetOf(owners[l], x, y, q);
+        known |= 1u << l;
+        return of[l];
+    }
+};
+
+/// voteOf() of source `s` on the points of `wanted`, 0 on others.
 HWY_INLINE Counts votesOf(shared::Votes& votes, const VotingSource& from, int s,
-                          const FramePoints& points, const OwnerOf& ownerOf, PointMask wanted) {
+                          const FramePoints& points, Facets& facets, PointMask wanted) {
     const PointTag d;
     const CountTag di;
-    const Counts cast = votesAt(votes, from, s, points, wanted);
-    const PointMask any = hn::RebindMask(d, hn::Gt(cast, hn::Zero(di)));
-    if (hn::AllFalse(d, any)) return cast;
+    PointMask outline = wanted;
+    const Counts cast = votesAt(votes, from, s, points, wanted, outline);
+    outline = hn::And(outline, hn::RebindMask(d, hn::Gt(cast, hn::Zero(di))));
+    if (hn::AllFalse(d, outline)) return cast;
     alignas(64) std::int32_t vote[kMostPoints];
     hn::Store(cast, di, vote);
-    return withVotes(cast, points.x, points.y, points.q, any,
-                     [&](int l, float x, float y, float q) {
-                         return votes.voteOnOutline(s, ownerOf(l), x, y, q, vote[l]);
-                     });
+    return withVotes(
+        cast, points.x, points.y, points.q, outline, [&](int l, float x, float y, float q) {
+            return votes.voteOnOutline(s, facets.at(votes, l, x, y, q), x, y, q, vote[l]);
+        });
 }
 
 }  // namespace stx::surface::HWY_NAMESPACE
