@@ -140,6 +140,8 @@ Result<std::unique_ptr<Film>> Film::open(const fs::path& path, const Limits& lim
         track.pixels = in.getText();
         track.width = in.get<std::int32_t>();
         track.height = in.get<std::int32_t>();
+        track.turn = in.get<video::Turn>();
+        if (track.turn.sideways()) std::swap(track.width, track.height);
         track.title = in.getText();
         track.attachment = in.getText();
         const auto bytes = in.getBytes();
@@ -165,6 +167,7 @@ Result<void> Film::select(int track) {
         return failAt(where(), ErrorCode::invalidInput,
                       "its pictures are {}x{} pixels; each side must be 1 to {}", chosenTrack.width,
                       chosenTrack.height, limits_.maxImageSide);
+    turn_ = chosenTrack.turn;
     video::Packer request;
     request.put(static_cast<std::int32_t>(track));
     STX_TRY(const auto chosen, ask(video::Tag::selectTrack, request, video::Tag::done));
@@ -233,6 +236,7 @@ Result<VideoPicture> Film::picture(int k) {
     if (!found)
         return tl::unexpected(
             found.error().at(fmt::format("{}: frame {} ({:.4g} s)", where(), k, times_[at])));
+    found->turn(turn_);
     return found;
 }
 

@@ -28,9 +28,10 @@ class Film {
   public:
     struct Track {
         bool video = false;
-        std::string codec;   ///< "h264", "ffv1", "rawvideo"
-        std::string pixels;  ///< "yuv420p", "gray16be"
-        int width = 0, height = 0;
+        std::string codec;          ///< "h264", "ffv1", "rawvideo"
+        std::string pixels;         ///< "yuv420p", "gray16be"
+        int width = 0, height = 0;  ///< as it is shown, turned
+        video::Turn turn;
         std::string title;
         std::string attachment;  ///< of a file in the film: its name
         Bytes attached;          ///< and what is in it
@@ -54,7 +55,8 @@ class Film {
     [[nodiscard]] int count() const { return static_cast<int>(times_.size()); }
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-    /// Picture `k`, by the time that it is shown. Errors name the file, the picture and its time.
+    /// Picture `k`, by the time that it is shown, turned as players do. Errors name the file, the
+    /// picture and its time.
     [[nodiscard]] Result<VideoPicture> picture(int k);
 
   private:
@@ -71,6 +73,7 @@ class Film {
     std::mutex mutex_;
     std::unique_ptr<VideoProcess> process_;
     std::vector<Track> tracks_;
+    video::Turn turn_;         ///< of the chosen track
     std::vector<Unit> units_;  ///< in the order of decoding
     std::vector<CodedPicture> coded_;
     std::vector<std::size_t> shown_;  ///< units in the order of times_

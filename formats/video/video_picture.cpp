@@ -19,6 +19,20 @@ ByteSpan samplesOf(const Bytes& bytes) {
     return ByteSpan(bytes).subspan(sizeof(video::PictureHeader));
 }
 
+template <class T>
+Image<T> turned(Image<T> picture, video::Turn turn) {
+    if (turn.none()) return picture;
+    const int w = picture.width(), h = picture.height();
+    Image<T> out(turn.sideways() ? h : w, turn.sideways() ? w : h);
+    const int left = turn.a + turn.c < 0 ? out.width() - 1 : 0;
+    const int top = turn.b + turn.d < 0 ? out.height() - 1 : 0;
+    for (int y = 0; y < h; ++y)
+        for (int x = 0; x < w; ++x)
+            out.at(left + turn.a * x + turn.c * y, top + turn.b * x + turn.d * y) =
+                picture.at(x, y);
+    return out;
+}
+
 }  // namespace
 
 Result<VideoPicture> VideoPicture::from(Bytes answer, const Limits& limits) {
@@ -49,31 +63,31 @@ Result<Rgba8Image> VideoPicture::colour(const Limits& limits) const {
     if (header_.rgba) {
         Rgba8Image out(header_.width, header_.height);
         std::memcpy(out.data(), samples.data(), samples.size());
-        return out;
+        return turned(std::move(out), turn_);
     }
-    return imagesets::rgbFromYuv(samples, formatOf(header_),
-                                 {header_.bt601 != 0, header_.fullRange != 0}, "the picture",
-                                 limits);
+    STX_TRY(auto out, imagesets::rgbFromYuv(samples, formatOf(header_),
+                                            {header_.bt601 != 0, header_.fullRange != 0},
+                                            "the picture", limits));
+    return turned(std::move(out), turn_);
 }
 
-std::vector<std::uint16_t> VideoPicture::lumaCodes() const {
+Image<std::uint16_t> VideoPicture::lumaImage() const {
     const ByteSpan samples = samplesOf(bytes_);
-    std::vector<std::uint16_t> out(static_cast<std::size_t>(header_.width) *
-                                   static_cast<std::size_t>(header_.height));
-    for (std::size_t i = 0; i < out.size(); ++i) {
+    Image<std::uint16_t> out(header_.width, header_.height);
+    for (std::size_t i = 0; i < out.count(); ++i) {
         if (header_.bits == 8) {
-            out[i] = std::to_integer<std::uint16_t>(samples[i]);
+            out.data()[i] = std::to_integer<std::uint16_t>(samples[i]);
         } else {
-            std::memcpy(&out[i], samples.data() + 2 * i, 2);
+            std::memcpy(&out.data()[i], samples.data() + 2 * i, 2);
         }
     }
-    return out;
+    return turned(std::move(out), turn_);
 }
 
 Image<float> VideoPicture::luma() const {
-    const auto codes = lumaCodes();
-    Image<float> out(header_.width, header_.height);
-    std::copy(codes.begin(), codes.end(), out.data());
+    const auto codes = lumaImage();
+    Image<float> out(codes.width(), codes.height());
+    std::copy(codes.data(), codes.data() + codes.count(), out.data());
     return out;
 }
 

@@ -15,8 +15,10 @@ class VideoPicture {
     /// Of an answer of the process. Errors: sizes that are not what they say, or over the limits.
     [[nodiscard]] static Result<VideoPicture> from(Bytes answer, const Limits& limits);
 
-    [[nodiscard]] int width() const { return header_.width; }
-    [[nodiscard]] int height() const { return header_.height; }
+    /// What is taken from it is turned so.
+    void turn(video::Turn how) { turn_ = how; }
+    [[nodiscard]] int width() const { return turn_.sideways() ? header_.height : header_.width; }
+    [[nodiscard]] int height() const { return turn_.sideways() ? header_.width : header_.height; }
     /// Of a sample of luma: 8 to 16.
     [[nodiscard]] int bits() const { return header_.bits; }
     /// Luma is there as it was coded; else the picture has colours only.
@@ -29,10 +31,16 @@ class VideoPicture {
     [[nodiscard]] Result<Rgba8Image> colour(const Limits& limits) const;
     /// The values of luma as they are, whatever range the stream tells. Needs hasLuma().
     [[nodiscard]] Image<float> luma() const;
-    [[nodiscard]] std::vector<std::uint16_t> lumaCodes() const;
+    [[nodiscard]] std::vector<std::uint16_t> lumaCodes() const {
+        const auto codes = lumaImage();
+        return {codes.data(), codes.data() + codes.count()};
+    }
 
   private:
+    [[nodiscard]] Image<std::uint16_t> lumaImage() const;
+
     video::PictureHeader header_;
+    video::Turn turn_;
     Bytes bytes_;  ///< with the header in front
 };
 

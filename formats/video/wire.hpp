@@ -63,6 +63,14 @@ struct EncoderRequest {
     double rate = 25;             ///< pictures a second, on average
 };
 
+/// How players turn and mirror the pictures of a track: what is at (x, y) is shown at (ax + cy,
+/// bx + dy), moved into the picture (ISO/IEC 14496-12, 8.3.2). Phones write it.
+struct Turn {
+    std::int8_t a = 1, b = 0, c = 0, d = 1;
+    [[nodiscard]] bool none() const { return a == 1 && d == 1; }
+    [[nodiscard]] bool sideways() const { return a == 0; }
+};
+
 /// Puts values behind each other.
 class Packer {
   public:

@@ -18,6 +18,25 @@ std::string tagOf(const AVDictionary* tags, const char* key) {
     return entry ? entry->value : "";
 }
 
+/// A track's matrix where that is of quarter turns and mirrors; players turn by other angles, too,
+/// which no camera writes.
+Turn turnOf(const AVStream& stream) {
+    std::size_t size = 0;
+    const std::uint8_t* data = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &size);
+    std::int32_t matrix[9] = {};
+    if (!data || size < sizeof(matrix)) return {};
+    std::memcpy(matrix, data, sizeof(matrix));
+    const auto part = [&](int i) {
+        // Fixed point of 16 bits.
+        constexpr std::int32_t kHalf = 1 << 15;
+        return static_cast<std::int8_t>(matrix[i] > kHalf ? 1 : matrix[i] < -kHalf ? -1 : 0);
+    };
+    const Turn turn{part(0), part(1), part(3), part(4)};
+    const bool straight = turn.a != 0 && turn.d != 0 && turn.b == 0 && turn.c == 0;
+    const bool across = turn.a == 0 && turn.d == 0 && turn.b != 0 && turn.c != 0;
+    return straight || across ? turn : Turn{};
+}
+
 }  // namespace
 
 FilmReader::FilmReader(int file, const std::string& format) {
@@ -85,6 +104,7 @@ std::vector<std::byte> FilmReader::describe() const {
         out.putText(track.codec_type == AVMEDIA_TYPE_VIDEO && pixels ? pixels : "");
         out.put(static_cast<std::int32_t>(track.width));
         out.put(static_cast<std::int32_t>(track.height));
+        out.put(turnOf(stream));
         out.putText(tagOf(stream.metadata, "title"));
         const bool attached =
             track.codec_type == AVMEDIA_TYPE_ATTACHMENT && track.extradata_size > 0 &&

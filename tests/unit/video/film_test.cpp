@@ -2,6 +2,8 @@
 
 #include "formats/video/film.hpp"
 
+#include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <thread>
 
@@ -78,6 +80,56 @@ INSTANTIATE_TEST_SUITE_P(
                     "gray12le",
                     "d.mp4"}),
     [](const auto& coding) { return std::string(coding.param.name); });
+
+/// Films of phones are stored as the sensor lies; players turn them by what the file says.
+TEST(TurnedFilms, AreShownAsPlayersShowThem) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writePictures(folder.path(), 3, kWide, kHigh);
+    films::ffmpeg(folder.path(), "-framerate 25 -i c%d.png -c:v png still.mov");
+    for (const int degrees : {90, 180, 270}) {
+        films::ffmpeg(
+            folder.path(),
+            fmt::format("-i still.mov -c copy -metadata:s:v:0 rotate={} turned.mov", degrees));
+        films::ffmpeg(folder.path(), "-i turned.mov -pix_fmt rgba t%d.png");
+        Job job;
+        auto frames = openVideoFrames({folder / "turned.mov"}, job);
+        ASSERT_TRUE(frames) << frames.error().text();
+        const auto bytes = readFile(folder / "t2.png", {});
+        const auto expected = decodeRgba8(*bytes, "t2.png", {});
+        ASSERT_TRUE(expected);
+        const bool across = degrees != 180;
+        EXPECT_EQ((*frames)->size(), across ? glm::ivec2(kHigh, kWide) : glm::ivec2(kWide, kHigh));
+        const auto is = (*frames)->frame(1);
+        ASSERT_TRUE(is) << is.error().text();
+        EXPECT_TRUE(std::ranges::equal((*is)->pixels(), expected->pixels())) << degrees;
+        const auto film = openedFilm(folder / "turned.mov");
+        EXPECT_EQ(film->picture(0)->width(), across ? kHigh : kWide);
+    }
+}
+
+TEST(TurnedFilms, OfDepthTurnTheirCodes) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::writeCodes(folder / "codes.raw", 1, kWide, kHigh, 65535);
+    films::ffmpeg(folder.path(), fmt::format("-f rawvideo -pix_fmt gray16le -s {}x{} -i codes.raw "
+                                             "-c:v rawvideo -pix_fmt gray16be still.mov",
+                                             kWide, kHigh));
+    films::ffmpeg(folder.path(), "-i still.mov -c copy -metadata:s:v:0 rotate=90 turned.mov");
+    films::ffmpeg(folder.path(), "-i turned.mov -f rawvideo -pix_fmt gray16le turned.raw");
+    const auto film = openedFilm(folder / "turned.mov");
+    ASSERT_TRUE(film);
+    const auto depth = film->picture(0)->luma();
+    ASSERT_EQ(depth.width(), kHigh);
+    const auto expected = readFile(folder / "turned.raw", {});
+    ASSERT_TRUE(expected);
+    ASSERT_EQ(expected->size(), 2 * depth.count());
+    for (std::size_t i = 0; i < depth.count(); ++i) {
+        std::uint16_t code = 0;
+        std::memcpy(&code, expected->data() + 2 * i, 2);
+        ASSERT_EQ(depth.data()[i], code) << i;
+    }
+}
 
 /// Colour, against ffmpeg's own decoding, in order, of the same file.
 class ColourFilms : public testing::TestWithParam<std::pair<const char*, const char*>> {};
