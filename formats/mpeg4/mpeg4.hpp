@@ -60,8 +60,8 @@ namespace mpeg4 {
                                      Job& job);
 
 /// In a scene that was made from a bundle, says what the tracks of its images are for: each gets a
-/// name, they are alternatives to each other, and only colour is enabled, so that players that know
-/// no scenes show no depth as a video. Other scenes stay as they are.
+/// name, and only colour is in the movie, so that players that know no scenes have no reason to
+/// show depth as a video. Other scenes stay as they are.
 void nameTracks(Document& document);
 
 /// Names for the files of all streams, each once: their own name where it is a plain one, else what

@@ -266,12 +266,11 @@ Result<void> writeTrack(ByteWriter& out, const Track& track, std::uint32_t times
     const BoxScope trak(out, "trak");
     {
         const std::uint64_t duration = movieDuration(track, timescale);
-        const std::uint32_t flags = isSystems(track) ? 1 : track.stream.enabled ? 7 : 6;
+        // Enabled; in the movie and in its preview, too.
+        const std::uint32_t flags = isSystems(track) || !track.stream.inMovie ? 1 : 7;
         const BoxScope tkhd(out, "tkhd", needsWide(duration) ? 1 : 0, flags);
         writeTimes(out, needsWide(duration), track.id, true, duration);
-        out.zeros(10);  // and the layer
-        out.u16(static_cast<std::uint16_t>(track.stream.alternateGroup));
-        out.zeros(4);
+        out.zeros(16);  // layer, alternate group and volume with what is reserved around them
         writeMatrix(out);
         out.u32(static_cast<std::uint32_t>(track.stream.width) << 16);
         out.u32(static_cast<std::uint32_t>(track.stream.height) << 16);

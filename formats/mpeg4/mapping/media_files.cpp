@@ -232,8 +232,7 @@ void nameTracks(Document& document) {
         const auto role = roles.find(odId);
         if (role == roles.end()) return Result<void>();
         stream.trackName = role->second.view + " " + role->second.field;
-        stream.alternateGroup = 1;
-        stream.enabled = role->second.field == "texture";
+        stream.inMovie = role->second.field == "texture";
         return Result<void>();
     });
     (void)done;  // the body never fails

@@ -114,10 +114,10 @@ struct ElementaryStream {
     Bytes sampleEntry;
     std::string handler;  ///< four characters; empty: by streamType
     /// How an .mp4 presents the track to players that know no scenes (ISO/IEC 14496-12, 8.3.2):
-    /// readers leave these as they are here. No name: one for all images.
+    /// readers leave these as they are here. No name: one for all images. All tracks are enabled
+    /// and none is an alternative to another: a scene needs them all.
     std::string trackName;
-    bool enabled = true;
-    int alternateGroup = 0;  ///< tracks of one group are alternatives; 0: none
+    bool inMovie = true;  ///< shown as a picture of its own
     /// Of a visual track as its sample entry says; 0: the writer looks into the image.
     int width = 0, height = 0;
     /// The name of the file that the stream came from or goes to: MuxInfo.fileName, StreamSource

@@ -176,31 +176,48 @@ TEST(Mpeg4Files, DumpsOfAnotherProgramAreReadBesideTheirFile) {
     }
 }
 
-/// Players that know no scenes take every image track for a video.
-TEST(Mpeg4Files, OnlyColourTracksAreEnabledInScenesOfOurs) {
+/// A reader may take a disabled track as absent, and plays one of an alternate group only (ISO/IEC
+/// 14496-12, 8.3.2): a scene needs all of its pictures. Players that know no scenes take every
+/// track in the movie for a video, which only colour is.
+TEST(Mpeg4Files, AllTracksOfAnOwnSceneAreEnabledAndColourAloneIsInTheMovie) {
     const TemporaryFolder folder("enabled");
     Job job;
-    const Document scene = sceneOf(twoViews());
+    Bundle bundle = twoViews();
+    Environment environment;
+    environment.pictures.assign(6, Texture(Rgba8Image(8, 8, glm::u8vec4(40, 50, 60, 255))));
+    bundle.environment = std::make_shared<const Environment>(environment);
+    const Document scene = sceneOf(bundle);
     mustWrite(writeMpeg4(scene, folder / "a.mp4", job));
     const Bytes bytes = bytesOfFile(folder / "a.mp4");
     const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    int enabled = 0, disabled = 0;
+    int inMovie = 0, others = 0;
     for (std::size_t at = file.find("tkhd"); at != std::string_view::npos;
          at = file.find("tkhd", at + 1)) {
-        const std::string_view name = file.substr(file.find("hdlr", at) + 28);
-        const bool image = name.starts_with("view");
+        const std::string_view tail = file.substr(file.find("hdlr", at) + 28);
+        const std::string_view name = tail.substr(0, tail.find('\0'));
         const int flags = file[at + 7], group = file[at + 4 + 4 + 20 + 8 + 3];
-        if (!image) {
-            EXPECT_EQ(flags, 1) << "scene and descriptors";
-            continue;
-        }
-        EXPECT_EQ(group, 1) << name.substr(0, 20);
-        const bool colour = name.substr(0, name.find('\0')).ends_with(" texture");
-        EXPECT_EQ(flags, colour ? 7 : 6) << name.substr(0, 20);
-        ++(colour ? enabled : disabled);
+        EXPECT_EQ(group, 0) << name;
+        const bool colour = name.ends_with(" texture");
+        EXPECT_EQ(flags, colour ? 7 : 1) << name;
+        ++(colour ? inMovie : others);
     }
-    EXPECT_EQ(enabled, 2);
-    EXPECT_EQ(disabled, 5);
+    EXPECT_EQ(inMovie, 2);
+    EXPECT_EQ(others, 2 + 5 + 6) << "scene and descriptors, depth and vectors, Background";
+    // Files of before had 6 for the others, and one group: they are read as ever.
+    Bytes before = bytes;
+    for (std::size_t at = file.find("tkhd"); at != std::string_view::npos;
+         at = file.find("tkhd", at + 1)) {
+        if (before[at + 7] == std::byte{1}) before[at + 7] = std::byte{6};
+        before[at + 4 + 4 + 20 + 8 + 3] = std::byte{1};
+    }
+    mustWrite(writeFile(folder / "before.mp4", before));
+    const auto now = readMpeg4Bundle(folder / "a.mp4", job);
+    const auto old = readMpeg4Bundle(folder / "before.mp4", job);
+    ASSERT_TRUE(now && old);
+    ASSERT_EQ(old->views.size(), now->views.size());
+    for (std::size_t i = 0; i < old->views.size(); ++i)
+        EXPECT_EQ(old->views[i].depth, now->views[i].depth);
+    EXPECT_EQ(old->environment->pictureCount(), 6);
     // Through a text the same; a scene of others stays as it is.
     mustWrite(writeMpeg4(scene, folder / "a.bt", job));
     const auto text = readMpeg4(folder / "a.bt", job);
