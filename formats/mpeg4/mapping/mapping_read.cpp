@@ -28,7 +28,9 @@ struct Plan {
     NodePtr texture;  ///< SimpleTexture(V2) or PointTexture(V2)
     Similarity worldFromLocal;
     std::string name;
-    std::string defName;
+    std::string key;         ///< in ViewNotes::views
+    int parent = 0;          ///< ShownNode::parent
+    std::size_t number = 0;  ///< among the views of that parent, with those that are left out
     const Octree* octree = nullptr;  ///< gives the depth, instead of the depth image
 };
 
@@ -47,8 +49,8 @@ class BundleReader {
             job_.note(fmt::format(
                 "nodes that place or choose their children by themselves are read as Group: {}",
                 fmt::join(shown.asGroups, ", ")));
-        const ViewNotes notes = notesOf(shown);
-        STX_TRY(const auto plans, makePlans(shown, notes));
+        STX_TRY(auto plans, makePlans(shown));
+        const ViewNotes notes = notesOf(shown, plans);
         if (plans.empty() && options_.mayBeEmpty) {
             Bundle nothing;
             nothing.title = shown.title;
@@ -80,15 +82,8 @@ class BundleReader {
                     read[i].error().at(fmt::format("view {} '{}'", i, plans[i].name)));
             for (std::size_t layer = 0; layer < read[i]->size(); ++layer) {
                 ReferenceView& view = (*read[i])[layer];
-                const auto pad = notes.paddings.find(plans[i].defName);
-                if (pad != notes.paddings.end()) removePadding(view, pad->second);
-                const std::pair key{plans[i].defName, static_cast<int>(layer)};
-                if (const auto at = notes.unknown.find(key); at != notes.unknown.end())
-                    if (markUnknown(view, plans[i], at->second)) view.noDepth = NoDepth::unknown;
-                if (const auto at = notes.pruned.find(key); at != notes.pruned.end())
-                    view.pruned = markUnknown(view, plans[i], at->second);
-                view.background =
-                    notes.backgrounds.contains({plans[i].defName, static_cast<int>(layer)});
+                if (const auto said = notes.views.find(plans[i].key); said != notes.views.end())
+                    applyNotes(view, plans[i], said->second, static_cast<int>(layer));
                 applySimilarity(view, plans[i].worldFromLocal);
                 bundle.views.push_back(std::move(view));
             }
@@ -108,16 +103,13 @@ class BundleReader {
   private:
     /// What all WorldInfo say. Bounds are moved as the WorldInfo is; they hold only when each
     /// object is moved with one.
-    ViewNotes notesOf(const ShownScene& shown) {
+    ViewNotes notesOf(const ShownScene& shown, std::vector<Plan>& plans) {
         ViewNotes all;
+        std::vector<std::string> lost;
         std::vector<glm::dmat4> places;
         for (const ShownInfo& info : shown.infos) {
             ViewNotes notes = ViewNotes::parse(info.text);
-            all.names.merge(notes.names);
-            all.paddings.merge(notes.paddings);
-            all.pruned.merge(notes.pruned);
-            all.unknown.merge(notes.unknown);
-            all.backgrounds.merge(notes.backgrounds);
+            takeViews(all, notes, info.parent, plans, lost);
             if (all.origin == glm::dvec3(0.0)) all.origin = notes.origin;
             if (!all.start) all.start = notes.start;
             if (!notes.bounds) continue;
@@ -130,6 +122,19 @@ class BundleReader {
                 all.bounds->add(glm::dvec3(info.worldFromLocal * p));
             }
         }
+        for (Plan& plan : plans) {
+            if (const auto at = all.views.find(plan.key);
+                at != all.views.end() && !at->second.name.empty())
+                plan.name = at->second.name;
+        }
+        if (!lost.empty())
+            job_.note(
+                fmt::format("WorldInfo says of {} view(s) what the scene does not show or has in "
+                            "another number, "
+                            "the first '{}': names, padding, what was pruned, unknown or "
+                            "background of these is "
+                            "lost",
+                            lost.size(), lost.front()));
         const bool moved =
             std::any_of(shown.nodes.begin(), shown.nodes.end(), [&](const ShownNode& node) {
                 return std::find(places.begin(), places.end(), node.worldFromLocal) == places.end();
@@ -141,6 +146,37 @@ class BundleReader {
             all.bounds.reset();
         }
         return all;
+    }
+    /// Takes over what a WorldInfo says of views: by their number among those beside it, where
+    /// these are as many as it was written for, or by the DEF names of before. Adds to `lost` the
+    /// keys that mean none of `plans`.
+    void takeViews(ViewNotes& all, const ViewNotes& notes, int parent,
+                   const std::vector<Plan>& plans, std::vector<std::string>& lost) const {
+        const auto beside = counts_.find(parent);
+        const bool counts =
+            notes.count && beside != counts_.end() && *notes.count == beside->second;
+        for (const auto& [key, view] : notes.views) {
+            bool found = false;
+            for (const Plan& plan : plans) {
+                const bool meant = key.starts_with('#') ? counts && plan.parent == parent &&
+                                                              key == ViewNotes::keyOf(plan.number)
+                                                        : key == plan.depthImage->defName;
+                if (meant) all.views.emplace(plan.key, view);
+                found = found || meant;
+            }
+            if (!found) lost.push_back(key);
+        }
+    }
+    /// Gives a view what a WorldInfo says of it.
+    void applyNotes(ReferenceView& view, const Plan& plan, const ViewNotes::View& notes,
+                    int layer) {
+        if (notes.padding) removePadding(view, *notes.padding);
+        const auto of = notes.layers.find(layer);
+        if (of == notes.layers.end()) return;
+        if (of->second.unknown && markUnknown(view, plan, *of->second.unknown))
+            view.noDepth = NoDepth::unknown;
+        if (of->second.pruned) view.pruned = markUnknown(view, plan, *of->second.pruned);
+        view.background = of->second.background;
     }
     /// Gives a view full alpha where its depth is unknown. A mask that is damaged costs quality
     /// only, so that it is a note, and false.
@@ -192,9 +228,8 @@ class BundleReader {
                 document_.frames.size() - 1, kOthers));
     }
 
-    std::string freeName(const NodePtr& node, const ViewNotes& notes) {
+    std::string freeName(const NodePtr& node) {
         std::string name = node->defName;
-        if (const auto own = notes.names.find(name); own != notes.names.end()) name = own->second;
         if (name.empty()) name = fmt::format("view{}", count_);
         ++count_;
         return name;
@@ -208,7 +243,7 @@ class BundleReader {
         }
     }
 
-    Result<std::vector<Plan>> makePlans(const ShownScene& shown, const ViewNotes& notes) {
+    Result<std::vector<Plan>> makePlans(const ShownScene& shown) {
         std::vector<Plan> plans;
         for (const ShownNode& node : shown.nodes) {
             const auto world = similarityFrom(node.worldFromLocal);
@@ -230,15 +265,16 @@ class BundleReader {
                                               octree->unusedBytes()));
                 }
                 for (const NodePtr& image : node.node->get<NodeList>("images"))
-                    addPlan(plans, image, *world, notes, octree.get());
+                    addPlan(plans, image, *world, node.parent, octree.get());
             } else {
-                addPlan(plans, node.node, *world, notes, nullptr);
+                addPlan(plans, node.node, *world, node.parent, nullptr);
             }
         }
         return plans;
     }
     void addPlan(std::vector<Plan>& plans, const NodePtr& image, const Similarity& world,
-                 const ViewNotes& notes, const Octree* octree) {
+                 int parent, const Octree* octree) {
+        const auto number = static_cast<std::size_t>(counts_[parent]++);
         if (!image) return;
         const NodePtr& texture = image->get<NodePtr>("diTexture");
         const bool isPoints = texture && texture->info->find("depthNbBits") >= 0;
@@ -250,7 +286,8 @@ class BundleReader {
                                   texture ? "images" : "diTexture"));
             return;
         }
-        plans.push_back({image, texture, world, freeName(image, notes), image->defName, octree});
+        plans.push_back({image, texture, world, freeName(image), fmt::format("{}", plans.size()),
+                         parent, number, octree});
     }
 
     /// What all pixels together will take, before the first is read.
@@ -473,6 +510,7 @@ class BundleReader {
     Job& job_;
     const StreamImages* images_ = nullptr;
     std::unordered_map<const Node*, std::unique_ptr<Octree>> octrees_;
+    std::unordered_map<int, int> counts_;  ///< of views, by ShownNode::parent
     int count_ = 0;
 };
 

@@ -76,20 +76,22 @@ class SceneWriter {
             for (std::size_t k = 1; k < layers; ++k)
                 if (!images[i + k])
                     return tl::unexpected(images[i + k].error().at(viewName(i + k)));
-            children.push_back(depthImage(i, layers, *images[i], notes));
+            const std::string key = ViewNotes::keyOf(children.size());
+            children.push_back(depthImage(i, layers, *images[i], key, notes));
             for (std::size_t k = 0; k < layers; ++k) {
                 const ReferenceView& view = bundle_.views[i + k];
-                const std::pair key{children.back()->defName, static_cast<int>(k)};
-                if (view.pruned) notes.pruned[key] = images[i + k]->unknown;
-                if (view.noDepth == NoDepth::unknown) notes.unknown[key] = images[i + k]->unknown;
+                const bool unknown = view.noDepth == NoDepth::unknown;
+                if (!view.pruned && !unknown && !view.background) continue;
+                ViewNotes::Layer& of = notes.views[key].layers[static_cast<int>(k)];
+                if (view.pruned) of.pruned = images[i + k]->unknown;
+                if (unknown) of.unknown = images[i + k]->unknown;
+                of.background = view.background;
             }
-            for (std::size_t k = 0; k < layers; ++k)
-                if (bundle_.views[i + k].background)
-                    notes.backgrounds.emplace(children.back()->defName, static_cast<int>(k));
             for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
             i += layers - 1;
         }
         sayTotals();
+        notes.count = static_cast<int>(children.size());
         return children;
     }
 
@@ -138,10 +140,11 @@ class SceneWriter {
         octree->set("octree", std::move(parts.octree));
         NodeList images;
         for (std::size_t i = 0; i < parts.pictures.size(); ++i) {
-            auto image = octreePicture(i, parts.pictures[i], notes);
+            auto image = octreePicture(i, parts.pictures[i], ViewNotes::keyOf(i), notes);
             if (!image) return tl::unexpected(image.error().at(viewName(i)));
             images.push_back(std::move(*image));
         }
+        notes.count = static_cast<int>(images.size());
         octree->set("images", std::move(images));
         job_.note(fmt::format("depth is rounded to {} voxels of {:.4g} scene units on a side",
                               parts.voxels, parts.side / parts.resolution));
@@ -161,7 +164,7 @@ class SceneWriter {
         return group;
     }
     Result<NodePtr> octreePicture(std::size_t i, const OctreeParts::Picture& picture,
-                                  ViewNotes& notes) {
+                                  const std::string& key, ViewNotes& notes) {
         STX_TRY(const auto padding,
                 centringPadding(picture.camera, std::min(job_.limits.maxImageSide, 65535)));
         const Rgba8Image colour = padded(picture.colour, padding);
@@ -172,7 +175,7 @@ class SceneWriter {
             STX_TRY(bytes, colourPng(colour, false));
         }
         NodePtr node = makeNode("DepthImage");
-        node->defName = defNameOf(bundle_.views[i], i, notes);
+        node->defName = defNameOf(bundle_.views[i], i, key, notes);
         const Camera& c = padding.camera;
         const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
         node->set("position", glm::vec3(c.position));
@@ -229,7 +232,8 @@ class SceneWriter {
     }
 
     /// A name that every text form can hold, and that no other view has.
-    std::string defNameOf(const ReferenceView& view, std::size_t i, ViewNotes& notes) {
+    std::string defNameOf(const ReferenceView& view, std::size_t i, const std::string& key,
+                          ViewNotes& notes) {
         std::string defName = view.name;
         for (char& c : defName)
             if (!isPlainName(std::string("a") + c)) c = '_';
@@ -239,7 +243,7 @@ class SceneWriter {
         const std::string base = defName;
         for (int n = 1; !taken_.insert(defName).second; ++n)
             defName = fmt::format("{}_{}", base, n);
-        if (defName != view.name && !view.name.empty()) notes.names[defName] = view.name;
+        if (defName != view.name && !view.name.empty()) notes.views[key].name = view.name;
         return defName;
     }
 
@@ -255,11 +259,12 @@ class SceneWriter {
         return node;
     }
 
-    NodePtr depthImage(std::size_t i, std::size_t layers, ViewImages& images, ViewNotes& notes) {
+    NodePtr depthImage(std::size_t i, std::size_t layers, ViewImages& images,
+                       const std::string& key, ViewNotes& notes) {
         const ReferenceView& view = bundle_.views[i];
         const bool v2 = isV2(view);
         NodePtr node = makeNode(v2 ? "DepthImageV2" : "DepthImage");
-        node->defName = defNameOf(view, i, notes);
+        node->defName = defNameOf(view, i, key, notes);
         const Camera& c = images.padding.camera;
         const glm::dvec4 turn = axisAngleFromQuat(c.orientation);
         node->set("position", glm::vec3(c.position));
@@ -298,8 +303,8 @@ class SceneWriter {
         }
         if (!view.camera.orthographic && !view.camera.centred(0.0)) {
             const Padding& p = images.padding;
-            notes.paddings[node->defName] = {p.left,   p.top,          p.right,
-                                             p.bottom, view.camera.cx, view.camera.cy};
+            notes.views[key].padding = {p.left,   p.top,          p.right,
+                                        p.bottom, view.camera.cx, view.camera.cy};
         }
         return node;
     }

@@ -61,7 +61,10 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             if (const auto n = numbers(line, 1); !n.empty()) notes.start = n[0];
         } else if (line.starts_with("name ")) {
             const auto w = words(line, 3);
-            if (w.size() == 3) notes.names[std::string(w[1])] = w[2];
+            if (w.size() == 3) notes.views[std::string(w[1])].name = w[2];
+        } else if (line.starts_with("views ")) {
+            const auto count = integerFromText(std::string_view(line).substr(6));
+            if (count && *count >= 0 && *count <= 1 << 20) notes.count = static_cast<int>(*count);
         } else if (line.starts_with("padding ")) {
             const auto w = words(line, 9);
             if (w.size() != 8) continue;
@@ -77,18 +80,18 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             if (!good || !cx || !cy) continue;
             pad.cx = *cx;
             pad.cy = *cy;
-            notes.paddings[std::string(w[1])] = pad;
+            notes.views[std::string(w[1])].padding = pad;
         } else if (line.starts_with("pruned ") || line.starts_with("unknown ")) {
             const auto w = words(line, 4);
             const auto layer = w.size() == 4 ? integerFromText(w[2]) : std::nullopt;
-            auto& where = w[0] == "pruned" ? notes.pruned : notes.unknown;
-            if (layer && *layer >= 0 && *layer <= 1 << 20)
-                where[{std::string(w[1]), static_cast<int>(*layer)}] = w[3];
+            if (!layer || *layer < 0 || *layer > 1 << 20) continue;
+            auto& of = notes.views[std::string(w[1])].layers[static_cast<int>(*layer)];
+            (w[0] == "pruned" ? of.pruned : of.unknown) = w[3];
         } else if (line.starts_with("background ")) {
             const auto w = words(line, 4);
             const auto layer = w.size() == 3 ? integerFromText(w[2]) : std::nullopt;
             if (layer && *layer >= 0 && *layer <= 1 << 20)
-                notes.backgrounds.emplace(std::string(w[1]), static_cast<int>(*layer));
+                notes.views[std::string(w[1])].layers[static_cast<int>(*layer)].background = true;
         }
     }
     return notes;
@@ -102,17 +105,20 @@ std::vector<std::string> ViewNotes::text() const {
     if (origin != glm::dvec3(0.0))
         info.push_back(fmt::format("origin {} {} {}", origin.x, origin.y, origin.z));
     if (start) info.push_back(fmt::format("start {}", *start));
-    for (const auto& [defName, own] : names)
-        info.push_back(fmt::format("name {} {}", defName, own));
-    for (const auto& [defName, pad] : paddings)
-        info.push_back(fmt::format("padding {} {} {} {} {} {} {}", defName, pad.left, pad.top,
-                                   pad.right, pad.bottom, pad.cx, pad.cy));
-    for (const auto& [key, where] : pruned)
-        info.push_back(fmt::format("pruned {} {} {}", key.first, key.second, where));
-    for (const auto& [key, where] : unknown)
-        info.push_back(fmt::format("unknown {} {} {}", key.first, key.second, where));
-    for (const auto& [defName, layer] : backgrounds)
-        info.push_back(fmt::format("background {} {}", defName, layer));
+    if (count && !views.empty()) info.push_back(fmt::format("views {}", *count));
+    for (const auto& [key, view] : views) {
+        if (!view.name.empty()) info.push_back(fmt::format("name {} {}", key, view.name));
+        if (const auto& pad = view.padding)
+            info.push_back(fmt::format("padding {} {} {} {} {} {} {}", key, pad->left, pad->top,
+                                       pad->right, pad->bottom, pad->cx, pad->cy));
+        for (const auto& [number, layer] : view.layers) {
+            if (layer.pruned)
+                info.push_back(fmt::format("pruned {} {} {}", key, number, *layer.pruned));
+            if (layer.unknown)
+                info.push_back(fmt::format("unknown {} {} {}", key, number, *layer.unknown));
+            if (layer.background) info.push_back(fmt::format("background {} {}", key, number));
+        }
+    }
     return info;
 }
 

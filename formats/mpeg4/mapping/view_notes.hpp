@@ -2,9 +2,10 @@
 
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "formats/mpeg4/scene/placement.hpp"
 #include "lib/base/job.hpp"
@@ -17,13 +18,15 @@
 ///     "bounds minX minY minZ maxX maxY maxZ"
 ///     "start seconds" (of the film's own clock, at the presentation's 0; see Timeline)
 ///     "origin x y z" (added to all coordinates here, gives the world's; see Bundle::origin)
-///     "name DEFNAME the view's own name"
-///     "padding DEFNAME left top right bottom cx cy"
-///     "pruned DEFNAME layer where"
-///     "unknown DEFNAME layer where" (see ReferenceView::noDepth)
-///     "background DEFNAME layer" (see ReferenceView::background)
+///     "views count" (DepthImages, or pictures of an OctreeImage, beside the WorldInfo)
+///     "name #N the view's own name"
+///     "padding #N left top right bottom cx cy"
+///     "pruned #N layer where"
+///     "unknown #N layer where" (see ReferenceView::noDepth)
+///     "background #N layer" (see ReferenceView::background)
 ///
-/// Padding is in pixels, cx and cy are the principal point without it. A pruned view is layer 0 of
+/// N is the view's number among those beside the WorldInfo, from 0: programs that write a scene
+/// anew keep the order, not DEF names. Files of before have DEF names instead. Padding is in pixels, cx and cy are the principal point without it. A pruned view is layer 0 of
 /// its DepthImage, or a further one of a PointTexture; where it was pruned is "alpha" (full alpha
 /// without a depth), or, when the scene has no alpha for it, "all" (all that has no depth) or a PNG
 /// in base64, white where it was pruned. The same of views whose missing depth is unknown. Other
@@ -35,18 +38,27 @@ struct ViewNotes {
     std::optional<Bounds> bounds;
     glm::dvec3 origin{0.0};
     std::optional<double> start;
-    std::map<std::string, std::string> names;  ///< by DEF name
+    std::optional<int> count;  ///< of the views that keys number
     struct Pad {
         int left = 0, top = 0, right = 0, bottom = 0;
         double cx = 0, cy = 0;
     };
-    std::map<std::string, Pad> paddings;  ///< by DEF name
-    /// Where depth is unknown, by DEF name and layer: kUnknownInAlpha, kUnknownAll, or the text of
-    /// a mask. Of views that were pruned, and of those with NoDepth::unknown.
-    std::map<std::pair<std::string, int>, std::string> pruned, unknown;
-
-    /// Views that are background, by DEF name and layer.
-    std::set<std::pair<std::string, int>> backgrounds;
+    struct Layer {
+        /// Where depth is unknown: kUnknownInAlpha, kUnknownAll, or the text of a mask. Of a view
+        /// that was pruned, and of one with NoDepth::unknown.
+        std::optional<std::string> pruned, unknown;
+        bool background = false;
+    };
+    struct View {
+        std::string name;  ///< its own; empty: not said
+        std::optional<Pad> padding;
+        std::map<int, Layer> layers;
+    };
+    std::map<std::string, View> views;  ///< by keyOf() or DEF name
+    /// Of a view with that number.
+    [[nodiscard]] static std::string keyOf(std::size_t number) {
+        return fmt::format("#{}", number);
+    }
 
     /// Strings that are not ours, or do not parse, are passed over.
     [[nodiscard]] static ViewNotes parse(const std::vector<std::string>& info);

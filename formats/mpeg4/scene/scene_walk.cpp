@@ -42,7 +42,7 @@ class Walker {
         } else if (type == "WorldInfo") {
             const auto& title = node->get<std::string>("title");
             if (scene_.title.empty()) scene_.title = title;
-            scene_.infos.push_back({node->get<std::vector<std::string>>("info"), world});
+            scene_.infos.push_back({node->get<std::vector<std::string>>("info"), world, parent});
         } else if (type == "Switch") {
             const auto& choice = node->get<NodeList>("choice");
             const auto chosen = node->get<std::int32_t>("whichChoice");

@@ -21,6 +21,7 @@ struct ShownNode {
 struct ShownInfo {
     std::vector<std::string> text;
     glm::dmat4 worldFromLocal{1.0};  ///< of all Transforms above it
+    int parent = 0;                  ///< as that of nodes is
 };
 
 /// A Background, and how the nodes above it turn it: nothing else of theirs counts (VRML97, 6.5).
