@@ -73,6 +73,7 @@ Result<Bundle> momentWithMost(Sequence& frames, Job& job) {
         STX_CHECK(job.checkCancelled());
         Job quiet;
         quiet.limits = job.limits;
+        quiet.worksFor = &job;
         STX_TRY(auto bundle, frames.frame(i * (timeline.count() - 1) / (count - 1), quiet));
         if (bundle.pointCount() <= most) continue;
         most = bundle.pointCount();

@@ -129,6 +129,7 @@ MovingPictures::MovingPictures(std::unique_ptr<Sequence> frames, RenderSettings 
       device_(device),
       job_(job) {
     ahead_.limits = job.limits;
+    ahead_.worksFor = &job;
 }
 
 MovingPictures::~MovingPictures() {

@@ -162,9 +162,22 @@ void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
         origin.x, origin.y, origin.z));
 }
 
-/// The views of a described frame.
+/// What is known of a camera without a picture: its place and its size.
+void makeUnknown(ReferenceView& view) {
+    view.noDepth = NoDepth::unknown;
+    view.pruned = false;
+    std::ranges::fill(view.depth.pixels(), kNoDepth);
+    if (Rgba8Image* texture = view.texture.rgba8())
+        std::ranges::fill(texture->pixels(), glm::u8vec4(0, 0, 0, 255));
+    if (RgbaFloatImage* texture = view.texture.rgbaFloat())
+        std::ranges::fill(texture->pixels(), glm::vec4(0, 0, 0, 1));
+}
+
+/// The views of a described frame. `failing` becomes the number of the view that cannot be read,
+/// where it is one.
 Result<Bundle> readViews(SetDescription set, const std::string& where,
-                         const ImageSetOptions& options, Job& job) {
+                         const ImageSetOptions& options, Job& job,
+                         std::optional<std::size_t>* failing = nullptr) {
     useOrigin(set);
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput,
@@ -205,9 +218,14 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     bundle.title = std::move(set.title);
     for (Job& own : jobs)
         for (std::string& note : own.takeNotes()) job.note(std::move(note));
-    for (auto& views : loaded) {
+    for (std::size_t i = 0; i < loaded.size(); ++i) {
+        auto& views = loaded[i];
+        if (!views && failing) *failing = i;
         if (!views) return tl::unexpected(views.error().at(where));
-        for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));
+        for (ReferenceView& view : *views) {
+            if (set.views[i].absent) makeUnknown(view);
+            bundle.views.push_back(std::move(view));
+        }
     }
     makeNamesUnique(bundle.views);
     if (!set.environment.empty()) {
@@ -232,6 +250,83 @@ void takeEvery(SetDescription& set, Motion& motion, int every) {
         thin(motion.times);
     else
         thin(set.views);
+}
+
+/// Whether an error is one of a picture itself.
+bool isDamage(const Error& error) {
+    return error.code == ErrorCode::invalidInput || error.code == ErrorCode::io;
+}
+
+std::string damageNote(const std::string& camera, const std::string& when, const Error& error) {
+    return fmt::format(
+        "the picture of camera '{}' {} cannot be used, and the one before it is shown on (so it is "
+        "with others that cannot be used); --strict makes it an error: {}",
+        camera, when, error.text());
+}
+
+/// A job whose notes are passed on only when it succeeds.
+void beginPart(Job& part, Job& whole) {
+    part.limits = whole.limits;
+    part.cancelled = whole.cancelled.load();
+    part.worksFor = &whole;
+}
+
+/// Pictures of a film whose files are missing are left out, with a note; their cameras show those
+/// before. Errors when `strict`, or when no camera has any.
+Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool strict, Job& job) {
+    if (!motion.moves()) return {};
+    for (std::size_t i = 0; i < set.views.size(); ++i)
+        if (set.views[i].missing) motion.gone.insert(i);
+    if (motion.gone.empty()) return {};
+    const Error& first = *set.views[*motion.gone.begin()].missing;
+    if (strict) return tl::unexpected(first);
+    std::erase_if(motion.tracks, [&](const Motion::Track& track) {
+        return std::ranges::all_of(
+            track.views, [&](std::size_t picture) { return motion.gone.contains(picture); });
+    });
+    if (motion.tracks.empty()) return tl::unexpected(first);
+    job.note(
+        fmt::format("{} of {} pictures {} missing, and their cameras show the ones before; the "
+                    "first: {}",
+                    motion.gone.size(), set.views.size(), motion.gone.size() == 1 ? "is" : "are",
+                    first.text()));
+    return {};
+}
+
+/// A moment of a film. Pictures that are damaged join those that are gone, with a note of the
+/// first.
+Result<Bundle> momentOf(const SetDescription& set, Motion& motion, std::size_t frame,
+                        const std::string& where, const ImageSetOptions& options, Job& job) {
+    // A film of which nothing can be used from its beginning is not damaged but another film than
+    // was thought: its first error says more than a search through all of it.
+    constexpr std::size_t kMostInVain = 8;
+    std::optional<Error> first;
+    for (std::size_t inVain = 0;;) {
+        STX_TRY(const auto pictures, motion.picturesAt(set, frame));
+        STX_TRY(auto now, motion.moment(set, frame));
+        std::optional<std::size_t> failing;
+        Job attempt;
+        beginPart(attempt, job);
+        auto bundle = readViews(std::move(now), where, options, attempt, &failing);
+        if (bundle || !failing || options.strict || !isDamage(bundle.error())) {
+            for (std::string& note : attempt.takeNotes()) job.note(std::move(note));
+            return bundle;
+        }
+        const std::size_t picture = pictures[*failing];
+        const bool later = *set.views[picture].time > motion.times[frame];
+        const auto& track = motion.tracks[*failing].views;
+        if (!first) first = bundle.error();
+        if ((later || picture == track.front()) && ++inVain == kMostInVain)
+            return tl::unexpected(*first);
+        if (std::ranges::none_of(
+                track, [&](std::size_t p) { return p != picture && !motion.gone.contains(p); }))
+            return tl::unexpected(*first);
+        if (!motion.damaged)
+            job.noteAbove(damageNote(motion.tracks[*failing].name,
+                                     fmt::format("at {:.6g} s", *set.views[picture].time), *first));
+        motion.damaged = true;
+        motion.gone.insert(picture);
+    }
 }
 
 /// A set whose moments are in its description, or one that is described again for each frame.
@@ -259,30 +354,66 @@ class SetSequence : public Sequence {
     }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
-        SetDescription now;
-        if (motion_.moves()) {
-            now = motion_.moment(set_, index);
-        } else {
-            ImageSetOptions options = options_;
-            options.frame = static_cast<int>(index) * options_.every;
-            STX_TRY(now, describeSet(path_, options, job));
-            if (set_.origin) now.origin = set_.origin;
-        }
-        // Once for all frames: it is what stands still.
-        if (environment_) now.environment.clear();
-        STX_TRY(auto bundle, readViews(std::move(now), inQuotes(path_.string()), options_, job));
+        STX_TRY(auto bundle, motion_.moves() ? momentOf(set_, motion_, index,
+                                                        inQuotes(path_.string()), options_, job)
+                                             : described(index, job));
         if (!environment_) environment_ = bundle.environment;
+        set_.environment.clear();
         bundle.environment = environment_;
         setTime(bundle, index);
         return bundle;
     }
 
   private:
+    /// A frame of a set that is described again for each. A view whose files are missing, or
+    /// damaged, is that of the frame before.
+    Result<Bundle> described(std::size_t index, Job& job) {
+        const std::string where = inQuotes(path_.string());
+        STX_TRY(auto now, describe(index, job));
+        for (std::size_t back = 0;;) {
+            const auto missing = std::ranges::find_if(
+                now.views, [](const SetView& view) { return view.missing.has_value(); });
+            std::optional<std::size_t> failing;
+            Job attempt;
+            beginPart(attempt, job);
+            Result<Bundle> bundle = Bundle();
+            if (missing != now.views.end() && !options_.strict && index > back) {
+                failing = static_cast<std::size_t>(missing - now.views.begin());
+                bundle = tl::unexpected(*missing->missing);
+            } else {
+                SetDescription copy = now;
+                if (environment_) copy.environment.clear();
+                bundle = readViews(std::move(copy), where, options_, attempt, &failing);
+            }
+            if (bundle || !failing || options_.strict || index == back ||
+                !isDamage(bundle.error())) {
+                for (std::string& note : attempt.takeNotes()) job.note(std::move(note));
+                return bundle;
+            }
+            if (!told_)
+                job.noteAbove(damageNote(now.views[*failing].name,
+                                         fmt::format("of frame {}", index), bundle.error()));
+            told_ = true;
+            ++back;
+            STX_TRY(auto before, describe(index - back, job));
+            if (before.views.size() != now.views.size()) return bundle;
+            now.views[*failing] = std::move(before.views[*failing]);
+        }
+    }
+    Result<SetDescription> describe(std::size_t index, Job& job) {
+        ImageSetOptions options = options_;
+        options.frame = static_cast<int>(index) * options_.every;
+        STX_TRY(auto now, describeSet(path_, options, job));
+        if (set_.origin) now.origin = set_.origin;
+        return now;
+    }
+
     std::shared_ptr<const Environment> environment_;
     std::filesystem::path path_;
     ImageSetOptions options_;
     SetDescription set_;
     Motion motion_;
+    bool told_ = false;
 };
 
 /// A set of one moment: opening it reads no pixel.
@@ -323,8 +454,9 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     if (options.frame == 0)
         job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
                              motion.times.size(), motion.timeline().duration()));
-    STX_TRY(auto bundle, readViews(motion.moment(set, static_cast<std::size_t>(options.frame)),
-                                   where, options, job));
+    STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
+    STX_TRY(auto bundle,
+            momentOf(set, motion, static_cast<std::size_t>(options.frame), where, options, job));
     bundle.time = motion.times[static_cast<std::size_t>(options.frame)];
     return bundle;
 }
@@ -341,6 +473,7 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
     takeEvery(set, motion, options.every);
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "it has no view; at least one is expected");
+    STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
     if (set.frames == 1 && !motion.moves())
         return std::make_unique<StillSet>(where, options, std::move(set));
     return std::make_unique<SetSequence>(path, options, std::move(set), std::move(motion));

@@ -60,19 +60,37 @@ Timeline Motion::timeline() const {
     return line;
 }
 
-SetDescription Motion::moment(const SetDescription& set, std::size_t frame) const {
-    SetDescription now;
-    now.title = set.title;
-    now.origin = set.origin;
+Result<std::vector<std::size_t>> Motion::picturesAt(const SetDescription& set,
+                                                    std::size_t frame) const {
+    std::vector<std::size_t> pictures;
     for (const Track& track : tracks) {
+        const auto usable = [&](std::size_t picture) { return !gone.contains(picture); };
         const auto next =
             std::upper_bound(track.views.begin(), track.views.end(), times[frame],
                              [&](double time, std::size_t view) {
                                  return time + halfTick(kTick, time) < *set.views[view].time;
                              });
-        const std::size_t index = next == track.views.begin() ? *next : *std::prev(next);
-        SetView view = set.views[index];
-        view.name = track.name;
+        const auto last =
+            std::find_if(std::make_reverse_iterator(next), track.views.rend(), usable);
+        const auto first = std::find_if(next, track.views.end(), usable);
+        if (last == track.views.rend() && first == track.views.end())
+            return fail(ErrorCode::invalidInput, "no picture of camera '{}' can be used",
+                        track.name);
+        pictures.push_back(last != track.views.rend() ? *last : *first);
+    }
+    return pictures;
+}
+
+Result<SetDescription> Motion::moment(const SetDescription& set, std::size_t frame) const {
+    SetDescription now;
+    now.title = set.title;
+    now.origin = set.origin;
+    now.environment = set.environment;
+    STX_TRY(const auto pictures, picturesAt(set, frame));
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+        SetView view = set.views[pictures[i]];
+        view.name = tracks[i].name;
+        view.absent = *view.time > times[frame] + halfTick(kTick, times[frame]);
         now.views.push_back(std::move(view));
     }
     return now;

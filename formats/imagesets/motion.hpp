@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,17 @@ struct Motion {
 
     [[nodiscard]] bool moves() const { return times.size() > 1; }
     [[nodiscard]] Timeline timeline() const;
-    /// Each track's last picture at times[frame], or its first one where it begins later.
-    [[nodiscard]] SetDescription moment(const SetDescription& set, std::size_t frame) const;
+    /// Pictures that cannot be used: missing files, damage. Indices of SetDescription::views.
+    std::set<std::size_t> gone;
+    bool damaged = false;  ///< one of them is damaged, and a note has said so
+
+    /// The picture that each track shows at times[frame]: its last one, or where it begins later
+    /// its first one, of which nothing but the size is shown (SetView::absent). Errors: none of a
+    /// track can be used.
+    [[nodiscard]] Result<std::vector<std::size_t>> picturesAt(const SetDescription& set,
+                                                              std::size_t frame) const;
+    /// Those pictures as a set of one moment.
+    [[nodiscard]] Result<SetDescription> moment(const SetDescription& set, std::size_t frame) const;
 };
 
 /// What of a set moves: nothing when its views have no times or one only, or options.moving says

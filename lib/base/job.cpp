@@ -24,6 +24,13 @@ void Job::note(std::string text) {
     notes_.push_back({std::move(text)});
 }
 
+void Job::noteAbove(std::string text) {
+    if (worksFor)
+        worksFor->noteAbove(std::move(text));
+    else
+        note(std::move(text));
+}
+
 std::vector<std::string> Job::takeNotes() {
     const std::lock_guard lock(mutex_);
     std::vector<std::string> lines;

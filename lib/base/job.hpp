@@ -35,6 +35,11 @@ class Job {
 
     /// Something a person should know: lossy, dropped, clamped. Said once each, in order.
     void note(std::string text);
+    /// One that must not be lost: it goes to the job that this one works for, at once.
+    void noteAbove(std::string text);
+    /// The job of which this one does a part whose other notes are passed on or dropped by who made
+    /// it; null: none. It must outlive this.
+    Job* worksFor = nullptr;
     /// The notes so far, sorted by first mention; duplicates counted as `text (3 times)`.
     [[nodiscard]] std::vector<std::string> takeNotes();
 
