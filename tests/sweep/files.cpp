@@ -127,7 +127,7 @@ Outcome clock(Pictures& pictures) {
     if (view.pointCount() == 0 || pictures.stage().from.offCentre) return std::nullopt;
     Timeline timeline = steadyTimeline(frames, rate);
     for (double& time : timeline.times) time += start;
-    timeline.duration += start;
+    timeline.end += start;
     Numbered film(view, timeline);
     Folder folder;
     Job job;

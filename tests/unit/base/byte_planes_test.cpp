@@ -104,7 +104,9 @@ TEST(BytePlanes, PlanesOfHalvesAreTheHalves) {
                 ASSERT_EQ(planes[i % static_cast<std::size_t>(values)]
                                 [i / static_cast<std::size_t>(values)],
                           expected[i]);
-            if (values == 3) EXPECT_EQ(planes[3], std::vector<std::uint16_t>(count, 9));
+            if (values == 3) {
+                EXPECT_EQ(planes[3], std::vector<std::uint16_t>(count, 9));
+            }
         }
     }
 }

@@ -12,7 +12,7 @@ using namespace sets;
 
 namespace {
 
-constexpr int kWidth = 160, kHeight = 120;
+constexpr int kRoomWidth = 160, kRoomHeight = 120;
 constexpr double kStep = 0.001;
 
 /// A point of the depth camera is kTurn * p + kShift in the colour camera, y down, z forward.
@@ -24,8 +24,9 @@ struct Recording {
     ReferenceView colour, depth;
 };
 
-Recording recorded(int depthWidth = kWidth, int depthHeight = kHeight) {
-    const Camera camera = analyticCamera(AnalyticScene::room, 1, 4).resized(kWidth, kHeight);
+Recording recorded(int depthWidth = kRoomWidth, int depthHeight = kRoomHeight) {
+    const Camera camera =
+        analyticCamera(AnalyticScene::room, 1, 4).resized(kRoomWidth, kRoomHeight);
     Camera other = camera.resized(depthWidth, depthHeight);
     other.fx *= 1.1;
     other.fy *= 1.12;
@@ -78,16 +79,16 @@ ImageSetOptions optionsOf(const Recording& r, const std::filesystem::path& folde
 /// Pixels whose depth is not that of the picture's own camera, as a share of those that have one.
 double offShare(const Recording& r, const ReferenceView& read) {
     int known = 0, off = 0;
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < kRoomHeight; ++y)
+        for (int x = 0; x < kRoomWidth; ++x) {
             const float d = read.depth.at(x, y), truth = r.colour.depth.at(x, y);
             if (!hasPoint(d) || !hasPoint(truth)) continue;
             ++known;
             off += std::abs(d - truth) > 0.01f * truth;
         }
-    std::printf("  %d of %d pixels have depth, %d are off\n", known, kWidth * kHeight, off);
+    std::printf("  %d of %d pixels have depth, %d are off\n", known, kRoomWidth * kRoomHeight, off);
     // The border that the depth camera does not see, and what is hidden from it.
-    EXPECT_GT(known, kWidth * kHeight * 3 / 4);
+    EXPECT_GT(known, kRoomWidth * kRoomHeight * 3 / 4);
     return static_cast<double>(off) / known;
 }
 
