@@ -141,6 +141,7 @@ Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begi
             // Notes are those of the second time.
             Job quiet;
             quiet.limits = program.job.limits;
+            quiet.worksFor = &program.job;
             STX_TRY(const auto whole, frames.frame(i, quiet));
             Bundle pruned = whole;
             if (prunes(o)) {

@@ -11,6 +11,7 @@
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
+#include "lib/model/sequence.hpp"
 #include "lib/registration/refine_poses.hpp"
 
 namespace stx {
@@ -174,7 +175,7 @@ void makeUnknown(ReferenceView& view) {
 }
 
 /// The views of a described frame. `failing` becomes the number of the view that cannot be read,
-/// where it is one.
+/// where it is that.
 Result<Bundle> readViews(SetDescription set, const std::string& where,
                          const ImageSetOptions& options, Job& job,
                          std::optional<std::size_t>* failing = nullptr) {
@@ -252,39 +253,21 @@ void takeEvery(SetDescription& set, Motion& motion, int every) {
         thin(set.views);
 }
 
-/// Whether an error is one of a picture itself.
-bool isDamage(const Error& error) {
-    return error.code == ErrorCode::invalidInput || error.code == ErrorCode::io;
-}
-
-std::string damageNote(const std::string& camera, const std::string& when, const Error& error) {
-    return fmt::format(
-        "the picture of camera '{}' {} cannot be used, and the one before it is shown on (so it is "
-        "with others that cannot be used); --strict makes it an error: {}",
-        camera, when, error.text());
-}
-
-/// A job whose notes are passed on only when it succeeds.
-void beginPart(Job& part, Job& whole) {
-    part.limits = whole.limits;
-    part.cancelled = whole.cancelled.load();
-    part.worksFor = &whole;
-}
-
-/// Pictures of a film whose files are missing are left out, with a note; their cameras show those
-/// before. Errors when `strict`, or when no camera has any.
+/// Pictures of a film whose files are missing are left out, with a note: their cameras show those
+/// before, and the film begins with the first that is there. Errors when `strict`, or when none is.
 Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool strict, Job& job) {
     if (!motion.moves()) return {};
     for (std::size_t i = 0; i < set.views.size(); ++i)
-        if (set.views[i].missing) motion.gone.insert(i);
+        if (set.views[i].missing) motion.gone.emplace(i, *set.views[i].missing);
     if (motion.gone.empty()) return {};
-    const Error& first = *set.views[*motion.gone.begin()].missing;
+    const Error& first = motion.gone.begin()->second;
     if (strict) return tl::unexpected(first);
     std::erase_if(motion.tracks, [&](const Motion::Track& track) {
         return std::ranges::all_of(
             track.views, [&](std::size_t picture) { return motion.gone.contains(picture); });
     });
     if (motion.tracks.empty()) return tl::unexpected(first);
+    while (motion.nothingBegan(set, 0)) motion.times.erase(motion.times.begin());
     job.note(
         fmt::format("{} of {} pictures {} missing, and their cameras show the ones before; the "
                     "first: {}",
@@ -293,39 +276,66 @@ Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool str
     return {};
 }
 
+/// A job for a part of the work of another, whose notes are passed on only when it succeeds.
+struct Attempt {
+    explicit Attempt(Job& of) : whole(of) {
+        part.limits = whole.limits;
+        part.cancelled = whole.cancelled.load();
+        part.worksFor = &whole;
+    }
+    void passNotes() {
+        for (std::string& note : part.takeNotes()) whole.note(std::move(note));
+    }
+    Job& whole;
+    Job part;
+};
+
+/// Puts the damaged picture of a track that is shown at a frame with those that are gone, and the
+/// ones that would be shown in its place and are damaged, too. Errors: all of the track are.
+Result<void> passOver(const SetDescription& set, Motion& motion, const Motion::Track& track,
+                      std::size_t frame, Error error, const std::string& where,
+                      const ImageSetOptions& options, Job& job) {
+    if (!motion.damaged) {
+        const SetView& view = set.views[*motion.pictureAt(set, track, frame)];
+        job.noteAbove(
+            fmt::format("the picture of camera '{}' at {:.6g} s cannot be used: the one before it "
+                        "is shown on, and no more is said of others like it; stx convert --strict "
+                        "stops there: {}",
+                        track.name, *view.time, error.text()));
+    }
+    motion.damaged = true;
+    for (std::optional<Error> failed = error; failed;) {
+        motion.gone.emplace(*motion.pictureAt(set, track, frame), *failed);
+        const auto next = motion.pictureAt(set, track, frame);
+        if (!next) return tl::unexpected(std::move(error));
+        STX_CHECK(job.checkCancelled());
+        SetDescription alone;
+        alone.origin = set.origin;
+        alone.views = {set.views[*next]};
+        Attempt attempt(job);
+        const auto read = readViews(std::move(alone), where, options, attempt.part);
+        failed.reset();
+        if (!read && isDamage(read.error())) failed = read.error();
+    }
+    return {};
+}
+
 /// A moment of a film. Pictures that are damaged join those that are gone, with a note of the
-/// first.
+/// first. Errors where it has none at all, or `strict`.
 Result<Bundle> momentOf(const SetDescription& set, Motion& motion, std::size_t frame,
                         const std::string& where, const ImageSetOptions& options, Job& job) {
-    // A film of which nothing can be used from its beginning is not damaged but another film than
-    // was thought: its first error says more than a search through all of it.
-    constexpr std::size_t kMostInVain = 8;
-    std::optional<Error> first;
-    for (std::size_t inVain = 0;;) {
-        STX_TRY(const auto pictures, motion.picturesAt(set, frame));
-        STX_TRY(auto now, motion.moment(set, frame));
+    for (;;) {
+        if (motion.nothingBegan(set, frame))
+            return tl::unexpected(motion.gone.at(motion.tracks.front().views.front()));
         std::optional<std::size_t> failing;
-        Job attempt;
-        beginPart(attempt, job);
-        auto bundle = readViews(std::move(now), where, options, attempt, &failing);
+        Attempt attempt(job);
+        auto bundle = readViews(motion.moment(set, frame), where, options, attempt.part, &failing);
         if (bundle || !failing || options.strict || !isDamage(bundle.error())) {
-            for (std::string& note : attempt.takeNotes()) job.note(std::move(note));
+            attempt.passNotes();
             return bundle;
         }
-        const std::size_t picture = pictures[*failing];
-        const bool later = *set.views[picture].time > motion.times[frame];
-        const auto& track = motion.tracks[*failing].views;
-        if (!first) first = bundle.error();
-        if ((later || picture == track.front()) && ++inVain == kMostInVain)
-            return tl::unexpected(*first);
-        if (std::ranges::none_of(
-                track, [&](std::size_t p) { return p != picture && !motion.gone.contains(p); }))
-            return tl::unexpected(*first);
-        if (!motion.damaged)
-            job.noteAbove(damageNote(motion.tracks[*failing].name,
-                                     fmt::format("at {:.6g} s", *set.views[picture].time), *first));
-        motion.damaged = true;
-        motion.gone.insert(picture);
+        STX_CHECK(passOver(set, motion, motion.tracks[*failing], frame, bundle.error(), where,
+                           options, job));
     }
 }
 
@@ -354,9 +364,9 @@ class SetSequence : public Sequence {
     }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
-        STX_TRY(auto bundle, motion_.moves() ? momentOf(set_, motion_, index,
-                                                        inQuotes(path_.string()), options_, job)
-                                             : described(index, job));
+        const std::string where = inQuotes(path_.string());
+        STX_TRY(auto bundle, motion_.moves() ? momentOf(set_, motion_, index, where, options_, job)
+                                             : described(index, where, job));
         if (!environment_) environment_ = bundle.environment;
         set_.environment.clear();
         bundle.environment = environment_;
@@ -365,47 +375,18 @@ class SetSequence : public Sequence {
     }
 
   private:
-    /// A frame of a set that is described again for each. A view whose files are missing, or
-    /// damaged, is that of the frame before.
-    Result<Bundle> described(std::size_t index, Job& job) {
-        const std::string where = inQuotes(path_.string());
-        STX_TRY(auto now, describe(index, job));
-        for (std::size_t back = 0;;) {
-            const auto missing = std::ranges::find_if(
-                now.views, [](const SetView& view) { return view.missing.has_value(); });
-            std::optional<std::size_t> failing;
-            Job attempt;
-            beginPart(attempt, job);
-            Result<Bundle> bundle = Bundle();
-            if (missing != now.views.end() && !options_.strict && index > back) {
-                failing = static_cast<std::size_t>(missing - now.views.begin());
-                bundle = tl::unexpected(*missing->missing);
-            } else {
-                SetDescription copy = now;
-                if (environment_) copy.environment.clear();
-                bundle = readViews(std::move(copy), where, options_, attempt, &failing);
-            }
-            if (bundle || !failing || options_.strict || index == back ||
-                !isDamage(bundle.error())) {
-                for (std::string& note : attempt.takeNotes()) job.note(std::move(note));
-                return bundle;
-            }
-            if (!told_)
-                job.noteAbove(damageNote(now.views[*failing].name,
-                                         fmt::format("of frame {}", index), bundle.error()));
-            told_ = true;
-            ++back;
-            STX_TRY(auto before, describe(index - back, job));
-            if (before.views.size() != now.views.size()) return bundle;
-            now.views[*failing] = std::move(before.views[*failing]);
-        }
-    }
-    Result<SetDescription> describe(std::size_t index, Job& job) {
+    /// A frame of a set that is described again for each, with all its cameras.
+    Result<Bundle> described(std::size_t index, const std::string& where, Job& job) {
         ImageSetOptions options = options_;
         options.frame = static_cast<int>(index) * options_.every;
         STX_TRY(auto now, describeSet(path_, options, job));
+        for (const SetView& camera : set_.views)
+            if (std::ranges::find(now.views, camera.name, &SetView::name) == now.views.end())
+                return failAt(where, ErrorCode::io, "camera '{}' has no picture of frame {}",
+                              camera.name, options.frame);
         if (set_.origin) now.origin = set_.origin;
-        return now;
+        if (environment_) now.environment.clear();
+        return readViews(std::move(now), where, options_, job);
     }
 
     std::shared_ptr<const Environment> environment_;
@@ -413,7 +394,6 @@ class SetSequence : public Sequence {
     ImageSetOptions options_;
     SetDescription set_;
     Motion motion_;
-    bool told_ = false;
 };
 
 /// A set of one moment: opening it reads no pixel.

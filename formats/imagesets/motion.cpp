@@ -50,6 +50,10 @@ std::vector<std::string> takersOf(const SetDescription& set) {
     return takers;
 }
 
+bool beginsLater(const SetView& view, double time) {
+    return *view.time > time + halfTick(kTick, time);
+}
+
 }  // namespace
 
 Timeline Motion::timeline() const {
@@ -60,37 +64,35 @@ Timeline Motion::timeline() const {
     return line;
 }
 
-Result<std::vector<std::size_t>> Motion::picturesAt(const SetDescription& set,
-                                                    std::size_t frame) const {
-    std::vector<std::size_t> pictures;
-    for (const Track& track : tracks) {
-        const auto usable = [&](std::size_t picture) { return !gone.contains(picture); };
-        const auto next =
-            std::upper_bound(track.views.begin(), track.views.end(), times[frame],
-                             [&](double time, std::size_t view) {
-                                 return time + halfTick(kTick, time) < *set.views[view].time;
-                             });
-        const auto last =
-            std::find_if(std::make_reverse_iterator(next), track.views.rend(), usable);
-        const auto first = std::find_if(next, track.views.end(), usable);
-        if (last == track.views.rend() && first == track.views.end())
-            return fail(ErrorCode::invalidInput, "no picture of camera '{}' can be used",
-                        track.name);
-        pictures.push_back(last != track.views.rend() ? *last : *first);
-    }
-    return pictures;
+std::optional<std::size_t> Motion::pictureAt(const SetDescription& set, const Track& track,
+                                             std::size_t frame) const {
+    const auto usable = [&](std::size_t picture) { return !gone.contains(picture); };
+    const auto next = std::ranges::partition_point(track.views, [&](std::size_t picture) {
+        return !beginsLater(set.views[picture], times[frame]);
+    });
+    const auto last = std::find_if(std::make_reverse_iterator(next), track.views.rend(), usable);
+    if (last != track.views.rend()) return *last;
+    const auto first = std::find_if(next, track.views.end(), usable);
+    if (first == track.views.end()) return std::nullopt;
+    return *first;
 }
 
-Result<SetDescription> Motion::moment(const SetDescription& set, std::size_t frame) const {
+bool Motion::nothingBegan(const SetDescription& set, std::size_t frame) const {
+    return std::ranges::all_of(tracks, [&](const Track& track) {
+        const auto picture = pictureAt(set, track, frame);
+        return !picture || beginsLater(set.views[*picture], times[frame]);
+    });
+}
+
+SetDescription Motion::moment(const SetDescription& set, std::size_t frame) const {
     SetDescription now;
     now.title = set.title;
     now.origin = set.origin;
     now.environment = set.environment;
-    STX_TRY(const auto pictures, picturesAt(set, frame));
-    for (std::size_t i = 0; i < tracks.size(); ++i) {
-        SetView view = set.views[pictures[i]];
-        view.name = tracks[i].name;
-        view.absent = *view.time > times[frame] + halfTick(kTick, times[frame]);
+    for (const Track& track : tracks) {
+        SetView view = set.views[*pictureAt(set, track, frame)];
+        view.name = track.name;
+        view.absent = beginsLater(view, times[frame]);
         now.views.push_back(std::move(view));
     }
     return now;

@@ -77,29 +77,35 @@ TEST(MovingSets, CamerasShowTheirLastPicture) {
 }
 
 TEST(MovingSets, ACameraThatStartsLaterIsNotThereBefore) {
-    TemporaryFolder folder;
-    const auto set =
-        writeShots(folder, {{"a", 0, 0, 1}, {"a", 1, 0, 2}, {"b", 1, 1, 3}, {"a", 2, 0, 4}});
-    const auto first = opened(set);
-    ASSERT_TRUE(first);
-    Job job;
-    for (const char* target : {"film.mp4", "film.xmt", "film_%02d.exr", "out"}) {
-        const auto path = folder / target;
-        const auto written = std::string(target) == "out" ? exportFrames(*first, path, {}, job)
-                                                          : saveSequence(*first, path, {}, job);
-        ASSERT_TRUE(written) << written.error().text();
-        const auto read = openSequence(path, {}, job);
-        ASSERT_TRUE(read) << read.error().text();
-        const auto before = (*read)->frame(0, job), since = (*read)->frame(1, job);
-        ASSERT_TRUE(before) << target << ": " << before.error().text();
-        ASSERT_TRUE(since) << target << ": " << since.error().text();
-        ASSERT_EQ(before->views.size(), 2u) << target;
-        EXPECT_EQ(before->views[1].pointCount(), 0) << target;
-        EXPECT_TRUE(before->views[1].depthMayBeUnknown()) << target;
-        EXPECT_EQ(before->views[1].texture.at(3, 3).a, 1.0f) << target << ": it hides nothing";
-        EXPECT_EQ(before->views[0].pointCount(), 48) << target;
-        EXPECT_EQ(since->views[1].pointCount(), 48) << target;
-        EXPECT_NEAR(since->views[1].depth.at(3, 3), 1.003, 1e-3) << target;
+    for (const double start : {0.0, 7.3, -1.0, 1.3e9}) {
+        TemporaryFolder folder;
+        const auto set = writeShots(folder, {{"a", start, 0, 1},
+                                             {"a", start + 1, 0, 2},
+                                             {"b", start + 1, 1, 3},
+                                             {"a", start + 2, 0, 4}});
+        const auto first = opened(set);
+        ASSERT_TRUE(first);
+        Job job;
+        for (const char* target : {"film.mp4", "film.xmt", "film_%02d.exr", "out"}) {
+            const auto path = folder / target;
+            const auto written = std::string(target) == "out" ? exportFrames(*first, path, {}, job)
+                                                              : saveSequence(*first, path, {}, job);
+            ASSERT_TRUE(written) << written.error().text();
+            const auto read = openSequence(path, {}, job);
+            ASSERT_TRUE(read) << read.error().text();
+            EXPECT_EQ((*read)->timeline().start(), start) << target;
+            EXPECT_NEAR((*read)->timeline().end, start + 3, 1e-6) << target;
+            const auto before = (*read)->frame(0, job), since = (*read)->frame(1, job);
+            ASSERT_TRUE(before) << target << ": " << before.error().text();
+            ASSERT_TRUE(since) << target << ": " << since.error().text();
+            ASSERT_EQ(before->views.size(), 2u) << target;
+            EXPECT_EQ(before->views[1].pointCount(), 0) << target;
+            EXPECT_TRUE(before->views[1].depthMayBeUnknown()) << target;
+            EXPECT_EQ(before->views[1].texture.at(3, 3).a, 1.0f) << target << ": it hides nothing";
+            EXPECT_EQ(before->views[0].pointCount(), 48) << target;
+            EXPECT_EQ(since->views[1].pointCount(), 48) << target;
+            EXPECT_NEAR(since->views[1].depth.at(3, 3), 1.003, 1e-3) << target;
+        }
     }
 }
 
@@ -138,6 +144,16 @@ TEST(MovingSets, AMissingPictureIsTheOneBefore) {
     const auto moment = readImageSet(set, options, job);
     ASSERT_TRUE(moment) << moment.error().text();
     EXPECT_NEAR(moment->views[0].depth.at(3, 3), 1.001, 1e-4);
+}
+
+TEST(MovingSets, AFilmBeginsWithItsFirstPictureThatIsThere) {
+    TemporaryFolder folder;
+    const auto set = writeShots(folder, {{"a", 7.3, 0, 1}, {"a", 8.3, 0, 2}, {"a", 9.3, 0, 3}});
+    std::filesystem::remove(folder / "c0.png");
+    const auto read = opened(set);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->timeline().times, (std::vector<double>{8.3, 9.3}));
+    EXPECT_NEAR(depthOf(*read, 0, 0), 1.002, 1e-4);
 }
 
 TEST(MovingSets, ADamagedPictureIsTheOneBefore) {
@@ -179,6 +195,19 @@ TEST(MovingSets, AFirstPictureThatIsDamagedIsNotKnown) {
     EXPECT_FALSE(hasPoint(depthOf(*read, 0, 0)));
     EXPECT_NEAR(depthOf(*read, 0, 1), 1.002, 1e-4);
     EXPECT_NEAR(depthOf(*read, 1, 0), 1.003, 1e-4);
+}
+
+TEST(MovingSets, ACameraOfWhichAllIsDamagedIsAnError) {
+    TemporaryFolder folder;
+    const auto set =
+        writeShots(folder, {{"a", 0, 0, 1}, {"b", 0, 0, 2}, {"a", 1, 0, 3}, {"b", 1, 0, 4}});
+    for (const char* file : {"d1.png", "d3.png"}) writeText(folder / file, "no picture");
+    const auto read = opened(set);
+    ASSERT_TRUE(read);
+    Job job;
+    const auto first = read->frame(0, job);
+    ASSERT_FALSE(first);
+    EXPECT_NE(first.error().text().find("d1.png"), std::string::npos) << first.error().text();
 }
 
 TEST(MovingSets, TimesThatAreNoneAreNamed) {
@@ -320,7 +349,7 @@ TEST(MovingSets, MasksTakeAwayWhatIsNotTheObject) {
     ASSERT_FALSE(wrong);
     EXPECT_NE(wrong.error().text().find("the mask is 4x4"), std::string::npos);
     std::filesystem::remove(folder / "m_c0.png");
-    const auto missing = sequence->frame(0, job);
+    const auto missing = opened(set, options)->frame(0, job);
     ASSERT_FALSE(missing);
     EXPECT_EQ(missing.error().code, ErrorCode::io);
 }
