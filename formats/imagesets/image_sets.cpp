@@ -276,6 +276,15 @@ Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool str
     return {};
 }
 
+/// How a set moves, with each N-th view or moment of it; see leaveMissingOut().
+Result<Motion> motionToRead(SetDescription& set, const ImageSetOptions& options,
+                            const std::string& where, Job& job) {
+    STX_TRY(Motion motion, within(where, motionOf(set, options)));
+    takeEvery(set, motion, options.every);
+    STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
+    return motion;
+}
+
 /// A job for a part of the work of another, whose notes are passed on only when it succeeds.
 struct Attempt {
     explicit Attempt(Job& of) : whole(of) {
@@ -419,8 +428,7 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     STX_CHECK(checkOptions(options));
     STX_TRY(SetDescription set, describeSet(path, options, job));
     const std::string where = inQuotes(path.string());
-    STX_TRY(Motion motion, within(where, motionOf(set, options)));
-    takeEvery(set, motion, options.every);
+    STX_TRY(Motion motion, motionToRead(set, options, where, job));
     // What is not there says more than a number that is too large.
     if (!motion.moves()) {
         STX_CHECK(dropMissing(set, options.strict, job));
@@ -434,7 +442,6 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     if (options.frame == 0)
         job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
                              motion.times.size(), motion.timeline().duration()));
-    STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
     STX_TRY(auto bundle,
             momentOf(set, motion, static_cast<std::size_t>(options.frame), where, options, job));
     bundle.time = motion.times[static_cast<std::size_t>(options.frame)];
@@ -449,11 +456,9 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
                     "--refine-poses moves the cameras of one moment; give --frame N or --still");
     STX_TRY(SetDescription set, describeSet(path, options, job));
     const std::string where = inQuotes(path.string());
-    STX_TRY(Motion motion, within(where, motionOf(set, options)));
-    takeEvery(set, motion, options.every);
+    STX_TRY(Motion motion, motionToRead(set, options, where, job));
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "it has no view; at least one is expected");
-    STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
     if (set.frames == 1 && !motion.moves())
         return std::make_unique<StillSet>(where, options, std::move(set));
     return std::make_unique<SetSequence>(path, options, std::move(set), std::move(motion));
@@ -462,8 +467,8 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
 Result<int> imageSetFrameCount(const std::filesystem::path& path, const ImageSetOptions& options,
                                Job& job) {
     STX_CHECK(checkOptions(options));
-    STX_TRY(const SetDescription set, describeSet(path, options, job));
-    STX_TRY(const Motion motion, within(inQuotes(path.string()), motionOf(set, options)));
+    STX_TRY(SetDescription set, describeSet(path, options, job));
+    STX_TRY(const Motion motion, motionToRead(set, options, inQuotes(path.string()), job));
     return motion.moves() ? static_cast<int>(motion.times.size()) : set.frames;
 }
 

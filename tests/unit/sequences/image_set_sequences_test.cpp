@@ -154,6 +154,13 @@ TEST(MovingSets, AFilmBeginsWithItsFirstPictureThatIsThere) {
     ASSERT_TRUE(read);
     EXPECT_EQ(read->timeline().times, (std::vector<double>{8.3, 9.3}));
     EXPECT_NEAR(depthOf(*read, 0, 0), 1.002, 1e-4);
+    Job job;
+    ImageSetOptions options;
+    EXPECT_EQ(imageSetFrameCount(set, options, job), 2);
+    options.frame = 1;
+    EXPECT_NEAR(readImageSet(set, options, job)->views[0].depth.at(3, 3), 1.003, 1e-4);
+    options.frame = 2;
+    EXPECT_FALSE(readImageSet(set, options, job));
 }
 
 TEST(MovingSets, ADamagedPictureIsTheOneBefore) {
