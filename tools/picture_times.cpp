@@ -128,8 +128,7 @@ MovingPictures::MovingPictures(std::unique_ptr<Sequence> frames, RenderSettings 
       backend_(backend),
       device_(device),
       job_(job) {
-    ahead_.limits = job.limits;
-    ahead_.worksFor = &job;
+    ahead_.workFor(job);
 }
 
 MovingPictures::~MovingPictures() {

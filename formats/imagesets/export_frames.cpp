@@ -71,8 +71,7 @@ class FrameExporter {
     Result<void> add(std::size_t index) {
         // Notes are those of the first frame.
         Job quiet;
-        quiet.limits = job_.limits;
-        quiet.worksFor = &job_;
+        quiet.workFor(job_);
         STX_TRY(auto bundle, frames_.frame(index, index == 0 ? job_ : quiet));
         STX_CHECK(bundle.check());
         if (index == 0)

@@ -198,14 +198,13 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     std::vector<Result<std::vector<ReferenceView>>> loaded(set.views.size());
     // Notes in the order of the views, whichever is ready first.
     std::vector<Job> jobs(set.views.size());
+    for (Job& own : jobs) own.workFor(job);
     std::atomic<std::int64_t> done = 0;
     std::atomic<bool> failed = false;
     parallelFor(0, count, [&](std::int64_t i) {
         const auto at = static_cast<std::size_t>(i);
         if (failed) return;
         Job& own = jobs[at];
-        own.limits = job.limits;
-        own.cancelled = job.cancelled.load();
         try {
             loaded[at] = loadSetView(set.views[at], options, own);
         } catch (const std::bad_alloc&) {
@@ -217,8 +216,7 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     });
     Bundle bundle;
     bundle.title = std::move(set.title);
-    for (Job& own : jobs)
-        for (std::string& note : own.takeNotes()) job.note(std::move(note));
+    for (Job& own : jobs) own.passNotesOn();
     for (std::size_t i = 0; i < loaded.size(); ++i) {
         auto& views = loaded[i];
         if (!views && failing) *failing = i;
@@ -285,20 +283,6 @@ Result<Motion> motionToRead(SetDescription& set, const ImageSetOptions& options,
     return motion;
 }
 
-/// A job for a part of the work of another, whose notes are passed on only when it succeeds.
-struct Attempt {
-    explicit Attempt(Job& of) : whole(of) {
-        part.limits = whole.limits;
-        part.cancelled = whole.cancelled.load();
-        part.worksFor = &whole;
-    }
-    void passNotes() {
-        for (std::string& note : part.takeNotes()) whole.note(std::move(note));
-    }
-    Job& whole;
-    Job part;
-};
-
 /// Puts the damaged picture of a track that is shown at a frame with those that are gone, and the
 /// ones that would be shown in its place and are damaged, too. Errors: all of the track are.
 Result<void> passOver(const SetDescription& set, Motion& motion, const Motion::Track& track,
@@ -321,8 +305,9 @@ Result<void> passOver(const SetDescription& set, Motion& motion, const Motion::T
         SetDescription alone;
         alone.origin = set.origin;
         alone.views = {set.views[*next]};
-        Attempt attempt(job);
-        const auto read = readViews(std::move(alone), where, options, attempt.part);
+        Job quiet;
+        quiet.workFor(job);
+        const auto read = readViews(std::move(alone), where, options, quiet);
         failed.reset();
         if (!read && isDamage(read.error())) failed = read.error();
     }
@@ -337,10 +322,11 @@ Result<Bundle> momentOf(const SetDescription& set, Motion& motion, std::size_t f
         if (motion.nothingBegan(set, frame))
             return tl::unexpected(motion.gone.at(motion.tracks.front().views.front()));
         std::optional<std::size_t> failing;
-        Attempt attempt(job);
-        auto bundle = readViews(motion.moment(set, frame), where, options, attempt.part, &failing);
+        Job attempt;
+        attempt.workFor(job);
+        auto bundle = readViews(motion.moment(set, frame), where, options, attempt, &failing);
         if (bundle || !failing || options.strict || !isDamage(bundle.error())) {
-            attempt.passNotes();
+            attempt.passNotesOn();
             return bundle;
         }
         STX_CHECK(passOver(set, motion, motion.tracks[*failing], frame, bundle.error(), where,

@@ -24,9 +24,18 @@ void Job::note(std::string text) {
     notes_.push_back({std::move(text)});
 }
 
+void Job::workFor(Job& whole) {
+    limits = whole.limits;
+    whole_ = &whole;
+}
+
+void Job::passNotesOn() {
+    for (std::string& text : takeNotes()) whole_->note(std::move(text));
+}
+
 void Job::noteAbove(std::string text) {
-    if (worksFor)
-        worksFor->noteAbove(std::move(text));
+    if (whole_)
+        whole_->noteAbove(std::move(text));
     else
         note(std::move(text));
 }
@@ -42,7 +51,7 @@ std::vector<std::string> Job::takeNotes() {
 
 Result<void> Job::checkCancelled() const {
     if (cancelled.load(std::memory_order_relaxed)) return fail(ErrorCode::failed, "stopped");
-    return {};
+    return whole_ ? whole_->checkCancelled() : Result<void>();
 }
 
 }  // namespace stx

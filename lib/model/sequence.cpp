@@ -91,13 +91,10 @@ class AcrossDamage : public Sequence {
         if (const auto known = damaged_.find(index); known != damaged_.end())
             return tl::unexpected(known->second);
         Job part;
-        part.limits = job.limits;
-        part.cancelled = job.cancelled.load();
-        part.worksFor = &job;
+        part.workFor(job);
         auto bundle = frames_->frame(index, part);
         if (!bundle && isDamage(bundle.error())) damaged_.emplace(index, bundle.error());
-        if (bundle)
-            for (std::string& note : part.takeNotes()) job.note(std::move(note));
+        if (bundle) part.passNotesOn();
         return bundle;
     }
 

@@ -94,9 +94,7 @@ class SequenceWriter {
     /// A frame with the ranges of the sequence. Its notes are said once, of the first frame.
     Result<Bundle> frame(std::size_t i) {
         Job quiet;
-        quiet.limits = job_.limits;
-        quiet.worksFor = &job_;
-        quiet.cancelled = job_.cancelled.load();
+        quiet.workFor(job_);
         auto bundle = frames_.frame(i, i == 0 && ranges_.empty() ? job_ : quiet);
         if (!bundle) return tl::unexpected(bundle.error().at(placeOf(i)));
         for (std::size_t k = 0; k < ranges_.size(); ++k) {

@@ -65,8 +65,7 @@ void damage(const std::filesystem::path& path, std::uint64_t from, std::uint64_t
     ASSERT_TRUE(writeFile(path, bytes));
 }
 
-/// Damages a sample of the only stream of a film of MovingViews whose pictures all change and are
-/// colours: that with the object type, and with more than one sample.
+/// Damages a sample of the first stream that moves: the colours of MovingViews' first view.
 void damageSample(const std::filesystem::path& path, std::size_t sample) {
     Job job;
     std::uint64_t from = 0, size = 0;
@@ -100,7 +99,7 @@ TEST(DamagedFilms, BeginWithTheFirstThatCanBeRead) {
 TEST(DamagedFilms, SayItOnceAndToTheJobAbove) {
     const auto film = acrossDamage(std::make_unique<DamagedViews>(4, std::set<std::size_t>{1, 3}));
     Job job, part;
-    part.worksFor = &job;
+    part.workFor(job);
     for (std::size_t i = 0; i < 4; ++i) ASSERT_TRUE(film->frame(i, part));
     EXPECT_EQ(notesOf(job),
               "frame 1 (0.04 s) cannot be used: the one before it is shown in its place, and no "
