@@ -53,36 +53,93 @@ Result<Shown> shownOf(const fs::path& path, bool atlas, const Limits& limits) {
     return Shown{header.atlas.time, header.atlas.duration};
 }
 
-Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> files,
-                                               const fs::path& pattern, Job& job) {
-    STX_TRY(const auto kind, recognise(files.front().path));
-    const bool atlases = kind == FileKind::atlas;
+/// The first file that is missing between others; nothing where all are there. Numbers may count in
+/// steps: the least difference is the usual one.
+std::optional<std::int64_t> firstMissing(const std::vector<NumberedFile>& files) {
+    std::int64_t step = 0;
+    for (std::size_t i = 1; i < files.size(); ++i) {
+        const std::int64_t own = files[i].number - files[i - 1].number;
+        step = step == 0 ? own : std::min(step, own);
+    }
+    for (std::size_t i = 1; i < files.size(); ++i)
+        if (files[i].number - files[i - 1].number != step) return files[i - 1].number + step;
+    return std::nullopt;
+}
+
+/// The files that tell when they are shown. The others are left out with a note, so that those
+/// before are shown on; they are errors when `strict`, or when none is left.
+struct NumberedFilm {
+    std::vector<NumberedFile> files;
+    std::vector<Shown> shown;
+    bool atlases = false;
+};
+Result<NumberedFilm> usableFiles(std::vector<NumberedFile> files, const fs::path& pattern,
+                                 bool strict, Job& job) {
+    NumberedFilm film;
+    std::optional<Error> first;
+    const auto all = files.size();
+    if (const auto gap = firstMissing(files)) {
+        const Error missing{ErrorCode::io,
+                            fmt::format("'{}': number {} is missing, but files before and after "
+                                        "it are there",
+                                        pattern.string(), *gap),
+                            {}};
+        if (strict) return tl::unexpected(missing);
+        job.note(
+            fmt::format("{}: the frame before it is shown on, and no more is said of others "
+                        "like it; stx convert --strict stops there",
+                        missing.text()));
+    }
+    for (NumberedFile& file : files) {
+        STX_CHECK(job.checkCancelled());
+        const auto add = [&]() -> Result<void> {
+            STX_TRY(const auto kind, recognise(file.path));
+            STX_TRY(const auto shown, shownOf(file.path, kind == FileKind::atlas, job.limits));
+            if (film.files.empty()) film.atlases = kind == FileKind::atlas;
+            film.shown.push_back(shown);
+            film.files.push_back(std::move(file));
+            return {};
+        };
+        if (auto added = add(); !added) {
+            if (strict || !isDamage(added.error())) return propagate(added);
+            if (!first) first = added.error();
+        }
+    }
+    if (film.files.empty()) return tl::unexpected(*first);
+    if (first)
+        job.note(
+            fmt::format("{} of {} frames cannot be used: the ones before are shown on, and the "
+                        "film begins with the first that can; stx convert --strict stops "
+                        "there; the first: {}",
+                        all - film.files.size(), all, first->text()));
+    return film;
+}
+
+Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
+                                               const fs::path& pattern, bool strict, Job& job) {
+    STX_TRY(auto film, usableFiles(std::move(all), pattern, strict, job));
+    auto& files = film.files;
     Timeline line;
     line.times.clear();
-    std::vector<double> told;
     std::optional<double> last;
-    for (const NumberedFile& file : files) {
-        STX_CHECK(job.checkCancelled());
-        STX_TRY(const auto shown, shownOf(file.path, atlases, job.limits));
-        const auto& time = shown.time;
-        if (!time) break;
-        last = shown.duration;
-        if (!told.empty() && !(*time > told.back()))
-            return failAt(fmt::format("'{}'", file.path.string()), ErrorCode::invalidInput,
-                          "its time is {:g} s, but the file before it is of {:g} s", *time,
-                          told.back());
-        told.push_back(*time);
-    }
-    if (told.size() == files.size()) {
-        line.times = std::move(told);
-    } else {
-        last.reset();
-        for (const NumberedFile& file : files)
-            line.times.push_back(static_cast<double>(file.number - files.front().number) /
+    const bool told = std::ranges::all_of(film.shown, [](const Shown& s) { return !!s.time; });
+    for (std::size_t i = 0; i < files.size(); ++i) {
+        if (!told) {
+            line.times.push_back(static_cast<double>(files[i].number - files.front().number) /
                                  kUsualRate);
+            continue;
+        }
+        const double time = *film.shown[i].time;
+        if (i > 0 && !(time > line.times.back()))
+            return failAt(fmt::format("'{}'", files[i].path.string()), ErrorCode::invalidInput,
+                          "its time is {:g} s, but the file before it is of {:g} s", time,
+                          line.times.back());
+        line.times.push_back(time);
+        last = film.shown[i].duration;
+    }
+    if (!told)
         job.note(fmt::format("the files of '{}' do not all tell their time: {} frames a second",
                              pattern.string(), kUsualRate));
-    }
     line.end = line.times.back();
     if (last)
         line.end += *last;
@@ -91,19 +148,18 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> files,
     line.findTick();
     if (const auto sound = line.check(); !sound)
         return tl::unexpected(sound.error().at(fmt::format("'{}'", pattern.string())));
-    return std::make_unique<NumberedSequence>(std::move(files), atlases, std::move(line));
+    return std::make_unique<NumberedSequence>(std::move(files), film.atlases, std::move(line));
 }
 
-}  // namespace
-
-Result<std::unique_ptr<Sequence>> openSequence(const fs::path& path, const OpenOptions& options,
-                                               Job& job) {
+/// Frames as their files have them.
+Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOptions& options,
+                                             Job& job) {
     std::error_code ec;
     if (frameName(path.filename().string(), 0) && !fs::exists(path, ec)) {
         auto files = numberedFiles(path.string());
         if (isNumberedExr(path) || (files && isAtlasFolder(files->front().path))) {
             if (!files) return propagate(files);
-            return openNumbered(std::move(*files), path, job);
+            return openNumbered(std::move(*files), path, options.set.strict, job);
         }
     }
     STX_TRY(const auto kind, recognise(path));
@@ -120,6 +176,15 @@ Result<std::unique_ptr<Sequence>> openSequence(const fs::path& path, const OpenO
     }
     STX_TRY(auto bundle, openBundle(path, options, job));
     return sequenceOf(std::move(bundle));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Sequence>> openSequence(const fs::path& path, const OpenOptions& options,
+                                               Job& job) {
+    STX_TRY(auto frames, openFrames(path, options, job));
+    if (!frames->timeline().moves() || options.set.strict) return frames;
+    return acrossDamage(std::move(frames));
 }
 
 bool holdsSequences(const fs::path& target) {

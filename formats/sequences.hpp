@@ -12,8 +12,8 @@ namespace stx {
 /// Opens whatever holds views in time: an MPEG-4 presentation with MovieTextures, commands or
 /// interpolators; an image set with time; OpenEXR bundles and atlases by a numbered name
 /// (`name_%04d.exr`, `atlas_%04d` of folders), with the times that they hold, else 25 a second.
-/// Whatever stands still gives one frame. Errors
-/// as openBundle().
+/// Whatever stands still gives one frame. Frames that are missing or damaged are the ones before,
+/// with a note, or errors where options.set.strict (acrossDamage()). Errors as openBundle().
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openSequence(const std::filesystem::path& path,
                                                              const OpenOptions& options, Job& job);
 

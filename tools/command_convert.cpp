@@ -64,8 +64,11 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
 /// Heading of the help that options of image sets are under.
 constexpr const char* kSetHeading = "Image sets";
 
+/// What an input is read as.
+enum class Reads { mesh, moment, film };
+
 /// Options that were given but do not matter to this input: lists of many inputs may hold others.
-void noteUnused(const std::filesystem::path& input, bool mesh, const ConvertOptions& o,
+void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptions& o,
                 Program& program) {
     const auto kind = recognise(input);
     // An .exr is a bundle or a picture with Z.
@@ -78,13 +81,16 @@ void noteUnused(const std::filesystem::path& input, bool mesh, const ConvertOpti
                                      fmt::join(options, ", "), options.size() == 1 ? "is" : "are",
                                      ofWhat, input.filename().string(), isWhat));
     };
-    if (!mesh) {
+    if (as != Reads::mesh) {
         auto options = o.givenOfMeshes;
         // Of an image set it is the pattern of names.
         if (set) std::erase(options, "--texture");
         note(options, "meshes", kind ? nameOf(*kind) : "none");
     }
-    if (!set) note(o.givenOfSets, "image sets", nameOf(*kind));
+    if (set) return;
+    auto options = o.givenOfSets;
+    if (as == Reads::film) std::erase(options, "--strict");
+    note(options, "image sets", nameOf(*kind));
 }
 
 Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptions& o,
@@ -94,7 +100,8 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
     open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
     open.materials = o.mesh->materials;
     STX_TRY(auto opened, openRenderable(input, open, program.job));
-    noteUnused(input, std::holds_alternative<Mesh>(opened), o, program);
+    noteUnused(input, std::holds_alternative<Mesh>(opened) ? Reads::mesh : Reads::moment, o,
+               program);
     if (auto* mesh = std::get_if<Mesh>(&opened)) {
         auto bundle = captureMesh(*mesh, *o.mesh, program);
         if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", input.string())));
@@ -163,7 +170,7 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
             return {};
         });
     }
-    noteUnused(input, false, o, program);
+    noteUnused(input, Reads::film, o, program);
     Converted done;
     const Timeline timeline = frames->timeline();
     // The first frame is looked at when it passes.
@@ -193,7 +200,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                 convertDocument(input, target, saveOptions(o, program),
                                 o.mesh->depthBits.has_value(), countPoints, program.job));
         if (passed) {
-            noteUnused(input, false, o, program);
+            noteUnused(input, Reads::moment, o, program);
             done = summaryOf(*passed, countPoints);
         }
     }
@@ -447,9 +454,11 @@ void addConvert(CommandLine& line, Program& program) {
         .range(1, 1000000)
         .takes("N")
         .group(sets);
-    c.flag("--strict", o->open.set.strict,
-           "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
-           "it out")
+    c.flag(
+         "--strict", o->open.set.strict,
+         "Stop at a view whose files are missing (transforms, TUM, 7-Scenes), instead of leaving "
+         "it out, and at frames of films that are missing or damaged, instead of showing the ones "
+         "before")
         .group(sets);
     const auto numbers = [&](const char* name, const char* type, const char* help,
                              std::vector<double*> to) {

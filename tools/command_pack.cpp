@@ -140,7 +140,7 @@ Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begi
             STX_CHECK(checkTarget(targetOf(i), program));
             // Notes are those of the second time.
             Job quiet;
-            quiet.limits = program.job.limits;
+            quiet.workFor(program.job);
             STX_TRY(const auto whole, frames.frame(i, quiet));
             Bundle pruned = whole;
             if (prunes(o)) {

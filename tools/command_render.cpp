@@ -269,6 +269,17 @@ Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnS
     return noted(std::move(pictures));
 }
 
+/// The times of pictures as a clock; nothing where they do not ascend.
+std::optional<Timeline> clockOf(const std::vector<NovelCamera>& pictures) {
+    Timeline line;
+    line.times.clear();
+    for (const NovelCamera& picture : pictures) line.times.push_back(picture.time.value_or(0));
+    line.end = line.times.empty() ? 0 : line.times.back();
+    if (!line.moves() || !line.check()) return std::nullopt;
+    line.findTick();
+    return line;
+}
+
 /// The camera of a reference view, which may move, in a picture as large as `picture`.
 Camera ofView(const std::vector<Camera>& views, const RenderOptions& o, const Camera& picture) {
     return inPicture(views[static_cast<std::size_t>(o.camera.view)],
@@ -364,8 +375,13 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
             static_cast<std::uint64_t>(camera.width) * camera.height, 64, "the picture"));
     }
     if (scene.moving && scene.moving->timeline().moves() && o.output == "-" &&
-        o.framesPerSecond.empty() && o.time.times == "all")
-        writing.rate = streamRateOf(scene.moving->timeline(), program.job);
+        o.framesPerSecond.empty()) {
+        if (o.time.times == "all")
+            writing.rate =
+                streamRateOf(scene.moving->timeline(), "frames of the film", program.job);
+        if (const auto clock = clockOf(pictures); clock && o.time.times == "cameras")
+            writing.rate = streamRateOf(*clock, "pictures of the cameras", program.job);
+    }
     if (!scene.moving) {
         STX_TRY(scene.still,
                 rendererOf(std::move(scene.model), settings, program.job, o.backend, o.device));
@@ -567,7 +583,7 @@ void addRender(CommandLine& line, Program& program) {
     c.option(
          "--fps", o->framesPerSecond,
          "Frame rate written into the stream, as in 30 or 30000/1001 (default: of --times all the "
-         "input's, else 25)")
+         "input's, of --times cameras theirs, else 25)")
         .takes("RATE")
         .group(output);
     c.flag("--skip-existing", o->skipExisting, "Leave pictures that exist as they are")

@@ -72,7 +72,7 @@ Result<Bundle> momentWithMost(Sequence& frames, Job& job) {
     for (std::size_t i = 1; i < count; ++i) {
         STX_CHECK(job.checkCancelled());
         Job quiet;
-        quiet.limits = job.limits;
+        quiet.workFor(job);
         STX_TRY(auto bundle, frames.frame(i * (timeline.count() - 1) / (count - 1), quiet));
         if (bundle.pointCount() <= most) continue;
         most = bundle.pointCount();

@@ -104,7 +104,7 @@ Result<std::vector<double>> timesOf(const TimeOptions& o, const Timeline& timeli
     return times;
 }
 
-std::pair<int, int> streamRateOf(const Timeline& line, Job& job) {
+std::pair<int, int> streamRateOf(const Timeline& line, const char* what, Job& job) {
     if (const double rate = line.rate(); rate > 0) return rateOf(rate);
     const double mean =
         static_cast<double>(line.count() - 1) / (line.times.back() - line.times.front());
@@ -115,9 +115,9 @@ std::pair<int, int> streamRateOf(const Timeline& line, Job& job) {
     }
     const auto written = rateOf(mean);
     job.note(
-        fmt::format("frames of the film last {:.4g} to {:.4g} s, and a stream has one rate: "
+        fmt::format("{} last {:.4g} to {:.4g} s, and a stream has one rate: "
                     "the mean, {:.6g} frames a second, is written; --fps gives another",
-                    shortest, longest, static_cast<double>(written.first) / written.second));
+                    what, shortest, longest, static_cast<double>(written.first) / written.second));
     return written;
 }
 
@@ -128,7 +128,7 @@ MovingPictures::MovingPictures(std::unique_ptr<Sequence> frames, RenderSettings 
       backend_(backend),
       device_(device),
       job_(job) {
-    ahead_.limits = job.limits;
+    ahead_.workFor(job);
 }
 
 MovingPictures::~MovingPictures() {

@@ -38,9 +38,9 @@ void noteOutside(const std::vector<double>& times, const Timeline& timeline, Job
 [[nodiscard]] Result<std::vector<double>> timesOf(const TimeOptions& options,
                                                   const Timeline& timeline);
 
-/// The rate of a stream of all frames, as a fraction. A stream has one rate: where frames do not
-/// last equally long it is the mean, with a note.
-[[nodiscard]] std::pair<int, int> streamRateOf(const Timeline& line, Job& job);
+/// The rate of a stream of all frames, as a fraction. A stream has one rate: where frames (`what`,
+/// as in "frames of the film") do not last equally long it is the mean, with a note.
+[[nodiscard]] std::pair<int, int> streamRateOf(const Timeline& line, const char* what, Job& job);
 
 /// Renderers of the frames of a sequence, one after another; the next frame is read while one is
 /// drawn.

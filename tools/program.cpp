@@ -363,8 +363,7 @@ std::uint64_t bytesOf(const std::filesystem::path& path) {
     std::uint64_t sum = 0;
     if (frameName(path.filename().string(), 0))
         if (const auto files = numberedFiles(path.string()))
-            for (const NumberedFile& file : *files)
-                sum += std::filesystem::file_size(file.path, ec);
+            for (const NumberedFile& file : *files) sum += bytesOf(file.path);
     for (auto it = std::filesystem::recursive_directory_iterator(path, ec);
          !ec && it != std::filesystem::recursive_directory_iterator(); it.increment(ec)) {
         if (it->is_regular_file(ec)) sum += it->file_size(ec);

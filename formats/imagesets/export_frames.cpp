@@ -71,7 +71,7 @@ class FrameExporter {
     Result<void> add(std::size_t index) {
         // Notes are those of the first frame.
         Job quiet;
-        quiet.limits = job_.limits;
+        quiet.workFor(job_);
         STX_TRY(auto bundle, frames_.frame(index, index == 0 ? job_ : quiet));
         STX_CHECK(bundle.check());
         if (index == 0)
@@ -86,6 +86,7 @@ class FrameExporter {
         });
         for (std::size_t k = 0; k < bundle.views.size(); ++k) {
             if (!written[k]) return propagate(written[k]);
+            if (tracks_[k].name.empty()) continue;
             auto frame = transformsFrame(bundle.views[k], tracks_[k].name, ending, bundle.origin);
             frame["time"] = frames_.timeline().times[index];
             frame["camera"] = bundle.views[k].name;
@@ -126,6 +127,8 @@ class FrameExporter {
     /// Nothing when it is what it was.
     Result<void> writeView(const ReferenceView& view, std::size_t k, std::size_t index) {
         Track& track = tracks_[k];
+        // A camera of which nothing is known yet has no picture.
+        if (track.name.empty() && view.depthMayBeUnknown() && view.pointCount() == 0) return {};
         if (index > 0 && samePictures(view, track.before)) return {};
         track.name = fmt::format("{}_{:04}", names_[k], index);
         STX_CHECK(writeColour(view, root_ / "images" / track.name));

@@ -11,6 +11,7 @@
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
+#include "lib/model/sequence.hpp"
 #include "lib/registration/refine_poses.hpp"
 
 namespace stx {
@@ -162,9 +163,22 @@ void findOrigin(Bundle& bundle, const SetDescription& set, Job& job) {
         origin.x, origin.y, origin.z));
 }
 
-/// The views of a described frame.
+/// What is known of a camera without a picture: its place and its size.
+void makeUnknown(ReferenceView& view) {
+    view.noDepth = NoDepth::unknown;
+    view.pruned = false;
+    std::ranges::fill(view.depth.pixels(), kNoDepth);
+    if (Rgba8Image* texture = view.texture.rgba8())
+        std::ranges::fill(texture->pixels(), glm::u8vec4(0, 0, 0, 255));
+    if (RgbaFloatImage* texture = view.texture.rgbaFloat())
+        std::ranges::fill(texture->pixels(), glm::vec4(0, 0, 0, 1));
+}
+
+/// The views of a described frame. `failing` becomes the number of the view that cannot be read,
+/// where it is that.
 Result<Bundle> readViews(SetDescription set, const std::string& where,
-                         const ImageSetOptions& options, Job& job) {
+                         const ImageSetOptions& options, Job& job,
+                         std::optional<std::size_t>* failing = nullptr) {
     useOrigin(set);
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput,
@@ -184,14 +198,13 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     std::vector<Result<std::vector<ReferenceView>>> loaded(set.views.size());
     // Notes in the order of the views, whichever is ready first.
     std::vector<Job> jobs(set.views.size());
+    for (Job& own : jobs) own.workFor(job);
     std::atomic<std::int64_t> done = 0;
     std::atomic<bool> failed = false;
     parallelFor(0, count, [&](std::int64_t i) {
         const auto at = static_cast<std::size_t>(i);
         if (failed) return;
         Job& own = jobs[at];
-        own.limits = job.limits;
-        own.cancelled = job.cancelled.load();
         try {
             loaded[at] = loadSetView(set.views[at], options, own);
         } catch (const std::bad_alloc&) {
@@ -203,11 +216,15 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
     });
     Bundle bundle;
     bundle.title = std::move(set.title);
-    for (Job& own : jobs)
-        for (std::string& note : own.takeNotes()) job.note(std::move(note));
-    for (auto& views : loaded) {
+    for (Job& own : jobs) own.passNotesOn();
+    for (std::size_t i = 0; i < loaded.size(); ++i) {
+        auto& views = loaded[i];
+        if (!views && failing) *failing = i;
         if (!views) return tl::unexpected(views.error().at(where));
-        for (ReferenceView& view : *views) bundle.views.push_back(std::move(view));
+        for (ReferenceView& view : *views) {
+            if (set.views[i].absent) makeUnknown(view);
+            bundle.views.push_back(std::move(view));
+        }
     }
     makeNamesUnique(bundle.views);
     if (!set.environment.empty()) {
@@ -232,6 +249,89 @@ void takeEvery(SetDescription& set, Motion& motion, int every) {
         thin(motion.times);
     else
         thin(set.views);
+}
+
+/// Pictures of a film whose files are missing are left out, with a note: their cameras show those
+/// before, and the film begins with the first that is there. Errors when `strict`, or when none is.
+Result<void> leaveMissingOut(const SetDescription& set, Motion& motion, bool strict, Job& job) {
+    if (!motion.moves()) return {};
+    for (std::size_t i = 0; i < set.views.size(); ++i)
+        if (set.views[i].missing) motion.gone.emplace(i, *set.views[i].missing);
+    if (motion.gone.empty()) return {};
+    const Error& first = motion.gone.begin()->second;
+    if (strict) return tl::unexpected(first);
+    std::erase_if(motion.tracks, [&](const Motion::Track& track) {
+        return std::ranges::all_of(
+            track.views, [&](std::size_t picture) { return motion.gone.contains(picture); });
+    });
+    if (motion.tracks.empty()) return tl::unexpected(first);
+    while (motion.nothingBegan(set, 0)) motion.times.erase(motion.times.begin());
+    job.note(
+        fmt::format("{} of {} pictures {} missing, and their cameras show the ones before; the "
+                    "first: {}",
+                    motion.gone.size(), set.views.size(), motion.gone.size() == 1 ? "is" : "are",
+                    first.text()));
+    return {};
+}
+
+/// How a set moves, with each N-th view or moment of it; see leaveMissingOut().
+Result<Motion> motionToRead(SetDescription& set, const ImageSetOptions& options,
+                            const std::string& where, Job& job) {
+    STX_TRY(Motion motion, within(where, motionOf(set, options)));
+    takeEvery(set, motion, options.every);
+    STX_CHECK(within(where, leaveMissingOut(set, motion, options.strict, job)));
+    return motion;
+}
+
+/// Puts the damaged picture of a track that is shown at a frame with those that are gone, and the
+/// ones that would be shown in its place and are damaged, too. Errors: all of the track are.
+Result<void> passOver(const SetDescription& set, Motion& motion, const Motion::Track& track,
+                      std::size_t frame, Error error, const std::string& where,
+                      const ImageSetOptions& options, Job& job) {
+    if (!motion.damaged) {
+        const SetView& view = set.views[*motion.pictureAt(set, track, frame)];
+        job.noteAbove(
+            fmt::format("the picture of camera '{}' at {:.6g} s cannot be used: the one before it "
+                        "is shown on, and no more is said of others like it; stx convert --strict "
+                        "stops there: {}",
+                        track.name, *view.time, error.text()));
+    }
+    motion.damaged = true;
+    for (std::optional<Error> failed = error; failed;) {
+        motion.gone.emplace(*motion.pictureAt(set, track, frame), *failed);
+        const auto next = motion.pictureAt(set, track, frame);
+        if (!next) return tl::unexpected(std::move(error));
+        STX_CHECK(job.checkCancelled());
+        SetDescription alone;
+        alone.origin = set.origin;
+        alone.views = {set.views[*next]};
+        Job quiet;
+        quiet.workFor(job);
+        const auto read = readViews(std::move(alone), where, options, quiet);
+        failed.reset();
+        if (!read && isDamage(read.error())) failed = read.error();
+    }
+    return {};
+}
+
+/// A moment of a film. Pictures that are damaged join those that are gone, with a note of the
+/// first. Errors where it has none at all, or `strict`.
+Result<Bundle> momentOf(const SetDescription& set, Motion& motion, std::size_t frame,
+                        const std::string& where, const ImageSetOptions& options, Job& job) {
+    for (;;) {
+        if (motion.nothingBegan(set, frame))
+            return tl::unexpected(motion.gone.at(motion.tracks.front().views.front()));
+        std::optional<std::size_t> failing;
+        Job attempt;
+        attempt.workFor(job);
+        auto bundle = readViews(motion.moment(set, frame), where, options, attempt, &failing);
+        if (bundle || !failing || options.strict || !isDamage(bundle.error())) {
+            attempt.passNotesOn();
+            return bundle;
+        }
+        STX_CHECK(passOver(set, motion, motion.tracks[*failing], frame, bundle.error(), where,
+                           options, job));
+    }
 }
 
 /// A set whose moments are in its description, or one that is described again for each frame.
@@ -259,25 +359,31 @@ class SetSequence : public Sequence {
     }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
-        SetDescription now;
-        if (motion_.moves()) {
-            now = motion_.moment(set_, index);
-        } else {
-            ImageSetOptions options = options_;
-            options.frame = static_cast<int>(index) * options_.every;
-            STX_TRY(now, describeSet(path_, options, job));
-            if (set_.origin) now.origin = set_.origin;
-        }
-        // Once for all frames: it is what stands still.
-        if (environment_) now.environment.clear();
-        STX_TRY(auto bundle, readViews(std::move(now), inQuotes(path_.string()), options_, job));
+        const std::string where = inQuotes(path_.string());
+        STX_TRY(auto bundle, motion_.moves() ? momentOf(set_, motion_, index, where, options_, job)
+                                             : described(index, where, job));
         if (!environment_) environment_ = bundle.environment;
+        set_.environment.clear();
         bundle.environment = environment_;
         setTime(bundle, index);
         return bundle;
     }
 
   private:
+    /// A frame of a set that is described again for each, with all its cameras.
+    Result<Bundle> described(std::size_t index, const std::string& where, Job& job) {
+        ImageSetOptions options = options_;
+        options.frame = static_cast<int>(index) * options_.every;
+        STX_TRY(auto now, describeSet(path_, options, job));
+        for (const SetView& camera : set_.views)
+            if (std::ranges::find(now.views, camera.name, &SetView::name) == now.views.end())
+                return failAt(where, ErrorCode::io, "camera '{}' has no picture of frame {}",
+                              camera.name, options.frame);
+        if (set_.origin) now.origin = set_.origin;
+        if (environment_) now.environment.clear();
+        return readViews(std::move(now), where, options_, job);
+    }
+
     std::shared_ptr<const Environment> environment_;
     std::filesystem::path path_;
     ImageSetOptions options_;
@@ -308,8 +414,7 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     STX_CHECK(checkOptions(options));
     STX_TRY(SetDescription set, describeSet(path, options, job));
     const std::string where = inQuotes(path.string());
-    STX_TRY(Motion motion, within(where, motionOf(set, options)));
-    takeEvery(set, motion, options.every);
+    STX_TRY(Motion motion, motionToRead(set, options, where, job));
     // What is not there says more than a number that is too large.
     if (!motion.moves()) {
         STX_CHECK(dropMissing(set, options.strict, job));
@@ -323,8 +428,8 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
     if (options.frame == 0)
         job.note(fmt::format("the set moves: {} frames over {:.4g} s; this is the first",
                              motion.times.size(), motion.timeline().duration()));
-    STX_TRY(auto bundle, readViews(motion.moment(set, static_cast<std::size_t>(options.frame)),
-                                   where, options, job));
+    STX_TRY(auto bundle,
+            momentOf(set, motion, static_cast<std::size_t>(options.frame), where, options, job));
     bundle.time = motion.times[static_cast<std::size_t>(options.frame)];
     return bundle;
 }
@@ -337,8 +442,7 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
                     "--refine-poses moves the cameras of one moment; give --frame N or --still");
     STX_TRY(SetDescription set, describeSet(path, options, job));
     const std::string where = inQuotes(path.string());
-    STX_TRY(Motion motion, within(where, motionOf(set, options)));
-    takeEvery(set, motion, options.every);
+    STX_TRY(Motion motion, motionToRead(set, options, where, job));
     if (set.views.empty())
         return failAt(where, ErrorCode::invalidInput, "it has no view; at least one is expected");
     if (set.frames == 1 && !motion.moves())
@@ -349,8 +453,8 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
 Result<int> imageSetFrameCount(const std::filesystem::path& path, const ImageSetOptions& options,
                                Job& job) {
     STX_CHECK(checkOptions(options));
-    STX_TRY(const SetDescription set, describeSet(path, options, job));
-    STX_TRY(const Motion motion, within(inQuotes(path.string()), motionOf(set, options)));
+    STX_TRY(SetDescription set, describeSet(path, options, job));
+    STX_TRY(const Motion motion, motionToRead(set, options, inQuotes(path.string()), job));
     return motion.moves() ? static_cast<int>(motion.times.size()) : set.frames;
 }
 

@@ -348,13 +348,14 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
         view.distances = distancesOf(range);
         if (set.views.empty() &&
             (isNumbered(options.texturePattern) || isNumbered(options.depthPattern))) {
-            Search nextTexture = forTexture, nextDepth = forDepth;
-            int count = options.frame + 1;
-            for (; count < 100000; ++count) {
-                nextTexture.frame = nextDepth.frame = count;
-                if (findFile(nextTexture, textures).empty() || findFile(nextDepth, depths).empty())
-                    break;
-            }
+            const auto there = [&](int frame) {
+                Search nextTexture = forTexture, nextDepth = forDepth;
+                nextTexture.frame = nextDepth.frame = frame;
+                return !findFile(nextTexture, textures).empty() &&
+                       !findFile(nextDepth, depths).empty();
+            };
+            const auto& numbered = isNumbered(options.depthPattern) ? depth : texture;
+            const int count = 1 + lastFrame(folder, folder / numbered, options.frame, there);
             frames = frames == 0 ? count : std::min(frames, count);
         }
         if (!view.exactName.empty()) view.name = view.exactName;

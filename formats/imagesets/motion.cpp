@@ -50,6 +50,10 @@ std::vector<std::string> takersOf(const SetDescription& set) {
     return takers;
 }
 
+bool beginsLater(const SetView& view, double time) {
+    return *view.time > time + halfTick(kTick, time);
+}
+
 }  // namespace
 
 Timeline Motion::timeline() const {
@@ -60,19 +64,35 @@ Timeline Motion::timeline() const {
     return line;
 }
 
+std::optional<std::size_t> Motion::pictureAt(const SetDescription& set, const Track& track,
+                                             std::size_t frame) const {
+    const auto usable = [&](std::size_t picture) { return !gone.contains(picture); };
+    const auto next = std::ranges::partition_point(track.views, [&](std::size_t picture) {
+        return !beginsLater(set.views[picture], times[frame]);
+    });
+    const auto last = std::find_if(std::make_reverse_iterator(next), track.views.rend(), usable);
+    if (last != track.views.rend()) return *last;
+    const auto first = std::find_if(next, track.views.end(), usable);
+    if (first == track.views.end()) return std::nullopt;
+    return *first;
+}
+
+bool Motion::nothingBegan(const SetDescription& set, std::size_t frame) const {
+    return std::ranges::all_of(tracks, [&](const Track& track) {
+        const auto picture = pictureAt(set, track, frame);
+        return !picture || beginsLater(set.views[*picture], times[frame]);
+    });
+}
+
 SetDescription Motion::moment(const SetDescription& set, std::size_t frame) const {
     SetDescription now;
     now.title = set.title;
     now.origin = set.origin;
+    now.environment = set.environment;
     for (const Track& track : tracks) {
-        const auto next =
-            std::upper_bound(track.views.begin(), track.views.end(), times[frame],
-                             [&](double time, std::size_t view) {
-                                 return time + halfTick(kTick, time) < *set.views[view].time;
-                             });
-        const std::size_t index = next == track.views.begin() ? *next : *std::prev(next);
-        SetView view = set.views[index];
+        SetView view = set.views[*pictureAt(set, track, frame)];
         view.name = track.name;
+        view.absent = beginsLater(view, times[frame]);
         now.views.push_back(std::move(view));
     }
     return now;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +24,19 @@ struct Motion {
 
     [[nodiscard]] bool moves() const { return times.size() > 1; }
     [[nodiscard]] Timeline timeline() const;
-    /// Each track's last picture at times[frame], or its first one where it begins later.
+    /// Pictures that cannot be used and why: missing files, damage. By index of
+    /// SetDescription::views.
+    std::map<std::size_t, Error> gone;
+    bool damaged = false;  ///< one of them is damaged, and a note has said so
+
+    /// The picture that a track shows at times[frame]: its last one that can be used, or where it
+    /// begins later its first one, of which nothing but the size is shown (SetView::absent).
+    /// Nothing when none can be used.
+    [[nodiscard]] std::optional<std::size_t> pictureAt(const SetDescription& set,
+                                                       const Track& track, std::size_t frame) const;
+    /// Whether all tracks begin later than times[frame].
+    [[nodiscard]] bool nothingBegan(const SetDescription& set, std::size_t frame) const;
+    /// The pictures of all tracks at times[frame] as a set of one moment. Each has one.
     [[nodiscard]] SetDescription moment(const SetDescription& set, std::size_t frame) const;
 };
 

@@ -197,13 +197,12 @@ Result<SetDescription> describeMsr(const path& given, const ImageSetOptions& opt
         view.distances = distancesOf(placed, options.depthMin, options.depthMax);
         set.views.push_back(std::move(view));
         if (set.views.size() == 1) {
-            int frames = options.frame + 1;
-            while (frames < 100000 &&
-                   !firstThere(folder, names(options.depthPattern, "depth", frames)).empty() &&
-                   names(options.depthPattern, "depth", frames) != depths &&
-                   firstThere(folder, names(options.depthPattern, "depth", frames)) != depth)
-                ++frames;
-            set.frames = frames;
+            const auto there = [&](int frame) {
+                const auto of = names(options.depthPattern, "depth", frame);
+                const std::string found = firstThere(folder, of);
+                return !found.empty() && of != depths && found != depth;
+            };
+            set.frames = 1 + lastFrame(folder, folder / depth, options.frame, there);
             set.rate = kMsrRate;
         }
     }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -14,5 +16,11 @@ struct Placeholders {
 
 /// The pattern with its words filled in; {format} and unknown ones are left as they are.
 [[nodiscard]] std::string filled(std::string_view pattern, const Placeholders& placeholders);
+
+/// The number of the last frame that `there` confirms, whatever is missing before it: of the
+/// numbers from `frame` on in the names beside `file` (that of `frame`) and, within `folder`,
+/// beside the folder in which it is; at least `frame`.
+[[nodiscard]] int lastFrame(const std::filesystem::path& folder, const std::filesystem::path& file,
+                            int frame, const std::function<bool(int)>& there);
 
 }  // namespace stx::imagesets

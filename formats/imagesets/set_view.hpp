@@ -89,6 +89,7 @@ struct SetView {
     std::optional<NoDepth> noDepth;           ///< of an export of ours; see ReferenceView::noDepth
     bool pruned = false;                      ///< see ReferenceView::pruned
     bool background = false;                  ///< see ReferenceView::background
+    bool absent = false;    ///< its camera has no picture yet: what it sees is not known
     std::string exactName;  ///< where `name` had to be changed to be a file's; else empty
 };
 

@@ -24,6 +24,22 @@ void Job::note(std::string text) {
     notes_.push_back({std::move(text)});
 }
 
+void Job::workFor(Job& whole) {
+    limits = whole.limits;
+    whole_ = &whole;
+}
+
+void Job::passNotesOn() {
+    for (std::string& text : takeNotes()) whole_->note(std::move(text));
+}
+
+void Job::noteAbove(std::string text) {
+    if (whole_)
+        whole_->noteAbove(std::move(text));
+    else
+        note(std::move(text));
+}
+
 std::vector<std::string> Job::takeNotes() {
     const std::lock_guard lock(mutex_);
     std::vector<std::string> lines;
@@ -35,7 +51,7 @@ std::vector<std::string> Job::takeNotes() {
 
 Result<void> Job::checkCancelled() const {
     if (cancelled.load(std::memory_order_relaxed)) return fail(ErrorCode::failed, "stopped");
-    return {};
+    return whole_ ? whole_->checkCancelled() : Result<void>();
 }
 
 }  // namespace stx

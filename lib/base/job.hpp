@@ -35,6 +35,13 @@ class Job {
 
     /// Something a person should know: lossy, dropped, clamped. Said once each, in order.
     void note(std::string text);
+    /// Makes this the job of a part of another's work: of the same limits, stopped with it. Its
+    /// notes are its own, until they are passed on or dropped. `whole` must outlive it.
+    void workFor(Job& whole);
+    /// Passes the notes so far on to the job that this one works for.
+    void passNotesOn();
+    /// A note that must not be dropped: it goes to the job that this one works for, at once.
+    void noteAbove(std::string text);
     /// The notes so far, sorted by first mention; duplicates counted as `text (3 times)`.
     [[nodiscard]] std::vector<std::string> takeNotes();
 
@@ -56,6 +63,7 @@ class Job {
     };
     std::mutex mutex_;
     std::vector<Note> notes_;
+    Job* whole_ = nullptr;  ///< that this one works for
 };
 
 }  // namespace stx

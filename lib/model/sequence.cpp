@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace stx {
 namespace {
@@ -52,6 +53,54 @@ class Chosen : public Sequence {
   private:
     std::unique_ptr<Sequence> frames_;
     std::vector<std::size_t> numbers_;
+};
+
+class AcrossDamage : public Sequence {
+  public:
+    explicit AcrossDamage(std::unique_ptr<Sequence> frames) : frames_(std::move(frames)) {
+        timeline_ = frames_->timeline();
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        auto bundle = attempt(index, job);
+        if (bundle || !isDamage(bundle.error())) return bundle;
+        const Error error = bundle.error();
+        const auto go = [&](std::size_t to) -> Result<void> {
+            STX_CHECK(job.checkCancelled());
+            bundle = attempt(to, job);
+            if (!bundle && !isDamage(bundle.error())) return tl::unexpected(bundle.error());
+            return {};
+        };
+        for (std::size_t i = index; !bundle && i > 0;) STX_CHECK(go(--i));
+        const bool before = bundle.has_value();
+        for (std::size_t i = index + 1; !bundle && i < timeline_.count(); ++i) STX_CHECK(go(i));
+        if (!bundle) return tl::unexpected(error);
+        if (!noted_)
+            job.noteAbove(fmt::format(
+                "frame {} ({:.6g} s) cannot be used: {} is shown in its place, and no more is said "
+                "of others like it; stx convert --strict stops there: {}",
+                index, timeline_.times[index], before ? "the one before it" : "the first that can",
+                error.text()));
+        noted_ = true;
+        setTime(*bundle, index);
+        return bundle;
+    }
+
+  private:
+    /// A frame, unless it is known to be damaged. Its notes are passed on when it is there.
+    Result<Bundle> attempt(std::size_t index, Job& job) {
+        if (const auto known = damaged_.find(index); known != damaged_.end())
+            return tl::unexpected(known->second);
+        Job part;
+        part.workFor(job);
+        auto bundle = frames_->frame(index, part);
+        if (!bundle && isDamage(bundle.error())) damaged_.emplace(index, bundle.error());
+        if (bundle) part.passNotesOn();
+        return bundle;
+    }
+
+    std::unique_ptr<Sequence> frames_;
+    std::map<std::size_t, Error> damaged_;
+    bool noted_ = false;
 };
 
 /// Ticks a second that MP4 files usually have, with those of the rates that films have.
@@ -167,6 +216,14 @@ Result<std::unique_ptr<Sequence>> someFrames(std::unique_ptr<Sequence> frames,
                         numbers[i - 1]);
     }
     return std::make_unique<Chosen>(std::move(frames), std::move(numbers));
+}
+
+bool isDamage(const Error& error) {
+    return error.code == ErrorCode::invalidInput || error.code == ErrorCode::io;
+}
+
+std::unique_ptr<Sequence> acrossDamage(std::unique_ptr<Sequence> frames) {
+    return std::make_unique<AcrossDamage>(std::move(frames));
 }
 
 Result<void> checkSameViews(const Bundle& first, const Bundle& frame) {

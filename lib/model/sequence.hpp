@@ -61,8 +61,8 @@ struct Timeline {
 
 /// A bundle in time, whose frames are made when they are asked for: a film of ten thousand frames
 /// takes the memory of one. All frames have the same views: in number, order and name; a view
-/// without a picture of a moment has its last one then (before its first: the first). What stands
-/// still is the case of one frame.
+/// without a picture of a moment has its last one then, and before its first one nothing is known
+/// of what it sees (NoDepth::unknown). What stands still is the case of one frame.
 class Sequence {
   public:
     virtual ~Sequence() = default;
@@ -91,6 +91,15 @@ class Sequence {
 /// Errors (usage): no frame, or numbers that are not in the sequence or do not ascend.
 [[nodiscard]] Result<std::unique_ptr<Sequence>> someFrames(std::unique_ptr<Sequence> frames,
                                                            std::vector<std::size_t> numbers);
+
+/// Whether an error is that of a picture, or of another part of a film, which is damaged or
+/// missing.
+[[nodiscard]] bool isDamage(const Error& error);
+
+/// The same frames, of files that may be damaged: one that cannot be read (isDamage()) is the one
+/// before it, or where none before it can be read the first that can. A note says so once. Errors:
+/// no frame can be read.
+[[nodiscard]] std::unique_ptr<Sequence> acrossDamage(std::unique_ptr<Sequence> frames);
 
 /// Errors (invalidInput), which name the view and the time, when a frame does not have the views of
 /// the first: their number, names and sizes.

@@ -23,6 +23,7 @@ struct ViewRange {
     int depthBits = 8;
     float longestSplat = 0;
     bool normals = false, splats = false;
+    bool everUnknown = false, alwaysUnknown = true;  ///< NoDepth::unknown, of its frames
 };
 
 /// The images of a SimpleTexture, in the order in which they are coded.
@@ -93,8 +94,7 @@ class SequenceWriter {
     /// A frame with the ranges of the sequence. Its notes are said once, of the first frame.
     Result<Bundle> frame(std::size_t i) {
         Job quiet;
-        quiet.limits = job_.limits;
-        quiet.cancelled = job_.cancelled.load();
+        quiet.workFor(job_);
         auto bundle = frames_.frame(i, i == 0 && ranges_.empty() ? job_ : quiet);
         if (!bundle) return tl::unexpected(bundle.error().at(placeOf(i)));
         for (std::size_t k = 0; k < ranges_.size(); ++k) {
@@ -102,6 +102,10 @@ class SequenceWriter {
             view.nearPlane = ranges_[k].nearPlane;
             view.farPlane = ranges_[k].farPlane;
             view.depthBits = ranges_[k].depthBits;
+            // A note says it of the whole film; alpha, where it is written, of each frame.
+            const bool alpha = !asVideo() && options_.texture == SceneWriteOptions::Texture::png;
+            const bool unknown = alpha ? ranges_[k].everUnknown : ranges_[k].alwaysUnknown;
+            view.noDepth = unknown ? NoDepth::unknown : NoDepth::empty;
         }
         return bundle;
     }
@@ -157,6 +161,9 @@ class SequenceWriter {
                         "a pruned view that moves keeps its mark in the alpha of its colour, "
                         "which {} does not have; use PNG",
                         asVideo() ? "H.264" : "JPEG");
+        const bool unknown = view.noDepth == NoDepth::unknown;
+        range.everUnknown = range.everUnknown || unknown;
+        range.alwaysUnknown = range.alwaysUnknown && unknown;
         range.nearPlane = std::min(range.nearPlane, view.nearPlane);
         range.farPlane = std::max(range.farPlane, view.farPlane);
         range.depthBits = std::max(range.depthBits, view.depthBits);

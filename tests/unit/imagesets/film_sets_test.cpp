@@ -107,6 +107,42 @@ TEST(FilmPairs, FramesAreMatchedByTime) {
     EXPECT_NEAR(bundle->views[0].depth.at(9, 9), films::code(9, 9, 2, 4000) * 0.001, 1e-3);
 }
 
+TEST(FilmPairs, GoOnWhereAPictureIsDamaged) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    // Pictures that can be read alone, with a checksum.
+    writeFilms(folder, "-level 3 -slicecrc 1 -g 1");
+    auto bytes = *readFile(folder / "depth.mkv", {});
+    for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 40; ++i)
+        bytes[i] ^= std::byte{0x5a};
+    ASSERT_TRUE(writeFile(folder / "depth.mkv", bytes));
+    Job job;
+    const auto set = writeCameras(folder, pose(0));
+    const auto read = openImageSet(set, filmOptions(), job);
+    ASSERT_TRUE(read) << read.error().text();
+    int frozen = 0;
+    float last = 0;
+    for (std::size_t k = 0; k < kFrames; ++k) {
+        const auto bundle = (*read)->frame(k, job);
+        ASSERT_TRUE(bundle) << bundle.error().text();
+        const float depth = bundle->views[0].depth.at(9, 9);
+        frozen += depth == last ? 1 : 0;
+        last = depth;
+    }
+    EXPECT_EQ(frozen, 1);
+    std::string notes;
+    for (const std::string& note : job.takeNotes()) notes += note + "\n";
+    EXPECT_NE(notes.find("cannot be used: the one before it is shown on"), std::string::npos)
+        << notes;
+    auto options = filmOptions();
+    options.strict = true;
+    const auto strict = openImageSet(set, options, job);
+    ASSERT_TRUE(strict);
+    int errors = 0;
+    for (std::size_t k = 0; k < kFrames; ++k) errors += (*strict)->frame(k, job) ? 0 : 1;
+    EXPECT_EQ(errors, 1);
+}
+
 TEST(FilmPairs, WhatIsMissingIsSaid) {
     REQUIRE_VIDEO();
     const TemporaryFolder folder;

@@ -51,12 +51,6 @@ std::vector<std::string> containers() {
     return all;
 }
 
-Timeline moved(Timeline line, double by) {
-    for (double& time : line.times) time += by;
-    line.end += by;
-    return line;
-}
-
 /// The frames that are shown at `times` + `by`.
 std::vector<std::size_t> shownAt(const Timeline& line, const std::vector<double>& times,
                                  double by = 0) {

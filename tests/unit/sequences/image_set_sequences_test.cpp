@@ -1,6 +1,8 @@
 // Image sets with time: which pictures belong to which camera, and what a moment shows.
 
+#include "formats/imagesets/export.hpp"
 #include "formats/imagesets/image_sets.hpp"
+#include "formats/sequences.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 
@@ -62,8 +64,9 @@ TEST(MovingSets, CamerasShowTheirLastPicture) {
     const auto sequence = opened(set);
     ASSERT_TRUE(sequence);
     EXPECT_EQ(sequence->timeline().times, (std::vector<double>{2, 2.5, 3, 4}));
-    // b is the first in the file; before its first picture it shows that one.
-    EXPECT_NEAR(depthOf(*sequence, 0, 0), 1.004, 1e-4);
+    // b is the first in the file; before its first picture nothing is known of what it sees.
+    EXPECT_FALSE(hasPoint(depthOf(*sequence, 0, 0)));
+    EXPECT_NEAR(depthOf(*sequence, 1, 0), 1.004, 1e-4);
     EXPECT_NEAR(depthOf(*sequence, 0, 1), 1.001, 1e-4);
     EXPECT_NEAR(depthOf(*sequence, 2, 0), 1.004, 1e-4);
     EXPECT_NEAR(depthOf(*sequence, 2, 1), 1.003, 1e-4);
@@ -71,6 +74,147 @@ TEST(MovingSets, CamerasShowTheirLastPicture) {
     EXPECT_NEAR(depthOf(*sequence, 3, 1), 1.003, 1e-4);
     Job job;
     EXPECT_EQ(sequence->frame(1, job)->views[0].name, "b");
+}
+
+TEST(MovingSets, ACameraThatStartsLaterIsNotThereBefore) {
+    for (const double start : {0.0, 7.3, -1.0, 1.3e9}) {
+        TemporaryFolder folder;
+        const auto set = writeShots(folder, {{"a", start, 0, 1},
+                                             {"a", start + 1, 0, 2},
+                                             {"b", start + 1, 1, 3},
+                                             {"a", start + 2, 0, 4}});
+        const auto first = opened(set);
+        ASSERT_TRUE(first);
+        Job job;
+        for (const char* target : {"film.mp4", "film.xmt", "film_%02d.exr", "out"}) {
+            const auto path = folder / target;
+            const auto written = std::string(target) == "out" ? exportFrames(*first, path, {}, job)
+                                                              : saveSequence(*first, path, {}, job);
+            ASSERT_TRUE(written) << written.error().text();
+            const auto read = openSequence(path, {}, job);
+            ASSERT_TRUE(read) << read.error().text();
+            EXPECT_EQ((*read)->timeline().start(), start) << target;
+            EXPECT_NEAR((*read)->timeline().end, start + 3, 1e-6) << target;
+            const auto before = (*read)->frame(0, job), since = (*read)->frame(1, job);
+            ASSERT_TRUE(before) << target << ": " << before.error().text();
+            ASSERT_TRUE(since) << target << ": " << since.error().text();
+            ASSERT_EQ(before->views.size(), 2u) << target;
+            EXPECT_EQ(before->views[1].pointCount(), 0) << target;
+            EXPECT_TRUE(before->views[1].depthMayBeUnknown()) << target;
+            EXPECT_EQ(before->views[1].texture.at(3, 3).a, 1.0f) << target << ": it hides nothing";
+            EXPECT_EQ(before->views[0].pointCount(), 48) << target;
+            EXPECT_EQ(since->views[1].pointCount(), 48) << target;
+            EXPECT_NEAR(since->views[1].depth.at(3, 3), 1.003, 1e-3) << target;
+        }
+    }
+}
+
+namespace {
+
+std::string notesOf(Job& job) {
+    std::string all;
+    for (const std::string& note : job.takeNotes()) all += note + "\n";
+    return all;
+}
+
+}  // namespace
+
+TEST(MovingSets, AMissingPictureIsTheOneBefore) {
+    TemporaryFolder folder;
+    const auto set = writeShots(
+        folder, {{"a", 0, 0, 1}, {"b", 0, 1, 2}, {"a", 1, 0, 3}, {"b", 1, 1, 4}, {"a", 2, 0, 5}});
+    std::filesystem::remove(folder / "d2.png");
+    Job job;
+    auto read = openImageSet(set, {}, job);
+    ASSERT_TRUE(read) << read.error().text();
+    const auto notes = notesOf(job);
+    EXPECT_NE(notes.find("1 of 5 pictures is missing"), std::string::npos) << notes;
+    EXPECT_NE(notes.find("d2.png"), std::string::npos) << notes;
+    EXPECT_EQ((*read)->timeline().count(), 3u);
+    EXPECT_NEAR(depthOf(**read, 1, 0), 1.001, 1e-4);
+    EXPECT_NEAR(depthOf(**read, 1, 1), 1.004, 1e-4);
+    EXPECT_NEAR(depthOf(**read, 2, 0), 1.005, 1e-4);
+    ImageSetOptions options;
+    options.strict = true;
+    const auto strict = openImageSet(set, options, job);
+    ASSERT_FALSE(strict);
+    EXPECT_EQ(strict.error().code, ErrorCode::io);
+    options.strict = false;
+    options.frame = 1;
+    const auto moment = readImageSet(set, options, job);
+    ASSERT_TRUE(moment) << moment.error().text();
+    EXPECT_NEAR(moment->views[0].depth.at(3, 3), 1.001, 1e-4);
+}
+
+TEST(MovingSets, AFilmBeginsWithItsFirstPictureThatIsThere) {
+    TemporaryFolder folder;
+    const auto set = writeShots(folder, {{"a", 7.3, 0, 1}, {"a", 8.3, 0, 2}, {"a", 9.3, 0, 3}});
+    std::filesystem::remove(folder / "c0.png");
+    const auto read = opened(set);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->timeline().times, (std::vector<double>{8.3, 9.3}));
+    EXPECT_NEAR(depthOf(*read, 0, 0), 1.002, 1e-4);
+    Job job;
+    ImageSetOptions options;
+    EXPECT_EQ(imageSetFrameCount(set, options, job), 2);
+    options.frame = 1;
+    EXPECT_NEAR(readImageSet(set, options, job)->views[0].depth.at(3, 3), 1.003, 1e-4);
+    options.frame = 2;
+    EXPECT_FALSE(readImageSet(set, options, job));
+}
+
+TEST(MovingSets, ADamagedPictureIsTheOneBefore) {
+    TemporaryFolder folder;
+    const auto set =
+        writeShots(folder, {{"a", 0, 0, 1}, {"a", 1, 0, 2}, {"a", 2, 0, 3}, {"a", 3, 0, 4}});
+    for (const char* file : {"c1.png", "d2.png"}) {
+        auto bytes = *readFile(folder / file, {});
+        bytes.resize(bytes.size() / 2);
+        writeBytes(folder / file, bytes);
+    }
+    Job job;
+    const auto read = openImageSet(set, {}, job);
+    ASSERT_TRUE(read);
+    const auto saved = saveSequence(**read, folder / "film.mp4", {}, job);
+    ASSERT_TRUE(saved) << saved.error().text();
+    const auto notes = notesOf(job);
+    EXPECT_NE(notes.find("camera 'a' at 1 s"), std::string::npos) << notes;
+    EXPECT_NE(notes.find("c1.png"), std::string::npos) << notes;
+    EXPECT_EQ(notes.find("d2.png"), std::string::npos) << "the first says it for all: " << notes;
+    const auto film = openSequence(folder / "film.mp4", {}, job);
+    ASSERT_TRUE(film);
+    for (const double time : {0.0, 1.0, 2.0})
+        EXPECT_NEAR(depthOf(**film, (*film)->timeline().frameAt(time), 0), 1.001, 1e-3) << time;
+    EXPECT_NEAR(depthOf(**film, (*film)->timeline().frameAt(3), 0), 1.004, 1e-3);
+    ImageSetOptions options;
+    options.strict = true;
+    const auto strict = openImageSet(set, options, job);
+    ASSERT_TRUE(strict);
+    EXPECT_FALSE(saveSequence(**strict, folder / "strict.mp4", {}, job));
+}
+
+TEST(MovingSets, AFirstPictureThatIsDamagedIsNotKnown) {
+    TemporaryFolder folder;
+    const auto set = writeShots(folder, {{"a", 0, 0, 1}, {"b", 0, 0, 2}, {"a", 1, 0, 3}});
+    writeText(folder / "d0.png", "no picture");
+    const auto read = opened(set);
+    ASSERT_TRUE(read);
+    EXPECT_FALSE(hasPoint(depthOf(*read, 0, 0)));
+    EXPECT_NEAR(depthOf(*read, 0, 1), 1.002, 1e-4);
+    EXPECT_NEAR(depthOf(*read, 1, 0), 1.003, 1e-4);
+}
+
+TEST(MovingSets, ACameraOfWhichAllIsDamagedIsAnError) {
+    TemporaryFolder folder;
+    const auto set =
+        writeShots(folder, {{"a", 0, 0, 1}, {"b", 0, 0, 2}, {"a", 1, 0, 3}, {"b", 1, 0, 4}});
+    for (const char* file : {"d1.png", "d3.png"}) writeText(folder / file, "no picture");
+    const auto read = opened(set);
+    ASSERT_TRUE(read);
+    Job job;
+    const auto first = read->frame(0, job);
+    ASSERT_FALSE(first);
+    EXPECT_NE(first.error().text().find("d1.png"), std::string::npos) << first.error().text();
 }
 
 TEST(MovingSets, TimesThatAreNoneAreNamed) {
@@ -212,7 +356,7 @@ TEST(MovingSets, MasksTakeAwayWhatIsNotTheObject) {
     ASSERT_FALSE(wrong);
     EXPECT_NE(wrong.error().text().find("the mask is 4x4"), std::string::npos);
     std::filesystem::remove(folder / "m_c0.png");
-    const auto missing = sequence->frame(0, job);
+    const auto missing = opened(set, options)->frame(0, job);
     ASSERT_FALSE(missing);
     EXPECT_EQ(missing.error().code, ErrorCode::io);
 }

@@ -7,6 +7,12 @@
 
 namespace stx {
 
+inline Timeline moved(Timeline line, double by) {
+    for (double& time : line.times) time += by;
+    line.end += by;
+    return line;
+}
+
 /// Two views: the first has colours and a depth that change from frame to frame, the second stands
 /// still but for its camera, which moves along x. Depths are on the codes of the whole range.
 class MovingViews : public Sequence {
