@@ -91,6 +91,7 @@ void readFilm(ByteSpan bytes, const Limits& limits) {
         const bool isVideo = in.get<std::uint8_t>() != 0;
         for (int text = 0; text < 2; ++text) (void)in.getText();
         const auto width = in.get<std::int32_t>(), height = in.get<std::int32_t>();
+        (void)in.get<video::Turn>();
         for (int text = 0; text < 2; ++text) (void)in.getText();
         (void)in.getBytes();
         if (!in.ok()) std::abort();
