@@ -1,10 +1,13 @@
 #include <chrono>
+#include <optional>
 #include <set>
 
 #include <nlohmann/json.hpp>
 
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
+#include "formats/mpeg4/mpeg4.hpp"
+#include "formats/open.hpp"
 #include "formats/sequences.hpp"
 #include "formats/video/video_frames.hpp"
 #include "lib/background/sequence_background.hpp"
@@ -20,6 +23,8 @@ struct BackgroundOptions {
     std::string method = "select";
     StillSettings settings;
     TemporalBackgroundSettings temporal;
+    std::string video;
+    std::optional<int> crf;
 };
 
 /// A mask that is asked for.
@@ -112,6 +117,16 @@ double meanConfidence(const Image<std::uint8_t>& confidence) {
     return static_cast<double>(sum) / 255.0 / static_cast<double>(confidence.count());
 }
 
+/// Whether pictures of an MPEG-4 film are video.
+bool holdsVideo(const std::string& input, const Job& job) {
+    const auto kind = recognise(input);
+    if (!kind || *kind != FileKind::mpeg4) return false;
+    Job quiet;
+    quiet.limits = job.limits;
+    const auto document = readMpeg4(input, quiet);
+    return document && mpeg4::holdsVideo(*document);
+}
+
 /// What the cameras of a bundle with time see behind all that moves, as views of the bundle.
 Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
     const auto start = std::chrono::steady_clock::now();
@@ -144,7 +159,13 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
     frames = withBackgrounds(std::move(frames), std::move(*found));
     SaveOptions save;
     save.noClobber = program.common.noClobber;
+    if (!o.video.empty()) save.h264 = o.crf.value_or(18);
     STX_CHECK(saveSequence(*frames, o.output, save, program.job));
+    if (o.video.empty() && holdsVideo(o.inputs[0], program.job))
+        program.job.note(fmt::format(
+            "the video of '{}' ({}) is written as pictures ({}), without further loss; "
+            "--video h264 writes video",
+            o.inputs[0], humanBytes(bytesOf(o.inputs[0])), humanBytes(bytesOf(o.output))));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
@@ -286,6 +307,14 @@ void addBackground(CommandLine& line, Program& program) {
         .range(1, 64)
         .takes("N")
         .group("Bundles with time");
+    c.option("--video", o->video,
+             "h264: pictures that change as video, as stx convert does (.mp4, .xmt, .bt; default: "
+             "each picture exact)")
+        .oneOf({"h264"})
+        .group("Bundles with time");
+    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
+        .range(0, 51)
+        .group("Bundles with time");
     c.sharedOptions(program.common, kOutput);
     c.runs([o, c](Program& p) -> Result<int> {
         if (o->settings.method != StillMethod::select)
@@ -297,9 +326,11 @@ void addBackground(CommandLine& line, Program& program) {
             STX_CHECK(c.refuse({"--method", "--frames", "--confidence", "--mask-of",
                                 "--mask-output", "--quietest", "--window", "--adaptive", "--drift"},
                                "is of plain video, whose background is a picture"));
+            if (o->video.empty())
+                STX_CHECK(c.refuse({"--crf"}, "is of video; give --video h264, too"));
             return backgroundOfBundle(*o, p);
         }
-        STX_CHECK(c.refuse({"--key-views"}, "is of bundles with time"));
+        STX_CHECK(c.refuse({"--key-views", "--video", "--crf"}, "is of bundles with time"));
         return backgroundOfFrames(*o, p);
     });
 }

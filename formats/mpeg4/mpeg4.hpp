@@ -53,6 +53,9 @@ namespace mpeg4 {
 /// programs read, too: it has several pictures, or a sample entry or edits of its own.
 [[nodiscard]] bool needsTrackFile(const ElementaryStream& stream);
 
+/// Whether pictures of its views are video: H.264 or another coding that needs a decoder of video.
+[[nodiscard]] bool holdsVideo(const Document& document);
+
 /// Opens the files that the streams of a document (from a text) name, found in `folder`. Streams
 /// that do not say what they are get their type from the file. `name.mp4#3` is track 3 of an .mp4.
 /// Errors: (invalidInput) names that leave the folder; (io) files that are not there.

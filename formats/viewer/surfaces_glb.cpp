@@ -9,6 +9,7 @@
 
 #include "formats/images/images.hpp"
 #include "formats/viewer/page_scene.hpp"
+#include "formats/viewer/viewer_page.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 
@@ -279,6 +280,7 @@ class Writer {
 Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
                                      OutputFile::Options options, Job& job) {
     bundle.noteMaterialLeftOut(job);
+    noteEnvironmentLeftOut(bundle.environment, job);
     codeColours(bundle, "the model", job);
     STX_TRY(auto surfaces, viewSurfaces(bundle, job));
     Writer writer(bundle, job);

@@ -263,6 +263,13 @@ void noteSize(const PageReport& report, Job& job) {
 
 }  // namespace
 
+void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environment, Job& job) {
+    if (environment)
+        job.note(
+            "pages and models have no place for the environment: it is left out; stx extract to a "
+            "folder writes its pictures");
+}
+
 Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path& path,
                                    const PageOptions& options, Job& job) {
     const Timeline& line = frames.timeline();
@@ -276,6 +283,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         makeViewable(bundle, job);
         if (!writer) {
             bundle.noteMaterialLeftOut(job);
+            noteEnvironmentLeftOut(bundle.environment, job);
             STX_TRY(writer, startPage(path, options, bundle.title));
             writer->report.views = bundle.views.size();
             writer->report.points = bundle.pointCount();
@@ -321,6 +329,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
     writer.report.views = atlas.views.size();
     writer.report.points = atlas.pointCount();
     writer.report.frames = 1;
+    noteEnvironmentLeftOut(atlas.environment, job);
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
     STX_TRY(Json data,
             dataOf(atlas.views, set.bounds(), atlas.origin, Timeline(), options, writer.report));

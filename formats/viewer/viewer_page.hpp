@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "formats/files/files.hpp"
@@ -28,6 +29,9 @@ struct PageReport {
     std::uint64_t imageBytes = 0;  ///< of its PNG files
     std::uint64_t bytes = 0;       ///< of the page
 };
+
+/// Says, where there is an environment, that pages and models leave it out.
+void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environment, Job& job);
 
 /// Writes one HTML file, whole or not at all, that draws a bundle in any browser with WebGL 2 and
 /// needs nothing else: Lee & Park's path with stx's splats (formats/viewer). The views of each

@@ -34,6 +34,13 @@ bool isVideo(const ElementaryStream& stream) {
 
 }  // namespace
 
+bool holdsVideo(const Document& document) {
+    for (const ObjectDescriptor* od : document.objectDescriptors())
+        for (const ElementaryStream& stream : od->streams)
+            if (stream.streamType == StreamType::visual && isVideo(stream)) return true;
+    return false;
+}
+
 Result<StreamImages> StreamImages::make(const Document& document,
                                         const std::filesystem::path& folder, const Limits& limits) {
     StreamImages images;

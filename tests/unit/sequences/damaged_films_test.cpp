@@ -44,7 +44,7 @@ std::vector<int> shown(Sequence& frames) {
     return numbers;
 }
 
-std::string notesOf(Job& job) {
+std::string takenNotes(Job& job) {
     std::string all;
     for (const std::string& note : job.takeNotes()) all += note + "\n";
     return all;
@@ -101,10 +101,10 @@ TEST(DamagedFilms, SayItOnceAndToTheJobAbove) {
     Job job, part;
     part.workFor(job);
     for (std::size_t i = 0; i < 4; ++i) ASSERT_TRUE(film->frame(i, part));
-    EXPECT_EQ(notesOf(job),
+    EXPECT_EQ(takenNotes(job),
               "frame 1 (0.04 s) cannot be used: the one before it is shown in its place, and no "
               "more is said of others like it; stx convert --strict stops there: frame 1 is bad\n");
-    EXPECT_EQ(notesOf(part).find("frame 1 was tried"), std::string::npos);
+    EXPECT_EQ(takenNotes(part).find("frame 1 was tried"), std::string::npos);
 }
 
 TEST(DamagedFilms, OtherErrorsAreErrors) {
@@ -131,7 +131,7 @@ TEST(DamagedFilms, NumberedFilesMayBeMissing) {
     EXPECT_EQ(shown(*film), (std::vector<int>{0, 1, 3, 5}));
     EXPECT_EQ(film->timeline().start(), 7.3);
     EXPECT_NEAR(film->timeline().end, 7.54, 1e-6);
-    const auto notes = notesOf(job);
+    const auto notes = takenNotes(job);
     EXPECT_NE(notes.find("number 2 is missing"), std::string::npos) << notes;
     OpenOptions strict;
     strict.set.strict = true;
@@ -148,7 +148,7 @@ TEST(DamagedFilms, NumbersMayCountInSteps) {
     for (const int i : {0, 1, 3, 4, 6, 7})
         std::filesystem::remove(folder / fmt::format("f_{:02}.exr", i));
     ASSERT_TRUE(opened(folder / "f_%02d.exr", job, true));
-    EXPECT_EQ(notesOf(job).find("missing"), std::string::npos);
+    EXPECT_EQ(takenNotes(job).find("missing"), std::string::npos);
 }
 
 TEST(DamagedFilms, NumberedFilesMayBeDamaged) {
@@ -167,7 +167,7 @@ TEST(DamagedFilms, NumberedFilesMayBeDamaged) {
     const auto film = opened(path, job);
     ASSERT_TRUE(film);
     EXPECT_EQ(shown(*film), (std::vector<int>{1, 1, 3, 4, 5}));
-    const auto notes = notesOf(job);
+    const auto notes = takenNotes(job);
     EXPECT_NE(notes.find("1 of 6 frames cannot be used"), std::string::npos) << notes;
     EXPECT_NE(notes.find("f_00.exr"), std::string::npos) << notes;
     OpenOptions strict;
@@ -195,7 +195,7 @@ TEST(DamagedFilms, SamplesMayBeDamaged) {
         ASSERT_TRUE(bad) << bad.error().text();
         EXPECT_EQ(bad->time, film->timeline().times[3]);
         expectSameFrame(*bad, *before);
-        EXPECT_NE(notesOf(reading).find("frame 3 (0.12 s) cannot be used"), std::string::npos);
+        EXPECT_NE(takenNotes(reading).find("frame 3 (0.12 s) cannot be used"), std::string::npos);
         if (!video) {
             EXPECT_EQ(shown(*film), (std::vector<int>{0, 1, 2, 2, 4, 5}));
         }

@@ -250,6 +250,27 @@ TEST(ViewerPage, TakesAnAtlasAsItIs) {
     EXPECT_EQ(colour.height, atlas->height());
 }
 
+TEST(ViewerPage, SaysThatItLeavesTheEnvironmentOut) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = smallBundle(2, 16, false, false);
+    Environment sky;
+    sky.skyColours = {glm::vec3(0.5f)};
+    bundle.environment = std::make_shared<const Environment>(sky);
+    auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas);
+    atlas->environment = bundle.environment;
+    (void)job.takeNotes();
+    ASSERT_TRUE(write(std::move(bundle), folder.path() / "a.html", job));
+    auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("environment"), std::string::npos) << notes[0];
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}}, job));
+    notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("environment"), std::string::npos) << notes[0];
+}
+
 TEST(ViewerPage, LeavesNothingWhenItFails) {
     const TemporaryFolder folder;
     Job job;
