@@ -311,6 +311,66 @@ DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& setting
     return surface;
 }
 
+void continueSlopes(const Camera& camera, DepthSurface& surface) {
+    const int width = surface.w.width(), height = surface.w.height();
+    const auto linked = [&](int x, int y, int axis) {
+        const std::uint8_t bit = axis == 0 ? DepthSurface::kRight : DepthSurface::kDown;
+        const int bx = axis == 0 ? x - 1 : x, by = axis == 0 ? y : y - 1;
+        return (surface.links.at(x, y) & bit) ||
+               (surface.links.contains(bx, by) && (surface.links.at(bx, by) & bit));
+    };
+    // By axis: a bit for each that is not known.
+    Image<std::uint8_t> open(width, height, 0);
+    std::vector<glm::ivec2> left;
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            const double w = surface.w.at(x, y);
+            if (std::isnan(w)) continue;
+            const glm::vec2 facing(facingGradient(camera, x, y, w));
+            for (int axis = 0; axis < 2; ++axis)
+                if (!linked(x, y, axis) && surface.gradient.at(x, y)[axis] == facing[axis])
+                    open.at(x, y) |= static_cast<std::uint8_t>(1 << axis);
+            if (open.at(x, y)) left.emplace_back(x, y);
+        }
+    }
+    // From those beside known slopes on, so that a strip of several pixels gets them, too.
+    for (std::size_t before = 0; !left.empty() && left.size() != before;) {
+        before = left.size();
+        std::vector<std::pair<glm::ivec2, glm::vec2>> found;
+        std::vector<glm::ivec2> still;
+        for (const glm::ivec2 at : left) {
+            const std::uint8_t wanted = open.at(at.x, at.y);
+            double nearest = std::numeric_limits<double>::infinity();
+            glm::vec2 slope(0);
+            for (int j = -1; j <= 1; ++j) {
+                for (int i = -1; i <= 1; ++i) {
+                    const int x = at.x + i, y = at.y + j;
+                    if (!surface.w.contains(x, y) || std::isnan(surface.w.at(x, y)) ||
+                        (open.at(x, y) & wanted))
+                        continue;
+                    const glm::vec2 g = surface.gradient.at(x, y);
+                    const double off =
+                        std::abs(surface.w.at(x, y) - g.x * i - g.y * j - surface.w.at(at.x, at.y));
+                    if (!(off < nearest)) continue;
+                    nearest = off;
+                    slope = g;
+                }
+            }
+            if (std::isinf(nearest))
+                still.push_back(at);
+            else
+                found.emplace_back(at, slope);
+        }
+        for (const auto& [at, slope] : found) {
+            for (int axis = 0; axis < 2; ++axis)
+                if (open.at(at.x, at.y) >> axis & 1)
+                    surface.gradient.at(at.x, at.y)[axis] = slope[axis];
+            open.at(at.x, at.y) = 0;
+        }
+        left = std::move(still);
+    }
+}
+
 glm::dvec3 planeNormal(const Camera& camera, int x, int y, double w, glm::dvec2 gradient) {
     const double a = gradient.x * camera.fx, b = gradient.y * camera.fy;
     if (camera.orthographic) return glm::normalize(glm::dvec3(a, -b, 1.0));

@@ -42,6 +42,12 @@ struct DepthSurface {
 /// along an axis get the slope of a surface that faces the viewpoint.
 [[nodiscard]] DepthSurface depthSurface(const ReferenceView& view, const BakeSettings& settings);
 
+/// Gives pixels that are linked with no other along an axis, at outlines mostly, the slope along it
+/// of the neighbour that comes nearest to their depth when it goes on straight, in place of that of
+/// a surface that faces the viewpoint: what is beside an outline turns away. Pixels without any
+/// neighbour whose slope is known stay as they are.
+void continueSlopes(const Camera& camera, DepthSurface& surface);
+
 /// Unit normal in camera space, towards the viewpoint, of the plane through pixel (x, y)'s centre
 /// with the given w and gradient.
 [[nodiscard]] glm::dvec3 planeNormal(const Camera& camera, int x, int y, double w,

@@ -95,6 +95,32 @@ TEST(Normals, NeverAcrossADiscontinuity) {
     }
 }
 
+// Pixels at outlines are linked with none of those inside, so steep is what is between. They faced
+// the viewpoint: 2 % of the normals of a sphere and 20 % of those of a small torus were over 45
+// degrees off.
+TEST(Normals, GoOnOverOutlines) {
+    for (const auto& solid : {analytic::sphere, analytic::torus, analytic::bumpy}) {
+        for (const bool orthographic : {false, true}) {
+            for (const int size : {48, 128}) {
+                Bundle bundle;
+                Image<glm::vec3> truth;
+                bundle.views.push_back(analytic::capture(
+                    solid, analytic::lookingAt({1.2, 0.8, 2.8}, size, orthographic), 16, &truth));
+                Job job;
+                ASSERT_TRUE(bake(bundle, {}, job));
+                const ReferenceView& view = bundle.views[0];
+                int points = 0, off = 0;
+                for (std::size_t i = 0; i < truth.count(); ++i) {
+                    if (!hasPoint(view.depth.pixels()[i])) continue;
+                    ++points;
+                    off += glm::dot(view.normal.pixels()[i], truth.pixels()[i]) < std::sqrt(0.5f);
+                }
+                EXPECT_LE(off, 0.003 * points) << "of " << points << " in " << size << " pixels";
+            }
+        }
+    }
+}
+
 TEST(Normals, LonelyPointsFaceTheViewpoint) {
     Bundle bundle;
     ReferenceView view;
