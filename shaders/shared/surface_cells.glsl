@@ -17,3 +17,6 @@ CONSTANT uint kBesideBackground = 64u;
 CONSTANT int kDistanceShift = 8;  // distance to the nearest edge
 CONSTANT uint kDistanceMask = 7u;
 CONSTANT int kLeafShift = 16;  // the leaf's number in its block
+CONSTANT uint kLeafMask = 255u;
+CONSTANT int kLevelShift = 24;  // outline level (see outline_levels.hpp): (byte - kLevelZero) * kLevelStep
+CONSTANT float kLevelZero = 76.0f, kLevelStep = 0.01f;

@@ -36,13 +36,12 @@ CONSTANT float kOneSurface = 0.01f;
 CONSTANT float kLinkedSamples = 0.03f;
 // What an extension counts beside a mesh: its depth is used only where no mesh is.
 CONSTANT float kExtensionWeight = 0.01f;
-// Bilinear alpha below which a point is outside the object. Points tangent to a silhouette have one
+// Outline level below which a point is outside the object. Points tangent to a silhouette have one
 // half, and a threshold of one half or more removes them; this is clearly less. Among pruned
 // sources often only one is left to show a piece of surface, and no other agrees with it where it
 // touches another's silhouette: less still (the largest value at which spot, Fox, CesiumMilkTruck
-// and 2CylinderEngine open at no pixel). Where few sources vote, the one vote that is asked for beyond
-// the support makes outlines larger by more: a larger threshold makes up for some of that.
-CONSTANT float kFreeAlpha = 0.45f, kFreeAlphaOfFew = 0.4625f, kFreeAlphaPruned = 0.36f;
+// and 2CylinderEngine open at no pixel).
+CONSTANT float kFreeLevel = 0.4625f, kFreeLevelPruned = 0.36f;
 // Alpha from which on a pixel is covered in full, rounding apart.
 CONSTANT float kSolidAlpha = 0.99f;
 // Distances from edges are counted up to this, pixels.

@@ -55,9 +55,9 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         vec4 h = warp(self, x, y, q);
         ivec2 size = sizeOf(self);
         vec2 at = vec2(clamp(h.x / h.w, 0.0f, float(size.x)), clamp(h.y / h.w, 0.0f, float(size.y)));
-        float alpha = alphaAt(self, at);
-        if (isBackground(self, ivec2(floor(at - 0.5f)), alpha)) return true;
-        silhouette = alpha < kSolidAlpha;
+        float level = levelAt(self, at);
+        if (isBackground(self, ivec2(floor(at - 0.5f)), level)) return true;
+        silhouette = level < kSolidAlpha;
     }
     Facet facet = facetOf(self, x, y, q);
     int votes = 0, enough = kWholeVote * (nearEdge ? kVotesNearEdge : kVotesElsewhere);

@@ -5,14 +5,14 @@
 //   vec4 warpChange(s, d)      the same of a change of homogeneous points of the frame
 //   vec4 unwarpColumn(s, i)    column i of what maps homogeneous points of the source to those of the frame
 //   float texelAt(s, q)        scene units between points of neighbouring pixels
-//   ivec2 sizeOf(s), bool hasAlpha(s), float freeAlphaOf(s), Axis axisOf(s)
+//   ivec2 sizeOf(s), bool hasAlpha(s), float freeLevelOf(s), Axis axisOf(s)
 //   float nearestOf(s)         q at its camera: what is beyond is behind it
 //   float clearlyBehindOf(s)   share of q by which a surface must be behind a point, with its noise
 //   float coarseOf(s)          what its pixels are, in parts of kFinePixel
 //   float stepOf(s)            of its depth code, scene units
 //   float besideOf(s)          how far to the side its points and those of others may be off, pixels
 //   Place placeOf(s, corner)   where the 2x2 pixels from `corner` on are kept, and in that place
-//   float qAt(s, place, i, j), vec2 gradientAt(s, place, i, j), float alphaOf(s, place, i, j)
+//   float qAt(s, place, i, j), vec2 gradientAt(s, place, i, j), float levelOf(s, place, i, j)
 // Pixels of a place that are not inside the source are never asked for.
 //   Taps tapPlaceOf(s, corner), a Place of the 4x4 pixels from `corner` on, around a point among the
 //   middle four, and bool canRead(place, pixel) which of them are there
@@ -29,42 +29,43 @@ bool inside(ivec2 at, ivec2 size) {
     return at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
 }
 
-// Bilinear alpha at `t` (0..1) between the middles of the 2x2 pixels from `corner` on.
-float alphaAmong(int s, Place place, ivec2 corner, vec2 t) {
+// Bilinear outline level at `t` (0..1) between the middles of the 2x2 pixels from `corner` on: see
+// lib/render/surface/outline_levels.hpp.
+float levelAmong(int s, Place place, ivec2 corner, vec2 t) {
     ivec2 size = sizeOf(s);
     int i0 = corner.x < 0 ? 1 : 0, i1 = corner.x + 1 < size.x ? 1 : 0;
     int j0 = corner.y < 0 ? 1 : 0, j1 = corner.y + 1 < size.y ? 1 : 0;
-    return (alphaOf(s, place, i0, j0) * (1.0f - t.x) + alphaOf(s, place, i1, j0) * t.x) * (1.0f - t.y) +
-           (alphaOf(s, place, i0, j1) * (1.0f - t.x) + alphaOf(s, place, i1, j1) * t.x) * t.y;
+    return (levelOf(s, place, i0, j0) * (1.0f - t.x) + levelOf(s, place, i1, j0) * t.x) * (1.0f - t.y) +
+           (levelOf(s, place, i0, j1) * (1.0f - t.x) + levelOf(s, place, i1, j1) * t.x) * t.y;
 }
 
-// Bilinear alpha of a source at a position inside it, pixels; 1 when it has none.
-float alphaAt(int s, vec2 at) {
+// The same of a source at a position inside it, pixels; 1 when it has no alpha.
+float levelAt(int s, vec2 at) {
     if (!hasAlpha(s)) return 1.0f;
     vec2 f = floor(at - 0.5f);
     ivec2 corner = ivec2(f);
-    return alphaAmong(s, placeOf(s, corner), corner, at - 0.5f - f);
+    return levelAmong(s, placeOf(s, corner), corner, at - 0.5f - f);
 }
 
-// The largest alpha of the 4x4 pixels around the 2x2 from `corner` on.
-float largestAlphaAround(int s, ivec2 corner) {
+// The largest level of the 4x4 pixels around the 2x2 from `corner` on.
+float largestLevelAround(int s, ivec2 corner) {
     Taps place = tapPlaceOf(s, corner - 1);
     float largest = 0.0f;
     for (int t = 0; t < 16; ++t)
         if (canRead(place, corner - 1 + ivec2(t % 4, t / 4)))
-            largest = max(largest, alphaOf(s, place, t % 4, t / 4));
+            largest = max(largest, levelOf(s, place, t % 4, t / 4));
     return largest;
 }
 
 // The vote of a source that sees background.
 int backgroundVoteOf(int s) { return besideOf(s) > 0.0f ? kTwoVotes : kWholeVote; }
 
-// Whether a source with this bilinear alpha between the 2x2 pixels from `corner` on sees background
-// there. Only beside what covers a pixel in full does a part of its alpha tell: thin parts and leaves
-// never reach an alpha of 1.
-bool isBackground(int s, ivec2 corner, float alpha) {
-    if (!(alpha < freeAlphaOf(s))) return false;
-    return !(alpha > 0.0f) || !(largestAlphaAround(s, corner) < kSolidAlpha);
+// Whether a source with this bilinear level between the 2x2 pixels from `corner` on sees background
+// there. Only beside what covers a pixel in full does a part of its level tell: thin parts and leaves
+// never reach a level of 1.
+bool isBackground(int s, ivec2 corner, float level) {
+    if (!(level < freeLevelOf(s))) return false;
+    return !(level > 0.0f) || !(largestLevelAround(s, corner) < kSolidAlpha);
 }
 
 // The vote of a source on the point `at` in its image, at depth p, where it does not see background.
@@ -117,9 +118,9 @@ int voteAt(int s, vec4 h, OUT(bool) outline) {
     ivec2 corner = ivec2(f);
     Place place = placeOf(s, corner);
     if (hasAlpha(s)) {
-        float alpha = alphaAmong(s, place, corner, at - 0.5f - f);
-        outline = alpha > 0.0f;
-        if (isBackground(s, corner, alpha)) return backgroundVoteOf(s);
+        float level = levelAmong(s, place, corner, at - 0.5f - f);
+        outline = level > 0.0f;
+        if (isBackground(s, corner, level)) return backgroundVoteOf(s);
     }
     bool amid = corner.x > 0 && corner.y > 0 && corner.x + 2 < size.x && corner.y + 2 < size.y;
     if (amid && !(edgeDistanceOf(s, place, 0, 0) < float(kFarFromEdge - 1))) outline = false;

@@ -1,6 +1,6 @@
 // What the passes of surface mode share: the frame, the sources, and their pixels as the shared
-// code asks for them. Defined from outside: S (samples along a side of a pixel), kFreeAlpha of this
-// renderer as FREE_ALPHA.
+// code asks for them. Defined from outside: S (samples along a side of a pixel), kFreeLevel of this
+// renderer as FREE_LEVEL.
 #include "shared/language.glsl"
 #include "shared/surface_constants.glsl"
 #include "shared/surface_structs.glsl"
@@ -101,12 +101,16 @@ vec4 colourOf(int s, Place p, int i, int j) {
 float qAt(int s, Place p, int i, int j) { return uintBitsToFloat(surfaceAt(s, p, i, j).x); }
 vec2 gradientAt(int s, Place p, int i, int j) { return uintBitsToFloat(surfaceAt(s, p, i, j).yz); }
 float alphaOf(int s, Place p, int i, int j) { return colourOf(s, p, i, j).a; }
+float levelOf(int s, Place p, int i, int j) {
+    if (p.texel.z < 0) return float(p.outside >> (i + 2 * j) & 1u);
+    return (float(surfaceAt(s, p, i, j).w >> kLevelShift) - kLevelZero) * kLevelStep;
+}
 float edgeDistanceOf(int s, Place p, int i, int j) {
     return float(surfaceAt(s, p, i, j).w >> kDistanceShift & kDistanceMask);
 }
 ivec2 sizeOf(int s) { return sources[s].size.xy; }
 bool hasAlpha(int s) { return sources[s].size.z != 0; }
-float freeAlphaOf(int s) { return FREE_ALPHA; }
+float freeLevelOf(int s) { return FREE_LEVEL; }
 float stepOf(int s) { return sources[s].axis.z; }
 float besideOf(int s) { return sources[s].doubt.x; }
 vec4 unwarpColumn(int s, int i) { return sources[s].unwarp[i]; }

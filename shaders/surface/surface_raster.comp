@@ -53,7 +53,7 @@ void main() {
     if (shape == kNoCell) return;
     if (shape == kLeafCell) {
         // Each thread draws its own cell of the leaf.
-        uvec4 found = leaves[tasks[task].z + (code >> kLeafShift)];
+        uvec4 found = leaves[tasks[task].z + (code >> kLeafShift & kLeafMask)];
         vec3 leaf = uintBitsToFloat(found.xyz);
         vec2 d = vec2(p - ivec2(found.w & 0xffffu, found.w >> 16));
         drawLeaf(x, y, 1.0, leaf.x + leaf.y * d.x + leaf.z * d.y, leaf.y, leaf.z);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/cut_pixel.hpp"
 #include "lib/render/splat/plan.hpp"
 
 namespace stx {
@@ -25,16 +26,6 @@ constexpr float kEnoughPoints = 12.0f;
 constexpr std::size_t kMostViews = 24, kSides = 8;
 /// The outline of less even surroundings has no direction; of the sum of weights.
 constexpr float kLeastDirection = 0.15f;
-
-/// Area of the part of a unit square, centred at the origin, on which n . x < t; n has length 1.
-float areaBelow(float t, float nx, float ny) {
-    const float a = std::max(std::abs(nx), std::abs(ny)), b = std::min(std::abs(nx), std::abs(ny));
-    const float half = 0.5f * (a + b), size = std::abs(t);
-    if (size >= half) return t > 0 ? 1.0f : 0.0f;
-    if (size <= 0.5f * (a - b)) return 0.5f + t / a;
-    const float corner = (half - size) * (half - size) / (2 * a * b);
-    return t > 0 ? 1.0f - corner : corner;
-}
 
 bool solid(const Texture& texture, std::size_t texel) {
     return PageSet::alphaOf(texture, texel) >= 0.5f;

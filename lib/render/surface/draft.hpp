@@ -12,6 +12,7 @@ struct Draft {
     Image<float> q;               ///< see PreparedPage
     Image<std::uint8_t> info;     ///< see PreparedPage
     Image<std::uint8_t> covered;  ///< 1 = full alpha
+    Image<std::uint8_t> levels;   ///< see PreparedPage; empty without alpha
 
     [[nodiscard]] bool linkRight(int x, int y) const { return info.at(x, y) & Info::kLinkRight; }
     [[nodiscard]] bool linkDown(int x, int y) const { return info.at(x, y) & Info::kLinkDown; }

@@ -145,7 +145,6 @@ Effort effortOf(Quality quality, const SurfaceScene& scene) {
             e.shade.mostSources = 2;
             break;
         case Quality::normal:
-            e.freeAlpha = kFreeAlphaOfFew;
             break;
         case Quality::best:
             e.mostGeometry = kMostTileSources;
@@ -158,7 +157,7 @@ Effort effortOf(Quality quality, const SurfaceScene& scene) {
     // it. Of views with gaps as many are needed as together show what the usual number would.
     if (scene.set.pruned()) {
         e.mostGeometry = kMostTileSources;
-        e.freeAlpha = kFreeAlphaPruned;
+        e.freeLevel = kFreeLevelPruned;
         e.preferShown = true;
     } else if (valid < 1) {
         // Rounding, or a pixel in a million, does not ask for another source.

@@ -30,7 +30,7 @@ struct ShadeSettings {
 struct Effort {
     int samplesPerPixel = 4;  ///< along one side of a pixel
     int mostGeometry = 8;     ///< sources that one tile is built from, at most kMostTileSources
-    float freeAlpha = kFreeAlpha;
+    float freeLevel = kFreeLevel;
     /// Of many sources those that have something in a tile come first: pruned views.
     bool preferShown = false;
     ShadeSettings shade;

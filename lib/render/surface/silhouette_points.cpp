@@ -42,7 +42,7 @@ struct Witness {
         const int px = static_cast<int>(fu), py = static_cast<int>(fv);
         const float a = (alpha(px, py) * (1 - tx) + alpha(px + 1, py) * tx) * (1 - ty) +
                         (alpha(px, py + 1) * (1 - tx) + alpha(px + 1, py + 1) * tx) * ty;
-        if (!(a < kFreeAlpha)) return false;
+        if (!(a < kFreeLevel)) return false;
         if (!(a > 0.0f)) return true;
         for (int j = -1; j < 3; ++j)
             for (int i = -1; i < 3; ++i)
@@ -61,7 +61,7 @@ int countOf(const std::vector<Witness>& witnesses, float x, float y, float q) {
 bool hasBackground(const Texture& texture) {
     const auto pixels = static_cast<std::size_t>(texture.width()) * texture.height();
     for (std::size_t k = 0; k < pixels; ++k)
-        if (PageSet::alphaOf(texture, k) < kFreeAlpha) return true;
+        if (PageSet::alphaOf(texture, k) < kFreeLevel) return true;
     return false;
 }
 

@@ -10,6 +10,7 @@
 #include "lib/render/surface/draft.hpp"
 #include "lib/render/surface/fat_edges.hpp"
 #include "lib/render/surface/noisy_views.hpp"
+#include "lib/render/surface/outline_levels.hpp"
 #include "lib/render/surface/sharpen.hpp"
 #include "lib/render/surface/silhouette_points.hpp"
 #include "lib/render/surface/source_rows.hpp"
@@ -49,8 +50,10 @@ void forEachPixel(const Source& s, const PageRectangle& r, int around, const Vis
 
 Draft draftOf(const Source& s) {
     const bool unknown = s.view->depthMayBeUnknown();
-    Draft d{Image<float>(s.width, s.height, 0.0f), Image<std::uint8_t>(s.width, s.height),
-            Image<std::uint8_t>(s.width, s.height, 0)};
+    Draft d{Image<float>(s.width, s.height, 0.0f),
+            Image<std::uint8_t>(s.width, s.height),
+            Image<std::uint8_t>(s.width, s.height, 0),
+            {}};
     const auto mark = [&](int x, int y, bool covered) {
         d.covered.at(x, y) = covered ? 1 : 0;
         d.q.at(x, y) = covered && unknown ? -1.0f : 0.0f;
@@ -109,6 +112,7 @@ void keep(Source& s, Draft&& d, std::vector<PreparedPage>& pages) {
         PreparedPage& page = pages[static_cast<std::size_t>(s.whole - s.pages)];
         page.q = std::move(d.q);
         page.info = std::move(d.info);
+        page.levels = std::move(d.levels);
         return;
     }
     for (const PageRectangle& r : s.set->rectanglesOf(s.number)) {
@@ -116,6 +120,7 @@ void keep(Source& s, Draft&& d, std::vector<PreparedPage>& pages) {
         forEachPixel(s, r, PageSet::kPadding, [&](int x, int y, std::size_t texel) {
             page.q.data()[texel] = d.q.at(x, y);
             page.info.data()[texel] = d.info.at(x, y);
+            if (s.hasAlpha) page.levels.data()[texel] = d.levels.at(x, y);
         });
     }
 }
@@ -264,7 +269,8 @@ Draft beginSource(Source& s, NoisyView& noisy) {
     return d;
 }
 
-void finishSource(Source& s, Draft&& d, float left, std::vector<PreparedPage>& pages) {
+void finishSource(Source& s, Draft&& d, const Texture& texture, float left,
+                  std::vector<PreparedPage>& pages) {
     float step = s.step;
     // What smoothing leaves is like the step of a coarser depth code.
     if (left > 0) {
@@ -278,6 +284,7 @@ void finishSource(Source& s, Draft&& d, float left, std::vector<PreparedPage>& p
     findLinks(s, d, step);
     findEdges(s, d);
     findLeaves(s, d);
+    if (s.hasAlpha) d.levels = outlineLevels(texture);
     keep(s, std::move(d), pages);
 }
 
@@ -317,7 +324,7 @@ bool prepareAlone(std::vector<Source>& sources, std::vector<PreparedPage>& pages
         const Texture texture = s.set->textureOfView(s.number);
         const auto more = sharesAtEdges({&s.space, &texture, &d.q, s.step});
         shares.insert(shares.end(), more.begin(), more.end());
-        finishSource(s, std::move(d), 0.0f, pages);
+        finishSource(s, std::move(d), texture, 0.0f, pages);
     }
     return !edgesAreFat(colourAtEdges(std::move(shares)));
 }
@@ -358,7 +365,7 @@ bool prepareTogether(std::vector<Source>& sources, std::vector<PreparedPage>& pa
     for (std::size_t n = 0; n < noisy.size(); ++n) left[noisyOnes[n]] = noisy[n].left;
     parallelFor(0, count, [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
-        finishSource(sources[k], std::move(drafts[k]), left[k], pages);
+        finishSource(sources[k], std::move(drafts[k]), *textures[k], left[k], pages);
     });
     return !fat && noisy.empty();
 }
@@ -398,6 +405,7 @@ void SurfaceScene::prepare() {
         const Page& page = set.pages()[i];
         pages[i].q = Image<float>(page.width(), page.height(), 0.0f);
         pages[i].info = Image<std::uint8_t>(page.width(), page.height(), 0);
+        pages[i].levels = Image<std::uint8_t>(page.width(), page.height(), 0);
     }
     if (!prepareAlone(sources, pages)) {
         begin();

@@ -118,6 +118,7 @@ struct PreparedPage {
     /// 0 = nothing here; below 0 = unknown: a surface is here, other sources may give its distance.
     Image<float> q;
     Image<std::uint8_t> info;
+    Image<std::uint8_t> levels;  ///< outlineLevels(), of sources with alpha
     const Texture* texture = nullptr;
 };
 
@@ -146,7 +147,7 @@ struct Source {
     PixelSpace space;
     int width = 0, height = 0;
     bool hasAlpha = false;  ///< some pixel is not fully covered
-    float freeAlpha = kFreeAlpha;
+    float freeLevel = kFreeLevel;
     float step = 0;           ///< scene units between neighbouring depth codes, or left by noise
     float beside = 0;         ///< how far to the side noise may put points, pixels
     double validShare = 1.0;  ///< of the pixels of the object (points, or full alpha): with depth
@@ -199,6 +200,11 @@ struct Source {
     [[nodiscard]] float alphaAt(const Place& p, int i, int j) const {
         if (p.page) return PageSet::alphaOf(*p.page->texture, p.texel(i, j));
         return p.outside >> (i + 2 * j) & 1 ? 1.0f : 0.0f;
+    }
+    /// The outline level of a source with alpha.
+    [[nodiscard]] float levelAt(const Place& p, int i, int j) const {
+        if (!p.page) return p.outside >> (i + 2 * j) & 1 ? 1.0f : 0.0f;
+        return (static_cast<float>(p.page->levels.data()[p.texel(i, j)]) - kLevelZero) * kLevelStep;
     }
     /// dq/dx and dq/dy on the surface of pixel (x, y) = (i, j) of the place, which must have a
     /// point, from its linked neighbours.

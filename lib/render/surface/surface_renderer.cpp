@@ -38,7 +38,7 @@ class SurfaceRenderer final : public Renderer {
         double border = 0;
         for (Source& s : scene_.sources) {
             border += borderCoverage(s) / static_cast<double>(scene_.sources.size());
-            s.freeAlpha = effort_.freeAlpha;
+            s.freeLevel = effort_.freeLevel;
         }
         fillsFrame_ = border > kFilledBorder;
         // A draft has no pixels that are covered in part.

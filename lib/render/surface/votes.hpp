@@ -50,7 +50,7 @@ struct SourcePixels {
     }
     [[nodiscard]] ivec2 sizeOf(int s) const { return {at(s).width, at(s).height}; }
     [[nodiscard]] bool hasAlpha(int s) const { return at(s).hasAlpha; }
-    [[nodiscard]] float freeAlphaOf(int s) const { return at(s).freeAlpha; }
+    [[nodiscard]] float freeLevelOf(int s) const { return at(s).freeLevel; }
     [[nodiscard]] Axis axisOf(int s) const { return at(s).space.axis; }
     [[nodiscard]] float coarseOf(int s) const {
         return static_cast<float>(at(s).space.axis.coarse);
@@ -78,6 +78,9 @@ struct SourcePixels {
     }
     [[nodiscard]] float alphaOf(int s, const Place& p, int i, int j) const {
         return at(s).alphaAt(p.kept, i, j);
+    }
+    [[nodiscard]] float levelOf(int s, const Place& p, int i, int j) const {
+        return at(s).levelAt(p.kept, i, j);
     }
     [[nodiscard]] float edgeDistanceOf(int s, const Place& p, int i, int j) const {
         return static_cast<float>(at(s).infoAt(p.kept, i, j) >> 4);

@@ -369,7 +369,7 @@ class SurfaceShaders : public SurfaceCode {
         device->storage(6, locals);
     }
     void run(gpu::SurfaceProgram program, GLuint groups) const {
-        device->run(gpu::surfaceHeader({kPerPixel, 4, kFreeAlpha}, program),
+        device->run(gpu::surfaceHeader({kPerPixel, 4, kFreeLevel}, program),
                     {gpu::surfaceStage(program)}, groups);
     }
     std::unique_ptr<test::Device> device;

@@ -84,21 +84,21 @@ struct SampleFuser {
             if (!votes.hasAlpha(s) || hn::AllFalse(d, mine)) continue;
             const SourcePoints p(votes.locals[static_cast<std::size_t>(s)], points, true);
             const VotingSource from(votes.at(s));
-            Points alpha;
-            if (from.colour) {
-                alpha = alphaOf(from.colour, *from.source, p, mine, Window(*from.source, p, mine));
+            Points level;
+            if (from.levels) {
+                level = levelOf(from, p, mine, Window(*from.source, p, mine));
             } else {
                 alignas(64) float u[kMostPoints], v[kMostPoints], each[kMostPoints] = {};
                 hn::Store(p.u, d, u);
                 hn::Store(p.v, d, v);
                 for (std::uint32_t left = lanesOf(mine); left; left &= left - 1) {
                     const int l = std::countr_zero(left);
-                    each[l] = votes.alphaAt(s, {u[l], v[l]});
+                    each[l] = votes.levelAt(s, {u[l], v[l]});
                 }
-                alpha = hn::Load(d, each);
+                level = hn::Load(d, each);
             }
-            out = hn::Or(out, areBackground(votes, s, from.colour, p, alpha, mine));
-            silhouette = hn::Or(silhouette, hn::And(mine, hn::Lt(alpha, hn::Set(d, kSolidAlpha))));
+            out = hn::Or(out, areBackground(votes, from, s, p, level, mine));
+            silhouette = hn::Or(silhouette, hn::And(mine, hn::Lt(level, hn::Set(d, kSolidAlpha))));
         }
         asked = hn::AndNot(out, asked);
         if (hn::AllFalse(d, asked)) return out;

@@ -96,15 +96,13 @@ struct VotingSource {
     const Source* source;
     const float* q = nullptr;  ///< null: one point at a time
     const std::uint8_t* info = nullptr;
-    const glm::u8vec4* colour = nullptr;  ///< null: no alpha
+    const std::uint8_t* levels = nullptr;  ///< null: no alpha
 
     explicit VotingSource(const Source& s) : source(&s) {
         if (!s.whole || s.width < 4) return;  // a word of info, at least
-        const Rgba8Image* bytes = s.whole->texture->rgba8();
-        if (s.hasAlpha && !bytes) return;
         q = s.whole->q.data();
         info = s.whole->info.data();
-        if (s.hasAlpha) colour = bytes->data();
+        if (s.hasAlpha) levels = s.whole->levels.data();
     }
 };
 
@@ -201,56 +199,66 @@ struct Window {
 #endif
 };
 
-/// Alpha between the pixels around those points.
-HWY_INLINE Points alphaOf(const glm::u8vec4* colour, const Source& source, const SourcePoints& p,
-                          PointMask wanted, const Window& window) {
-    const PointTag d;
+/// Bytes of an image of so many, four or more, at those places.
+HWY_INLINE Counts gatheredBytes(const std::uint8_t* from, std::int32_t count, Counts places) {
     const CountTag di;
-    const hn::RebindToUnsigned<PointTag> du;
-    const auto* words = reinterpret_cast<const std::int32_t*>(colour);
-    const auto asAlpha = [&](Counts texel) HWY_ATTR {
-        const auto bits = hn::ShiftRight<24>(hn::BitCast(du, texel));
-        return hn::Mul(hn::ConvertTo(d, hn::BitCast(di, bits)), hn::Set(d, 1.0f / 255.0f));
+    const hn::RebindToUnsigned<CountTag> du;
+    // Whole words, for that is what vectors gather.
+    const Counts word = hn::Min(places, hn::Set(di, count - 4));
+    const auto bits =
+        hn::BitCast(du, hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(from), word));
+    const auto shift = hn::BitCast(du, hn::ShiftLeft<3>(hn::Sub(places, word)));
+    return hn::BitCast(di, hn::And(hn::Shr(bits, shift), hn::Set(du, 255u)));
+}
+
+/// Outline level between the pixels around those points.
+HWY_INLINE Points levelOf(const VotingSource& from, const SourcePoints& p, PointMask wanted,
+                          const Window& window) {
+    const PointTag d;
+    const auto asLevel = [&](Counts bytes) HWY_ATTR {
+        return hn::Mul(hn::Sub(hn::ConvertTo(d, bytes), hn::Set(d, kLevelZero)),
+                       hn::Set(d, kLevelStep));
     };
     const auto mix = [&](Points a, Points b, Points along)
                          HWY_ATTR { return hn::MulAdd(b, along, hn::NegMulAdd(a, along, a)); };
     const auto between = [&](const auto& at) HWY_ATTR {
-        return mix(mix(asAlpha(at(0, 0)), asAlpha(at(0, 1)), p.alongX),
-                   mix(asAlpha(at(1, 0)), asAlpha(at(1, 1)), p.alongX), p.alongY);
+        return mix(mix(asLevel(at(0, 0)), asLevel(at(0, 1)), p.alongX),
+                   mix(asLevel(at(1, 0)), asLevel(at(1, 1)), p.alongX), p.alongY);
     };
+    const int width = from.source->width, height = from.source->height;
 #if STX_VOTES_WINDOWS
     if (window.holds) {
-        const Counts table = window.read(words, source.width);
-        return between([&](int j, int i) HWY_ATTR { return window.at(di, table, i, j); });
+        const Counts table = window.read(from.levels, width);
+        return between([&](int j, int i) HWY_ATTR { return window.at(CountTag(), table, i, j); });
     }
 #else
     (void)window;
 #endif
-    const FourTexels texels(source, p, wanted);
-    return between([&](int j, int i)
-                       HWY_ATTR { return hn::GatherIndex(di, words, texels.at[j][i]); });
+    const FourTexels texels(*from.source, p, wanted);
+    return between([&](int j, int i) HWY_ATTR {
+        return gatheredBytes(from.levels, width * height, texels.at[j][i]);
+    });
 }
 
-/// Whether the largest alpha of the 4x4 pixels around the 2x2 from (column, row) on is solid; all
+/// Whether the largest level of the 4x4 pixels around the 2x2 from (column, row) on is solid; all
 /// of them must be in the picture.
-HWY_INLINE bool isSolidAround(const glm::u8vec4* colour, int width, int column, int row) {
-    const glm::u8vec4* from = colour + static_cast<std::ptrdiff_t>(row - 1) * width + (column - 1);
+HWY_INLINE bool isSolidAround(const std::uint8_t* levels, int width, int column, int row) {
+    const std::uint8_t* from = levels + static_cast<std::ptrdiff_t>(row - 1) * width + (column - 1);
     std::uint8_t largest = 0;
     for (int j = 0; j < 4; ++j, from += width)
-        largest = std::max(std::max(std::max(from[0].a, from[1].a), std::max(from[2].a, from[3].a)),
-                           largest);
-    return !(static_cast<float>(largest) * (1.0f / 255.0f) < kSolidAlpha);
+        largest =
+            std::max(std::max(std::max(from[0], from[1]), std::max(from[2], from[3])), largest);
+    return !((static_cast<float>(largest) - kLevelZero) * kLevelStep < kSolidAlpha);
 }
 
-/// isBackground() of those points, whose alpha is given. `colour`: the source's, or null where it
-/// cannot be read at once.
-HWY_INLINE PointMask areBackground(shared::Votes& votes, int s, const glm::u8vec4* colour,
-                                   const SourcePoints& p, Points alpha, PointMask wanted) {
+/// isBackground() of those points, whose level is given.
+HWY_INLINE PointMask areBackground(shared::Votes& votes, const VotingSource& from, int s,
+                                   const SourcePoints& p, Points level, PointMask wanted) {
     const PointTag d;
     const CountTag di;
-    const PointMask little = hn::And(wanted, hn::Lt(alpha, hn::Set(d, votes.freeAlphaOf(s))));
+    const PointMask little = hn::And(wanted, hn::Lt(level, hn::Set(d, votes.freeLevelOf(s))));
     if (hn::AllFalse(d, little)) return little;
-    const PointMask some = hn::And(little, hn::Gt(alpha, hn::Zero(d)));
+    const PointMask some = hn::And(little, hn::Gt(level, hn::Zero(d)));
     std::uint32_t doubtful = lanesOf(some);
     if (doubtful == 0) return little;
     alignas(64) std::int32_t column[kMostPoints], row[kMostPoints];
@@ -264,27 +272,15 @@ HWY_INLINE PointMask areBackground(shared::Votes& votes, int s, const glm::u8vec
         bool solid = false;
         if (before >= 0 && column[l] == column[before] && row[l] == row[before])
             solid = background >> before & 1u;
-        else if (colour && column[l] > 0 && row[l] > 0 && column[l] + 2 < source.width &&
+        else if (from.levels && column[l] > 0 && row[l] > 0 && column[l] + 2 < source.width &&
                  row[l] + 2 < source.height)
-            solid = isSolidAround(colour, source.width, column[l], row[l]);
+            solid = isSolidAround(from.levels, source.width, column[l], row[l]);
         else
-            solid = !(votes.largestAlphaAround(s, {column[l], row[l]}) < kSolidAlpha);
+            solid = !(votes.largestLevelAround(s, {column[l], row[l]}) < kSolidAlpha);
         if (solid) background |= 1u << l;
         before = l;
     }
     return maskOf(background);
-}
-
-/// PreparedPage::info at those texels, of an image of so many.
-HWY_INLINE Counts gatheredInfo(const std::uint8_t* info, std::int32_t count, Counts texels) {
-    const CountTag di;
-    const hn::RebindToUnsigned<CountTag> du;
-    // Whole words, for that is what vectors gather.
-    const Counts word = hn::Min(hn::ShiftRight<2>(texels), hn::Set(di, std::max(count / 4 - 1, 0)));
-    const auto bits =
-        hn::BitCast(du, hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(info), word));
-    const auto place = hn::BitCast(du, hn::ShiftLeft<3>(hn::And(texels, hn::Set(di, 3))));
-    return hn::BitCast(di, hn::And(hn::Shr(bits, place), hn::Set(du, 255u)));
 }
 
 /// Of the points of `asked`, those that the upper left of the pixels around them tells to have no
@@ -411,24 +407,24 @@ HWY_INLINE Counts votesAt(shared::Votes& votes, const VotingSource& from, int s,
         look([&](int x, int y, PointMask lanes)
                  HWY_ATTR { return hn::GatherIndex(d, from.q, at(x, y, lanes)); },
              [&](int x, int y, PointMask lanes) HWY_ATTR {
-                 return gatheredInfo(from.info, source.width * source.height, at(x, y, lanes));
+                 return gatheredBytes(from.info, source.width * source.height, at(x, y, lanes));
              });
     }
     const PointMask nearEdge =
         hn::RebindMask(d, hn::Lt(hn::ShiftRight<4>(info), hn::Set(di, kFarFromEdge - 1)));
     outline = hn::AndNot(hn::AndNot(nearEdge, asked), outline);
-    if (from.colour) {
+    if (from.levels) {
         // Background is not hidden: it is never far from an edge.
         const PointMask doubtful = hn::Or(hn::AndNot(amid, left), hn::And(asked, nearEdge));
         if (!hn::AllFalse(d, doubtful)) {
             const bool allAmid = hn::AllFalse(d, hn::AndNot(amid, doubtful));
-            const Points alpha = alphaOf(from.colour, source, p, doubtful,
-                                         allAmid ? window : Window(source, p, doubtful));
-            const PointMask background = areBackground(votes, s, from.colour, p, alpha, doubtful);
+            const Points level =
+                levelOf(from, p, doubtful, allAmid ? window : Window(source, p, doubtful));
+            const PointMask background = areBackground(votes, from, s, p, level, doubtful);
             cast = hn::IfThenElseZero(hn::RebindMask(di, background),
                                       hn::Set(di, votes.backgroundVoteOf(s)));
             left = hn::AndNot(background, left);
-            outline = hn::AndNot(hn::And(background, hn::Le(alpha, hn::Zero(d))), outline);
+            outline = hn::AndNot(hn::And(background, hn::Le(level, hn::Zero(d))), outline);
         }
     }
     left = hn::AndNot(hidden, left);

@@ -117,7 +117,7 @@ class GpuSurfaceBackend final : public surface::SurfaceBackend {
 
     std::shared_ptr<EglContext> context_;
     int perPixel_ = 1, mostSources_ = 4;
-    float freeAlpha_ = surface::kFreeAlpha;
+    float freeLevel_ = surface::kFreeLevel;
     std::int64_t mostSlots_ = 0, mostTiles_ = 0;  ///< of a batch
     std::unique_ptr<Resources> resources_;
     std::deque<Begun> begun_;
@@ -125,7 +125,7 @@ class GpuSurfaceBackend final : public surface::SurfaceBackend {
 
 Result<GlProgram> GpuSurfaceBackend::build(SurfaceProgram program) const {
     const std::array<ShaderStage, 1> stages{surfaceStage(program)};
-    return buildProgram(surfaceHeader({perPixel_, mostSources_, freeAlpha_}, program), stages);
+    return buildProgram(surfaceHeader({perPixel_, mostSources_, freeLevel_}, program), stages);
 }
 
 Result<void> GpuSurfaceBackend::prepare(const SurfaceScene& scene, const surface::Effort& effort,
@@ -135,7 +135,7 @@ Result<void> GpuSurfaceBackend::prepare(const SurfaceScene& scene, const surface
     Resources& r = *resources_;
     perPixel_ = effort.samplesPerPixel;
     mostSources_ = effort.shade.mostSources;
-    freeAlpha_ = effort.freeAlpha;
+    freeLevel_ = effort.freeLevel;
     const std::int64_t storage = context_->abilities().maxStorageBytes;
     const std::int64_t perTile = kTilePixels * perPixel_ * perPixel_;
     mostSlots_ = std::min(storage, kSampleBytes) / (perTile * 4);

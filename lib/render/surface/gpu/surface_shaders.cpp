@@ -6,9 +6,9 @@ namespace stx::gpu {
 
 std::string surfaceHeader(const SurfaceVariant& v, SurfaceProgram program) {
     return fmt::format(
-        "#version 450 core\n#define S {}\n#define FREE_ALPHA {:.9e}\n#define MOST {}\n"
+        "#version 450 core\n#define S {}\n#define FREE_LEVEL {:.9e}\n#define MOST {}\n"
         "#define EXTEND {}\n#define ORIGIN {}\n",
-        v.samplesPerPixel, v.freeAlpha, v.mostSources,
+        v.samplesPerPixel, v.freeLevel, v.mostSources,
         program == SurfaceProgram::extensions ? 1 : 0,
         program == SurfaceProgram::resolveWithOrigin ? 1 : 0);
 }

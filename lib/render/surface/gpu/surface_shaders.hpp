@@ -13,7 +13,7 @@ namespace stx::gpu {
 struct SurfaceVariant {
     int samplesPerPixel = 3;  ///< along a side
     int mostSources = 4;      ///< that a piece takes colours from
-    float freeAlpha = surface::kFreeAlpha;
+    float freeLevel = surface::kFreeLevel;
 };
 
 enum class SurfaceProgram { mesh, extensions, fuse, shade, resolve, resolveWithOrigin };

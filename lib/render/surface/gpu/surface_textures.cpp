@@ -51,10 +51,12 @@ Image<glm::uvec4> surfaceTexels(const surface::SurfaceScene& scene,
                     for (int x = x0; x < x1; ++x) {
                         const std::size_t texel = r.texel(x, y);
                         const float q = page.q.data()[texel];
+                        const std::uint32_t level = s.hasAlpha ? page.levels.data()[texel] : 0u;
                         const glm::vec2 g = q > 0.0f ? s.gradient(x, y) : glm::vec2(0.0f);
                         texels.data()[texel] = {std::bit_cast<std::uint32_t>(q),
                                                 std::bit_cast<std::uint32_t>(g.x),
-                                                std::bit_cast<std::uint32_t>(g.y), codes.at(x, y)};
+                                                std::bit_cast<std::uint32_t>(g.y),
+                                                codes.at(x, y) | level << surface::kLevelShift};
                     }
                 }
             });
