@@ -8,6 +8,8 @@
 #include <limits>
 
 #include "lib/base/parallel.hpp"
+#include "lib/render/finish/fill_half.hpp"
+#include "lib/render/finish/fill_rays.hpp"
 #include "lib/render/finish/for_where.hpp"
 #include "lib/render/surface/votes.hpp"
 
@@ -82,27 +84,24 @@ constexpr float kForeground = 0.01f, kForegroundWeight = 0.1f, kEndedWeight = 0.
 // Backgrounds (fillBackground).
 /// Depths behind that of a fill that are looked up in the sources, up to kFarthestShare.
 constexpr int kFarther = 4;
-/// Pixels farther than this from any surface are filled from a picture of half the size, nearer
-/// ones by rays; from half of it on both are mixed. Twice as much, and twice as many rays, cost
-/// four times as long and gain 0.05 dB of a whole frame that a camera outside of the rig sees.
-constexpr int kNearSurface = 8;
+/// Pixels of a frame, and of those of half its size and less, that are farther than this from any
+/// surface are filled from a picture of half the size, nearer ones by rays; from half of it on both
+/// are mixed. 8 for frames, too, gains 0.02 dB of a whole frame that a camera outside of the rig
+/// sees and takes 1 % of the time of a frame that is filled by half; 4 loses 0.05 dB.
+constexpr int kNearSurface = 6, kNearSurfaceOfHalves = 8;
 /// Pixels no farther than this from surface have a ray that meets it: the rays are no further
 /// apart than a pixel there.
 constexpr int kSurelyMet = 2;
-/// No ray is longer: what is farther weighs next to nothing beside what is near.
-constexpr float kLongestRay = 512;
-/// Directions that surface is looked for in.
-constexpr int kRays = 16;
-/// Pixels averaged where a ray meets surface, while they differ by no more than this share of q.
-constexpr int kAveraged = 2;
+/// Where a ray meets surface the pixel behind the first counts, too, when they differ by no more
+/// than this share of q.
 constexpr float kSameSurface = 0.03f;
 /// The farthest hits weigh most. Depths are compared over their range and this share of q, so that
 /// equal depths weigh the same; the nearest keep a little weight.
 constexpr float kLeastRange = 0.05f, kNearestWeight = 0.01f;
 
 struct Hit {
-    glm::vec3 colour{0.0f};
-    float q = 0, distance = 0;
+    glm::vec3 colour;
+    float q, distance;
 };
 
 struct Fill {
@@ -120,29 +119,30 @@ struct Rim {
     bool continues = false;  ///< no source sees past it there
 };
 
-/// Filled pixels of each row, put in at the end so that no fill feeds on another.
-void putIn(OpenFrame& frame, const std::vector<std::vector<Fill>>& rows) {
-    for (const auto& row : rows) {
-        for (const Fill& fill : row) {
-            glm::vec4& pixel = frame.albedo.at(fill.x, fill.y);
-            const float open = 1.0f - pixel.a;
-            pixel += glm::vec4(fill.colour * open, open);
-            float& q = frame.q.at(fill.x, fill.y);
-            if (q > 0.0f && open <= kMostlyOpen) continue;
-            q = fill.q;
-            if (frame.normal && fill.normal != glm::vec3(0.0f))
-                frame.normal->at(fill.x, fill.y) = fill.normal;
-        }
-    }
+void putIn(OpenFrame& frame, const Fill& fill) {
+    glm::vec4& pixel = frame.albedo.at(fill.x, fill.y);
+    const float open = 1.0f - pixel.a;
+    pixel += glm::vec4(fill.colour * open, open);
+    float& q = frame.q.at(fill.x, fill.y);
+    if (q > 0.0f && open <= kMostlyOpen) return;
+    q = fill.q;
+    if (frame.normal && fill.normal != glm::vec3(0.0f))
+        frame.normal->at(fill.x, fill.y) = fill.normal;
 }
 
 bool closed(const OpenFrame& frame, int x, int y) {
     return frame.albedo.at(x, y).a >= kClosed && frame.q.at(x, y) > 0.0f;
 }
 
+/// At a pixel, counted by rows.
+Hit hitAt(const OpenFrame& frame, std::ptrdiff_t pixel, float distance) {
+    const glm::vec4 c = frame.albedo.data()[pixel];
+    // What is divided by one stays the same.
+    return {c.a == 1.0f ? glm::vec3(c) : glm::vec3(c) / c.a, frame.q.data()[pixel], distance};
+}
+
 Hit hitAt(const OpenFrame& frame, int x, int y, float distance) {
-    const glm::vec4 c = frame.albedo.at(x, y);
-    return {glm::vec3(c) / c.a, frame.q.at(x, y), distance};
+    return hitAt(frame, static_cast<std::ptrdiff_t>(y) * frame.q.width() + x, distance);
 }
 
 /// The closed ones among up to 64 pixels of a row, a bit each.
@@ -359,17 +359,19 @@ Fill continued(const OpenFrame& frame, std::span<const LocalSource> sources, int
 
 /// The frame at half the size, rounded up: each pixel is the mean of the closed ones among its
 /// four, and open where there is none.
-void halve(const OpenFrame& frame, Image<glm::vec4>& albedo, Image<float>& q) {
+void halve(const OpenFrame& frame, const Image<std::uint8_t>& distances, Image<glm::vec4>& albedo,
+           Image<float>& q) {
     const int width = (frame.q.width() + 1) / 2, height = (frame.q.height() + 1) / 2;
     albedo = Image<glm::vec4>(width, height, glm::vec4(0.0f));
     q = Image<float>(width, height, 0.0f);
     parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
             for (int x = 0; x < width; ++x) {
+                if (distances.at(2 * x, 2 * y) > 1) continue;  // nor are those beside it closed
                 float count = 0;
                 for (int k = 0; k < 4; ++k) {
                     const int nx = 2 * x + k % 2, ny = 2 * y + k / 2;
-                    if (!frame.q.contains(nx, ny) || !closed(frame, nx, ny)) continue;
+                    if (!frame.q.contains(nx, ny) || distances.at(nx, ny) > 0) continue;
                     const Hit hit = hitAt(frame, nx, ny, 0);
                     albedo.at(x, y) += glm::vec4(hit.colour, 1.0f);
                     q.at(x, y) += hit.q;
@@ -383,123 +385,50 @@ void halve(const OpenFrame& frame, Image<glm::vec4>& albedo, Image<float>& q) {
     });
 }
 
-/// What a frame of half the size has between its pixels.
-struct Sample {
-    enum Kind { open, filled, mixed } kind = mixed;
-    glm::vec3 colour{0.0f};  ///< of those that are not open
-    float q = 0;             ///< 0 where all are open
-};
-
-/// The filled half of a frame; none: empty.
-struct Half {
-    Image<glm::vec4> albedo;
-    Image<float> q;
-
-    /// At pixel (x, y) of the frame.
-    [[nodiscard]] Sample at(int x, int y) const {
-        Sample sample;
-        if (q.empty()) return sample;
-        const int lastX = q.width() - 1, lastY = q.height() - 1;
-        // Pixels of the half are two wide: those on both sides of the middle of this one.
-        const std::array<int, 2> xs = {std::max((x - 1) >> 1, 0), std::min((x + 1) >> 1, lastX)};
-        const std::array<int, 2> ys = {std::max((y - 1) >> 1, 0), std::min((y + 1) >> 1, lastY)};
-        int filled = 0;
-        for (const int ny : ys)
-            for (const int nx : xs) filled += q.at(nx, ny) > 0.0f;
-        sample.kind = filled == 4 ? Sample::filled : filled == 0 ? Sample::open : Sample::mixed;
-        if (filled == 0) return sample;
-        const float tu = x % 2 ? 0.25f : 0.75f, tv = y % 2 ? 0.25f : 0.75f;
-        float weights = 0;
-        for (std::size_t k = 0; k < 4; ++k) {
-            const int nx = xs[k % 2], ny = ys[k / 2];
-            if (!(q.at(nx, ny) > 0.0f)) continue;
-            const float weight = (k % 2 ? tu : 1 - tu) * (k / 2 ? tv : 1 - tv);
-            sample.colour += weight * glm::vec3(albedo.at(nx, ny));
-            sample.q += weight * q.at(nx, ny);
-            weights += weight;
-        }
-        sample.colour /= weights;
-        sample.q /= weights;
-        return sample;
-    }
-};
-
 /// 0 up to `t` = 0, 1 from `t` = 1 on.
 float smoothStep(float t) {
     t = std::clamp(t, 0.0f, 1.0f);
     return t * t * (3 - 2 * t);
 }
 
-const std::array<glm::vec2, kRays>& rayDirections() {
-    static const auto rays = [] {
-        std::array<glm::vec2, kRays> directions;
-        for (int k = 0; k < kRays; ++k) {
-            const float angle = static_cast<float>(k) * (6.2831853f / kRays);
-            directions[static_cast<std::size_t>(k)] = {std::cos(angle), std::sin(angle)};
-        }
-        return directions;
-    }();
-    return rays;
-}
-
 /// What surface around shows at an open pixel: where rays through the picture meet it. False where
 /// none does.
-bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int x, int y,
-               Fill& fill) {
-    const int width = frame.q.width(), height = frame.q.height();
-    std::array<Hit, kRays> hits;
-    int count = 0;
-    for (const glm::vec2 ray : rayDirections()) {
-        float along = distances.at(x, y);  // nothing is nearer
-        Hit hit;
-        int averaged = 0;
-        while (averaged < kAveraged && along <= kLongestRay) {
-            const float px = static_cast<float>(x) + 0.5f + ray.x * along;
-            const float py = static_cast<float>(y) + 0.5f + ray.y * along;
-            if (!(px >= 0 && py >= 0 && px < static_cast<float>(width) &&
-                  py < static_cast<float>(height)))
-                break;
-            const int nx = static_cast<int>(px), ny = static_cast<int>(py);
-            const int distance = distances.at(nx, ny);
-            if (distance > 0) {
-                if (averaged) break;
-                // No ray crosses more pixels in as many steps.
-                along += static_cast<float>(distance);
-                continue;
-            }
-            along += 1;
-            const Hit here = hitAt(frame, nx, ny, along);
-            if (averaged == 0) {
-                hit = here;
-            } else {
-                if (std::abs(here.q - hit.q) > kSameSurface * frame.space.axis.relativeScale(hit.q))
-                    break;
-                hit.colour += here.colour;
-            }
-            ++averaged;
-        }
-        if (!averaged) continue;
-        hit.colour /= static_cast<float>(averaged);
-        hits[static_cast<std::size_t>(count++)] = hit;
+bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, const RayBatch& batch,
+               std::size_t pixel, Fill& fill) {
+    std::array<glm::vec3, kRays> colours;
+    std::array<float, kRays> qs, weights;  // weights are distances first
+    std::size_t count = 0;
+    for (const RayBatch::Rays& rays : batch.rays()) {
+        const std::int32_t rim = rays.rim[pixel], behind = rays.behind[pixel];
+        if (rim == RayBatch::kNone) continue;
+        const Hit hit = hitAt(frame, rim, 0);
+        colours[count] = hit.colour;
+        qs[count] = hit.q;
+        weights[count++] = rays.length[pixel] + 1;
+        if (behind == RayBatch::kNone || distances.data()[behind] > 0) continue;
+        const Hit second = hitAt(frame, behind, 0);
+        if (std::abs(second.q - hit.q) > kSameSurface * frame.space.axis.relativeScale(hit.q))
+            continue;
+        colours[count - 1] = 0.5f * (hit.colour + second.colour);
     }
-    if (!count) return false;
-    float farthest = hits[0].q, nearest = hits[0].q;
-    for (int k = 1; k < count; ++k) {
-        farthest = std::min(farthest, hits[static_cast<std::size_t>(k)].q);
-        nearest = std::max(nearest, hits[static_cast<std::size_t>(k)].q);
+    if (count == 0) return false;
+    const auto [farthest, nearest] = std::minmax_element(qs.begin(), qs.begin() + count);
+    const float front = *nearest;
+    const float range = front - *farthest + kLeastRange * frame.space.axis.relativeScale(front);
+    // All at once in vectors.
+    for (std::size_t k = 0; k < count; ++k) {
+        const float behind = (front - qs[k]) / range + kNearestWeight;
+        weights[k] = behind * behind / (weights[k] * std::sqrt(weights[k]));
     }
-    const float range = nearest - farthest + kLeastRange * frame.space.axis.relativeScale(nearest);
     glm::vec3 sum(0.0f);
-    float weights = 0, depth = 0;
-    for (int k = 0; k < count; ++k) {
-        const Hit& hit = hits[static_cast<std::size_t>(k)];
-        const float behind = (nearest - hit.q) / range + kNearestWeight;
-        const float weight = behind * behind / (hit.distance * std::sqrt(hit.distance));
-        sum += weight * hit.colour;
-        depth += weight * hit.q;
-        weights += weight;
+    float all = 0, depth = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+        sum += weights[k] * colours[k];
+        depth += weights[k] * qs[k];
+        all += weights[k];
     }
-    fill = {x, y, sum / weights, depth / weights};
+    fill.colour = sum / all;
+    fill.q = depth / all;
     return true;
 }
 
@@ -508,20 +437,21 @@ bool alongRays(const OpenFrame& frame, const Image<std::uint8_t>& distances, int
 void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale) {
     const int height = frame.q.height();
     const Image<std::uint8_t> distances = distancesToSurface(frame);
-    int nearest = kFarthestCounted, farthest = 0;
-    for (const std::uint8_t d : distances.pixels()) {
-        nearest = std::min<int>(nearest, d);
-        farthest = std::max<int>(farthest, d);
-    }
-    if (nearest > 0 || farthest == 0) return;
+    const auto all = distances.pixels();
+    const auto surface = std::find(all.begin(), all.end(), std::uint8_t{0}) - all.begin();
+    if (surface == std::ssize(all)) return;
+    std::uint8_t farthest = 0;
+    for (const std::uint8_t d : all) farthest = std::max(farthest, d);
+    if (farthest == 0) return;
     Half half;
     if (farthest > kSurelyMet) {
-        halve(frame, half.albedo, half.q);
+        halve(frame, distances, half.albedo, half.q);
         OpenFrame smaller{half.albedo, half.q, frame.space};
         fillLevel(smaller, sources, 2 * scale);
     }
 
-    std::vector<std::vector<Fill>> rows(static_cast<std::size_t>(height));
+    const auto near = static_cast<float>(scale == 1 ? kNearSurface : kNearSurfaceOfHalves);
+    // Only closed pixels are read, so that no fill feeds on another.
     parallelForBlocks(0, height, 8, [&](std::int64_t from, std::int64_t to) {
         shared::LookedAt places{{sources}};
         int last = 0;  // the source that hid a place, which is likely to hide the next
@@ -542,34 +472,58 @@ void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale
             }
             return false;
         };
-        for (int y = static_cast<int>(from); y < to; ++y) {
-            forWhere(
-                distances.row(y), [](std::uint8_t d) { return d > 0; },
-                [&](int x) {
-                    const int distance = distances.at(x, y);
-                    if (frame.albedo.at(x, y).a >= kClosed) return;
-                    const Sample beyond = half.at(x, y);
-                    if (beyond.kind == Sample::open) return;
-                    const float far =
-                        half.q.empty()
-                            ? 0.0f
-                            : smoothStep(2.0f * static_cast<float>(distance) / kNearSurface - 1);
-                    Fill fill{x, y, glm::vec3(0.0f), 0.0f};
-                    const bool met = far < 1.0f && alongRays(frame, distances, x, y, fill);
-                    if (!met) {
-                        if (!(beyond.q > 0.0f)) return;
-                        fill.colour = beyond.colour;
-                        fill.q = beyond.q;
-                    } else if (far > 0.0f && beyond.q > 0.0f) {
+        const auto put = [&](const Fill& fill, const Sample& beyond) {
+            if (!beyond.mixed || toFill(fill)) putIn(frame, fill);
+        };
+        struct Near {
+            int x, y;
+            float far;
+            Sample beyond;
+        };
+        std::array<Near, kRayBatch> nearby;
+        RayBatch rays(distances, static_cast<std::int32_t>(surface));
+        const auto putNear = [&] {
+            rays.walk();
+            for (std::size_t i = 0; i < rays.count(); ++i) {
+                const auto& [x, y, far, beyond] = nearby[i];
+                Fill fill{x, y, beyond.colour, beyond.q};
+                if (alongRays(frame, distances, rays, i, fill)) {
+                    if (far > 0.0f && beyond.q > 0.0f) {
                         fill.colour = glm::mix(fill.colour, beyond.colour, far);
                         fill.q = glm::mix(fill.q, beyond.q, far);
                     }
-                    if (beyond.kind == Sample::mixed && !toFill(fill)) return;
-                    rows[static_cast<std::size_t>(y)].push_back(fill);
-                });
+                } else if (!(beyond.q > 0.0f)) {
+                    continue;
+                }
+                put(fill, beyond);
+            }
+            rays.clear();
+        };
+        std::vector<std::uint8_t> open, filled;
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            const auto look = [&](int x) {
+                if (frame.albedo.at(x, y).a >= kClosed) return;
+                const Sample beyond = half.at(x, y);
+                const int distance = distances.at(x, y);
+                // What looks at colours of halves is hardly ever beside surface there.
+                const bool unseen = scale > 1 && distance == 1 && !beyond.mixed;
+                const float far = half.q.empty()
+                                      ? 0.0f
+                                      : smoothStep(2.0f * static_cast<float>(distance) / near - 1);
+                if (unseen || far >= 1.0f) return put({x, y, beyond.colour, beyond.q}, beyond);
+                nearby[rays.count()] = {x, y, far, beyond};
+                rays.add(x, y, distance);
+                if (rays.full()) putNear();
+            };
+            const auto row = distances.row(y);
+            open.assign(row.size() + row.size() % 2, 0);
+            std::copy(row.begin(), row.end(), open.begin());
+            half.keepFilled(y, open, filled);
+            forWhere(
+                open, [](std::uint8_t d) { return d > 0; }, look);
         }
+        putNear();
     });
-    putIn(frame, rows);
 }
 
 }  // namespace
@@ -610,7 +564,9 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
                 distances.row(y), [&](std::uint8_t d) { return d > 0 && d <= reach; }, look);
         }
     });
-    putIn(frame, rows);
+    // At the end, so that no fill feeds on another.
+    for (const auto& row : rows)
+        for (const Fill& fill : row) putIn(frame, fill);
 }
 
 void fillBackground(OpenFrame frame, std::span<const LocalSource> sources) {
