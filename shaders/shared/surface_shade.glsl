@@ -3,7 +3,7 @@
 // does the same with vectors in lib/render/surface/cpu/shade.cpp; a test holds both against this.
 // Needs surface_votes.glsl. From outside: FrameEntry frame; SourceEntry sources[]; MOST, sources
 // that a piece takes colours from; int sourceOf(k), source k of the piece's tile; in a place
-//   float edgeDistanceOf(s, place, i, j), vec4 colourOf(s, place, i, j)
+//   float ownColourOf(s, place, i, j), how far from edges, 0 on creases, and vec4 colourOf(s, place, i, j)
 // Taps tapPlaceOf(s, corner), a Place of 4x4 pixels around a point, and bool canRead(place, pixel) which of
 // them are there
 
@@ -12,7 +12,7 @@ struct SourceView {
     vec2 at;               // position in it, pixels
     float xu, xv, yu, yv;  // d(x, y in the frame) / d(u, v)
     float weight;          // 0 = does not see it
-    bool plain;            // far from edges: all taps are on one surface, fully covered
+    bool plain;            // far from edges, on no crease: all taps are on one surface, fully covered
     float reach;           // pixels from `at` to the farthest taps that count, along either axis
 };
 
@@ -52,7 +52,7 @@ SourceView viewOf(int s, Piece piece) {
     float t = kAngleFalloff * sqrt(max(2.0f - 2.0f * cosine, 0.0f));
     float series = t * (t * (t / 6.0f + 0.5f) + 1.0f) + 1.0f;
     ivec2 pixel = ivec2(min(int(u), size.x - 1), min(int(v), size.y - 1));
-    float edge = edgeDistanceOf(s, placeOf(s, pixel), 0, 0);
+    float edge = ownColourOf(s, placeOf(s, pixel), 0, 0);
     view.weight = min(1.0f, sqrt(max(det, kLeastArea))) / series *
                   (kEdgeWeight + (1.0f - kEdgeWeight) * min(edge / kEdgeFade, 1.0f));
     view.plain = edge >= kEdgeFade;

@@ -108,6 +108,9 @@ float levelOf(int s, Place p, int i, int j) {
 float edgeDistanceOf(int s, Place p, int i, int j) {
     return float(surfaceAt(s, p, i, j).w >> kDistanceShift & kDistanceMask);
 }
+float ownColourOf(int s, Place p, int i, int j) {
+    return (surfaceAt(s, p, i, j).w & kCreasePixel) != 0u ? 0.0f : edgeDistanceOf(s, p, i, j);
+}
 ivec2 sizeOf(int s) { return sources[s].size.xy; }
 bool hasAlpha(int s) { return sources[s].size.z != 0; }
 float freeLevelOf(int s) { return FREE_LEVEL; }

@@ -6,6 +6,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/surface/colour_depth.hpp"
+#include "lib/render/surface/creases.hpp"
 #include "lib/render/surface/depth_noise.hpp"
 #include "lib/render/surface/draft.hpp"
 #include "lib/render/surface/fat_edges.hpp"
@@ -284,6 +285,7 @@ void finishSource(Source& s, Draft&& d, const Texture& texture, float left,
     findLinks(s, d, step);
     findEdges(s, d);
     findLeaves(s, d);
+    findCreases(s, d);
     if (s.hasAlpha) d.levels = outlineLevels(texture);
     keep(s, std::move(d), pages);
 }

@@ -110,7 +110,11 @@ struct SourceBlock : BlockRange {
 
 /// Bits of PreparedPage::info; the distance to the nearest edge is above them, from bit 4 on.
 struct Info {
-    static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4;
+    static constexpr std::uint8_t kLinkRight = 1, kLinkDown = 2, kBesideBackground = 4, kCrease = 8;
+
+    /// How far a pixel is from where another surface may have a part in its colour: the nearest
+    /// edge, or a crease that runs through it.
+    [[nodiscard]] static int ownColour(std::uint8_t info) { return info & kCrease ? 0 : info >> 4; }
 };
 
 /// What surface mode knows of each texel of a page.

@@ -85,6 +85,10 @@ struct SourcePixels {
     [[nodiscard]] float edgeDistanceOf(int s, const Place& p, int i, int j) const {
         return static_cast<float>(at(s).infoAt(p.kept, i, j) >> 4);
     }
+    [[nodiscard]] float ownColourOf(int s, const Place& p, int i, int j) const {
+        return static_cast<float>(
+            Info::ownColour(static_cast<std::uint8_t>(at(s).infoAt(p.kept, i, j))));
+    }
     [[nodiscard]] static float relativeScale(Axis axis, float q) { return axis.relativeScale(q); }
     [[nodiscard]] static float qPerUnit(Axis axis, float q) { return axis.qPerUnit(q); }
 };

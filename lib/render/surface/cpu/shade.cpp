@@ -27,7 +27,7 @@ constexpr int kMostShaded = 8;
 using Wide = std::integral_constant<int, kTaps>;
 using Narrow = std::integral_constant<int, 3>;
 
-/// The distance to the nearest edge at the position of each lane. Lanes without texels lose their
+/// Info::ownColour() at the position of each lane. Lanes without texels lose their
 /// weight.
 HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) {
     const int lastX = source.width - 1, lastY = source.height - 1;
@@ -43,7 +43,7 @@ HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) 
             hn::Store(hn::Add(row, pixel(view.u, lastX)), di, texel + l);
         }
         const std::uint8_t* info = source.whole->info.data();
-        for (int l = 0; l < kGroup; ++l) edge[l] = info[texel[l]] >> 4;
+        for (int l = 0; l < kGroup; ++l) edge[l] = Info::ownColour(info[texel[l]]);
         return;
     }
     for (int l = 0; l < kGroup; ++l) {
@@ -57,7 +57,8 @@ HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) 
         if (!taps.page)
             view.weight[l] = 0.0f;
         else if (column >= taps.x0 && row >= taps.y0 && column < taps.x1 && row < taps.y1)
-            edge[l] = taps.page->info.data()[taps.texel(column - baseU, row - baseV)] >> 4;
+            edge[l] =
+                Info::ownColour(taps.page->info.data()[taps.texel(column - baseU, row - baseV)]);
     }
 }
 

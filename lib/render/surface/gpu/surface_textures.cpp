@@ -83,6 +83,7 @@ Image<std::uint32_t> cellCodes(const Source& s) {
                     const std::uint32_t info = texels.info[texels.at(i, j)];
                     code = info >> 4 << surface::kDistanceShift;
                     if (info & surface::Info::kBesideBackground) code |= surface::kBesideBackground;
+                    if (info & surface::Info::kCrease) code |= surface::kCreasePixel;
                     if (block.edges[j] >> i & 1) code |= surface::kEdgePixel;
                     if (!(block.cells[j] >> i & 1)) continue;
                     code |= surface::cellShape(s, texels, i, j);
