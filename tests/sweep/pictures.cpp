@@ -31,6 +31,20 @@ bool showsPlane(const ReferenceView& view, glm::dvec3 point, glm::dvec3 normal) 
     return true;
 }
 
+/// Whether a view has texels of a point of the scene.
+bool samples(const Scene& scene, const Camera& camera, const Hit& hit) {
+    const glm::dvec3 local = glm::dvec3(camera.cameraFromWorld() * glm::dvec4(hit.point, 1));
+    if (!(local.z < 0)) return false;
+    const glm::dvec3 at = camera.project(local);
+    if (!(at.x >= 0 && at.y >= 0 && at.x < camera.width && at.y < camera.height)) return false;
+    // Steeper than this (84 degrees), a texel is more than ten times as deep as wide.
+    constexpr double kHardlySampled = 0.1;
+    if (-glm::dot(camera.viewDirection(at.x, at.y), hit.normal) < kHardlySampled) return false;
+    const Hit first = scene.trace(camera, at.x, at.y);
+    return first.any() &&
+           glm::distance(first.point, hit.point) < 0.01 * camera.sampleSpacing(at.z).x;
+}
+
 }  // namespace
 
 Result<Frame> drawBundle(const Bundle& bundle, const Camera& camera, const Drawn& how,
@@ -47,7 +61,9 @@ Result<Frame> drawBundle(const Bundle& bundle, const Camera& camera, const Drawn
 Pictures::Pictures(const Stage& stage)
     : stage_(stage),
       seenBy_(stage.novel.width, stage.novel.height, 0),
-      empty_(stage.novel.width, stage.novel.height, 0) {
+      empty_(stage.novel.width, stage.novel.height, 0),
+      guessed_(stage.novel.width, stage.novel.height, 0) {
+    findGuesses();
     const Camera& novel = stage.novel;
     const Rgba8Image& truth = *stage.truth.texture.rgba8();
     // A texel is so many novel pixels wide, at half of it outlines may be drawn too large.
@@ -81,6 +97,29 @@ Pictures::Pictures(const Stage& stage)
     }
 }
 
+void Pictures::findGuesses() {
+    const Camera& novel = stage_.novel;
+    // What lies within half a texel of a place that no view shows may be drawn from both sides.
+    const int margin = static_cast<int>(std::ceil(0.5 * stage_.from.magnification));
+    const auto look = [&](double x, double y) {
+        const Hit hit = stage_.scene.trace(novel, x, y);
+        if (!hit.any()) return;
+        for (const ReferenceView& view : stage_.bundle.views)
+            if (samples(stage_.scene, view.camera, hit)) return;
+        const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
+        const bool corner = x == column;  // of four pixels
+        for (int v = row - margin - corner; v <= row + margin; ++v)
+            for (int u = column - margin - corner; u <= column + margin; ++u)
+                if (guessed_.contains(u, v)) guessed_.at(u, v) = 1;
+    };
+    for (int y = 0; y <= novel.height; ++y) {
+        for (int x = 0; x <= novel.width; ++x) {
+            look(x, y);
+            if (x < novel.width && y < novel.height) look(x + 0.5, y + 0.5);
+        }
+    }
+}
+
 Result<const Frame*> Pictures::of(const Drawn& how) {
     const auto found = drawn_.find(how);
     if (found != drawn_.end()) return &found->second;
@@ -96,15 +135,17 @@ std::int64_t Pictures::seenCount(int least) const {
 
 double Pictures::psnr(const Frame& frame, glm::ivec2 first) const {
     const Rgba8Image& truth = *stage_.truth.texture.rgba8();
-    double squared = 0;
+    double squared = 0, judged = 0;
     for (int y = 0; y < frame.colour.height(); ++y) {
         for (int x = 0; x < frame.colour.width(); ++x) {
+            if (guessed_.at(x + first.x, y + first.y)) continue;
+            judged += 1;
             const glm::vec4 t = glm::vec4(truth.at(x + first.x, y + first.y)) / 255.0f;
             const glm::vec3 d = glm::vec3(frame.colour.at(x, y)) - glm::vec3(t) * t.a;
             squared += glm::dot(d, d);
         }
     }
-    return decibels(squared, 3.0 * double(frame.colour.count()));
+    return decibels(squared, 3.0 * judged);
 }
 
 double psnrBetween(const Frame& a, const Frame& b) {

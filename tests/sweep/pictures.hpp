@@ -38,13 +38,17 @@ class Pictures {
     [[nodiscard]] const stx::Image<std::uint8_t>& empty() const { return empty_; }
     /// Pixels of seenBy() that count at least `least`.
     [[nodiscard]] std::int64_t seenCount(int least) const;
-    /// PSNR of a frame against the truth, before black. `frame` may be a part of the picture whose
-    /// pixel (0, 0) is at `first`.
+    /// PSNR of a frame against the truth, before black, without the pixels where the truth shows
+    /// something that no view shows: what is drawn there is a guess. `frame` may be a part of the
+    /// picture whose pixel (0, 0) is at `first`.
     [[nodiscard]] double psnr(const stx::Frame& frame, glm::ivec2 first = {0, 0}) const;
 
   private:
     const Stage& stage_;
+    void findGuesses();
+
     stx::Image<std::uint8_t> seenBy_, empty_;
+    stx::Image<std::uint8_t> guessed_;  ///< 1 = not judged
     std::map<Drawn, stx::Frame> drawn_;
 };
 

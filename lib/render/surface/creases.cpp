@@ -22,11 +22,11 @@ constexpr float kFlatBeside = 0.1f;
 constexpr float kSteps = 3.0f, kNoises = 2.0f;
 
 /// How a row or a column of pixels bends, in q.
-class Line {
+class PixelRow {
   public:
     /// `count` pixels, `stride` apart; those of `link` are one surface with the next.
-    Line(const float* q, const std::uint8_t* info, int count, std::ptrdiff_t stride,
-         std::uint8_t link)
+    PixelRow(const float* q, const std::uint8_t* info, int count, std::ptrdiff_t stride,
+             std::uint8_t link)
         : q_(q), info_(info), count_(count), stride_(stride), link_(link) {}
 
     [[nodiscard]] float bend(int i) const {
@@ -56,15 +56,16 @@ void findCreases(const Source& s, Draft& d) {
     std::vector<std::vector<int>> found(static_cast<std::size_t>(s.height));
     parallelForBlocks(0, s.height, 32, [&](std::int64_t from, std::int64_t to) {
         for (int y = static_cast<int>(from); y < to; ++y) {
-            const Line row(d.q.row(y).data(), d.info.row(y).data(), s.width, 1, Info::kLinkRight);
+            const PixelRow row(d.q.row(y).data(), d.info.row(y).data(), s.width, 1,
+                               Info::kLinkRight);
             for (int x = 0; x < s.width; ++x) {
                 const float q = d.q.at(x, y);
                 if (!(q > 0.0f)) continue;
                 const float least =
                     (kLeastBend * axis.texel(q) + kSteps * s.step) * axis.qPerUnit(q) +
                     kNoises * s.noise * axis.relativeScale(q);
-                const Line column(&d.q.at(x, 0), &d.info.at(x, 0), s.height, s.width,
-                                  Info::kLinkDown);
+                const PixelRow column(&d.q.at(x, 0), &d.info.at(x, 0), s.height, s.width,
+                                      Info::kLinkDown);
                 if (row.creased(x, least) || column.creased(y, least))
                     found[static_cast<std::size_t>(y)].push_back(x);
             }

@@ -21,7 +21,7 @@ constexpr float kMostMisfit = 0.1f;
 constexpr float kLeastChange = 1.0f;
 
 /// The outline through a pixel.
-struct Line {
+struct OutlineLine {
     int x;
     float below;    ///< covered is what is below it along `out`, from the pixel's middle on
     glm::vec2 out;  ///< out of the object, length 1
@@ -60,14 +60,14 @@ class Levels {
     void findLines(int y, Image<std::uint8_t>& levels) {
         for (int x = 0; x < width(); ++x) {
             const float a = alpha(x, y);
-            Line line;
+            OutlineLine line;
             const bool outline = a > 0.0f && a < 1.0f && findLine(x, y, a, line);
             set(levels.at(x, y), outline ? 0.5f + line.below : a);
             if (outline) lines_[static_cast<std::size_t>(y)].push_back(line);
         }
     }
 
-    [[nodiscard]] bool findLine(int x, int y, float a, Line& line) const {
+    [[nodiscard]] bool findLine(int x, int y, float a, OutlineLine& line) const {
         float around[3][3];
         float least = 1, most = 0;
         glm::vec2 change(0.0f);
@@ -99,16 +99,16 @@ class Levels {
     void continueLines(int y, std::vector<glm::vec2>& sums, Image<std::uint8_t>& levels) const {
         const auto forEach = [&](const auto& visit) {
             for (int j = std::max(y - 1, 0); j <= std::min(y + 1, height() - 1); ++j)
-                for (const Line& line : lines_[static_cast<std::size_t>(j)])
+                for (const OutlineLine& line : lines_[static_cast<std::size_t>(j)])
                     for (int x = std::max(line.x - 1, 0); x <= std::min(line.x + 1, width() - 1);
                          ++x)
                         visit(line, x, j, sums[static_cast<std::size_t>(x)]);
         };
-        forEach([&](const Line& line, int x, int j, glm::vec2& sum) {
+        forEach([&](const OutlineLine& line, int x, int j, glm::vec2& sum) {
             sum += glm::vec2(0.5f + line.below - glm::dot(line.out, glm::vec2(x - line.x, y - j)),
                              1.0f);
         });
-        forEach([&](const Line&, int x, int, glm::vec2& sum) {
+        forEach([&](const OutlineLine&, int x, int, glm::vec2& sum) {
             if (!(sum.y > 0.0f)) return;
             const float level = sum.x / sum.y, a = alpha(x, y);
             if (a >= 1.0f) set(levels.at(x, y), std::max(level, 1.0f));
@@ -118,7 +118,7 @@ class Levels {
     }
 
     const Texture& texture_;
-    std::vector<std::vector<Line>> lines_;  ///< by row
+    std::vector<std::vector<OutlineLine>> lines_;  ///< by row
 };
 
 }  // namespace

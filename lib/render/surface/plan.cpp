@@ -83,7 +83,8 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q) {
         left.emplace_back(-glm::dot(look, towards(f.source->space.camera)),
                           static_cast<int>(left.size()));
     std::make_heap(left.begin(), left.end(), std::greater<>());
-    const auto most = static_cast<std::size_t>(frame.effort.mostGeometry);
+    const auto most = static_cast<std::size_t>(
+        std::min(frame.effort.mostGeometry, kMostTileSources - kSourcesOfPlaces));
     std::vector<int> chosen;
     while (!left.empty() && chosen.size() < most) {
         std::pop_heap(left.begin(), left.end(), std::greater<>());
