@@ -9,21 +9,21 @@
 namespace stx::surface {
 namespace {
 
-constexpr int kSize = 40;
+constexpr int kRidgeSide = 40;
 constexpr double kPixel = 0.02;  // scene units
 
 /// A view along parallel rays of what lies `distAt` (x, y) away, pixels to pixels' sizes.
 Bundle viewOf(const std::function<std::optional<double>(double, double)>& distAt, int bits = 32) {
     ReferenceView view;
-    view.camera = Camera::fromFieldOfView({0, 0, 0}, {1, 0, 0, 0}, glm::dvec2(kSize * kPixel), true,
-                                          kSize, kSize);
+    view.camera = Camera::fromFieldOfView({0, 0, 0}, {1, 0, 0, 0}, glm::dvec2(kRidgeSide * kPixel),
+                                          true, kRidgeSide, kRidgeSide);
     view.nearPlane = 1;
     view.farPlane = 9;
     view.depthBits = bits;
-    view.depth = Image<float>(kSize, kSize, kNoDepth);
-    Rgba8Image texture(kSize, kSize, glm::u8vec4(0));
-    for (int y = 0; y < kSize; ++y)
-        for (int x = 0; x < kSize; ++x) {
+    view.depth = Image<float>(kRidgeSide, kRidgeSide, kNoDepth);
+    Rgba8Image texture(kRidgeSide, kRidgeSide, glm::u8vec4(0));
+    for (int y = 0; y < kRidgeSide; ++y)
+        for (int x = 0; x < kRidgeSide; ++x) {
             const auto dist = distAt(x + 0.5, y + 0.5);
             if (!dist) continue;
             const double step = bits < 32 ? view.depthCode().step() : 0;
@@ -41,8 +41,8 @@ Bundle viewOf(const std::function<std::optional<double>(double, double)>& distAt
 std::vector<glm::ivec2> creasesIn(const Bundle& bundle) {
     const SurfaceScene scene(bundle);
     std::vector<glm::ivec2> found;
-    for (int y = 0; y < kSize; ++y)
-        for (int x = 0; x < kSize; ++x)
+    for (int y = 0; y < kRidgeSide; ++y)
+        for (int x = 0; x < kRidgeSide; ++x)
             if (scene.pages[0].info.at(x, y) & Info::kCrease) found.emplace_back(x, y);
     return found;
 }
@@ -50,11 +50,11 @@ std::vector<glm::ivec2> creasesIn(const Bundle& bundle) {
 TEST(Creases, RunThroughThePixelsOfBothFaces) {
     // Two faces that meet in a ridge, upright and slanted.
     for (const double slant : {0.0, 0.3}) {
-        const auto edge = [&](double y) { return 17.5 + slant * (y - 0.5 * kSize); };
+        const auto edge = [&](double y) { return 17.5 + slant * (y - 0.5 * kRidgeSide); };
         const Bundle ridge =
             viewOf([&](double x, double y) { return 200 + 1.4 * std::abs(x - edge(y)); });
         const auto found = creasesIn(ridge);
-        EXPECT_GT(found.size(), kSize / 3);
+        EXPECT_GT(found.size(), kRidgeSide / 3);
         for (const glm::ivec2 at : found)
             EXPECT_LT(std::abs(at.x + 0.5 - edge(at.y + 0.5)), 1.0) << at.x << ' ' << at.y;
     }

@@ -30,7 +30,7 @@ Image<std::uint8_t> someDistances(int width, int height, int surfaces, std::mt19
     return distances;
 }
 
-struct Ray {
+struct PlainRay {
     glm::vec2 start, direction;
     const Image<std::uint8_t>& distances;
 
@@ -74,7 +74,7 @@ TEST(FillRays, ABatchGoesAsRaysDoOneByOne) {
             for (std::size_t i = 0; i < pixels; ++i) {
                 for (std::size_t k = 0; k < kRays; ++k) {
                     const float angle = static_cast<float>(k) * (6.2831853f / kRays);
-                    const Ray ray{
+                    const PlainRay ray{
                         glm::vec2(places[i]) + 0.5f, {std::cos(angle), std::sin(angle)}, distances};
                     const float length = ray.walk(distances.at(places[i].x, places[i].y));
                     const RayBatch::Rays& rays = batch.rays()[k];

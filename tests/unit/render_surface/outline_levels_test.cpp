@@ -11,15 +11,15 @@
 namespace stx::surface {
 namespace {
 
-constexpr int kSide = 12;
+constexpr int kPlaneSide = 12;
 
 /// What a half plane leaves covered of each pixel: what is below `below` along `out` from the
 /// middle on.
 Texture halfPlane(glm::vec2 out, float below) {
-    Rgba8Image image(kSide, kSide, glm::u8vec4(90, 90, 90, 0));
-    for (int y = 0; y < kSide; ++y)
-        for (int x = 0; x < kSide; ++x) {
-            const glm::vec2 at = glm::vec2(x, y) + 0.5f - 0.5f * kSide;
+    Rgba8Image image(kPlaneSide, kPlaneSide, glm::u8vec4(90, 90, 90, 0));
+    for (int y = 0; y < kPlaneSide; ++y)
+        for (int x = 0; x < kPlaneSide; ++x) {
+            const glm::vec2 at = glm::vec2(x, y) + 0.5f - 0.5f * kPlaneSide;
             const float cover = areaBelow(below - glm::dot(out, at), out.x, out.y);
             image.at(x, y).a = static_cast<std::uint8_t>(std::lround(255 * cover));
         }
@@ -51,7 +51,7 @@ TEST(OutlineLevels, AreOneHalfOnStraightOutlines) {
         const Image<std::uint8_t> levels = outlineLevels(texture);
         for (int k = 0; k < 8; ++k) {
             const glm::vec2 on = below * out + 3.0f * offsets(random) * glm::vec2(-out.y, out.x);
-            const glm::vec2 at = on + 0.5f * kSide;
+            const glm::vec2 at = on + 0.5f * kPlaneSide;
             const float level =
                 bilinear(at, [&](int x, int y) { return levelOf(levels.at(x, y)); });
             const float alpha = bilinear(
@@ -69,16 +69,17 @@ TEST(OutlineLevels, AreOneHalfOnStraightOutlines) {
 
 TEST(OutlineLevels, AreAlphaWhereThatIsNoOutline) {
     // A bar thinner than a pixel, a mask of two values, and a soft ramp.
-    Rgba8Image image(kSide, kSide, glm::u8vec4(0));
-    for (int y = 0; y < kSide; ++y) {
+    Rgba8Image image(kPlaneSide, kPlaneSide, glm::u8vec4(0));
+    for (int y = 0; y < kPlaneSide; ++y) {
         image.at(2, y).a = 140;
         for (int x = 5; x < 7; ++x) image.at(x, y).a = 255;
-        for (int x = 8; x < kSide; ++x) image.at(x, y).a = static_cast<std::uint8_t>((x - 7) * 50);
+        for (int x = 8; x < kPlaneSide; ++x)
+            image.at(x, y).a = static_cast<std::uint8_t>((x - 7) * 50);
     }
     const Rgba8Image given = image;
     const Image<std::uint8_t> levels = outlineLevels(Texture(std::move(image)));
-    for (int y = 0; y < kSide; ++y)
-        for (int x = 0; x < kSide; ++x)
+    for (int y = 0; y < kPlaneSide; ++y)
+        for (int x = 0; x < kPlaneSide; ++x)
             EXPECT_NEAR(levelOf(levels.at(x, y)), given.at(x, y).a / 255.0f, 0.006)
                 << x << ' ' << y;
 }
