@@ -13,8 +13,8 @@ namespace stx::surface {
 namespace {
 
 /// A line bears its surroundings out when what it covers of 3x3 pixels is what they are covered,
-/// but for so much (root of the mean square). Half and twice that change the pictures of the tables
-/// by less than 0.02 dB.
+/// but for so much (root of the mean square). From 0.05 to 0.25 the means over 40 scenes of
+/// tests/sweep change by no more than 0.1 dB.
 constexpr float kMostMisfit = 0.1f;
 /// Where alpha changes less across 3x3 pixels, of the 4 of an outline along rows or columns, there
 /// is none.
