@@ -8,8 +8,8 @@
 namespace stx::surface {
 namespace {
 
-// Measured on scenes of tests/sweep, statue, Fox, truck, engine and spheres-miv: half and a quarter of
-// the first cost a truck 0.2 dB, three times the second spheres-miv 0.05.
+// Measured on scenes of tests/sweep, statue, Fox, truck, engine and spheres-miv: half and a quarter
+// of the first cost a truck 0.2 dB, three times the second spheres-miv 0.05.
 
 /// A crease bends the surface by this in a pixel: change of depth, in pixels' sizes.
 constexpr float kLeastBend = 2.0f;
