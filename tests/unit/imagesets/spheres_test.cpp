@@ -102,4 +102,47 @@ TEST(SpheresMiv, TheCenterViewIsRenderedAsWellAsTheDesignPromises) {
     }
 }
 
+/// PSNR of Y of a picture of the set, whole, as users get it.
+double wholeFrame(const Bundle& bundle, const std::filesystem::path& set, const std::string& name) {
+    Job job;
+    const auto cameras = readCameraFile(set / "cameras.json", job);
+    const auto bytes = readFile(set / (name + "_color.png"), job.limits);
+    const auto renderer = makeRenderer(Backend::cpu, bundle, {}, -1, job);
+    if (!cameras || !bytes || !renderer) return 0;
+    const auto truth = decodeImage(*bytes, name, job.limits);
+    for (const auto& [label, camera, time] : *cameras) {
+        if (label != name) continue;
+        const auto frame = (*renderer)->render(camera);
+        if (!truth || !frame) return 0;
+        Rgba8Image out(camera.width, camera.height);
+        for (std::size_t i = 0; i < out.count(); ++i)
+            out.data()[i] =
+                glm::u8vec4(glm::clamp(frame->colour.data()[i], 0.0f, 1.0f) * 255.0f + 0.5f);
+        const auto result = compare(out, rgba8From(*truth));
+        return result ? *result->psnrY : 0;
+    }
+    return 0;
+}
+
+TEST(SpheresMiv, ABorderWithoutDepthTakesNoFillingAway) {
+    REQUIRE_SHARED(set, "data/imagesets/spheres-miv");
+    Job job;
+    const auto bundle = readImageSet(set, {}, job);
+    ASSERT_TRUE(bundle) << bundle.error().text();
+    Bundle ring = *bundle;
+    for (ReferenceView& view : ring.views) {
+        view.noDepth = NoDepth::unknown;
+        const int width = view.depth.width(), height = view.depth.height();
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x)
+                if (x == 0 || y == 0 || x + 1 == width || y + 1 == height)
+                    view.depth.at(x, y) = kNoDepth;
+    }
+    const double whole = wholeFrame(*bundle, set, "gt_outside");
+    const double without = wholeFrame(ring, set, "gt_outside");
+    std::printf("gt_outside: %.2f dB, without the outermost ring %.2f dB\n", whole, without);
+    EXPECT_GT(whole, 38);
+    EXPECT_GT(without, whole - 0.5);
+}
+
 }  // namespace
