@@ -14,6 +14,8 @@ Outcome betterQualityCoversLess(Pictures& pictures);
 Outcome betterQualityIsWorse(Pictures& pictures);
 Outcome surfaceBelowSplats(Pictures& pictures);
 
+Outcome exactDepthIsRepaired(Pictures& pictures);
+
 // same_scene.cpp: the same scene, asked in another way.
 Outcome crop(Pictures& pictures);
 Outcome otherOrder(Pictures& pictures);

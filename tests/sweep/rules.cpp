@@ -22,6 +22,8 @@ const std::vector<SweepRule>& rules() {
          measures::betterQualityIsWorse},
         {"surface-splat", "surface mode is not worse than splats", 0.5, "dB", "as asked", 1,
          measures::surfaceBelowSplats},
+        {"exact", "exact depth is left as it is", 0, "repairs", "it has no noise and no fat edges",
+         1, measures::exactDepthIsRepaired},
         {"crop", "a part of a frame is drawn as in the whole", 0.3, "dB", kAlike, 0.15,
          measures::crop},
         {"order", "views in another order give the same picture", 0.3, "dB", kAlike, 0.15,

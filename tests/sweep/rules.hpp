@@ -7,7 +7,7 @@
 
 /// What a rule measured in a case. `found` must not be above `allowed`.
 struct Measure {
-    double found = 0;
+    double found = 0;  ///< may be negative: by how much more than asked the rule holds
     std::string what;  ///< for people: what was compared, "normal 41.20 dB, splat 44.10 dB"
 };
 

@@ -29,15 +29,15 @@ measures::Outcome worseThanBefore(Pictures& pictures, const Drawn& how, const Fr
 }
 
 /// Two pictures of which neither has a reason to be better. Sources that show a place equally well
-/// are chosen by tiles and in their order, so single pixels may differ; but neither picture may be
-/// nearer to the truth.
-Measure alike(const Pictures& pictures, const Drawn& how, const Frame& a, const Frame& b,
+/// are chosen by tiles and in their order, so single pixels may differ; but the changed picture
+/// may not be farther from the truth.
+Measure alike(const Pictures& pictures, const Drawn& how, const Frame& before, const Frame& changed,
               glm::ivec2 first = {0, 0}) {
     // Less than half a step of 8 bits: the order in which numbers are added.
     constexpr double kSame = 54;
-    const double between = psnrBetween(a, b);
-    const double psnrA = pictures.psnr(a, first), psnrB = pictures.psnr(b, first);
-    return {between >= kSame ? 0 : std::abs(worseBy(psnrA, psnrB)),
+    const double between = psnrBetween(before, changed);
+    const double psnrA = pictures.psnr(before, first), psnrB = pictures.psnr(changed, first);
+    return {between >= kSame ? 0 : worseBy(psnrB, psnrA),
             fmt::format("{}: {:.2f} dB between the two, {:.2f} and {:.2f} dB from the truth",
                         nameOf(how), between, psnrA, psnrB)};
 }
@@ -100,7 +100,7 @@ Outcome crop(Pictures& pictures) {
             b.colour.at(x, y) = frame->colour.at(x + left + kBorder, y + top + kBorder);
         }
     }
-    return alike(pictures, how, a, b, {left + kBorder, top + kBorder});
+    return alike(pictures, how, b, a, {left + kBorder, top + kBorder});
 }
 
 Outcome otherOrder(Pictures& pictures) {

@@ -139,11 +139,19 @@ double texelAt(const std::vector<Camera>& cameras, glm::dvec3 place) {
     return finest;
 }
 
+/// -1 to 1, and 0 of 0: the fraction of `x` to both sides.
+double aside(double x) {
+    return 2 * (x - std::round(x));
+}
+
 Result<Camera> novelCamera(const SweepCase& c, const Scene& scene,
                            const std::vector<Camera>& cameras) {
     Random random(c.seed * 104729 + static_cast<std::uint64_t>(c.number) + 5);
     const bool rig = c.layout == SweepCase::rig;
-    const double a = glm::radians(c.azimuth), e = glm::radians(c.altitude);
+    // The golden section and the root of 2 spread any number of places evenly.
+    constexpr double kWithin = 15;  // degrees
+    const double a = glm::radians(c.azimuth + kWithin * aside(c.beside * 0.618034)),
+                 e = glm::radians(c.altitude + kWithin * aside(c.beside * 0.414214));
     const glm::dvec3 away(std::cos(e) * std::sin(a), std::sin(e), std::cos(e) * std::cos(a));
     glm::dvec3 eye;
     if (rig) {
@@ -194,6 +202,7 @@ const std::vector<SweepCase::Field>& SweepCase::fields() {
         {"azimuth", nullptr, &SweepCase::azimuth},
         {"altitude", nullptr, &SweepCase::altitude},
         {"distance", nullptr, &SweepCase::distance},
+        {"beside", &SweepCase::beside},
     };
     return kFields;
 }
@@ -284,6 +293,12 @@ std::string SweepCase::describe() const {
     if (offCentre) out += ", off centre";
     out += fmt::format(", {} bits, drawn at {}x{}{}, a texel {:.2f} pixels wide", depthBits,
                        outWidth, outHeight, outOrthographic ? " orthographic" : "", magnification);
+    return out;
+}
+
+std::vector<SweepCase> SweepCase::besides() const {
+    std::vector<SweepCase> out(kBesides, *this);
+    for (int i = 0; i < kBesides; ++i) out[static_cast<std::size_t>(i)].beside = beside + i + 1;
     return out;
 }
 

@@ -39,6 +39,8 @@ struct SweepCase {
     double magnification = 1;          ///< novel pixels for each reference texel, about
     double azimuth = 0, altitude = 0;  ///< degrees; of a rig: where between and around its cameras
     double distance = 1;               ///< of that of the reference cameras
+    /// 0, or the number of another eye near this one; see besides().
+    int beside = 0;
 
     /// A field by name, for `--set` and for reducing.
     struct Field {
@@ -55,6 +57,9 @@ struct SweepCase {
     [[nodiscard]] std::string changes() const;
     /// For people: "torus, ring:5 of 48x48, orthographic, drawn at 96x80, 2.0 times magnified".
     [[nodiscard]] std::string describe() const;
+    /// The same case seen from `kBesides` other places within 15 degrees.
+    static constexpr int kBesides = 7;
+    [[nodiscard]] std::vector<SweepCase> besides() const;
     /// Simpler cases of the same kind, the simplest first.
     [[nodiscard]] std::vector<SweepCase> simpler() const;
 };

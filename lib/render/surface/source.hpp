@@ -43,6 +43,10 @@ struct DepthAxis {
     [[nodiscard]] float texel(float q) const {
         return static_cast<float>(pixel) / (inverse ? q : 1.0f);
     }
+    /// The same as a share of q, at any.
+    [[nodiscard]] float pixelShare() const {
+        return static_cast<float>(inverse ? pixel : pixel / unit);
+    }
     /// How much q changes over one scene unit of distance.
     [[nodiscard]] float qPerUnit(float q) const {
         return inverse ? q * q : static_cast<float>(1.0 / unit);

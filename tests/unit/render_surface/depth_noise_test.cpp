@@ -43,6 +43,30 @@ TEST(DepthNoise, IsMeasuredWhateverTheShape) {
     EXPECT_EQ(depthNoise(Image<float>(8, 8, 0.0f), {}), 0.0f);
 }
 
+/// q of a ball so many pixels wide, from three radii away, with noise (a share).
+Image<float> ballOf(int pixels, double noise) {
+    Image<float> q(pixels, pixels, 0.0f);
+    const double radius = pixels / 2.0;
+    for (int y = 0; y < pixels; ++y) {
+        for (int x = 0; x < pixels; ++x) {
+            const double dx = (x + 0.5) / radius - 1, dy = (y + 0.5) / radius - 1;
+            if (dx * dx + dy * dy > 0.98) continue;
+            const double depth = 3 - std::sqrt(1 - dx * dx - dy * dy);
+            const double error = noisy::normal(9, static_cast<std::uint64_t>(y * pixels + x));
+            q.at(x, y) = static_cast<float>((1 + noise * error) / depth);
+        }
+    }
+    return q;
+}
+
+// The sweep found balls of thirty pixels whose bend was taken for noise of a tenth of their depth.
+TEST(DepthNoise, WhatBendsEvenlyIsNone) {
+    for (const int pixels : {16, 24, 31, 64, 200})
+        EXPECT_LT(depthNoise(ballOf(pixels, 0), {}), 0.001) << pixels;
+    for (const int pixels : {31, 64, 200})
+        EXPECT_NEAR(depthNoise(ballOf(pixels, 0.02), {}), 0.02, 0.01) << pixels;
+}
+
 TEST(DepthNoise, SmoothingLeavesAFifthOfItAndKeepsTheStep) {
     const Image<float> exact = steppedPlane(0.05, 0);
     Image<float> q = steppedPlane(0.05, 0.005);
