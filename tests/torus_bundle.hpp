@@ -7,7 +7,8 @@
 
 /// A torus from 14 sides, its colour changing from place to place; `shift` moves it, not the
 /// cameras.
-inline stx::Bundle torusViews(int side = 192, glm::dvec3 shift = glm::dvec3(0.0)) {
+inline stx::Bundle torusViews(int side = 192, glm::dvec3 shift = glm::dvec3(0.0),
+                              stx::ViewLayout layout = {stx::ViewLayout::Kind::sphere, 14, 0}) {
     using namespace stx;
     Mesh mesh;
     mesh.materials.emplace_back();
@@ -28,7 +29,7 @@ inline stx::Bundle torusViews(int side = 192, glm::dvec3 shift = glm::dvec3(0.0)
     ViewFraming framing;
     framing.width = framing.height = side;
     Job job;
-    const auto cameras = layoutCameras({ViewLayout::Kind::sphere, 14, 0}, framing, mesh.positions);
+    const auto cameras = layoutCameras(layout, framing, mesh.positions);
     EXPECT_TRUE(cameras);
     for (auto& position : mesh.positions) position += shift;
     auto bundle = captureBundle(mesh, *cameras, {}, job);

@@ -166,7 +166,7 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         translucent = translucent || changed;
         return opaque;
     };
-    PageSet drawn = solid(inFront(set, settings, job));
+    PageSet drawn = solid(inFront(set.distinct(), settings, job));
     if (drawn.behind()) drawn = drawn.before(solid(*drawn.behind()));
     if (translucent)
         job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");

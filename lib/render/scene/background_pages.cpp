@@ -39,6 +39,12 @@ std::vector<LitPair> samePoints(const PageSet& a, std::size_t viewA, const PageS
 }  // namespace
 
 PageSet PageSet::part(bool background) const {
+    std::vector<bool> kept;
+    for (const PageView& view : views()) kept.push_back(view.background == background);
+    return only(kept);
+}
+
+PageSet PageSet::only(const std::vector<bool>& kept) const {
     auto data = std::make_shared<Data>();
     data->padding = data_->padding;
     data->bounds = data_->bounds;
@@ -48,7 +54,7 @@ PageSet PageSet::part(bool background) const {
     std::vector<std::uint32_t> rectangleOf(data_->rectangles.size(), 0);
     for (std::size_t i = 0; i < data_->views.size(); ++i) {
         PageView view = data_->views[i];
-        if (view.background != background) continue;
+        if (!kept[i]) continue;
         const auto first = static_cast<std::uint32_t>(data->rectangles.size());
         for (std::uint32_t k = 0; k < view.rectangleCount; ++k) {
             PageRectangle r = data_->rectangles[view.firstRectangle + k];

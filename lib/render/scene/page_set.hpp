@@ -112,6 +112,10 @@ class PageSet {
     /// The views that are background, or those that are not, with their pages only. Empty when
     /// there are none: nothing can be drawn from it then.
     [[nodiscard]] PageSet part(bool background) const;
+    /// The same without views that repeat another: a grid of octahedral:N has its border twice.
+    /// Views that agree only because they are one would outvote the others. The first of each is
+    /// kept; of pruned views all are, since each has its own part.
+    [[nodiscard]] PageSet distinct() const;
     /// The same with colours in the light of another set: where a view of that has the same camera,
     /// colours are multiplied by what they differ by where both show the same surface (for each
     /// channel, robustly; nothing below half a step of 8 bits, nothing above a factor of two).
@@ -218,6 +222,7 @@ class PageSet {
         std::vector<const Texture*> captured;  ///< by page; empty: those of the pages
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+    [[nodiscard]] PageSet only(const std::vector<bool>& kept) const;
     static void addBundle(const Bundle& bundle, Data& data);
     static void addRectangle(const AtlasRectangle& from, int padding, Data& data);
     static void buildIndex(Data& data);

@@ -1,0 +1,58 @@
+#include <algorithm>
+#include <cmath>
+
+#include "lib/render/scene/page_set.hpp"
+
+namespace stx {
+namespace {
+
+/// Pixels of a view that are compared, about.
+constexpr double kComparedPixels = 20000;
+/// Colours (0..1) and depths (a share) that are apart by no more are the same: steps of 8 bits, and
+/// what rounding makes of poses that are the same up to it.
+constexpr float kSameColours = 2.5f / 255, kSameDistance = 1e-4f;
+/// The share of pixels that may differ: where rounding decides at an edge.
+constexpr double kMayDiffer = 0.001;
+
+bool samePixel(const PageSet& set, std::size_t a, std::size_t b, int x, int y) {
+    const PageRectangle *ra = set.find(a, x, y), *rb = set.find(b, x, y);
+    if (!ra || !rb) return ra == rb;
+    const float za = set.depth(a, x, y), zb = set.depth(b, x, y);
+    if (hasPoint(za) != hasPoint(zb)) return false;
+    if (hasPoint(za) && !(std::abs(za - zb) <= kSameDistance * za)) return false;
+    const auto colour = [&](const PageRectangle& r) {
+        return set.pages()[static_cast<std::size_t>(r.page)].texture->at(r.texel(x, y));
+    };
+    return glm::all(
+        glm::lessThanEqual(glm::abs(colour(*ra) - colour(*rb)), glm::vec4(kSameColours)));
+}
+
+/// Whether two views of one camera show the same.
+bool samePicture(const PageSet& set, std::size_t a, std::size_t b) {
+    const Camera& c = set.views()[a].camera;
+    const double pixels = static_cast<double>(c.width) * c.height;
+    const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kComparedPixels)));
+    std::int64_t compared = 0, different = 0;
+    for (int y = step / 2; y < c.height; y += step) {
+        for (int x = step / 2; x < c.width; x += step) {
+            ++compared;
+            different += !samePixel(set, a, b, x, y);
+        }
+    }
+    return static_cast<double>(different) <= kMayDiffer * static_cast<double>(compared);
+}
+
+}  // namespace
+
+PageSet PageSet::distinct() const {
+    if (pruned()) return *this;
+    std::vector<bool> kept(views().size(), true);
+    for (std::size_t i = 0; i < kept.size(); ++i)
+        for (std::size_t k = 0; k < i && kept[i]; ++k)
+            kept[i] = !kept[k] || views()[k].background != views()[i].background ||
+                      !sameCamera(views()[k].camera, views()[i].camera) ||
+                      !samePicture(*this, k, i);
+    return std::all_of(kept.begin(), kept.end(), [](bool k) { return k; }) ? *this : only(kept);
+}
+
+}  // namespace stx
