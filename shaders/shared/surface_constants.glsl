@@ -49,6 +49,9 @@ CONSTANT int kFarFromEdge = 4;
 // A surface is seen edge on by a source that has no more than this share of the area for it that the source
 // has that shows it. Background must be there so many of its pixels behind that surface, too.
 CONSTANT float kEdgeOn = 0.05f, kBehindTexel = 0.25f;
+// A source that sees a surface this many times as large as another knows better where it is. Of 121 random cases
+// 1.0, 1.5 and 2.0 raise the mean by 0.115, 0.120 and 0.106 dB; a truck loses 0.09, 0.08 and 0.01.
+CONSTANT float kSeesBetter = 2.0f;
 // A point this share of its depth in front of a surface is in front of it.
 CONSTANT float kClearlyBehind = 0.0002f;
 // And this share of the change of q over a pixel more, where the surface is steep.

@@ -45,8 +45,11 @@ vec2 slopeInside(int k, int i, int j) {
     return vec2(right - left, down - up) * (float(S) / float(max(S - 1, 1)));
 }
 
-// Whether more sources see past the point (x, y, q), which source `own` shows, than show it; (i, j)
-// is its sample. The flags are an argument of their own: the bits of a computed q mean nothing.
+// Whether the point (x, y, q), which source `own` shows, is left out; (i, j) is its sample. It is when
+// more sources see past it than show it. An extension is also when a source that looks less aside is
+// sure of what it shows closely behind and cannot tell the two apart: an extension of what turns away
+// is a guess.
+// The flags are an argument of their own: the bits of a computed q mean nothing.
 bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     bool nearEdge = (flags & kNearEdgeBit) != 0u;
     bool silhouette = false;  // beside background in its own source, not at an edge inside the object
@@ -62,14 +65,19 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     Facet facet = facetOf(self, x, y, q);
     int votes = 0, enough = kWholeVote * (nearEdge ? kVotesNearEdge : kVotesElsewhere);
     uint others = 0u;  // do not show it
-    float within = sameWithin(q);
+    uint closelyBehind = 0u;  // are sure of what they show there
+    bool guess = (flags & kExtensionBit) != 0u;
+    float within = sameWithin(q), close = kLinkedSamples * relativeScale(frameAxis(), q);
     for (int k = 0; k < int(tile.count); ++k) {
         if (k == own) continue;
         uint value = sampleOf(k, i, j);
-        if (value == 0u || !(abs(uintBitsToFloat(value) - q) < within)) {
+        float apart = q - uintBitsToFloat(value);
+        if (value == 0u || !(abs(apart) < within)) {
             others |= 1u << k;
+            if ((value & kSampleFlags) == 0u && apart > 0.0f && apart < close) closelyBehind |= 1u << k;
         } else if ((value & kExtensionBit) == 0u) {
             enough += kWholeVote;
+            guess = false;
         } else {
             // The rims of thin parts are extensions in all sources, which show them where they do not see
             // past them. Extensions inside the object are guesses, which support nothing.
@@ -78,8 +86,14 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
             if (vote == kNoVote && silhouette) enough += kWholeVote;
         }
     }
-    for (int k = 0; k < int(tile.count) && votes < enough; ++k)
-        if ((others >> k & 1u) != 0u) votes += voteOf(sourceOf(k), x, y, q, facet);
+    for (int k = 0; k < int(tile.count) && votes < enough; ++k) {
+        if ((others >> k & 1u) == 0u) continue;
+        int vote = voteOf(sourceOf(k), x, y, q, facet);
+        if (guess && vote == kNoVote && (closelyBehind >> k & 1u) != 0u && facet.any &&
+            sizeIn(sourceOf(k), facet, x, y, q) > kSeesBetter)
+            return true;
+        votes += vote;
+    }
     return votes >= enough;
 }
 

@@ -144,8 +144,20 @@ Facet facetOf(int s, float x, float y, float q) {
     Facet facet;
     facet.any = h.w > 0.0f && at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y);
     if (!facet.any) return facet;
-    ivec2 pixel = ivec2(min(int(at.x), size.x - 1), min(int(at.y), size.y - 1));
-    vec2 g = gradientAt(s, placeOf(s, pixel), 0, 0);
+    // An extension is beside the pixel that it extends.
+    ivec2 corner = ivec2(floor(at - 0.5f));
+    Place place = placeOf(s, corner);
+    vec2 g = vec2(0.0f, 0.0f);
+    float nearest = 3.0e38f;
+    for (int t = 0; t < 4; ++t) {
+        ivec2 c = corner + ivec2(t % 2, t / 2);
+        if (!inside(c, size) || !(qAt(s, place, t % 2, t / 2) > 0.0f)) continue;
+        vec2 apart = at - 0.5f - vec2(float(c.x), float(c.y));
+        float square = apart.x * apart.x + apart.y * apart.y;
+        if (!(square < nearest)) continue;
+        nearest = square;
+        g = gradientAt(s, place, t % 2, t / 2);
+    }
     facet.into = unwarpColumn(s, 2) * h.w;
     facet.along = unwarpColumn(s, 0) * h.w + facet.into * g.x;
     facet.across = unwarpColumn(s, 1) * h.w + facet.into * g.y;
@@ -154,18 +166,23 @@ Facet facetOf(int s, float x, float y, float q) {
     return facet;
 }
 
-// The vote of a source that votes on the point (x, y, q) of the frame, which is of this facet. Of a surface
-// that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it must see
-// past what is so far behind the point, too.
-int voteOnOutline(int s, Facet facet, float x, float y, float q, int vote) {
-    if (!facet.any) return vote;
+// How large a source sees a facet at the point (x, y, q), as a share of what the facet's own source sees.
+float sizeIn(int s, Facet facet, float x, float y, float q) {
     vec4 h = warp(s, x, y, q), a = warpChange(s, facet.along), b = warpChange(s, facet.across);
     float inverse = 1.0f / h.w;
     float u = h.x * inverse, v = h.y * inverse, texel = texelAt(s, h.z * inverse);
     float area = ((a.x - u * a.w) * (b.y - v * b.w) - (a.y - v * a.w) * (b.x - u * b.w)) * inverse * inverse;
-    if (!(abs(area) * texel * texel < kEdgeOn * facet.area)) return vote;
+    return abs(area) * texel * texel / facet.area;
+}
+
+// The vote of a source that votes on the point (x, y, q) of the frame, which is of this facet. Of a surface
+// that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it must see
+// past what is so far behind the point, too.
+int voteOnOutline(int s, Facet facet, float x, float y, float q, int vote) {
+    if (!facet.any || !(sizeIn(s, facet, x, y, q) < kEdgeOn)) return vote;
+    vec4 h = warp(s, x, y, q);
     bool outline;
-    float behind = kBehindTexel * texel * facet.perUnit;
+    float behind = kBehindTexel * texelAt(s, h.z / h.w) * facet.perUnit;
     return min(vote, voteAt(s, h - warpChange(s, facet.into) * behind, outline));
 }
 

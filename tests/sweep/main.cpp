@@ -33,14 +33,14 @@ std::optional<Measure> measureOf(const SweepRule& rule, Pictures& pictures) {
 }
 
 /// What a rule finds in a case; nothing when it holds. A few pixels at edges make one picture of
-/// some thousand pixels worse by half a decibel, and the next better: decibels are judged by the
-/// mean of eight pictures from places beside each other.
+/// some thousand pixels worse by half a decibel, and the next better: where the picture of a case
+/// is off by decibels, the mean of eight others from places beside it judges.
 std::optional<Measure> findingOf(const SweepRule& rule, Pictures& pictures) {
     auto finding = measureOf(rule, pictures);
     if (!finding || finding->found <= rule.allowed) return std::nullopt;
     if (std::string_view(rule.unit) != "dB") return finding;
-    double sum = finding->found;
-    int count = 1;
+    double sum = 0;
+    int count = 0;
     for (const SweepCase& beside : pictures.stage().from.besides()) {
         const auto stage = stageOf(beside);
         if (!stage) continue;
@@ -50,7 +50,8 @@ std::optional<Measure> findingOf(const SweepRule& rule, Pictures& pictures) {
         sum += measured->found;
         ++count;
     }
-    finding->what += fmt::format("; {:.2f} dB here, mean of {} pictures", finding->found, count);
+    if (count == 0) return finding;
+    finding->what += fmt::format("; {:.2f} dB here, mean of {} beside", finding->found, count);
     finding->found = sum / count;
     if (finding->found <= rule.allowed) return std::nullopt;
     return finding;

@@ -118,6 +118,10 @@ struct SampleFuser {
         // Who does not show it: sources that show something else, and those that show nothing.
         std::uint32_t others[kMostTileSources];
         std::uint32_t listed = 0;
+        std::uint32_t closelyBehind[kMostTileSources] = {};
+        PointMask guess = hn::And(asked, flagged(q, kExtensionBit));
+        const Points close =
+            hn::Mul(hn::Set(d, kLinkedSamples), tile.axis.inverse ? q : hn::Set(d, 1.0f));
         for (int i = 0; i < pixel.count; ++i) {
             const int k = pixel.owner[i];
             listed |= 1u << k;
@@ -125,9 +129,17 @@ struct SampleFuser {
             const PointMask theirs = hn::AndNot(isOwner(i), asked);
             const PointMask same = hn::And(hn::And(theirs, hn::Gt(value, hn::Zero(d))),
                                            hn::Lt(hn::Abs(hn::Sub(value, q)), within));
-            others[k] = lanesOf(hn::AndNot(same, theirs));
+            const PointMask apart = hn::AndNot(same, theirs);
+            others[k] = lanesOf(apart);
+            closelyBehind[k] =
+                lanesOf(hn::AndNot(flagged(value, kSampleFlags),
+                                   hn::And(hn::And(apart, guess),
+                                           hn::And(hn::Gt(hn::Sub(q, value), hn::Zero(d)),
+                                                   hn::And(hn::Gt(value, hn::Zero(d)),
+                                                           hn::Lt(hn::Sub(q, value), close))))));
             const PointMask extension = hn::And(same, flagged(value, kExtensionBit));
             PointMask supports = hn::AndNot(extension, same);
+            guess = hn::AndNot(supports, guess);
             if (!hn::AllFalse(d, extension)) {
                 const Counts vote =
                     votesOf(votes, VotingSource(votes.at(k)), k, points, facets, extension);
@@ -145,21 +157,41 @@ struct SampleFuser {
             most =
                 hn::Add(most, hn::IfThenElseZero(asCounts(maskOf(others[pixel.owner[i]])), each));
         std::uint32_t open = lanesOf(asked);
+        std::uint32_t replaced = 0, waits[kMostTileSources + 1] = {};
+        for (int k = count - 1; k >= 0; --k) {
+            closelyBehind[k] &= lanesOf(guess);
+            waits[k] = waits[k + 1] | closelyBehind[k];
+        }
         for (int k = 0; k < count; ++k) {
-            // Those that have enough, and those that cannot have it any more, need no other.
-            open &= lanesOf(hn::RebindMask(d, hn::Gt(enough, against))) &
-                    ~lanesOf(hn::RebindMask(d, hn::Gt(enough, hn::Add(against, most))));
+            // Those that have enough need no other, nor those that cannot have it any more, unless
+            // what is closely behind them may replace them.
+            open &=
+                lanesOf(hn::RebindMask(d, hn::Gt(enough, against))) &
+                (~lanesOf(hn::RebindMask(d, hn::Gt(enough, hn::Add(against, most)))) | waits[k]);
             if (!open) break;
             const bool lists = listed >> k & 1u;
             const PointMask other = lists ? maskOf(others[k]) : asked;
             most = hn::Sub(most, hn::IfThenElseZero(asCounts(other), each));
             const std::uint32_t asks = lists ? others[k] & open : open;
             if (!asks) continue;
-            against = hn::Add(against, votesOf(votes, VotingSource(votes.at(k)), k, points, facets,
-                                               maskOf(asks)));
+            const Counts vote =
+                votesOf(votes, VotingSource(votes.at(k)), k, points, facets, maskOf(asks));
+            against = hn::Add(against, vote);
+            const std::uint32_t none = lanesOf(hn::RebindMask(d, hn::Eq(vote, hn::Zero(di))));
+            for (std::uint32_t left = none & closelyBehind[k] & asks; left; left &= left - 1) {
+                const int l = std::countr_zero(left);
+                alignas(64) float px[kMostPoints], py[kMostPoints], pq[kMostPoints];
+                hn::Store(x, d, px);
+                hn::Store(y, d, py);
+                hn::Store(q, d, pq);
+                const auto& facet = facets.at(votes, l, px[l], py[l], pq[l]);
+                if (facet.any && votes.sizeIn(k, facet, px[l], py[l], pq[l]) > kSeesBetter)
+                    replaced |= 1u << l;
+            }
+            open &= ~replaced;
         }
         const PointMask few = hn::RebindMask(d, hn::Gt(enough, against));
-        return hn::Or(out, hn::AndNot(few, asked));
+        return hn::Or(hn::Or(out, maskOf(replaced)), hn::AndNot(few, asked));
     }
 
     /// agreed() of the shared code.
