@@ -22,6 +22,11 @@ CONSTANT float kLeafGrow = 0.06f;
 CONSTANT float kHalfBesideBackground = 0.6f, kHalfInside = 0.5f;
 // The corners of an extension leave its pixel's q by no more.
 CONSTANT float kExtensionReach = 0.02f;
+// An extension beside background is drawn over what its source shows behind it (by kLinkedSamples), so that faces
+// that views see one by one meet at their edge. Not where its q changes by this share over its half side: there
+// what turns away ends sooner. Of 121 random cases 0.002, 0.006 and 0.02 raise the mean by 0.03, 0.04 and 0.04 dB,
+// the last with a torus 0.9 dB worse; over inner edges, too, spheres-miv loses 0.3 dB.
+CONSTANT float kExtensionCovers = 0.006f;
 
 // Fusing them.
 // Surfaces closer than this share of their depth are one.
@@ -62,6 +67,8 @@ CONSTANT int kVotesNearEdge = 1, kVotesElsewhere = 2;
 // Flags in the lowest bits of a sample's q, where they do not matter to its value: beyond the
 // source's own mesh; from within two pixels of an edge.
 CONSTANT uint kExtensionBit = 1u, kNearEdgeBit = 2u, kSampleFlags = 3u;
+// Beside them, of polygons: they are drawn over what is behind them, and not kept.
+CONSTANT uint kCoversBit = 4u;
 // Sources that one tile is built from, at most: the bits of a piece's `seenBy`.
 CONSTANT int kMostTileSources = 32;
 // Of them, so many are kept for sources of places that the others do not show: in 540 cases of tests/sweep

@@ -2,7 +2,9 @@
 // with vectors in lib/render/surface/cpu/raster.cpp; a test holds both against this. From outside:
 //   vec4 toSamples(x, y, q)      a position in the source as sample position and q, homogeneous
 //   int SIDE, float qLimit()     samples along a side of the tile, the largest q
-//   bool mayDraw(x, y)           whether a sample is free: extensions are drawn only there
+//   Axis frameAxis(), float relativeScale(Axis, q)  of the frame: see surface_votes.glsl
+//   bool mayDraw(x, y, behind)   whether a sample is free or holds less than `behind`: extensions are
+//                                drawn only there
 //   void raise(x, y, value)      makes a sample at least as near as `value`, bits of q and flags
 
 // Sample position, q and, in w, 1 = in front of the camera.
@@ -15,15 +17,17 @@ vec4 cornerAt(float x, float y, float q) {
 // Samples of the convex polygon with these edges (ex x + ey y + e0 >= 0), this plane of q and this
 // range, inside a box.
 void scan(vec4 ex, vec4 ey, vec4 e0, vec3 plane, float qMin, float qMax, vec2 low, vec2 high, uint flags) {
+    // What is behind it by so much is another surface.
+    float behind = (flags & kCoversBit) != 0u ? qMin - kLinkedSamples * relativeScale(frameAxis(), qMin) : 0.0f;
     vec2 from = max(low, vec2(0.0f)), to = min(high, vec2(float(SIDE - 1)));
     if (!(from.x <= to.x && from.y <= to.y) || !(qMin > 0.0f) || !(qMax <= qLimit())) return;
     ivec2 first = ivec2(ceil(from)), last = ivec2(floor(to));
     for (int y = first.y; y <= last.y; ++y) {
         for (int x = first.x; x <= last.x; ++x) {
             vec4 e = ex * float(x) + (ey * float(y) + e0);
-            if (min(min(e.x, e.y), min(e.z, e.w)) < 0.0f || !mayDraw(x, y)) continue;
+            if (min(min(e.x, e.y), min(e.z, e.w)) < 0.0f || !mayDraw(x, y, behind)) continue;
             float q = clamp(plane.x * float(x) + (plane.y * float(y) + plane.z), qMin, qMax);
-            raise(x, y, (floatBitsToUint(q) & ~kSampleFlags) | flags);
+            raise(x, y, (floatBitsToUint(q) & ~kSampleFlags) | (flags & kSampleFlags));
         }
     }
 }
@@ -81,9 +85,10 @@ void drawLeaf(float x, float y, float size, float q0, float qx, float qy) {
 void drawExtension(float x, float y, float q, float gx, float gy, float scale, bool besideBackground) {
     float side = besideBackground ? kHalfBesideBackground : kHalfInside;
     float reach = kExtensionReach * scale;
+    bool covers = besideBackground && (abs(gx) + abs(gy)) * side < kExtensionCovers * scale;
     float plus = clamp(gx * side + gy * side, -reach, reach);
     float minus = clamp(gx * side - gy * side, -reach, reach);
     fillQuad(cornerAt(x - side, y - side, q - plus), cornerAt(x + side, y - side, q + minus),
              cornerAt(x + side, y + side, q + plus), cornerAt(x - side, y + side, q - minus), kCrack,
-             kExtensionBit | kNearEdgeBit);
+             kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u));
 }

@@ -19,10 +19,10 @@ vec4 toSamples(float x, float y, float q) {
 }
 float qLimit() { return frame.axis.z; }
 uint sampleNumber(int x, int y) { return slot * uint(SIDE * SIDE) + uint(y * SIDE + x); }
-bool mayDraw(int x, int y) {
+bool mayDraw(int x, int y, float behind) {
 #if EXTEND
     uint old = samples[sampleNumber(x, y)];
-    return old == 0u || (old & kExtensionBit) != 0u;
+    return old == 0u || (old & kExtensionBit) != 0u || uintBitsToFloat(old) < behind;
 #else
     return true;
 #endif

@@ -35,7 +35,7 @@ TEST_P(PlannedBlocks, AreAllThatShowInATile) {
                 warpFrom(frame.sampleFromPixel(tile, effort.samplesPerPixel) * f.pixelFromSource);
             const auto draw = [&](std::span<const std::uint32_t> some,
                                   std::vector<float>& samples) {
-                if (!rasteriseSource(*f.source, warp, some, grid, frame.qLimit(), samples.data()))
+                if (!rasteriseSource(*f.source, warp, some, grid, frame.space.axis, samples.data()))
                     std::fill(samples.begin(), samples.end(), 0.0f);
             };
             draw(f.blocksOf(tile), listed);
@@ -74,7 +74,7 @@ TEST(TurnedAwayBlocks, DrawNothing) {
                     away += behind.size();
                     blocks += f.blocksOf(tile).size();
                     const Warp warp = warpFrom(frame.sampleFromPixel(tile, 2) * f.pixelFromSource);
-                    ASSERT_FALSE(rasteriseSource(*f.source, warp, behind, grid, frame.qLimit(),
+                    ASSERT_FALSE(rasteriseSource(*f.source, warp, behind, grid, frame.space.axis,
                                                  samples.data()))
                         << "source " << f.source->number << ", tile " << tile;
                 }
@@ -145,7 +145,8 @@ TEST_P(PlannedBlocks, AreOfViewsThatShowAllThatAnyShows) {
                 for (const std::uint32_t block : f.blocksOf(tile))
                     if (!f.turnedAway[block]) facing.push_back(block);
                 const Warp warp = warpFrom(frame.sampleFromPixel(tile, 1) * f.pixelFromSource);
-                if (!rasteriseSource(*f.source, warp, facing, grid, frame.qLimit(), samples.data()))
+                if (!rasteriseSource(*f.source, warp, facing, grid, frame.space.axis,
+                                     samples.data()))
                     continue;
                 const bool isChosen =
                     std::find(some.begin(), some.end(), static_cast<int>(k)) != some.end();

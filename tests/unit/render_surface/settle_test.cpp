@@ -36,7 +36,7 @@ struct DrawnTile {
             if (middles) needs.of = middles->drawnIn[k];
             const glm::dmat4 map =
                 f.sampleFromPixel(tile, grid.perPixel, grid.apron) * s.pixelFromSource;
-            const bool drawn = rasteriseSource(*s.source, warpFrom(map), blocks, grid, f.qLimit(),
+            const bool drawn = rasteriseSource(*s.source, warpFrom(map), blocks, grid, f.space.axis,
                                                samples.back().data(), needs);
             sources.push_back({s.source, s.sourceFromPixel, nullptr});
             if (drawn) sources.back().samples = samples.back().data();

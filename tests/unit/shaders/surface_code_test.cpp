@@ -26,6 +26,7 @@ constexpr int kSources = 4, kFrame = 64, kPerPixel = 3;
 
 struct ScalarRaster {
     const Warp& samplesFromSource;
+    const DepthAxis& axis;  ///< of the frame
     int S = kPerPixel, SIDE = kTile * kPerPixel;
     bool extend = false;
     std::vector<uint> samples = std::vector<uint>(static_cast<std::size_t>(SIDE) * SIDE, 0u);
@@ -33,12 +34,17 @@ struct ScalarRaster {
     [[nodiscard]] vec4 toSamples(float x, float y, float q) const {
         return samplesFromSource.homogeneous(x, y, q);
     }
-    [[nodiscard]] static float qLimit() { return std::numeric_limits<float>::max(); }
+    [[nodiscard]] float qLimit() const { return axis.nearest(); }
+    [[nodiscard]] const DepthAxis& frameAxis() const { return axis; }
+    [[nodiscard]] static float relativeScale(const DepthAxis& a, float q) {
+        return a.relativeScale(q);
+    }
     [[nodiscard]] uint& sample(int x, int y) {
         return samples[static_cast<std::size_t>(y) * SIDE + x];
     }
-    [[nodiscard]] bool mayDraw(int x, int y) {
-        return !extend || sample(x, y) == 0 || (sample(x, y) & kExtensionBit);
+    [[nodiscard]] bool mayDraw(int x, int y, float behind) {
+        return !extend || sample(x, y) == 0 || (sample(x, y) & kExtensionBit) ||
+               uintBitsToFloat(sample(x, y)) < behind;
     }
     void raise(int x, int y, uint value) { sample(x, y) = std::max(sample(x, y), value); }
 
@@ -191,8 +197,8 @@ struct Inputs {
             for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b] = static_cast<uint>(b);
             samples.emplace_back(grid.count());
             // What was never written is 0, nothing.
-            (void)rasteriseSource(s, sampleWarps.back(), blocks, grid,
-                                  std::numeric_limits<float>::max(), samples.back().data());
+            (void)rasteriseSource(s, sampleWarps.back(), blocks, grid, space.axis,
+                                  samples.back().data());
         }
         for (std::size_t i = 0; i < sources().size(); ++i)
             locals.push_back({&sources()[i], warps[i], samples[i].data(), unwarps[i]});
@@ -270,7 +276,7 @@ std::vector<uint> samplesOf(const Inputs& in, std::size_t source) {
 }
 
 std::vector<uint> scalarSamples(const Inputs& in, std::size_t source) {
-    ScalarRaster scalar{in.sampleWarps[source]};
+    ScalarRaster scalar{in.sampleWarps[source], in.space.axis};
     scalar.drawAll(in.sources()[source]);
     return scalar.samples;
 }

@@ -84,7 +84,6 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
         local.push_back({f.source, f.sourceFromPixel, nullptr, f.pixelFromSource});
         shade.push_back({f.source, f.sourceFromPixel, f.fromEye});
     }
-    const float qLimit = frame.qLimit();
     // The blocks of each source that may show, one source after another, and where each is drawn.
     static thread_local std::vector<std::uint32_t> facing;
     static thread_local std::vector<std::size_t> facingEnd;
@@ -117,7 +116,7 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
             first = facingEnd[k];
             const bool drawn =
                 rasteriseSource(*f.source, warpFrom(sampleFromPixel * f.pixelFromSource), blocks,
-                                each, qLimit, mine, own);
+                                each, space.axis, mine, own);
             local[k].samples = drawn ? mine : nullptr;
         }
     };

@@ -41,6 +41,7 @@ struct Target {
     std::size_t count;
     int side, stride;
     float qLimit;
+    bool inverse;     ///< DepthAxis::inverse of the frame
     Squares squares;  ///< that are asked for
     float squaresPerSample;
     float edgeGrow;     ///< by which what is near an edge of its source is larger, samples
@@ -104,6 +105,7 @@ struct Filling {
     alignas(64) float px[kLanes], py[kLanes], p0[kLanes], low[kLanes], high[kLanes];
     alignas(64) float ex[4][kLanes], ey[4][kLanes], e0[4][kLanes];
     alignas(64) std::uint32_t flags[kLanes];
+    alignas(64) float behind[kLanes];
 };
 
 template <bool kExtend>
@@ -140,14 +142,16 @@ HWY_INLINE void fillPolygon(const Target& t, const Filling& f, int l) {
                 const Bits oldBits = hn::BitCast(du, old);
                 const auto extension = hn::MaskFromVec(hn::BitCast(
                     d, hn::VecFromMask(du, hn::TestBit(oldBits, hn::Set(du, kExtensionBit)))));
-                mask = hn::And(mask, hn::Or(hn::Eq(old, zero), extension));
+                const auto behind = hn::Lt(old, hn::Set(d, f.behind[l]));
+                mask = hn::And(mask, hn::Or(hn::Or(hn::Eq(old, zero), behind), extension));
             }
             hn::StoreU(hn::IfThenElse(mask, q, old), d, out);
         }
     }
 }
 
-/// Draws polygons. With kExtend only samples that no mesh holds are written.
+/// Draws polygons. With kExtend only samples that no mesh holds are written, and with kCoversBit
+/// those of meshes behind.
 template <bool kExtend>
 HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
     const FloatTag d;
@@ -196,13 +200,23 @@ HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
         e0[i] = hn::MulSub(p.grow, hn::Add(hn::Abs(ex[i]), hn::Abs(ey[i])), from);
     }
 
+    const Bits flags = hn::And(p.flags, hn::Set(du, std::uint32_t{kSampleFlags}));
+    Floats limit = zero;
+    if (kExtend) {
+        const auto covers = hn::RebindMask(
+            d, hn::Ne(hn::And(p.flags, hn::Set(du, std::uint32_t{kCoversBit})), hn::Zero(du)));
+        const Floats apart = hn::Set(d, kLinkedSamples);
+        limit = hn::IfThenElseZero(covers, hn::Sub(low, t.inverse ? hn::Mul(apart, low) : apart));
+    }
+
     // Of up to 2x2 samples: each of them in all polygons at once.
     const FloatMask small =
         hn::And(mask, hn::And(hn::Le(hn::Sub(x1, x0), one), hn::Le(hn::Sub(y1, y0), one)));
     if (!hn::AllFalse(d, small)) {
         const hn::RebindToSigned<FloatTag> di;
-        alignas(64) float values[kLanes];
+        alignas(64) float values[kLanes], behind[kLanes];
         alignas(64) std::int32_t places[kLanes];
+        hn::Store(limit, d, behind);
         const Floats clean = hn::BitCast(d, hn::Set(du, ~std::uint32_t{kSampleFlags}));
         for (int k = 0; k < 4; ++k) {
             const Floats x = k & 1 ? hn::Add(x0, one) : x0, y = k & 2 ? hn::Add(y0, one) : y0;
@@ -214,13 +228,14 @@ HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
             if (!left) continue;
             Floats q = hn::MulAdd(px, x, hn::MulAdd(py, y, p0));
             q = hn::Min(hn::Max(q, low), high);
-            hn::Store(hn::Or(hn::And(q, clean), hn::BitCast(d, p.flags)), d, values);
+            hn::Store(hn::Or(hn::And(q, clean), hn::BitCast(d, flags)), d, values);
             const auto place = hn::MulAdd(y, hn::Set(d, static_cast<float>(t.stride)), x);
             hn::Store(hn::ConvertTo(di, place), di, places);
             for (; left; left &= left - 1) {
                 const int l = std::countr_zero(left);
                 float& old = t.samples[places[l]];
-                if (kExtend && old != 0.0f && !(std::bit_cast<std::uint32_t>(old) & kExtensionBit))
+                if (kExtend && old != 0.0f && !(old < behind[l]) &&
+                    !(std::bit_cast<std::uint32_t>(old) & kExtensionBit))
                     continue;
                 old = std::max(old, values[l]);
             }
@@ -229,6 +244,7 @@ HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
     std::uint32_t large = bitsOf(hn::AndNot(small, mask));
     if (!large) return;
     Filling f;
+    hn::Store(limit, d, f.behind);
     hn::Store(x0, d, f.x0);
     hn::Store(y0, d, f.y0);
     hn::Store(x1, d, f.x1);
@@ -243,7 +259,7 @@ HWY_INLINE void drawPolygons(Target& t, const Polygons& p, Extent& extent) {
         hn::Store(ey[i], d, f.ey[i]);
         hn::Store(e0[i], d, f.e0[i]);
     }
-    hn::Store(p.flags, du, f.flags);
+    hn::Store(flags, du, f.flags);
     for (; large; large &= large - 1) {
         const int l = std::countr_zero(large);
         if (t.squares == kAllSquares ||

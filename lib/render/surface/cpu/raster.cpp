@@ -259,6 +259,7 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
     const Projection projection{warp};
     alignas(64) float xs[kLanes] = {}, ys[kLanes] = {}, qs[kLanes] = {}, halves[kLanes] = {};
     alignas(64) float gx[kLanes] = {}, gy[kLanes] = {}, reaches[kLanes] = {};
+    alignas(64) std::uint32_t flags[kLanes] = {};
     int count = 0;
     const auto flush = [&]() HWY_ATTR {
         const Floats x = hn::Load(d, xs), y = hn::Load(d, ys), q = hn::Load(d, qs);
@@ -267,7 +268,7 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
         Polygons p;
         p.there = hn::FirstN(d, static_cast<std::size_t>(count));
         p.grow = hn::Set(d, t.edgeGrow);
-        p.flags = hn::Set(BitTag(), std::uint32_t{kExtensionBit | kNearEdgeBit});
+        p.flags = hn::LoadU(BitTag(), flags);
         const Floats left = hn::Sub(x, half), right = hn::Add(x, half);
         const Floats top = hn::Sub(y, half), bottom = hn::Add(y, half);
         const auto on = [&](Floats change) HWY_ATTR {
@@ -288,8 +289,8 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
             const int x = x0 + i, y = y0 + j;
             const float* at = texels.q + texels.at(i, j);
             const std::uint8_t* info = texels.info + texels.at(i, j);
-            const float half =
-                (*info & Info::kBesideBackground) ? kHalfBesideBackground : kHalfInside;
+            const bool outside = *info & Info::kBesideBackground;
+            const float half = outside ? kHalfBesideBackground : kHalfInside;
             const glm::vec2 g = gradientFrom(at, info, 1, texels.stride, x > 0, y > 0) * half;
             xs[count] = static_cast<float>(x) + 0.5f;
             ys[count] = static_cast<float>(y) + 0.5f;
@@ -297,7 +298,10 @@ HWY_NOINLINE void drawExtensions(Target& t, const Source& s, const Warp& warp,
             halves[count] = half;
             gx[count] = g.x;
             gy[count] = g.y;
-            reaches[count] = kExtensionReach * s.space.axis.stepScale(*at);
+            const float scale = s.space.axis.stepScale(*at);
+            reaches[count] = kExtensionReach * scale;
+            const bool covers = outside && std::abs(g.x) + std::abs(g.y) < kExtensionCovers * scale;
+            flags[count] = kExtensionBit | kNearEdgeBit | (covers ? kCoversBit : 0u);
             if (++count == n) flush();
         }
     }
@@ -321,13 +325,14 @@ HWY_INLINE Squares squaresAround(const Target& t, const Extent& extent) {
 }
 
 bool RasteriseSource(const Source& s, const Warp& warp, std::span<const std::uint32_t> blocks,
-                     const SampleGrid& grid, float qLimit, float* samples,
+                     const SampleGrid& grid, const DepthAxis& axis, float* samples,
                      const RasterNeeds& needs) {
     Target t{samples,
              grid.count(),
              grid.side(),
              grid.stride(),
-             qLimit,
+             axis.nearest(),
+             axis.inverse,
              needs.squares,
              1.0f / static_cast<float>(kSquare * grid.perPixel),
              needs.reachFromEdges ? 0.5f : kCrack};
@@ -380,9 +385,9 @@ namespace stx::surface {
 HWY_EXPORT(RasteriseSource);
 
 bool rasteriseSource(const Source& source, const Warp& sampleFromSource,
-                     std::span<const std::uint32_t> blocks, const SampleGrid& grid, float qLimit,
-                     float* samples, const RasterNeeds& needs) {
-    return HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, qLimit,
+                     std::span<const std::uint32_t> blocks, const SampleGrid& grid,
+                     const DepthAxis& axis, float* samples, const RasterNeeds& needs) {
+    return HWY_DYNAMIC_DISPATCH(RasteriseSource)(source, sampleFromSource, blocks, grid, axis,
                                                  samples, needs);
 }
 

@@ -43,10 +43,12 @@ struct RasterNeeds {
 
 /// Draws blocks of one source as a surface into a tile: the nearest q at each sample, 0 where the
 /// source has nothing, with kSampleFlags in its lowest bits. Surfaces seen from behind are left
-/// out. `sampleFromSource` maps source pixel positions to sample indices; q beyond `qLimit` is cut
-/// off. False when nothing of it shows there: then `samples` are left as they were.
+/// out. `sampleFromSource` maps source pixel positions to sample indices; q beyond
+/// axis.nearest() is cut off; `axis` is that of the frame. False when nothing of it shows there:
+/// then `samples` are left as they were.
 [[nodiscard]] bool rasteriseSource(const Source& source, const Warp& sampleFromSource,
                                    std::span<const std::uint32_t> blocks, const SampleGrid& grid,
-                                   float qLimit, float* samples, const RasterNeeds& needs = {});
+                                   const DepthAxis& axis, float* samples,
+                                   const RasterNeeds& needs = {});
 
 }  // namespace stx::surface
