@@ -31,18 +31,23 @@ bool showsPlane(const ReferenceView& view, glm::dvec3 point, glm::dvec3 normal) 
     return true;
 }
 
-/// Whether a view has texels of a point of the scene.
+/// Whether a view has texels of a point of the scene: the middle of the pixel that it falls in shows
+/// the same surface, and it lies between the middles of pixels.
 bool samples(const Scene& scene, const Camera& camera, const Hit& hit) {
     const glm::dvec3 local = glm::dvec3(camera.cameraFromWorld() * glm::dvec4(hit.point, 1));
     if (!(local.z < 0)) return false;
     const glm::dvec3 at = camera.project(local);
-    if (!(at.x >= 0 && at.y >= 0 && at.x < camera.width && at.y < camera.height)) return false;
+    if (!(at.x >= 0.5 && at.y >= 0.5 && at.x < camera.width - 0.5 && at.y < camera.height - 0.5))
+        return false;
     // Steeper than this (84 degrees), a texel is more than ten times as deep as wide.
     constexpr double kHardlySampled = 0.1;
     if (-glm::dot(camera.viewDirection(at.x, at.y), hit.normal) < kHardlySampled) return false;
     const Hit first = scene.trace(camera, at.x, at.y);
-    return first.any() &&
-           glm::distance(first.point, hit.point) < 0.01 * camera.sampleSpacing(at.z).x;
+    if (!first.any() ||
+        !(glm::distance(first.point, hit.point) < 0.01 * camera.sampleSpacing(at.z).x))
+        return false;
+    return scene.trace(camera, std::floor(at.x) + 0.5, std::floor(at.y) + 0.5).surface ==
+           hit.surface;
 }
 
 }  // namespace

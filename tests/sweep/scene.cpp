@@ -84,11 +84,12 @@ Meeting meetCone(double radius, double half, glm::dvec3 from, glm::dvec3 directi
     const double b = from.x * direction.x + from.z * direction.z + k * k * h * direction.y;
     const double c = from.x * from.x + from.z * from.z - k * k * h * h;
     const double root = b * b - a * c;
-    if (root >= 0 && std::abs(a) > 1e-14) {
-        for (const double sign : {-1.0, 1.0}) {
-            const double t = (-b + sign * std::sqrt(root)) / a;
+    if (root >= 0) {
+        // So that a ray along the slope of the cone, whose a is 0, meets it once.
+        const double sum = -(b + std::copysign(std::sqrt(root), b));
+        for (const double t : {sum / a, c / sum}) {
             const glm::dvec3 p = from + direction * t;
-            if (t <= 0 || t >= out.t || std::abs(p.y) > half) continue;
+            if (!(t > 0 && t < out.t && std::abs(p.y) <= half)) continue;
             out = {t, glm::normalize(glm::dvec3(p.x, k * k * (half - p.y), p.z)), 0};
         }
     }

@@ -206,6 +206,34 @@ TEST(CoarseViews, FacesSeenEdgeOnAreNoFreeSpace) {
     }
 }
 
+// Its depth changes by some six pixels' sizes from row to row. Not linked each pixel was drawn
+// alone.
+TEST(CoarseViews, AFaceSeenAtAGrazingAngleIsOneSurface) {
+    Mesh mesh;
+    mesh.materials.emplace_back();
+    addBox(mesh, glm::vec3(0), {1, 0.01f, 1}, glm::vec3(0.5f));
+    const glm::dvec3 eye(0, 0.65, 4);
+    const Camera camera =
+        Camera::fromFieldOfView(eye, *lookAt(eye, {0, 0, 0}, {0, 1, 0}), {0.7, 0.7}, false, 64, 64);
+    Job job;
+    const auto bundle = captureBundle(mesh, {camera}, {}, job);
+    ASSERT_TRUE(bundle);
+    const PageSet set(*bundle);
+    const surface::SurfaceScene scene(set);
+    const surface::Source& s = scene.sources[0];
+    int pairs = 0, linked = 0;
+    for (int y = 0; y + 1 < s.height; ++y) {
+        for (int x = 0; x < s.width; ++x) {
+            if (!(s.q(x, y) > 0) || !(s.q(x, y + 1) > 0)) continue;
+            ++pairs;
+            linked += s.infoAt(s.placeOf(x, y), 0, 0) & surface::Info::kLinkDown ? 1 : 0;
+        }
+    }
+    EXPECT_GT(pairs, 150);
+    // Its lower edge is a row of others.
+    EXPECT_GE(linked, 0.8 * pairs);
+}
+
 // Of the faces that meet at an edge of a box each is shown by one view, whose outermost pixels end
 // up to half a pixel before it. Behind the gap is what the same view shows of the other box.
 TEST(CoarseViews, FacesThatViewsShowOneByOneMeet) {

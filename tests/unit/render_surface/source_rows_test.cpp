@@ -18,7 +18,7 @@ bool linked(const DepthAxis& axis, float codeStep, float a, float b, float c, fl
     const float step = c - b, size = std::abs(step), nearer = std::max(b, c);
     const float scale = axis.relativeScale(nearer);
     if (size < 0.005f * scale + 1.5f * codeStep * axis.qPerUnit(nearer)) return true;
-    if (size >= 0.03f * scale) return false;
+    if (size >= std::max(0.03f, 8 * axis.pixelShare()) * scale) return false;
     return (a > 0 && std::abs(step - (b - a)) < 0.5f * size) ||
            (d > 0 && std::abs(step - (d - c)) < 0.5f * size);
 }
@@ -41,7 +41,8 @@ TEST(SourceRows, LinksAreThoseOfTheDefinitionAtAnyWidth) {
         std::mt19937 random(5);
         for (int width = 1; width < 70; ++width) {
             for (const bool inverse : {true, false}) {
-                const DepthAxis axis{inverse, 0.0, 2.0};
+                DepthAxis axis{inverse, 0.0, 2.0};
+                axis.pixel = width % 3 == 0 ? 0.01 : 0.0;
                 const float step = width % 2 ? 0.001f : 0.0f;
                 const auto above = someRow(width, random), here = someRow(width, random),
                            below = someRow(width, random), second = someRow(width, random);
