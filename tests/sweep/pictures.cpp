@@ -31,8 +31,8 @@ bool showsPlane(const ReferenceView& view, glm::dvec3 point, glm::dvec3 normal) 
     return true;
 }
 
-/// Whether a view has texels of a point of the scene: the middle of the pixel that it falls in shows
-/// the same surface, and it lies between the middles of pixels.
+/// Whether a view has texels of a point of the scene: the middle of the pixel that it falls in
+/// shows the same surface, and it lies between the middles of pixels.
 bool samples(const Scene& scene, const Camera& camera, const Hit& hit) {
     const glm::dvec3 local = glm::dvec3(camera.cameraFromWorld() * glm::dvec4(hit.point, 1));
     if (!(local.z < 0)) return false;

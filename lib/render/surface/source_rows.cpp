@@ -17,9 +17,9 @@ namespace stx::surface {
 /// Neighbours whose q differ by less than this share of it are one surface; by more than the
 /// second, never; between them, when the slope goes on within this share of the step.
 inline constexpr float kLinkAlways = 0.005f, kLinkNever = 0.03f, kSameSlope = 0.5f;
-/// In coarse views, whose pixels are so large a share, not before so many pixels' sizes: a face seen
-/// at 83 degrees. Of 91 random cases 5, 8, 12 and 20 raise the mean by 0.085, 0.093, 0.074 and 0.078
-/// dB against 3; a room of 45 pixels from 24.5 to 37.7, a plate from 10 to 27.
+/// In coarse views, whose pixels are so large a share, not before so many pixels' sizes: a face
+/// seen at 83 degrees. Of 91 random cases 5, 8, 12 and 20 raise the mean by 0.085, 0.093, 0.074 and
+/// 0.078 dB against 3; a room of 45 pixels from 24.5 to 37.7, a plate from 10 to 27.
 inline constexpr float kLinkSteepest = 8.0f;
 /// Steps of the depth code that neighbours may differ by all the same: one, and rounding.
 inline constexpr float kLinkSteps = 1.5f;
@@ -99,8 +99,8 @@ struct Linker {
                                               hn::Mul(hn::Set(d, kLinkSteps * step), perUnit)));
         const float never = std::max(kLinkNever * static_cast<float>(axis.coarse),
                                      kLinkSteepest * axis.pixelShare());
-        const MF possible = hn::Lt(
-            size, axis.inverse ? hn::Mul(nearer, hn::Set(d, never)) : hn::Set(d, never));
+        const MF possible =
+            hn::Lt(size, axis.inverse ? hn::Mul(nearer, hn::Set(d, never)) : hn::Set(d, never));
         const VF agree = hn::Mul(hn::Set(d, kSameSlope), size);
         const MF goesOn =
             hn::Or(hn::And(hn::Gt(before, zero),
