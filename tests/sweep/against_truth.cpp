@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "lib/render/surface/source.hpp"
+#include "tests/noisy_depth.hpp"
 #include "tests/sweep/measures.hpp"
 #include "tests/sweep/random.hpp"
 
@@ -107,6 +108,20 @@ Outcome surfaceBelowSplats(Pictures& pictures) {
     STX_TRY(const Frame* splats, pictures.of(kSplat));
     const double a = pictures.psnr(*surface), b = pictures.psnr(*splats);
     return Measure{worseBy(a, b), fmt::format("surface {:.2f} dB, splat {:.2f} dB", a, b)};
+}
+
+Outcome noisySurfaceBelowSplats(Pictures& pictures) {
+    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+    constexpr std::array kShares{0.002, 0.005, 0.01};
+    const double share = kShares[std::size_t(pick(pictures, 311, int(kShares.size())))];
+    Bundle noisy = pictures.stage().bundle;
+    noisy::addNoise(noisy, share);
+    STX_TRY(const Frame surface, drawBundle(noisy, pictures.stage().novel, kNormal));
+    STX_TRY(const Frame splats, drawBundle(noisy, pictures.stage().novel, kSplat));
+    const double a = pictures.psnr(surface), b = pictures.psnr(splats);
+    return Measure{
+        worseBy(a, b),
+        fmt::format("noise of {:.1f} %: surface {:.2f} dB, splat {:.2f} dB", 100 * share, a, b)};
 }
 
 }  // namespace measures

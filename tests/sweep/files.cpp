@@ -97,7 +97,7 @@ Outcome prunedAtlas(Pictures& pictures) {
 
 Outcome clock(Pictures& pictures) {
     constexpr std::array kRates{24.0, 25.0, 29.5, 30000.0 / 1001, 30.0, 39.0, 60.0, 120.0};
-    constexpr std::array kStarts{0.0, 7.3, 0.1, 1234.5678, 1.3e9};
+    constexpr std::array kStarts{0.0, 7.3, 0.1, -1.0, 1234.5678, 1.3e9};
     constexpr std::array kNames{"a.mp4", "a.xmt", "a.bt", "a_%04d.exr"};
     const double rate = kRates[std::size_t(pick(pictures, 231, int(kRates.size())))];
     const double start = kStarts[std::size_t(pick(pictures, 232, int(kStarts.size())))];

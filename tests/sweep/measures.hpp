@@ -13,6 +13,7 @@ Outcome drawnWhereEmpty(Pictures& pictures);
 Outcome betterQualityCoversLess(Pictures& pictures);
 Outcome betterQualityIsWorse(Pictures& pictures);
 Outcome surfaceBelowSplats(Pictures& pictures);
+Outcome noisySurfaceBelowSplats(Pictures& pictures);
 
 Outcome exactDepthIsRepaired(Pictures& pictures);
 

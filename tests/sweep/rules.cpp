@@ -52,6 +52,8 @@ const std::vector<SweepRule>& rules() {
          measures::clock},
         {"unknown", "a view whose depth is not known everywhere makes no picture worse", 0.3, "dB",
          "", 0.5, measures::unknownDepth},
+        {"noisy", "noisy surfaces are not worse than noisy splats", 0.5, "dB", "as for exact depth",
+         0.2, measures::noisySurfaceBelowSplats},
     };
     return kRules;
 }
