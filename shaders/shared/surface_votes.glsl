@@ -133,6 +133,7 @@ struct Facet {
     vec4 along, across, into;
     float area;     // of the pixel, square scene units, if it faced the source
     float perUnit;  // how much q changes over a scene unit
+    float noise;    // how far off q may be
 };
 
 // The one that a source shows at the point (x, y, q) of the frame.
@@ -163,6 +164,7 @@ Facet facetOf(int s, float x, float y, float q) {
     facet.across = unwarpColumn(s, 1) * h.w + facet.into * g.y;
     facet.area = texelAt(s, p) * texelAt(s, p);
     facet.perUnit = qPerUnit(axisOf(s), p);
+    facet.noise = (clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p);
     return facet;
 }
 
@@ -179,10 +181,13 @@ float sizeIn(int s, Facet facet, float x, float y, float q) {
 // that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it must see
 // past what is so far behind the point, too.
 int voteOnOutline(int s, Facet facet, float x, float y, float q, int vote) {
-    if (!facet.any || !(sizeIn(s, facet, x, y, q) < kEdgeOn)) return vote;
+    if (!facet.any) return vote;
+    // Noise tilts facets, and puts points in front of them.
+    float off = kBehindNoises * facet.noise, tilt = off / (facet.perUnit * sqrt(facet.area));
+    if (!(sizeIn(s, facet, x, y, q) < kEdgeOn + tilt)) return vote;
     vec4 h = warp(s, x, y, q);
     bool outline;
-    float behind = kBehindTexel * texelAt(s, h.z / h.w) * facet.perUnit;
+    float behind = kBehindTexel * texelAt(s, h.z / h.w) * facet.perUnit + off;
     return min(vote, voteAt(s, h - warpChange(s, facet.into) * behind, outline));
 }
 

@@ -11,6 +11,7 @@
 #include "lib/render/mesh/mesh_renderer.hpp"
 #include "lib/render/renderer.hpp"
 #include "lib/render/surface/source.hpp"
+#include "tests/noisy_depth.hpp"
 
 namespace stx {
 namespace {
@@ -256,6 +257,30 @@ TEST(CoarseViews, FacesThatViewsShowOneByOneMeet) {
             blue += truth.colour.data()[i].r > 0.8f && frame->colour.data()[i].r < 0.5f;
         EXPECT_EQ(blue, 0) << "views of " << side;
     }
+}
+
+// The views of the horizon see the face edge on, and noise puts it in front of what they see.
+// Before that was allowed for they voted its border away.
+TEST(CoarseViews, ANoisyFaceKeepsItsBorder) {
+    Mesh mesh;
+    mesh.materials.emplace_back();
+    addBox(mesh, glm::vec3(0), {1, 0.05f, 1}, glm::vec3(0.5f));
+    Bundle bundle = viewsOf(mesh, "hemi-octahedral:3", 70, false);
+    noisy::addNoise(bundle, 0.002);
+    const Camera camera = cameraAt(mesh, 40, 100, 50);
+    Job job;
+    const Frame truth = *makeMeshRenderer(mesh, {}, job)->render(camera);
+    RenderSettings settings;
+    settings.fill = Fill::none;
+    const auto frame = (*makeRenderer(Backend::cpu, bundle, settings, -1, job))->render(camera);
+    ASSERT_TRUE(frame);
+    int solid = 0, open = 0;
+    for (std::size_t i = 0; i < truth.colour.count(); ++i) {
+        if (truth.colour.data()[i].a < 0.99f) continue;
+        ++solid;
+        open += frame->colour.data()[i].a < 0.5f;
+    }
+    EXPECT_LE(open, 0.02 * solid) << open << " of " << solid;
 }
 
 struct Close {
