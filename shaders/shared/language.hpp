@@ -4,8 +4,9 @@
 /// them. In C++ such a file is included into a struct, whose other members are what the shader has
 /// as globals; the struct lives in a namespace that says `using namespace stx::glsl`. Rules for
 /// those files: numbers end in f; no swizzles; vectors are built from numbers; structs are filled
-/// member by member; parameters that are written are OUT or INOUT; sums are in the order in which
-/// the processor has always added them, because its pictures must stay the same to the byte.
+/// member by member; structs that are parameters are IN, parameters that are written OUT or INOUT;
+/// sums are in the order in which the processor has always added them, because its pictures must
+/// stay the same to the byte.
 
 #include <bit>
 #include <cstdint>
@@ -14,6 +15,7 @@
 
 #define CONSTANT static constexpr
 #define INLINE inline
+#define IN(T) const T&
 #define OUT(T) T&
 #define INOUT(T) T&
 #define OUT_ARRAY(T, name, size) T(&name)[size]

@@ -90,7 +90,7 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         if ((others >> k & 1u) == 0u) continue;
         int vote = voteOf(sourceOf(k), x, y, q, facet);
         if (guess && vote == kNoVote && (closelyBehind >> k & 1u) != 0u && facet.any &&
-            sizeIn(sourceOf(k), facet, x, y, q) > kSeesBetter)
+            sizeIn(sourceOf(k), facet, warp(sourceOf(k), x, y, q)) > kSeesBetter)
             return true;
         votes += vote;
     }

@@ -133,7 +133,8 @@ struct Facet {
     vec4 along, across, into;
     float area;     // of the pixel, square scene units, if it faced the source
     float perUnit;  // how much q changes over a scene unit
-    float noise;    // how far off q may be
+    float off;      // how far in front of it noise may put a point of it
+    float edgeOn;   // seen this small or smaller, as a share of its own pixel, it is seen edge on
 };
 
 // The one that a source shows at the point (x, y, q) of the frame.
@@ -145,12 +146,15 @@ Facet facetOf(int s, float x, float y, float q) {
     Facet facet;
     facet.any = h.w > 0.0f && at.x >= 0.0f && at.y >= 0.0f && at.x < float(size.x) && at.y < float(size.y);
     if (!facet.any) return facet;
+    ivec2 pixel = ivec2(min(int(at.x), size.x - 1), min(int(at.y), size.y - 1));
+    Place own = placeOf(s, pixel);
+    bool shown = qAt(s, own, 0, 0) > 0.0f;
+    vec2 g = shown ? gradientAt(s, own, 0, 0) : vec2(0.0f, 0.0f);
     // An extension is beside the pixel that it extends.
     ivec2 corner = ivec2(floor(at - 0.5f));
     Place place = placeOf(s, corner);
-    vec2 g = vec2(0.0f, 0.0f);
     float nearest = 3.0e38f;
-    for (int t = 0; t < 4; ++t) {
+    for (int t = 0; t < 4 && !shown; ++t) {
         ivec2 c = corner + ivec2(t % 2, t / 2);
         if (!inside(c, size) || !(qAt(s, place, t % 2, t / 2) > 0.0f)) continue;
         vec2 apart = at - 0.5f - vec2(float(c.x), float(c.y));
@@ -162,15 +166,19 @@ Facet facetOf(int s, float x, float y, float q) {
     facet.into = unwarpColumn(s, 2) * h.w;
     facet.along = unwarpColumn(s, 0) * h.w + facet.into * g.x;
     facet.across = unwarpColumn(s, 1) * h.w + facet.into * g.y;
-    facet.area = texelAt(s, p) * texelAt(s, p);
+    float texel = texelAt(s, p);
+    facet.area = texel * texel;
     facet.perUnit = qPerUnit(axisOf(s), p);
-    facet.noise = (clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p);
+    // Noise tilts facets, and puts points in front of them.
+    facet.off = kBehindNoises * (clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p);
+    facet.edgeOn = kEdgeOn + facet.off / (facet.perUnit * texel);
     return facet;
 }
 
-// How large a source sees a facet at the point (x, y, q), as a share of what the facet's own source sees.
-float sizeIn(int s, Facet facet, float x, float y, float q) {
-    vec4 h = warp(s, x, y, q), a = warpChange(s, facet.along), b = warpChange(s, facet.across);
+// How large a source sees a facet at a point of the source, homogeneous, as a share of what the facet's own
+// source sees.
+float sizeIn(int s, IN(Facet) facet, vec4 h) {
+    vec4 a = warpChange(s, facet.along), b = warpChange(s, facet.across);
     float inverse = 1.0f / h.w;
     float u = h.x * inverse, v = h.y * inverse, texel = texelAt(s, h.z * inverse);
     float area = ((a.x - u * a.w) * (b.y - v * b.w) - (a.y - v * a.w) * (b.x - u * b.w)) * inverse * inverse;
@@ -180,19 +188,17 @@ float sizeIn(int s, Facet facet, float x, float y, float q) {
 // The vote of a source that votes on the point (x, y, q) of the frame, which is of this facet. Of a surface
 // that it sees edge on, all is outline, and where that is its pixels tell to a part of one only: it must see
 // past what is so far behind the point, too.
-int voteOnOutline(int s, Facet facet, float x, float y, float q, int vote) {
+int voteOnOutline(int s, IN(Facet) facet, float x, float y, float q, int vote) {
     if (!facet.any) return vote;
-    // Noise tilts facets, and puts points in front of them.
-    float off = kBehindNoises * facet.noise, tilt = off / (facet.perUnit * sqrt(facet.area));
-    if (!(sizeIn(s, facet, x, y, q) < kEdgeOn + tilt)) return vote;
     vec4 h = warp(s, x, y, q);
+    if (!(sizeIn(s, facet, h) < facet.edgeOn)) return vote;
     bool outline;
-    float behind = kBehindTexel * texelAt(s, h.z / h.w) * facet.perUnit + off;
+    float behind = kBehindTexel * texelAt(s, h.z / h.w) * facet.perUnit + facet.off;
     return min(vote, voteAt(s, h - warpChange(s, facet.into) * behind, outline));
 }
 
 // The vote of a source on the point (x, y, q) of the frame, which is of this facet.
-int voteOf(int s, float x, float y, float q, Facet facet) {
+int voteOf(int s, float x, float y, float q, IN(Facet) facet) {
     bool outline;
     int vote = voteAt(s, warp(s, x, y, q), outline);
     return vote == kNoVote || !outline ? vote : voteOnOutline(s, facet, x, y, q, vote);

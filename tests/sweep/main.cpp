@@ -37,7 +37,7 @@ std::optional<Measure> measureOf(const SweepRule& rule, Pictures& pictures) {
 /// is off by decibels, the mean of eight others from places beside it judges.
 std::optional<Measure> findingOf(const SweepRule& rule, Pictures& pictures) {
     auto finding = measureOf(rule, pictures);
-    if (!finding || finding->found <= rule.allowed) return std::nullopt;
+    if (!finding || finding->amount() <= rule.allowed) return std::nullopt;
     if (std::string_view(rule.unit) != "dB") return finding;
     double sum = 0;
     int count = 0;
@@ -53,7 +53,7 @@ std::optional<Measure> findingOf(const SweepRule& rule, Pictures& pictures) {
     if (count == 0) return finding;
     finding->what += fmt::format("; {:.2f} dB here, mean of {} beside", finding->found, count);
     finding->found = sum / count;
-    if (finding->found <= rule.allowed) return std::nullopt;
+    if (finding->amount() <= rule.allowed) return std::nullopt;
     return finding;
 }
 

@@ -14,7 +14,6 @@ Outcome betterQualityCoversLess(Pictures& pictures);
 Outcome betterQualityIsWorse(Pictures& pictures);
 Outcome surfaceBelowSplats(Pictures& pictures);
 Outcome noisySurfaceBelowSplats(Pictures& pictures);
-
 Outcome exactDepthIsRepaired(Pictures& pictures);
 
 // same_scene.cpp: the same scene, asked in another way.

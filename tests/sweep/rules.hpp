@@ -1,14 +1,19 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
 #include "tests/sweep/pictures.hpp"
 
-/// What a rule measured in a case. `found` must not be above `allowed`.
+/// What a rule measured in a case: `amount()` must not be above `allowed`.
 struct Measure {
     double found = 0;  ///< may be negative: by how much more than asked the rule holds
     std::string what;  ///< for people: what was compared, "normal 41.20 dB, splat 44.10 dB"
+    /// The two must agree: better is a fault as much as worse.
+    bool eitherWay = false;
+
+    [[nodiscard]] double amount() const { return eitherWay ? std::abs(found) : found; }
 };
 
 /// Something that must hold for every case.

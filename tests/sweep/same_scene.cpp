@@ -29,8 +29,8 @@ measures::Outcome worseThanBefore(Pictures& pictures, const Drawn& how, const Fr
 }
 
 /// Two pictures of which neither has a reason to be better. Sources that show a place equally well
-/// are chosen by tiles and in their order, so single pixels may differ; but the changed picture
-/// may not be farther from the truth.
+/// are chosen by tiles and in their order, so single pixels may differ; but one picture may not be
+/// farther from the truth than the other.
 Measure alike(const Pictures& pictures, const Drawn& how, const Frame& before, const Frame& changed,
               glm::ivec2 first = {0, 0}) {
     // Less than half a step of 8 bits: the order in which numbers are added.
@@ -39,7 +39,8 @@ Measure alike(const Pictures& pictures, const Drawn& how, const Frame& before, c
     const double psnrA = pictures.psnr(before, first), psnrB = pictures.psnr(changed, first);
     return {between >= kSame ? 0 : worseBy(psnrB, psnrA),
             fmt::format("{}: {:.2f} dB between the two, {:.2f} and {:.2f} dB from the truth",
-                        nameOf(how), between, psnrA, psnrB)};
+                        nameOf(how), between, psnrA, psnrB),
+            true};
 }
 
 /// A picture of the bundle after `change` of it and of the camera.

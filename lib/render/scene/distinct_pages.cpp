@@ -50,6 +50,7 @@ PageSet PageSet::distinct() const {
     for (std::size_t i = 0; i < kept.size(); ++i)
         for (std::size_t k = 0; k < i && kept[i]; ++k)
             kept[i] = !kept[k] || views()[k].background != views()[i].background ||
+                      views()[k].hasNormals != views()[i].hasNormals ||
                       !sameCamera(views()[k].camera, views()[i].camera) ||
                       !samePicture(*this, k, i);
     return std::all_of(kept.begin(), kept.end(), [](bool k) { return k; }) ? *this : only(kept);

@@ -61,7 +61,7 @@ struct Around {
     const Image<float>& q;
     int x, y;
 
-    /// Nothing where there is no point.
+    /// Empty where there is no point.
     [[nodiscard]] std::optional<float> at(int dx, int dy) const {
         if (!q.contains(x + dx, y + dy)) return std::nullopt;
         const float there = q.at(x + dx, y + dy);

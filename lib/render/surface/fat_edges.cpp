@@ -22,8 +22,8 @@ constexpr int kReach = 4;
 /// Squared distance of two colours (0..1 each) that tell surfaces apart.
 constexpr float kContrast = 3 * 0.04f * 0.04f;
 /// And of so many times what the colours of both differ by among themselves (the sum of their
-/// variances): a texture of few pixels is no evidence. With it the oak tree's exact edges have 0.75
-/// of their own colour, moved ones 0.52.
+/// variances): a texture whose spots are a few pixels looks like an edge. With it the oak tree's
+/// exact edges have 0.75 of their own colour, moved ones 0.52.
 constexpr float kContrastOfSpread = 2.0f;
 /// Rows and edges that are looked at in a view, about, and the fewest edges that tell.
 constexpr int kRows = 128;

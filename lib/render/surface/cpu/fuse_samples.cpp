@@ -122,6 +122,8 @@ struct SampleFuser {
         PointMask guess = hn::And(asked, flagged(q, kExtensionBit));
         const Points close =
             hn::Mul(hn::Set(d, kLinkedSamples), tile.axis.inverse ? q : hn::Set(d, 1.0f));
+        const Points farthest = hn::Max(hn::Sub(q, close), hn::Zero(d));
+        std::uint32_t mayGiveWay = 0;  // lanes that something is closely behind
         for (int i = 0; i < pixel.count; ++i) {
             const int k = pixel.owner[i];
             listed |= 1u << k;
@@ -131,12 +133,12 @@ struct SampleFuser {
                                            hn::Lt(hn::Abs(hn::Sub(value, q)), within));
             const PointMask apart = hn::AndNot(same, theirs);
             others[k] = lanesOf(apart);
-            closelyBehind[k] =
-                lanesOf(hn::AndNot(flagged(value, kSampleFlags),
-                                   hn::And(hn::And(apart, guess),
-                                           hn::And(hn::Gt(hn::Sub(q, value), hn::Zero(d)),
-                                                   hn::And(hn::Gt(value, hn::Zero(d)),
-                                                           hn::Lt(hn::Sub(q, value), close))))));
+            const PointMask near =
+                hn::And(hn::And(apart, guess), hn::And(hn::Lt(value, q), hn::Gt(value, farthest)));
+            if (!hn::AllFalse(d, near)) {
+                closelyBehind[k] = lanesOf(hn::AndNot(flagged(value, kSampleFlags), near));
+                mayGiveWay |= closelyBehind[k];
+            }
             const PointMask extension = hn::And(same, flagged(value, kExtensionBit));
             PointMask supports = hn::AndNot(extension, same);
             guess = hn::AndNot(supports, guess);
@@ -158,8 +160,9 @@ struct SampleFuser {
                 hn::Add(most, hn::IfThenElseZero(asCounts(maskOf(others[pixel.owner[i]])), each));
         std::uint32_t open = lanesOf(asked);
         std::uint32_t replaced = 0, waits[kMostTileSources + 1] = {};
-        for (int k = count - 1; k >= 0; --k) {
-            closelyBehind[k] &= lanesOf(guess);
+        mayGiveWay &= lanesOf(guess);
+        for (int k = count - 1; k >= 0 && mayGiveWay; --k) {
+            closelyBehind[k] &= mayGiveWay;
             waits[k] = waits[k + 1] | closelyBehind[k];
         }
         for (int k = 0; k < count; ++k) {
@@ -177,17 +180,16 @@ struct SampleFuser {
             const Counts vote =
                 votesOf(votes, VotingSource(votes.at(k)), k, points, facets, maskOf(asks));
             against = hn::Add(against, vote);
-            const std::uint32_t none = lanesOf(hn::RebindMask(d, hn::Eq(vote, hn::Zero(di))));
-            for (std::uint32_t left = none & closelyBehind[k] & asks; left; left &= left - 1) {
-                const int l = std::countr_zero(left);
-                alignas(64) float px[kMostPoints], py[kMostPoints], pq[kMostPoints];
-                hn::Store(x, d, px);
-                hn::Store(y, d, py);
-                hn::Store(q, d, pq);
-                const auto& facet = facets.at(votes, l, px[l], py[l], pq[l]);
-                if (facet.any && votes.sizeIn(k, facet, px[l], py[l], pq[l]) > kSeesBetter)
-                    replaced |= 1u << l;
-            }
+            const std::uint32_t maybe =
+                asks & closelyBehind[k] & lanesOf(hn::RebindMask(d, hn::Eq(vote, hn::Zero(di))));
+            if (!maybe) continue;
+            const auto seesBetter = [&](int l, float px, float py, float pq) {
+                const auto& facet = facets.at(votes, l, px, py, pq);
+                return facet.any && votes.sizeIn(k, facet, votes.warp(k, px, py, pq)) > kSeesBetter;
+            };
+            replaced |= lanesOf(hn::RebindMask(
+                d,
+                hn::Gt(withVotes(hn::Zero(di), x, y, q, maskOf(maybe), seesBetter), hn::Zero(di))));
             open &= ~replaced;
         }
         const PointMask few = hn::RebindMask(d, hn::Gt(enough, against));
