@@ -60,6 +60,17 @@ TEST(Creases, RunThroughThePixelsOfBothFaces) {
     }
 }
 
+// Both pixels bend, each by less than the whole turn.
+TEST(Creases, RunBetweenTheMiddlesOfPixels) {
+    for (const double edge : {17.5, 17.7, 17.9, 18.2}) {
+        const auto found =
+            creasesIn(viewOf([&](double x, double) { return 200 + 0.75 * std::abs(x - edge); }));
+        EXPECT_GE(found.size(), kRidgeSide) << edge;
+        for (const glm::ivec2 at : found)
+            EXPECT_LE(std::abs(at.x + 0.5 - edge), 0.5) << edge << ": " << at.x << ' ' << at.y;
+    }
+}
+
 TEST(Creases, AreNotWhereSurfacesTurnAwayOrJump) {
     const Bundle ball = viewOf([](double x, double y) -> std::optional<double> {
         const double left = 15 * 15 - std::pow(x - 20.2, 2) - std::pow(y - 19.9, 2);
