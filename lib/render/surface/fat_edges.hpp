@@ -29,7 +29,8 @@ struct EdgeView {
 [[nodiscard]] bool edgesAreFat(float colour);
 
 /// Takes a pixel off the surfaces in front, where stereo and filters of depth let them grow over
-/// what is behind, as long as edgesAreFat(). Pixels whose own colour is that of the
+/// what is behind, as long as edgesAreFat() and no other views deny it: of thin bars and fine
+/// textures a view alone cannot tell. Pixels whose own colour is that of the
 /// surface in front stay. A filter that gives each pixel the nearest depth around it moves slopes
 /// towards the camera, too: where the views agree clearly better on their surfaces then, every
 /// pixel gets the farthest depth around it instead. Gives by how many pixels; 0 = nothing was
