@@ -13,9 +13,9 @@
 #include "formats/images/codec_module.hpp"
 #include "formats/video/video_module.hpp"
 #include "lib/base/counted.hpp"
+#include "lib/base/cpu_device.hpp"
 #include "lib/base/parallel.hpp"
-#include "lib/render/cpu_device.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 
 namespace stx {
 namespace {

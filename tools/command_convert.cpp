@@ -11,7 +11,7 @@
 #include "formats/sequences.hpp"
 #include "formats/stx/mesh_views.hpp"
 #include "lib/capture/capture.hpp"
-#include "lib/render/finish/around.hpp"
+#include "lib/render/around/around.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
 #include "tools/environment_options.hpp"

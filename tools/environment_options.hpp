@@ -4,7 +4,7 @@
 #include <string>
 
 #include "lib/environment/environment.hpp"
-#include "lib/render/lighting.hpp"
+#include "lib/light/lighting.hpp"
 #include "tools/command_line.hpp"
 #include "tools/program.hpp"
 

@@ -14,7 +14,7 @@
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
 #include "lib/model/texture.hpp"
-#include "lib/render/frame.hpp"
+#include "lib/render/api/frame.hpp"
 
 namespace stx::tools {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "lib/render/lighting.hpp"
+#include "lib/light/lighting.hpp"
 
 namespace stx::tools {
 

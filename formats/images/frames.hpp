@@ -12,7 +12,7 @@
 
 #include "formats/files/files.hpp"
 #include "lib/geometry/camera.hpp"
-#include "lib/render/frame_picture.hpp"
+#include "lib/render/api/frame_picture.hpp"
 
 namespace stx {
 

@@ -5,7 +5,7 @@
 
 #include <glm/gtc/constants.hpp>
 
-#include "lib/render/finish/around.hpp"
+#include "lib/render/around/around.hpp"
 
 namespace stx::imagesets {
 

@@ -1,7 +1,8 @@
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
-#include "lib/render/finish/environment_behind.hpp"
+#include "lib/render/compose/environment_behind.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
 
 namespace stx {

@@ -45,7 +45,7 @@
 #include "lib/model/sequence.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "lib/surface/normals.hpp"
 
 namespace stx {

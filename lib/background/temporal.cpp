@@ -27,7 +27,7 @@ constexpr std::int64_t kRows = 8;
 constexpr float kFullAlpha = 0.999f;
 
 float alphaOf(const ReferenceView& frame, std::size_t pixel) {
-    return PageSet::alphaOf(frame.texture, pixel);
+    return frame.texture.alpha(pixel);
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 #include "lib/base/image.hpp"
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
+#include "lib/light/lighting.hpp"
 #include "lib/model/mesh.hpp"
-#include "lib/render/lighting.hpp"
 
 namespace stx {
 

@@ -51,6 +51,11 @@ class Texture {
         if (const auto* i = rgba8()) return glm::vec4(i->data()[pixel]) * (1.0f / 255.0f);
         return rgbaFloat()->data()[pixel];
     }
+    /// Its coverage, 0..1.
+    [[nodiscard]] float alpha(std::size_t pixel) const {
+        if (const auto* i = rgba8()) return i->data()[pixel].a * (1.0f / 255.0f);
+        return rgbaFloat()->data()[pixel].a;
+    }
 
     bool operator==(const Texture&) const = default;
 

@@ -1,4 +1,5 @@
 #include "lib/quality/capture_quality.hpp"
+#include "lib/render/factory.hpp"
 
 #include <algorithm>
 #include <map>

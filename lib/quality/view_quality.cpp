@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "lib/metrics/compare.hpp"
-#include "lib/render/frame_picture.hpp"
+#include "lib/render/api/frame_picture.hpp"
 
 namespace stx {
 namespace {

@@ -5,7 +5,7 @@
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
 #include "lib/model/texture.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 
 namespace stx {
 

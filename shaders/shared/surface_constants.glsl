@@ -1,4 +1,4 @@
-// The numbers that surface mode is tuned with: C++ has them by lib/render/surface/constants.hpp.
+// The numbers that surface mode is tuned with: C++ has them by lib/render/surface/prepare/constants.hpp.
 // Depths are in q (see DepthAxis), shares of q or of 1. Where no source is named the value was
 // chosen by measurement on the image sets and meshes of tests/bench/pictures.md.
 

@@ -1,5 +1,5 @@
 // The buffers of surface mode (std430, std140): what C++ writes and shaders read. C++ checks the
-// layout in lib/render/surface/structs.hpp.
+// layout in lib/render/surface/prepare/structs.hpp.
 
 // A source in one frame.
 struct SourceEntry {

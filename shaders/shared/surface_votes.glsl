@@ -30,7 +30,7 @@ bool inside(ivec2 at, ivec2 size) {
 }
 
 // Bilinear outline level at `t` (0..1) between the middles of the 2x2 pixels from `corner` on: see
-// lib/render/surface/outline_levels.hpp.
+// lib/render/surface/prepare/outline_levels.hpp.
 float levelAmong(int s, Place place, ivec2 corner, vec2 t) {
     ivec2 size = sizeOf(s);
     int i0 = corner.x < 0 ? 1 : 0, i1 = corner.x + 1 < size.x ? 1 : 0;

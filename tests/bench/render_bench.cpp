@@ -10,7 +10,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/bench/yardstick.hpp"
 
 namespace {

@@ -19,7 +19,7 @@
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/open.hpp"
 #include "formats/stx/stx.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/bench/yardstick.hpp"
 
 namespace {

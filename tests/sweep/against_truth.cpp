@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "lib/render/surface/source.hpp"
+#include "lib/render/surface/prepare/source.hpp"
 #include "tests/noisy_depth.hpp"
 #include "tests/sweep/measures.hpp"
 #include "tests/sweep/random.hpp"

@@ -1,4 +1,5 @@
 #include "tests/sweep/pictures.hpp"
+#include "lib/render/factory.hpp"
 
 using namespace stx;
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "tests/sweep/sweep_case.hpp"
 
 /// How a case is drawn.

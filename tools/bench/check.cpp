@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "lib/metrics/compare.hpp"
+#include "lib/render/api/frame_picture.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
-#include "lib/render/frame_picture.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/surface/normals.hpp"
 
 namespace stx {

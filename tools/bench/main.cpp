@@ -6,7 +6,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/bench.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tools/bench/check.hpp"
 
 namespace {

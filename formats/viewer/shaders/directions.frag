@@ -1,4 +1,4 @@
-// Which way the outline runs beside a pixel, from what is open around it: lib/render/finish/outlines.cpp.
+// Which way the outline runs beside a pixel, from what is open around it: lib/render/outline/outlines.cpp.
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D pictureTexture;

@@ -1,4 +1,4 @@
-// Each solid point, over the 3x3 pixels around it: lib/render/finish/outlines.cpp.
+// Each solid point, over the 3x3 pixels around it: lib/render/outline/outlines.cpp.
 #include "formats/viewer/shaders/points.glsl"
 uniform vec2 frameSize;
 

@@ -1,4 +1,4 @@
-// Closes single open pixels, as lib/render/finish/pinholes.cpp: what opens between two surfaces belongs to
+// Closes single open pixels, as lib/render/splat/pinholes.cpp: what opens between two surfaces belongs to
 // the one behind.
 precision highp float;
 precision highp sampler2D;

@@ -1,5 +1,5 @@
 // Gives the outline the coverage of what lies within its outermost points, or where these are too few that
-// which the views' alpha saw: lib/render/finish/outlines.cpp and silhouettes.cpp.
+// which the views' alpha saw: lib/render/outline/outlines.cpp and silhouettes.cpp.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

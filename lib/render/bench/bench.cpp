@@ -1,8 +1,8 @@
 #include "lib/render/bench/bench.hpp"
 
+#include "lib/base/cpu_device.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
-#include "lib/render/cpu_device.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 #include "lib/render/surface/cpu/cpu_surface.hpp"
 #ifdef STX_WITH_GPU

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "lib/base/job.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 
 namespace stx::gpu {
 
@@ -98,7 +98,7 @@ struct Faults {
 };
 void setFaultsForTests(const Faults& faults);
 
-/// listDevices() of lib/render/renderer.hpp; `tried` receives a clause for each failure.
+/// listDevices() of lib/render/api/renderer.hpp; `tried` receives a clause for each failure.
 [[nodiscard]] std::vector<Device> enumerateDevices(std::vector<std::string>& tried);
 
 }  // namespace stx::gpu

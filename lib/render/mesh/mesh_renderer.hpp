@@ -4,7 +4,7 @@
 
 #include "lib/base/job.hpp"
 #include "lib/model/mesh.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 
 namespace stx {
 

@@ -182,17 +182,13 @@ class PageSet {
     [[nodiscard]] float alpha(std::size_t view, int x, int y) const {
         const PageRectangle* r = find(view, x, y);
         if (!r) return objectOutside(view, x, y) ? 1.0f : 0.0f;
-        return alphaOf(*pages()[static_cast<std::size_t>(r->page)].texture, r->texel(x, y));
+        return pages()[static_cast<std::size_t>(r->page)].texture->alpha(r->texel(x, y));
     }
     /// Distance; kNoDepth where there is no point.
     [[nodiscard]] float depth(std::size_t view, int x, int y) const {
         const PageRectangle* r = find(view, x, y);
         return r ? pages()[static_cast<std::size_t>(r->page)].depth->data()[r->texel(x, y)]
                  : kNoDepth;
-    }
-    [[nodiscard]] static float alphaOf(const Texture& texture, std::size_t texel) {
-        if (const auto* bytes = texture.rgba8()) return bytes->data()[texel].a * (1.0f / 255.0f);
-        return texture.rgbaFloat()->data()[texel].a;
     }
     /// The texture of one view, as large as the view. Pixels that no rectangle shows are black;
     /// they have full alpha where objectOutside().

@@ -18,7 +18,7 @@ Image<std::uint8_t> translucentInside(const Texture& texture, const Image<float>
     Image<std::uint8_t> inside(w, h, std::uint8_t{0});
     const auto isTranslucent = [&](int x, int y) {
         const std::size_t texel = static_cast<std::size_t>(y) * w + x;
-        const float alpha = PageSet::alphaOf(texture, texel);
+        const float alpha = texture.alpha(texel);
         return alpha > 0.0f && alpha < 1.0f && hasPoint(depth.data()[texel]);
     };
     // Most pictures have no such pixel at all: this is a loop that compilers make vectors of.

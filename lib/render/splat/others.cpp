@@ -57,8 +57,7 @@ Samples samplesOf(const PageRectangle& r, const Page& page, const std::vector<Sl
         return static_cast<std::size_t>(r.pageY + y) * page.width() + r.pageX + x;
     };
     const auto isDrawn = [&](std::size_t texel) {
-        return hasPoint(page.depth->data()[texel]) &&
-               (b.opaque || PageSet::alphaOf(*page.texture, texel) > 0);
+        return hasPoint(page.depth->data()[texel]) && (b.opaque || page.texture->alpha(texel) > 0);
     };
     for (int y = y0; y < y1; ++y)
         for (int x = x0; x < x1; ++x)

@@ -4,8 +4,7 @@
 #include <cstdint>
 
 #include "lib/render/scene/page_set.hpp"
-#include "lib/render/splat/cpu/kernels.hpp"
-#include "lib/render/splat/prepared.hpp"
+#include "lib/render/splat/block_task.hpp"
 
 namespace stx::splat {
 

@@ -6,7 +6,7 @@
 
 #include <glm/glm.hpp>
 
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/splat/prepared.hpp"
 
 namespace stx {

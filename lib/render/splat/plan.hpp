@@ -4,12 +4,9 @@
 #include <vector>
 
 #include "lib/geometry/camera.hpp"
-#include "lib/render/splat/cpu/kernels.hpp"
+#include "lib/render/splat/block_task.hpp"
 
 namespace stx::splat {
-
-/// Where the pixels of `source` are in the picture of `novel`.
-[[nodiscard]] PixelMap pixelMap(const Camera& source, const Camera& novel);
 
 /// What to do for one block in one frame. False when nothing of it can be seen: it lies outside, or
 /// all of it faces away (only where `cullBackFaces`).

@@ -109,9 +109,7 @@ struct Window {
         return static_cast<std::size_t>(origin + y * stride + x);
     }
     [[nodiscard]] float depth(int x, int y) const { return page.depth->data()[texel(x, y)]; }
-    [[nodiscard]] float alpha(int x, int y) const {
-        return PageSet::alphaOf(*page.texture, texel(x, y));
-    }
+    [[nodiscard]] float alpha(int x, int y) const { return page.texture->alpha(texel(x, y)); }
 };
 
 glm::vec2 slopeFromDepth(const Window& w, int x, int y) {

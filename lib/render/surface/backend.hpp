@@ -4,7 +4,7 @@
 #include <string>
 
 #include "lib/base/job.hpp"
-#include "lib/render/surface/plan.hpp"
+#include "lib/render/surface/plan/plan.hpp"
 
 namespace stx::surface {
 

@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "lib/base/parallel.hpp"
-#include "lib/render/finish/behind.hpp"
-#include "lib/render/finish/fill.hpp"
-#include "lib/render/finish/round_outlines.hpp"
+#include "lib/render/compose/behind.hpp"
+#include "lib/render/outline/round_outlines.hpp"
 #include "lib/render/surface/backend.hpp"
+#include "lib/render/surface/fill/fill.hpp"
 #include "lib/render/surface/view_normals.hpp"
 #include "lib/surface/depth_gradient.hpp"
 

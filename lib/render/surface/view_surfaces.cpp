@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "lib/base/parallel.hpp"
-#include "lib/render/surface/cells.hpp"
+#include "lib/render/surface/prepare/cells.hpp"
 
 namespace stx {
 namespace {
@@ -143,8 +143,7 @@ class Maker {
         return s.whole->info.data()[pixel] >> 4;
     }
     [[nodiscard]] static bool shows(const Source& s, std::uint32_t pixel) {
-        return s.whole->q.data()[pixel] > 0 &&
-               PageSet::alphaOf(*s.whole->texture, pixel) >= kLeastAlpha;
+        return s.whole->q.data()[pixel] > 0 && s.whole->texture->alpha(pixel) >= kLeastAlpha;
     }
     [[nodiscard]] static bool sameDepth(const Source& s, std::uint32_t pixel, double dist) {
         const double there = s.space.axis.dist(s.whole->q.data()[pixel]);

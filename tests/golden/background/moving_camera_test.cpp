@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/background/sequence_background.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/golden/background/frames_of.hpp"
 #include "tests/moving_frames.hpp"
 #include "tests/shared_data.hpp"

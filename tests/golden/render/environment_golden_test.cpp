@@ -7,9 +7,9 @@
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
-#include "lib/render/finish/environment_behind.hpp"
+#include "lib/render/compose/environment_behind.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
-#include "lib/render/renderer.hpp"
 #include "tests/painted_environment.hpp"
 
 namespace stx {

@@ -9,8 +9,8 @@
 #include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
-#include "lib/render/renderer.hpp"
 #include "tests/shared_data.hpp"
 
 namespace stx {
@@ -156,7 +156,7 @@ Mesh texturedSphere() {
 }
 
 // The fit of colours blurs detail as fine as the pixels by as much as they were sharpened before
-// (see lib/render/surface/sharpen.hpp).
+// (see lib/render/surface/prepare/sharpen.hpp).
 TEST(Textures, StaySharpWhereTheyAreAsFineAsThePixels) {
     const auto psnr = psnrOf(texturedSphere());
     const std::array<double, 2> least{43.25, 43.35};

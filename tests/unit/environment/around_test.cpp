@@ -7,7 +7,8 @@
 #include "formats/images/frames.hpp"
 #include "formats/open.hpp"
 #include "lib/base/parallel.hpp"
-#include "lib/render/finish/around.hpp"
+#include "lib/render/around/around.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/painted_environment.hpp"
 #include "tests/temporary_folder.hpp"
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/model/texture.hpp"
-#include "lib/render/finish/environment_behind.hpp"
+#include "lib/render/compose/environment_behind.hpp"
 #include "tests/painted_environment.hpp"
 
 namespace stx {

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <glm/gtc/constants.hpp>
 
+#include "lib/light/lighting.hpp"
 #include "lib/model/texture.hpp"
-#include "lib/render/lighting.hpp"
 #include "tests/painted_environment.hpp"
 
 namespace stx {

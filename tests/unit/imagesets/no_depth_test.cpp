@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/naive_warp.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 

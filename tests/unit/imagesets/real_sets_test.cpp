@@ -16,7 +16,7 @@
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "lib/metrics/compare.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/naive_warp.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/temporary_folder.hpp"

@@ -8,7 +8,7 @@
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "lib/metrics/compare.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/shared_data.hpp"
 
 using namespace stx;

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "lib/metrics/compare.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 

@@ -8,7 +8,7 @@
 #include "formats/open.hpp"
 #include "lib/base/job.hpp"
 #include "lib/capture/capture.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/limits/peak_memory.hpp"

@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "lib/render/finish/behind.hpp"
+#include "lib/render/compose/behind.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "tests/wall_with_block.hpp"
 

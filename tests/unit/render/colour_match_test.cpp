@@ -10,7 +10,7 @@
 #include "lib/base/job.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "tests/noisy_depth.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lib/render/cpu_device.hpp"
+#include "lib/base/cpu_device.hpp"
 
 namespace stx {
 namespace {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/packing/packing.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "tests/torus_bundle.hpp"
 

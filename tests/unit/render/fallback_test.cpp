@@ -1,4 +1,4 @@
-#include "lib/render/fallback.hpp"
+#include "lib/render/compose/fallback.hpp"
 
 #include <gtest/gtest.h>
 

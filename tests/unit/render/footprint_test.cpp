@@ -1,4 +1,5 @@
-#include "lib/render/finish/footprint.hpp"
+#include "lib/render/compose/footprint.hpp"
+#include "lib/render/factory.hpp"
 
 #include <gtest/gtest.h>
 

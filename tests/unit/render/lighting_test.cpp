@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "lib/light/lighting.hpp"
 #include "lib/model/texture.hpp"
-#include "lib/render/lighting.hpp"
 
 namespace stx {
 namespace {

@@ -1,4 +1,4 @@
-#include "lib/render/finish/outlines.hpp"
+#include "lib/render/outline/outlines.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
-#include "lib/render/finish/round_outlines.hpp"
+#include "lib/render/outline/round_outlines.hpp"
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 
 namespace stx {

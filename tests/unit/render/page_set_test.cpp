@@ -5,7 +5,7 @@
 #include "lib/metrics/compare.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/surface/normals.hpp"
 #include "tests/torus_bundle.hpp"
 #include "tests/unit/surface/analytic.hpp"

@@ -1,4 +1,4 @@
-#include "lib/render/finish/silhouettes.hpp"
+#include "lib/render/outline/silhouettes.hpp"
 
 #include <gtest/gtest.h>
 

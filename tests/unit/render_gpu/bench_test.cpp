@@ -1,4 +1,5 @@
 #include "lib/render/bench/bench.hpp"
+#include "lib/render/factory.hpp"
 
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 

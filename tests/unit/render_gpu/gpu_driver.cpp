@@ -5,7 +5,7 @@
 
 #include <dlfcn.h>
 
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 
 namespace stx::test {
 namespace {

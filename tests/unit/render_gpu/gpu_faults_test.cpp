@@ -1,5 +1,6 @@
 // What goes wrong with devices: little memory, a reset, old drivers, small textures.
 
+#include "lib/render/factory.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 
 namespace stx {

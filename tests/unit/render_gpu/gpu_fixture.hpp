@@ -8,7 +8,7 @@
 
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/device/egl_context.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/unit/render_gpu/gpu_driver.hpp"
 
 namespace stx::test {

@@ -4,6 +4,7 @@
 
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/painted_environment.hpp"
 #include "tests/torus_bundle.hpp"
 #include "tests/unit/render_gpu/gpu_fixture.hpp"

@@ -1,4 +1,5 @@
 #include "lib/render/splat/gpu/gpu_splat.hpp"
+#include "lib/render/factory.hpp"
 
 #include "tests/unit/render_gpu/gpu_fixture.hpp"
 

@@ -201,7 +201,7 @@ std::vector<double> neededOf(const Bundle& bundle, const Camera& novel) {
         splat::RectangleImages source;
         source.fx = static_cast<float>(r.camera().fx);
         source.fy = static_cast<float>(r.camera().fy);
-        source.map = splat::pixelMap(r.camera(), novel);
+        source.map = pixelMap(r.camera(), novel);
         int needed = 0;
         for (const splat::BlockInfo& block : r.blocks) {
             splat::BlockTask task;

@@ -8,9 +8,9 @@
 
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/render/mesh/mesh_renderer.hpp"
-#include "lib/render/renderer.hpp"
-#include "lib/render/surface/source.hpp"
+#include "lib/render/surface/prepare/source.hpp"
 #include "tests/noisy_depth.hpp"
 
 namespace stx {

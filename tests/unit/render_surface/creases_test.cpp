@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lib/render/surface/source.hpp"
+#include "lib/render/surface/prepare/source.hpp"
 
 namespace stx::surface {
 namespace {

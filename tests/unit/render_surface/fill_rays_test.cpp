@@ -1,4 +1,4 @@
-#include "lib/render/finish/fill_rays.hpp"
+#include "lib/render/surface/fill/fill_rays.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lib/render/finish/fill_half.hpp"
+#include "lib/render/surface/fill/fill_half.hpp"
 
 namespace stx::surface {
 namespace {

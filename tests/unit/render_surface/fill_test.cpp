@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lib/render/finish/fill.hpp"
+#include "lib/render/surface/fill/fill.hpp"
 
 namespace stx::surface {
 namespace {

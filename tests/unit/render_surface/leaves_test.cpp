@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "lib/render/surface/draft.hpp"
+#include "lib/render/surface/prepare/draft.hpp"
 
 namespace stx::surface {
 namespace {

@@ -1,4 +1,4 @@
-#include "lib/render/surface/outline_levels.hpp"
+#include "lib/render/surface/prepare/outline_levels.hpp"
 
 #include <cmath>
 #include <random>
@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/geometry/cut_pixel.hpp"
-#include "lib/render/surface/constants.hpp"
+#include "lib/render/surface/prepare/constants.hpp"
 
 namespace stx::surface {
 namespace {

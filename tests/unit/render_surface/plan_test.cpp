@@ -1,4 +1,4 @@
-#include "lib/render/surface/plan.hpp"
+#include "lib/render/surface/plan/plan.hpp"
 
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/surface/cpu/raster.hpp"
-#include "lib/render/surface/placement.hpp"
+#include "lib/render/surface/plan/placement.hpp"
 
 namespace stx::surface {
 namespace {

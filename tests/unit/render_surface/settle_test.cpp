@@ -8,7 +8,7 @@
 
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/surface/cpu/fuse.hpp"
-#include "lib/render/surface/plan.hpp"
+#include "lib/render/surface/plan/plan.hpp"
 
 namespace stx::surface {
 namespace settle_test {

@@ -1,4 +1,4 @@
-#include "lib/render/surface/sharpen.hpp"
+#include "lib/render/surface/prepare/sharpen.hpp"
 
 #include <gtest/gtest.h>
 

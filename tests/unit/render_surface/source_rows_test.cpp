@@ -1,4 +1,4 @@
-#include "lib/render/surface/source_rows.hpp"
+#include "lib/render/surface/prepare/source_rows.hpp"
 
 #include <gtest/gtest.h>
 

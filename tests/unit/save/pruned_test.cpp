@@ -11,6 +11,7 @@
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
 #include "lib/quality/view_quality.hpp"
+#include "lib/render/factory.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/torus_bundle.hpp"
 

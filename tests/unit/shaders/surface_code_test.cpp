@@ -7,11 +7,11 @@
 #include <gtest/gtest.h>
 
 #include "lib/packing/packing.hpp"
-#include "lib/render/surface/cells.hpp"
 #include "lib/render/surface/cpu/fuse.hpp"
 #include "lib/render/surface/cpu/fuse_samples.hpp"
 #include "lib/render/surface/cpu/raster.hpp"
 #include "lib/render/surface/cpu/shade.hpp"
+#include "lib/render/surface/prepare/cells.hpp"
 
 #ifdef STX_WITH_GPU
 #include "lib/render/surface/gpu/surface_shaders.hpp"

@@ -8,10 +8,9 @@
 #define STX_SPLAT_LAND_INL_HPP
 #endif
 
-#include <limits>
-
 #include <hwy/highway.h>
 
+#include "lib/geometry/row_map-inl.hpp"
 #include "lib/render/splat/cpu/kernels.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -19,54 +18,18 @@ namespace stx::splat::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using DF = hn::CappedTag<float, kBlock>;
-using DI = hn::RebindToSigned<DF>;
+using stx::HWY_NAMESPACE::bitsOf;
+using stx::HWY_NAMESPACE::DF;
+using stx::HWY_NAMESPACE::DI;
+using stx::HWY_NAMESPACE::kInfinity;
+using stx::HWY_NAMESPACE::kRowPixels;
+using stx::HWY_NAMESPACE::loadDepth;
+using stx::HWY_NAMESPACE::RowMap;
+
+static_assert(kBlock == kRowPixels);
+
 using VF = hn::Vec<DF>;
 using VI = hn::Vec<DI>;
-
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-// A row of a block: H = (a + i au) z + (b + i bu) for its i-th pixel.
-struct RowMap {
-    float a[3], au[3], av[3], b[3], bu[3], bv[3];
-    RowMap(const PixelMap& m, int u, int v)
-        : map_(m),
-          a_(m.a0 + m.au * double(u) + m.av * double(v)),
-          b_(m.b0 + m.bu * double(u) + m.bv * double(v)) {
-        for (int k = 0; k < 3; ++k) {
-            au[k] = static_cast<float>(m.au[k]);
-            av[k] = static_cast<float>(m.av[k]);
-            bu[k] = static_cast<float>(m.bu[k]);
-            bv[k] = static_cast<float>(m.bv[k]);
-        }
-        round();
-    }
-    // Goes on to the row below.
-    void next() {
-        a_ += map_.av;
-        b_ += map_.bv;
-        round();
-    }
-
-  private:
-    void round() {
-        for (int k = 0; k < 3; ++k) {
-            a[k] = static_cast<float>(a_[k]);
-            b[k] = static_cast<float>(b_[k]);
-        }
-    }
-
-    const PixelMap& map_;
-    glm::dvec3 a_, b_;
-};
-
-// Depths of `count` pixels, infinity after them.
-HWY_INLINE VF loadDepth(DF d, const float* from, int count) {
-    if (count >= static_cast<int>(hn::Lanes(d))) return hn::LoadU(d, from);
-    HWY_ALIGN float padded[kBlock];
-    for (int i = 0; i < kBlock; ++i) padded[i] = i < count ? from[i] : kInfinity;
-    return hn::Load(d, padded);
-}
 
 // Points of a row and their places: the pixel to the upper left of each (only where `inside`
 // the region), how far into the next it lies (0..1), its novel depth.
@@ -128,12 +91,6 @@ HWY_INLINE hn::Mask<DF> alphaAbove(DF d, const RectangleImages& s, std::size_t p
             alpha[i] = s.rgbaFloat[4 * (pixel + i) + 3] * 255.0f;
     }
     return hn::Gt(hn::Load(d, alpha), hn::Set(d, static_cast<float>(threshold)));
-}
-
-HWY_INLINE std::uint32_t bitsOf(DF d, hn::Mask<DF> mask) {
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(d, mask, bytes);
-    return bytes[0] | (bytes[1] << 8);
 }
 
 }  // namespace stx::splat::HWY_NAMESPACE

@@ -8,13 +8,13 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include "lib/base/cpu_device.hpp"
 #include "lib/base/parallel.hpp"
-#include "lib/render/cpu_device.hpp"
-#include "lib/render/finish/pinholes.hpp"
-#include "lib/render/finish/silhouettes.hpp"
+#include "lib/render/outline/silhouettes.hpp"
 #include "lib/render/splat/cpu/kernels.hpp"
 #include "lib/render/splat/others.hpp"
 #include "lib/render/splat/paper_rule.hpp"
+#include "lib/render/splat/pinholes.hpp"
 #include "lib/render/splat/plan.hpp"
 #include "lib/render/splat/prepared.hpp"
 

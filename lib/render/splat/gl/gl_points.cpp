@@ -44,7 +44,7 @@ PointArrays makePointArrays(const PageSet& set, bool lit) {
                     const std::size_t texel = r.texel(x, y);
                     const float dist = page.depth->data()[texel];
                     if (!hasPoint(dist)) continue;
-                    if (!(PageSet::alphaOf(*page.texture, texel) > 0.5f)) continue;
+                    if (!(page.texture->alpha(texel) > 0.5f)) continue;
                     const glm::dvec3 p =
                         camera.position +
                         camera.orientation * camera.unproject(x + 0.5, y + 0.5, dist) - out.centre;

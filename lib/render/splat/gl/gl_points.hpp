@@ -4,7 +4,7 @@
 
 #include <glm/glm.hpp>
 
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx::gl {

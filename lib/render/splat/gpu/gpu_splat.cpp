@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "lib/base/parallel.hpp"
-#include "lib/render/finish/pinholes.hpp"
-#include "lib/render/finish/silhouettes.hpp"
+#include "lib/render/outline/silhouettes.hpp"
 #include "lib/render/splat/gpu/gpu_scene.hpp"
+#include "lib/render/splat/pinholes.hpp"
 
 namespace stx::gpu {
 namespace {

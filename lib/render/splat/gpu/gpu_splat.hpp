@@ -2,8 +2,8 @@
 
 #include <memory>
 
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/device/egl_context.hpp"
-#include "lib/render/renderer.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/splat/gpu/splat_pipeline.hpp"
 

@@ -69,8 +69,8 @@ SplatFrame planSplatFrame(const GpuScene& scene, const RenderSettings& settings,
         source.orthographic = c.orthographic;
         source.fx = static_cast<float>(c.fx);
         source.fy = static_cast<float>(c.fy);
-        source.map = splat::pixelMap(c, novel);
-        const splat::PixelMap& m = source.map;
+        source.map = pixelMap(c, novel);
+        const PixelMap& m = source.map;
         frame.views.push_back({glm::vec4(m.a0, c.orthographic ? 1.0f : 0.0f), glm::vec4(m.au, c.fx),
                                glm::vec4(m.av, c.fy), glm::vec4(m.b0, 0), glm::vec4(m.bu, 0),
                                glm::vec4(m.bv, 0)});

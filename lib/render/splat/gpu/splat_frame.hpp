@@ -6,7 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/geometry/camera.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/splat/gpu/gpu_scene.hpp"
 #include "shaders/shared/language.hpp"
 

@@ -7,8 +7,8 @@
 
 #include <glm/glm.hpp>
 
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/device/egl_context.hpp"
-#include "lib/render/renderer.hpp"
 #include "lib/render/splat/gpu/gpu_scene.hpp"
 #include "lib/render/splat/gpu/splat_frame.hpp"
 #include "lib/render/splat/gpu/splat_shaders.hpp"

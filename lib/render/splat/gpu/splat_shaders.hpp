@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/device/shader_program.hpp"
-#include "lib/render/renderer.hpp"
 #include "lib/render/splat/gpu/gpu_scene.hpp"
 
 namespace stx::gpu {

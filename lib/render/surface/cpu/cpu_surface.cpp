@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "lib/base/cpu_device.hpp"
 #include "lib/base/parallel.hpp"
-#include "lib/render/cpu_device.hpp"
 #include "lib/render/surface/backend.hpp"
 #include "lib/render/surface/cpu/fuse.hpp"
 #include "lib/render/surface/cpu/raster.hpp"

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "lib/base/job.hpp"
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {

@@ -10,9 +10,9 @@
 
 #include <hwy/highway.h>
 
-#include "lib/render/surface/constants.hpp"
 #include "lib/render/surface/cpu/fetch-inl.hpp"
 #include "lib/render/surface/cpu/shade_groups.hpp"
+#include "lib/render/surface/prepare/constants.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stx::surface::HWY_NAMESPACE {

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "lib/render/surface/cpu/fuse_samples.hpp"
-#include "lib/render/surface/votes.hpp"
+#include "lib/render/surface/prepare/votes.hpp"
 
 namespace stx::surface {
 namespace shared {

@@ -7,7 +7,7 @@
 
 #include "lib/render/surface/cpu/raster.hpp"
 #include "lib/render/surface/cpu/settle.hpp"
-#include "lib/render/surface/votes.hpp"
+#include "lib/render/surface/prepare/votes.hpp"
 
 namespace stx::surface {
 

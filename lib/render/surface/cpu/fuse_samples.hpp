@@ -4,7 +4,7 @@
 #include <span>
 
 #include "lib/render/surface/cpu/raster.hpp"
-#include "lib/render/surface/votes.hpp"
+#include "lib/render/surface/prepare/votes.hpp"
 
 namespace stx::surface {
 

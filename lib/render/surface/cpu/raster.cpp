@@ -7,7 +7,7 @@
 
 #include <hwy/cache_control.h>
 
-#include "lib/render/surface/cells.hpp"
+#include "lib/render/surface/prepare/cells.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lib/render/surface/cpu/raster.cpp"

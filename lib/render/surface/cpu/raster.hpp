@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "lib/render/surface/constants.hpp"
-#include "lib/render/surface/source.hpp"
+#include "lib/render/surface/prepare/constants.hpp"
+#include "lib/render/surface/prepare/source.hpp"
 
 namespace stx::surface {
 

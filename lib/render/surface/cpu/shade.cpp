@@ -6,8 +6,8 @@
 #include <cstring>
 #include <type_traits>
 
-#include "lib/render/surface/constants.hpp"
 #include "lib/render/surface/cpu/shade_groups.hpp"
+#include "lib/render/surface/prepare/constants.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lib/render/surface/cpu/shade.cpp"

@@ -7,7 +7,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/render/surface/cpu/fuse.hpp"
-#include "lib/render/surface/plan.hpp"
+#include "lib/render/surface/plan/plan.hpp"
 
 namespace stx::surface {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "lib/render/surface/source.hpp"
+#include "lib/render/surface/prepare/source.hpp"
 
 namespace stx::surface {
 

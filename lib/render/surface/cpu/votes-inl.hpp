@@ -14,7 +14,7 @@
 
 #include <hwy/highway.h>
 
-#include "lib/render/surface/votes.hpp"
+#include "lib/render/surface/prepare/votes.hpp"
 
 // Vectors of 16 points are lookups of 4x4 texels, too.
 #undef STX_VOTES_WINDOWS

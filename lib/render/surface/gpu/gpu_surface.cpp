@@ -11,7 +11,7 @@
 #include "lib/render/surface/backend.hpp"
 #include "lib/render/surface/gpu/surface_shaders.hpp"
 #include "lib/render/surface/gpu/surface_textures.hpp"
-#include "lib/render/surface/structs.hpp"
+#include "lib/render/surface/prepare/structs.hpp"
 
 namespace stx::gpu {
 namespace {
@@ -38,7 +38,7 @@ constexpr std::int64_t kMostGroups = 65535;
 /// The four rows of a warp.
 struct Rows {
     glm::vec4 x, y, q, w;
-    explicit Rows(const surface::Warp& warp) { std::memcpy(this, warp.m.data(), sizeof(*this)); }
+    explicit Rows(const Warp& warp) { std::memcpy(this, warp.m.data(), sizeof(*this)); }
 };
 /// The three rows of a ray.
 struct RayRows {
@@ -216,7 +216,7 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
             const bool any = !blocks.empty();
             batch.locals[local++] = {static_cast<std::uint32_t>(k), any ? slot : kNoSlot};
             if (!any) continue;
-            const Rows warp(surface::warpFrom(sampleFromPixel * f.pixelFromSource));
+            const Rows warp(warpFrom(sampleFromPixel * f.pixelFromSource));
             batch.slots[slot] = {warp.x, warp.y, warp.q, warp.w, glm::ivec4(k, 0, 0, 0)};
             const std::uint32_t firstLeaf =
                 resources_->scene.firstLeaf[static_cast<std::size_t>(k)];
@@ -244,7 +244,7 @@ void GpuSurfaceBackend::uploadSources(const SurfaceFrame& work) {
     std::vector<SourceEntry> entries;
     for (const FrameSource& f : work.sources) {
         const Source& s = *f.source;
-        const surface::DepthAxis& axis = s.space.axis;
+        const DepthAxis& axis = s.space.axis;
         const Rows warp(f.sourceFromPixel);
         const RayRows ray(f.fromEye);
         entries.push_back({warp.x,
@@ -292,7 +292,7 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
         return fail(ErrorCode::failed, "'{}' gives no memory to read the frame back through",
                     context_->device().name);
 
-    const surface::DepthAxis& axis = work.space.axis;
+    const DepthAxis& axis = work.space.axis;
     const bool bytes = !work.sources[0].source->set->linear();
     const surface::ShadeSettings& shade = work.effort.shade;
     const RayRows eye(surface::rayFrom(work.space, work.space));

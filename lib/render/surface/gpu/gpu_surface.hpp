@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "lib/render/renderer.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx::gpu {

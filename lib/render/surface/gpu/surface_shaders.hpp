@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "lib/render/device/shader_program.hpp"
-#include "lib/render/surface/constants.hpp"
+#include "lib/render/surface/prepare/constants.hpp"
 
 namespace stx::gpu {
 

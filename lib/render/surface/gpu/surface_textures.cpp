@@ -3,7 +3,7 @@
 #include <bit>
 
 #include "lib/base/parallel.hpp"
-#include "lib/render/surface/cells.hpp"
+#include "lib/render/surface/prepare/cells.hpp"
 
 namespace stx::gpu {
 namespace {

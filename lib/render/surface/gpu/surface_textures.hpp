@@ -8,7 +8,7 @@
 #include "lib/base/job.hpp"
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/device/gl_object.hpp"
-#include "lib/render/surface/source.hpp"
+#include "lib/render/surface/prepare/source.hpp"
 
 namespace stx::gpu {
 

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "lib/base/image.hpp"
+#include "lib/geometry/pixel_space.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx {
+
+/// A view whose edges are looked at.
+struct EdgeView {
+    const PixelSpace* space = nullptr;
+    const Texture* texture = nullptr;  ///< of the view alone, as large as its depth
+    Image<float>* q = nullptr;         ///< as in PreparedPage
+    float step = 0.0f;                 ///< of its depth code, scene units
+};
+
+/// Where a surface ends before another, the last pixels with its depth should have its colour, at
+/// least for a half. How much of it single ones of a view have, 0..1, of at most about 600.
+[[nodiscard]] std::vector<float> sharesAtEdges(const EdgeView& view);
+
+/// Their median, of one view or of all; 1 when too few of them tell.
+[[nodiscard]] float colourAtEdges(std::vector<float> shares);
+[[nodiscard]] float colourAtEdges(std::span<const EdgeView> views);
+
+/// Whether that says that surfaces reach over their edges.
+[[nodiscard]] bool edgesAreFat(float colour);
+
+/// Takes a pixel off the surfaces in front, where stereo and filters of depth let them grow over
+/// what is behind, as long as edgesAreFat() and no other views deny it: of thin bars and fine
+/// textures a view alone cannot tell. Pixels whose own colour is that of the
+/// surface in front stay. A filter that gives each pixel the nearest depth around it moves slopes
+/// towards the camera, too: where the views agree clearly better on their surfaces then, every
+/// pixel gets the farthest depth around it instead. Gives by how many pixels; 0 = nothing was
+/// changed. The same on any number of threads.
+int thinFatEdges(std::span<const EdgeView> views);
+
+}  // namespace stx

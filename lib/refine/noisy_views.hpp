@@ -1,0 +1,46 @@
+#pragma once
+
+#include <span>
+
+#include <glm/glm.hpp>
+
+#include "lib/base/image.hpp"
+#include "lib/geometry/pixel_space.hpp"
+#include "lib/model/texture.hpp"
+
+namespace stx {
+
+/// A view whose depth was noisy, after smoothDepth().
+struct NoisyView {
+    const PixelSpace* space = nullptr;
+    const Texture* texture = nullptr;  ///< of the view alone, as large as its depth
+    Image<float>* q = nullptr;         ///< as in PreparedPage
+    /// Of each point: dq/dx and dq/dy of its surface, and how far off q may be (one standard
+    /// deviation, in q).
+    Image<glm::vec3> surface;
+    float left = 0.0f;  ///< how far off points may be, a share of q; see smoothDepth()
+};
+
+/// Where a point of one view is in another, and the surface that the other shows there.
+struct ShownSurface {
+    bool found = false;
+    float u = 0, v = 0;  ///< the point, in pixels of the other view
+    float inverse = 0;   ///< one over its homogeneous coordinate there
+    float there = 0;     ///< its q there
+    float shown = 0;     ///< q of the pixel that it falls on
+    float off = 0;       ///< from `there` to the surface of that pixel
+    float rate = 0;      ///< by how much `off` falls as the point's own q grows
+    float doubt = 0;     ///< how far off that surface may be, in q
+};
+
+/// Of a point (x, y, q) of the view whose pixels `warp` leads from into those of `other`.
+[[nodiscard]] ShownSurface surfaceShownBy(const NoisyView& other, const Warp& warp, float x,
+                                          float y, float q);
+
+/// Moves the points of each view along their rays to where the views around it show the same
+/// surface: the mean of all that agree within their noise, each weighted by one over the variance
+/// that it has along the ray. Surfaces seen from behind count only where a point lies on the wrong
+/// side of them. What is left of the noise becomes less by that. The same on any number of threads.
+void agreeOnDepth(std::span<NoisyView> views);
+
+}  // namespace stx

@@ -1,0 +1,206 @@
+#include "lib/render/compose/footprint.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+/// Points that are looked at in each view, along a side: enough for a median.
+constexpr int kGrid = 24;
+/// Samples to a pixel, along a side, up to which renderers do well by themselves; chosen by trial
+/// on the project's image sets.
+constexpr double kEnough = 1.5;
+/// A larger picture has at most this many times the width.
+constexpr int kMostFactor = 16;
+/// Pixels of the larger picture.
+constexpr double kMostPixels = 16e6;
+/// Bytes of one of its pixels: colour, albedo, normal, depth, and what surface mode keeps beside.
+constexpr std::uint64_t kBytesEach = 64;
+
+class FootprintRenderer final : public Renderer {
+  public:
+    FootprintRenderer(std::unique_ptr<Renderer> inner, const PageSet& set, const Limits& limits)
+        : inner_(std::move(inner)), set_(set), footprint_(set), limits_(limits) {}
+
+    Result<Frame> render(const Camera& camera) override {
+        STX_CHECK(camera.check());
+        const int factor = factorOf(camera);
+        large_ = factor > 1;
+        if (!large_) return inner_->render(camera);
+        STX_TRY(Frame large, inner_->render(enlarged(camera, factor)));
+        Frame out = minified(large, factor);
+        inner_->reuse(std::move(large));
+        return out;
+    }
+    void expect(const Camera& next) override {
+        if (next.check()) inner_->expect(enlarged(next, factorOf(next)));
+    }
+    void reuse(Frame&& frame) override {
+        // Beside a larger one, which is kept already, it is of no use.
+        if (!large_) inner_->reuse(std::move(frame));
+    }
+    std::string backend() const override { return inner_->backend(); }
+    std::string device() const override { return inner_->device(); }
+
+  private:
+    static Camera enlarged(const Camera& camera, int factor) {
+        return factor == 1 ? camera : camera.resized(camera.width * factor, camera.height * factor);
+    }
+    [[nodiscard]] int factorOf(const Camera& camera) const {
+        // In sets of mixed resolution a small view's own pose looks like a reduced picture of the
+        // large ones; renderers return it exactly.
+        if (std::any_of(set_.views().begin(), set_.views().end(),
+                        [&](const PageView& v) { return sameCamera(v.camera, camera); }))
+            return 1;
+        const double ratio = footprint_.samplesPerPixel(camera);
+        if (!(ratio > kEnough)) return 1;
+        int factor = static_cast<int>(std::lround(std::min(ratio, double{kMostFactor})));
+        const double pixels = static_cast<double>(camera.width) * camera.height;
+        const auto fits = [&] {
+            const double large = pixels * factor * factor;
+            return large <= kMostPixels &&
+                   limits_.checkAllocation(static_cast<std::uint64_t>(large), kBytesEach, "");
+        };
+        while (factor > 1 && !fits()) --factor;
+        return factor;
+    }
+
+    std::unique_ptr<Renderer> inner_;
+    PageSet set_;
+    Footprint footprint_;
+    Limits limits_;
+    bool large_ = false;  ///< the last frame came from a larger one
+};
+
+}  // namespace
+
+Footprint::Footprint(const PageSet& set) {
+    for (std::size_t v = 0; v < set.views().size(); ++v) {
+        const Camera& c = set.views()[v].camera;
+        for (int j = 0; j < kGrid; ++j) {
+            for (int i = 0; i < kGrid; ++i) {
+                const int x = (2 * i + 1) * c.width / (2 * kGrid);
+                const int y = (2 * j + 1) * c.height / (2 * kGrid);
+                const float depth = set.depth(v, x, y);
+                if (!hasPoint(depth)) continue;
+                const glm::dvec2 spacing = c.sampleSpacing(depth);
+                points_.push_back(
+                    {c.position + c.orientation * c.unproject(x + 0.5, y + 0.5, depth),
+                     0.5 * (spacing.x + spacing.y)});
+            }
+        }
+    }
+}
+
+double Footprint::samplesPerPixel(const Camera& camera) const {
+    const glm::dmat4 cameraFromWorld = camera.cameraFromWorld();
+    std::vector<double> ratios;
+    for (const Point& p : points_) {
+        const glm::dvec3 at(cameraFromWorld * glm::dvec4(p.world, 1.0));
+        const double dist = -at.z;
+        if (!(dist > 0)) continue;
+        const double scale = camera.orthographic ? 1.0 : 1.0 / dist;
+        const double x = camera.cx + camera.fx * at.x * scale;
+        const double y = camera.cy - camera.fy * at.y * scale;
+        if (!(x >= 0 && y >= 0 && x < camera.width && y < camera.height)) continue;
+        const glm::dvec2 spacing = camera.sampleSpacing(dist);
+        ratios.push_back(0.5 * (spacing.x + spacing.y) / p.spacing);
+    }
+    if (ratios.empty()) return 1.0;
+    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+    std::nth_element(ratios.begin(), middle, ratios.end());
+    return *middle;
+}
+
+namespace {
+
+/// A row of minified() by 2 of colour and depth alone, which is what most pictures are.
+void halveRow(const Frame& large, int y, Frame& out) {
+    const float* above = &large.colour.row(2 * y).data()->x;
+    const float* below = &large.colour.row(2 * y + 1).data()->x;
+    const float* depthAbove = large.depth.row(2 * y).data();
+    const float* depthBelow = large.depth.row(2 * y + 1).data();
+    float* colour = &out.colour.row(y).data()->x;
+    float* depth = out.depth.row(y).data();
+    for (int x = 0; x < out.depth.width(); ++x, above += 8, below += 8, colour += 4) {
+        float sum[4];
+        for (int c = 0; c < 4; ++c) sum[c] = above[c] + above[4 + c];
+        for (int c = 0; c < 4; ++c) sum[c] += below[c];
+        for (int c = 0; c < 4; ++c) sum[c] += below[4 + c];
+        for (int c = 0; c < 4; ++c) colour[c] = sum[c] * 0.25f;
+        // All four are as near to the centre: the first that is covered.
+        const float d[4] = {depthAbove[2 * x], depthAbove[2 * x + 1], depthBelow[2 * x],
+                            depthBelow[2 * x + 1]};
+        int covered = 0;
+        float first = kNoDepth;
+        for (int k = 3; k >= 0; --k) {
+            covered += hasPoint(d[k]) ? 1 : 0;
+            first = hasPoint(d[k]) ? d[k] : first;
+        }
+        depth[x] = covered >= 2 ? first : kNoDepth;
+    }
+}
+
+}  // namespace
+
+Frame minified(const Frame& large, int factor) {
+    const int width = large.colour.width() / factor, height = large.colour.height() / factor;
+    Frame out;
+    out.linear = large.linear;
+    out.milliseconds = large.milliseconds;
+    out.colour = Image<glm::vec4>(width, height);
+    out.depth = Image<float>(width, height, kNoDepth);
+    if (!large.albedo.empty()) out.albedo = Image<glm::vec4>(width, height);
+    if (!large.normal.empty()) out.normal = Image<glm::vec3>(width, height);
+    const float share = 1.0f / static_cast<float>(factor * factor);
+    const auto pixel = [&](int x, int y) {
+        glm::vec4 colour(0.0f), albedo(0.0f);
+        glm::vec3 normal(0.0f);
+        float depth = kNoDepth;
+        int covered = 0, nearest = 4 * factor * factor;
+        for (int j = 0; j < factor; ++j) {
+            for (int i = 0; i < factor; ++i) {
+                const int sx = x * factor + i, sy = y * factor + j;
+                colour += large.colour.at(sx, sy);
+                if (!large.albedo.empty()) albedo += large.albedo.at(sx, sy);
+                if (!large.normal.empty()) normal += large.normal.at(sx, sy);
+                const float d = large.depth.at(sx, sy);
+                if (!hasPoint(d)) continue;
+                ++covered;
+                // Twice the offset from the centre, squared.
+                const int dx = 2 * i + 1 - factor, dy = 2 * j + 1 - factor;
+                if (const int at = dx * dx + dy * dy; at < nearest) {
+                    nearest = at;
+                    depth = d;
+                }
+            }
+        }
+        out.colour.at(x, y) = colour * share;
+        if (2 * covered >= factor * factor) out.depth.at(x, y) = depth;
+        if (!out.albedo.empty()) out.albedo.at(x, y) = albedo * share;
+        if (const float length = glm::length(normal); !out.normal.empty() && length > 1e-6f)
+            out.normal.at(x, y) = normal / length;
+    };
+    const bool plain = factor == 2 && large.albedo.empty() && large.normal.empty();
+    parallelForBlocks(0, height, 16, [&](std::int64_t from, std::int64_t to) {
+        for (int y = static_cast<int>(from); y < to; ++y) {
+            if (plain) {
+                halveRow(large, y, out);
+                continue;
+            }
+            for (int x = 0; x < width; ++x) pixel(x, y);
+        }
+    });
+    return out;
+}
+
+std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const PageSet& set,
+                                        const Limits& limits) {
+    return std::make_unique<FootprintRenderer>(std::move(inner), set, limits);
+}
+
+}  // namespace stx

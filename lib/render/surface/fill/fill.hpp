@@ -1,0 +1,35 @@
+#pragma once
+
+#include <span>
+
+#include "lib/base/image.hpp"
+#include "lib/render/api/frame.hpp"
+#include "lib/render/surface/prepare/votes.hpp"
+
+namespace stx::surface {
+
+/// A frame before its holes are filled.
+struct OpenFrame {
+    Image<glm::vec4>& albedo;  ///< premultiplied; alpha below 1 is open
+    Image<float>& q;           ///< of the main surface of each pixel, 0 = none
+    const PixelSpace& space;
+    Image<glm::vec3>* normal = nullptr;  ///< world, zero where unknown; null when not wanted
+};
+
+/// Fills holes that no source looks into: where a stretch of the ray is hidden from every source,
+/// and most directions meet surface nearby or the hole is at most `widest` pixels wide (0 = small
+/// ones only). Gaps that a source sees through stay open. Depth and normal are those of the surface
+/// that continues there: the planes of the surfaces around are followed into the hole, and the
+/// nearest that no source sees past counts. Where all end, depth is where the hidden stretch
+/// begins, and the normal stays as it is.
+void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int widest);
+
+/// Fills what is open from the background around it: for scenes that fill the frame. Filled is what
+/// a source looked at but something hid: where a ray, from the depth of the fill to twice that, is
+/// in its frustum, before its far plane, and it does not see past it; with a border of a twentieth
+/// of its picture. The rest stays open. Near surface along rays through the picture, beyond from a
+/// picture of half the size that was filled before, so that the time grows with the pixels however
+/// large the openings are. Without any surface nothing is filled.
+void fillBackground(OpenFrame frame, std::span<const LocalSource> sources);
+
+}  // namespace stx::surface

@@ -1,0 +1,243 @@
+#include "lib/render/surface/plan/plan.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/surface/plan/placement.hpp"
+#include "lib/render/surface/plan/places.hpp"
+
+namespace stx::surface {
+namespace {
+
+void addBounds(const Source& s, Bounds& bounds) {
+    for (int by = 0; by < s.blocksY; ++by) {
+        for (int bx = 0; bx < s.blocksX; ++bx) {
+            const SourceBlock& block = s.blocks[static_cast<std::size_t>(by) * s.blocksX + bx];
+            if (!(block.qMax > 0)) continue;
+            for (int corner = 0; corner < 8; ++corner) {
+                const double x = std::min((bx + (corner & 1)) * kBlock, s.width);
+                const double y = std::min((by + (corner >> 1 & 1)) * kBlock, s.height);
+                const double q = (corner & 4) ? block.qMax : block.qMin;
+                const glm::dvec4 p = s.space.worldFromPixel * glm::dvec4(x, y, q, 1.0);
+                bounds.add(glm::dvec3(p) / p.w);
+            }
+        }
+    }
+}
+
+/// By tile: q in the middle of the blocks of all sources that fall in it, 0 = none.
+std::vector<double> middlesOf(const SurfaceFrame& frame,
+                              std::span<const std::vector<PlacedBlocks>> placed) {
+    struct Sum {
+        double q = 0;
+        int blocks = 0;
+    };
+    // Where some of them is behind the camera, only without others.
+    const std::size_t tiles = static_cast<std::size_t>(frame.tilesX) * frame.tilesY;
+    std::vector<std::array<Sum, 2>> sums(tiles);
+    for (const auto& ofSource : placed) {
+        for (const PlacedBlocks& p : ofSource) {
+            for (int y = p.tiles.y0; y <= p.tiles.y1; ++y) {
+                for (int x = p.tiles.x0; x <= p.tiles.x1; ++x) {
+                    Sum& sum = sums[static_cast<std::size_t>(y * frame.tilesX + x)][p.partlyBehind];
+                    const auto count = static_cast<int>(p.end - p.begin);
+                    sum.q += p.q * count;
+                    sum.blocks += count;
+                }
+            }
+        }
+    }
+    std::vector<double> middles(tiles, 0.0);
+    for (std::size_t t = 0; t < tiles; ++t)
+        if (const Sum& sum = sums[t][sums[t][0].blocks ? 0 : 1]; sum.blocks)
+            middles[t] = sum.q / sum.blocks;
+    return middles;
+}
+
+/// The sources that a tile of many is built from; `q`: in the middle of what falls in it.
+std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q) {
+    const glm::dvec4 h =
+        frame.space.worldFromPixel *
+        glm::dvec4(frame.tileX(tile) + kTile * 0.5, frame.tileY(tile) + kTile * 0.5, q, 1.0);
+    const glm::dvec3 point = glm::dvec3(h) / h.w;
+    const auto towards = [&](const Camera& c) {
+        return c.orthographic ? c.forward() : glm::normalize(point - c.position);
+    };
+    const glm::dvec3 look = towards(frame.space.camera);
+    // A camera may stand right where the view is drawn from and look elsewhere.
+    const auto inPicture = [&](const Source& s) {
+        const glm::dvec4 at = s.space.pixelFromWorld * glm::dvec4(point, 1.0);
+        return at.w > 0 && at.x >= 0 && at.y >= 0 && at.x <= at.w * s.width &&
+               at.y <= at.w * s.height;
+    };
+    // The first of what is left, by rank; those that show nothing there come last, by theirs.
+    using Ranked = std::pair<double, int>;
+    std::vector<Ranked> left, idle;
+    left.reserve(frame.sources.size());
+    for (const FrameSource& f : frame.sources)
+        left.emplace_back(-glm::dot(look, towards(f.source->space.camera)),
+                          static_cast<int>(left.size()));
+    std::make_heap(left.begin(), left.end(), std::greater<>());
+    const auto most = static_cast<std::size_t>(
+        std::min(frame.effort.mostGeometry, kMostTileSources - kSourcesOfPlaces));
+    std::vector<int> chosen;
+    while (!left.empty() && chosen.size() < most) {
+        std::pop_heap(left.begin(), left.end(), std::greater<>());
+        const auto [rank, i] = left.back();
+        left.pop_back();
+        const FrameSource& f = frame.sources[static_cast<std::size_t>(i)];
+        if (inPicture(*f.source) && !(frame.effort.preferShown && f.blocksOf(tile).empty()))
+            chosen.push_back(i);
+        else
+            idle.emplace_back(rank, i);
+    }
+    std::sort(idle.begin(), idle.end());
+    for (std::size_t k = 0; chosen.size() < most; ++k) chosen.push_back(idle[k].second);
+    std::sort(chosen.begin(), chosen.end());
+    return chosen;
+}
+
+FrameSource sourceIn(const PixelSpace& space, const Source& s) {
+    FrameSource f;
+    f.source = &s;
+    f.pixelFromSource = space.pixelFromWorld * s.space.worldFromPixel;
+    f.sourceFromPixel = warpFrom(s.space.pixelFromWorld * space.worldFromPixel);
+    f.fromEye = rayFrom(s.space, space);
+    return f;
+}
+
+/// Places the blocks of the sources that are wanted.
+void placeAll(SurfaceFrame& frame, const std::vector<char>& wanted) {
+    parallelFor(0, static_cast<std::int64_t>(wanted.size()), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        if (wanted[k]) placeBlocks(frame.sources[k], frame.space, frame.tilesX, frame.tilesY);
+    });
+}
+
+}  // namespace
+
+Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
+    Ray ray{};
+    const glm::dmat4& m = frame.worldFromPixel;
+    const glm::dvec3 at = eye.camera.position;
+    const glm::dvec3 forward = eye.camera.forward();
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int column = 0; column < 4; ++column) {
+            const double value = eye.camera.orthographic
+                                     ? (column == 3 ? forward[axis] : 0.0)
+                                     : m[column][axis] - at[axis] * m[column][3];
+            ray[static_cast<std::size_t>(axis * 4 + column)] = static_cast<float>(value);
+        }
+    }
+    return ray;
+}
+
+Effort effortOf(Quality quality, const SurfaceScene& scene) {
+    Effort e;
+    switch (quality) {
+        case Quality::draft:
+            e.samplesPerPixel = 1;
+            e.mostGeometry = 4;
+            e.shade.mostSources = 2;
+            break;
+        case Quality::normal:
+            break;
+        case Quality::best:
+            // More look from so far aside that they take as much away as they add (pictures.md).
+            e.mostGeometry = 16;
+            break;
+    }
+    double valid = 0;
+    for (const Source& s : scene.sources)
+        valid += s.validShare / static_cast<double>(scene.sources.size());
+    // Pruned views share the surface among them: each may be the only one left to show a piece of
+    // it. Of views with gaps as many are needed as together show what the usual number would.
+    if (scene.set.pruned()) {
+        e.mostGeometry = kMostTileSources;
+        e.freeLevel = kFreeLevelPruned;
+        e.preferShown = true;
+    } else if (valid < 1) {
+        // Rounding, or a pixel in a million, does not ask for another source.
+        constexpr double kNothing = 1e-5;
+        e.mostGeometry = static_cast<int>(
+            std::min<double>(kMostTileSources, std::ceil(e.mostGeometry / valid - kNothing)));
+    }
+    return e;
+}
+
+glm::dmat4 SurfaceFrame::sampleFromPixel(int tile, int perPixel, int apron) const {
+    glm::dmat4 m(1.0);
+    m[0][0] = m[1][1] = perPixel;
+    m[3][0] = -(tileX(tile) - apron) * perPixel - 0.5;
+    m[3][1] = -(tileY(tile) - apron) * perPixel - 0.5;
+    return m;
+}
+
+float SurfaceFrame::qLimit() const {
+    return space.axis.nearest();
+}
+
+void keepTiles(SurfaceFrame& frame, std::span<const std::uint8_t> wanted) {
+    for (std::size_t t = 0; t < frame.tileSources.size(); ++t)
+        if (!wanted[t]) frame.tileSources[t].clear();
+}
+
+Bounds boundsOf(const SurfaceScene& scene) {
+    Bounds bounds;
+    for (const Source& s : scene.sources) addBounds(s, bounds);
+    return bounds;
+}
+
+SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Effort& effort,
+                       const Camera& camera) {
+    double farthest = 1.0;
+    if (!bounds.empty())
+        farthest = std::max(
+            1e-6 * bounds.radius(),
+            glm::dot(bounds.centre() - camera.position, camera.forward()) + bounds.radius());
+    SurfaceFrame f;
+    f.space = PixelSpace(camera, farthest);
+    f.tilesX = (camera.width + kTile - 1) / kTile;
+    f.tilesY = (camera.height + kTile - 1) / kTile;
+    f.effort = effort;
+    for (const Source& s : scene.sources) f.sources.push_back(sourceIn(f.space, s));
+    const std::size_t tiles = static_cast<std::size_t>(f.tilesX) * f.tilesY;
+    f.tileSources.resize(tiles);
+    const bool all = static_cast<int>(f.sources.size()) <= effort.mostGeometry;
+    if (all || effort.preferShown) placeAll(f, std::vector<char>(f.sources.size(), 1));
+    if (all) {
+        std::vector<int> every(f.sources.size());
+        std::iota(every.begin(), every.end(), 0);
+        for (std::size_t t = 0; t < tiles; ++t)
+            if (std::any_of(f.sources.begin(), f.sources.end(), [&](const FrameSource& s) {
+                    return !s.blocksOf(static_cast<int>(t)).empty();
+                }))
+                f.tileSources[t] = every;
+        return f;
+    }
+    std::vector<std::vector<PlacedBlocks>> placed(f.sources.size());
+    parallelFor(0, static_cast<std::int64_t>(placed.size()), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        placed[k] = placedBlocks(f.sources[k], f.space);
+    });
+    const std::vector<double> middles = middlesOf(f, placed);
+    parallelFor(0, static_cast<std::int64_t>(tiles), [&](std::int64_t i) {
+        const auto t = static_cast<std::size_t>(i);
+        if (middles[t] > 0) f.tileSources[t] = chooseSources(f, static_cast<int>(i), middles[t]);
+    });
+    addSourcesOfPlaces(f, placed);
+    if (!effort.preferShown) {
+        std::vector<char> wanted(f.sources.size(), 0);
+        for (const auto& chosen : f.tileSources)
+            for (const int k : chosen) wanted[static_cast<std::size_t>(k)] = 1;
+        placeAll(f, wanted);
+    }
+    return f;
+}
+
+}  // namespace stx::surface
