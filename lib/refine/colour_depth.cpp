@@ -81,27 +81,12 @@ Pull pullOf(const Beside& other, float x, float y, float q, float scale, float l
     return {weight * g * r, weight * g * g};
 }
 
-/// The views that look from the most alike places.
-std::vector<std::size_t> nearestViews(std::span<const NoisyView> views, std::size_t number) {
-    std::vector<std::pair<double, std::size_t>> ranked;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        if (i == number) continue;
-        const Camera &a = views[number].space->camera, &b = views[i].space->camera;
-        ranked.emplace_back(-glm::dot(a.forward(), b.forward()), i);
-    }
-    std::sort(ranked.begin(), ranked.end());
-    ranked.resize(std::min(ranked.size(), kColourPartners));
-    std::vector<std::size_t> out;
-    for (const auto& entry : ranked) out.push_back(entry.second);
-    return out;
-}
-
 Image<float> matched(std::span<const NoisyView> views, std::span<const Image<float>> lightness,
                      std::size_t number) {
     const NoisyView& view = views[number];
     const DepthAxis& axis = view.space->axis;
     std::vector<Beside> others;
-    for (const std::size_t i : nearestViews(views, number))
+    for (const std::size_t i : nearViews(views, number, kColourPartners))
         others.push_back({&views[i], &lightness[i],
                           warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel)});
     Image<float> out = *view.q;

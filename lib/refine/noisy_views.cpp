@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lib/base/parallel.hpp"
+#include "lib/geometry/near_views.hpp"
 #include "lib/refine/depth_noise.hpp"
 
 namespace stx {
@@ -44,28 +45,6 @@ glm::dvec3 middleOf(const NoisyView& view) {
     return points > 0 ? sum / static_cast<double>(points) : view.space->camera.position;
 }
 
-/// The views that see the middle of this one from the most alike directions.
-std::vector<std::size_t> partnersOf(std::span<const NoisyView> views, std::size_t number) {
-    const glm::dvec3 middle = middleOf(views[number]);
-    const auto towards = [&](const Camera& c) {
-        return c.orthographic ? c.forward() : glm::normalize(middle - c.position);
-    };
-    const glm::dvec3 look = towards(views[number].space->camera);
-    std::vector<std::pair<double, std::size_t>> ranked;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        const PixelSpace& space = *views[i].space;
-        const glm::dvec4 at = space.pixelFromWorld * glm::dvec4(middle, 1.0);
-        if (i == number || !(at.w > 0)) continue;
-        const double turned = glm::dot(look, towards(space.camera));
-        if (turned > 0) ranked.emplace_back(-turned, i);
-    }
-    std::sort(ranked.begin(), ranked.end());
-    ranked.resize(std::min(ranked.size(), kPartners));
-    std::vector<std::size_t> partners;
-    for (const auto& entry : ranked) partners.push_back(entry.second);
-    return partners;
-}
-
 struct Partner {
     const NoisyView* view;
     Warp warp;  ///< from the pixels of the view that is moved
@@ -92,7 +71,7 @@ Opinion opinionOf(const Partner& p, const DepthAxis& axis, float x, float y, flo
 std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size_t number) {
     const NoisyView& view = views[number];
     std::vector<Partner> partners;
-    for (const std::size_t i : partnersOf(views, number))
+    for (const std::size_t i : nearViews(views, number, kPartners))
         partners.push_back(
             {&views[i], warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel)});
     const DepthAxis& axis = view.space->axis;
@@ -128,6 +107,13 @@ std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size
 }
 
 }  // namespace
+
+std::vector<std::size_t> nearViews(std::span<const NoisyView> views, std::size_t number,
+                                   std::size_t most) {
+    return nearViews(
+        views.size(), [&](std::size_t i) -> const Camera& { return views[i].space->camera; },
+        number, middleOf(views[number]), most);
+}
 
 ShownSurface surfaceShownBy(const NoisyView& other, const Warp& warp, float x, float y, float q) {
     ShownSurface s;

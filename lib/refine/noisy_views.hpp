@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
+#include <vector>
 
 #include <glm/glm.hpp>
 
@@ -36,6 +38,11 @@ struct ShownSurface {
 /// Of a point (x, y, q) of the view whose pixels `warp` leads from into those of `other`.
 [[nodiscard]] ShownSurface surfaceShownBy(const NoisyView& other, const Warp& warp, float x,
                                           float y, float q);
+
+/// The views that see the middle of the points of a view most as it does: see nearViews() of
+/// geometry.
+[[nodiscard]] std::vector<std::size_t> nearViews(std::span<const NoisyView> views,
+                                                 std::size_t number, std::size_t most);
 
 /// Moves the points of each view along their rays to where the views around it show the same
 /// surface: the mean of all that agree within their noise, each weighted by one over the variance
