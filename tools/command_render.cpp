@@ -32,6 +32,7 @@ struct RenderOptions {
     bool around = false;  ///< equirectangular pictures
     std::vector<std::string> lights;
     std::string ambient = "0.2", specular = "0";
+    std::string refine = "auto";
     double shininess = 32;
     std::string fileFormat;
     std::string framesPerSecond;  ///< empty: that of the input, else 25
@@ -128,7 +129,7 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
     };
     if (std::holds_alternative<Mesh>(model)) {
         note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
-                            "--splat-coefficient", "--fill", "--match-colours"}),
+                            "--splat-coefficient", "--fill", "--match-colours", "--refine"}),
              "a mesh is rasterised itself, on the processor");
         return;
     }
@@ -138,6 +139,17 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
     else
         note(command.given({"--splat", "--splat-coefficient", "--pipeline"}),
              "they are of --mode splat");
+}
+
+/// With the steps as refineSteps() has them.
+std::string refineHelp() {
+    std::string text =
+        "Captured depth is repaired before it is drawn: auto does what is needed (default), off "
+        "leaves depth as it is. Or these steps only, with commas between them:";
+    for (const RefineStepInfo& step : refineSteps())
+        text += fmt::format("{} {} ({})", &step == refineSteps().data() ? "" : ",", step.name,
+                            step.sentence);
+    return text;
 }
 
 Result<RenderSettings> settingsOf(const RenderOptions& o) {
@@ -154,6 +166,7 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
         STX_TRY(const auto light, parseLight(text, glm::dvec3(0.0)));
         s.lighting.lights.push_back(light);
     }
+    STX_TRY(s.refine, RefineSettings::from(o.refine));
     STX_TRY(s.lighting.ambient, parseGreyOrRgb(o.ambient, "--ambient"));
     STX_TRY(s.lighting.specular, parseGreyOrRgb(o.specular, "--specular"));
     s.lighting.shininess = static_cast<float>(o.shininess);
@@ -544,6 +557,7 @@ void addRender(CommandLine& line, Program& program) {
                    "surface (exposure, white balance): auto brings them to those of most, off "
                    "leaves them (default auto)")
         .group(drawing);
+    c.option("--refine", o->refine, refineHelp()).takes("auto|off|STEPS").group(drawing);
     c.option("--background", o->background,
              "What stands where no view shows a surface. temporal: the bundle's background views, "
              "then what is around, in scenes that fill the frame (default); spatial: what is "

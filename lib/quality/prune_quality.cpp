@@ -56,7 +56,8 @@ std::vector<Camera> posesOf(const Bundle& bundle) {
 Result<PruneReport> search(Bundle& bundle, const PruneSettings& settings, double wantedPsnr,
                            Job& job) {
     STX_TRY(const auto quality,
-            ViewQuality::against(*makeCpuSurfaceRenderer(bundle, {}, job), posesOf(bundle), job));
+            ViewQuality::against(*makeCpuSurfaceRenderer(PageSet(bundle).refined({}), {}, job),
+                                 posesOf(bundle), job));
     Bundle best;
     PruneReport report;
     std::vector<std::string> notes;
@@ -66,7 +67,9 @@ Result<PruneReport> search(Bundle& bundle, const PruneSettings& settings, double
         PruneSettings now = settings;
         now.minPsnr = estimate;
         STX_TRY(auto pruned, prune(candidate, now, job));
-        STX_TRY(const auto psnr, quality.measure(*makeCpuSurfaceRenderer(candidate, {}, job), job));
+        STX_TRY(
+            const auto psnr,
+            quality.measure(*makeCpuSurfaceRenderer(PageSet(candidate).refined({}), {}, job), job));
         pruned.psnr = psnr.worst;
         if (!(pruned.psnr >= wantedPsnr)) return false;
         best = std::move(candidate);

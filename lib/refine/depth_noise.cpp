@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -243,8 +244,12 @@ float depthNoise(const Image<float>& q, const DepthAxis& axis) {
     return std::min(noise, kMoreThanCurves * oneInTwenty(withoutCurve) / kSmallestOfTwo);
 }
 
+bool isNoisy(float noise, const DepthAxis& axis) {
+    return noise >= kLeastNoise && noise >= kLeastOfPixel * axis.pixelShare();
+}
+
 float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm::vec3>* surface) {
-    if (noise < kLeastNoise || noise < kLeastOfPixel * axis.pixelShare()) return 0.0f;
+    if (!isNoisy(noise, axis)) return 0.0f;
     const Image<float> from = q;
     const Bands bands = bandsFor(from, axis, noise);
     if (surface) *surface = Image<glm::vec3>(q.width(), q.height(), glm::vec3(0.0f));
@@ -282,9 +287,14 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
     return kDoubt * static_cast<float>(meanOfRows(left, points).value_or(0));
 }
 
-void closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& covered, const DepthAxis& axis,
-                       float noise) {
+std::int64_t closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& covered,
+                               const DepthAxis& axis, float noise) {
+    std::int64_t missed = 0;
+    for (std::size_t i = 0; i < q.count(); ++i)
+        missed += static_cast<int>(q.data()[i] == 0.0f) & static_cast<int>(covered.data()[i] != 0);
+    if (missed == 0) return 0;
     const Image<float> from = q;
+    std::atomic<std::int64_t> closed = 0;
     parallelForBlocks(1, q.height() - 1, 16, [&](std::int64_t first, std::int64_t last) {
         for (int y = static_cast<int>(first); y < last; ++y) {
             for (int x = 1; x + 1 < q.width(); ++x) {
@@ -301,10 +311,13 @@ void closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& covered, cons
                 const float band =
                     (kPinholeBand + kPinholeDeviations * noise) * axis.relativeScale(middle);
                 const LocalPlane plane = fitAround(from, x, y, 1, {middle}, band);
-                if (plane.points >= kLeastNeighbours && plane.q0 > 0.0f) q.at(x, y) = plane.q0;
+                if (plane.points < kLeastNeighbours || !(plane.q0 > 0.0f)) continue;
+                q.at(x, y) = plane.q0;
+                ++closed;
             }
         }
     });
+    return closed;
 }
 
 }  // namespace stx

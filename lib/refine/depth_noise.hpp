@@ -22,8 +22,11 @@ inline constexpr float kDoubt = 2.0f;
 /// four directions: at edges and creases one of them runs along the edge, noise is in all.
 [[nodiscard]] float depthNoise(const Image<float>& q, const DepthAxis& axis);
 
+/// Whether there is more noise than a code's rounding. `noise` is depthNoise().
+[[nodiscard]] bool isNoisy(float noise, const DepthAxis& axis);
+
 /// Replaces each point by the plane that fits its surroundings, without what is on another surface,
-/// when there is more noise than a code's rounding; else leaves all as they are. The window of each
+/// when isNoisy(); else leaves all as they are. The window of each
 /// point grows until its estimates disagree (Goldenshluger & Nemirovski 1997: intersection of
 /// confidence intervals), so that creases and leaves stay. `noise` is depthNoise(). Gives how far
 /// off points may be then, a share of q; 0 when nothing was done. The same on any number of
@@ -32,8 +35,8 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise,
                   Image<glm::vec3>* surface = nullptr);
 
 /// Gives single pixels that a sensor missed (full cover, no depth) the depth of the surface around
-/// them, when all of their neighbours are on one. `covered`: 1 = full alpha.
-void closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& covered, const DepthAxis& axis,
-                       float noise);
+/// them, when all of their neighbours are on one. `covered`: 1 = full alpha. Gives how many.
+std::int64_t closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& covered,
+                               const DepthAxis& axis, float noise);
 
 }  // namespace stx

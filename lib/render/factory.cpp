@@ -166,8 +166,17 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         translucent = translucent || changed;
         return opaque;
     };
-    PageSet drawn = solid(inFront(set.distinct(), settings, job));
-    if (drawn.behind()) drawn = drawn.before(solid(*drawn.behind()));
+    if (settings.mode == RenderMode::splat) settings.refine = settings.refine.forSplats();
+    const auto refined = [&](const PageSet& views) {
+        RefineReport report;
+        PageSet better = views.refined(settings.refine, &report);
+        if (report.changed())
+            job.note(fmt::format("depth was refined ({}); --refine off leaves it as it is",
+                                 report.names()));
+        return better;
+    };
+    PageSet drawn = refined(solid(inFront(set.distinct(), settings, job)));
+    if (drawn.behind()) drawn = drawn.before(refined(solid(*drawn.behind())));
     if (translucent)
         job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");
     // What is around an open place is a guess; the environment is known.

@@ -95,11 +95,9 @@ Outcome betterQualityIsWorse(Pictures& pictures) {
 
 Outcome exactDepthIsRepaired(Pictures& pictures) {
     const PageSet pages(pictures.stage().bundle);
-    const surface::SurfaceScene scene(pages, false);
-    double most = 0;
-    for (const surface::Source& source : scene.sources) most = std::max(most, double(source.noise));
-    return Measure{scene.exactDepth ? 0.0 : 1.0,
-                   fmt::format("doubt of up to {:.3f} % of the depth", 100 * most)};
+    RefineReport report;
+    const PageSet refined = pages.refined({}, &report);
+    return Measure{refined.exactDepth() ? 0.0 : 1.0, report.text()};
 }
 
 Outcome surfaceBelowSplats(Pictures& pictures) {

@@ -9,6 +9,7 @@
 #include "lib/light/lighting.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/refine/refine.hpp"
 #include "lib/render/api/frame.hpp"
 
 namespace stx {
@@ -50,6 +51,8 @@ struct RenderSettings {
     /// Colours of views that differ from the others where they show the same surface, by exposure
     /// or white balance, are brought to those of most. Views that agree are drawn as they are.
     bool matchColours = true;
+    /// Captured depth is repaired before it is drawn; exact depth is drawn as it is.
+    RefineSettings refine;
     /// What is seen where nothing covers a pixel in full, in place of what is around it; null: the
     /// environment that a bundle or an atlas has, if `ownEnvironment`. Frames are opaque then as
     /// far as the environment is; their depth and albedo are the object's alone.

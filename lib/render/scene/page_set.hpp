@@ -14,6 +14,7 @@
 #include "lib/geometry/depth_code.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/refine/refine.hpp"
 
 namespace stx {
 
@@ -59,6 +60,7 @@ struct PageView {
     Camera camera;
     double nearPlane = 0, farPlane = 0;  ///< scene units
     int depthBits = 16;
+    float depthDoubt = 0;              ///< see RefinedView::doubt
     NoDepth noDepth = NoDepth::empty;  ///< see ReferenceView::noDepth
     bool pruned = false;               ///< see ReferenceView::pruned
     bool background = false;           ///< see ReferenceView::background
@@ -124,6 +126,12 @@ class PageSet {
     /// cameras with exposures of their own need it (see matchColours()); the very same when they
     /// agree already. `changed`: how many views have other colours.
     [[nodiscard]] PageSet inOneLight(std::size_t& changed) const;
+    /// The same with the depth of its views refined, those behind it not: the very same where depth
+    /// is exact. `report`, if any, tells what was found and changed.
+    [[nodiscard]] PageSet refined(const RefineSettings& settings,
+                                  RefineReport* report = nullptr) const;
+    /// Whether refined() left all depth as it was.
+    [[nodiscard]] bool exactDepth() const { return data_->exactDepth; }
     /// The texture of a page as it was before inOneLight().
     [[nodiscard]] const Texture& captured(std::size_t page) const {
         return data_->captured.empty() ? *pages()[page].texture : *data_->captured[page];
@@ -216,6 +224,8 @@ class PageSet {
         /// Of solid(), inLightOf() and inOneLight().
         std::vector<std::shared_ptr<const Texture>> changed;
         std::vector<const Texture*> captured;  ///< by page; empty: those of the pages
+        bool exactDepth = true;
+        std::vector<std::shared_ptr<const Image<float>>> refined;  ///< depth of refined()
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
     [[nodiscard]] PageSet only(const std::vector<bool>& kept) const;

@@ -16,6 +16,8 @@ constexpr float kSteepestRim = 1.0f;
 // At a crease the flatter side counts: the other is steeper by this factor and this much. Chosen by
 // trial on the project's image sets.
 constexpr float kCreaseFactor = 3.0f, kCreaseMore = 0.5f;
+/// Pixels that tell the tilt of noisy depth, to each side.
+constexpr int kFarther = 3;
 
 std::int16_t coded(float slope) {
     return static_cast<std::int16_t>(
@@ -112,6 +114,26 @@ struct Window {
     [[nodiscard]] float alpha(int x, int y) const { return page.texture->alpha(texel(x, y)); }
 };
 
+/// The slope along one axis over pixels further away: of noisy depth next neighbours say little.
+/// `depth(k)` is the depth k pixels away, `scale` makes a change of it a tangent.
+template <class Depth, class Scale>
+float slopeFromFarther(const Depth& depth, const Scale& scale, float here) {
+    float sum = 0, weights = 0;
+    for (const int way : {-1, 1}) {
+        float before = here;
+        for (int k = 1; k <= kFarther; ++k) {
+            const float there = depth(way * k);
+            const auto step = static_cast<float>(way) * scale(there);
+            if (!(std::abs((there - before) * step) <= kSteepest)) break;
+            const float change = (there - here) * step;
+            sum += static_cast<float>(k) * change;
+            weights += static_cast<float>(k * k);
+            before = there;
+        }
+    }
+    return weights > 0 ? sum / weights : 0.0f;
+}
+
 glm::vec2 slopeFromDepth(const Window& w, int x, int y) {
     const auto& c = w.camera();
     const float z = w.depth(x, y);
@@ -122,6 +144,11 @@ glm::vec2 slopeFromDepth(const Window& w, int x, int y) {
     const auto scale = [&](double f, float other) {
         return static_cast<float>(c.orthographic ? f : f / other);
     };
+    if (w.view.depthDoubt > 0.0f)
+        return {slopeFromFarther([&](int k) { return depth(x + k, y); },
+                                 [&](float other) { return scale(c.fx, other); }, z),
+                slopeFromFarther([&](int k) { return depth(x, y + k); },
+                                 [&](float other) { return scale(c.fy, other); }, z)};
     const float l = depth(x - 1, y), r = depth(x + 1, y), t = depth(x, y - 1), b = depth(x, y + 1);
     return {slopeFromNeighbours(l, z, r, scale(c.fx, l), scale(c.fx, r)),
             slopeFromNeighbours(t, z, b, scale(c.fy, t), scale(c.fy, b))};

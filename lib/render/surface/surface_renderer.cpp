@@ -129,7 +129,8 @@ bool SurfaceRenderer::pointsAreExact() const {
         const auto pixel = camera.sampleSpacing(std::max(dist, 0.1 * bounds_.radius()));
         return s.step <= kExactStep * std::min(pixel.x, pixel.y);
     };
-    return scene_.exactDepth && std::all_of(scene_.sources.begin(), scene_.sources.end(), isFine);
+    return scene_.set.exactDepth() &&
+           std::all_of(scene_.sources.begin(), scene_.sources.end(), isFine);
 }
 
 void SurfaceRenderer::findNormals() {

@@ -151,7 +151,7 @@ int changedByPacking(const Bundle& bundle) {
     if (!atlas) return -1;
     const auto set = PageSet::of(*atlas, job);
     if (!set || set->views()[0].whole) return -1;
-    const surface::SurfaceScene whole{PageSet(bundle)}, packed(*set);
+    const surface::SurfaceScene whole{PageSet(bundle).refined({})}, packed(set->refined({}));
     int changed = 0;
     for (std::size_t v = 0; v < bundle.views.size(); ++v)
         for (int y = 0; y < whole.sources[v].height; ++y)

@@ -5,11 +5,6 @@
 #include <cstring>
 
 #include "lib/base/parallel.hpp"
-#include "lib/refine/colour_depth.hpp"
-#include "lib/refine/depth_noise.hpp"
-#include "lib/refine/fat_edges.hpp"
-#include "lib/refine/noisy_views.hpp"
-#include "lib/refine/silhouette_points.hpp"
 #include "lib/render/surface/prepare/creases.hpp"
 #include "lib/render/surface/prepare/draft.hpp"
 #include "lib/render/surface/prepare/outline_levels.hpp"
@@ -246,9 +241,8 @@ float typicalDist(const Source& s, const Draft& d) {
     return 1.0f / *middle;
 }
 
-/// The first half of preparing a source: its points. Those of a noisy view may be improved before
-/// finishSource().
-Draft beginSource(Source& s, NoisyView& noisy) {
+/// Links, edges, planar pieces and outlines of a source, from its points.
+void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
     const Camera& camera = s.view->camera;
     s.width = camera.width;
     s.height = camera.height;
@@ -263,18 +257,9 @@ Draft beginSource(Source& s, NoisyView& noisy) {
     s.validShare = counts.object > 0
                        ? static_cast<double>(counts.points) / static_cast<double>(counts.object)
                        : 1.0;
-    const float noise = depthNoise(d.q, s.space.axis);
-    closeMissedPixels(d.q, d.covered, s.space.axis, noise);
-    noisy.left = smoothDepth(d.q, s.space.axis, noise, &noisy.surface);
-    noisy.space = &s.space;
-    return d;
-}
-
-void finishSource(Source& s, Draft&& d, const Texture& texture, float left,
-                  std::vector<PreparedPage>& pages) {
     float step = s.step;
     // What smoothing leaves is like the step of a coarser depth code.
-    if (left > 0) {
+    if (const float left = s.view->depthDoubt; left > 0) {
         const float dist = typicalDist(s, d);
         step = std::max(step, kLeftInLinks * left * dist);
         s.step = std::max(s.step, kLeftInStep * left * dist);
@@ -286,7 +271,8 @@ void finishSource(Source& s, Draft&& d, const Texture& texture, float left,
     findEdges(s, d);
     findLeaves(s, d);
     findCreases(s, d);
-    if (s.hasAlpha) d.levels = outlineLevels(texture);
+    if (s.hasAlpha)
+        d.levels = outlineLevels(s.whole ? *s.whole->texture : s.set->textureOfView(s.number));
     keep(s, std::move(d), pages);
 }
 
@@ -313,63 +299,6 @@ std::vector<std::int32_t> placesOfBlocks(const Source& s) {
         }
     }
     return places;
-}
-
-/// Views in rectangles, one after the other: a draft takes the memory of a whole view. False when
-/// their depth is noisy or reaches over their edges, so that prepareTogether() makes more of them.
-bool prepareAlone(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
-    std::vector<float> shares;
-    for (Source& s : sources) {
-        NoisyView noisy;
-        Draft d = beginSource(s, noisy);
-        if (noisy.left > 0) return false;
-        const Texture texture = s.set->textureOfView(s.number);
-        const auto more = sharesAtEdges({&s.space, &texture, &d.q, s.step});
-        shares.insert(shares.end(), more.begin(), more.end());
-        finishSource(s, std::move(d), texture, 0.0f, pages);
-    }
-    return !edgesAreFat(colourAtEdges(std::move(shares)));
-}
-
-/// Views side by side: they wait for each other where their depth is noisy or reaches over their
-/// edges. Those in rectangles take the memory of whole views meanwhile. Whether neither was so.
-bool prepareTogether(std::vector<Source>& sources, std::vector<PreparedPage>& pages) {
-    std::vector<Draft> drafts(sources.size());
-    std::vector<NoisyView> views(sources.size());
-    std::vector<Texture> copies(sources.size());
-    std::vector<const Texture*> textures(sources.size());
-    const auto count = static_cast<std::int64_t>(sources.size());
-    parallelFor(0, count, [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
-        const Source& s = sources[k];
-        drafts[k] = beginSource(sources[k], views[k]);
-        if (!s.whole) copies[k] = s.set->textureOfView(k);
-        textures[k] = s.whole ? s.whole->texture : &copies[k];
-    });
-    std::vector<EdgeView> edges;
-    for (std::size_t k = 0; k < sources.size(); ++k)
-        edges.push_back({&sources[k].space, textures[k], &drafts[k].q, sources[k].step});
-    const bool fat = thinFatEdges(edges) > 0;
-    std::vector<std::size_t> noisyOnes;
-    std::vector<NoisyView> noisy;
-    for (std::size_t k = 0; k < sources.size(); ++k) {
-        if (!(views[k].left > 0)) continue;
-        noisyOnes.push_back(k);
-        noisy.push_back(std::move(views[k]));
-        noisy.back().q = &drafts[k].q;
-        noisy.back().texture = textures[k];
-    }
-    keepInSilhouettes(noisy, {kFreeLevel, kSolidAlpha});
-    agreeOnDepth(noisy);
-    agreeOnColours(noisy);
-    keepInSilhouettes(noisy, {kFreeLevel, kSolidAlpha});
-    std::vector<float> left(sources.size(), 0.0f);
-    for (std::size_t n = 0; n < noisy.size(); ++n) left[noisyOnes[n]] = noisy[n].left;
-    parallelFor(0, count, [&](std::int64_t i) {
-        const auto k = static_cast<std::size_t>(i);
-        finishSource(sources[k], std::move(drafts[k]), *textures[k], left[k], pages);
-    });
-    return !fat && noisy.empty();
 }
 
 }  // namespace
@@ -399,8 +328,12 @@ void SurfaceScene::prepare() {
     pages.resize(set.pages().size());
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = set.pages()[i].texture;
     begin();
-    if (std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.whole; })) {
-        exactDepth = prepareTogether(sources, pages);
+    const bool whole =
+        std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.whole; });
+    if (whole) {
+        parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
+            prepareSource(sources[static_cast<std::size_t>(i)], pages);
+        });
         return;
     }
     for (std::size_t i = 0; i < pages.size(); ++i) {
@@ -409,10 +342,8 @@ void SurfaceScene::prepare() {
         pages[i].info = Image<std::uint8_t>(page.width(), page.height(), 0);
         pages[i].levels = Image<std::uint8_t>(page.width(), page.height(), 0);
     }
-    if (!prepareAlone(sources, pages)) {
-        begin();
-        exactDepth = prepareTogether(sources, pages);
-    }
+    // One after the other: a draft takes the memory of a whole view.
+    for (Source& s : sources) prepareSource(s, pages);
     for (Source& s : sources)
         if (!s.whole) s.placeOfBlock = placesOfBlocks(s);
 }

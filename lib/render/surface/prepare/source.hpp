@@ -211,8 +211,6 @@ struct SurfaceScene {
     PageSet set;
     std::vector<PreparedPage> pages;
     std::vector<Source> sources;
-    /// No view is noisy, and none reaches over its edges.
-    bool exactDepth = true;
 
     /// Textures of `pages` that are not the set's own; see sharpenedTextures().
     std::vector<std::shared_ptr<const Texture>> sharpened;

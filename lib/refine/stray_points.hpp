@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "lib/refine/noisy_views.hpp"
+
+namespace stx {
+
+/// Points that too few of those around them are on one surface with become unknown: at rims a plane
+/// has too few points to be fitted to, and their noise stays. Gives how many. The same on any
+/// number of threads.
+std::int64_t removeStrays(const NoisyView& view);
+
+}  // namespace stx

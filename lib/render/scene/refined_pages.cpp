@@ -1,0 +1,95 @@
+#include <algorithm>
+
+#include "lib/base/parallel.hpp"
+#include "lib/render/scene/page_set.hpp"
+
+namespace stx {
+namespace {
+
+/// A view as refineDepth() takes it. Of one in rectangles `copy` keeps the images.
+RefineView refineView(const PageSet& set, std::size_t number, ReferenceView& copy) {
+    const PageView& view = set.views()[number];
+    const float step = view.depthBits < 32 ? static_cast<float>(view.depthCode().step()) : 0.0f;
+    if (view.whole) {
+        const Page& page = set.pages()[static_cast<std::size_t>(set.rectanglesOf(number)[0].page)];
+        return {&view.camera, page.texture, page.depth, view.depthMayBeUnknown(), step};
+    }
+    copy.texture = set.textureOfView(number);
+    copy.depth = Image<float>(view.camera.width, view.camera.height, kNoDepth);
+    for (const PageRectangle& r : set.rectanglesOf(number)) {
+        const float* depth = set.pages()[static_cast<std::size_t>(r.page)].depth->data();
+        for (int y = r.y0; y < r.y1; ++y)
+            for (int x = r.x0; x < r.x1; ++x) copy.depth.at(x, y) = depth[r.texel(x, y)];
+    }
+    return {&view.camera, &copy.texture, &copy.depth, view.depthMayBeUnknown(), step};
+}
+
+/// Puts the depth of a view where its rectangles are on a page, padding included.
+void putDepth(const Image<float>& depth, const PageRectangle& r, Image<float>& page) {
+    const int x0 = std::max(r.x0 - PageSet::kPadding, 0),
+              x1 = std::min(r.x1 + PageSet::kPadding, depth.width());
+    const int y0 = std::max(r.y0 - PageSet::kPadding, 0),
+              y1 = std::min(r.y1 + PageSet::kPadding, depth.height());
+    for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x) {
+            const bool inside = x >= r.x0 && y >= r.y0 && x < r.x1 && y < r.y1;
+            // Padding may repeat pixels that no rectangle shows.
+            if (inside || hasPoint(depth.at(x, y))) page.data()[r.texel(x, y)] = depth.at(x, y);
+        }
+}
+
+}  // namespace
+
+PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) const {
+    RefineReport own;
+    RefineReport& found = report ? *report : own;
+    found = {};
+    if (!settings.any() || views().empty()) return *this;
+    const bool whole =
+        std::all_of(views().begin(), views().end(), [](const PageView& v) { return v.whole; });
+    if (!whole) {
+        RefineNeeds needs(settings);
+        for (std::size_t i = 0; i < views().size(); ++i) {
+            ReferenceView copy;
+            needs.add(refineView(*this, i, copy));
+        }
+        if (!needs.any()) return *this;
+    }
+    std::vector<ReferenceView> copies(views().size());
+    std::vector<RefineView> given(views().size());
+    parallelFor(0, static_cast<std::int64_t>(given.size()), [&](std::int64_t i) {
+        const auto number = static_cast<std::size_t>(i);
+        given[number] = refineView(*this, number, copies[number]);
+    });
+    auto better = refineDepth(given, settings, found);
+    if (!found.changed()) return *this;
+    auto data = std::make_shared<Data>(*data_);
+    data->exactDepth =
+        found.of(RefineStep::noise).pixels == 0 && found.of(RefineStep::edges).pixels == 0;
+    std::vector<std::shared_ptr<Image<float>>> depths(data->pages.size());
+    for (std::size_t i = 0; i < better.size(); ++i) {
+        data->views[i].depthDoubt = better[i].doubt;
+        if (better[i].doubt > 0) data->views[i].noDepth = NoDepth::unknown;
+        if (!better[i].depth) continue;
+        for (const PageRectangle& r : rectanglesOf(i)) {
+            auto& depth = depths[static_cast<std::size_t>(r.page)];
+            const auto page = static_cast<std::size_t>(r.page);
+            if (views()[i].whole) {
+                depth = std::make_shared<Image<float>>(std::move(*better[i].depth));
+                break;
+            }
+            if (!depth) depth = std::make_shared<Image<float>>(*data_->pages[page].depth);
+            putDepth(*better[i].depth, r, *depth);
+        }
+    }
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+        if (!depths[i]) continue;
+        data->pages[i].depth = depths[i].get();
+        data->refined.push_back(std::move(depths[i]));
+    }
+    PageSet set(std::move(data));
+    set.behind_ = behind_;
+    return set;
+}
+
+}  // namespace stx

@@ -1,0 +1,114 @@
+// The steps of refining together: what they leave alone, what they report, and how they are chosen.
+
+#include "lib/refine/refine.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lib/render/bench/analytic_scene.hpp"
+#include "lib/render/scene/page_set.hpp"
+#include "tests/noisy_depth.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kViews = 3, kWidth = 160, kHeight = 120;
+
+/// Small views of a closed room: every pixel is a point.
+Bundle room() {
+    Bundle bundle;
+    for (int i = 0; i < kViews; ++i)
+        bundle.views.push_back(viewOfAnalyticScene(
+            AnalyticScene::room,
+            analyticCamera(AnalyticScene::room, i, kViews).resized(kWidth, kHeight), 2));
+    return bundle;
+}
+
+Bundle noisyRoom() {
+    Bundle bundle = room();
+    noisy::addNoise(bundle, 0.005);
+    return bundle;
+}
+
+/// Root of the mean square of what the depth of a set is off by, a share of the distance.
+double off(const PageSet& set, const Bundle& exact) {
+    double sum = 0, count = 0;
+    for (std::size_t v = 0; v < exact.views.size(); ++v) {
+        const Image<float>& depth = *set.pages()[v].depth;
+        for (std::size_t i = 0; i < depth.count(); ++i) {
+            if (!hasPoint(depth.data()[i])) continue;
+            const double d = depth.data()[i] / exact.views[v].depth.data()[i] - 1;
+            sum += d * d;
+            ++count;
+        }
+    }
+    return std::sqrt(sum / count);
+}
+
+TEST(Refine, LeavesExactDepthAsItIs) {
+    const Bundle bundle = room();
+    RefineReport report;
+    const PageSet refined = PageSet(bundle).refined(RefineSettings::all(), &report);
+    EXPECT_FALSE(report.changed()) << report.text();
+    EXPECT_TRUE(refined.exactDepth());
+    for (std::size_t v = 0; v < bundle.views.size(); ++v)
+        EXPECT_EQ(refined.pages()[v].depth, &bundle.views[v].depth);
+}
+
+TEST(Refine, SaysWhatItFoundAndDid) {
+    const Bundle bundle = noisyRoom();
+    RefineReport report;
+    const PageSet refined = PageSet(bundle).refined({}, &report);
+    EXPECT_NEAR(report.noise, 0.005, 0.0015);
+    EXPECT_EQ(report.of(RefineStep::noise).views, kViews);
+    EXPECT_GT(report.of(RefineStep::noise).pixels, kViews * kWidth * kHeight * 9 / 10);
+    EXPECT_NEAR(report.of(RefineStep::noise).meanMove, 0.004, 0.002);
+    EXPECT_GT(report.of(RefineStep::agree).pixels, 0);
+    EXPECT_EQ(report.of(RefineStep::strays).pixels, 0) << "of splats only";
+    EXPECT_FALSE(refined.exactDepth());
+    EXPECT_GT(refined.views()[0].depthDoubt, 0.0f);
+    EXPECT_LT(off(refined, room()), 0.6 * off(PageSet(bundle), room()));
+}
+
+TEST(Refine, DoesTheStepsThatAreAskedFor) {
+    const Bundle bundle = noisyRoom();
+    RefineReport report;
+    const auto only = RefineSettings::from("noise");
+    ASSERT_TRUE(only);
+    const PageSet some = PageSet(bundle).refined(*only, &report);
+    EXPECT_EQ(report.names(), "noise");
+    EXPECT_LT(off(PageSet(bundle).refined({}), room()), off(some, room()));
+    const PageSet none = PageSet(bundle).refined(RefineSettings::none(), &report);
+    EXPECT_FALSE(report.changed());
+    EXPECT_EQ(none.pages()[0].depth, &bundle.views[0].depth);
+}
+
+TEST(Refine, SettingsAreNamesOfSteps) {
+    const auto two = RefineSettings::from("agree,edges");
+    ASSERT_TRUE(two);
+    for (const RefineStepInfo& step : refineSteps())
+        EXPECT_EQ(two->on(step.step), step.name == "agree" || step.name == "edges") << step.name;
+    EXPECT_FALSE(two->forSplats().on(RefineStep::strays));
+    EXPECT_FALSE(RefineSettings::from("auto")->on(RefineStep::strays));
+    EXPECT_TRUE(RefineSettings::from("auto")->forSplats().on(RefineStep::strays));
+    EXPECT_FALSE(RefineSettings::from("off")->forSplats().any());
+    for (const char* wrong : {"", "all", "noise,", "noise,,agree", "Noise"}) {
+        const auto made = RefineSettings::from(wrong);
+        ASSERT_FALSE(made) << wrong;
+        EXPECT_EQ(made.error().code, ErrorCode::usage);
+        EXPECT_NE(made.error().text().find("silhouettes"), std::string::npos);
+    }
+}
+
+TEST(Refine, StraysAreUnknown) {
+    Bundle bundle = noisyRoom();
+    Image<float>& depth = bundle.views[0].depth;
+    depth.at(40, 30) *= 0.8f;
+    const PageSet refined = PageSet(bundle).refined(RefineSettings::all());
+    EXPECT_FALSE(hasPoint(refined.pages()[0].depth->at(40, 30)));
+    EXPECT_TRUE(refined.views()[0].depthMayBeUnknown());
+}
+
+}  // namespace
+}  // namespace stx
