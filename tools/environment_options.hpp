@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "lib/environment/environment.hpp"
+#include "lib/model/environment.hpp"
 #include "lib/render/lighting.hpp"
 #include "tools/command_line.hpp"
 #include "tools/program.hpp"

@@ -6,7 +6,7 @@
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/geometry/directions.hpp"
 
 namespace stx::mpeg4 {
 namespace {
