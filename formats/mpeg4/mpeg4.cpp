@@ -1,6 +1,7 @@
 #include "formats/mpeg4/mpeg4.hpp"
 
 #include "formats/files/files.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"

@@ -202,7 +202,7 @@ Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>
                         input.string(), folder ? "a folder" : "a video");
         if (film) return openFilm(input, job);
         if (!y4m) continue;
-        STX_TRY(auto source, mpeg4::ByteSource::open(input));
+        STX_TRY(auto source, ByteSource::open(input));
         STX_TRY(auto reader, imagesets::within(inQuotes(input.string()),
                                                Y4mReader::open(std::move(source), job)));
         return std::make_unique<Y4mFrames>(std::move(reader), input, job);

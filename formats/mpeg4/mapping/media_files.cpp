@@ -2,6 +2,7 @@
 #include <map>
 #include <set>
 
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"

@@ -149,7 +149,7 @@ std::string y4mText(const Rgba8Image& a, const Rgba8Image& b, const Y4mOptions& 
 }
 
 Result<Y4mReader> openText(std::string_view text, Job& job) {
-    return Y4mReader::open(mpeg4::ByteSource::fromView(std::as_bytes(std::span(text))), job);
+    return Y4mReader::open(ByteSource::fromView(std::as_bytes(std::span(text))), job);
 }
 
 int largestDifference(const Rgba8Image& a, const Rgba8Image& b) {
