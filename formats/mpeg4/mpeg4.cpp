@@ -3,6 +3,7 @@
 #include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/media_files.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
