@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-#include "formats/video/y4m_reader.hpp"
+#include "formats/yuv/y4m_reader.hpp"
 
 using namespace stx;
 

@@ -1,4 +1,4 @@
-#include "formats/video/y4m_reader.hpp"
+#include "formats/yuv/y4m_reader.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -51,7 +51,7 @@ std::string formatName(std::string_view chroma) {
 
 /// What the line at the beginning says.
 struct Y4mHeaderLine {
-    imagesets::YuvFormat format;
+    YuvFormat format;
     bool fullRange = false, interlaced = false;
 };
 
@@ -87,7 +87,7 @@ Result<Y4mHeaderLine> parseHeader(std::string_view line, const Limits& limits) {
         return failAt(atByte(0), ErrorCode::invalidInput,
                       "the first line does not say the {} of the frames",
                       width == 0 ? "width" : "height");
-    const auto format = imagesets::yuvFormatNamed(formatName(chroma));
+    const auto format = yuvFormatNamed(formatName(chroma));
     if (!format)
         return failAt(atByte(0), ErrorCode::unsupported,
                       "pixels of the kind C{} are not read; make 4:2:0 of them: ffmpeg -i IN.y4m "
@@ -151,7 +151,7 @@ Result<Rgba8Image> Y4mReader::frame(int k, const Limits& limits) const {
     const auto load = [&]() -> Result<Rgba8Image> {
         const ByteRange range(source_, offset, format_.frameBytes());
         STX_TRY(const auto bytes, range.load(limits));
-        return imagesets::rgbFromYuv(bytes, format_, colour_, name, limits);
+        return rgbFromYuv(bytes, format_, colour_, name, limits);
     };
     auto image = load();
     if (!image) return tl::unexpected(image.error().at(atByte(offset)));

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "formats/files/byte_source.hpp"
-#include "formats/imagesets/yuv.hpp"
+#include "formats/yuv/yuv.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/texture.hpp"
 
@@ -33,7 +33,7 @@ class Y4mReader {
   private:
     Y4mReader() = default;
     ByteSource source_;
-    imagesets::YuvFormat format_;
+    YuvFormat format_;
     YuvColour colour_;
     std::vector<std::uint64_t> frames_;  ///< where the samples of each begin
 };
