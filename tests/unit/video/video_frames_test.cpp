@@ -6,7 +6,7 @@
 #include "formats/video/numbered_pictures.hpp"
 #include "formats/video/video_module.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/yuv/y4m_text.hpp"
+#include "tests/y4m_text.hpp"
 
 namespace stx {
 namespace {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/yuv/y4m_text.hpp"
+#include "tests/y4m_text.hpp"
 
 namespace stx {
 namespace {
