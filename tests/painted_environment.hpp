@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "lib/environment/environment.hpp"
+#include "lib/model/environment.hpp"
 
 /// A colour for each direction: smooth, unlike in all directions, 0.2..0.8.
 inline glm::dvec3 paintedColour(glm::dvec3 direction) {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "formats/parts.hpp"
+#include "formats/parts/parts.hpp"
 
 namespace stx::tools {
 

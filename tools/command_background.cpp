@@ -4,11 +4,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/open.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "formats/open.hpp"
-#include "formats/sequences.hpp"
 #include "formats/video/video_frames.hpp"
 #include "lib/background/sequence_background.hpp"
 #include "lib/background/still.hpp"

@@ -2,10 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
-#include "formats/open.hpp"
-#include "formats/save.hpp"
-#include "formats/sequences.hpp"
 #include "lib/surface/normals.hpp"
 #include "tools/commands.hpp"
 

@@ -4,11 +4,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
-#include "formats/open.hpp"
-#include "formats/save.hpp"
-#include "formats/sequences.hpp"
 #include "formats/stx/mesh_views.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/render/around/around.hpp"

@@ -1,6 +1,6 @@
 #include <nlohmann/json.hpp>
 
-#include "formats/parts.hpp"
+#include "formats/parts/parts.hpp"
 #include "lib/base/printable.hpp"
 #include "tools/build_text.hpp"
 #include "tools/commands.hpp"

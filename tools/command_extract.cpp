@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/meshes/meshes.hpp"
-#include "formats/sequences.hpp"
 #include "lib/base/parallel.hpp"
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"

@@ -1,6 +1,6 @@
+#include "formats/any/info.hpp"
+#include "formats/any/open.hpp"
 #include "formats/images/images.hpp"
-#include "formats/info.hpp"
-#include "formats/open.hpp"
 #include "lib/sheet/camera_plot.hpp"
 #include "tools/commands.hpp"
 

@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
-#include "formats/sequences.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/period.hpp"
 #include "lib/quality/prune_quality.hpp"

@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
 #include "formats/images/images.hpp"
-#include "formats/open.hpp"
 #include "formats/panorama/panorama_files.hpp"
-#include "formats/save.hpp"
 #include "lib/panorama/panorama.hpp"
 #include "tools/commands.hpp"
 

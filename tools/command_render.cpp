@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/sequences.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
-#include "formats/sequences.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/render/around/around.hpp"
 #include "lib/render/factory.hpp"

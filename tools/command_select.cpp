@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
-#include "formats/open.hpp"
-#include "formats/save.hpp"
-#include "formats/sequences.hpp"
 #include "lib/selection/selection.hpp"
 #include "tools/commands.hpp"
 #include "tools/mesh_views.hpp"

@@ -3,11 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/open.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/images/images.hpp"
-#include "formats/open.hpp"
-#include "formats/sequences.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/sheet/sheet.hpp"

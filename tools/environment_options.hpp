@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
-#include "lib/environment/environment.hpp"
 #include "lib/light/lighting.hpp"
+#include "lib/model/environment.hpp"
 #include "tools/command_line.hpp"
 #include "tools/program.hpp"
 

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/any/open.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
-#include "formats/open.hpp"
-#include "formats/sequences.hpp"
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "tools/picture_times.hpp"

@@ -10,7 +10,7 @@
 
 #include "formats/files/files.hpp"
 #include "formats/images/frames.hpp"
-#include "formats/images/y4m.hpp"
+#include "formats/yuv/y4m_writer.hpp"
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
 #include "lib/model/texture.hpp"

@@ -171,7 +171,7 @@ Result<std::shared_ptr<const Environment>> openEnvironment(const fs::path& path,
     if (!fs::exists(path, ec))
         return failAt(where, ErrorCode::io, "the file or folder does not exist");
     if (fs::is_directory(path, ec)) return openFolder(path, job);
-    STX_TRY(auto source, mpeg4::ByteSource::open(path));
+    STX_TRY(auto source, ByteSource::open(path));
     Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));
     if (auto ok = source.read(0, head); !ok) return tl::unexpected(ok.error().at(where));
     if (isExrFile(head)) return readEnvironmentExr(path, job);

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "lib/base/job.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/model/environment.hpp"
 
 namespace stx {
 

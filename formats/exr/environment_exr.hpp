@@ -8,7 +8,7 @@
 
 #include "formats/exr/exr_file.hpp"
 #include "lib/base/job.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/model/environment.hpp"
 
 // clang-format off
 /// Environments in OpenEXR files: one part with the standard attribute `envmap`, R G B A

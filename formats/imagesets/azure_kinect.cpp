@@ -6,9 +6,9 @@
 #include <cmath>
 #include <mutex>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/film_frames.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/video/film.hpp"
 

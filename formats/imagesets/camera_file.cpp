@@ -1,7 +1,7 @@
 #include "formats/imagesets/camera_file.hpp"
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "lib/base/counted.hpp"
 
 namespace stx {

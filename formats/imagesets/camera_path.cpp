@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/poses.hpp"
 
 namespace stx::imagesets {

@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/exr/environment_exr.hpp"
+#include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export_colmap.hpp"
 #include "formats/imagesets/export_files.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -19,7 +19,6 @@ namespace {
 using imagesets::addOwnKeys;
 using imagesets::colourEnding;
 using imagesets::fileNames;
-using imagesets::inQuotes;
 using imagesets::kEnvironmentFile;
 using imagesets::OutputJson;
 using imagesets::transformsFrame;

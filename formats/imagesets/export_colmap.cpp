@@ -3,9 +3,9 @@
 #include <bit>
 #include <map>
 
+#include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/colmap.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx::imagesets {

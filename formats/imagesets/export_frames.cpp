@@ -2,9 +2,9 @@
 
 #include "formats/exr/environment_exr.hpp"
 #include "formats/files/files.hpp"
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/export_files.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/same_pictures.hpp"
 
@@ -12,7 +12,6 @@ namespace stx {
 namespace {
 
 using imagesets::fileNames;
-using imagesets::inQuotes;
 using imagesets::kEnvironmentFile;
 using imagesets::OutputJson;
 using imagesets::transformsFrame;

@@ -7,8 +7,8 @@
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/exr/exr_file.hpp"
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 
 namespace stx::imagesets {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/video/film.hpp"
 #include "lib/base/counted.hpp"

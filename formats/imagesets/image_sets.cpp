@@ -5,8 +5,8 @@
 #include <set>
 
 #include "formats/exr/environment_exr.hpp"
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/motion.hpp"
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/yuv/yuv_colour.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/sequence.hpp"
@@ -41,12 +42,6 @@ enum class CloseGaps {
     automatic,  ///< older Middlebury sets
     on,
     off,
-};
-
-/// How pictures stored as Y, Cb, Cr become RGB.
-struct YuvColour {
-    bool bt601 = false;      ///< the matrix of BT.601 instead of BT.709
-    bool fullRange = false;  ///< 0..255 instead of 16..235 (of 8 bits)
 };
 
 struct ImageSetOptions {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/imagesets/messages.hpp"
+#include "formats/files/messages.hpp"
 
 namespace stx::imagesets {
 

@@ -2,8 +2,8 @@
 #include <atomic>
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/mixed_pixels.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/pictures.hpp"

@@ -6,8 +6,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/middlebury.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/text_lines.hpp"

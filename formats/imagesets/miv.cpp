@@ -6,8 +6,8 @@
 
 #include <glm/gtc/constants.hpp>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/patterns.hpp"
 
 namespace stx::imagesets {

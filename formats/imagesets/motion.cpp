@@ -5,7 +5,7 @@
 #include <map>
 #include <tuple>
 
-#include "formats/imagesets/messages.hpp"
+#include "formats/files/messages.hpp"
 
 namespace stx::imagesets {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"

@@ -5,8 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/video/film.hpp"
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "formats/imagesets/messages.hpp"
+#include "formats/files/messages.hpp"
 #include "formats/video/film.hpp"
 
 namespace stx {

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <optional>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/text_lines.hpp"

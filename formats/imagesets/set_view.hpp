@@ -10,7 +10,7 @@
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/imagesets/lens.hpp"
 #include "formats/imagesets/panorama.hpp"
-#include "formats/imagesets/yuv.hpp"
+#include "formats/yuv/yuv.hpp"
 #include "lib/model/bundle.hpp"
 
 namespace stx {

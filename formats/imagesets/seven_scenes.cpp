@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/text_lines.hpp"

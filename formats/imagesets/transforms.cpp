@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/kinds.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/imagesets/poses.hpp"
 #include "lib/base/parallel.hpp"
 

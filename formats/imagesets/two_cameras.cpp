@@ -1,7 +1,7 @@
 #include "formats/imagesets/two_cameras.hpp"
 
 #include "formats/files/files.hpp"
-#include "formats/imagesets/messages.hpp"
+#include "formats/files/messages.hpp"
 #include "formats/imagesets/text_lines.hpp"
 
 namespace stx::imagesets {

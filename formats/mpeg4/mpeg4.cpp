@@ -1,12 +1,14 @@
 #include "formats/mpeg4/mpeg4.hpp"
 
 #include "formats/files/files.hpp"
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/media_files.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/geometry/directions.hpp"
 
 namespace stx {
 

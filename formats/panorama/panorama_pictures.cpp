@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <mutex>
 
+#include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/panorama/exif.hpp"
 #include "formats/panorama/panorama_files.hpp"
 #include "formats/video/numbered_pictures.hpp"
@@ -11,7 +11,6 @@ namespace stx {
 namespace {
 
 namespace fs = std::filesystem;
-using imagesets::inQuotes;
 
 /// Half the diagonal of a picture of 36x24 mm.
 constexpr double kHalfDiagonal35 = 21.633;

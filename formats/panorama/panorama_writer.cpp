@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <initializer_list>
 
+#include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/environment/environment_files.hpp"
 #include "formats/images/frames.hpp"
-#include "formats/open.hpp"
 #include "formats/panorama/panorama_files.hpp"
-#include "formats/save.hpp"
-#include "formats/sequences.hpp"
 #include "lib/environment/environment_map.hpp"
 
 namespace stx {

@@ -5,9 +5,7 @@ cmake_policy(VERSION 3.25)
 
 function(room_of header result)
     # What stx.hpp takes of the folders below formats are options, but for the rules of validate.
-    string(REGEX REPLACE "^formats/(stx/options|imagesets/.+)$" "formats/options/" header ${header}.)
-    # Bundles have an environment, and an environment has textures, which are of the model.
-    string(REGEX REPLACE "^lib/environment/environment[.]" "lib/model/environment." header ${header})
+    string(REGEX REPLACE "^formats/(any/options[.]|imagesets/|yuv/).+$" "formats/options/" header ${header}.)
     string(REGEX REPLACE "^(formats/stx|formats|lib)/([a-z_]+)[/.].*$" "\\2" room ${header})
     set(${result} ${room} PARENT_SCOPE)
 endfunction()

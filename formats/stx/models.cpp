@@ -1,8 +1,8 @@
+#include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/image_sets.hpp"
-#include "formats/open.hpp"
-#include "formats/save.hpp"
-#include "formats/sequences.hpp"
 #include "formats/stx/mesh_views.hpp"
 
 namespace stx {

@@ -33,8 +33,8 @@
 #include <variant>
 #include <vector>
 
+#include "formats/any/options.hpp"
 #include "formats/environment/environment_files.hpp"
-#include "formats/stx/options.hpp"
 #include "formats/validate/validate.hpp"
 #include "lib/base/job.hpp"
 #include "lib/base/parallel.hpp"

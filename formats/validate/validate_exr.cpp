@@ -1,7 +1,7 @@
 #include <algorithm>
 
+#include "formats/any/open.hpp"
 #include "formats/exr/bundle_exr.hpp"
-#include "formats/open.hpp"
 #include "formats/validate/findings.hpp"
 
 namespace stx {

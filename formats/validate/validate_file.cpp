@@ -1,7 +1,7 @@
+#include "formats/any/open.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
-#include "formats/open.hpp"
 #include "formats/validate/findings.hpp"
 #include "formats/validate/validate_mpeg4.hpp"
 

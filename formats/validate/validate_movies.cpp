@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include "lib/model/sequence.hpp"
+
 namespace stx {
 
 using namespace mpeg4;

@@ -3,18 +3,17 @@
 #include <algorithm>
 #include <fstream>
 
+#include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
-#include "formats/imagesets/messages.hpp"
 #include "formats/video/film.hpp"
 #include "formats/video/numbered_pictures.hpp"
-#include "formats/video/y4m_reader.hpp"
+#include "formats/yuv/y4m_reader.hpp"
 #include "lib/base/counted.hpp"
 
 namespace stx {
 namespace {
 
 namespace fs = std::filesystem;
-using imagesets::inQuotes;
 
 class PictureFrames final : public VideoFrames {
   public:
@@ -67,8 +66,7 @@ class Y4mFrames final : public VideoFrames {
     [[nodiscard]] glm::ivec2 size() const override { return {reader_.width(), reader_.height()}; }
     [[nodiscard]] int count() const override { return reader_.count(); }
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
-        STX_TRY(auto picture,
-                imagesets::within(inQuotes(file_.string()), reader_.frame(k, job_.limits)));
+        STX_TRY(auto picture, within(inQuotes(file_.string()), reader_.frame(k, job_.limits)));
         return std::make_shared<const Rgba8Image>(std::move(picture));
     }
     [[nodiscard]] std::string name(int k) const override {
@@ -97,7 +95,7 @@ class FilmFrames final : public VideoFrames {
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
         STX_TRY(const auto picture, film_->picture(k));
         const std::string where = fmt::format("{}: frame {}", inQuotes(film_->path().string()), k);
-        STX_TRY(auto colour, imagesets::within(where, picture.colour(job_.limits)));
+        STX_TRY(auto colour, within(where, picture.colour(job_.limits)));
         if (colour.size() != size_)
             return failAt(where, ErrorCode::invalidInput,
                           "it is {}x{}, but the track is {}x{}; all frames must have one size",
@@ -202,9 +200,9 @@ Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>
                         input.string(), folder ? "a folder" : "a video");
         if (film) return openFilm(input, job);
         if (!y4m) continue;
-        STX_TRY(auto source, mpeg4::ByteSource::open(input));
-        STX_TRY(auto reader, imagesets::within(inQuotes(input.string()),
-                                               Y4mReader::open(std::move(source), job)));
+        STX_TRY(auto source, ByteSource::open(input));
+        STX_TRY(auto reader,
+                within(inQuotes(input.string()), Y4mReader::open(std::move(source), job)));
         return std::make_unique<Y4mFrames>(std::move(reader), input, job);
     }
     return openPictures(inputs, inputs.size() == 1 ? inputs[0].string() : "pictures", job);

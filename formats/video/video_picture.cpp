@@ -3,8 +3,8 @@
 namespace stx {
 namespace {
 
-imagesets::YuvFormat formatOf(const video::PictureHeader& h) {
-    imagesets::YuvFormat format;
+YuvFormat formatOf(const video::PictureHeader& h) {
+    YuvFormat format;
     format.width = h.width;
     format.height = h.height;
     format.bits = h.bits;
@@ -65,9 +65,9 @@ Result<Rgba8Image> VideoPicture::colour(const Limits& limits) const {
         std::memcpy(out.data(), samples.data(), samples.size());
         return turned(std::move(out), turn_);
     }
-    STX_TRY(auto out, imagesets::rgbFromYuv(samples, formatOf(header_),
-                                            {header_.bt601 != 0, header_.fullRange != 0},
-                                            "the picture", limits));
+    STX_TRY(auto out,
+            rgbFromYuv(samples, formatOf(header_), {header_.bt601 != 0, header_.fullRange != 0},
+                       "the picture", limits));
     return turned(std::move(out), turn_);
 }
 

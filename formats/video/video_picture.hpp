@@ -1,8 +1,8 @@
 #pragma once
 
 #include "formats/files/files.hpp"
-#include "formats/imagesets/yuv.hpp"
 #include "formats/video/wire.hpp"
+#include "formats/yuv/yuv.hpp"
 #include "lib/base/image.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/texture.hpp"

@@ -6,7 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "lib/base/job.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/model/environment.hpp"
 
 namespace stx {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "lib/base/job.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/model/environment.hpp"
 #include "lib/model/reference_view.hpp"
 
 namespace stx {

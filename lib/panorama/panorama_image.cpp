@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lib/environment/environment.hpp"
 #include "lib/geometry/catmull_rom.hpp"
+#include "lib/geometry/directions.hpp"
 #include "lib/panorama/panorama.hpp"
 
 namespace stx {

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "formats/any/open.hpp"
 #include "formats/files/files.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/camera_file.hpp"
-#include "formats/open.hpp"
 #include "formats/stx/stx.hpp"
 #include "tests/naive_warp.hpp"
 

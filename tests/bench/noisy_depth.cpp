@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "formats/any/open.hpp"
 #include "formats/exr/bundle_exr.hpp"
-#include "formats/open.hpp"
 
 int main(int argc, char** argv) {
     using namespace stx;

@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
+#include "formats/any/open.hpp"
 #include "formats/imagesets/camera_file.hpp"
-#include "formats/open.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/render/factory.hpp"
 #include "tests/bench/yardstick.hpp"

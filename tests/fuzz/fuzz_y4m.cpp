@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-#include "formats/video/y4m_reader.hpp"
+#include "formats/yuv/y4m_reader.hpp"
 
 using namespace stx;
 
@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     Job job;
     job.limits.maxMemoryBytes = 8u << 20;
     const ByteSpan bytes(reinterpret_cast<const std::byte*>(data), size);
-    const auto reader = Y4mReader::open(mpeg4::ByteSource::fromView(bytes), job);
+    const auto reader = Y4mReader::open(ByteSource::fromView(bytes), job);
     if (!reader) {
         if (reader.error().message.empty()) std::abort();
         return 0;

@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/bifs/descriptors.hpp"
-#include "formats/mpeg4/container/byte_io.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 

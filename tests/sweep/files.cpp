@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "formats/sequences.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/stx/stx.hpp"
 #include "tests/sweep/measures.hpp"
 #include "tests/sweep/random.hpp"

@@ -1,6 +1,6 @@
 #include "formats/mpeg4/bifs/descriptors.hpp"
 
-#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/files/byte_io.hpp"
 
 namespace stx::mpeg4 {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/scene/document.hpp"
 
 namespace stx::mpeg4 {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/scene/document.hpp"
 
 /// Inside of the MP4 reader: boxes, and tracks by their tables.

@@ -4,8 +4,8 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/bifs/descriptors.hpp"
-#include "formats/mpeg4/container/byte_io.hpp"
 #include "formats/mpeg4/container/image_headers.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/container/movie_boxes.hpp"

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/scene/document.hpp"
 
 namespace stx::mpeg4 {

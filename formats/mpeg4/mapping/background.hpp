@@ -5,7 +5,7 @@
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/stream_images.hpp"
 #include "formats/mpeg4/scene/scene_walk.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/model/environment.hpp"
 
 /// The Background node and environments (ISO/IEC 14496-11; VRML97, 6.5). Faces are turned as the
 /// text says: top has +Z up, bottom -Z, +X is to the right on both. (GPAC draws these two turned by

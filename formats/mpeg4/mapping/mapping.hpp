@@ -55,6 +55,9 @@ struct SceneReadOptions {
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
 
+/// Whether pictures of its views are video: H.264 or another coding that needs a decoder of video.
+[[nodiscard]] bool holdsVideo(const Document& document);
+
 /// What the scene's objects are: "SimpleTexture", "SimpleTextureV2", "PointTexture", "OctreeImage",
 /// or "none"; the richest where there are several.
 [[nodiscard]] const char* nodeKindOf(const Document& document);

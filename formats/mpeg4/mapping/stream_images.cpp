@@ -4,6 +4,7 @@
 
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
+#include "lib/model/sequence.hpp"
 
 namespace stx::mpeg4 {
 namespace {

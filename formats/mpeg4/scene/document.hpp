@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "formats/mpeg4/container/byte_source.hpp"
+#include "formats/files/byte_source.hpp"
 #include "formats/mpeg4/scene/scene.hpp"
 
 // clang-format off

@@ -6,8 +6,8 @@
 #include <cassert>
 #include <unordered_map>
 
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/scene/node_rows.hpp"
-#include "formats/mpeg4/text/text_values.hpp"
 
 namespace stx::mpeg4 {
 namespace {

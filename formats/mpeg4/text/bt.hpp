@@ -13,7 +13,7 @@ namespace stx::mpeg4 {
 /// blocks with commands and UPDATE OD / REMOVE OD. The words of descriptors and the names of fields
 /// are taken in any case of letters. Times are ticks of the stream (milliseconds unless its
 /// SLConfigDescriptor has another timeStampResolution). The DEF name N12 is node id 13.
-/// Streams get their file names, not their bytes: see loadMedia() in mpeg4.hpp.
+/// Streams get their file names, not their bytes: see loadMedia() in media_files.hpp.
 /// `name` is for errors, which are at `'name':line:column`. Errors (invalidInput): what the syntax
 /// or the node table does not have, with what was found and what expected; (unsupported) PROTO.
 [[nodiscard]] Result<Document> readBt(std::string_view text, const std::string& name, Job& job);

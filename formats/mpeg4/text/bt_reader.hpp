@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/bt_lexer.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"

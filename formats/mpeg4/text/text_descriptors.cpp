@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 
 namespace stx::mpeg4 {

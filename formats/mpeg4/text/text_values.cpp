@@ -6,12 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "formats/files/no_case.hpp"
+
 namespace stx::mpeg4 {
 namespace {
-
-char lower(char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-}
 
 /// The digits of a hexadecimal integer without sign and 0x, or nothing.
 std::optional<std::uint64_t> hexFromText(std::string_view digits) {
@@ -124,13 +122,6 @@ std::optional<int> odFromUrl(std::string_view url) {
     const auto [at, error] = std::from_chars(url.data(), end, id);
     if (url.empty() || error != std::errc() || at != end || id < 1 || id > 1023) return {};
     return id;
-}
-
-bool equalNoCase(std::string_view a, std::string_view b) {
-    if (a.size() != b.size()) return false;
-    for (std::size_t i = 0; i < a.size(); ++i)
-        if (lower(a[i]) != lower(b[i])) return false;
-    return true;
 }
 
 std::string quotedText(std::string_view text) {

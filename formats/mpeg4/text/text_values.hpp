@@ -32,9 +32,6 @@ namespace stx::mpeg4 {
 /// case). Nothing for all other URLs: `10 ` with a blank is one, and so are ids above 1023.
 [[nodiscard]] std::optional<int> odFromUrl(std::string_view url);
 
-/// Equal but for the case of ASCII letters.
-[[nodiscard]] bool equalNoCase(std::string_view a, std::string_view b);
-
 /// `text` in quotes for BT and for lists of strings in XMT-A: `"` and `\` get a backslash before.
 [[nodiscard]] std::string quotedText(std::string_view text);
 

@@ -10,8 +10,8 @@ namespace stx::mpeg4 {
 
 /// Reads a presentation: Header with InitialObjectDescriptor (may be missing), Body with Replace,
 /// Insert, Delete, ObjectDescriptorUpdate and `par begin="seconds"`. The DEF name N12 is node
-/// id 13. Streams get their file names, not their bytes: see loadMedia() in mpeg4.hpp. DTDs are
-/// passed over: no entity but the five of XML is known, none is expanded. `name` is for errors,
+/// id 13. Streams get their file names, not their bytes: see loadMedia() in media_files.hpp. DTDs
+/// are passed over: no entity but the five of XML is known, none is expanded. `name` is for errors,
 /// which are at `'name':line:column`. Errors (invalidInput): XML that is not well-formed, what the
 /// schema or the node table does not have, with what was found and what expected.
 [[nodiscard]] Result<Document> readXmt(std::string_view text, const std::string& name, Job& job);

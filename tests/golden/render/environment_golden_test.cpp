@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/open.hpp"
+#include "formats/any/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/render/compose/environment_behind.hpp"

@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/any/open.hpp"
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/imagesets/image_sets.hpp"
-#include "formats/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/metrics/compare.hpp"

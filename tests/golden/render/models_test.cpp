@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/open.hpp"
+#include "formats/any/open.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/render/factory.hpp"

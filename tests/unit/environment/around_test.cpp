@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <glm/gtc/constants.hpp>
 
+#include "formats/any/open.hpp"
 #include "formats/images/frames.hpp"
-#include "formats/open.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/render/around/around.hpp"
 #include "lib/render/factory.hpp"

@@ -5,7 +5,6 @@
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/exr/exr_file.hpp"
 #include "formats/images/images.hpp"
-#include "formats/images/y4m.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/model/texture.hpp"
@@ -138,57 +137,6 @@ TEST(Frames, NoClobberAndEmptyFrames) {
     EXPECT_TRUE(writeFrame(threePixels(false), folder / "a.png", options));
     EXPECT_FALSE(writeFrame(threePixels(false), folder / "a.png", options));
     EXPECT_FALSE(writeFrame(Frame(), folder / "b.png"));
-}
-
-std::vector<int> intsOf(const Bytes& bytes) {
-    std::vector<int> ints;
-    for (const auto b : bytes) ints.push_back(std::to_integer<int>(b));
-    return ints;
-}
-
-TEST(Y4m, CodesKnownColours) {
-    Image<glm::u8vec4> image(1, 1);
-    Y4mOptions options;
-    options.chroma = Y4mOptions::Chroma::yuv444;
-    const auto coded = [&](glm::u8vec4 p) {
-        image.at(0, 0) = p;
-        return intsOf(y4mPlanes(image, options));
-    };
-    // The colour bars of ITU-R BT.601 and BT.709 at 100 %.
-    EXPECT_EQ(coded({255, 255, 255, 255}), (std::vector<int>{235, 128, 128}));
-    EXPECT_EQ(coded({0, 0, 0, 255}), (std::vector<int>{16, 128, 128}));
-    EXPECT_EQ(coded({255, 0, 0, 255}), (std::vector<int>{81, 90, 240}));
-    EXPECT_EQ(coded({0, 255, 0, 255}), (std::vector<int>{145, 54, 34}));
-    EXPECT_EQ(coded({0, 0, 255, 255}), (std::vector<int>{41, 240, 110}));
-    options.matrix = Y4mOptions::Matrix::bt709;
-    EXPECT_EQ(coded({255, 0, 0, 255}), (std::vector<int>{63, 102, 240}));
-    EXPECT_EQ(coded({0, 255, 0, 255}), (std::vector<int>{173, 42, 26}));
-    options.fullRange = true;
-    EXPECT_EQ(coded({255, 255, 255, 255}), (std::vector<int>{255, 128, 128}));
-}
-
-TEST(Y4m, AStreamHasHeaderFramesAndRoundedUpChroma) {
-    const TemporaryFolder folder;
-    auto file = OutputFile::create(folder / "a.y4m");
-    ASSERT_TRUE(file);
-    Y4mOptions options;
-    options.rateNumerator = 25;
-    auto writer = Y4mWriter::create(*file, 3, 1, options);
-    ASSERT_TRUE(writer);
-    const Rgba8Image picture = rgba8From(threePixels(false), glm::vec3(0.0f));
-    ASSERT_TRUE(writer->write(picture));
-    ASSERT_TRUE(writer->write(picture));
-    EXPECT_FALSE(writer->write(Image<glm::u8vec4>(4, 1)));
-    ASSERT_TRUE(file->commit());
-    const auto bytes = readFile(folder / "a.y4m", Limits());
-    ASSERT_TRUE(bytes);
-    const std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-    const std::string header = "YUV4MPEG2 W3 H1 F25:1 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
-    EXPECT_EQ(text.substr(0, header.size()), header);
-    EXPECT_EQ(text.substr(header.size(), 6), "FRAME\n");
-    EXPECT_EQ(text.size(), header.size() + 2 * (6 + 3 + 2 + 2));
-    // The last pixel has nothing but the background.
-    EXPECT_EQ(static_cast<unsigned char>(text[header.size() + 6 + 2]), 16);
 }
 
 }  // namespace

@@ -5,11 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/any/info.hpp"
+#include "formats/any/open.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/imagesets/pictures.hpp"
-#include "formats/info.hpp"
-#include "formats/open.hpp"
 #include "lib/packing/packing.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"

@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/any/info.hpp"
+#include "formats/any/open.hpp"
 #include "formats/images/images.hpp"
-#include "formats/info.hpp"
-#include "formats/open.hpp"
 #include "lib/base/job.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/render/factory.hpp"

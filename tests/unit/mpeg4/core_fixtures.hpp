@@ -17,10 +17,10 @@ inline std::vector<std::filesystem::path> mp4FilesIn(const std::filesystem::path
     return files;
 }
 
-inline stx::mpeg4::ByteSource openSource(const std::filesystem::path& path) {
-    auto source = stx::mpeg4::ByteSource::open(path);
+inline stx::ByteSource openSource(const std::filesystem::path& path) {
+    auto source = stx::ByteSource::open(path);
     EXPECT_TRUE(source) << path;
-    return source ? *source : stx::mpeg4::ByteSource();
+    return source ? *source : stx::ByteSource();
 }
 
 /// "c0 05 a6"

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/files/byte_io.hpp"
 #include "formats/mpeg4/container/image_headers.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 

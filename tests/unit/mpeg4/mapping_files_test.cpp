@@ -2,6 +2,7 @@
 #include <fstream>
 
 #include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/media_files.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"

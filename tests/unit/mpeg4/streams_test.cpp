@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/mpeg4/container/byte_io.hpp"
+#include "formats/files/byte_io.hpp"
 #include "tests/unit/mpeg4/core_fixtures.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
 #include "tests/unit/mpeg4/round_trips.hpp"

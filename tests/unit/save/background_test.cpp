@@ -2,9 +2,9 @@
 // container that a bundle can be written to.
 #include <gtest/gtest.h>
 
+#include "formats/any/save.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/export.hpp"
-#include "formats/save.hpp"
 #include "lib/packing/packing.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/torus_bundle.hpp"

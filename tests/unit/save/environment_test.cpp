@@ -1,9 +1,9 @@
 // The environment of a bundle through every container, an atlas, and what picks or changes views.
 #include <gtest/gtest.h>
 
+#include "formats/any/save.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/export.hpp"
-#include "formats/save.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/selection/selection.hpp"
 #include "tests/painted_environment.hpp"

@@ -4,10 +4,10 @@
 
 #include <random>
 
+#include "formats/any/save.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/mpeg4/mapping/view_notes.hpp"
-#include "formats/save.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/prune.hpp"
 #include "lib/quality/view_quality.hpp"

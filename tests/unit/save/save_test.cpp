@@ -1,5 +1,5 @@
 // Bundles through the facade: what is refused on the way out and on the way in, and where.
-#include "formats/save.hpp"
+#include "formats/any/save.hpp"
 
 #include <gtest/gtest.h>
 

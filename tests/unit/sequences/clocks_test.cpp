@@ -3,9 +3,9 @@
 
 #include <cmath>
 
+#include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/export.hpp"
-#include "formats/sequences.hpp"
 #include "lib/packing/packing.hpp"
 #include "tests/ffmpeg.hpp"
 #include "tests/temporary_folder.hpp"

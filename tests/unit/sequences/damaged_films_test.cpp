@@ -2,9 +2,9 @@
 
 #include <set>
 
+#include "formats/any/sequences.hpp"
 #include "formats/files/files.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "formats/sequences.hpp"
 #include "formats/video/video_module.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/temporary_folder.hpp"

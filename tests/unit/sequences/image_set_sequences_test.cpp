@@ -1,8 +1,8 @@
 // Image sets with time: which pictures belong to which camera, and what a moment shows.
 
+#include "formats/any/sequences.hpp"
 #include "formats/imagesets/export.hpp"
 #include "formats/imagesets/image_sets.hpp"
-#include "formats/sequences.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/imagesets/set_writer.hpp"
 

@@ -1,10 +1,10 @@
 // Bundles in time as MPEG-4 presentations: MovieTextures, commands, clocks, interpolators.
 
+#include "formats/any/sequences.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mapping/sequence_write.hpp"
 #include "formats/mpeg4/scene/interpolators.hpp"
-#include "formats/sequences.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/unit/sequences/moving_views.hpp"
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <set>
 
+#include "formats/any/sequences.hpp"
 #include "formats/files/files.hpp"
 #include "formats/mpeg4/mapping/media_clock.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "formats/sequences.hpp"
 #include "tests/ffmpeg.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/temporary_folder.hpp"

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "formats/any/info.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/imagesets/export.hpp"
-#include "formats/info.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/geometry/origin.hpp"
 #include "tests/temporary_folder.hpp"

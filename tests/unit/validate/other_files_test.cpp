@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/any/save.hpp"
 #include "formats/imagesets/export.hpp"
-#include "formats/save.hpp"
 #include "formats/validate/validate.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"

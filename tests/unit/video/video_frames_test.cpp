@@ -3,24 +3,15 @@
 #include <gtest/gtest.h>
 
 #include "formats/images/images.hpp"
-#include "formats/images/y4m.hpp"
 #include "formats/video/numbered_pictures.hpp"
 #include "formats/video/video_module.hpp"
-#include "formats/video/y4m_reader.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/y4m_text.hpp"
 
 namespace stx {
 namespace {
 
 namespace fs = std::filesystem;
-
-Rgba8Image ramp(int width, int height, int k = 0) {
-    Rgba8Image out(width, height);
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x)
-            out.at(x, y) = {40 + x * 4 + k, 60 + y * 5, 150 - x - y, 255};
-    return out;
-}
 
 void writePng(const fs::path& path, const Rgba8Image& image) {
     const auto png = encodePng(image.width(), image.height(), 4, 8, image.data(), true);
@@ -134,115 +125,6 @@ TEST(VideoFrames, WhatIsNoFrameSaysWhatToDo) {
     const auto avi = errorOf({folder / "clip.AVI"}, ErrorCode::unsupported);
     EXPECT_TRUE(has(avi, "ffmpeg -i") && has(avi, "frame_%04d.png")) << avi;
     EXPECT_TRUE(has(errorOf({folder / "a.png", folder.path()}, ErrorCode::usage), "is a folder"));
-}
-
-// ---- YUV4MPEG2 ----
-
-std::string y4mText(const Rgba8Image& a, const Rgba8Image& b, const Y4mOptions& options) {
-    std::string text = y4mHeader(a.width(), a.height(), options) + "\n";
-    for (const auto* image : {&a, &b}) {
-        const auto planes = y4mPlanes(*image, options);
-        text += "FRAME\n";
-        text.append(reinterpret_cast<const char*>(planes.data()), planes.size());
-    }
-    return text;
-}
-
-Result<Y4mReader> openText(std::string_view text, Job& job) {
-    return Y4mReader::open(mpeg4::ByteSource::fromView(std::as_bytes(std::span(text))), job);
-}
-
-int largestDifference(const Rgba8Image& a, const Rgba8Image& b) {
-    int most = 0;
-    for (std::size_t i = 0; i < a.count(); ++i)
-        for (int c = 0; c < 4; ++c)
-            most = std::max(most, std::abs(a.pixels()[i][c] - b.pixels()[i][c]));
-    return most;
-}
-
-TEST(Y4mReader, GivesBackWhatOurWriterWrote) {
-    for (const auto chroma : {Y4mOptions::Chroma::yuv420, Y4mOptions::Chroma::yuv444}) {
-        for (const bool full : {false, true}) {
-            for (const glm::ivec2 size :
-                 {glm::ivec2(12, 8), glm::ivec2(7, 5), glm::ivec2(2, 720)}) {
-                Y4mOptions options;
-                options.chroma = chroma;
-                options.fullRange = full;
-                const auto a = ramp(size.x, std::min(size.y, 20)),
-                           b = ramp(size.x, std::min(size.y, 20), 9);
-                const auto text = y4mText(a, b, options);
-                Job job;
-                const auto reader = openText(text, job);
-                ASSERT_TRUE(reader) << reader.error().text();
-                ASSERT_EQ(reader->count(), 2);
-                const int room = chroma == Y4mOptions::Chroma::yuv444 ? 3 : 8;
-                EXPECT_LE(largestDifference(*reader->frame(0, job.limits), a), room);
-                EXPECT_LE(largestDifference(*reader->frame(1, job.limits), b), room);
-            }
-        }
-    }
-}
-
-TEST(Y4mReader, TakesTheMatrixOfTheSize) {
-    for (const int height : {718, 720}) {
-        const Rgba8Image red(2, height, glm::u8vec4(200, 30, 20, 255));
-        const auto text = y4mText(red, red, {});
-        Job job;
-        EXPECT_LE(largestDifference(*openText(text, job)->frame(1, job.limits), red), 3) << height;
-    }
-}
-
-TEST(Y4mReader, ReadsLumaAloneManyBitsAndFrameParameters) {
-    Job job;
-    const auto grey = openText("YUV4MPEG2 W2 H1 Cmono XCOLORRANGE=FULL\nFRAME Ixyz\n\x10\x80", job);
-    ASSERT_TRUE(grey) << grey.error().text();
-    EXPECT_EQ((*grey->frame(0, job.limits)).at(1, 0), glm::u8vec4(128, 128, 128, 255));
-    using std::string_view_literals::operator""sv;
-    const auto ten = openText(
-        "YUV4MPEG2 W1 H1 F25:1 C444p10 XCOLORRANGE=FULL\nFRAME\n"
-        "\xff\x03\x00\x02\x00\x02"sv,
-        job);
-    ASSERT_TRUE(ten) << ten.error().text();
-    EXPECT_EQ((*ten->frame(0, job.limits)).at(0, 0), glm::u8vec4(255, 255, 255, 255));
-    const auto beyond = openText("YUV4MPEG2 W1 H1 Cmono10\nFRAME\n\xff\x04"sv, job);
-    ASSERT_TRUE(beyond);
-    const auto value = beyond->frame(0, job.limits);
-    ASSERT_FALSE(value);
-    EXPECT_TRUE(has(value.error().text(), "10 bits reach only to 1023")) << value.error().text();
-    EXPECT_TRUE(job.takeNotes().empty());
-    EXPECT_TRUE(openText("YUV4MPEG2 W1 H1 It Cmono\nFRAME\nx", job));
-    EXPECT_EQ(job.takeNotes().size(), 1u);
-}
-
-TEST(Y4mReader, ErrorsSayWhere) {
-    Job job;
-    const struct {
-        const char* text;
-        const char* error;
-    } cases[] = {
-        {"YUV4MPEG W2 H2\n", "byte 0: it does not begin with YUV4MPEG2"},
-        {"YUV4MPEG2 W2 H2", "byte 0: the line of the file has no end within 15 bytes"},
-        {"YUV4MPEG2 W2\nFRAME\n", "byte 0: the first line does not say the height of the frames"},
-        {"YUV4MPEG2 W0 H2\n", "byte 0: the width of the frames is '0'; 1 to 65535 is expected"},
-        {"YUV4MPEG2 W2 H99999999999\n", "byte 0: the height of the frames is '99999999999'"},
-        {"YUV4MPEG2 W2 H2x\n", "byte 0: the height of the frames is '2x'"},
-        {"YUV4MPEG2 W2 H2 C411\n", "byte 0: pixels of the kind C411 are not read"},
-        {"YUV4MPEG2 W2 H2 C420p99\n", "byte 0: pixels of the kind C420p99 are not read"},
-        {"YUV4MPEG2 W2 H2\n", "byte 16: it holds no frame"},
-        {"YUV4MPEG2 W2 H2 Cmono\nFRAME\nabcdFRAME\nabc",
-         "byte 38: frame 1 is cut off: 3 bytes of 4 are here"},
-        {"YUV4MPEG2 W2 H2 Cmono\nFRAME\nabcdefghijkl\n",
-         "byte 32: frame 1 must begin with FRAME here, not with 'efghijkl'"},
-        {"YUV4MPEG2 W2 H2 Cmono\nFRAMES\nabcd", "byte 22: frame 0 must begin with FRAME here"},
-    };
-    for (const auto& c : cases) {
-        const auto reader = openText(c.text, job);
-        ASSERT_FALSE(reader) << c.text;
-        EXPECT_TRUE(has(reader.error().text(), c.error)) << reader.error().text();
-    }
-    // A claim of gigabytes costs nothing but its frame.
-    job.limits.maxMemoryBytes = 1 << 20;
-    EXPECT_FALSE(openText("YUV4MPEG2 W65535 H65535\nFRAME\nabc", job));
 }
 
 TEST(VideoFrames, AY4mFileIsReadFrameByFrame) {

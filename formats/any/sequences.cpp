@@ -1,13 +1,13 @@
-#include "formats/sequences.hpp"
+#include "formats/any/sequences.hpp"
 
+#include "formats/any/open.hpp"
+#include "formats/any/save.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mapping/sequence_write.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "formats/open.hpp"
-#include "formats/save.hpp"
 
 namespace stx {
 namespace {

@@ -1,4 +1,4 @@
-#include "formats/video/y4m_reader.hpp"
+#include "formats/yuv/y4m_reader.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -20,8 +20,7 @@ std::string atByte(std::uint64_t offset) {
 }
 
 /// The line at `offset` without its newline.
-Result<std::string> lineAt(const mpeg4::ByteSource& source, std::uint64_t offset,
-                           std::string_view what) {
+Result<std::string> lineAt(const ByteSource& source, std::uint64_t offset, std::string_view what) {
     std::string line(std::min<std::uint64_t>(kLongestLine, source.size() - offset), '\0');
     STX_CHECK(source.read(offset, std::as_writable_bytes(std::span(line))));
     const auto end = line.find('\n');
@@ -52,7 +51,7 @@ std::string formatName(std::string_view chroma) {
 
 /// What the line at the beginning says.
 struct Y4mHeaderLine {
-    imagesets::YuvFormat format;
+    YuvFormat format;
     bool fullRange = false, interlaced = false;
 };
 
@@ -88,7 +87,7 @@ Result<Y4mHeaderLine> parseHeader(std::string_view line, const Limits& limits) {
         return failAt(atByte(0), ErrorCode::invalidInput,
                       "the first line does not say the {} of the frames",
                       width == 0 ? "width" : "height");
-    const auto format = imagesets::yuvFormatNamed(formatName(chroma));
+    const auto format = yuvFormatNamed(formatName(chroma));
     if (!format)
         return failAt(atByte(0), ErrorCode::unsupported,
                       "pixels of the kind C{} are not read; make 4:2:0 of them: ffmpeg -i IN.y4m "
@@ -109,7 +108,7 @@ bool Y4mReader::recognises(ByteSpan head) {
            std::equal(kMagic.begin(), kMagic.end(), reinterpret_cast<const char*>(head.data()));
 }
 
-Result<Y4mReader> Y4mReader::open(mpeg4::ByteSource source, Job& job) {
+Result<Y4mReader> Y4mReader::open(ByteSource source, Job& job) {
     Y4mReader out;
     out.source_ = std::move(source);
     const std::uint64_t size = out.source_.size();
@@ -150,9 +149,9 @@ Result<Rgba8Image> Y4mReader::frame(int k, const Limits& limits) const {
     const std::uint64_t offset = frames_[static_cast<std::size_t>(k)];
     const auto name = fmt::format("frame {}", k);
     const auto load = [&]() -> Result<Rgba8Image> {
-        const mpeg4::ByteRange range(source_, offset, format_.frameBytes());
+        const ByteRange range(source_, offset, format_.frameBytes());
         STX_TRY(const auto bytes, range.load(limits));
-        return imagesets::rgbFromYuv(bytes, format_, colour_, name, limits);
+        return rgbFromYuv(bytes, format_, colour_, name, limits);
     };
     auto image = load();
     if (!image) return tl::unexpected(image.error().at(atByte(offset)));

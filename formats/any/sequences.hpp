@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "formats/stx/options.hpp"
+#include "formats/any/options.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/sequence.hpp"
 

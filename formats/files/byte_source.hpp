@@ -7,7 +7,7 @@
 
 #include "formats/files/files.hpp"
 
-namespace stx::mpeg4 {
+namespace stx {
 
 /// Bytes that may be read at any offset: memory, or a file that stays on disk. Cheap to copy; the
 /// bytes live as long as any copy. Safe to use from several threads.
@@ -54,4 +54,4 @@ struct ByteRange {
     [[nodiscard]] Result<Bytes> load(const Limits& limits) const;
 };
 
-}  // namespace stx::mpeg4
+}  // namespace stx

@@ -1,12 +1,15 @@
+#include "formats/mpeg4/media_files.hpp"
+
 #include <cmath>
 #include <map>
 #include <set>
 
+#include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
-#include "formats/mpeg4/mpeg4.hpp"
+#include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
-#include "lib/environment/environment.hpp"
+#include "lib/geometry/directions.hpp"
 
 namespace stx::mpeg4 {
 namespace {

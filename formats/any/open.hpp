@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "formats/stx/options.hpp"
+#include "formats/any/options.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"

@@ -1,4 +1,4 @@
-#include "formats/images/y4m.hpp"
+#include "formats/yuv/y4m_writer.hpp"
 
 #include <cmath>
 

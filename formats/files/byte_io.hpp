@@ -6,7 +6,7 @@
 
 #include "formats/files/files.hpp"
 
-namespace stx::mpeg4 {
+namespace stx {
 
 /// Reads big-endian numbers. Past the end it gives zeros and remembers that it failed.
 class ByteReader {
@@ -94,4 +94,4 @@ class ByteWriter {
     Bytes bytes_;
 };
 
-}  // namespace stx::mpeg4
+}  // namespace stx

@@ -7,7 +7,7 @@
 
 #include "lib/base/result.hpp"
 
-namespace stx::imagesets {
+namespace stx {
 
 /// A file's name for a message.
 [[nodiscard]] inline std::string inQuotes(std::string_view name) {
@@ -21,4 +21,4 @@ template <class T>
     return result;
 }
 
-}  // namespace stx::imagesets
+}  // namespace stx

@@ -1,13 +1,13 @@
-#include "formats/imagesets/yuv.hpp"
+#include "formats/yuv/yuv.hpp"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 
-#include "formats/imagesets/messages.hpp"
+#include "formats/files/messages.hpp"
 
-namespace stx::imagesets {
+namespace stx {
 namespace {
 
 std::uint64_t planeValues(const YuvFormat& f) {
@@ -195,4 +195,4 @@ Result<Image<float>> readYuvLuma(const std::filesystem::path& path, const YuvFor
     return out;
 }
 
-}  // namespace stx::imagesets
+}  // namespace stx

@@ -1,4 +1,4 @@
-#include "formats/parts.hpp"
+#include "formats/parts/parts.hpp"
 
 #include <unistd.h>
 

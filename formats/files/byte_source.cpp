@@ -1,4 +1,4 @@
-#include "formats/mpeg4/container/byte_source.hpp"
+#include "formats/files/byte_source.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
-namespace stx::mpeg4 {
+namespace stx {
 
 struct ByteSource::Impl {
     std::string name;
@@ -114,4 +114,4 @@ Result<Bytes> ByteRange::load(const Limits& limits) const {
     return bytes;
 }
 
-}  // namespace stx::mpeg4
+}  // namespace stx

@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <optional>
 
+#include "formats/any/open.hpp"
+#include "formats/any/options.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "formats/open.hpp"
-#include "formats/stx/options.hpp"
 
 namespace stx {
 

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/imagesets/yuv.hpp"
-#include "formats/mpeg4/container/byte_source.hpp"
+#include "formats/files/byte_source.hpp"
+#include "formats/yuv/yuv.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/texture.hpp"
 
@@ -19,7 +19,7 @@ class Y4mReader {
     /// Errors (invalidInput), with the byte: no such file, sizes out of range, a kind of pixels
     /// that is not read, a frame that is cut off or does not begin where it must; memory over the
     /// limit. A note when frames are interlaced.
-    [[nodiscard]] static Result<Y4mReader> open(mpeg4::ByteSource source, Job& job);
+    [[nodiscard]] static Result<Y4mReader> open(ByteSource source, Job& job);
     /// Whether the first bytes of a file are those of such a file.
     [[nodiscard]] static bool recognises(ByteSpan head);
 
@@ -32,8 +32,8 @@ class Y4mReader {
 
   private:
     Y4mReader() = default;
-    mpeg4::ByteSource source_;
-    imagesets::YuvFormat format_;
+    ByteSource source_;
+    YuvFormat format_;
     YuvColour colour_;
     std::vector<std::uint64_t> frames_;  ///< where the samples of each begin
 };

@@ -1,4 +1,4 @@
-#include "formats/open.hpp"
+#include "formats/any/open.hpp"
 
 #include <algorithm>
 #include <fstream>

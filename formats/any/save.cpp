@@ -1,4 +1,4 @@
-#include "formats/save.hpp"
+#include "formats/any/save.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,6 @@
-#include "formats/info.hpp"
+#include "formats/any/info.hpp"
 
+#include "formats/any/open.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/imagesets/summary.hpp"
@@ -7,7 +8,6 @@
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/scene_sequence.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "formats/open.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/packing/packing.hpp"

@@ -7,11 +7,12 @@
 #include <string>
 #include <string_view>
 
-#include "formats/imagesets/image_sets.hpp"
+#include "formats/yuv/yuv_colour.hpp"
 #include "lib/base/image.hpp"
+#include "lib/base/job.hpp"
 #include "lib/model/texture.hpp"
 
-namespace stx::imagesets {
+namespace stx {
 
 /// Raw planes of a .yuv file: Y, then Cb and Cr, rows from the top, without padding.
 struct YuvFormat {
@@ -50,4 +51,4 @@ struct YuvFormat {
                                                const YuvFormat& format, int frame,
                                                const Limits& limits);
 
-}  // namespace stx::imagesets
+}  // namespace stx
