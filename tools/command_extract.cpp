@@ -11,6 +11,7 @@
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
 #include "tools/picture_times.hpp"
+#include "tools/refine_option.hpp"
 
 namespace stx::tools {
 namespace {
@@ -19,6 +20,7 @@ struct ExtractOptions {
     std::string input, output;
     std::string cameras = "transforms";
     std::string depth = "exr";
+    std::string refine = "auto";
     std::optional<double> time;
     PointWriteOptions points;
 };
@@ -84,8 +86,9 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
-    if (shown) return extractShown(o.input, o.output, o.time, program);
+    if (shown) return extractShown(o.input, o.output, o.time, o.refine, program);
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    STX_TRY(frames, refined(std::move(frames), o.refine));
     const Timeline timeline = frames->timeline();
     STX_TRY(const std::size_t moment,
             momentOf(o.time, timeline, points ? "points are" : nullptr, o.input, program.job));
@@ -175,6 +178,7 @@ void addExtract(CommandLine& line, Program& program) {
         .oneOf({"exr", "png"});
     c.option("--time", o->time, "Of a film: the moment, in seconds by its own clock (default: all)")
         .takes("T");
+    refineOption(c, o->refine);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.sharedOptions(program.common, kOutput | kOutside);

@@ -12,12 +12,14 @@
 #include "lib/quality/prune_quality.hpp"
 #include "tools/commands.hpp"
 #include "tools/picture_times.hpp"
+#include "tools/refine_option.hpp"
 
 namespace stx::tools {
 namespace {
 
 struct PackOptions {
     std::string input, output;
+    std::string refine = "auto";
     PackSettings settings;
     bool prune = false;
     std::string budget;
@@ -175,6 +177,7 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     }
     preloadCodecs(o.input);
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    STX_TRY(frames, refined(std::move(frames), o.refine));
     const Timeline timeline = frames->timeline();
     const std::size_t count = timeline.count();
     const bool numbered = frameName(o.output, 0).has_value();
@@ -238,6 +241,7 @@ void addPack(CommandLine& line, Program& program) {
              "png (exact) or jpeg, in a folder; alpha stays exact (default png)")
         .oneOf({"png", "jpeg"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
+    refineOption(c, o->refine);
     const char* pruning = "Pruning";
     c.flag("--prune", o->prune, "Leave out pixels that another kept view shows as well or better")
         .group(pruning);

@@ -16,6 +16,7 @@
 #include "tools/frame_writer.hpp"
 #include "tools/light_options.hpp"
 #include "tools/picture_times.hpp"
+#include "tools/refine_option.hpp"
 #include "tools/shard.hpp"
 
 namespace stx::tools {
@@ -139,17 +140,6 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
     else
         note(command.given({"--splat", "--splat-coefficient", "--pipeline"}),
              "they are of --mode splat");
-}
-
-/// With the steps as refineSteps() has them.
-std::string refineHelp() {
-    std::string text =
-        "Captured depth is repaired before it is drawn: auto does what is needed (default), off "
-        "leaves depth as it is. Or these steps only, with commas between them:";
-    for (const RefineStepInfo& step : refineSteps())
-        text += fmt::format("{} {} ({})", &step == refineSteps().data() ? "" : ",", step.name,
-                            step.sentence);
-    return text;
 }
 
 Result<RenderSettings> settingsOf(const RenderOptions& o) {
@@ -557,7 +547,7 @@ void addRender(CommandLine& line, Program& program) {
                    "surface (exposure, white balance): auto brings them to those of most, off "
                    "leaves them (default auto)")
         .group(drawing);
-    c.option("--refine", o->refine, refineHelp()).takes("auto|off|STEPS").group(drawing);
+    refineOption(c, o->refine).group(drawing);
     c.option("--background", o->background,
              "What stands where no view shows a surface. temporal: the bundle's background views, "
              "then what is around, in scenes that fill the frame (default); spatial: what is "

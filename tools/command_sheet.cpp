@@ -12,6 +12,7 @@
 #include "lib/base/printable.hpp"
 #include "lib/sheet/sheet.hpp"
 #include "tools/commands.hpp"
+#include "tools/refine_option.hpp"
 
 namespace stx::tools {
 namespace {
@@ -21,6 +22,7 @@ constexpr int kMomentsOfPairs = 6;  ///< that are compared, of two inputs that m
 struct SheetOptions {
     std::vector<std::string> inputs;
     std::string output, size;
+    std::string refine = "auto";
     SheetSettings settings;
     OpenOptions open;
 };
@@ -127,7 +129,8 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
             return sheetOf(atlas, o.settings, job);
         }
     }
-    STX_TRY(const auto frames, openSequence(input, o.open, job));
+    STX_TRY(auto frames, openSequence(input, o.open, job));
+    STX_TRY(frames, refined(std::move(frames), o.refine));
     if (frames->timeline().moves()) return sheetOf(*frames, o.settings, job);
     STX_TRY(const auto bundle, frames->frame(0, job));
     return sheetOf(bundle, o.settings, job);
@@ -197,6 +200,7 @@ void addSheet(CommandLine& line, Program& program) {
              "6 moments)")
         .range(1, 1000)
         .takes("N");
+    refineOption(c, o->refine);
     c.sharedOptions(program.common, kOutput | kOutside);
     c.runs([o](Program& p) { return sheet(*o, p); });
 }

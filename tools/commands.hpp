@@ -10,6 +10,7 @@ void addConvert(CommandLine& line, Program& program);
 void addSelect(CommandLine& line, Program& program);
 void addPack(CommandLine& line, Program& program);
 void addBake(CommandLine& line, Program& program);
+void addRefine(CommandLine& line, Program& program);
 void addBackground(CommandLine& line, Program& program);
 void addPanorama(CommandLine& line, Program& program);
 void addRender(CommandLine& line, Program& program);

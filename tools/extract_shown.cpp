@@ -10,6 +10,7 @@
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "tools/picture_times.hpp"
+#include "tools/refine_option.hpp"
 
 namespace stx::tools {
 namespace {
@@ -22,7 +23,8 @@ struct Shown {
 };
 
 /// A page for browsers, of an atlas' own textures where it is one.
-Result<Shown> writePage(const std::string& input, const std::string& output, Program& program) {
+Result<Shown> writePage(const std::string& input, const std::string& output,
+                        const std::string& refine, Program& program) {
     PageOptions write;
     // Without its folder: pages of the same input are the same wherever it lies.
     const std::filesystem::path path(input);
@@ -34,7 +36,8 @@ Result<Shown> writePage(const std::string& input, const std::string& output, Pro
         STX_TRY(const auto atlas, readAtlas(input, program.job));
         page = writeViewerPage(atlas, output, write, program.job);
     } else {
-        STX_TRY(const auto frames, openSequence(input, {}, program.job));
+        STX_TRY(auto frames, openSequence(input, {}, program.job));
+        STX_TRY(frames, refined(std::move(frames), refine));
         page = writeViewerPage(*frames, output, write, program.job);
     }
     if (!page) return propagate(page);
@@ -46,8 +49,10 @@ Result<Shown> writePage(const std::string& input, const std::string& output, Pro
 
 /// A model of one moment.
 Result<Shown> writeModel(const std::string& input, const std::string& output,
-                         const std::optional<double>& time, Program& program) {
-    STX_TRY(const auto frames, openSequence(input, {}, program.job));
+                         const std::optional<double>& time, const std::string& refine,
+                         Program& program) {
+    STX_TRY(auto frames, openSequence(input, {}, program.job));
+    STX_TRY(frames, refined(std::move(frames), refine));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a model is", input, program.job));
     STX_TRY(auto bundle, frames->frame(moment, program.job));
@@ -68,11 +73,12 @@ bool isShown(const std::string& ending) {
 }
 
 Result<int> extractShown(const std::string& input, const std::string& output,
-                         const std::optional<double>& time, Program& program) {
+                         const std::optional<double>& time, const std::string& refine,
+                         Program& program) {
     const auto start = std::chrono::steady_clock::now();
     STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
-                                  ? writeModel(input, output, time, program)
-                                  : writePage(input, output, program));
+                                  ? writeModel(input, output, time, refine, program)
+                                  : writePage(input, output, refine, program));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();

@@ -11,8 +11,10 @@ namespace stx::tools {
 /// and ".glb", a model for any viewer.
 [[nodiscard]] bool isShown(const std::string& ending);
 /// `stx extract` into such a file: says what was written and reports it. `time`: the moment that a
-/// model is of. Errors: those of momentOf(), of the input and of writing.
+/// model is of. `refine`: see refineOption(). Errors: those of momentOf(), of the input and of
+/// writing.
 [[nodiscard]] Result<int> extractShown(const std::string& input, const std::string& output,
-                                       const std::optional<double>& time, Program& program);
+                                       const std::optional<double>& time, const std::string& refine,
+                                       Program& program);
 
 }  // namespace stx::tools

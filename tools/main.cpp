@@ -13,9 +13,9 @@ int mainProgram(int argc, char** argv) {
     Program program;
     CommandLine line;
     // In the order of the help.
-    for (const auto add : {addConvert, addSelect, addPack, addBake, addBackground, addPanorama,
-                           addRender, addInfo, addSheet, addExtract, addValidate, addCompare,
-                           addBench, addReport, addDoctor, addCompletion})
+    for (const auto add : {addConvert, addSelect, addPack, addBake, addRefine, addBackground,
+                           addPanorama, addRender, addInfo, addSheet, addExtract, addValidate,
+                           addCompare, addBench, addReport, addDoctor, addCompletion})
         add(line, program);
     const auto request = line.parse(argc, argv);
     if (!request) {

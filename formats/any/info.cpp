@@ -52,6 +52,7 @@ Json viewJson(const ReferenceView& view, glm::dvec3 origin) {
               {"farPlane", view.farPlane}};
     addLens(view.camera, j);
     j["noDepth"] = nameOf(view.noDepth);
+    if (!view.refined.steps.empty()) j["refined"] = view.refined.text();
     if (view.pruned) j["pruned"] = true;
     if (view.background) j["background"] = true;
     return j;
@@ -458,7 +459,7 @@ std::string describeAsText(const Json& info) {
             }
             out += fmt::format(
                 "view {} '{}': {}x{}, {}-bit depth {:.6g}..{:.6g}, {}, at {:.10g} {:.10g} "
-                "{:.10g}{}{}{}{}{}{}\n",
+                "{:.10g}{}{}{}{}{}{}{}\n",
                 i++, text(v["name"]), text(v["width"]), text(v["height"]), text(v["depthBits"]),
                 v["nearPlane"].get<double>(), v["farPlane"].get<double>(), lensText(v),
                 v["position"][0].get<double>(), v["position"][1].get<double>(),
@@ -467,6 +468,7 @@ std::string describeAsText(const Json& info) {
                 v.contains("metallicRoughness") ? ", metallic-roughness" : "",
                 v.contains("emissive") ? ", emissive" : "",
                 v.value("noDepth", "") == "unknown" ? ", no depth: unknown" : "",
+                v.contains("refined") ? fmt::format(", refined ({})", text(v["refined"])) : "",
                 v.contains("pruned") ? ", pruned" : "",
                 v.contains("background") ? ", background" : "");
         }

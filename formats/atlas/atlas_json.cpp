@@ -42,6 +42,7 @@ Json jsonOf(const ReferenceView& v) {
     j["farPlane"] = v.farPlane;
     j["depthBits"] = v.depthBits;
     if (v.noDepth == NoDepth::unknown) j["noDepth"] = nameOf(v.noDepth);
+    if (!v.refined.steps.empty()) j["refined"] = v.refined.text();
     j["pruned"] = v.pruned;
     if (v.background) j["background"] = true;
     return j;
@@ -196,6 +197,13 @@ Result<void> readView(const Reader& r, const Limits& limits, int version, bool p
     const auto named = noDepthNamed(noDepth);
     if (!named) return r.wrong("noDepth", "must be empty or unknown");
     v.noDepth = *named;
+    std::string refined;
+    STX_CHECK(r.text("refined", refined, false));
+    if (!refined.empty()) {
+        const auto found = Refined::from(refined);
+        if (!found) return r.wrong("refined", "must be steps and a number: \"noise,agree 0.003\"");
+        v.refined = *found;
+    }
     // Older versions did not write it: there fewer pixels than before meant that all were pruned.
     v.pruned = prunedByCount;
     STX_CHECK(r.flag("pruned", v.pruned, false));

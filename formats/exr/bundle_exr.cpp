@@ -14,8 +14,8 @@
 //              stx:quaternion (text: w x y z) · stx:fieldOfView (v2d) · stx:orthographic (int) ·
 //              stx:fx, stx:fy, stx:cx, stx:cy (double, pixels) · stx:nearPlane, stx:farPlane
 //              (double) · stx:depthBits (int) · stx:points (double) · stx:noDepth ("unknown" or
-//              "empty", which is left out) · stx:pruned (int, 1; of pruned views only) ·
-//              stx:background (int, 1; of background views only)
+//              "empty", which is left out) · stx:refined (text: see Refined::text()) · stx:pruned
+//              (int, 1; of pruned views only) · stx:background (int, 1; of background views only)
 //   part 0:    stx:version (int) · stx:kind ("bundle") · stx:colour ("sRGB8" or "linear") ·
 //              stx:title (text) · stx:boundsMin, stx:boundsMax (v3d) · stx:origin (v3d; where it
 //              is not 0: added to positions and bounds, gives the world's) · stx:time (double,

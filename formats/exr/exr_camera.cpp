@@ -113,6 +113,7 @@ void setExrCamera(ExrPart& part, const ReferenceView& view) {
     a["stx:farPlane"] = view.farPlane;
     a["stx:depthBits"] = std::int64_t{view.depthBits};
     if (view.noDepth == NoDepth::unknown) a["stx:noDepth"] = std::string(nameOf(view.noDepth));
+    if (!view.refined.steps.empty()) a["stx:refined"] = view.refined.text();
     if (view.pruned) a["stx:pruned"] = std::int64_t{1};
     if (view.background) a["stx:background"] = std::int64_t{1};
 }
@@ -173,6 +174,15 @@ Result<ReferenceView> exrCamera(const ExrPart& part) {
                         "part '{}': stx:noDepth is '{}'; 'empty' or 'unknown' is expected",
                         part.name, noDepth->substr(0, 100));
         view.noDepth = *named;
+    }
+    if (const auto* refined = part.attribute<std::string>("stx:refined")) {
+        const auto found = Refined::from(*refined);
+        if (!found)
+            return fail(ErrorCode::invalidInput,
+                        "part '{}': stx:refined is '{}'; steps and a number, as in 'noise,agree "
+                        "0.003', are expected",
+                        part.name, refined->substr(0, 100));
+        view.refined = *found;
     }
     const auto* pruned = part.attribute<std::int64_t>("stx:pruned");
     view.pruned = pruned && *pruned != 0;

@@ -101,6 +101,7 @@ void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin) 
     json["farPlane"] = view.farPlane;
     json["depthBits"] = view.depthBits;
     if (view.noDepth == NoDepth::unknown) json["stx:noDepth"] = nameOf(view.noDepth);
+    if (!view.refined.steps.empty()) json["stx:refined"] = view.refined.text();
     if (view.pruned) json["stx:pruned"] = true;
     if (view.background) json["stx:background"] = true;
 }

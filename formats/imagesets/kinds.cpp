@@ -47,6 +47,16 @@ Result<void> readOwnKeys(const Json& camera, const std::string& where, SetView& 
             return failAt(where, ErrorCode::invalidInput,
                           "'stx:noDepth' is '{}'; 'empty' or 'unknown' is expected", *noDepth);
     }
+    STX_TRY(const auto refined, findText(camera, "stx:refined", where));
+    if (refined) {
+        const auto found = Refined::from(*refined);
+        if (!found)
+            return failAt(where, ErrorCode::invalidInput,
+                          "'stx:refined' is '{}'; steps and a number, as in 'noise,agree 0.003', "
+                          "are expected",
+                          *refined);
+        view.refined = *found;
+    }
     STX_TRY(const auto q, findNumbers(camera, "stx:quaternion", 4, where));
     if (q) {
         const glm::dquat exact((*q)[3], (*q)[0], (*q)[1], (*q)[2]);

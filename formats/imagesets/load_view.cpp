@@ -214,6 +214,7 @@ Result<ReferenceView> finish(const SetView& set, std::string name, const Camera&
     view.pruned = set.pruned && ownAlpha;
     coverOnlyPoints(texture, depth, ownAlpha, view.depthMayBeUnknown());
     view.background = set.background;
+    view.refined = set.refined;
     view.name = std::move(name);
     view.camera = camera;
     view.texture = std::move(texture);

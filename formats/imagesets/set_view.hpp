@@ -87,6 +87,7 @@ struct SetView {
     int depthBits = 0;                        ///< with planes: 8, 16, 32
     std::optional<glm::dvec3> localPosition;  ///< of an export of ours that has an origin
     std::optional<NoDepth> noDepth;           ///< of an export of ours; see ReferenceView::noDepth
+    Refined refined;                          ///< the same
     bool pruned = false;                      ///< see ReferenceView::pruned
     bool background = false;                  ///< see ReferenceView::background
     bool absent = false;    ///< its camera has no picture yet: what it sees is not known

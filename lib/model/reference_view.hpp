@@ -38,9 +38,23 @@ enum class NoDepth : std::uint8_t {
     return std::nullopt;
 }
 
-/// One reference image of an object: a DepthImage with its SimpleTexture or SimpleTextureV2
-/// (ISO/IEC 14496-16, 4.5.4). All images of a view have the camera's width and height.
-struct ReferenceView {
+/// What refining has done to the depth of a view (lib/refine/refine.hpp).
+struct Refined {
+    /// Those that changed something in its set: names with commas between them; empty: none.
+    std::string steps;
+    /// How far off points may be: share of the distance (of orthographic views: of the depth range
+    /// of their DepthAxis), one standard deviation; 0 of depth that was exact.
+    float doubt = 0;
+
+    /// As containers keep it: "noise,agree 0.0031".
+    [[nodiscard]] std::string text() const;
+    /// Of such a text; none of others.
+    [[nodiscard]] static std::optional<Refined> from(std::string_view text);
+    bool operator==(const Refined&) const = default;
+};
+
+/// What is said of a view beside its images.
+struct ViewHeader {
     std::string name;  ///< unique in its bundle; becomes part and file names
     Camera camera;
 
@@ -56,7 +70,18 @@ struct ReferenceView {
     /// What is behind everything that moves, remembered from other times (TemporalBackground).
     /// Renderers use it only where no other view shows a surface.
     bool background = false;
+    Refined refined;
 
+    /// Whether a pixel of full alpha without a depth is a surface whose distance is not known.
+    [[nodiscard]] bool depthMayBeUnknown() const { return pruned || noDepth == NoDepth::unknown; }
+    [[nodiscard]] DepthCode depthCode() const {
+        return {nearPlane, farPlane, depthBits == 8 ? 255u : 65535u};
+    }
+};
+
+/// One reference image of an object: a DepthImage with its SimpleTexture or SimpleTextureV2
+/// (ISO/IEC 14496-16, 4.5.4). All images of a view have the camera's width and height.
+struct ReferenceView : ViewHeader {
     Texture texture;     ///< colour with coverage in alpha
     Image<float> depth;  ///< planar distance in scene units; kNoDepth where there is no point
 
@@ -73,14 +98,9 @@ struct ReferenceView {
     [[nodiscard]] bool hasMaterial() const {
         return !metallicRoughness.empty() || !emissive.empty();
     }
-    /// Whether a pixel of full alpha without a depth is a surface whose distance is not known.
-    [[nodiscard]] bool depthMayBeUnknown() const { return pruned || noDepth == NoDepth::unknown; }
     [[nodiscard]] bool hasNormals() const { return !normal.empty(); }
     [[nodiscard]] bool hasSplats() const { return !splatU.empty() && !splatV.empty(); }
 
-    [[nodiscard]] DepthCode depthCode() const {
-        return {nearPlane, farPlane, depthBits == 8 ? 255u : 65535u};
-    }
     /// Pixels that are points of the object.
     [[nodiscard]] std::int64_t pointCount() const;
     /// The same, and the error of check() when a depth is NaN or below 0.

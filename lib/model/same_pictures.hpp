@@ -13,7 +13,7 @@ namespace stx {
         return x.size() == y.size() &&
                (x.empty() || std::memcmp(x.data(), y.data(), x.count() * sizeof(*x.data())) == 0);
     };
-    if (a.pruned != b.pruned || a.noDepth != b.noDepth ||
+    if (a.pruned != b.pruned || a.noDepth != b.noDepth || a.refined != b.refined ||
         a.texture.isLinear() != b.texture.isLinear())
         return false;
     const bool colour = a.texture.isLinear() ? same(*a.texture.rgbaFloat(), *b.texture.rgbaFloat())

@@ -83,14 +83,7 @@ void makeFurther(const Contents& contents, int width, int height, To& to) {
 /// A view without its images: what an atlas keeps of it.
 ReferenceView withoutImages(const ReferenceView& view) {
     ReferenceView v;
-    v.name = view.name;
-    v.camera = view.camera;
-    v.nearPlane = view.nearPlane;
-    v.farPlane = view.farPlane;
-    v.depthBits = view.depthBits;
-    v.noDepth = view.noDepth;
-    v.pruned = view.pruned;
-    v.background = view.background;
+    static_cast<ViewHeader&>(v) = view;
     return v;
 }
 

@@ -4,16 +4,12 @@
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "lib/base/image.hpp"
+#include "lib/base/job.hpp"
 #include "lib/base/result.hpp"
-#include "lib/geometry/camera.hpp"
-#include "lib/model/texture.hpp"
+#include "lib/model/bundle.hpp"
 
 /// Captured depth repaired, before anything is drawn from it.
 
@@ -42,11 +38,15 @@ class RefineSettings {
     [[nodiscard]] bool on(RefineStep step) const { return !off_[static_cast<std::size_t>(step)]; }
     [[nodiscard]] bool any() const { return !off_.all(); }
     void set(RefineStep step, bool on) { off_[static_cast<std::size_t>(step)] = !on; }
+    /// What is left to do for views that were refined before: nothing but `strays`.
+    [[nodiscard]] RefineSettings after(const Refined& had) const;
     [[nodiscard]] static RefineSettings none();
     [[nodiscard]] static RefineSettings all();
     /// Of "auto", "off" (none) or names of steps with commas between them. Errors (usage): a
     /// name that is none, with the list of those that are.
     [[nodiscard]] static Result<RefineSettings> from(std::string_view text);
+    /// The steps that are done unless said otherwise, but for some. Errors (usage) as from().
+    [[nodiscard]] static Result<RefineSettings> without(std::string_view text);
 
   private:
     std::bitset<kRefineSteps> off_;
@@ -70,47 +70,19 @@ struct RefineReport {
         return steps[static_cast<std::size_t>(step)];
     }
     [[nodiscard]] bool changed() const;
-    /// The steps that changed something: "noise, agree".
+    /// Of more views, or of another moment.
+    void add(const RefineReport& other);
+    /// The steps that changed something, as Refined::steps has them: "noise,agree".
     [[nodiscard]] std::string names() const;
+    /// For people who did not ask for it: which steps, and how to leave them out.
+    [[nodiscard]] std::string note() const;
     /// A clause for each: "noise: 9120 pixels of 4 views, moved by 0.31 % on average; agree: ...".
     [[nodiscard]] std::string text() const;
 };
 
-/// A view whose depth is refined. All images have the camera's size.
-struct RefineView {
-    const Camera* camera = nullptr;
-    const Texture* texture = nullptr;
-    const Image<float>* depth = nullptr;  ///< scene units, kNoDepth = no point
-    bool depthMayBeUnknown = false;       ///< see ReferenceView::depthMayBeUnknown()
-    float step = 0;                       ///< scene units between depth codes, 0 of floats
-};
-
-struct RefinedView {
-    /// None: as it was. Pixels that no step changed have the very same value; those without depth
-    /// that have full alpha are unknown in a view with doubt.
-    std::optional<Image<float>> depth;
-    /// How far off points may be: share of the distance (orthographic views: of the depth range of
-    /// their DepthAxis), one standard deviation; 0 of depth that was exact.
-    float doubt = 0;
-};
-
-/// Refines the depth of views of one moment. The same on any number of threads.
-[[nodiscard]] std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
-                                                   const RefineSettings& settings,
-                                                   RefineReport& report);
-
-/// Tells of views that are looked at one by one whether refineDepth() would change one of them:
-/// views in the rectangles of an atlas cost memory to be side by side.
-class RefineNeeds {
-  public:
-    explicit RefineNeeds(const RefineSettings& settings) : settings_(settings) {}
-    void add(const RefineView& view);
-    [[nodiscard]] bool any() const;
-
-  private:
-    RefineSettings settings_;
-    bool some_ = false;
-    std::vector<float> edgeShares_;
-};
+/// Refines the depth of a bundle of one moment: exact depth stays as it is, to the bit, and so does
+/// what was refined before (ViewHeader::refined). The same on any number of threads. Errors: a
+/// bundle that fails check(), cancelled.
+[[nodiscard]] Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job& job);
 
 }  // namespace stx

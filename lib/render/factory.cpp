@@ -170,9 +170,7 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     const auto refined = [&](const PageSet& views) {
         RefineReport report;
         PageSet better = views.refined(settings.refine, &report);
-        if (report.changed())
-            job.note(fmt::format("depth was refined ({}); --refine off leaves it as it is",
-                                 report.names()));
+        if (report.changed()) job.note(report.note());
         return better;
     };
     PageSet drawn = refined(solid(inFront(set.distinct(), settings, job)));

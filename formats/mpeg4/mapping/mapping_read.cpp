@@ -177,6 +177,7 @@ class BundleReader {
             view.noDepth = NoDepth::unknown;
         if (of->second.pruned) view.pruned = markUnknown(view, plan, *of->second.pruned);
         view.background = of->second.background;
+        view.refined = of->second.refined;
     }
     /// Gives a view full alpha where its depth is unknown. A mask that is damaged costs quality
     /// only, so that it is a note, and false.

@@ -81,11 +81,13 @@ class SceneWriter {
             for (std::size_t k = 0; k < layers; ++k) {
                 const ReferenceView& view = bundle_.views[i + k];
                 const bool unknown = view.noDepth == NoDepth::unknown;
-                if (!view.pruned && !unknown && !view.background) continue;
+                if (!view.pruned && !unknown && !view.background && view.refined.steps.empty())
+                    continue;
                 ViewNotes::Layer& of = notes.views[key].layers[static_cast<int>(k)];
                 if (view.pruned) of.pruned = images[i + k]->unknown;
                 if (unknown) of.unknown = images[i + k]->unknown;
                 of.background = view.background;
+                of.refined = view.refined;
             }
             for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
             i += layers - 1;

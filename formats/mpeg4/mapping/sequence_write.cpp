@@ -24,6 +24,7 @@ struct ViewRange {
     float longestSplat = 0;
     bool normals = false, splats = false;
     bool everUnknown = false, alwaysUnknown = true;  ///< NoDepth::unknown, of its frames
+    Refined refined;  ///< steps of the first frame, and the largest doubt
 };
 
 /// The images of a SimpleTexture, in the order in which they are coded.
@@ -106,6 +107,7 @@ class SequenceWriter {
             const bool alpha = !asVideo() && options_.texture == SceneWriteOptions::Texture::png;
             const bool unknown = alpha ? ranges_[k].everUnknown : ranges_[k].alwaysUnknown;
             view.noDepth = unknown ? NoDepth::unknown : NoDepth::empty;
+            view.refined = ranges_[k].refined;
         }
         return bundle;
     }
@@ -141,10 +143,8 @@ class SequenceWriter {
     static Bundle headersOf(const Bundle& bundle) {
         Bundle headers;
         for (const ReferenceView& view : bundle.views) {
-            ReferenceView header;
-            header.name = view.name;
-            header.camera = view.camera;
-            headers.views.push_back(std::move(header));
+            headers.views.emplace_back();
+            static_cast<ViewHeader&>(headers.views.back()) = view;
         }
         return headers;
     }
@@ -152,7 +152,9 @@ class SequenceWriter {
         if (first) {
             range.normals = view.hasNormals();
             range.splats = view.hasSplats();
+            range.refined.steps = view.refined.steps;
         }
+        range.refined.doubt = std::max(range.refined.doubt, view.refined.doubt);
         if (range.normals != view.hasNormals() || range.splats != view.hasSplats())
             return fail(ErrorCode::unsupported,
                         "normals or splats are there in some frames only; bake all or none");

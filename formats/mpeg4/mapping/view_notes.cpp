@@ -81,12 +81,16 @@ ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
             pad.cx = *cx;
             pad.cy = *cy;
             notes.views[std::string(w[1])].padding = pad;
-        } else if (line.starts_with("pruned ") || line.starts_with("unknown ")) {
+        } else if (line.starts_with("pruned ") || line.starts_with("unknown ") ||
+                   line.starts_with("refined ")) {
             const auto w = words(line, 4);
             const auto layer = w.size() == 4 ? integerFromText(w[2]) : std::nullopt;
             if (!layer || *layer < 0 || *layer > 1 << 20) continue;
             auto& of = notes.views[std::string(w[1])].layers[static_cast<int>(*layer)];
-            (w[0] == "pruned" ? of.pruned : of.unknown) = w[3];
+            if (w[0] == "refined")
+                of.refined = Refined::from(w[3]).value_or(Refined{});
+            else
+                (w[0] == "pruned" ? of.pruned : of.unknown) = w[3];
         } else if (line.starts_with("background ")) {
             const auto w = words(line, 4);
             const auto layer = w.size() == 3 ? integerFromText(w[2]) : std::nullopt;
@@ -117,6 +121,8 @@ std::vector<std::string> ViewNotes::text() const {
             if (layer.unknown)
                 info.push_back(fmt::format("unknown {} {} {}", key, number, *layer.unknown));
             if (layer.background) info.push_back(fmt::format("background {} {}", key, number));
+            if (!layer.refined.steps.empty())
+                info.push_back(fmt::format("refined {} {} {}", key, number, layer.refined.text()));
         }
     }
     return info;

@@ -10,6 +10,7 @@
 #include "formats/mpeg4/scene/placement.hpp"
 #include "lib/base/job.hpp"
 #include "lib/geometry/bounds.hpp"
+#include "lib/model/reference_view.hpp"
 
 // clang-format off
 /// What our scenes say in WorldInfo.info beyond the nodes' fields, so that nothing of a bundle is
@@ -24,6 +25,7 @@
 ///     "pruned #N layer where"
 ///     "unknown #N layer where" (see ReferenceView::noDepth)
 ///     "background #N layer" (see ReferenceView::background)
+///     "refined #N layer steps doubt" (see Refined::text())
 ///
 /// N is the view's number among those beside the WorldInfo, from 0: programs that write a scene
 /// anew keep the order, not DEF names. Files of before have DEF names instead. Padding is in pixels, cx and cy are the principal point without it. A pruned view is layer 0 of
@@ -48,6 +50,7 @@ struct ViewNotes {
         /// that was pruned, and of one with NoDepth::unknown.
         std::optional<std::string> pruned, unknown;
         bool background = false;
+        Refined refined;
     };
     struct View {
         std::string name;  ///< its own; empty: not said

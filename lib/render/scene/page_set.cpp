@@ -39,19 +39,6 @@ bool anyValue(const Image<glm::vec3>& image, const PageRectangle& r) {
     return false;
 }
 
-PageView viewFrom(const ReferenceView& from) {
-    PageView v;
-    v.name = from.name;
-    v.camera = from.camera;
-    v.nearPlane = from.nearPlane;
-    v.farPlane = from.farPlane;
-    v.depthBits = from.depthBits;
-    v.noDepth = from.noDepth;
-    v.pruned = from.pruned;
-    v.background = from.background;
-    return v;
-}
-
 }  // namespace
 
 void PageSet::addRectangle(const AtlasRectangle& from, int padding, Data& data) {
@@ -88,7 +75,7 @@ void PageSet::addBundle(const Bundle& bundle, Data& data) {
         const ReferenceView& from = bundle.views[i];
         data.pages.push_back({&from.texture, &from.depth, orNull(from.normal), orNull(from.splatU),
                               orNull(from.splatV)});
-        PageView v = viewFrom(from);
+        PageView v{from};
         v.hasNormals = from.hasNormals();
         v.hasSplats = from.hasSplats();
         v.firstRectangle = static_cast<std::uint32_t>(i);
@@ -123,7 +110,7 @@ Result<PageSet> PageSet::of(const Atlas& atlas, Job& job) {
         data->pages.push_back({&page.texture, &page.depth, orNull(page.normal), orNull(page.splatU),
                                orNull(page.splatV)});
     for (const ReferenceView& view : atlas.views) {
-        data->views.push_back(viewFrom(view));
+        data->views.push_back({view});
         data->pruned = data->pruned || view.pruned;
     }
     std::vector<AtlasRectangle> sorted = atlas.rectangles;
@@ -183,6 +170,12 @@ void PageSet::buildIndex(Data& data) {
     }
 }
 
+bool PageSet::exactDepth() const {
+    return std::none_of(views().begin(), views().end(), [](const PageView& v) {
+        return v.refined.doubt > 0 || v.refined.steps.find("edges") != std::string::npos;
+    });
+}
+
 std::int64_t PageSet::pointCount() const {
     std::int64_t n = 0;
     for (const PageRectangle& r : rectangles()) {
@@ -238,14 +231,7 @@ ReferenceView PageSet::copyOfView(std::size_t number) const {
     const PageView& from = views()[number];
     const int width = from.camera.width, height = from.camera.height;
     ReferenceView view;
-    view.name = from.name;
-    view.camera = from.camera;
-    view.nearPlane = from.nearPlane;
-    view.farPlane = from.farPlane;
-    view.depthBits = from.depthBits;
-    view.noDepth = from.noDepth;
-    view.pruned = from.pruned;
-    view.background = from.background;
+    static_cast<ViewHeader&>(view) = from;
     view.texture = textureOfView(number);
     view.depth = Image<float>(width, height, kNoDepth);
     if (from.hasNormals) view.normal = Image<glm::vec3>(width, height, glm::vec3(0));

@@ -55,26 +55,12 @@ struct PageRectangle {
 };
 
 /// A reference view of a PageSet.
-struct PageView {
-    std::string name;
-    Camera camera;
-    double nearPlane = 0, farPlane = 0;  ///< scene units
-    int depthBits = 16;
-    float depthDoubt = 0;              ///< see RefinedView::doubt
-    NoDepth noDepth = NoDepth::empty;  ///< see ReferenceView::noDepth
-    bool pruned = false;               ///< see ReferenceView::pruned
-    bool background = false;           ///< see ReferenceView::background
+struct PageView : ViewHeader {
     bool hasNormals = false, hasSplats = false;
     /// Its rectangles in PageSet::rectangles().
     std::uint32_t firstRectangle = 0, rectangleCount = 0;
     /// One upright rectangle holds all of the view, and nothing else is on the page.
     bool whole = false;
-
-    [[nodiscard]] DepthCode depthCode() const {
-        return {nearPlane, farPlane, depthBits == 8 ? 255u : 65535u};
-    }
-    /// See ReferenceView::depthMayBeUnknown().
-    [[nodiscard]] bool depthMayBeUnknown() const { return pruned || noDepth == NoDepth::unknown; }
 };
 
 /// What renderers draw from: texture pages, rectangles on them, cameras (Lee & Park, section 3.1:
@@ -130,8 +116,8 @@ class PageSet {
     /// is exact. `report`, if any, tells what was found and changed.
     [[nodiscard]] PageSet refined(const RefineSettings& settings,
                                   RefineReport* report = nullptr) const;
-    /// Whether refined() left all depth as it was.
-    [[nodiscard]] bool exactDepth() const { return data_->exactDepth; }
+    /// Whether depth is as exact as its codes: no noise, nothing that reached over its edges.
+    [[nodiscard]] bool exactDepth() const;
     /// The texture of a page as it was before inOneLight().
     [[nodiscard]] const Texture& captured(std::size_t page) const {
         return data_->captured.empty() ? *pages()[page].texture : *data_->captured[page];
@@ -224,7 +210,6 @@ class PageSet {
         /// Of solid(), inLightOf() and inOneLight().
         std::vector<std::shared_ptr<const Texture>> changed;
         std::vector<const Texture*> captured;  ///< by page; empty: those of the pages
-        bool exactDepth = true;
         std::vector<std::shared_ptr<const Image<float>>> refined;  ///< depth of refined()
     };
     explicit PageSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}

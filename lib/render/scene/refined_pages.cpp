@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "lib/base/parallel.hpp"
+#include "lib/refine/refine_depth.hpp"
 #include "lib/render/scene/page_set.hpp"
 
 namespace stx {
@@ -9,10 +10,9 @@ namespace {
 /// A view as refineDepth() takes it. Of one in rectangles `copy` keeps the images.
 RefineView refineView(const PageSet& set, std::size_t number, ReferenceView& copy) {
     const PageView& view = set.views()[number];
-    const float step = view.depthBits < 32 ? static_cast<float>(view.depthCode().step()) : 0.0f;
     if (view.whole) {
         const Page& page = set.pages()[static_cast<std::size_t>(set.rectanglesOf(number)[0].page)];
-        return {&view.camera, page.texture, page.depth, view.depthMayBeUnknown(), step};
+        return {&view, page.texture, page.depth};
     }
     copy.texture = set.textureOfView(number);
     copy.depth = Image<float>(view.camera.width, view.camera.height, kNoDepth);
@@ -21,7 +21,7 @@ RefineView refineView(const PageSet& set, std::size_t number, ReferenceView& cop
         for (int y = r.y0; y < r.y1; ++y)
             for (int x = r.x0; x < r.x1; ++x) copy.depth.at(x, y) = depth[r.texel(x, y)];
     }
-    return {&view.camera, &copy.texture, &copy.depth, view.depthMayBeUnknown(), step};
+    return {&view, &copy.texture, &copy.depth};
 }
 
 /// Puts the depth of a view where its rectangles are on a page, padding included.
@@ -44,11 +44,13 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
     RefineReport own;
     RefineReport& found = report ? *report : own;
     found = {};
-    if (!settings.any() || views().empty()) return *this;
+    RefineSettings left = settings;
+    for (const PageView& view : views()) left = left.after(view.refined);
+    if (!left.any() || views().empty()) return *this;
     const bool whole =
         std::all_of(views().begin(), views().end(), [](const PageView& v) { return v.whole; });
     if (!whole) {
-        RefineNeeds needs(settings);
+        RefineNeeds needs(left);
         for (std::size_t i = 0; i < views().size(); ++i) {
             ReferenceView copy;
             needs.add(refineView(*this, i, copy));
@@ -61,15 +63,12 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
         const auto number = static_cast<std::size_t>(i);
         given[number] = refineView(*this, number, copies[number]);
     });
-    auto better = refineDepth(given, settings, found);
+    auto better = refineDepth(given, left, found);
     if (!found.changed()) return *this;
     auto data = std::make_shared<Data>(*data_);
-    data->exactDepth =
-        found.of(RefineStep::noise).pixels == 0 && found.of(RefineStep::edges).pixels == 0;
     std::vector<std::shared_ptr<Image<float>>> depths(data->pages.size());
     for (std::size_t i = 0; i < better.size(); ++i) {
-        data->views[i].depthDoubt = better[i].doubt;
-        if (better[i].doubt > 0) data->views[i].noDepth = NoDepth::unknown;
+        better[i].giveTo(data->views[i]);
         if (!better[i].depth) continue;
         for (const PageRectangle& r : rectanglesOf(i)) {
             auto& depth = depths[static_cast<std::size_t>(r.page)];

@@ -144,7 +144,7 @@ glm::vec2 slopeFromDepth(const Window& w, int x, int y) {
     const auto scale = [&](double f, float other) {
         return static_cast<float>(c.orthographic ? f : f / other);
     };
-    if (w.view.depthDoubt > 0.0f)
+    if (w.view.refined.doubt > 0.0f)
         return {slopeFromFarther([&](int k) { return depth(x + k, y); },
                                  [&](float other) { return scale(c.fx, other); }, z),
                 slopeFromFarther([&](int k) { return depth(x, y + k); },

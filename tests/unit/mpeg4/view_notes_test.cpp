@@ -17,6 +17,8 @@ Bundle markedViews() {
     bundle.views[2].pruned = true;
     bundle.views[3].noDepth = NoDepth::unknown;
     bundle.views[4].background = true;
+    bundle.views[0].refined = {"edges", 0};
+    bundle.views[3].refined = {"edges", 0.00125f};
     for (std::size_t i = 2; i < 4; ++i) {
         bundle.views[i].depth.at(2, 3) = kNoDepth;
         bundle.views[i].texture.rgba8()->at(2, 3).a = 255;
@@ -52,6 +54,7 @@ void expectMarks(const Bundle& back, const Bundle& bundle) {
         EXPECT_EQ(is.pruned, was.pruned) << i;
         EXPECT_EQ(is.noDepth, was.noDepth) << i;
         EXPECT_EQ(is.background, was.background) << i;
+        EXPECT_EQ(is.refined, was.refined) << i;
     }
 }
 
@@ -96,7 +99,7 @@ TEST(ViewNotes, ThatMeanNoViewAreTold) {
     EXPECT_FALSE(less->views[4].background);
     auto notes = job.takeNotes();
     ASSERT_EQ(notes.size(), 1u);
-    EXPECT_NE(notes[0].find("of 4 view(s)"), std::string::npos) << notes[0];
+    EXPECT_NE(notes[0].find("of 5 view(s)"), std::string::npos) << notes[0];
 
     written.info->set("info", std::vector<std::string>{"background gone 0"});
     ASSERT_TRUE(bundleFromScene(written.document, {}, job));

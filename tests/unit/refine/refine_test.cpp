@@ -67,7 +67,7 @@ TEST(Refine, SaysWhatItFoundAndDid) {
     EXPECT_GT(report.of(RefineStep::agree).pixels, 0);
     EXPECT_EQ(report.of(RefineStep::strays).pixels, 0) << "of splats only";
     EXPECT_FALSE(refined.exactDepth());
-    EXPECT_GT(refined.views()[0].depthDoubt, 0.0f);
+    EXPECT_GT(refined.views()[0].refined.doubt, 0.0f);
     EXPECT_LT(off(refined, room()), 0.6 * off(PageSet(bundle), room()));
 }
 
@@ -82,6 +82,53 @@ TEST(Refine, DoesTheStepsThatAreAskedFor) {
     const PageSet none = PageSet(bundle).refined(RefineSettings::none(), &report);
     EXPECT_FALSE(report.changed());
     EXPECT_EQ(none.pages()[0].depth, &bundle.views[0].depth);
+}
+
+TEST(Refine, ABundleIsRefinedOnce) {
+    Bundle bundle = noisyRoom();
+    const PageSet refined = PageSet(bundle).refined({});
+    Bundle better = bundle;
+    Job job;
+    const auto report = refine(better, {}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_TRUE(report->changed());
+    for (std::size_t v = 0; v < bundle.views.size(); ++v) {
+        EXPECT_EQ(better.views[v].depth, *refined.pages()[v].depth) << v;
+        EXPECT_EQ(better.views[v].refined, refined.views()[v].refined) << v;
+        EXPECT_EQ(better.views[v].refined.steps, report->names());
+        EXPECT_EQ(better.views[v].noDepth, NoDepth::unknown);
+    }
+    EXPECT_TRUE(better.check());
+    const Bundle once = better;
+    const auto again = refine(better, RefineSettings().forSplats(), job);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->names(), "strays");
+    EXPECT_EQ(again->of(RefineStep::noise).pixels, 0);
+    const auto third = refine(better, RefineSettings::all(), job);
+    ASSERT_TRUE(third);
+    EXPECT_FALSE(third->changed()) << third->text();
+}
+
+TEST(Refine, BackgroundsAreOfOtherTimes) {
+    Bundle bundle = noisyRoom();
+    Bundle alone = bundle;
+    alone.views.pop_back();
+    bundle.views.back().background = true;
+    Job job;
+    ASSERT_TRUE(refine(bundle, {}, job));
+    ASSERT_TRUE(refine(alone, {}, job));
+    for (std::size_t v = 0; v < alone.views.size(); ++v)
+        EXPECT_EQ(bundle.views[v].depth, alone.views[v].depth) << v;
+}
+
+TEST(Refine, WhatViewsHaveHadIsAText) {
+    const Refined refined{"noise,agree", 0.0031f};
+    EXPECT_EQ(refined.text(), "noise,agree 0.0031");
+    EXPECT_EQ(Refined::from(refined.text()), refined);
+    EXPECT_EQ(Refined::from("edges 0"), (Refined{"edges", 0}));
+    for (const char* wrong : {"", "noise", "noise ", " 0.1", "noise -1", "noise 2", "noise nan",
+                              "noise 0.1 more", "Noise 0.1", "a;b 0"})
+        EXPECT_FALSE(Refined::from(wrong)) << wrong;
 }
 
 TEST(Refine, SettingsAreNamesOfSteps) {

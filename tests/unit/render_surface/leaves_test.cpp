@@ -23,8 +23,10 @@ struct WavyView {
         source.blocksX = (width + kBlock - 1) / kBlock;
         source.blocksY = (height + kBlock - 1) / kBlock;
         source.blocks.resize(static_cast<std::size_t>(source.blocksX) * source.blocksY);
-        draft = {Image<float>(width, height), Image<std::uint8_t>(width, height),
-                 Image<std::uint8_t>(width, height, 1), {}};
+        draft = {Image<float>(width, height),
+                 Image<std::uint8_t>(width, height),
+                 Image<std::uint8_t>(width, height, 1),
+                 {}};
         std::mt19937 random(8);
         for (int y = 0; y < height; ++y) {
             for (int x = 0; x < width; ++x) {

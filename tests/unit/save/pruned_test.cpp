@@ -118,6 +118,7 @@ Bundle photographs(bool someEmpty) {
         }
     }
     bundle.views[1].noDepth = NoDepth::empty;
+    for (const std::size_t i : {0, 2}) bundle.views[i].refined = {"noise,agree", 0.0031f};
     for (std::size_t i = 0; i < bundle.views[1].depth.count(); ++i)
         if (!hasPoint(bundle.views[1].depth.pixels()[i]))
             bundle.views[1].texture.rgba8()->pixels()[i].a = 0;
@@ -164,6 +165,7 @@ TEST(UnknownDepth, ComesBackFromEveryContainer) {
             for (std::size_t i = 0; i < bundle.views.size(); ++i) {
                 const ReferenceView &was = bundle.views[i], &now = back->views[i];
                 EXPECT_EQ(now.noDepth, was.noDepth) << i;
+                EXPECT_EQ(now.refined, was.refined) << i << " " << now.refined.text();
                 EXPECT_FALSE(now.pruned);
                 int wrong = 0;
                 for (std::size_t k = 0; k < was.depth.count(); ++k)

@@ -259,7 +259,7 @@ void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
                        : 1.0;
     float step = s.step;
     // What smoothing leaves is like the step of a coarser depth code.
-    if (const float left = s.view->depthDoubt; left > 0) {
+    if (const float left = s.view->refined.doubt; left > 0) {
         const float dist = typicalDist(s, d);
         step = std::max(step, kLeftInLinks * left * dist);
         s.step = std::max(s.step, kLeftInStep * left * dist);

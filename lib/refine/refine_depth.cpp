@@ -1,0 +1,255 @@
+#include "lib/refine/refine_depth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lib/base/parallel.hpp"
+#include "lib/geometry/depth_code.hpp"
+#include "lib/geometry/pixel_space.hpp"
+#include "lib/refine/colour_depth.hpp"
+#include "lib/refine/depth_noise.hpp"
+#include "lib/refine/fat_edges.hpp"
+#include "lib/refine/noisy_views.hpp"
+#include "lib/refine/silhouette_points.hpp"
+#include "lib/refine/stray_points.hpp"
+
+namespace stx {
+namespace {
+
+/// Coverage below which surface mode takes a ray as free, and above which as stopped: kFreeLevel
+/// and kSolidAlpha of shaders/shared/surface_constants.glsl.
+constexpr SilhouetteAlpha kLevels{0.4625f, 0.99f};
+
+/// A view while it is refined.
+struct Work {
+    PixelSpace space;
+    Image<float> q;  ///< above 0: DepthAxis::q(); 0 = nothing here, -1 = not known
+    Image<std::uint8_t> covered;
+};
+
+double farthestPoint(const RefineView& view) {
+    double farthest = 0;
+    for (const float dist : view.depth->pixels())
+        if (hasPoint(dist)) farthest = std::max(farthest, static_cast<double>(dist));
+    return farthest;
+}
+
+Work workOn(const RefineView& view) {
+    const int width = view.depth->width(), height = view.depth->height();
+    Work w{PixelSpace(view.header->camera,
+                      view.header->camera.orthographic ? farthestPoint(view) : 0.0),
+           Image<float>(width, height), Image<std::uint8_t>(width, height)};
+    const DepthAxis axis = w.space.axis;
+    const auto* bytes = view.texture->rgba8();
+    parallelForBlocks(0, height, 32, [&](std::int64_t from, std::int64_t to) {
+        for (auto y = static_cast<int>(from); y < to; ++y) {
+            const float* depth = view.depth->row(y).data();
+            std::uint8_t* covered = w.covered.row(y).data();
+            float* q = w.q.row(y).data();
+            const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
+            for (int x = 0; x < width; ++x) {
+                const std::size_t pixel = first + static_cast<std::size_t>(x);
+                covered[x] =
+                    (bytes ? bytes->data()[pixel].a == 255 : view.texture->alpha(pixel) >= 1.0f);
+            }
+            for (int x = 0; x < width; ++x) {
+                const float none =
+                    covered[x] != 0 && view.header->depthMayBeUnknown() ? -1.0f : 0.0f;
+                const bool point = hasPoint(depth[x]) && depth[x] > 0.0f;
+                q[x] = !point         ? none
+                       : axis.inverse ? 1.0f / depth[x]
+                                      : static_cast<float>(axis.q(depth[x]));
+            }
+        }
+    });
+    return w;
+}
+
+/// Scene units between depth codes; 0 of floats.
+float stepOf(const ViewHeader& view) {
+    return view.depthBits < 32 ? static_cast<float>(view.depthCode().step()) : 0.0f;
+}
+
+/// A view that smoothDepth() has made before, with the mean of what it left of the noise.
+NoisyView smoothedBefore(const RefineView& view, Work& w) {
+    NoisyView n;
+    n.left = view.header->refined.doubt;
+    n.surface = Image<glm::vec3>(w.q.width(), w.q.height(), glm::vec3(0.0f));
+    for (std::size_t i = 0; i < w.q.count(); ++i)
+        if (const float q = w.q.data()[i]; q > 0.0f)
+            n.surface.data()[i].z = n.left / kDoubt * w.space.axis.relativeScale(q);
+    return n;
+}
+
+/// What a step changes in the views, by comparing them before and after it.
+class Changes {
+  public:
+    Changes(std::span<Work> works, RefineStepReport& report) : works_(works), report_(report) {
+        for (const Work& w : works) before_.push_back(w.q);
+    }
+    ~Changes() {
+        double moves = report_.meanMove * static_cast<double>(report_.moved);
+        int views = 0;
+        for (std::size_t v = 0; v < works_.size(); ++v) {
+            const Image<float>&a = before_[v], &b = works_[v].q;
+            std::int64_t pixels = 0;
+            for (std::size_t i = 0; i < a.count(); ++i) {
+                const float was = a.data()[i], is = b.data()[i];
+                if (was == is) continue;
+                ++pixels;
+                if (!(was > 0.0f) || !(is > 0.0f)) continue;
+                moves += std::abs(is - was) / works_[v].space.axis.relativeScale(was);
+                ++report_.moved;
+            }
+            views += pixels > 0;
+            report_.pixels += pixels;
+        }
+        report_.views = std::max(report_.views, views);
+        if (report_.moved > 0) report_.meanMove = moves / static_cast<double>(report_.moved);
+    }
+    Changes(const Changes&) = delete;
+    Changes& operator=(const Changes&) = delete;
+
+  private:
+    std::span<Work> works_;
+    RefineStepReport& report_;
+    std::vector<Image<float>> before_;
+};
+
+/// The depth of a view after refining: pixels whose q is the same keep their very value.
+std::optional<Image<float>> depthOf(const RefineView& view, const Work& w) {
+    const Work before = workOn(view);
+    std::optional<Image<float>> out;
+    for (std::size_t i = 0; i < w.q.count(); ++i) {
+        const float q = w.q.data()[i];
+        if (q == before.q.data()[i]) continue;
+        if (!out) out = *view.depth;
+        out->data()[i] = q > 0.0f ? static_cast<float>(w.space.axis.dist(q)) : kNoDepth;
+    }
+    return out;
+}
+
+}  // namespace
+
+void RefinedView::giveTo(ViewHeader& view) const {
+    view.refined = refined;
+    if (refined.doubt > 0) view.noDepth = NoDepth::unknown;
+    if (!depth) return;
+    for (const float dist : depth->pixels()) {
+        if (!hasPoint(dist)) continue;
+        view.nearPlane = std::min(view.nearPlane, static_cast<double>(dist));
+        view.farPlane = std::max(view.farPlane, static_cast<double>(dist));
+    }
+}
+
+std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
+                                     const RefineSettings& wanted, RefineReport& report) {
+    RefineSettings settings = wanted;
+    for (const RefineView& view : views) settings = settings.after(view.header->refined);
+    const auto count = static_cast<std::int64_t>(views.size());
+    std::vector<Work> works(views.size());
+    std::vector<NoisyView> noisyViews(views.size());
+    std::vector<RefinedView> out(views.size());
+    std::vector<float> noise(views.size(), 0.0f);
+    const auto reportOf = [&](RefineStep step) -> RefineStepReport& {
+        return report.steps[static_cast<std::size_t>(step)];
+    };
+    const auto ofEach = [&](const auto& call) {
+        parallelFor(0, count, [&](std::int64_t i) { call(static_cast<std::size_t>(i)); });
+    };
+    ofEach([&](std::size_t k) {
+        works[k] = workOn(views[k]);
+        noise[k] = depthNoise(works[k].q, works[k].space.axis);
+    });
+    report.noise = views.empty() ? 0.0 : *std::max_element(noise.begin(), noise.end());
+    if (settings.on(RefineStep::pinholes)) {
+        std::vector<std::int64_t> closed(views.size());
+        ofEach([&](std::size_t k) {
+            closed[k] =
+                closeMissedPixels(works[k].q, works[k].covered, works[k].space.axis, noise[k]);
+        });
+        for (const std::int64_t pixels : closed) {
+            reportOf(RefineStep::pinholes).views += pixels > 0;
+            reportOf(RefineStep::pinholes).pixels += pixels;
+        }
+    }
+    bool someNoisy = false;
+    for (std::size_t k = 0; k < views.size(); ++k)
+        someNoisy = someNoisy || isNoisy(noise[k], works[k].space.axis);
+    if (someNoisy && settings.on(RefineStep::noise)) {
+        const Changes changes(works, reportOf(RefineStep::noise));
+        ofEach([&](std::size_t k) {
+            NoisyView& n = noisyViews[k];
+            n.left = smoothDepth(works[k].q, works[k].space.axis, noise[k], &n.surface);
+        });
+    }
+    ofEach([&](std::size_t k) {
+        if (views[k].header->refined.doubt > 0) noisyViews[k] = smoothedBefore(views[k], works[k]);
+        noisyViews[k].space = &works[k].space;
+        noisyViews[k].texture = views[k].texture;
+        noisyViews[k].q = &works[k].q;
+    });
+    if (settings.on(RefineStep::edges)) {
+        std::vector<EdgeView> edges;
+        for (std::size_t k = 0; k < views.size(); ++k)
+            edges.push_back(
+                {&works[k].space, views[k].texture, &works[k].q, stepOf(*views[k].header)});
+        report.ownColour = colourAtEdges(edges);
+        if (edgesAreFat(static_cast<float>(report.ownColour))) {
+            const Changes changes(works, reportOf(RefineStep::edges));
+            thinFatEdges(edges);
+        }
+    }
+    std::vector<std::size_t> noisyOnes;
+    std::vector<NoisyView> noisy;
+    for (std::size_t k = 0; k < views.size(); ++k) {
+        if (!(noisyViews[k].left > 0)) continue;
+        noisyOnes.push_back(k);
+        noisy.push_back(std::move(noisyViews[k]));
+    }
+    if (!noisy.empty()) {
+        const auto step = [&](RefineStep s, const auto& call) {
+            if (!settings.on(s)) return;
+            const Changes changes(works, reportOf(s));
+            call();
+        };
+        const auto silhouettes = [&] { keepInSilhouettes(noisy, kLevels); };
+        step(RefineStep::silhouettes, silhouettes);
+        step(RefineStep::agree, [&] { agreeOnDepth(noisy); });
+        step(RefineStep::colours, [&] { agreeOnColours(noisy); });
+        step(RefineStep::silhouettes, silhouettes);
+        step(RefineStep::strays, [&] {
+            for (const NoisyView& n : noisy) removeStrays(n);
+        });
+    }
+    for (std::size_t k = 0; k < views.size(); ++k) out[k].refined = views[k].header->refined;
+    for (std::size_t n = 0; n < noisy.size(); ++n) out[noisyOnes[n]].refined.doubt = noisy[n].left;
+    if (!report.changed()) return out;
+    ofEach([&](std::size_t k) {
+        out[k].depth = depthOf(views[k], works[k]);
+        std::string& steps = out[k].refined.steps;
+        steps += (steps.empty() ? "" : ",") + report.names();
+    });
+    return out;
+}
+
+void RefineNeeds::add(const RefineView& view) {
+    if (some_) return;
+    std::vector<RefinedView> alone;
+    RefineSettings settings = settings_;
+    settings.set(RefineStep::edges, false);
+    RefineReport report;
+    (void)refineDepth({&view, 1}, settings, report);
+    some_ = report.changed();
+    if (some_ || !settings_.on(RefineStep::edges)) return;
+    Work w = workOn(view);
+    const auto more = sharesAtEdges({&w.space, view.texture, &w.q, stepOf(*view.header)});
+    edgeShares_.insert(edgeShares_.end(), more.begin(), more.end());
+}
+
+bool RefineNeeds::any() const {
+    return some_ || edgesAreFat(colourAtEdges(edgeShares_));
+}
+
+}  // namespace stx

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "lib/base/image.hpp"
+#include "lib/model/reference_view.hpp"
+#include "lib/refine/refine.hpp"
+
+/// Refining of views wherever their images are: in a bundle, or on the pages of an atlas.
+
+namespace stx {
+
+/// A view whose depth is refined. All images have the camera's size.
+struct RefineView {
+    const ViewHeader* header = nullptr;
+    const Texture* texture = nullptr;
+    const Image<float>* depth = nullptr;  ///< scene units, kNoDepth = no point
+};
+
+struct RefinedView {
+    /// None: as it was. Pixels that no step changed have the very same value; those without depth
+    /// that have full alpha are unknown in a view with doubt.
+    std::optional<Image<float>> depth;
+    Refined refined;
+
+    /// Writes into a view's header what is said there: steps, doubt, planes around the new depth.
+    void giveTo(ViewHeader& view) const;
+};
+
+/// Refines the depth of views of one moment, unless one of them was refined before: see
+/// RefineSettings::after(). The same on any number of threads.
+[[nodiscard]] std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
+                                                   const RefineSettings& settings,
+                                                   RefineReport& report);
+
+/// Tells of views that are looked at one by one whether refineDepth() would change one of them:
+/// views in the rectangles of an atlas cost memory to be side by side.
+class RefineNeeds {
+  public:
+    explicit RefineNeeds(const RefineSettings& settings) : settings_(settings) {}
+    void add(const RefineView& view);
+    [[nodiscard]] bool any() const;
+
+  private:
+    RefineSettings settings_;
+    bool some_ = false;
+    std::vector<float> edgeShares_;
+};
+
+}  // namespace stx
