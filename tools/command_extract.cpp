@@ -11,7 +11,7 @@
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
 #include "tools/picture_times.hpp"
-#include "tools/refine_option.hpp"
+#include "tools/stage_options.hpp"
 
 namespace stx::tools {
 namespace {

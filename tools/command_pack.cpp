@@ -12,7 +12,7 @@
 #include "lib/quality/prune_quality.hpp"
 #include "tools/commands.hpp"
 #include "tools/picture_times.hpp"
-#include "tools/refine_option.hpp"
+#include "tools/stage_options.hpp"
 
 namespace stx::tools {
 namespace {

@@ -25,7 +25,8 @@ nlohmann::ordered_json stepsJson(const RefineReport& report) {
                          {"views", s.views},
                          {"pixels", s.pixels},
                          {"moved", s.moved},
-                         {"meanMove", s.meanMove}});
+                         {"meanMove", s.meanMove},
+                         {"milliseconds", s.milliseconds}});
     }
     return steps;
 }

@@ -16,8 +16,8 @@
 #include "tools/frame_writer.hpp"
 #include "tools/light_options.hpp"
 #include "tools/picture_times.hpp"
-#include "tools/refine_option.hpp"
 #include "tools/shard.hpp"
+#include "tools/stage_options.hpp"
 
 namespace stx::tools {
 namespace {
@@ -33,7 +33,8 @@ struct RenderOptions {
     bool around = false;  ///< equirectangular pictures
     std::vector<std::string> lights;
     std::string ambient = "0.2", specular = "0";
-    std::string refine = "auto";
+    std::string refine = "auto", without;
+    bool matchColours = true, explain = false;
     double shininess = 32;
     std::string fileFormat;
     std::string framesPerSecond;  ///< empty: that of the input, else 25
@@ -130,7 +131,8 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
     };
     if (std::holds_alternative<Mesh>(model)) {
         note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
-                            "--splat-coefficient", "--fill", "--match-colours", "--refine"}),
+                            "--splat-coefficient", "--fill", "--match-colours", "--refine",
+                            "--without", "--explain"}),
              "a mesh is rasterised itself, on the processor");
         return;
     }
@@ -157,6 +159,9 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
         s.lighting.lights.push_back(light);
     }
     STX_TRY(s.refine, RefineSettings::from(o.refine));
+    if (!o.without.empty()) STX_CHECK(leaveOut(o.without, s));
+    if (!o.matchColours) s.without.add(Stage::exposure);
+    if (o.explain) s.log = std::make_shared<StageLog>();
     STX_TRY(s.lighting.ambient, parseGreyOrRgb(o.ambient, "--ambient"));
     STX_TRY(s.lighting.specular, parseGreyOrRgb(o.specular, "--specular"));
     s.lighting.shininess = static_cast<float>(o.shininess);
@@ -465,6 +470,12 @@ Result<int> render(const RenderOptions& given, const Command& command, Program& 
         {"points", scene.moving ? scene.moving->points() : scene.points},
         {"views", views}};
     if (o.shard.given) report["shard"] = shardJson(o.shard, pictures.size());
+    if (settings.log) {
+        report["stages"] = stagesJson(*settings.log);
+        const std::string text = explained(*settings.log, static_cast<std::size_t>(drawn));
+        // Where the pictures go to stdout it is for a person beside them.
+        o.output == "-" ? program.say(text) : program.print(text);
+    }
     STX_CHECK(program.writeReport(report));
     return 0;
 }
@@ -542,12 +553,20 @@ void addRender(CommandLine& line, Program& program) {
                    "What no view shows: background (--background temporal) or none (default "
                    "background)")
         .group(drawing);
-    c.choice<bool>("--match-colours", o->settings.matchColours, {{"auto", true}, {"off", false}},
+    c.choice<bool>("--match-colours", o->matchColours, {{"auto", true}, {"off", false}},
                    "Gains and offsets between views that differ clearly where they show the same "
                    "surface (exposure, white balance): auto brings them to those of most, off "
                    "leaves them (default auto)")
         .group(drawing);
     refineOption(c, o->refine).group(drawing);
+    c.option(
+         "--without", o->without,
+         "Leave out stages, with commas between them: " + stageNames() + ", and those of --refine")
+        .takes("STAGES")
+        .group(drawing);
+    c.flag("--explain", o->explain,
+           "Print what each stage takes and how many pixels it changes (in the report, too)")
+        .group(drawing);
     c.option("--background", o->background,
              "What stands where no view shows a surface. temporal: the bundle's background views, "
              "then what is around, in scenes that fill the frame (default); spatial: what is "

@@ -12,7 +12,7 @@
 #include "lib/base/printable.hpp"
 #include "lib/sheet/sheet.hpp"
 #include "tools/commands.hpp"
-#include "tools/refine_option.hpp"
+#include "tools/stage_options.hpp"
 
 namespace stx::tools {
 namespace {

@@ -1,35 +1,13 @@
 #include "lib/quality/capture_quality.hpp"
-#include "lib/render/factory.hpp"
 
 #include <algorithm>
 #include <map>
 
-#include "lib/geometry/view_layout.hpp"
 #include "lib/quality/view_quality.hpp"
-#include "lib/render/mesh/mesh_renderer.hpp"
+#include "lib/render/factory.hpp"
 #include "lib/selection/selection.hpp"
 
 namespace stx {
-
-namespace {
-
-/// Cameras from all sides, as somebody would look at the object.
-Result<std::vector<Camera>> novelCameras(const Mesh& mesh, int side) {
-    ViewFraming framing;
-    framing.width = framing.height = side;
-    ViewLayout layout;
-    layout.count = 6;
-    const auto points = drawnPoints(mesh);
-    const auto sphere = boundingSphere(points);
-    std::vector<Camera> cameras;
-    for (const auto& direction : layoutDirections(layout)) {
-        STX_TRY(const auto camera, frameCamera(direction, framing, points, sphere, false));
-        cameras.push_back(camera);
-    }
-    return cameras;
-}
-
-}  // namespace
 
 Result<FewestCameras> fewestCameras(const Mesh& mesh, const std::vector<Camera>& cameras,
                                     const CaptureSettings& settings, double wantedPsnr, Job& job) {
@@ -40,11 +18,8 @@ Result<FewestCameras> fewestCameras(const Mesh& mesh, const std::vector<Camera>&
     constexpr double kAsGood = 0.1;  // dB that are not worth more views
     Job quiet;                       // each attempt would give the same notes again
     quiet.limits = job.limits;
-    STX_TRY(
-        auto novel,
-        novelCameras(mesh, std::min(kLargestSide, std::max(cameras[0].width, cameras[0].height))));
-    STX_TRY(const auto quality,
-            ViewQuality::against(*makeMeshRenderer(mesh, {}, quiet), std::move(novel), job));
+    const int side = std::min(kLargestSide, std::max(cameras[0].width, cameras[0].height));
+    STX_TRY(const auto quality, ViewQuality::against(mesh, side, quiet));
     std::map<int, double> reached;
     const auto measure = [&](int n) -> Result<double> {
         STX_TRY(const auto bundle,

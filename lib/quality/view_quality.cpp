@@ -2,8 +2,11 @@
 
 #include <limits>
 
+#include "lib/capture/capture.hpp"
+#include "lib/geometry/view_layout.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/render/api/frame_picture.hpp"
+#include "lib/render/mesh/mesh_renderer.hpp"
 
 namespace stx {
 namespace {
@@ -25,6 +28,37 @@ Result<ViewQuality> ViewQuality::against(Renderer& truth, std::vector<Camera> ca
     for (const Camera& camera : quality.cameras_) {
         STX_TRY(auto picture, drawn(truth, camera, job));
         quality.truth_.push_back(std::move(picture));
+    }
+    return quality;
+}
+
+Result<ViewQuality> ViewQuality::against(const Mesh& mesh, int side, Job& job) {
+    ViewFraming framing;
+    framing.width = framing.height = side;
+    ViewLayout layout;
+    layout.count = 6;
+    const auto points = drawnPoints(mesh);
+    const auto sphere = boundingSphere(points);
+    std::vector<Camera> cameras;
+    for (const auto& direction : layoutDirections(layout)) {
+        STX_TRY(const auto camera, frameCamera(direction, framing, points, sphere, false));
+        cameras.push_back(camera);
+    }
+    return against(*makeMeshRenderer(mesh, {}, job), std::move(cameras), job);
+}
+
+ViewQuality ViewQuality::of(std::span<const ReferenceView> views) {
+    ViewQuality quality;
+    for (const ReferenceView& view : views) {
+        quality.cameras_.push_back(view.camera);
+        Frame frame;
+        frame.linear = view.texture.isLinear();
+        frame.colour = Image<glm::vec4>(view.depth.width(), view.depth.height());
+        for (std::size_t i = 0; i < frame.colour.count(); ++i) {
+            const glm::vec4 c = view.texture.at(i);
+            frame.colour.data()[i] = glm::vec4(glm::vec3(c) * c.a, c.a);
+        }
+        quality.truth_.push_back(rgba8From(frame, glm::vec3(0.0f)));
     }
     return quality;
 }

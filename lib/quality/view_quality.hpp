@@ -1,10 +1,12 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "lib/base/job.hpp"
 #include "lib/geometry/camera.hpp"
-#include "lib/model/texture.hpp"
+#include "lib/model/mesh.hpp"
+#include "lib/model/reference_view.hpp"
 #include "lib/render/api/renderer.hpp"
 
 namespace stx {
@@ -22,6 +24,12 @@ class ViewQuality {
     /// Draws the truth, which is not needed afterwards. Errors: those of render(), cancelled.
     [[nodiscard]] static Result<ViewQuality> against(Renderer& truth, std::vector<Camera> cameras,
                                                      const Job& job);
+
+    /// Against a mesh itself: six pictures from all sides, as somebody would look at the object.
+    /// Errors: those of frameCamera() and render(), cancelled.
+    [[nodiscard]] static Result<ViewQuality> against(const Mesh& mesh, int side, Job& job);
+    /// Against what views show, where they are the truth: on black.
+    [[nodiscard]] static ViewQuality of(std::span<const ReferenceView> views);
 
     /// Draws and compares. Errors: those of render(), cancelled.
     [[nodiscard]] Result<Psnr> measure(Renderer& renderer, const Job& job) const;

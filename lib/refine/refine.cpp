@@ -98,6 +98,7 @@ void RefineReport::add(const RefineReport& other) {
         s.views += o.views;
         s.pixels += o.pixels;
         s.moved += o.moved;
+        s.milliseconds += o.milliseconds;
         s.meanMove = s.moved > 0 ? moves / static_cast<double>(s.moved) : 0;
     }
     noise = std::max(noise, other.noise);

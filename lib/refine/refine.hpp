@@ -32,10 +32,16 @@ inline constexpr std::size_t kRefineSteps = 7;
 /// Which steps are done: unless said otherwise all but `strays`, which forSplats() has, too.
 class RefineSettings {
   public:
-    RefineSettings() { set(RefineStep::strays, false); }
     /// The same for what is drawn as splats; of settings that were asked for nothing changes.
-    [[nodiscard]] RefineSettings forSplats() const { return automatic_ ? all() : *this; }
-    [[nodiscard]] bool on(RefineStep step) const { return !off_[static_cast<std::size_t>(step)]; }
+    [[nodiscard]] RefineSettings forSplats() const {
+        RefineSettings settings = *this;
+        settings.splats_ = true;
+        return settings;
+    }
+    [[nodiscard]] bool on(RefineStep step) const {
+        return !off_[static_cast<std::size_t>(step)] &&
+               (step != RefineStep::strays || splats_ || !automatic_);
+    }
     [[nodiscard]] bool any() const { return !off_.all(); }
     void set(RefineStep step, bool on) { off_[static_cast<std::size_t>(step)] = !on; }
     /// What is left to do for views that were refined before: nothing but `strays`.
@@ -50,7 +56,7 @@ class RefineSettings {
 
   private:
     std::bitset<kRefineSteps> off_;
-    bool automatic_ = true;
+    bool automatic_ = true, splats_ = false;
 };
 
 /// What a step found and did.
@@ -59,6 +65,7 @@ struct RefineStepReport {
     std::int64_t pixels = 0;  ///< of those; of a step that is done twice, of both times
     std::int64_t moved = 0;   ///< pixels that had a depth before and after
     double meanMove = 0;      ///< of those, share of the distance
+    double milliseconds = 0;  ///< of all processors together, measuring included
 };
 struct RefineReport {
     /// By RefineStep.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "lib/base/cpu_clock.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/pixel_space.hpp"
@@ -117,6 +118,19 @@ class Changes {
     std::vector<Image<float>> before_;
 };
 
+/// What a step took, until the end.
+class Clock {
+  public:
+    explicit Clock(RefineStepReport& report) : report_(report) {}
+    ~Clock() { report_.milliseconds += processMilliseconds() - start_; }
+    Clock(const Clock&) = delete;
+    Clock& operator=(const Clock&) = delete;
+
+  private:
+    RefineStepReport& report_;
+    double start_ = processMilliseconds();
+};
+
 /// The depth of a view after refining: pixels whose q is the same keep their very value.
 std::optional<Image<float>> depthOf(const RefineView& view, const Work& w) {
     const Work before = workOn(view);
@@ -158,12 +172,14 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
     const auto ofEach = [&](const auto& call) {
         parallelFor(0, count, [&](std::int64_t i) { call(static_cast<std::size_t>(i)); });
     };
-    ofEach([&](std::size_t k) {
-        works[k] = workOn(views[k]);
-        noise[k] = depthNoise(works[k].q, works[k].space.axis);
-    });
+    ofEach([&](std::size_t k) { works[k] = workOn(views[k]); });
+    {
+        const Clock clock(reportOf(RefineStep::noise));
+        ofEach([&](std::size_t k) { noise[k] = depthNoise(works[k].q, works[k].space.axis); });
+    }
     report.noise = views.empty() ? 0.0 : *std::max_element(noise.begin(), noise.end());
     if (settings.on(RefineStep::pinholes)) {
+        const Clock clock(reportOf(RefineStep::pinholes));
         std::vector<std::int64_t> closed(views.size());
         ofEach([&](std::size_t k) {
             closed[k] =
@@ -178,6 +194,7 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
     for (std::size_t k = 0; k < views.size(); ++k)
         someNoisy = someNoisy || isNoisy(noise[k], works[k].space.axis);
     if (someNoisy && settings.on(RefineStep::noise)) {
+        const Clock clock(reportOf(RefineStep::noise));
         const Changes changes(works, reportOf(RefineStep::noise));
         ofEach([&](std::size_t k) {
             NoisyView& n = noisyViews[k];
@@ -191,6 +208,7 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
         noisyViews[k].q = &works[k].q;
     });
     if (settings.on(RefineStep::edges)) {
+        const Clock clock(reportOf(RefineStep::edges));
         std::vector<EdgeView> edges;
         for (std::size_t k = 0; k < views.size(); ++k)
             edges.push_back(
@@ -211,6 +229,7 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
     if (!noisy.empty()) {
         const auto step = [&](RefineStep s, const auto& call) {
             if (!settings.on(s)) return;
+            const Clock clock(reportOf(s));
             const Changes changes(works, reportOf(s));
             call();
         };

@@ -89,6 +89,7 @@ namespace {
 
 /// Points of one pixel, the paper's rule, drafts and conventional OpenGL stay what they are.
 bool averages(Backend backend, const RenderSettings& settings) {
+    if (!settings.does(Stage::footprint)) return false;
     if (settings.mode == RenderMode::surface) return settings.quality != Quality::draft;
     return settings.splat == SplatRule::data && backend != Backend::gl;
 }
@@ -124,7 +125,8 @@ Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const PageSet& set,
 /// background views only is drawn as any other.
 PageSet inFront(const PageSet& set, const RenderSettings& settings, Job& job) {
     const auto matched = [&](const PageSet& views) {
-        if (!settings.matchColours || views.views().size() < 2) return views;
+        if (!settings.does(Stage::exposure) || views.views().size() < 2) return views;
+        const StageTimer timer(settings.log.get(), "exposure", true);
         std::size_t changed = 0;
         PageSet alike = views.inOneLight(changed);
         if (changed > 0)
@@ -160,7 +162,8 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     // Alpha inside of the object is not an outline for surfaces to end at.
     bool translucent = false;
     const auto solid = [&](const PageSet& views) {
-        if (settings.mode != RenderMode::surface) return views;
+        if (settings.mode != RenderMode::surface || !settings.does(Stage::solid)) return views;
+        const StageTimer timer(settings.log.get(), "solid", true);
         bool changed = false;
         PageSet opaque = views.solid(changed);
         translucent = translucent || changed;
@@ -170,17 +173,26 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
     const auto refined = [&](const PageSet& views) {
         RefineReport report;
         PageSet better = views.refined(settings.refine, &report);
+        for (const RefineStepInfo& info : refineSteps())
+            if (const RefineStepReport& s = report.of(info.step);
+                settings.log && s.milliseconds > 0)
+                settings.log->add(info.name, s.milliseconds, s.pixels, true);
         if (report.changed()) job.note(report.note());
         return better;
     };
-    PageSet drawn = refined(solid(inFront(set.distinct(), settings, job)));
+    const PageSet distinct = [&] {
+        const StageTimer timer(settings.log.get(), "twins", true);
+        return settings.does(Stage::twins) ? set.distinct() : set;
+    }();
+    PageSet drawn = refined(solid(inFront(distinct, settings, job)));
     if (drawn.behind()) drawn = drawn.before(refined(solid(*drawn.behind())));
     if (translucent)
         job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");
     // What is around an open place is a guess; the environment is known.
     if (environment) settings.fill = Fill::none;
     STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));
-    if (averages(backend, settings)) made = withFootprint(std::move(made), drawn, job.limits);
+    if (averages(backend, settings))
+        made = withFootprint(std::move(made), drawn, settings.log, job.limits);
     if (environment) made = withEnvironment(std::move(made), environment);
     return made;
 }

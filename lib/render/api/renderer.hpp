@@ -11,6 +11,8 @@
 #include "lib/model/bundle.hpp"
 #include "lib/refine/refine.hpp"
 #include "lib/render/api/frame.hpp"
+#include "lib/render/api/stage_log.hpp"
+#include "lib/render/api/stages.hpp"
 
 namespace stx {
 
@@ -44,13 +46,11 @@ struct RenderSettings {
     SplatRule splat = SplatRule::data;
     double splatCoefficient = 0.0;  ///< for SplatRule::paper; 0 = fitted to the nearest view
     GpuPipeline pipeline = GpuPipeline::automatic;  ///< of splat mode
-    bool cullHidden = true;  ///< leave out blocks that others hide; the picture is the same
     /// Frames carry albedo and normals without lights, too. Not on Backend::gl.
     bool normals = false;
     Fill fill = Fill::background;
-    /// Colours of views that differ from the others where they show the same surface, by exposure
-    /// or white balance, are brought to those of most. Views that agree are drawn as they are.
-    bool matchColours = true;
+    /// Stages that are left out.
+    StageSet without;
     /// Captured depth is repaired before it is drawn; exact depth is drawn as it is.
     RefineSettings refine;
     /// What is seen where nothing covers a pixel in full, in place of what is around it; null: the
@@ -60,6 +60,10 @@ struct RenderSettings {
     bool ownEnvironment = true;
     Lighting lighting;
 
+    /// Told what each stage takes and changes; null: nobody asks.
+    std::shared_ptr<StageLog> log;
+
+    [[nodiscard]] bool does(Stage stage) const { return !without.has(stage); }
     [[nodiscard]] bool wantNormals() const { return normals || lighting.on(); }
 };
 

@@ -23,8 +23,13 @@ constexpr std::uint64_t kBytesEach = 64;
 
 class FootprintRenderer final : public Renderer {
   public:
-    FootprintRenderer(std::unique_ptr<Renderer> inner, const PageSet& set, const Limits& limits)
-        : inner_(std::move(inner)), set_(set), footprint_(set), limits_(limits) {}
+    FootprintRenderer(std::unique_ptr<Renderer> inner, const PageSet& set,
+                      std::shared_ptr<StageLog> log, const Limits& limits)
+        : inner_(std::move(inner)),
+          set_(set),
+          footprint_(set),
+          log_(std::move(log)),
+          limits_(limits) {}
 
     Result<Frame> render(const Camera& camera) override {
         STX_CHECK(camera.check());
@@ -32,7 +37,9 @@ class FootprintRenderer final : public Renderer {
         large_ = factor > 1;
         if (!large_) return inner_->render(camera);
         STX_TRY(Frame large, inner_->render(enlarged(camera, factor)));
+        StageTimer timer(log_.get(), "footprint");
         Frame out = minified(large, factor);
+        timer.changed(static_cast<std::int64_t>(out.depth.count()));
         inner_->reuse(std::move(large));
         return out;
     }
@@ -72,6 +79,7 @@ class FootprintRenderer final : public Renderer {
     std::unique_ptr<Renderer> inner_;
     PageSet set_;
     Footprint footprint_;
+    std::shared_ptr<StageLog> log_;
     Limits limits_;
     bool large_ = false;  ///< the last frame came from a larger one
 };
@@ -199,8 +207,8 @@ Frame minified(const Frame& large, int factor) {
 }
 
 std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner, const PageSet& set,
-                                        const Limits& limits) {
-    return std::make_unique<FootprintRenderer>(std::move(inner), set, limits);
+                                        std::shared_ptr<StageLog> log, const Limits& limits) {
+    return std::make_unique<FootprintRenderer>(std::move(inner), set, std::move(log), limits);
 }
 
 }  // namespace stx

@@ -33,6 +33,8 @@ class Footprint {
 /// alias. Cameras that see the samples at up to 1.5 to the pixel, and the very cameras of reference
 /// views, are left to `inner`. Larger pictures are held to `limits` and to 16 million pixels.
 [[nodiscard]] std::unique_ptr<Renderer> withFootprint(std::unique_ptr<Renderer> inner,
-                                                      const PageSet& set, const Limits& limits);
+                                                      const PageSet& set,
+                                                      std::shared_ptr<StageLog> log,
+                                                      const Limits& limits);
 
 }  // namespace stx

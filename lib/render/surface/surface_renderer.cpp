@@ -29,9 +29,9 @@ class SurfaceRenderer final : public Renderer {
   public:
     SurfaceRenderer(const PageSet& set, const RenderSettings& settings, Job& job,
                     std::unique_ptr<SurfaceBackend> backend)
-        : scene_(set, settings.quality != Quality::draft),
+        : scene_(set, settings),
           settings_(settings),
-          effort_(effortOf(settings.quality, scene_)),
+          effort_(effortOf(settings, scene_)),
           job_(job),
           bounds_(boundsOf(scene_)),
           backend_(std::move(backend)) {
@@ -44,7 +44,8 @@ class SurfaceRenderer final : public Renderer {
         // A draft has no pixels that are covered in part.
         const bool open = std::any_of(scene_.sources.begin(), scene_.sources.end(),
                                       [](const Source& s) { return s.hasAlpha; });
-        if (open && settings.quality != Quality::draft && pointsAreExact())
+        if (open && settings.does(Stage::outlines) && settings.quality != Quality::draft &&
+            pointsAreExact())
             outlines_.emplace(scene_.set);
         if (settings.wantNormals()) findNormals();
     }
@@ -69,6 +70,7 @@ class SurfaceRenderer final : public Renderer {
     /// The same of all pixels of a frame; see DrawnFrame::origin.
     void normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>& normal) const;
     [[nodiscard]] std::unique_ptr<SurfaceFrame> plan(const Camera& camera) const {
+        const StageTimer timer(settings_.log.get(), "plan");
         auto frame = std::make_unique<SurfaceFrame>(planFrame(scene_, bounds_, effort_, camera));
         frame->wantOrigin = settings_.wantNormals();
         return frame;
@@ -86,6 +88,8 @@ class SurfaceRenderer final : public Renderer {
                                          Frame& frame);
     /// What the backend drew: colours, q, and normals when they are wanted.
     [[nodiscard]] Result<void> collect(const SurfaceFrame& work, Frame& frame, Image<float>& q);
+    /// Closes holes, or fills what is around.
+    void fill(const SurfaceFrame& work, Frame& frame, Image<float>& q);
     /// Draws the background where a frame is open.
     [[nodiscard]] Result<void> drawBehind(const SurfaceFrame& work, Frame& frame, Image<float>& q);
     /// Only those tiles of a frame, 32 pixels wide, that `wanted` has; its depth, too.
@@ -282,25 +286,39 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
     const PixelSpace& space = work->space;
     beginExpected(next);
     Image<float> q;
-    STX_CHECK(collect(*work, frame, q));
+    {
+        const StageTimer timer(settings_.log.get(), "draw");
+        STX_CHECK(collect(*work, frame, q));
+    }
     if (behind_) STX_CHECK(drawBehind(*work, frame, q));
+    fill(*work, frame, q);
+    frame.depth = depthOf(std::move(q), space.axis);
+    if (outlines_ && !behind_)
+        finishStage(settings_.log.get(), "outlines", frame.colour,
+                    [&] { cutRoundOutlines(*outlines_, camera, frame); });
+    return {};
+}
+
+void SurfaceRenderer::fill(const SurfaceFrame& work, Frame& frame, Image<float>& q) {
+    const PixelSpace& space = work.space;
     std::vector<LocalSource> all;
-    for (const FrameSource& f : work->sources)
-        all.push_back({f.source, f.sourceFromPixel, nullptr});
+    for (const FrameSource& f : work.sources) all.push_back({f.source, f.sourceFromPixel, nullptr});
     if (fillsFrame_ && settings_.fill != Fill::none) {
+        if (!settings_.does(Stage::surroundings)) return;
         // Cameras of the background looked, too.
         if (behind_)
             for (const Source& s : behind_->scene_.sources)
                 all.push_back(
                     {&s, warpFrom(s.space.pixelFromWorld * space.worldFromPixel), nullptr});
-        fillBackground({frame.colour, q, space}, all);
-    } else {
-        fillUnseen({frame.colour, q, space, frame.normal.empty() ? nullptr : &frame.normal}, all,
-                   settings_.fill == Fill::none ? 0 : kWidestHole);
+        finishStage(settings_.log.get(), "surroundings", frame.colour, [&] {
+            fillBackground({frame.colour, q, space}, all);
+        });
+    } else if (settings_.does(Stage::holes)) {
+        finishStage(settings_.log.get(), "holes", frame.colour, [&] {
+            fillUnseen({frame.colour, q, space, frame.normal.empty() ? nullptr : &frame.normal},
+                       all, settings_.fill == Fill::none ? 0 : kWidestHole);
+        });
     }
-    frame.depth = depthOf(std::move(q), space.axis);
-    if (outlines_ && !behind_) cutRoundOutlines(*outlines_, camera, frame);
-    return {};
 }
 
 Result<void> SurfaceRenderer::drawBehind(const SurfaceFrame& work, Frame& frame, Image<float>& q) {

@@ -266,7 +266,9 @@ Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
     for (const ReferenceView& view : bundle.views) pixels += view.depth.count();
     // What surface mode keeps of a pixel, two triangles and a corner.
     STX_CHECK(job.limits.checkAllocation(pixels, 80, "the surfaces"));
-    const SurfaceScene scene{bundle};
+    RenderSettings settings;
+    settings.without.add(Stage::sharpen);
+    const SurfaceScene scene(bundle, settings);
     STX_CHECK(job.checkCancelled());
     Maker maker(scene);
     std::vector<ViewSurface> out(bundle.views.size());

@@ -177,7 +177,7 @@ TEST(MatchedPictures, AViewsOwnCameraGivesItsOwnColours) {
     Job job;
     const auto pictureAt = [&](const Camera& camera, bool match) {
         RenderSettings settings;
-        settings.matchColours = match;
+        if (!match) settings.without.add(Stage::exposure);
         const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
         return (*renderer)->render(camera)->colour;
     };

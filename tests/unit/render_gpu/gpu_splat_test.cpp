@@ -133,7 +133,7 @@ TEST(GpuSplatCulling, LeavesOutHiddenBlocksAndNothingElse) {
     settings.pipeline = GpuPipeline::compute;
     Job job;
     const auto culling = gpu::makeGpuSplatRenderer(bundle, settings, -1, job);
-    settings.cullHidden = false;
+    settings.without.add(Stage::cull);
     const auto plain = gpu::makeGpuSplatRenderer(bundle, settings, -1, job);
     ASSERT_TRUE(culling && plain);
     for (const double zoom : {0.5, 1.0, 4.0}) {

@@ -196,7 +196,7 @@ TEST(PlannedEffort, TakesNoMoreSourcesForRounding) {
             bundle.views.push_back(
                 viewOfAnalyticScene(AnalyticScene::room,
                                     analyticCamera(AnalyticScene::room, i, views).resized(32, 24)));
-        EXPECT_EQ(effortOf(Quality::normal, SurfaceScene(bundle)).mostGeometry, 8) << views;
+        EXPECT_EQ(effortOf({}, SurfaceScene(bundle)).mostGeometry, 8) << views;
     }
 }
 

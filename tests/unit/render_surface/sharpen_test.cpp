@@ -31,7 +31,7 @@ Rgba8Image greyWithSpot(int x, int y) {
 Rgba8Image sharpenedOf(const ReferenceView& view) {
     Bundle bundle;
     bundle.views = {view, view};
-    const SurfaceScene scene(bundle, true);
+    const SurfaceScene scene(bundle);
     return *scene.pages[0].texture->rgba8();
 }
 
@@ -64,7 +64,7 @@ TEST(Sharpen, ABrightLightLeavesNoBlackRing) {
     image.at(10, 12) = {1000.0f, 0.1f, 0.1f, 1.0f};
     Bundle bundle;
     bundle.views = {wallWith(image), wallWith(image)};
-    const SurfaceScene scene(bundle, true);
+    const SurfaceScene scene(bundle);
     const RgbaFloatImage& out = *scene.pages[0].texture->rgbaFloat();
     EXPECT_FLOAT_EQ(out.at(9, 12).r, 0.05f);
     EXPECT_FLOAT_EQ(out.at(9, 12).g, 0.1f);
@@ -74,10 +74,12 @@ TEST(Sharpen, ABrightLightLeavesNoBlackRing) {
 TEST(Sharpen, DraftsAndViewsAloneAreReadAsTheyAre) {
     Bundle bundle;
     bundle.views = {wallWith(greyWithSpot(10, 12))};
-    const SurfaceScene alone(bundle, true);
+    const SurfaceScene alone(bundle);
     EXPECT_EQ(alone.pages[0].texture, alone.set.pages()[0].texture);
     bundle.views.push_back(bundle.views[0]);
-    const SurfaceScene draft(bundle);
+    RenderSettings settings;
+    settings.quality = Quality::draft;
+    const SurfaceScene draft(bundle, settings);
     EXPECT_EQ(draft.pages[0].texture, draft.set.pages()[0].texture);
 }
 

@@ -42,9 +42,12 @@ class CpuSplatRenderer final : public Renderer {
           settings_(settings),
           limits_(job.limits),
           wantNormals_(settings.wantNormals()),
-          prepared_(preparePages(set_, wantNormals_)),
+          prepared_(prepared(set_, settings)),
           silhouettes_(set_) {
-        if (settings.splat == SplatRule::data) findOthers(set_, prepared_);
+        if (settings.splat == SplatRule::data && settings.does(Stage::nearer)) {
+            const StageTimer timer(settings.log.get(), "nearer", true);
+            findOthers(set_, prepared_);
+        }
         for (const auto& r : prepared_.rectangles) {
             for (const auto& b : r.blocks) opaque_ = opaque_ && b.opaque;
             blockCount_ += r.blocks.size();
@@ -67,6 +70,10 @@ class CpuSplatRenderer final : public Renderer {
         int across = 0;  // regions in a row
     };
 
+    static PreparedPages prepared(const PageSet& set, const RenderSettings& settings) {
+        const StageTimer timer(settings.log.get(), "prepare", true);
+        return preparePages(set, settings.wantNormals());
+    }
     void planFrame(const Camera& camera);
     std::span<const std::uint32_t> byColumn(int width);
     void drawRegion(Picture& picture, int index);
@@ -208,10 +215,18 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
             for (int x = x0 / kRegionWidth; x <= x1 / kRegionWidth; ++x)
                 bins_[static_cast<std::size_t>(y * picture.across + x)].push_back(i);
     }
-    parallelFor(0, regions, [&](std::int64_t n) { drawRegion(picture, static_cast<int>(n)); });
+    {
+        const StageTimer timer(settings_.log.get(), "draw");
+        parallelFor(0, regions, [&](std::int64_t n) { drawRegion(picture, static_cast<int>(n)); });
+    }
     if (settings_.splat == SplatRule::data) {
-        closePinholes(picture.frame, set_.pruned(), drawn);
-        silhouettes_.carve(picture.frame, camera, drawn);
+        const auto& colour = picture.frame.colour;
+        if (settings_.does(Stage::closing))
+            finishStage(settings_.log.get(), "closing", colour,
+                        [&] { closePinholes(picture.frame, set_.pruned(), drawn); });
+        if (settings_.does(Stage::coverage))
+            finishStage(settings_.log.get(), "coverage", colour,
+                        [&] { silhouettes_.carve(picture.frame, camera, drawn); });
     }
     picture.frame.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

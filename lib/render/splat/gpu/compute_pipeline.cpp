@@ -18,7 +18,7 @@ class ComputeSplats final : public SplatPipeline {
         : context_(context), scene_(scene), programs_(false, scene, settings) {
         SplatVariant& variant = programs_.variant;
         // Round splats of the paper's rule may reach beyond what the plan says of a block.
-        variant.cull = settings.cullHidden && settings.splat != SplatRule::paper;
+        variant.cull = settings.does(Stage::cull) && settings.splat != SplatRule::paper;
         const auto& able = context.abilities();
         // Linear colours need a float's range; 8-bit ones sum exactly in integers, two to a 64-bit
         // atomic where there is one.

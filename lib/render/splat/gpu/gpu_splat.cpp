@@ -83,8 +83,10 @@ Result<void> GpuSplatRenderer::prepare(Job& job) {
         pipeline = choosePipeline(context_->device(), context_->abilities()).pipeline;
     STX_TRY(auto current, context_->makeCurrent());
     resources_ = std::make_unique<Resources>();
-    STX_TRY(resources_->scene, GpuScene::upload(set_, *context_, settings_.wantNormals(),
-                                                settings_.splat == SplatRule::data, job));
+    STX_TRY(
+        resources_->scene,
+        GpuScene::upload(set_, *context_, settings_.wantNormals(),
+                         settings_.splat == SplatRule::data && settings_.does(Stage::nearer), job));
     const auto make = pipeline == GpuPipeline::compute ? makeComputeSplats : makeRasterSplats;
     STX_TRY(resources_->pipeline, make(*context_, resources_->scene, settings_, job));
     return {};
@@ -184,8 +186,12 @@ Result<Frame> GpuSplatRenderer::render(const Camera& camera) {
     }
     if (settings_.splat == SplatRule::data) {
         const auto start = Clock::now();
-        closePinholes(frame, set_.pruned());
-        silhouettes_.carve(frame, camera);
+        if (settings_.does(Stage::closing))
+            finishStage(settings_.log.get(), "closing", frame.colour,
+                        [&] { closePinholes(frame, set_.pruned()); });
+        if (settings_.does(Stage::coverage))
+            finishStage(settings_.log.get(), "coverage", frame.colour,
+                        [&] { silhouettes_.carve(frame, camera); });
         frame.milliseconds += millisecondsSince(start);
     }
     return frame;

@@ -121,7 +121,7 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
         }
     };
     pieces.clear();
-    if (perPixel == 1) {
+    if (perPixel == 1 || !frame.effort.settle) {
         drawAll(grid, {});
         fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces);
     } else {

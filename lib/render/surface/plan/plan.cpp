@@ -137,9 +137,11 @@ Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
     return ray;
 }
 
-Effort effortOf(Quality quality, const SurfaceScene& scene) {
+Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
     Effort e;
-    switch (quality) {
+    e.places = settings.does(Stage::places);
+    e.settle = settings.does(Stage::settle);
+    switch (settings.quality) {
         case Quality::draft:
             e.samplesPerPixel = 1;
             e.mostGeometry = 4;
@@ -230,7 +232,7 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
         const auto t = static_cast<std::size_t>(i);
         if (middles[t] > 0) f.tileSources[t] = chooseSources(f, static_cast<int>(i), middles[t]);
     });
-    addSourcesOfPlaces(f, placed);
+    if (effort.places) addSourcesOfPlaces(f, placed);
     if (!effort.preferShown) {
         std::vector<char> wanted(f.sources.size(), 0);
         for (const auto& chosen : f.tileSources)

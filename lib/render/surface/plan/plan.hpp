@@ -33,9 +33,10 @@ struct Effort {
     float freeLevel = kFreeLevel;
     /// Of many sources those that have something in a tile come first: pruned views.
     bool preferShown = false;
+    bool places = true, settle = true;  ///< stages
     ShadeSettings shade;
 };
-[[nodiscard]] Effort effortOf(Quality quality, const SurfaceScene& scene);
+[[nodiscard]] Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene);
 
 /// One source in one frame: its maps and, of sources that tiles are built from, which blocks may
 /// show in which tile.

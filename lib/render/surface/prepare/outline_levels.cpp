@@ -29,8 +29,10 @@ struct OutlineLine {
 
 class Levels {
   public:
-    explicit Levels(const Texture& texture)
-        : texture_(texture), lines_(static_cast<std::size_t>(texture.height())) {}
+    Levels(const Texture& texture, bool findsLines)
+        : texture_(texture),
+          findsLines_(findsLines),
+          lines_(static_cast<std::size_t>(texture.height())) {}
 
     Image<std::uint8_t> find() {
         Image<std::uint8_t> levels(width(), height());
@@ -61,7 +63,7 @@ class Levels {
         for (int x = 0; x < width(); ++x) {
             const float a = alpha(x, y);
             OutlineLine line;
-            const bool outline = a > 0.0f && a < 1.0f && findLine(x, y, a, line);
+            const bool outline = findsLines_ && a > 0.0f && a < 1.0f && findLine(x, y, a, line);
             set(levels.at(x, y), outline ? 0.5f + line.below : a);
             if (outline) lines_[static_cast<std::size_t>(y)].push_back(line);
         }
@@ -118,13 +120,14 @@ class Levels {
     }
 
     const Texture& texture_;
+    bool findsLines_;
     std::vector<std::vector<OutlineLine>> lines_;  ///< by row
 };
 
 }  // namespace
 
-Image<std::uint8_t> outlineLevels(const Texture& texture) {
-    return Levels(texture).find();
+Image<std::uint8_t> outlineLevels(const Texture& texture, bool findsLines) {
+    return Levels(texture, findsLines).find();
 }
 
 }  // namespace stx::surface

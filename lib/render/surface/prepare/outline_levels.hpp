@@ -16,7 +16,7 @@ namespace stx::surface {
 ///
 /// The outline of a pixel that is covered in part is a line: across it is the gradient of alpha
 /// (Youngs 1982, as solvers of flow with volumes of fluid do it), and its place follows from the
-/// area that is covered.
-[[nodiscard]] Image<std::uint8_t> outlineLevels(const Texture& texture);
+/// area that is covered. Unless `findsLines` all levels are the alpha.
+[[nodiscard]] Image<std::uint8_t> outlineLevels(const Texture& texture, bool findsLines = true);
 
 }  // namespace stx::surface

@@ -242,7 +242,7 @@ float typicalDist(const Source& s, const Draft& d) {
 }
 
 /// Links, edges, planar pieces and outlines of a source, from its points.
-void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
+void prepareSource(Source& s, const RenderSettings& settings, std::vector<PreparedPage>& pages) {
     const Camera& camera = s.view->camera;
     s.width = camera.width;
     s.height = camera.height;
@@ -270,9 +270,16 @@ void prepareSource(Source& s, std::vector<PreparedPage>& pages) {
     findLinks(s, d, step);
     findEdges(s, d);
     findLeaves(s, d);
-    findCreases(s, d);
-    if (s.hasAlpha)
-        d.levels = outlineLevels(s.whole ? *s.whole->texture : s.set->textureOfView(s.number));
+    const auto inThread = StageTimer::Of::thread;
+    if (settings.does(Stage::creases)) {
+        const StageTimer timer(settings.log.get(), "creases", true, inThread);
+        findCreases(s, d);
+    }
+    if (s.hasAlpha) {
+        const StageTimer timer(settings.log.get(), "levels", true, inThread);
+        d.levels = outlineLevels(s.whole ? *s.whole->texture : s.set->textureOfView(s.number),
+                                 settings.does(Stage::levels));
+    }
     keep(s, std::move(d), pages);
 }
 
@@ -303,10 +310,16 @@ std::vector<std::int32_t> placesOfBlocks(const Source& s) {
 
 }  // namespace
 
-SurfaceScene::SurfaceScene(const PageSet& pageSet, bool sharpens) : set(pageSet) {
-    prepare();
-    // One view cannot tell whether its depth is exact; where it is not, sharper is worse.
-    if (!sharpens || sources.size() < 2) return;
+SurfaceScene::SurfaceScene(const PageSet& pageSet, const RenderSettings& settings) : set(pageSet) {
+    {
+        const StageTimer timer(settings.log.get(), "prepare", true);
+        prepare(settings);
+    }
+    // One view cannot tell whether its depth is exact; where it is not, sharper is worse. The fit
+    // of drafts does not want it.
+    if (!settings.does(Stage::sharpen) || settings.quality == Quality::draft || sources.size() < 2)
+        return;
+    const StageTimer timer(settings.log.get(), "sharpen", true);
     sharpened = sharpenedTextures(*this);
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = sharpened[i].get();
 }
@@ -324,7 +337,7 @@ void SurfaceScene::begin() {
     }
 }
 
-void SurfaceScene::prepare() {
+void SurfaceScene::prepare(const RenderSettings& settings) {
     pages.resize(set.pages().size());
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = set.pages()[i].texture;
     begin();
@@ -332,7 +345,7 @@ void SurfaceScene::prepare() {
         std::all_of(sources.begin(), sources.end(), [](const Source& s) { return s.whole; });
     if (whole) {
         parallelFor(0, static_cast<std::int64_t>(sources.size()), [&](std::int64_t i) {
-            prepareSource(sources[static_cast<std::size_t>(i)], pages);
+            prepareSource(sources[static_cast<std::size_t>(i)], settings, pages);
         });
         return;
     }
@@ -343,7 +356,7 @@ void SurfaceScene::prepare() {
         pages[i].levels = Image<std::uint8_t>(page.width(), page.height(), 0);
     }
     // One after the other: a draft takes the memory of a whole view.
-    for (Source& s : sources) prepareSource(s, pages);
+    for (Source& s : sources) prepareSource(s, settings, pages);
     for (Source& s : sources)
         if (!s.whole) s.placeOfBlock = placesOfBlocks(s);
 }

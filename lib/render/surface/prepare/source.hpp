@@ -10,6 +10,7 @@
 
 #include "lib/base/image.hpp"
 #include "lib/geometry/pixel_space.hpp"
+#include "lib/render/api/renderer.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "lib/render/surface/prepare/constants.hpp"
 
@@ -215,14 +216,15 @@ struct SurfaceScene {
     /// Textures of `pages` that are not the set's own; see sharpenedTextures().
     std::vector<std::shared_ptr<const Texture>> sharpened;
 
-    /// `sharpens`: colours are read by the fit that wants them sharpened.
-    explicit SurfaceScene(const PageSet& pageSet, bool sharpens = false);
+    /// Stages of preparing that are left out are those of RenderSettings::without. Drafts and views
+    /// alone are not sharpened.
+    explicit SurfaceScene(const PageSet& pageSet, const RenderSettings& settings = {});
     SurfaceScene(const SurfaceScene&) = delete;
     SurfaceScene& operator=(const SurfaceScene&) = delete;
 
   private:
     void begin();
-    void prepare();
+    void prepare(const RenderSettings& settings);
 };
 
 /// q and info of a block of a source and one pixel around it, row by row.
