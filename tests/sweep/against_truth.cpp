@@ -30,7 +30,7 @@ std::int64_t coveredCount(const Frame& frame, const Image<std::uint8_t>& seen, i
 namespace measures {
 
 int pick(const Pictures& pictures, int salt, int below) {
-    const SweepCase& c = pictures.stage().from;
+    const SweepCase& c = pictures.captured().from;
     Random random(c.seed * 6151 + static_cast<std::uint64_t>(c.number) * 31 +
                   static_cast<std::uint64_t>(salt));
     return random.whole(0, below - 1);
@@ -94,7 +94,7 @@ Outcome betterQualityIsWorse(Pictures& pictures) {
 }
 
 Outcome exactDepthIsRepaired(Pictures& pictures) {
-    const PageSet pages(pictures.stage().bundle);
+    const PageSet pages(pictures.captured().bundle);
     RefineReport report;
     const PageSet refined = pages.refined({}, &report);
     return Measure{refined.exactDepth() ? 0.0 : 1.0, report.text()};
@@ -112,10 +112,10 @@ Outcome noisySurfaceBelowSplats(Pictures& pictures) {
     if (pictures.seenCount(1) < kFewest) return std::nullopt;
     constexpr std::array kShares{0.002, 0.005, 0.01};
     const double share = kShares[std::size_t(pick(pictures, 311, int(kShares.size())))];
-    Bundle noisy = pictures.stage().bundle;
+    Bundle noisy = pictures.captured().bundle;
     noisy::addNoise(noisy, share);
-    STX_TRY(const Frame surface, drawBundle(noisy, pictures.stage().novel, kNormal));
-    STX_TRY(const Frame splats, drawBundle(noisy, pictures.stage().novel, kSplat));
+    STX_TRY(const Frame surface, drawBundle(noisy, pictures.captured().novel, kNormal));
+    STX_TRY(const Frame splats, drawBundle(noisy, pictures.captured().novel, kSplat));
     const double a = pictures.psnr(surface), b = pictures.psnr(splats);
     return Measure{
         worseBy(a, b),

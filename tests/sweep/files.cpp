@@ -41,7 +41,7 @@ measures::Outcome drawnFrom(Pictures& pictures, Model model, const std::string& 
     settings.fill = Fill::none;
     Job job;
     STX_TRY(const auto renderer, rendererOf(std::move(model), settings, job, Backend::cpu));
-    STX_TRY(const Frame changed, renderer->render(pictures.stage().novel));
+    STX_TRY(const Frame changed, renderer->render(pictures.captured().novel));
     STX_TRY(const Frame* frame, pictures.of(how));
     const double before = pictures.psnr(*frame), after = pictures.psnr(changed);
     return Measure{worseBy(after, before),
@@ -56,10 +56,10 @@ namespace measures {
 Outcome container(Pictures& pictures) {
     constexpr std::array kNames{"a.exr", "a.mp4", "a.xmt", "a.bt"};
     const char* name = kNames[std::size_t(pick(pictures, 201, int(kNames.size())))];
-    Bundle bundle = pictures.stage().bundle;
+    Bundle bundle = pictures.captured().bundle;
     // Only .exr has room for principal points and for floats; the others are compared as they are.
     if (name != kNames[0]) {
-        if (pictures.stage().from.offCentre) return std::nullopt;
+        if (pictures.captured().from.offCentre) return std::nullopt;
         for (ReferenceView& view : bundle.views) view.depthBits = 16;
     }
     Folder folder;
@@ -74,7 +74,7 @@ Outcome atlas(Pictures& pictures) {
     PackSettings settings;
     settings.layout =
         pick(pictures, 211, 2) ? PackSettings::Layout::tight : PackSettings::Layout::grid;
-    STX_TRY(Atlas packed, pack(pictures.stage().bundle, settings, job));
+    STX_TRY(Atlas packed, pack(pictures.captured().bundle, settings, job));
     const char* kind = settings.layout == PackSettings::Layout::tight ? "tight" : "grid";
     if (pick(pictures, 212, 2)) return drawnFrom(pictures, std::move(packed), kind, 213);
     Folder folder;
@@ -86,7 +86,7 @@ Outcome atlas(Pictures& pictures) {
 
 Outcome prunedAtlas(Pictures& pictures) {
     Job job;
-    Bundle bundle = pictures.stage().bundle;
+    Bundle bundle = pictures.captured().bundle;
     STX_TRY(const PruneReport report, prune(bundle, {}, job));
     PackSettings settings;
     settings.layout = PackSettings::Layout::tight;
@@ -122,9 +122,9 @@ Outcome clock(Pictures& pictures) {
       private:
         ReferenceView view_;
     };
-    ReferenceView view = pictures.stage().bundle.views[0];
+    ReferenceView view = pictures.captured().bundle.views[0];
     view.depthBits = 16;
-    if (view.pointCount() == 0 || pictures.stage().from.offCentre) return std::nullopt;
+    if (view.pointCount() == 0 || pictures.captured().from.offCentre) return std::nullopt;
     Timeline timeline = steadyTimeline(frames, rate);
     for (double& time : timeline.times) time += start;
     timeline.end += start;

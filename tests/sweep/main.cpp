@@ -41,10 +41,10 @@ std::optional<Measure> findingOf(const SweepRule& rule, Pictures& pictures) {
     if (std::string_view(rule.unit) != "dB") return finding;
     double sum = 0;
     int count = 0;
-    for (const SweepCase& beside : pictures.stage().from.besides()) {
-        const auto stage = stageOf(beside);
-        if (!stage) continue;
-        Pictures others(*stage);
+    for (const SweepCase& beside : pictures.captured().from.besides()) {
+        const auto captured = capturedOf(beside);
+        if (!captured) continue;
+        Pictures others(*captured);
         const auto measured = measureOf(rule, others);
         if (!measured) continue;
         sum += measured->found;
@@ -66,9 +66,9 @@ SweepCase reduced(const SweepCase& found, const SweepRule& rule) {
         simpler = false;
         for (const SweepCase& candidate : current.simpler()) {
             if (++tries > kTries) break;
-            const auto stage = stageOf(candidate);
-            if (!stage) continue;
-            Pictures pictures(*stage);
+            const auto captured = capturedOf(candidate);
+            if (!captured) continue;
+            Pictures pictures(*captured);
             if (!findingOf(rule, pictures)) continue;
             current = candidate;
             simpler = true;
@@ -85,13 +85,13 @@ std::string repeatOf(const SweepCase& c, const SweepRule& rule) {
 }
 
 /// The bundle, the truth and the camera of a case as files, and what draws it.
-stx::Result<void> keep(const Stage& stage, const std::filesystem::path& folder) {
+stx::Result<void> keep(const Captured& captured, const std::filesystem::path& folder) {
     using namespace stx;
     Job job;
     std::filesystem::create_directories(folder);
-    STX_CHECK(save(stage.bundle, folder / "case.exr", {}, job));
+    STX_CHECK(save(captured.bundle, folder / "case.exr", {}, job));
     Bundle truth;
-    truth.views = {stage.truth};
+    truth.views = {captured.truth};
     truth.views[0].name = "truth";
     STX_CHECK(save(truth, folder / "truth.exr", {}, job));
     fmt::print(
@@ -118,16 +118,16 @@ int check(const Options& options) {
         // Before anything is drawn: who stops here is named by `run`.
         fmt::print("case {}:{} {}\n", options.seed, number, c.describe());
         std::fflush(stdout);
-        const auto stage = stageOf(c);
-        if (!stage) {
-            fmt::print("  skipped: {}\n", stage.error().message);
+        const auto captured = capturedOf(c);
+        if (!captured) {
+            fmt::print("  skipped: {}\n", captured.error().message);
             continue;
         }
         if (!options.keep.empty()) {
-            if (const auto kept = keep(*stage, options.keep); !kept)
+            if (const auto kept = keep(*captured, options.keep); !kept)
                 fmt::print("  {}\n", kept.error().message);
         }
-        Pictures pictures(*stage);
+        Pictures pictures(*captured);
         Random random(options.seed * 9176 + static_cast<std::uint64_t>(number) * 13 + 1);
         for (const SweepRule& rule : rules()) {
             const bool asked = random.chance(rule.share);

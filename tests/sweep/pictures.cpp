@@ -64,16 +64,16 @@ Result<Frame> drawBundle(const Bundle& bundle, const Camera& camera, const Drawn
     return renderer->render(camera);
 }
 
-Pictures::Pictures(const Stage& stage)
-    : stage_(stage),
-      seenBy_(stage.novel.width, stage.novel.height, 0),
-      empty_(stage.novel.width, stage.novel.height, 0),
-      guessed_(stage.novel.width, stage.novel.height, 0) {
+Pictures::Pictures(const Captured& captured)
+    : captured_(captured),
+      seenBy_(captured.novel.width, captured.novel.height, 0),
+      empty_(captured.novel.width, captured.novel.height, 0),
+      guessed_(captured.novel.width, captured.novel.height, 0) {
     findGuesses();
-    const Camera& novel = stage.novel;
-    const Rgba8Image& truth = *stage.truth.texture.rgba8();
+    const Camera& novel = captured.novel;
+    const Rgba8Image& truth = *captured.truth.texture.rgba8();
     // A texel is so many novel pixels wide, at half of it outlines may be drawn too large.
-    const int margin = 2 + static_cast<int>(std::ceil(stage.from.magnification));
+    const int margin = 2 + static_cast<int>(std::ceil(captured.from.magnification));
     Image<std::uint8_t> touched(novel.width, novel.height, 0);
     for (int y = 0; y < novel.height; ++y) {
         for (int x = 0; x < novel.width; ++x) {
@@ -88,15 +88,15 @@ Pictures::Pictures(const Stage& stage)
         for (int x = 1; x + 1 < novel.width; ++x) {
             if (!touched.at(x, y)) empty_.at(x, y) = 255;
             if (truth.at(x, y).a < 255) continue;
-            const Hit hit = stage.scene.trace(novel, x + 0.5, y + 0.5);
+            const Hit hit = captured.scene.trace(novel, x + 0.5, y + 0.5);
             if (!hit.any()) continue;
             bool solid = true;
             for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}})
-                solid = solid &&
-                        stage.scene.trace(novel, x + dx + 0.5, y + dy + 0.5).surface == hit.surface;
+                solid = solid && captured.scene.trace(novel, x + dx + 0.5, y + dy + 0.5).surface ==
+                                     hit.surface;
             if (!solid) continue;
             int count = 0;
-            for (const ReferenceView& view : stage.bundle.views)
+            for (const ReferenceView& view : captured.bundle.views)
                 count += showsPlane(view, hit.point, hit.normal);
             seenBy_.at(x, y) = static_cast<std::uint8_t>(count);
         }
@@ -104,14 +104,14 @@ Pictures::Pictures(const Stage& stage)
 }
 
 void Pictures::findGuesses() {
-    const Camera& novel = stage_.novel;
+    const Camera& novel = captured_.novel;
     // What lies within half a texel of a place that no view shows may be drawn from both sides.
-    const int margin = static_cast<int>(std::ceil(0.5 * stage_.from.magnification));
+    const int margin = static_cast<int>(std::ceil(0.5 * captured_.from.magnification));
     const auto look = [&](double x, double y) {
-        const Hit hit = stage_.scene.trace(novel, x, y);
+        const Hit hit = captured_.scene.trace(novel, x, y);
         if (!hit.any()) return;
-        for (const ReferenceView& view : stage_.bundle.views)
-            if (samples(stage_.scene, view.camera, hit)) return;
+        for (const ReferenceView& view : captured_.bundle.views)
+            if (samples(captured_.scene, view.camera, hit)) return;
         const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
         const bool corner = x == column;  // of four pixels
         for (int v = row - margin - corner; v <= row + margin; ++v)
@@ -129,7 +129,7 @@ void Pictures::findGuesses() {
 Result<const Frame*> Pictures::of(const Drawn& how) {
     const auto found = drawn_.find(how);
     if (found != drawn_.end()) return &found->second;
-    STX_TRY(Frame frame, drawBundle(stage_.bundle, stage_.novel, how));
+    STX_TRY(Frame frame, drawBundle(captured_.bundle, captured_.novel, how));
     return &(drawn_[how] = std::move(frame));
 }
 
@@ -140,7 +140,7 @@ std::int64_t Pictures::seenCount(int least) const {
 }
 
 double Pictures::psnr(const Frame& frame, glm::ivec2 first) const {
-    const Rgba8Image& truth = *stage_.truth.texture.rgba8();
+    const Rgba8Image& truth = *captured_.truth.texture.rgba8();
     double squared = 0, judged = 0;
     for (int y = 0; y < frame.colour.height(); ++y) {
         for (int x = 0; x < frame.colour.width(); ++x) {

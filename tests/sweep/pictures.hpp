@@ -25,9 +25,9 @@ struct Drawn {
 /// What the rules of one case share: its pictures, and which places its views show.
 class Pictures {
   public:
-    explicit Pictures(const Stage& stage);
+    explicit Pictures(const Captured& captured);
 
-    [[nodiscard]] const Stage& stage() const { return stage_; }
+    [[nodiscard]] const Captured& captured() const { return captured_; }
     /// drawBundle() of the case; drawn once.
     [[nodiscard]] stx::Result<const stx::Frame*> of(const Drawn& how);
     /// How many views show the place of a novel pixel for sure: the nine pixels around it are on
@@ -44,7 +44,7 @@ class Pictures {
     [[nodiscard]] double psnr(const stx::Frame& frame, glm::ivec2 first = {0, 0}) const;
 
   private:
-    const Stage& stage_;
+    const Captured& captured_;
     void findGuesses();
 
     stx::Image<std::uint8_t> seenBy_, empty_;

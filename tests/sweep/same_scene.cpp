@@ -46,8 +46,8 @@ Measure alike(const Pictures& pictures, const Drawn& how, const Frame& before, c
 /// A picture of the bundle after `change` of it and of the camera.
 template <class Change>
 measures::Outcome changedScene(Pictures& pictures, int salt, Change&& change) {
-    Bundle bundle = pictures.stage().bundle;
-    Camera camera = pictures.stage().novel;
+    Bundle bundle = pictures.captured().bundle;
+    Camera camera = pictures.captured().novel;
     change(bundle, camera);
     const Drawn how = modeOf(pictures, salt);
     STX_TRY(const Frame changed, drawBundle(bundle, camera, how));
@@ -79,7 +79,7 @@ void mirror(Camera& camera) {
 namespace measures {
 
 Outcome crop(Pictures& pictures) {
-    const Camera& whole = pictures.stage().novel;
+    const Camera& whole = pictures.captured().novel;
     const int left = pick(pictures, 11, 2) ? 13 : 37, top = pick(pictures, 12, 2) ? 13 : 37;
     Camera part = whole;
     part.width -= left;
@@ -88,7 +88,7 @@ Outcome crop(Pictures& pictures) {
     part.cx -= left;
     part.cy -= top;
     const Drawn how = modeOf(pictures, 13);
-    STX_TRY(const Frame cut, drawBundle(pictures.stage().bundle, part, how));
+    STX_TRY(const Frame cut, drawBundle(pictures.captured().bundle, part, how));
     STX_TRY(const Frame* frame, pictures.of(how));
     // What is at the border of the part has other neighbours in the whole.
     constexpr int kBorder = 4;
@@ -113,12 +113,12 @@ Outcome otherOrder(Pictures& pictures) {
 
 Outcome viewTwice(Pictures& pictures) {
     const std::size_t which =
-        static_cast<std::size_t>(pick(pictures, 31, int(pictures.stage().bundle.views.size())));
-    Bundle bundle = pictures.stage().bundle;
+        static_cast<std::size_t>(pick(pictures, 31, int(pictures.captured().bundle.views.size())));
+    Bundle bundle = pictures.captured().bundle;
     bundle.views.push_back(bundle.views[which]);
     bundle.views.back().name = "again";
     const Drawn how = modeOf(pictures, 32);
-    STX_TRY(const Frame changed, drawBundle(bundle, pictures.stage().novel, how));
+    STX_TRY(const Frame changed, drawBundle(bundle, pictures.captured().novel, how));
     return worseThanBefore(pictures, how, changed);
 }
 
@@ -172,8 +172,8 @@ Outcome movedFar(Pictures& pictures) {
 }
 
 Outcome mirrored(Pictures& pictures) {
-    Bundle bundle = pictures.stage().bundle;
-    Camera camera = pictures.stage().novel;
+    Bundle bundle = pictures.captured().bundle;
+    Camera camera = pictures.captured().novel;
     everyCamera(bundle, camera, mirror);
     for (ReferenceView& view : bundle.views) {
         flip(view.depth);
@@ -192,7 +192,7 @@ Outcome threads(Pictures& pictures) {
     for (int i = 0; i < 2; ++i) {
         const ThreadLimit limit(i + 1);
         STX_TRY(frames[std::size_t(i)],
-                drawBundle(pictures.stage().bundle, pictures.stage().novel, how, true));
+                drawBundle(pictures.captured().bundle, pictures.captured().novel, how, true));
     }
     std::int64_t different = 0;
     for (std::size_t i = 0; i < frames[0].colour.count(); ++i)

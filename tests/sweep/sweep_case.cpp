@@ -330,12 +330,12 @@ std::vector<SweepCase> SweepCase::simpler() const {
     return out;
 }
 
-Result<Stage> stageOf(const SweepCase& c) {
-    Stage stage;
-    stage.from = c;
-    stage.scene = sceneOf(c);
-    STX_TRY(std::vector<Camera> cameras, referenceCameras(c, stage.scene));
-    STX_TRY(stage.novel, novelCamera(c, stage.scene, cameras));
+Result<Captured> capturedOf(const SweepCase& c) {
+    Captured captured;
+    captured.from = c;
+    captured.scene = sceneOf(c);
+    STX_TRY(std::vector<Camera> cameras, referenceCameras(c, captured.scene));
+    STX_TRY(captured.novel, novelCamera(c, captured.scene, cameras));
     Random random(c.seed * 31337 + static_cast<std::uint64_t>(c.number) + 3);
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         const double dx = random.between(-0.15, 0.15), dy = random.between(-0.15, 0.15);
@@ -343,14 +343,14 @@ Result<Stage> stageOf(const SweepCase& c) {
             cameras[i].cx += dx * cameras[i].width;
             cameras[i].cy += dy * cameras[i].height;
         }
-        stage.bundle.views.push_back(look(stage.scene, cameras[i]));
-        stage.bundle.views.back().name = fmt::format("view{}", i);
+        captured.bundle.views.push_back(look(captured.scene, cameras[i]));
+        captured.bundle.views.back().name = fmt::format("view{}", i);
         if (c.depthBits == 32) continue;
-        ReferenceView& view = stage.bundle.views.back();
+        ReferenceView& view = captured.bundle.views.back();
         view.depthBits = c.depthBits;
         for (float& depth : view.depth.pixels())
             if (hasPoint(depth)) depth = view.depthCode().decode(view.depthCode().encode(depth));
     }
-    stage.truth = look(stage.scene, stage.novel);
-    return stage;
+    captured.truth = look(captured.scene, captured.novel);
+    return captured;
 }

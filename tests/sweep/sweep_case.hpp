@@ -65,7 +65,7 @@ struct SweepCase {
 };
 
 /// A case with its pictures computed.
-struct Stage {
+struct Captured {
     SweepCase from;
     Scene scene;
     stx::Bundle bundle;
@@ -74,4 +74,4 @@ struct Stage {
 };
 
 /// Captures a case. Errors: a layout that cannot be, as when no view sees the object.
-[[nodiscard]] stx::Result<Stage> stageOf(const SweepCase& from);
+[[nodiscard]] stx::Result<Captured> capturedOf(const SweepCase& from);
