@@ -156,10 +156,9 @@ void addBench(CommandLine& line, Program& program) {
     c.choice<RenderMode>("--mode", o->drawing.mode,
                          {{"surface", RenderMode::surface}, {"splat", RenderMode::splat}},
                          "Of --ablate (default surface)");
-    c.choice<Quality>(
-        "--quality", o->drawing.quality,
-        {{"draft", Quality::draft}, {"normal", Quality::normal}, {"best", Quality::best}},
-        "Of --ablate (default normal)");
+    c.choice<Quality>("--quality", o->drawing.quality,
+                      {{"normal", Quality::normal}, {"best", Quality::best}},
+                      "Of --ablate (default normal)");
     c.option("--plot", o->plot, "Draw the figures").takes("FILE.svg");
     c.sharedOptions(program.common, kFormat | kOutput);
     c.runs([o, c](Program& p) { return bench(*o, c, p); });

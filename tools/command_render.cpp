@@ -536,8 +536,8 @@ void addRender(CommandLine& line, Program& program) {
         .group(drawing);
     c.choice<Quality>(
          "--quality", o->settings.quality,
-         {{"draft", Quality::draft}, {"normal", Quality::normal}, {"best", Quality::best}},
-         "Of surface mode: draft, normal or best (default normal)")
+         {{"normal", Quality::normal}, {"best", Quality::best}, {"draft", Quality::normal}},
+         "Of surface mode: normal or best (default normal); draft is an older name of normal")
         .group(drawing);
     c.choice<SplatRule>(
          "--splat", o->settings.splat,

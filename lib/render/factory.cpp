@@ -87,10 +87,10 @@ DeviceChoice deviceChoice(int device) {
 
 namespace {
 
-/// Points of one pixel, the paper's rule, drafts and conventional OpenGL stay what they are.
+/// Points of one pixel, the paper's rule and conventional OpenGL stay what they are.
 bool averages(Backend backend, const RenderSettings& settings) {
     if (!settings.does(Stage::footprint)) return false;
-    if (settings.mode == RenderMode::surface) return settings.quality != Quality::draft;
+    if (settings.mode == RenderMode::surface) return true;
     return settings.splat == SplatRule::data && backend != Backend::gl;
 }
 

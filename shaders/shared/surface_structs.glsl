@@ -30,7 +30,8 @@ struct TileEntry {
     int x, y;           // first pixel
     uint first, count;  // its sources in locals[]
     float step;         // coarsest depth code of its sources, scene units
-    float pad0, pad1, pad2;
+    uint core;          // so many of its sources, the first, tell what it shows by themselves, too
+    float pad0, pad1;
 };
 // A part of a surface in one pixel, to be shaded.
 struct Piece {

@@ -12,11 +12,12 @@ layout(std430, binding = 13) writeonly buffer OriginOutBuffer { vec4 originOut[]
 
 void main() {
     uint index = gl_WorkGroupID.x * kShadeGroup + gl_LocalInvocationID.x;
-    uvec2 range = ranges[index];
+    uvec4 range = ranges[index];
     vec4 sum = vec4(0.0);
     float most = 0.0, q = 0.0;
     uint main_ = 0u;
-    for (uint k = range.x; k < range.x + range.y; ++k) {
+    for (uint n = 0u; n < range.y + range.w; ++n) {
+        uint k = n < range.y ? range.x + n : range.z + (n - range.y);
         float share = pieces[k].share;
         sum += vec4(pieceColours[k].rgb, 1.0) * share;
         if (share > most) {

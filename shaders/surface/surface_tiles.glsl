@@ -2,6 +2,7 @@
 layout(std430, binding = 5) readonly buffer TileBuffer { TileEntry tiles[]; };
 layout(std430, binding = 6) readonly buffer LocalBuffer { uvec2 locals[]; };  // source, slot
 layout(std430, binding = 7) buffer PieceBuffer { Piece pieces[]; };
-// First piece and number of pieces of each pixel.
-layout(std430, binding = 8) buffer RangeBuffer { uvec2 ranges[]; };
+// First piece and number of pieces of each pixel, of what all sources of its tile show, then of what the first
+// do, in tiles that are the mean of both.
+layout(std430, binding = 8) buffer RangeBuffer { uvec4 ranges[]; };
 layout(std430, binding = 9) buffer CountBuffer { uint groups[3]; uint pieceCount; };

@@ -20,7 +20,6 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parents[2]
 MODES = {
-    "draft": ["--quality", "draft"],
     "normal": ["--quality", "normal"],
     "best": ["--quality", "best"],
     "splat": ["--mode", "splat"],

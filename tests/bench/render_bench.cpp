@@ -106,10 +106,6 @@ BENCHMARK_CAPTURE(splatFrames, paper, SplatRule::paper)
     ->Arg(2)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(surfaceFrames, draft, Quality::draft)
-    ->Arg(2)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(surfaceFrames, normal, Quality::normal)
     ->Arg(2)
     ->UseManualTime()

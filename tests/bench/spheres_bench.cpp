@@ -4,7 +4,7 @@
 //
 //     bench_spheres [--json] [--frames N] [BUNDLE CAMERAS [MODE...]]
 //
-// CAMERAS is a camera file, or orbit:N for N pictures of 512x512 around the object. Modes: draft,
+// CAMERAS is a camera file, or orbit:N for N pictures of 512x512 around the object. Modes:
 // normal, best (surface), splat, points; all without one. Without BUNDLE: MPEG's scene spheres-miv.
 
 #include <algorithm>
@@ -34,7 +34,6 @@ struct Mode {
     SplatRule splat;
 };
 constexpr Mode kModes[] = {
-    {"draft", "surface draft", RenderMode::surface, Quality::draft, SplatRule::data},
     {"normal", "surface normal", RenderMode::surface, Quality::normal, SplatRule::data},
     {"best", "surface best", RenderMode::surface, Quality::best, SplatRule::data},
     {"splat", "splat", RenderMode::splat, Quality::normal, SplatRule::data},

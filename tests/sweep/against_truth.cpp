@@ -9,11 +9,10 @@ using namespace stx;
 
 namespace {
 
-constexpr Drawn kDraft{RenderMode::surface, Quality::draft},
-    kNormal{RenderMode::surface, Quality::normal}, kBest{RenderMode::surface, Quality::best},
-    kSplat{RenderMode::splat, Quality::normal};
-constexpr std::array kWays{kNormal, kDraft, kBest, kSplat};
-constexpr std::array kWayNames{"normal", "draft", "best", "splat"};
+constexpr Drawn kNormal{RenderMode::surface, Quality::normal},
+    kBest{RenderMode::surface, Quality::best}, kSplat{RenderMode::splat, Quality::normal};
+constexpr std::array kWays{kNormal, kBest, kSplat};
+constexpr std::array kWayNames{"normal", "best", "splat"};
 
 /// Fewer pixels than this say nothing about a share of them.
 constexpr std::int64_t kFewest = 100;
@@ -70,8 +69,7 @@ Outcome betterQualityCoversLess(Pictures& pictures) {
     if (seen < kFewest) return std::nullopt;
     Measure out;
     double before = 0;
-    for (const auto& [how, name] :
-         {std::pair(kDraft, "draft"), {kNormal, "normal"}, {kBest, "best"}}) {
+    for (const auto& [how, name] : {std::pair(kNormal, "normal"), {kBest, "best"}}) {
         STX_TRY(const Frame* frame, pictures.of(how));
         const double covered =
             100.0 * double(coveredCount(*frame, pictures.seenBy(), 1)) / double(seen);
@@ -85,12 +83,10 @@ Outcome betterQualityCoversLess(Pictures& pictures) {
 
 Outcome betterQualityIsWorse(Pictures& pictures) {
     if (pictures.seenCount(1) < kFewest) return std::nullopt;
-    STX_TRY(const Frame* draft, pictures.of(kDraft));
     STX_TRY(const Frame* normal, pictures.of(kNormal));
     STX_TRY(const Frame* best, pictures.of(kBest));
-    const double d = pictures.psnr(*draft), n = pictures.psnr(*normal), b = pictures.psnr(*best);
-    return Measure{std::max(worseBy(n, d), worseBy(b, std::max(d, n))),
-                   fmt::format("draft {:.2f} dB, normal {:.2f} dB, best {:.2f} dB", d, n, b)};
+    const double n = pictures.psnr(*normal), b = pictures.psnr(*best);
+    return Measure{worseBy(b, n), fmt::format("normal {:.2f} dB, best {:.2f} dB", n, b)};
 }
 
 Outcome exactDepthIsRepaired(Pictures& pictures) {

@@ -36,8 +36,6 @@ constexpr auto kNormal = Quality::normal;
 constexpr auto kByDevice = GpuPipeline::automatic;
 
 constexpr Way kWays[] = {
-    {"surface, draft", Backend::gpu, RenderMode::surface, Quality::draft, SplatRule::data,
-     kByDevice, false},
     {"surface, normal", Backend::gpu, RenderMode::surface, kNormal, SplatRule::data, kByDevice,
      false},
     {"surface, best", Backend::gpu, RenderMode::surface, Quality::best, SplatRule::data, kByDevice,

@@ -18,7 +18,7 @@ namespace stx {
 
 enum class Backend { automatic, gpu, gl, cpu };
 enum class RenderMode { splat, surface };
-enum class Quality { draft, normal, best };
+enum class Quality { normal, best };
 /// Splat mode's rule of size and shape.
 enum class SplatRule {
     data,   ///< ellipses from splatU/splatV, normals or neighbours: nothing by hand

@@ -20,6 +20,8 @@ namespace stx {
     STAGE(levels, surface, "outlines run where the covered parts of pixels tell", "Youngs 1982") \
     STAGE(sharpen, surface, "colours are as much sharper as fitting them blurs them", "") \
     STAGE(places, surface, "tiles get the sources of places that few of their own show", "") \
+    STAGE(mean, surface, "best is the mean of what few and what all sources of a tile show", \
+          "Breiman 1996") \
     STAGE(settle, surface, "one sample settles a pixel within a surface (cpu)", "") \
     STAGE(holes, surface, "holes that no view looks into continue what is around", "") \
     STAGE(surroundings, surface, "in scenes that fill the frame hidden background is filled", "") \

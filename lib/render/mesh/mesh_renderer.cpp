@@ -22,7 +22,7 @@ class MeshRenderer : public Renderer {
 
 Result<Frame> MeshRenderer::render(const Camera& camera) {
     RasterSettings raster;
-    raster.supersampling = settings_.quality == Quality::draft ? 2 : 4;
+    raster.supersampling = 4;
     raster.normals = true;
     raster.lighting = lightsInWorld(settings_.lighting, camera.worldFromCamera());
     STX_TRY(auto image, rasterise(mesh_, camera, raster, job_));

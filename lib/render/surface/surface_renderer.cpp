@@ -41,11 +41,9 @@ class SurfaceRenderer final : public Renderer {
             s.freeLevel = effort_.freeLevel;
         }
         fillsFrame_ = border > kFilledBorder;
-        // A draft has no pixels that are covered in part.
         const bool open = std::any_of(scene_.sources.begin(), scene_.sources.end(),
                                       [](const Source& s) { return s.hasAlpha; });
-        if (open && settings.does(Stage::outlines) && settings.quality != Quality::draft &&
-            pointsAreExact())
+        if (open && settings.does(Stage::outlines) && pointsAreExact())
             outlines_.emplace(scene_.set);
         if (settings.wantNormals()) findNormals();
     }

@@ -121,9 +121,6 @@ void hold(const Expected& expected) {
     EXPECT_GT(figures.uncovered, expected.uncovered - 0.2);
 }
 
-TEST(SurfaceSpheres, Draft) {
-    hold({Quality::draft, 47.0, 46.6, 44.5, 23.5});
-}
 TEST(SurfaceSpheres, Normal) {
     hold({Quality::normal, 50.15, 50.0, 47.4, 24.1});
 }

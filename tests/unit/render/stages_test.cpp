@@ -107,6 +107,7 @@ TEST(Stages, ChangePicturesOfSomeSet) {
     for (const RenderMode mode : {RenderMode::surface, RenderMode::splat}) {
         RenderSettings settings;
         settings.mode = mode;
+        settings.quality = Quality::best;  // which has all stages
         std::vector<Image<glm::vec4>> whole;
         for (const Shot& shot : all) whole.push_back(drawn(shot, settings));
         for (const StageInfo& stage : stages()) {

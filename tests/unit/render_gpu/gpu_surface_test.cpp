@@ -10,8 +10,8 @@ namespace {
 using test::coverageDifference;
 using test::psnr;
 
-const std::array<std::pair<Quality, const char*>, 3> kQualities{
-    {{Quality::draft, "draft"}, {Quality::normal, "normal"}, {Quality::best, "best"}}};
+const std::array<std::pair<Quality, const char*>, 2> kQualities{
+    {{Quality::normal, "normal"}, {Quality::best, "best"}}};
 
 RenderSettings surfaceSettings(Quality quality = Quality::normal) {
     RenderSettings s;

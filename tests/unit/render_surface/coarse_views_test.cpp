@@ -91,7 +91,7 @@ TEST_P(CoarseViews, AreDrawnWhole) {
     const Bundle bundle = viewsOf(mesh, c.views, c.side, false);
     const Camera camera = cameraAt(mesh, 40, 100);
     const Frame truth = *makeMeshRenderer(mesh, {}, job)->render(camera);
-    for (const Quality quality : {Quality::draft, Quality::normal, Quality::best}) {
+    for (const Quality quality : {Quality::normal, Quality::best}) {
         RenderSettings settings;
         settings.quality = quality;
         const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
@@ -102,8 +102,7 @@ TEST_P(CoarseViews, AreDrawnWhole) {
     }
 }
 
-// Before tiles got the sources of their places 20 % was open in draft and 11 % in normal, then 12 %
-// and 10 %.
+// Before tiles got the sources of their places 11 and 10 % was open.
 INSTANTIATE_TEST_SUITE_P(Kinds, CoarseViews,
                          testing::Values(Coarse{"octahedral", "octahedral:4", 48},
                                          Coarse{"hemiOctahedral", "hemi-octahedral:4", 64}),

@@ -71,16 +71,11 @@ TEST(Sharpen, ABrightLightLeavesNoBlackRing) {
     EXPECT_GT(out.at(10, 12).r, 1100.0f);
 }
 
-TEST(Sharpen, DraftsAndViewsAloneAreReadAsTheyAre) {
+TEST(Sharpen, ViewsAloneAreReadAsTheyAre) {
     Bundle bundle;
     bundle.views = {wallWith(greyWithSpot(10, 12))};
     const SurfaceScene alone(bundle);
     EXPECT_EQ(alone.pages[0].texture, alone.set.pages()[0].texture);
-    bundle.views.push_back(bundle.views[0]);
-    RenderSettings settings;
-    settings.quality = Quality::draft;
-    const SurfaceScene draft(bundle, settings);
-    EXPECT_EQ(draft.pages[0].texture, draft.set.pages()[0].texture);
 }
 
 }  // namespace

@@ -121,9 +121,10 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
         }
     };
     pieces.clear();
-    if (perPixel == 1 || !frame.effort.settle) {
+    const int core = frame.tileCore[static_cast<std::size_t>(tile)];
+    if (!frame.effort.settle) {
         drawAll(grid, {});
-        fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces);
+        fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces, nullptr, core);
     } else {
         // First one sample for each pixel; all of them only where that does not tell.
         drawAll(kMiddles, {kAllSquares, true, {}, {}});
@@ -131,7 +132,7 @@ void CpuSurfaceBackend::drawTile(const SurfaceFrame& frame, int tile, DrawnFrame
             fuseSettled(local, space.axis, tileX, tileY, columns, rows, perPixel, pieces);
         if (const Squares squares = squaresOf(open)) {
             drawAll(grid, {squares, false, {}, {}});
-            fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces, &open);
+            fuseTile(local, grid, space.axis, tileX, tileY, columns, rows, pieces, &open, core);
         }
     }
     shadePieces(pieces, shade, rayFrom(space, space), frame.effort.shade, colours, best);

@@ -158,7 +158,8 @@ struct Fuser : Votes {
     /// fuseSamples(), of a pixel in which only the sources `among` may have something.
     void showSamples(std::span<const int> among, int column, int row) {
         ShownSamples shown;
-        fuseSamplesOf({locals, grid, axis, tile.step, tile.x, tile.y}, among, column, row, shown);
+        fuseSamplesOf({locals.first(tile.count), grid, axis, tile.step, tile.x, tile.y}, among,
+                      column, row, shown);
         shownCount = 0;
         for (int k = 0; k < S * S; ++k) {
             const float q = shown.q[k];
@@ -175,8 +176,41 @@ struct Fuser : Votes {
         }
     }
 
-    void fuseRow(int row, int columns, std::uint32_t wanted, Pieces& pieces) {
-        std::array<RowRange, kMostTileSources> ranges;
+    using RowRanges = std::array<RowRange, kMostTileSources>;
+
+    /// Adds what the first `tile.count` sources show in a pixel, of which `list` may have something
+    /// there, with that share of it. False when it is simple, and all of it was added.
+    bool fusePixel(const RowRanges& ranges, std::span<const int> list, int column, int row,
+                   float share, Pieces& pieces) {
+        const auto x = static_cast<std::size_t>(column);
+        WholePixel whole = startPixel();
+        for (const int k : list) {
+            const RowRange& range = ranges[static_cast<std::size_t>(k)];
+            addSource(whole, k, range.low[x], range.high[x], range.any[x]);
+        }
+        if (!whole.any) return true;
+        Piece piece;
+        if (isSimple(whole)) {
+            uint also = 0;
+            for (uint left = whole.others; left != 0; left &= left - 1) {
+                const int k = findLSB(left);
+                const RowRange& range = ranges[static_cast<std::size_t>(k)];
+                if (alsoShows(whole, range.high[x], range.common[x])) also |= 1u << k;
+            }
+            if (simplePiece(whole, also, column, row, piece)) pieces.add(piece, share);
+            return false;
+        }
+        showSamples(list, column, row);
+        for (int begin = 0; begin < shownCount;) {
+            const int end = pieceEnd(begin);
+            pieces.add(pieceOf(column, row, begin, end), share);
+            begin = end;
+        }
+        return true;
+    }
+
+    void fuseRow(int row, int columns, std::uint32_t wanted, int core, Pieces& pieces) {
+        RowRanges ranges;
         std::array<int, kMostTileSources> list;  // sources that have something there
         int count = 0;
         for (std::size_t s = 0; s < locals.size(); ++s) {
@@ -187,44 +221,32 @@ struct Fuser : Votes {
             if (summarise[static_cast<std::size_t>(S - 1)](lines, stride, wanted, ranges[s]))
                 list[static_cast<std::size_t>(count++)] = static_cast<int>(s);
         }
-        const AgreedPixels agreed =
-            agreedPixels(ranges, {list.data(), static_cast<std::size_t>(count)});
+        const std::span<const int> there{list.data(), static_cast<std::size_t>(count)};
+        const std::span<const int> first{
+            list.data(), static_cast<std::size_t>(
+                             std::lower_bound(there.begin(), there.end(), core) - there.begin())};
+        const AgreedPixels agreed = agreedPixels(ranges, there);
+        const auto all = static_cast<uint>(locals.size());
+        const bool twice = core < static_cast<int>(all);
         for (int column = 0; column < columns; ++column) {
             if (!(wanted >> column & 1)) continue;
             const auto x = static_cast<std::size_t>(column);
-            WholePixel whole = startPixel();
             if (!agreed.doubtful[x]) {
                 if (!agreed.shown[x]) continue;
+                WholePixel whole = startPixel();
                 whole.shown = agreed.shown[x];
                 whole.sum = agreed.sum[x];
                 whole.first = agreed.first[x];
                 Piece piece;
-                if (simplePiece(whole, 0, column, row, piece)) pieces.add(piece);
+                if (simplePiece(whole, 0, column, row, piece)) pieces.add(piece, 1.0f);
                 continue;
             }
-            for (int i = 0; i < count; ++i) {
-                const int k = list[static_cast<std::size_t>(i)];
-                const RowRange& range = ranges[static_cast<std::size_t>(k)];
-                addSource(whole, k, range.low[x], range.high[x], range.any[x]);
-            }
-            if (!whole.any) continue;
-            Piece piece;
-            if (isSimple(whole)) {
-                uint also = 0;
-                for (uint left = whole.others; left != 0; left &= left - 1) {
-                    const int k = findLSB(left);
-                    const RowRange& range = ranges[static_cast<std::size_t>(k)];
-                    if (alsoShows(whole, range.high[x], range.common[x])) also |= 1u << k;
-                }
-                if (simplePiece(whole, also, column, row, piece)) pieces.add(piece);
-                continue;
-            }
-            showSamples({list.data(), static_cast<std::size_t>(count)}, column, row);
-            for (int begin = 0; begin < shownCount;) {
-                const int end = pieceEnd(begin);
-                pieces.add(pieceOf(column, row, begin, end));
-                begin = end;
-            }
+            const std::size_t before = pieces.size();
+            if (!fusePixel(ranges, there, column, row, 1.0f, pieces) || !twice) continue;
+            for (std::size_t i = before; i < pieces.size(); ++i) pieces.share[i] *= kAllShare;
+            tile.count = static_cast<uint>(core);
+            fusePixel(ranges, first, column, row, 1.0f - kAllShare, pieces);
+            tile.count = all;
         }
     }
 };
@@ -254,24 +276,24 @@ void Pieces::resize(std::size_t size) {
     pixel.resize(size);
 }
 
-void Pieces::add(const Piece& piece) {
+void Pieces::add(const Piece& piece, float of) {
     x.push_back(piece.x);
     y.push_back(piece.y);
     q.push_back(piece.q);
     qx.push_back(piece.qx);
     qy.push_back(piece.qy);
-    share.push_back(piece.share);
+    share.push_back(piece.share * of);
     sources.push_back(piece.seenBy);
     pixel.push_back(static_cast<std::uint16_t>(piece.at));
 }
 
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
-              int tileX, int tileY, int columns, int rows, Pieces& pieces,
-              const TilePixels* wanted) {
+              int tileX, int tileY, int columns, int rows, Pieces& pieces, const TilePixels* wanted,
+              int core) {
     shared::Fuser fuser(sources, grid, axis, tileX, tileY);
     for (int row = 0; row < rows; ++row) {
         const std::uint32_t some = wanted ? (*wanted)[static_cast<std::size_t>(row)] : ~0u;
-        if (some) fuser.fuseRow(row, columns, some, pieces);
+        if (some) fuser.fuseRow(row, columns, some, core, pieces);
     }
 }
 

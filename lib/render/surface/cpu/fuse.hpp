@@ -20,7 +20,8 @@ struct Pieces {
     std::vector<std::uint16_t> pixel;    ///< column + kTile * row in the tile
 
     void clear();
-    void add(const Piece& piece);
+    /// A piece that has `of` of its share.
+    void add(const Piece& piece, float of);
     void resize(std::size_t size);
     [[nodiscard]] std::size_t size() const { return x.size(); }
 };
@@ -29,11 +30,12 @@ struct Pieces {
 using TilePixels = std::array<std::uint32_t, kTile>;
 
 /// Decides what each pixel of a tile shows: fuses the surfaces of the sources, checked against what
-/// the others see. At most 32 sources, at most 4 samples a side. Of `wanted` pixels only, if given;
-/// samples of others need not be there, except beside those.
+/// the others see. At most 32 sources, at most 4 samples a side. Pixels that are not simple (see
+/// shaders/shared/surface_fuse.glsl) are the mean of that and of what the first `core` sources show.
+/// Of `wanted` pixels only, if given; samples of others need not be there, except beside those.
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
               int tileX, int tileY, int columns, int rows, Pieces& pieces,
-              const TilePixels* wanted = nullptr);
+              const TilePixels* wanted = nullptr, int core = kMostTileSources);
 
 /// Adds the pieces of the pixels that one sample in their middle settles (see settlePixels());
 /// `sources` have samples of kMiddles. Returns the other pixels, where that does not tell; those

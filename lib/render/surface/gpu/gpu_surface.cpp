@@ -117,6 +117,7 @@ class GpuSurfaceBackend final : public surface::SurfaceBackend {
 
     std::shared_ptr<EglContext> context_;
     int perPixel_ = 1, mostSources_ = 4;
+    int answers_ = 1;  ///< 2: pixels are the mean of what all sources and of what the first show
     float freeLevel_ = surface::kFreeLevel;
     std::int64_t mostSlots_ = 0, mostTiles_ = 0;  ///< of a batch
     std::unique_ptr<Resources> resources_;
@@ -136,10 +137,12 @@ Result<void> GpuSurfaceBackend::prepare(const SurfaceScene& scene, const surface
     perPixel_ = effort.samplesPerPixel;
     mostSources_ = effort.shade.mostSources;
     freeLevel_ = effort.freeLevel;
+    answers_ = effort.moreGeometry > 0 && effort.mean ? 2 : 1;
     const std::int64_t storage = context_->abilities().maxStorageBytes;
     const std::int64_t perTile = kTilePixels * perPixel_ * perPixel_;
     mostSlots_ = std::min(storage, kSampleBytes) / (perTile * 4);
-    mostTiles_ = std::min({storage / (perTile * kPieceBytes), kMostGroups * kShadeGroup / perTile,
+    mostTiles_ = std::min({storage / (answers_ * perTile * kPieceBytes),
+                           kMostGroups * kShadeGroup / (answers_ * perTile),
                            kMostGroups * kShadeGroup / kTilePixels});
     STX_TRY(r.scene, GpuSurfaceScene::upload(scene, *context_, job));
     STX_TRY(r.mesh, build(SurfaceProgram::mesh));
@@ -233,7 +236,9 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
                                                     plan.firstLocal,
                                                     static_cast<std::uint32_t>(plan.sources.size()),
                                                     step,
-                                                    0,
+                                                    static_cast<std::uint32_t>(
+                                                        work.tileCore[static_cast<std::size_t>(
+                                                            plan.tile)]),
                                                     0,
                                                     0};
     });
@@ -275,13 +280,13 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
     r.tiles.upload(batch.tiles);
     r.locals.upload(batch.locals);
     const auto tiles = static_cast<std::int64_t>(plans.size());
-    const std::int64_t pixels = tiles * kTilePixels, most = pixels * perPixel_ * perPixel_;
+    const std::int64_t pixels = tiles * kTilePixels, most = pixels * perPixel_ * perPixel_ * answers_;
     const std::int64_t sampleBytes =
         static_cast<std::int64_t>(batch.slots.size()) * kTilePixels * perPixel_ * perPixel_ * 4;
     r.samples.reserve(sampleBytes);
     r.pieces.reserve(most * kPieceBytes);
     r.pieceColours.reserve(most * 16);
-    r.ranges.reserve(pixels * 8);
+    r.ranges.reserve(pixels * 16);
     r.colour.reserve(pixels * 16);
     r.depth.reserve(pixels * 4);
     if (work.wantOrigin) r.origin.reserve(pixels * 16);

@@ -32,8 +32,7 @@ ShaderStage surfaceStage(SurfaceProgram program) {
 
 std::vector<ShaderText> allSurfaceShaders() {
     std::vector<ShaderText> out;
-    for (const SurfaceVariant v :
-         {SurfaceVariant{1, 2}, SurfaceVariant{3, 4}, SurfaceVariant{4, 4}})
+    for (const SurfaceVariant v : {SurfaceVariant{3, 4}, SurfaceVariant{4, 4}})
         for (const auto program :
              {SurfaceProgram::mesh, SurfaceProgram::extensions, SurfaceProgram::fuse,
               SurfaceProgram::shade, SurfaceProgram::resolve, SurfaceProgram::resolveWithOrigin}) {

@@ -59,8 +59,9 @@ std::vector<double> middlesOf(const SurfaceFrame& frame,
     return middles;
 }
 
-/// The sources that a tile of many is built from; `q`: in the middle of what falls in it.
-std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q) {
+/// The sources, `wanted` of them, that a tile of many is built from; `q`: in the middle of what
+/// falls in it.
+std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, int wanted) {
     const glm::dvec4 h =
         frame.space.worldFromPixel *
         glm::dvec4(frame.tileX(tile) + kTile * 0.5, frame.tileY(tile) + kTile * 0.5, q, 1.0);
@@ -83,8 +84,9 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q) {
         left.emplace_back(-glm::dot(look, towards(f.source->space.camera)),
                           static_cast<int>(left.size()));
     std::make_heap(left.begin(), left.end(), std::greater<>());
-    const auto most = static_cast<std::size_t>(
-        std::min(frame.effort.mostGeometry, kMostTileSources - kSourcesOfPlaces));
+    const std::size_t most =
+        std::min(left.size(),
+                 static_cast<std::size_t>(std::min(wanted, kMostTileSources - kSourcesOfPlaces)));
     std::vector<int> chosen;
     while (!left.empty() && chosen.size() < most) {
         std::pop_heap(left.begin(), left.end(), std::greater<>());
@@ -100,6 +102,17 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q) {
     for (std::size_t k = 0; chosen.size() < most; ++k) chosen.push_back(idle[k].second);
     std::sort(chosen.begin(), chosen.end());
     return chosen;
+}
+
+/// Adds, behind a tile's sources, those by which it is built a second time.
+void addFurtherSources(SurfaceFrame& frame, int tile, double q) {
+    std::vector<int>& sources = frame.tileSources[static_cast<std::size_t>(tile)];
+    const auto core = static_cast<std::ptrdiff_t>(sources.size());
+    for (const int k :
+         chooseSources(frame, tile, q, frame.effort.mostGeometry + frame.effort.moreGeometry))
+        if (sources.size() < kMostTileSources &&
+            !std::binary_search(sources.begin(), sources.begin() + core, k))
+            sources.push_back(k);
 }
 
 FrameSource sourceIn(const PixelSpace& space, const Source& s) {
@@ -140,20 +153,10 @@ Ray rayFrom(const PixelSpace& eye, const PixelSpace& frame) {
 Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
     Effort e;
     e.places = settings.does(Stage::places);
+    e.mean = settings.does(Stage::mean);
     e.settle = settings.does(Stage::settle);
-    switch (settings.quality) {
-        case Quality::draft:
-            e.samplesPerPixel = 1;
-            e.mostGeometry = 4;
-            e.shade.mostSources = 2;
-            break;
-        case Quality::normal:
-            break;
-        case Quality::best:
-            // More look from so far aside that they take as much away as they add (pictures.md).
-            e.mostGeometry = 16;
-            break;
-    }
+    // More look from so far aside that they take as much away as they add (pictures.md).
+    if (settings.quality == Quality::best) e.moreGeometry = 8;
     double valid = 0;
     for (const Source& s : scene.sources)
         valid += s.validShare / static_cast<double>(scene.sources.size());
@@ -161,13 +164,15 @@ Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
     // it. Of views with gaps as many are needed as together show what the usual number would.
     if (scene.set.pruned()) {
         e.mostGeometry = kMostTileSources;
+        e.moreGeometry = 0;
         e.freeLevel = kFreeLevelPruned;
         e.preferShown = true;
     } else if (valid < 1) {
         // Rounding, or a pixel in a million, does not ask for another source.
         constexpr double kNothing = 1e-5;
-        e.mostGeometry = static_cast<int>(
-            std::min<double>(kMostTileSources, std::ceil(e.mostGeometry / valid - kNothing)));
+        for (int* most : {&e.mostGeometry, &e.moreGeometry})
+            *most = static_cast<int>(
+                std::min<double>(kMostTileSources, std::ceil(*most / valid - kNothing)));
     }
     return e;
 }
@@ -220,6 +225,7 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
                     return !s.blocksOf(static_cast<int>(t)).empty();
                 }))
                 f.tileSources[t] = every;
+        f.tileCore.assign(tiles, static_cast<int>(every.size()));
         return f;
     }
     std::vector<std::vector<PlacedBlocks>> placed(f.sources.size());
@@ -230,9 +236,19 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
     const std::vector<double> middles = middlesOf(f, placed);
     parallelFor(0, static_cast<std::int64_t>(tiles), [&](std::int64_t i) {
         const auto t = static_cast<std::size_t>(i);
-        if (middles[t] > 0) f.tileSources[t] = chooseSources(f, static_cast<int>(i), middles[t]);
+        if (middles[t] > 0)
+            f.tileSources[t] =
+                chooseSources(f, static_cast<int>(i), middles[t], effort.mostGeometry);
     });
     if (effort.places) addSourcesOfPlaces(f, placed);
+    f.tileCore.resize(tiles);
+    parallelFor(0, static_cast<std::int64_t>(tiles), [&](std::int64_t i) {
+        const auto t = static_cast<std::size_t>(i);
+        f.tileCore[t] = static_cast<int>(f.tileSources[t].size());
+        if (effort.moreGeometry == 0 || !(middles[t] > 0)) return;
+        addFurtherSources(f, static_cast<int>(i), middles[t]);
+        if (!effort.mean) f.tileCore[t] = static_cast<int>(f.tileSources[t].size());
+    });
     if (!effort.preferShown) {
         std::vector<char> wanted(f.sources.size(), 0);
         for (const auto& chosen : f.tileSources)

@@ -30,10 +30,12 @@ struct ShadeSettings {
 struct Effort {
     int samplesPerPixel = 4;  ///< along one side of a pixel
     int mostGeometry = 8;     ///< sources that one tile is built from, at most kMostTileSources
+    /// So many more, with which it is built a second time: the picture is the mean of both.
+    int moreGeometry = 0;
     float freeLevel = kFreeLevel;
     /// Of many sources those that have something in a tile come first: pruned views.
     bool preferShown = false;
-    bool places = true, settle = true;  ///< stages
+    bool places = true, mean = true, settle = true;  ///< stages
     ShadeSettings shade;
 };
 [[nodiscard]] Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene);
@@ -63,9 +65,12 @@ struct SurfaceFrame {
     PixelSpace space;
     std::vector<FrameSource> sources;
     int tilesX = 0, tilesY = 0;
-    /// By tile: the sources that it is built from, at most kMostTileSources, in order; none where
-    /// no source has anything.
+    /// By tile: the sources that it is built from, at most kMostTileSources; none where no source
+    /// has anything.
     std::vector<std::vector<int>> tileSources;
+    /// By tile: so many of them, the first, tell what it shows by themselves, too: the picture is
+    /// the mean of that and of what all of them show. Those come in order, and so do the others.
+    std::vector<int> tileCore;
     Effort effort;
     bool wantOrigin = false;  ///< see DrawnFrame::origin
 
@@ -73,6 +78,11 @@ struct SurfaceFrame {
     [[nodiscard]] int tileY(int tile) const { return tile / tilesX * kTile; }
     [[nodiscard]] const std::vector<int>& sourcesOf(int tile) const {
         return tileSources[static_cast<std::size_t>(tile)];
+    }
+    /// Whether something is left of a tile's sources behind the first.
+    [[nodiscard]] bool isMean(int tile) const {
+        const auto t = static_cast<std::size_t>(tile);
+        return tileCore[t] < static_cast<int>(tileSources[t].size());
     }
     /// Samples of a tile from pixels of the frame: what is `apron` pixels before the tile's corner
     /// to the origin, `perPixel` to the pixel, the first sample at ½.

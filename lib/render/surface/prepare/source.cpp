@@ -315,10 +315,8 @@ SurfaceScene::SurfaceScene(const PageSet& pageSet, const RenderSettings& setting
         const StageTimer timer(settings.log.get(), "prepare", true);
         prepare(settings);
     }
-    // One view cannot tell whether its depth is exact; where it is not, sharper is worse. The fit
-    // of drafts does not want it.
-    if (!settings.does(Stage::sharpen) || settings.quality == Quality::draft || sources.size() < 2)
-        return;
+    // One view cannot tell whether its depth is exact; where it is not, sharper is worse.
+    if (!settings.does(Stage::sharpen) || sources.size() < 2) return;
     const StageTimer timer(settings.log.get(), "sharpen", true);
     sharpened = sharpenedTextures(*this);
     for (std::size_t i = 0; i < pages.size(); ++i) pages[i].texture = sharpened[i].get();

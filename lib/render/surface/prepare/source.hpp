@@ -216,7 +216,7 @@ struct SurfaceScene {
     /// Textures of `pages` that are not the set's own; see sharpenedTextures().
     std::vector<std::shared_ptr<const Texture>> sharpened;
 
-    /// Stages of preparing that are left out are those of RenderSettings::without. Drafts and views
+    /// Stages of preparing that are left out are those of RenderSettings::without. Views that are
     /// alone are not sharpened.
     explicit SurfaceScene(const PageSet& pageSet, const RenderSettings& settings = {});
     SurfaceScene(const SurfaceScene&) = delete;
