@@ -31,8 +31,9 @@ using TilePixels = std::array<std::uint32_t, kTile>;
 
 /// Decides what each pixel of a tile shows: fuses the surfaces of the sources, checked against what
 /// the others see. At most 32 sources, at most 4 samples a side. Pixels that are not simple (see
-/// shaders/shared/surface_fuse.glsl) are the mean of that and of what the first `core` sources show.
-/// Of `wanted` pixels only, if given; samples of others need not be there, except beside those.
+/// shaders/shared/surface_fuse.glsl) are the mean of that and of what the first `core` sources
+/// show. Of `wanted` pixels only, if given; samples of others need not be there, except beside
+/// those.
 void fuseTile(std::span<const LocalSource> sources, const SampleGrid& grid, const DepthAxis& axis,
               int tileX, int tileY, int columns, int rows, Pieces& pieces,
               const TilePixels* wanted = nullptr, int core = kMostTileSources);

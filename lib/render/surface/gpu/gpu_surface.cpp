@@ -231,16 +231,15 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
             }
             ++slot;
         }
-        batch.tiles[static_cast<std::size_t>(i)] = {plan.tile % work.tilesX * kTile,
-                                                    plan.tile / work.tilesX * kTile,
-                                                    plan.firstLocal,
-                                                    static_cast<std::uint32_t>(plan.sources.size()),
-                                                    step,
-                                                    static_cast<std::uint32_t>(
-                                                        work.tileCore[static_cast<std::size_t>(
-                                                            plan.tile)]),
-                                                    0,
-                                                    0};
+        batch.tiles[static_cast<std::size_t>(i)] = {
+            plan.tile % work.tilesX * kTile,
+            plan.tile / work.tilesX * kTile,
+            plan.firstLocal,
+            static_cast<std::uint32_t>(plan.sources.size()),
+            step,
+            static_cast<std::uint32_t>(work.tileCore[static_cast<std::size_t>(plan.tile)]),
+            0,
+            0};
     });
     return batch;
 }
@@ -280,7 +279,8 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
     r.tiles.upload(batch.tiles);
     r.locals.upload(batch.locals);
     const auto tiles = static_cast<std::int64_t>(plans.size());
-    const std::int64_t pixels = tiles * kTilePixels, most = pixels * perPixel_ * perPixel_ * answers_;
+    const std::int64_t pixels = tiles * kTilePixels,
+                       most = pixels * perPixel_ * perPixel_ * answers_;
     const std::int64_t sampleBytes =
         static_cast<std::int64_t>(batch.slots.size()) * kTilePixels * perPixel_ * perPixel_ * 4;
     r.samples.reserve(sampleBytes);
