@@ -46,9 +46,9 @@ vec2 slopeInside(int k, int i, int j) {
 }
 
 // Whether the point (x, y, q), which source `own` shows, is left out; (i, j) is its sample. It is when
-// more sources see past it than show it. An extension is also when a source that looks less aside is
-// sure of what it shows closely behind and cannot tell the two apart: an extension of what turns away
-// is a guess.
+// more sources see past it than show it. An extension is also when a source that looks less aside
+// shows something closely behind by more than an extension and cannot tell the two apart: an extension of
+// what turns away is a guess.
 // The flags are an argument of their own: the bits of a computed q mean nothing.
 bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     bool nearEdge = (flags & kNearEdgeBit) != 0u;
@@ -65,7 +65,7 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
     Facet facet = facetOf(self, x, y, q);
     int votes = 0, enough = kWholeVote * (nearEdge ? kVotesNearEdge : kVotesElsewhere);
     uint others = 0u;  // do not show it
-    uint closelyBehind = 0u;  // are sure of what they show there
+    uint closelyBehind = 0u;  // show something there, and not by an extension
     bool guess = (flags & kExtensionBit) != 0u;
     float within = sameWithin(q), close = kLinkedSamples * relativeScale(frameAxis(), q);
     for (int k = 0; k < int(tile.count); ++k) {
@@ -74,7 +74,7 @@ bool rejected(float q, uint flags, int own, float x, float y, int i, int j) {
         float apart = q - uintBitsToFloat(value);
         if (value == 0u || !(abs(apart) < within)) {
             others |= 1u << k;
-            if ((value & kSampleFlags) == 0u && apart > 0.0f && apart < close) closelyBehind |= 1u << k;
+            if ((value & kExtensionBit) == 0u && apart > 0.0f && apart < close) closelyBehind |= 1u << k;
         } else if ((value & kExtensionBit) == 0u) {
             enough += kWholeVote;
             guess = false;

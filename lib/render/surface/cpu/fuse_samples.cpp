@@ -136,7 +136,7 @@ struct SampleFuser {
             const PointMask near =
                 hn::And(hn::And(apart, guess), hn::And(hn::Lt(value, q), hn::Gt(value, farthest)));
             if (!hn::AllFalse(d, near)) {
-                closelyBehind[k] = lanesOf(hn::AndNot(flagged(value, kSampleFlags), near));
+                closelyBehind[k] = lanesOf(hn::AndNot(flagged(value, kExtensionBit), near));
                 mayGiveWay |= closelyBehind[k];
             }
             const PointMask extension = hn::And(same, flagged(value, kExtensionBit));
