@@ -1,5 +1,7 @@
 // Surface mode, pass B: what each pixel shows. A thread does one pixel with the code of
-// shared/surface_fuse.glsl, as the processor does in lib/render/surface/cpu/fuse.cpp.
+// shared/surface_fuse.glsl, as the processor does in lib/render/surface/cpu/fuse.cpp. Of tiles that are the mean of
+// two answers, CORE = 0 gives what all sources show, and CORE = 1 afterwards what the first do where that is not
+// simple. A loop around both would run into the 65535 rounds that llvmpipe allows all loops of a thread together.
 #include "surface/surface_common.glsl"
 #include "surface/surface_tiles.glsl"
 layout(local_size_x = 16, local_size_y = 16) in;
@@ -37,69 +39,71 @@ void main() {
     uint t = gl_WorkGroupID.x / uint(kTile * kTile / 256);
     uint part = gl_WorkGroupID.x % uint(kTile * kTile / 256);
     tile = tiles[t];
+    bool twice = tile.core < tile.count;
     ivec2 pixel =
         ivec2(part % uint(kTile / 16), part / uint(kTile / 16)) * 16 + ivec2(gl_LocalInvocationID.xy);
     uint first = t * uint(kTile * kTile);
-    bool open = tile.x + pixel.x < frame.size.x && tile.y + pixel.y < frame.size.y;
-    bool twice = tile.core < tile.count;
-    uvec4 found = uvec4(0u);  // see ranges[]
-    // What all sources show, and where that is not simple the mean of it and of what the first show.
-    for (int answer = 0; answer < (twice ? 2 : 1); ++answer) {
-        if (gl_LocalInvocationIndex == 0u) groupCount = 0u;
-        barrier();
-        shownCount = 0;
-        uint count = 0u;
-        bool simple = false;
-        Piece only;
-        if (open) {
-            WholePixel whole = startPixel();
-            for (int k = 0; k < int(tile.count); ++k) {
-                if (locals[tile.first + uint(k)].y == kNoSlot) continue;
-                uvec4 range = rangeOf(k, pixel);
-                addSource(whole, k, uintBitsToFloat(range.x), uintBitsToFloat(range.y), range.z);
+    uint index = first + uint(pixel.y * kTile + pixel.x);
+    bool wanted = tile.x + pixel.x < frame.size.x && tile.y + pixel.y < frame.size.y;
+#if CORE
+    wanted = wanted && ranges[index].z == kAsksAgain;
+    tile.count = tile.core;
+#endif
+    if (gl_LocalInvocationIndex == 0u) groupCount = 0u;
+    barrier();
+
+    shownCount = 0;
+    uint count = 0u;
+    bool simple = false;
+    Piece only;
+    if (wanted) {
+        WholePixel whole = startPixel();
+        for (int k = 0; k < int(tile.count); ++k) {
+            if (locals[tile.first + uint(k)].y == kNoSlot) continue;
+            uvec4 range = rangeOf(k, pixel);
+            addSource(whole, k, uintBitsToFloat(range.x), uintBitsToFloat(range.y), range.z);
+        }
+        simple = whole.any && isSimple(whole);
+        if (simple) {
+            uint also = 0u;
+            for (uint left = whole.others; left != 0u; left &= left - 1u) {
+                uvec4 range = rangeOf(findLSB(left), pixel);
+                if (alsoShows(whole, uintBitsToFloat(range.y), range.w)) also |= 1u << findLSB(left);
             }
-            simple = whole.any && isSimple(whole);
-            if (simple) {
-                uint also = 0u;
-                for (uint left = whole.others; left != 0u; left &= left - 1u) {
-                    uvec4 range = rangeOf(findLSB(left), pixel);
-                    if (alsoShows(whole, uintBitsToFloat(range.y), range.w)) also |= 1u << findLSB(left);
-                }
-                count = simplePiece(whole, also, pixel.x, pixel.y, only) ? 1u : 0u;
-            } else if (whole.any) {
-                fuseSamples(pixel.x, pixel.y);
-                for (int begin = 0; begin < shownCount; begin = pieceEnd(begin)) ++count;
-            }
+            count = simplePiece(whole, also, pixel.x, pixel.y, only) ? 1u : 0u;
+        } else if (whole.any) {
+            fuseSamples(pixel.x, pixel.y);
+            for (int begin = 0; begin < shownCount; begin = pieceEnd(begin)) ++count;
         }
-        // Room for the pieces of all pixels of the group at once.
-        uint mine = count > 0u ? atomicAdd(groupCount, count) : 0u;
-        barrier();
-        if (gl_LocalInvocationIndex == 0u && groupCount > 0u) {
-            groupFirst = atomicAdd(pieceCount, groupCount);
-            atomicMax(groups[0], (groupFirst + groupCount + kShadeGroup - 1u) / kShadeGroup);
-        }
-        barrier();
-        mine += groupFirst;
-        if (answer == 0)
-            found.xy = uvec2(mine, count);
-        else
-            found.zw = uvec2(mine, count);
-        float share = answer == 1 ? 1.0f - kAllShare : twice && !simple ? kAllShare : 1.0f;
-        if (simple && count > 0u) {
-            only.at += first;
-            only.share *= share;
-            pieces[mine] = only;
-        }
-        for (int begin = 0; begin < shownCount;) {
-            int end = pieceEnd(begin);
-            Piece piece = pieceOf(pixel.x, pixel.y, begin, end);
-            piece.at += first;
-            piece.share *= share;
-            pieces[mine++] = piece;
-            begin = end;
-        }
-        open = open && !simple;
-        tile.count = tile.core;
     }
-    ranges[first + uint(pixel.y * kTile + pixel.x)] = found;
+    // Room for the pieces of all pixels of the group at once.
+    uint mine = count > 0u ? atomicAdd(groupCount, count) : 0u;
+    barrier();
+    if (gl_LocalInvocationIndex == 0u && groupCount > 0u) {
+        groupFirst = atomicAdd(pieceCount, groupCount);
+        atomicMax(groups[0], (groupFirst + groupCount + kShadeGroup - 1u) / kShadeGroup);
+    }
+    barrier();
+    mine += groupFirst;
+#if CORE
+    float share = 1.0f - kAllShare;
+    if (wanted) ranges[index].zw = uvec2(mine, count);
+#else
+    bool again = twice && !simple;
+    float share = again ? kAllShare : 1.0f;
+    ranges[index] = uvec4(mine, count, again ? kAsksAgain : 0u, 0u);
+#endif
+    if (simple && count > 0u) {
+        only.at += first;
+        only.share *= share;
+        pieces[mine] = only;
+    }
+    for (int begin = 0; begin < shownCount;) {
+        int end = pieceEnd(begin);
+        Piece piece = pieceOf(pixel.x, pixel.y, begin, end);
+        piece.at += first;
+        piece.share *= share;
+        pieces[mine++] = piece;
+        begin = end;
+    }
 }

@@ -431,6 +431,8 @@ TEST_P(SurfaceShaders, FuseAsTheSharedCodeDoesOnTheProcessor) {
     device->storage(8, std::vector<glm::uvec4>(kPixels));
     device->storage(9, std::vector<uint>{0, 1, 1, 0});
     run(gpu::SurfaceProgram::fuse, kPixels / 256);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    if (in.core < kSources) run(gpu::SurfaceProgram::fuseCore, kPixels / 256);
     const auto pieces = device->read<Piece>(7, kMost);
     const auto ranges = device->read<glm::uvec4>(8, kPixels);
     std::vector<std::vector<Piece>> expected(kPixels);

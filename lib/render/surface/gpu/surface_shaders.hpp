@@ -16,7 +16,8 @@ struct SurfaceVariant {
     float freeLevel = surface::kFreeLevel;
 };
 
-enum class SurfaceProgram { mesh, extensions, fuse, shade, resolve, resolveWithOrigin };
+/// `fuseCore`: what the first sources of a tile show, after `fuse` (SurfaceFrame::tileCore).
+enum class SurfaceProgram { mesh, extensions, fuse, fuseCore, shade, resolve, resolveWithOrigin };
 
 [[nodiscard]] std::string surfaceHeader(const SurfaceVariant& variant, SurfaceProgram program);
 [[nodiscard]] ShaderStage surfaceStage(SurfaceProgram program);
