@@ -315,7 +315,7 @@ void addBackground(CommandLine& line, Program& program) {
     c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
         .range(0, 51)
         .group("Bundles with time");
-    c.sharedOptions(program.common, kOutput);
+    c.sharedOptions(program.common, kOutput | kPictures);
     c.runs([o, c](Program& p) -> Result<int> {
         if (o->settings.method != StillMethod::select)
             STX_CHECK(c.refuse({"--quietest", "--window", "--adaptive", "--drift"},

@@ -240,6 +240,11 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
         flag("--allow-outside", to.allowOutside,
              "Let names inside the input reach files outside its folder")
             .group(group);
+    if (which & kPictures)
+        choice("--damaged", to.keepDamaged, {{"error", false}, {"keep", true}},
+               "A damaged JPEG is an error, or is drawn as far as it goes, with a note (default "
+               "error)")
+            .group(group);
 }
 
 void Command::runs(Body body) {

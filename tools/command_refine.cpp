@@ -99,7 +99,7 @@ void addRefine(CommandLine& line, Program& program) {
         .takes("OUT");
     c.option("--only", o->only, "These steps, with commas between them").takes("STEPS");
     c.option("--without", o->without, "All but these steps and strays").takes("STEPS");
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return refineInput(*o, c, p); });
 }
 

@@ -201,7 +201,7 @@ void addSheet(CommandLine& line, Program& program) {
         .range(1, 1000)
         .takes("N");
     refineOption(c, o->refine);
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return sheet(*o, p); });
 }
 
