@@ -6,11 +6,15 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <optional>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
+#include "formats/images/damage.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
+#include "tools/standard_streams.hpp"
 #include "tools/stop_signals.hpp"
 
 namespace stx::tools {
@@ -56,7 +60,7 @@ void Program::say(std::string_view line) {
 
 void Program::complain(std::string_view line) {
     progress.erase();
-    fmt::print(stderr, "{}\n", printable(line));
+    writeToStderr(printable(line) + "\n");
 }
 
 namespace {
@@ -155,6 +159,9 @@ int Program::run(const std::function<Result<int>()>& body) {
             progress.show(done, total, what);
         };
     const ThreadLimit threads(common.threads);
+    std::optional<KeepDamaged> keeping;
+    if (common.keepDamaged)
+        keeping.emplace([this](std::string note) { job.note(std::move(note)); });
     Result<int> code = 0;
     try {
         // A report that cannot be written is an error before the work, not after it.
@@ -164,6 +171,9 @@ int Program::run(const std::function<Result<int>()>& body) {
         code = report ? body() : tl::unexpected(report.error());
     } catch (const std::bad_alloc&) {
         code = fail(ErrorCode::failed, "out of memory; use smaller images or fewer --threads");
+    } catch (const std::system_error& e) {
+        code = fail(ErrorCode::failed,
+                    "the system refused what the work needs, perhaps another thread: {}", e.what());
     } catch (const std::exception& e) {
         code = fail(ErrorCode::failed, "{}", e.what());
     }
