@@ -56,8 +56,8 @@ def main():
         harness.write(os.path.join(folder, "list"), "quad.obj\nnone.obj\n")
         batch = [args.stx, "convert", "@list", "-o", "batch_{stem}.mp4", "--views", "ring:2", "--size", "24x24",
                  "--keep-going", "--report", "batch.jsonl"]
-        for name, done in (("full", run(batch, folder, stderr=full)), ("pipe", run(batch, folder, stderr=pipe))):
-            expect(f"batch, {name}", done, 2)
+        for name, stream in (("full", full), ("pipe", pipe)):
+            expect(f"batch, {name}", run(batch, folder, stderr=stream), 2)
             for output in ("batch_quad.mp4", "batch.jsonl"):
                 path = os.path.join(folder, output)
                 if not os.path.exists(path):
