@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/source_date.hpp"
 #include "formats/images/damage.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
@@ -168,14 +169,23 @@ int Program::run(const std::function<Result<int>()>& body) {
         const auto report =
             common.report.empty() ? Result<void>() : checkTarget(common.report, *this);
         reportWritten_ = !report;  // there is no place for it
-        code = report ? body() : tl::unexpected(report.error());
+        const auto date = command.empty() ? Result<void>() : checkSourceDate();
+        const auto input = takeStandardInput(job.limits);
+        code = !report  ? tl::unexpected(report.error())
+               : !date  ? tl::unexpected(date.error())
+               : !input ? tl::unexpected(input.error())
+                        : body();
     } catch (const std::bad_alloc&) {
         code = fail(ErrorCode::failed, "out of memory; use smaller images or fewer --threads");
     } catch (const std::system_error& e) {
         code = fail(ErrorCode::failed,
                     "the system refused what the work needs, perhaps another thread: {}", e.what());
     } catch (const std::exception& e) {
-        code = fail(ErrorCode::failed, "{}", e.what());
+        // TBB has its own way to say that there are no threads.
+        const bool threads =
+            std::string_view(e.what()).find("pthread_create") != std::string_view::npos;
+        code = fail(ErrorCode::failed, "{}{}", e.what(),
+                    threads ? "; with --threads 1 none but the first is needed" : "");
     }
     job.onProgress = nullptr;
     sayNotes();

@@ -1,6 +1,7 @@
 #include "formats/files/files.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -83,10 +84,16 @@ tl::unexpected<Error> failExists(const fs::path& target) {
 
 /// What a target's name stands for; a link is written through, not replaced.
 Result<fs::path> throughLinks(const fs::path& target) {
+    // Step by step: weakly_canonical() leaves a link to what does not exist yet as it is.
+    constexpr int kMostLinks = 40;  // as the system
     std::error_code ec;
-    if (!fs::is_symlink(fs::symlink_status(target, ec))) return target;
-    fs::path real = fs::weakly_canonical(target, ec);
-    if (ec) return failIo("follow", target, ec.value());
+    fs::path real = target;
+    for (int links = 0; fs::is_symlink(fs::symlink_status(real, ec)); ++links) {
+        if (links == kMostLinks) return failIo("follow", target, ELOOP);
+        const fs::path next = fs::read_symlink(real, ec);
+        if (ec) return failIo("follow", target, ec.value());
+        real = folderOf(real) / next;
+    }
     return real;
 }
 
@@ -394,6 +401,11 @@ Result<void> OutputFolder::commit() {
 
 Result<void> OutputFolder::commitWith(OutputFile& file) {
     const auto& text = *file.impl_;
+    // Of two runs that write the same names one comes whole after the other: else the text of one
+    // could stand beside the folder of the other. File systems without locks go on without.
+    const Descriptor alone(
+        ::open(folderOf(impl_->real).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (alone.get() >= 0) (void)::flock(alone.get(), LOCK_EX);
     const fs::path aside = impl_->temporary.string() + "-file";
     const bool replaces =
         !text.direct && !text.options.noClobber && ::rename(text.real.c_str(), aside.c_str()) == 0;
