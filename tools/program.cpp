@@ -330,7 +330,8 @@ std::string textOf(const Error& error) {
     const auto quoted = where.substr(
         0, where.find("': ") == std::string::npos ? where.size() : where.find("': ") + 1);
     if (quoted.size() > 2 && quoted.starts_with('\'') && quoted.ends_with('\'') &&
-        error.message.find(quoted) != std::string::npos) {
+        (error.message.find(quoted) != std::string::npos ||
+         where.find(quoted, quoted.size()) != std::string::npos)) {
         where.erase(0, quoted.size());
         if (where.starts_with(": ")) where.erase(0, 2);
     }
