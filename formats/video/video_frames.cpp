@@ -44,6 +44,9 @@ class PictureFrames final : public VideoFrames {
     [[nodiscard]] std::string name(int k) const override {
         return files_[static_cast<std::size_t>(k)].stem().string();
     }
+    [[nodiscard]] std::string place(int k) const override {
+        return inQuotes(files_[static_cast<std::size_t>(k)].string());
+    }
     [[nodiscard]] std::string description() const override {
         return fmt::format("{} ({})", what_, counted(files_.size(), "picture"));
     }
@@ -75,6 +78,9 @@ class Y4mFrames final : public VideoFrames {
     [[nodiscard]] std::string name(int k) const override {
         return fmt::format("{}_{:04}", file_.stem().string(), k);
     }
+    [[nodiscard]] std::string place(int k) const override {
+        return fmt::format("{}: frame {}", inQuotes(file_.string()), k);
+    }
     [[nodiscard]] std::string description() const override {
         return fmt::format("{} ({})", file_.filename().string(), counted(count(), "frame"));
     }
@@ -97,12 +103,14 @@ class FilmFrames final : public VideoFrames {
     [[nodiscard]] int count() const override { return film_->count(); }
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
         STX_TRY(const auto picture, film_->picture(k));
-        const std::string where = fmt::format("{}: frame {}", inQuotes(film_->path().string()), k);
-        STX_TRY(auto colour, within(where, picture.colour(job_.limits)));
+        STX_TRY(auto colour, within(place(k), picture.colour(job_.limits)));
         return std::make_shared<const Rgba8Image>(std::move(colour));
     }
     [[nodiscard]] std::string name(int k) const override {
         return fmt::format("{}_{:04}", film_->path().stem().string(), k);
+    }
+    [[nodiscard]] std::string place(int k) const override {
+        return fmt::format("{}: frame {}", inQuotes(film_->path().string()), k);
     }
     [[nodiscard]] std::string description() const override {
         return fmt::format("{} ({})", film_->path().filename().string(), counted(count(), "frame"));
@@ -146,12 +154,14 @@ class SteadyFrames final : public VideoFrames {
         const auto found = (*picture)->size(), wanted = size();
         if (found != wanted)
             return failAt(
-                fmt::format("frame {} ('{}')", k, frames_->name(k)), ErrorCode::invalidInput,
-                "it is {}x{}, but the first frame is {}x{}; all frames must have one size", found.x,
-                found.y, wanted.x, wanted.y);
+                place(k), ErrorCode::invalidInput,
+                "it is {}x{}, but the first frame, {}, is {}x{}; all frames must have one "
+                "size",
+                found.x, found.y, place(0), wanted.x, wanted.y);
         return picture;
     }
     [[nodiscard]] std::string name(int k) const override { return frames_->name(k); }
+    [[nodiscard]] std::string place(int k) const override { return frames_->place(k); }
     [[nodiscard]] std::string description() const override { return frames_->description(); }
 
   private:

@@ -15,6 +15,8 @@ class VideoFrames : public StillFrames {
     /// What to call frame k in the names of files that are made from it: the name of its own file
     /// without the ending, or that of its video with `_0007`.
     [[nodiscard]] virtual std::string name(int k) const = 0;
+    /// Where frame k is, for messages: "'hall/in000007.png'", "'film.mp4': frame 7".
+    [[nodiscard]] virtual std::string place(int k) const = 0;
     /// What all frames came from, for messages: "hall (99 pictures)".
     [[nodiscard]] virtual std::string description() const = 0;
 };

@@ -127,7 +127,7 @@ TEST(VideoFrames, ASizeThatChangesAndABrokenPictureAreNamed) {
     const auto other = (*frames)->frame(1);
     ASSERT_FALSE(other);
     EXPECT_EQ(other.error().code, ErrorCode::invalidInput);
-    EXPECT_TRUE(has(other.error().text(), "frame 1 ('f2'): it is 6x8, but the first frame"))
+    EXPECT_TRUE(has(other.error().text(), "f2.png': it is 6x8, but the first frame"))
         << other.error().text();
     const auto broken = (*frames)->frame(2);
     ASSERT_FALSE(broken);
