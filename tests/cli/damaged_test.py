@@ -105,7 +105,7 @@ class Test:
               "SimpleTexture { texture ImageTexture { url \"colour.png\" } depth ImageTexture { url \"depth.png\" } } } ] }\n")
         limit = ["--max-memory", "512"]
         for words in (["compare", "colour.png", "colour.png"], ["sheet", "colour.png", "colour.png", "-o", "a.png"],
-                      ["pack", "large.bt", "-o", "atlas"], ["extract", "large.bt", "-o", "a.html"],
+                      ["pack", "large.bt", "-o", "atlas"], ["refine", "large.bt", "-o", "a.mp4"], ["extract", "large.bt", "-o", "a.html"],
                       ["background", "colour.png", "colour.png", "-o", "a.png", "--method", "median"]):
             self.expect(3, *words, *limit, says="more than the memory limit of 512 MiB", peak=1024)
 
