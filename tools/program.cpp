@@ -182,10 +182,10 @@ int Program::run(const std::function<Result<int>()>& body) {
                     "the system refused what the work needs, perhaps another thread: {}", e.what());
     } catch (const std::exception& e) {
         // TBB has its own way to say that there are no threads.
-        const bool threads =
+        const bool noThreads =
             std::string_view(e.what()).find("pthread_create") != std::string_view::npos;
         code = fail(ErrorCode::failed, "{}{}", e.what(),
-                    threads ? "; with --threads 1 none but the first is needed" : "");
+                    noThreads ? "; with --threads 1 none but the first is needed" : "");
     }
     job.onProgress = nullptr;
     sayNotes();
