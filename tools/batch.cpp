@@ -96,7 +96,7 @@ Json doItem(const BatchItem& item, const BatchWork& work, Program& program) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(1);
     // Less patient than the process that waits for this one.
-    watchStopSignals(program.job.cancelled, 400);
+    (void)watchStopSignals(program.job.cancelled, 400);
     program.job.onProgress = nullptr;
     program.progress.leaveToParent(!program.common.quiet && ::isatty(STDERR_FILENO) != 0);
     const ThreadLimit limit(threads);

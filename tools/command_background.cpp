@@ -25,6 +25,7 @@ struct BackgroundOptions {
     TemporalBackgroundSettings temporal;
     std::string video;
     std::optional<int> crf;
+    bool strict = false;
 };
 
 /// A mask that is asked for.
@@ -135,7 +136,9 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
                     o.inputs.size(), o.output);
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.inputs[0]);
-    STX_TRY(auto frames, openSequence(o.inputs[0], {}, program.job));
+    OpenOptions open;
+    open.set.strict = o.strict;
+    STX_TRY(auto frames, openSequence(o.inputs[0], open, program.job));
     if (!frames->timeline().moves())
         return failAt(fmt::format("'{}'", o.inputs[0]), ErrorCode::invalidInput,
                       "it has one frame; a background is found in what others uncover");
@@ -197,20 +200,24 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
     }
     const std::vector<std::filesystem::path> inputs(o.inputs.begin(), o.inputs.end());
     preloadCodecs(inputs[0]);
-    STX_TRY(const auto frames, openVideoFrames(inputs, program.job));
+    STX_TRY(auto frames, openVideoFrames(inputs, program.job, o.strict));
     STX_TRY(const auto masks, maskTargets(o, *frames, program));
     STX_TRY(const auto background, stillBackground(*frames, o.settings, program.job));
     // The background last: where it is, the rest is, too.
     STX_CHECK(writeMasks(masks, background.colour, *frames, program));
     if (!o.confidence.empty()) STX_CHECK(writeGrey(background.confidence, o.confidence, program));
     STX_CHECK(writeColour(background.colour, o.output, program));
+    const std::string description = frames->description();
+    const int count = frames->count();
+    frames.reset();  // which says what of them was damaged
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     program.sayNotes();
-    program.say(fmt::format("{} → {} ({}), {}x{} of {}, {}", frames->description(),
+    program.say(fmt::format("{} → {} ({}), {}x{} of {}, {}", description,
                             std::filesystem::path(o.output).filename().string(),
-                            humanBytes(bytesOf(o.output)), frames->size().x, frames->size().y,
-                            counted(background.framesUsed, "frame"), humanSeconds(seconds)));
+                            humanBytes(bytesOf(o.output)), background.colour.width(),
+                            background.colour.height(), counted(background.framesUsed, "frame"),
+                            humanSeconds(seconds)));
     auto maskNames = nlohmann::ordered_json::array();
     for (const MaskTarget& mask : masks)
         maskNames.push_back({{"frame", mask.frame}, {"output", mask.path}});
@@ -218,9 +225,9 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
                                    {"inputs", o.inputs},
                                    {"output", o.output},
                                    {"method", o.method},
-                                   {"width", frames->size().x},
-                                   {"height", frames->size().y},
-                                   {"frames", frames->count()},
+                                   {"width", background.colour.width()},
+                                   {"height", background.colour.height()},
+                                   {"frames", count},
                                    {"framesUsed", background.framesUsed},
                                    {"confidence", meanConfidence(background.confidence)},
                                    {"masks", maskNames},
@@ -268,6 +275,7 @@ void addBackground(CommandLine& line, Program& program) {
     c.option("--frames", o->settings.frames, "Frames to look at, spread evenly (default: all)")
         .range(2, 65535)
         .takes("K");
+    c.flag("--strict", o->strict, "Frames that are missing or damaged are errors");
     c.option("--confidence", o->confidence,
              "Write how far frames agree with each pixel: 0 (none) to 255 (all)")
         .takes("FILE.png");
@@ -315,7 +323,7 @@ void addBackground(CommandLine& line, Program& program) {
     c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
         .range(0, 51)
         .group("Bundles with time");
-    c.sharedOptions(program.common, kOutput);
+    c.sharedOptions(program.common, kOutput | kPictures);
     c.runs([o, c](Program& p) -> Result<int> {
         if (o->settings.method != StillMethod::select)
             STX_CHECK(c.refuse({"--quietest", "--window", "--adaptive", "--drift"},

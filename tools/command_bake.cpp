@@ -80,7 +80,7 @@ void addBake(CommandLine& line, Program& program) {
     c.option("--discontinuity", o->settings.discontinuity,
              "Relative depth difference beyond the slope that parts two surfaces (default 0.01)")
         .range(1e-6, 1.0);
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return bakeBundle(*o, p); });
 }
 

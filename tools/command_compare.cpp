@@ -38,6 +38,9 @@ Result<Comparison> comparePair(const std::string& a, const std::string& b, const
                                const Image<std::uint8_t>* mask, Steadiness* steadiness,
                                Program& program) {
     STX_TRY(const auto first, openPicture(a, program.job));
+    // Both, what of the second its decoder holds, and their luma.
+    STX_CHECK(program.job.limits.checkAllocation(first.coded.count(), first.isLinear() ? 56 : 16,
+                                                 "two pictures that are compared"));
     STX_TRY(const auto second, openPicture(b, program.job));
     CompareSettings settings;
     settings.mask = mask;
@@ -176,7 +179,7 @@ void addCompare(CommandLine& line, Program& program) {
         .takes("SSIM");
     c.option("--first-frame", o->firstFrame, "First frame of sequences (default 0)").notNegative();
     c.option("--frames", o->frames, "Number of frames (default: all that exist)").notNegative();
-    c.sharedOptions(program.common, kFormat | kOutput);
+    c.sharedOptions(program.common, kFormat | kOutput | kPictures);
     c.runs([o, c](Program& p) { return compareImages(*o, c, p); });
 }
 

@@ -572,7 +572,7 @@ void addConvert(CommandLine& line, Program& program) {
          "Colour of YUV files (default bt709)")
         .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"})
         .group(sets);
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return convert(*o, c, p); });
 }
 

@@ -7,6 +7,7 @@
 
 #include "tools/build_text.hpp"
 #include "tools/program.hpp"
+#include "tools/standard_streams.hpp"
 
 namespace stx::tools {
 namespace {
@@ -178,12 +179,23 @@ Option& Option::positive() {
     return *this;
 }
 
+namespace {
+
+/// Positionals are names of inputs, or words among which - is none.
+CLI::Option* withStandardInput(CLI::Option* option) {
+    if (option->get_positional())
+        option->transform([](std::string text) { return inputNamed(std::move(text)); });
+    return option;
+}
+
+}  // namespace
+
 Option Command::option(const std::string& names, std::string& to, const std::string& help) {
-    return Option(app_->add_option(names, to, help));
+    return Option(withStandardInput(app_->add_option(names, to, help)));
 }
 Option Command::option(const std::string& names, std::vector<std::string>& to,
                        const std::string& help) {
-    return Option(app_->add_option(names, to, help));
+    return Option(withStandardInput(app_->add_option(names, to, help)));
 }
 Option Command::option(const std::string& names, int& to, const std::string& help) {
     return Option(app_->add_option(names, to, help));
@@ -239,6 +251,11 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
     if (which & kOutside)
         flag("--allow-outside", to.allowOutside,
              "Let names inside the input reach files outside its folder")
+            .group(group);
+    if (which & kPictures)
+        choice("--damaged", to.keepDamaged, {{"error", false}, {"keep", true}},
+               "A damaged JPEG is an error, or is drawn as far as it goes, with a note (default "
+               "error)")
             .group(group);
 }
 

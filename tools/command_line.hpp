@@ -52,9 +52,10 @@ class Option {
 
 /// Which of the shared options a command has beside --threads, --max-memory, --quiet, -v.
 enum SharedOptions : unsigned {
-    kOutput = 1,   ///< --no-clobber, --report
-    kFormat = 2,   ///< --format text|json
-    kOutside = 4,  ///< --allow-outside
+    kOutput = 1,    ///< --no-clobber, --report
+    kFormat = 2,    ///< --format text|json
+    kOutside = 4,   ///< --allow-outside
+    kPictures = 8,  ///< --damaged error|keep, where pictures are decoded
 };
 
 /// One command and its options. `names` are as in "-o,--output"; a name without dashes is of a

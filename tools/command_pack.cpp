@@ -255,7 +255,7 @@ void addPack(CommandLine& line, Program& program) {
         .takes("DB")
         .range(0.0, 200.0)
         .group(pruning);
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return packInput(*o, p); });
 }
 

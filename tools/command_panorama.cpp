@@ -226,7 +226,7 @@ void addPanorama(CommandLine& line, Program& program) {
     c.flag("--leave-one-out", o->leaveOneOut,
            "Draws each picture again out of a panorama of the others: how near they come (dB) is "
            "told, and in the report of each");
-    c.sharedOptions(program.common, kOutput);
+    c.sharedOptions(program.common, kOutput | kPictures);
     c.runs([o, c](Program& p) -> Result<int> {
         o->settings.closeLoop = !o->noLoop;
         return makePanorama(*o, c, p);

@@ -47,8 +47,13 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     std::size_t views = 0, seen = 0;
     bool before = false;
     frames = changed(std::move(frames), [&](Bundle& bundle, Job& job) -> Result<void> {
-        for (const ReferenceView& view : bundle.views)
+        std::uint64_t pixels = 0;
+        for (const ReferenceView& view : bundle.views) {
             before = before || !view.refined.steps.empty();
+            pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
+        }
+        // The views as they were and as they become, and their pictures while they are packed.
+        STX_CHECK(job.limits.checkAllocation(pixels, 24, "refining"));
         STX_TRY(const auto found, refine(bundle, settings, job));
         // Some containers are written in two passes.
         if (seen++ < timeline.count()) report.add(found);
@@ -99,7 +104,7 @@ void addRefine(CommandLine& line, Program& program) {
         .takes("OUT");
     c.option("--only", o->only, "These steps, with commas between them").takes("STEPS");
     c.option("--without", o->without, "All but these steps and strays").takes("STEPS");
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return refineInput(*o, c, p); });
 }
 

@@ -615,7 +615,7 @@ void addRender(CommandLine& line, Program& program) {
     c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group(output);
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return render(*o, c, p); });
 }
 

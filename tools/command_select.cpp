@@ -180,7 +180,7 @@ void addSelect(CommandLine& line, Program& program) {
              "Wanted samples per scene unit (default: what the views typically have)")
         .notNegative();
     c.option("--plot", o->plot, "Draw quality against the number of views").takes("FILE.svg");
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return select(*o, c, p); });
 }
 

@@ -49,6 +49,9 @@ Texture textureOf(Picture picture) {
 
 Result<std::vector<SheetPair>> pairsOfPictures(const SheetOptions& o, Job& job) {
     STX_TRY(auto a, openPicture(o.inputs[0], job));
+    // Both, as they are and for the sheet, and their difference.
+    STX_CHECK(job.limits.checkAllocation(a.coded.count(), a.isLinear() ? 64 : 24,
+                                         "two pictures that are compared"));
     STX_TRY(auto b, openPicture(o.inputs[1], job));
     std::vector<SheetPair> pairs(1);
     pairs[0].title = fileName(o.inputs[0]) + " | " + fileName(o.inputs[1]);
@@ -201,7 +204,7 @@ void addSheet(CommandLine& line, Program& program) {
         .range(1, 1000)
         .takes("N");
     refineOption(c, o->refine);
-    c.sharedOptions(program.common, kOutput | kOutside);
+    c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return sheet(*o, p); });
 }
 

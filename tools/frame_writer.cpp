@@ -1,6 +1,7 @@
 #include "tools/frame_writer.hpp"
 
 #include <filesystem>
+#include <system_error>
 
 #include "lib/base/parallel.hpp"
 #include "tools/program.hpp"
@@ -27,7 +28,14 @@ Result<void> FrameWriter::check(const Settings& s) {
 FrameWriter::FrameWriter(Settings settings, Job& job) : settings_(std::move(settings)), job_(job) {
     // A stream is written in order by one thread; files by as many as may run.
     const int count = settings_.pattern == "-" ? 1 : threadCount();
-    for (int i = 0; i < count; ++i) threads_.emplace_back([this] { work(); });
+    for (int i = 0; i < count; ++i) {
+        try {
+            threads_.emplace_back([this] { work(); });
+        } catch (const std::system_error&) {
+            if (threads_.empty()) throw;
+            break;  // the system gives no more of them; these do
+        }
+    }
 }
 
 FrameWriter::~FrameWriter() {

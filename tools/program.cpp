@@ -6,11 +6,16 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <optional>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
+#include "formats/files/source_date.hpp"
+#include "formats/images/damage.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
+#include "tools/standard_streams.hpp"
 #include "tools/stop_signals.hpp"
 
 namespace stx::tools {
@@ -56,7 +61,7 @@ void Program::say(std::string_view line) {
 
 void Program::complain(std::string_view line) {
     progress.erase();
-    fmt::print(stderr, "{}\n", printable(line));
+    writeToStderr(printable(line) + "\n");
 }
 
 namespace {
@@ -155,17 +160,32 @@ int Program::run(const std::function<Result<int>()>& body) {
             progress.show(done, total, what);
         };
     const ThreadLimit threads(common.threads);
+    std::optional<KeepDamaged> keeping;
+    if (common.keepDamaged)
+        keeping.emplace([this](std::string note) { job.note(std::move(note)); });
     Result<int> code = 0;
     try {
         // A report that cannot be written is an error before the work, not after it.
         const auto report =
             common.report.empty() ? Result<void>() : checkTarget(common.report, *this);
         reportWritten_ = !report;  // there is no place for it
-        code = report ? body() : tl::unexpected(report.error());
+        const auto date = command.empty() ? Result<void>() : checkSourceDate();
+        const auto input = takeStandardInput(job.limits);
+        code = !report  ? tl::unexpected(report.error())
+               : !date  ? tl::unexpected(date.error())
+               : !input ? tl::unexpected(input.error())
+                        : body();
     } catch (const std::bad_alloc&) {
         code = fail(ErrorCode::failed, "out of memory; use smaller images or fewer --threads");
+    } catch (const std::system_error& e) {
+        code = fail(ErrorCode::failed,
+                    "the system refused what the work needs, perhaps another thread: {}", e.what());
     } catch (const std::exception& e) {
-        code = fail(ErrorCode::failed, "{}", e.what());
+        // TBB has its own way to say that there are no threads.
+        const bool noThreads =
+            std::string_view(e.what()).find("pthread_create") != std::string_view::npos;
+        code = fail(ErrorCode::failed, "{}{}", e.what(),
+                    noThreads ? "; with --threads 1 none but the first is needed" : "");
     }
     job.onProgress = nullptr;
     sayNotes();
@@ -310,7 +330,8 @@ std::string textOf(const Error& error) {
     const auto quoted = where.substr(
         0, where.find("': ") == std::string::npos ? where.size() : where.find("': ") + 1);
     if (quoted.size() > 2 && quoted.starts_with('\'') && quoted.ends_with('\'') &&
-        error.message.find(quoted) != std::string::npos) {
+        (error.message.find(quoted) != std::string::npos ||
+         where.find(quoted, quoted.size()) != std::string::npos)) {
         where.erase(0, quoted.size());
         if (where.starts_with(": ")) where.erase(0, 2);
     }

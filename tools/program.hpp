@@ -25,6 +25,7 @@ struct CommonOptions {
     int verbose = 0;
     bool noClobber = false;
     bool allowOutside = false;
+    bool keepDamaged = false;  ///< `--damaged keep`
     std::uint64_t maxMemoryMiB = 4096;
     std::string report;           ///< path of a JSON report; empty = none
     std::string format = "text";  ///< or "json", for commands that answer on stdout

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "tools/program.hpp"
+#include "tools/standard_streams.hpp"
 
 namespace stx::tools {
 
@@ -26,12 +27,12 @@ void ProgressLine::show(std::int64_t done, std::int64_t total, std::string_view 
         left = fmt::format(", {} left",
                            humanSeconds(std::ceil(elapsed * static_cast<double>(total - done) /
                                                   static_cast<double>(done - firstDone_))));
-    fmt::print(stderr, "\r\033[K{} {}/{}{}", what, done, total, left);
+    writeToStderr(fmt::format("\r\033[K{} {}/{}{}", what, done, total, left));
 }
 
 void ProgressLine::erase() {
     const std::lock_guard lock(mutex_);
-    if (shown_ || ofParent_) fmt::print(stderr, "\r\033[K");
+    if (shown_ || ofParent_) writeToStderr("\r\033[K");
     shown_ = false;
 }
 

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <ctime>
 #include <functional>
+#include <system_error>
 #include <thread>
 
 #include "formats/files/temporaries.hpp"
@@ -33,11 +34,10 @@ void watch(sigset_t signals, std::atomic<bool>& cancelled, int patienceMs) {
 
 }  // namespace
 
-void watchStopSignals(std::atomic<bool>& cancelled, int patienceMs) {
+bool watchStopSignals(std::atomic<bool>& cancelled, int patienceMs) {
     struct sigaction action {};
     sigemptyset(&action.sa_mask);
     action.sa_handler = SIG_IGN;
-    sigaction(SIGPIPE, &action, nullptr);
     sigaction(SIGXFSZ, &action, nullptr);
 
     // Blocked in every thread, they wait for the one that takes them. A signal that the caller
@@ -50,7 +50,13 @@ void watchStopSignals(std::atomic<bool>& cancelled, int patienceMs) {
         if (now.sa_handler != SIG_IGN) sigaddset(&signals, signal);
     }
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-    std::thread(watch, signals, std::ref(cancelled), patienceMs).detach();
+    try {
+        std::thread(watch, signals, std::ref(cancelled), patienceMs).detach();
+        return true;
+    } catch (const std::system_error&) {
+        pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+        return false;
+    }
 }
 
 int stopSignal() {

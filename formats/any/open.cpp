@@ -5,6 +5,7 @@
 
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/not_there.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
@@ -43,9 +44,8 @@ bool isExrBundleFile(const fs::path& path) {
 }
 
 Error notThere(const fs::path& path) {
-    return {ErrorCode::io,
-            fmt::format("cannot read '{}': the file or folder does not exist", path.string()),
-            {}};
+    return {
+        ErrorCode::io, fmt::format("cannot read '{}': {}", path.string(), whyNotThere(path)), {}};
 }
 
 }  // namespace

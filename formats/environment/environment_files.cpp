@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "formats/exr/environment_exr.hpp"
+#include "formats/files/not_there.hpp"
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
@@ -168,8 +169,7 @@ Result<void> saveFaces(const Environment& environment, const fs::path& target,
 Result<std::shared_ptr<const Environment>> openEnvironment(const fs::path& path, Job& job) {
     std::error_code ec;
     const std::string where = fmt::format("'{}'", path.string());
-    if (!fs::exists(path, ec))
-        return failAt(where, ErrorCode::io, "the file or folder does not exist");
+    if (!fs::exists(path, ec)) return failAt(where, ErrorCode::io, "{}", whyNotThere(path));
     if (fs::is_directory(path, ec)) return openFolder(path, job);
     STX_TRY(auto source, ByteSource::open(path));
     Bytes head(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 4096)));

@@ -21,11 +21,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <system_error>
 
 #include "formats/exr/exr_adapt.hpp"
+#include "formats/exr/exr_chunks.hpp"
 #include "formats/exr/exr_streams.hpp"
 #include "formats/exr/exr_zip.hpp"
 #include "lib/base/parallel.hpp"
@@ -162,6 +164,7 @@ struct ExrReader::Impl {
     bool readZipped(int index, const std::vector<ExrPixels>& pixels) const;
     bool readZippedChunk(int index, std::size_t chunk, int lines,
                          const std::vector<ExrPixels>& pixels) const;
+    Result<void> checkChunks(int index) const;
     bool readAt(std::uint64_t offset, void* to, std::size_t count) const {
         if (offset > size || count > size - offset) return false;
         if (!stream->isMemoryMapped())
@@ -249,6 +252,25 @@ bool ExrReader::Impl::readZipped(int index, const std::vector<ExrPixels>& pixels
             whole = false;
     });
     return whole;
+}
+
+Result<void> ExrReader::Impl::checkChunks(int index) const {
+    const Imf::Header& header = file->header(index);
+    exr::ChunkLayout layout;
+    layout.firstX = header.dataWindow().min.x;
+    layout.firstY = header.dataWindow().min.y;
+    if (parts.size() > 1) layout.part = index;
+    // The type decides where there is one, as for the library.
+    if (header.hasType() ? header.type() == Imf::TILEDIMAGE : header.hasTileDescription()) {
+        constexpr auto kMost = static_cast<unsigned>(std::numeric_limits<int>::max());
+        layout.tileWidth = static_cast<int>(std::min(header.tileDescription().xSize, kMost));
+        layout.tileHeight = static_cast<int>(std::min(header.tileDescription().ySize, kMost));
+    }
+    const auto at = static_cast<std::size_t>(index);
+    return exr::checkChunks(parts[at], layout, at < chunks.size() ? chunks[at] : ExrChunks(),
+                            [this](std::uint64_t offset, void* to, std::size_t count) {
+                                return readAt(offset, to, count);
+                            });
 }
 
 ExrReader::ExrReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -358,6 +380,7 @@ Result<void> ExrReader::readPart(int index, const std::vector<ExrPixels>& pixels
                                            p.stride * sizeof(float) * part.width));
         }
         if (buffer.begin() == buffer.end() || impl_->readZipped(index, pixels)) return {};
+        if (auto ok = impl_->checkChunks(index); !ok) return tl::unexpected(ok.error().at(where()));
         in.setFrameBuffer(buffer);
         in.readPixels(window.min.y, window.max.y);
         return {};

@@ -76,13 +76,60 @@ class Cursor {
     char block_[16384];
 };
 
-/// Chunks of a single-part file of scan lines, by its compression and data window; 0 = not known.
-std::uint64_t chunksOf(int compression, const std::int32_t (&window)[4], bool tiled) {
+/// What a header says of how its pixels are cut.
+struct Cut {
+    std::int32_t chunkCount = 0;
+    int compression = -1;
+    std::int32_t window[4] = {};
+    std::int32_t tile[2] = {};  ///< 0, 0 = scan lines
+    unsigned tileMode = 0;      ///< levels in the low four bits, how their sizes are rounded above
+};
+
+/// Tiles of all levels (OpenEXR file layout, "Tile description"); 0 = not known.
+std::uint64_t tilesOf(const Cut& cut, std::int64_t width, std::int64_t height) {
+    if (cut.tile[0] < 1 || cut.tile[1] < 1) return 0;
+    const bool up = cut.tileMode >> 4 & 1u;
+    const auto levels = [up](std::int64_t size) {
+        int n = 1;
+        while (size > 1) {
+            size = (size + (up ? 1 : 0)) / 2;
+            ++n;
+        }
+        return n;
+    };
+    const auto tiles = [up](std::int64_t size, int level, std::int64_t tile) {
+        const std::int64_t whole = std::int64_t{1} << level;
+        size = std::max<std::int64_t>((size + (up ? whole - 1 : 0)) / whole, 1);
+        return static_cast<std::uint64_t>((size + tile - 1) / tile);
+    };
+    std::uint64_t count = 0;
+    switch (cut.tileMode & 15u) {
+        case 0:
+            return tiles(width, 0, cut.tile[0]) * tiles(height, 0, cut.tile[1]);
+        case 1:
+            for (int i = 0; i < levels(std::max(width, height)); ++i)
+                count += tiles(width, i, cut.tile[0]) * tiles(height, i, cut.tile[1]);
+            return count;
+        case 2:
+            for (int y = 0; y < levels(height); ++y) {
+                for (int x = 0; x < levels(width); ++x)
+                    count += tiles(width, x, cut.tile[0]) * tiles(height, y, cut.tile[1]);
+            }
+            return count;
+        default:
+            return 0;
+    }
+}
+
+/// Chunks of a single-part file, which need not say how many it has; 0 = not known.
+std::uint64_t chunksOf(const Cut& cut, bool tiled) {
     static constexpr int kLines[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
-    if (tiled || compression < 0 || compression > 9) return 0;
-    const std::int64_t height = std::int64_t{window[3]} - window[1] + 1;
-    if (height < 1) return 0;
-    return static_cast<std::uint64_t>((height + kLines[compression] - 1) / kLines[compression]);
+    const std::int64_t width = std::int64_t{cut.window[2]} - cut.window[0] + 1;
+    const std::int64_t height = std::int64_t{cut.window[3]} - cut.window[1] + 1;
+    if (width < 1 || height < 1 || cut.compression < 0 || cut.compression > 9) return 0;
+    if (tiled) return tilesOf(cut, width, height);
+    const int lines = kLines[cut.compression];
+    return static_cast<std::uint64_t>((height + lines - 1) / lines);
 }
 
 /// Bytes of a value of a type whose size is fixed, and which OpenEXR reads without a look at the
@@ -188,28 +235,33 @@ std::vector<ExrChunks> exrChunksOfParts(
     for (;;) {
         if (!cursor.readName(name)) return {};
         if (name.empty()) break;  // the end of the list of headers
-        std::int32_t chunkCount = 0, window[4] = {};
-        int compression = -1;
+        Cut cut;
         while (!name.empty()) {
             std::int32_t size = 0;
             if (!cursor.readName(type) || !cursor.readInt(size) || size < 0) return {};
             if (name == "chunkCount" && size == 4) {
-                if (!cursor.readInt(chunkCount)) return {};
+                if (!cursor.readInt(cut.chunkCount)) return {};
             } else if (name == "compression" && size == 1) {
                 unsigned char c = 0;
                 if (!cursor.read(&c, 1)) return {};
-                compression = c;
+                cut.compression = c;
             } else if (name == "dataWindow" && size == 16) {
-                for (auto& v : window) {
+                for (auto& v : cut.window) {
                     if (!cursor.readInt(v)) return {};
                 }
+            } else if (name == "tiles" && size == 9) {
+                unsigned char mode = 0;
+                if (!cursor.readInt(cut.tile[0]) || !cursor.readInt(cut.tile[1]) ||
+                    !cursor.read(&mode, 1))
+                    return {};
+                cut.tileMode = mode;
             } else if (!cursor.skip(static_cast<std::uint64_t>(size))) {
                 return {};
             }
             if (!cursor.readName(name)) return {};
         }
-        const auto count = chunkCount > 0 ? static_cast<std::uint64_t>(chunkCount)
-                                          : chunksOf(compression, window, tiled);
+        const auto count =
+            cut.chunkCount > 0 ? static_cast<std::uint64_t>(cut.chunkCount) : chunksOf(cut, tiled);
         if (count == 0 || count > fileSize / 8) return {};
         chunks.push_back(count);
         if (!multi) break;

@@ -23,6 +23,7 @@
 #include "formats/exr/exr_file.hpp"
 #include "formats/exr/exr_streams.hpp"
 #include "formats/exr/exr_zip.hpp"
+#include "formats/files/shown_name.hpp"
 #include "formats/files/source_date.hpp"
 #include "lib/base/byte_planes.hpp"
 #include "lib/base/parallel.hpp"
@@ -284,7 +285,7 @@ ExrWriter::~ExrWriter() = default;
 
 Result<ExrWriter> ExrWriter::create(OutputFile& file, const std::vector<ExrPart>& parts) {
     auto impl = std::make_unique<Impl>();
-    impl->where = "cannot write the OpenEXR file";
+    impl->where = fmt::format("cannot write '{}'", shownName(file.temporaryPath()).string());
     impl->parts = parts;
     STX_CHECK(adapt(ErrorCode::io, impl->where, [&]() -> Result<void> {
         impl->stream = std::make_unique<exr::OutputStream>(file.temporaryPath());

@@ -1,16 +1,20 @@
 #include "formats/files/files.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <system_error>
 
+#include "formats/files/shown_name.hpp"
 #include "formats/files/temporaries.hpp"
 
 namespace stx {
@@ -23,8 +27,28 @@ std::string systemText(int error) {
     return std::generic_category().message(error);
 }
 
+/// The targets of temporary files and folders, by their paths.
+struct Targets {
+    std::mutex mutex;
+    std::map<fs::path, fs::path> of;
+};
+Targets& targets() {
+    static Targets all;
+    return all;
+}
+
+void rememberTarget(const fs::path& temporary, const fs::path& target) {
+    const std::lock_guard lock(targets().mutex);
+    targets().of[temporary] = target;
+}
+void forgetTarget(const fs::path& temporary) {
+    const std::lock_guard lock(targets().mutex);
+    targets().of.erase(temporary);
+}
+
 tl::unexpected<Error> failIo(std::string_view doing, const fs::path& path, int error) {
-    return fail(ErrorCode::io, "cannot {} '{}': {}", doing, path.string(), systemText(error));
+    return fail(ErrorCode::io, "cannot {} '{}': {}", doing, shownName(path).string(),
+                systemText(error));
 }
 
 Result<void> writeAll(int fd, ByteSpan bytes, const fs::path& path) {
@@ -83,14 +107,36 @@ tl::unexpected<Error> failExists(const fs::path& target) {
 
 /// What a target's name stands for; a link is written through, not replaced.
 Result<fs::path> throughLinks(const fs::path& target) {
+    // Step by step: weakly_canonical() leaves a link to what does not exist yet as it is.
+    constexpr int kMostLinks = 40;  // as the system
     std::error_code ec;
-    if (!fs::is_symlink(fs::symlink_status(target, ec))) return target;
-    fs::path real = fs::weakly_canonical(target, ec);
-    if (ec) return failIo("follow", target, ec.value());
+    fs::path real = target;
+    for (int links = 0; fs::is_symlink(fs::symlink_status(real, ec)); ++links) {
+        if (links == kMostLinks) return failIo("follow", target, ELOOP);
+        const fs::path next = fs::read_symlink(real, ec);
+        if (ec) return failIo("follow", target, ec.value());
+        real = folderOf(real) / next;
+    }
     return real;
 }
 
 }  // namespace
+
+fs::path shownName(const fs::path& path) {
+    const std::lock_guard lock(targets().mutex);
+    const auto& of = targets().of;
+    const auto own = of.find(path);
+    const fs::path shown = own == of.end() ? path : own->second;
+    // A file in a folder that is temporary itself.
+    fs::path above = shown.parent_path(), inside = shown.filename();
+    while (!above.empty()) {
+        if (const auto known = of.find(above); known != of.end()) return known->second / inside;
+        if (above == above.parent_path()) break;
+        inside = above.filename() / inside;
+        above = above.parent_path();
+    }
+    return shown;
+}
 
 fs::path folderOf(const fs::path& path) {
     return path.has_parent_path() ? path.parent_path() : fs::path(".");
@@ -126,6 +172,7 @@ struct OutputFile::Impl {
 
     ~Impl() {
         if (!committed && !temporary.empty()) ::unlink(temporary.c_str());
+        if (!temporary.empty()) forgetTarget(temporary);
     }
 };
 
@@ -169,6 +216,7 @@ Result<OutputFile> OutputFile::create(const fs::path& target, Options options) {
     if (!temporary) return failIo("write", target, temporary.error());
     impl->fd = std::move(temporary->fd);
     impl->temporary = std::move(temporary->path);
+    rememberTarget(impl->temporary, target);
     if (exists) (void)!::fchmod(impl->fd.get(), info.st_mode & 07777);
     return OutputFile(std::move(impl));
 }
@@ -250,12 +298,14 @@ struct OutputFolder::Impl {
     OutputFile::Options options;
     std::vector<std::string> ownNames;
     fs::path temporary;
+    fs::path named;   ///< as it was given to rememberTarget(); commit() may move `temporary`
     Descriptor lock;  ///< tells other runs that the temporary folder is in use
     bool committed = false;
 
     ~Impl() {
         std::error_code ec;
         if (!committed && !temporary.empty()) fs::remove_all(temporary, ec);
+        if (!named.empty()) forgetTarget(named);
     }
 };
 
@@ -291,6 +341,8 @@ Result<OutputFolder> OutputFolder::create(const fs::path& target, OutputFile::Op
     if (!temporary) return failIo("write", target, temporary.error());
     impl->lock = std::move(temporary->fd);
     impl->temporary = std::move(temporary->path);
+    impl->named = impl->temporary;
+    rememberTarget(impl->named, named);
     return OutputFolder(std::move(impl));
 }
 
@@ -394,6 +446,11 @@ Result<void> OutputFolder::commit() {
 
 Result<void> OutputFolder::commitWith(OutputFile& file) {
     const auto& text = *file.impl_;
+    // Of two runs that write the same names one comes whole after the other: else the text of one
+    // could stand beside the folder of the other. File systems without locks go on without.
+    const Descriptor alone(
+        ::open(folderOf(impl_->real).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (alone.get() >= 0) (void)::flock(alone.get(), LOCK_EX);
     const fs::path aside = impl_->temporary.string() + "-file";
     const bool replaces =
         !text.direct && !text.options.noClobber && ::rename(text.real.c_str(), aside.c_str()) == 0;

@@ -25,6 +25,15 @@ std::optional<std::uint64_t> sourceDate() {
     return seconds;
 }
 
+Result<void> checkSourceDate() {
+    const char* text = std::getenv("SOURCE_DATE_EPOCH");
+    if (text == nullptr || *text == 0 || sourceDate()) return {};
+    return fail(ErrorCode::usage,
+                "SOURCE_DATE_EPOCH is '{}'; whole seconds since 1970 up to the year 9999 are "
+                "expected: correct it, or unset it for outputs without a date",
+                text);
+}
+
 std::string exrDate(std::uint64_t seconds) {
     using namespace std::chrono;
     const sys_seconds moment{std::chrono::seconds(static_cast<std::int64_t>(seconds))};

@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <thread>
 
 #include "formats/files/module.hpp"
@@ -29,8 +30,16 @@ Result<const codecs::Table*> load() {
 /// Waits for the loading at the process's end: unloading while loading crashes.
 class Preloader {
   public:
-    Preloader() : thread_([] { (void)loadCodecs(); }) {}
-    ~Preloader() { thread_.join(); }
+    Preloader() {
+        try {
+            thread_ = std::thread([] { (void)loadCodecs(); });
+        } catch (const std::system_error&) {
+            // No thread to be had: it is loaded when it is needed.
+        }
+    }
+    ~Preloader() {
+        if (thread_.joinable()) thread_.join();
+    }
 
   private:
     std::thread thread_;

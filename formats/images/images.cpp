@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "formats/images/codec_module.hpp"
+#include "formats/images/damage.hpp"
 #include "formats/images/exr_image.hpp"
 #include "formats/images/isolated_decode.hpp"
 #include "formats/images/reader.hpp"
@@ -130,6 +131,14 @@ Result<T> at(std::string_view name, Result<T> result) {
     return result;
 }
 
+/// The same, and says what is wrong with pixels that are given all the same.
+template <class T>
+Result<T> at(std::string_view name, const ImageReader& reader, Result<T> result) {
+    if (result && !reader.damage().empty())
+        noteDamaged(fmt::format("'{}': {}", name, reader.damage()));
+    return at(name, std::move(result));
+}
+
 }  // namespace
 
 Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Limits& limits) {
@@ -140,7 +149,8 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
     if (isOtherKind(bytes)) return at(name, decodeWithCodecs(bytes, std::string(name), limits));
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<DecodedImage>(name, tl::unexpected(reader.error()));
-    return at(name, readDirect(**reader));
+    auto image = readDirect(**reader);
+    return at(name, **reader, std::move(image));
 }
 
 Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
@@ -151,7 +161,8 @@ Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
     }
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<Image<glm::u8vec4>>(name, tl::unexpected(reader.error()));
-    return at(name, readDirectRgba8(**reader, limits));
+    auto image = readDirectRgba8(**reader, limits);
+    return at(name, **reader, std::move(image));
 }
 
 }  // namespace stx

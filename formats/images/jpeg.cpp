@@ -2,12 +2,15 @@
 #include <cstdio>  // before jpeglib.h, which uses FILE
 #include <cstdlib>
 
-#include <jerror.h>
 #include <jpeglib.h>
 
+#include <jerror.h>  // behind jpeglib.h, which says whether there are arithmetic codes
+
 #include <array>
+#include <string>
 #include <string_view>
 
+#include "formats/images/damage.hpp"
 #include "formats/images/reader.hpp"
 
 namespace stx {
@@ -20,8 +23,10 @@ namespace {
 struct Errors {
     jpeg_error_mgr base;  ///< the first member, which the library points to
     std::jmp_buf escape;
-    bool ranOut = false;    ///< the bytes ended before the end marker
-    bool bitsLack = false;  ///< a scan asked for bits that are not there
+    bool ranOut = false;                ///< the bytes ended before the end marker
+    bool bitsLack = false;              ///< a scan asked for bits that are not there
+    bool watching = false;              ///< from the first scan on: what is damaged now is pixels
+    char damage[JMSG_LENGTH_MAX] = {};  ///< the first of what the library warned of; "" = nothing
 
     static Errors& of(j_common_ptr info) { return *reinterpret_cast<Errors*>(info->err); }
 
@@ -30,9 +35,21 @@ struct Errors {
         base.error_exit = [](j_common_ptr info) { std::longjmp(of(info).escape, 1); };
         base.output_message = [](j_common_ptr) {};
         base.emit_message = [](j_common_ptr info, int level) {
-            if (level < 0 && info->err->msg_code == JWRN_HIT_MARKER) of(info).bitsLack = true;
+            if (level < 0) of(info).warn(info);
         };
         return &base;
+    }
+    /// The library paints over what it cannot decode, and warns.
+    void warn(j_common_ptr info) {
+        // Some cameras pad with a few bytes before a marker.
+        constexpr int kPadding = 4;
+        const int code = base.msg_code;
+        if (code == JWRN_HIT_MARKER) bitsLack = true;
+        const bool spoils = code == JWRN_HIT_MARKER || code == JWRN_HUFF_BAD_CODE ||
+                            code == JWRN_ARITH_BAD_CODE || code == JWRN_BOGUS_PROGRESSION ||
+                            code == JWRN_MUST_RESYNC ||
+                            (code == JWRN_EXTRANEOUS_DATA && base.msg_parm.i[0] > kPadding);
+        if (watching && spoils && damage[0] == 0) base.format_message(info, damage);
     }
     /// The error that the library jumped out with.
     template <class Info>
@@ -76,7 +93,7 @@ class JpegReader final : public ImageReader {
     }
 
     Result<void> read(void* values) override {
-        return checked(readRows(static_cast<JSAMPLE*>(values), info_.channels));
+        return checked(readRows(static_cast<JSAMPLE*>(values), info_.channels) && readToEnd());
     }
 
     [[nodiscard]] bool givesRgba8() const override {
@@ -84,7 +101,7 @@ class JpegReader final : public ImageReader {
     }
     Result<void> readRgba8(glm::u8vec4* pixels) override {
         jpeg_.out_color_space = JCS_EXT_RGBA;
-        return checked(readRows(&pixels->r, 4));
+        return checked(readRows(&pixels->r, 4) && readToEnd());
     }
 
   private:
@@ -128,6 +145,7 @@ class JpegReader final : public ImageReader {
     /// `step` bytes a pixel; CMYK is made RGB.
     bool readRows(JSAMPLE* to, int step) {
         if (setjmp(errors_.escape)) return false;
+        errors_.watching = true;
         jpeg_start_decompress(&jpeg_);
         const std::size_t rowBytes = std::size_t{jpeg_.output_width} * step;
         JSAMPROW inks = nullptr;
@@ -151,16 +169,43 @@ class JpegReader final : public ImageReader {
         return true;
     }
 
+    /// What follows the last row shows whether it was the last: scans that are left over, data that
+    /// no pixel needed.
+    bool readToEnd() {
+        hasRows_ = true;
+        for (int i = 0; i < jpeg_.num_components; ++i) {
+            // No scan of it came, or, of a progressive file, not all of its bits (coef_bits).
+            bool came = jpeg_.comp_info[i].quant_table != nullptr;
+            for (int k = 0; jpeg_.coef_bits && k < DCTSIZE2; ++k)
+                came = came && jpeg_.coef_bits[i][k] == 0;
+            scansLack_ = scansLack_ || !came;
+        }
+        if (setjmp(errors_.escape)) return false;
+        jpeg_finish_decompress(&jpeg_);
+        return true;
+    }
+
     Result<void> checked(bool done) {
         if (scansTooMany_)
             return fail(ErrorCode::invalidInput, "the JPEG has more than {} scans", kMaxScans);
+        std::string damage = errors_.damage;
+        if (!done && damage.empty()) damage = errors_.message(jpeg_);
+        if (damage.empty() && scansLack_) damage = "scans are missing";
         // Arithmetic decoding takes what lacks for zeros and says nothing.
-        if (errors_.ranOut && (!done || errors_.bitsLack || jpeg_.arith_code))
+        if (errors_.ranOut && (!hasRows_ || errors_.bitsLack || scansLack_ || jpeg_.arith_code))
+            damage = fmt::format("it ends at byte {} before its last pixels", file_.size());
+        if (damage.empty()) return {};
+        if (!hasRows_ && errors_.code() == ErrorCode::failed)
+            return fail(ErrorCode::failed, "the JPEG cannot be decoded: {}", damage);
+        if (hasRows_ && keepsDamaged()) {
+            damage_ = fmt::format("the JPEG is damaged ({}) and drawn as far as it goes", damage);
+            return {};
+        }
+        if (errors_.ranOut && damage.starts_with("it ends"))
             return fail(ErrorCode::invalidInput,
                         "the JPEG ends at byte {} before its last pixels; it is cut off",
                         file_.size());
-        if (!done) return fail(errors_.code(), "the JPEG is damaged: {}", errors_.message(jpeg_));
-        return {};
+        return fail(ErrorCode::invalidInput, "the JPEG is damaged: {}", damage);
     }
 
     template <class Info>
@@ -174,6 +219,8 @@ class JpegReader final : public ImageReader {
 
     ByteSpan file_;
     bool cmyk_ = false;
+    bool hasRows_ = false;  ///< all rows were decoded, though perhaps painted over
+    bool scansLack_ = false;
     bool scansTooMany_ = false;
     Errors errors_{};
     jpeg_source_mgr source_{};

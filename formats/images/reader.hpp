@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 
 #include "formats/files/files.hpp"
 #include "formats/images/images.hpp"
@@ -22,9 +23,12 @@ class ImageReader {
     [[nodiscard]] virtual bool givesRgba8() const = 0;
     /// The same pixels as 8-bit RGBA: grey spread, missing alpha 255.
     [[nodiscard]] virtual Result<void> readRgba8(glm::u8vec4* pixels) = 0;
+    /// What is wrong with pixels that were read though they are damaged (KeepDamaged); else empty.
+    [[nodiscard]] const std::string& damage() const { return damage_; }
 
   protected:
     ImageInfo info_;
+    std::string damage_;
 };
 
 /// Readers of bytes that begin as a PNG (libdeflate, else libspng) or JPEG (libjpeg-turbo); `bytes`

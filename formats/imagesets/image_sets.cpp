@@ -6,6 +6,7 @@
 
 #include "formats/exr/environment_exr.hpp"
 #include "formats/files/messages.hpp"
+#include "formats/files/not_there.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/motion.hpp"
 #include "formats/imagesets/recognise.hpp"
@@ -24,7 +25,7 @@ Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
     }
     std::error_code ec;
     if (!std::filesystem::exists(path, ec))
-        return failAt(inQuotes(path.string()), ErrorCode::io, "the file or folder does not exist");
+        return failAt(inQuotes(path.string()), ErrorCode::io, "{}", whyNotThere(path));
     if (namesFilms(options)) return describeFilms(path, options, job);
     const KindEntry* entry = kindNamed(kind);
     if (!entry) {
@@ -334,6 +335,27 @@ Result<Bundle> momentOf(const SetDescription& set, Motion& motion, std::size_t f
     }
 }
 
+/// The description of a set by its first frame that can be described: of a film whose frames are
+/// files with numbers the first ones may be missing or damaged, unless `strict`.
+Result<SetDescription> describeFirst(const std::filesystem::path& path,
+                                     const ImageSetOptions& options, Job& job) {
+    auto set = describeSet(path, options, job);
+    if (set || options.strict || options.frame != 0 || !isDamage(set.error())) return set;
+    constexpr int kMostLost = 10;  // more at the beginning are a set that is not there
+    for (int frame = 1; frame <= kMostLost; ++frame) {
+        STX_CHECK(job.checkCancelled());
+        Job quiet;
+        quiet.workFor(job);
+        ImageSetOptions later = options;
+        later.frame = frame;
+        auto other = describeSet(path, later, quiet);
+        if (!other || other->frames <= frame) continue;
+        quiet.passNotesOn();
+        return other;
+    }
+    return set;
+}
+
 /// A set whose moments are in its description, or one that is described again for each frame.
 class SetSequence : public Sequence {
   public:
@@ -397,7 +419,10 @@ class StillSet : public Sequence {
     StillSet(std::string where, ImageSetOptions options, SetDescription set)
         : where_(std::move(where)), options_(std::move(options)), set_(std::move(set)) {}
 
-    Result<Bundle> frame(std::size_t, Job& job) override {
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        if (index > 0)
+            return failAt(where_, ErrorCode::usage, "frame {} is asked for, but there is one (0)",
+                          index);
         return readViews(set_, where_, options_, job);
     }
 
@@ -440,7 +465,7 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
     if (options.refinePoses)
         return fail(ErrorCode::usage,
                     "--refine-poses moves the cameras of one moment; give --frame N or --still");
-    STX_TRY(SetDescription set, describeSet(path, options, job));
+    STX_TRY(SetDescription set, describeFirst(path, options, job));
     const std::string where = inQuotes(path.string());
     STX_TRY(Motion motion, motionToRead(set, options, where, job));
     if (set.views.empty())

@@ -218,7 +218,8 @@ bool isNumbered(const std::string& pattern) {
     return pattern.find("{frame") != std::string::npos;
 }
 
-/// Resolves a file and finds out its planes and frame. Sets `frames` to the least of all.
+/// Resolves a file and finds out its planes and frame. Sets `frames` to the most of all: where a
+/// file has fewer, frames are missing.
 Result<PictureSource> sourceOf(const std::string& name, const Search& search, bool numbered,
                                int& frames, const Limits& limits) {
     STX_TRY(auto source, sourceInside(search.folder, name, "", limits));
@@ -227,7 +228,7 @@ Result<PictureSource> sourceOf(const std::string& name, const Search& search, bo
         STX_TRY(const int count, yuvFrameCount(source.path, *source.yuv));
         if (numbered) return source;
         source.frame = search.frame;
-        frames = frames == 0 ? count : std::min(frames, count);
+        frames = std::max(frames, count);
     }
     return source;
 }
@@ -302,6 +303,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
     STX_TRY(set.origin, originOf(json, where));
     STX_TRY(set.environment, environmentOf(json, folder, where, job.limits));
     int frames = 0;
+    bool counted = false;  // files with numbers, by those of the first camera that is there
     for (std::size_t i = 0; i < all.size(); ++i) {
         SetView& view = all[i];
         if (!sources.empty() && !sources.contains(view.name)) continue;
@@ -346,8 +348,7 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
                 within(place, sourceOf(depth, forDepth, isNumbered(options.depthPattern), frames,
                                        job.limits)));
         view.distances = distancesOf(range);
-        if (set.views.empty() &&
-            (isNumbered(options.texturePattern) || isNumbered(options.depthPattern))) {
+        if (!counted && (isNumbered(options.texturePattern) || isNumbered(options.depthPattern))) {
             const auto there = [&](int frame) {
                 Search nextTexture = forTexture, nextDepth = forDepth;
                 nextTexture.frame = nextDepth.frame = frame;
@@ -356,7 +357,8 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
             };
             const auto& numbered = isNumbered(options.depthPattern) ? depth : texture;
             const int count = 1 + lastFrame(folder, folder / numbered, options.frame, there);
-            frames = frames == 0 ? count : std::min(frames, count);
+            frames = std::max(frames, count);
+            counted = true;
         }
         if (!view.exactName.empty()) view.name = view.exactName;
         set.views.push_back(std::move(view));

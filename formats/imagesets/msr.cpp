@@ -171,10 +171,10 @@ Result<SetDescription> describeMsr(const path& given, const ImageSetOptions& opt
         SetView view;
         view.name = fmt::format("cam{}", m.index);
         const std::string place1 = fmt::format("{}: camera {}", where, m.index);
-        const auto names = [&](const std::string& pattern, const char* what, int frame) {
-            return pattern.empty()
-                       ? usualNames(what, view.name, frame)
-                       : std::vector<std::string>{filled(pattern, {view.name, 0, 0, frame})};
+        const auto names = [name = view.name](const std::string& pattern, const char* what,
+                                              int frame) {
+            return pattern.empty() ? usualNames(what, name, frame)
+                                   : std::vector<std::string>{filled(pattern, {name, 0, 0, frame})};
         };
         const auto textures = names(options.texturePattern, "color", options.frame);
         const auto depths = names(options.depthPattern, "depth", options.frame);

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/not_there.hpp"
 #include "formats/video/film.hpp"
 
 namespace stx {
@@ -117,8 +118,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     namespace fs = std::filesystem;
     std::error_code ec;
     const std::string where = inQuotes(path.string());
-    if (!fs::exists(path, ec))
-        return failAt(where, ErrorCode::io, "the file or folder does not exist");
+    if (!fs::exists(path, ec)) return failAt(where, ErrorCode::io, "{}", whyNotThere(path));
     if (!fs::is_directory(path, ec)) {
         if (path.extension() == ".json") {
             STX_TRY(const std::string kind, kindOfJson(path));

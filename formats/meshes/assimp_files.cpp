@@ -66,6 +66,11 @@ Assimp::IOStream* AssimpFiles::Open(const char* name, const char*) {
         if (missing_.empty()) missing_ = fmt::format("'{}' {}", file, whyNotThere(path.error()));
         return nullptr;
     }
+    // Files that name their materials thousands of times: once read, all is known.
+    if (!opened_.insert(path->string()).second) {
+        static constexpr std::string_view kNothing = "# This file has been read already.\n";
+        return new MemoryStream(std::as_bytes(std::span(kNothing)));
+    }
     auto bytes = readFile(*path, files_.job().limits);
     if (!bytes) {
         if (!error_) error_ = bytes.error().at(fmt::format("material file '{}'", file));

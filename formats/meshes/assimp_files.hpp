@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,7 @@ class AssimpFiles final : public Assimp::IOSystem {
     mutable std::string missing_;
     std::string materialFolder_;
     std::vector<std::string> sideTexts_;
+    std::set<std::string> opened_;  ///< paths of side files
 };
 
 }  // namespace stx

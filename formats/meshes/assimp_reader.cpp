@@ -26,8 +26,6 @@ const char* endingOf(AssimpFormat format) {
             return "obj";
         case AssimpFormat::stl:
             return "stl";
-        case AssimpFormat::off:
-            return "off";
         case AssimpFormat::dae:
             return "dae";
         case AssimpFormat::fbx:
@@ -312,6 +310,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
     STX_CHECK(files.job().limits.checkAllocation(bytes.size(), 30, "reading the model"));
     if (format == AssimpFormat::dae) STX_CHECK(checkColladaClaims(bytes, files.job().limits));
     if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, files.job().limits));
+    if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
         std::optional<ShiftedText> shifted;
         if (format == AssimpFormat::obj) shifted = shiftLargeCoordinates(bytes, "v");
@@ -321,34 +320,38 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         auto modelName = fileName;
         const auto dot = modelName.find_last_of('.');
         modelName = modelName.substr(0, dot) + "." + endingOf(format);
-        // Damaged files crash its readers of these.
-        if (format == AssimpFormat::dae || format == AssimpFormat::fbx)
-            STX_CHECK(tryApart(
-                [&] {
-                    Assimp::Importer importer;
-                    importer.SetIOHandler(new AssimpFiles(bytes, modelName, files));
-                    (void)importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
-                },
-                files.job().limits));
-        Assimp::Importer importer;
-        auto* system = new AssimpFiles(bytes, modelName, files);
-        importer.SetIOHandler(system);  // which owns it
-        const aiScene* scene = importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
-        if (system->error()) return tl::unexpected(*system->error());
-        if (!system->missing().empty() && system->sideTexts().empty())
-            files.job().note(
-                fmt::format("material file {}; its materials have no colour", system->missing()));
-        if (!scene) {
+        const auto read = [&](Assimp::Importer& importer,
+                              AssimpFiles* system) -> Result<const aiScene*> {
+            importer.SetIOHandler(system);  // which owns it
+            const aiScene* scene = importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
+            if (system->error()) return tl::unexpected(*system->error());
+            if (scene) return scene;
             std::string reason = importer.GetErrorString();
             std::replace(reason.begin(), reason.end(), '\n', ' ');
             return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
                         endingOf(format), reason.empty() ? "no reason given" : reason);
-        }
+        };
+        // Damaged files crash its readers of these, and small ones may take any memory. What fails
+        // there is not tried here.
+        if (format == AssimpFormat::dae || format == AssimpFormat::fbx)
+            STX_CHECK(tryApart(
+                [&]() -> Result<void> {
+                    Assimp::Importer importer;
+                    STX_CHECK(read(importer, new AssimpFiles(bytes, modelName, files)));
+                    return {};
+                },
+                files.job().limits));
+        Assimp::Importer importer;
+        auto* system = new AssimpFiles(bytes, modelName, files);
+        STX_TRY(const aiScene* const scene, read(importer, system));
+        if (!system->missing().empty() && system->sideTexts().empty())
+            files.job().note(
+                fmt::format("material file {}; its materials have no colour", system->missing()));
         return SceneConverter(*scene, format, files, *system,
                               shifted ? shifted->origin : glm::dvec3(0.0))
             .convert();
     } catch (const std::bad_alloc&) {
-        return fail(ErrorCode::invalidInput, "the model needs more memory than there is");
+        return fail(ErrorCode::failed, "the model needs more memory than there is");
     } catch (const std::exception& e) {
         return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
                     endingOf(format), e.what());

@@ -144,7 +144,7 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
         case Format::stl:
             return readWithAssimp(bytes, AssimpFormat::stl, name, files);
         case Format::off:
-            return readWithAssimp(bytes, AssimpFormat::off, name, files);
+            return readOff(bytes, job);
         case Format::dae:
             return readWithAssimp(bytes, AssimpFormat::dae, name, files);
         case Format::fbx:

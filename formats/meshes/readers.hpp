@@ -12,8 +12,10 @@ namespace stx {
 
 [[nodiscard]] Result<Mesh> readPly(ByteSpan bytes, ModelFiles& files);
 
-enum class AssimpFormat { obj, stl, off, dae, fbx };
-/// OBJ, STL, OFF, COLLADA and FBX. `fileName` is the model's own name in its folder.
+[[nodiscard]] Result<Mesh> readOff(ByteSpan bytes, Job& job);
+
+enum class AssimpFormat { obj, stl, dae, fbx };
+/// OBJ, STL, COLLADA and FBX. `fileName` is the model's own name in its folder.
 [[nodiscard]] Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format,
                                           const std::string& fileName, ModelFiles& files);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -128,6 +129,29 @@ Result<void> checkFbxClaims(ByteSpan bytes, const Limits& limits) {
         if (c == '}') --depth;
     }
     return {};
+}
+
+Result<void> checkStlEnd(ByteSpan bytes) {
+    constexpr std::size_t kTail = 4096;  // a name behind the word is no longer
+    const auto text = [&](std::size_t from, std::size_t size) {
+        std::string part(reinterpret_cast<const char*>(bytes.data()) + from, size);
+        for (char& c : part) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+        return part;
+    };
+    const std::string head = text(0, std::min(bytes.size(), kTail));
+    // Binary files may begin with the word, too; their size follows from a count at byte 80.
+    std::uint32_t triangles = 0;
+    if (bytes.size() >= 84) std::memcpy(&triangles, bytes.data() + 80, 4);
+    const bool binary = bytes.size() == 84 + std::uint64_t{triangles} * 50;
+    if (binary || head.find("solid") == std::string::npos ||
+        head.find("facet") == std::string::npos)
+        return {};
+    const std::size_t size = std::min(bytes.size(), kTail);
+    const std::string tail = text(bytes.size() - size, size);
+    const auto end = tail.rfind("endsolid"), facet = tail.rfind("facet");
+    if (end != std::string::npos && (facet == std::string::npos || facet < end)) return {};
+    return fail(ErrorCode::invalidInput,
+                "the STL ends without 'endsolid' at byte {}; it is cut off", bytes.size());
 }
 
 }  // namespace stx

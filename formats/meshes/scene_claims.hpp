@@ -16,4 +16,8 @@ namespace stx {
 /// than the memory limit.
 [[nodiscard]] Result<void> checkFbxClaims(ByteSpan bytes, const Limits& limits);
 
+/// STL: errors (invalidInput) when a text does not end with the word that says so; binary files
+/// pass.
+[[nodiscard]] Result<void> checkStlEnd(ByteSpan bytes);
+
 }  // namespace stx

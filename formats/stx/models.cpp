@@ -11,6 +11,7 @@ namespace {
 Bounds boundsOf(const Atlas& atlas) {
     if (atlas.bounds) return *atlas.bounds;
     Bounds bounds;
+    if (!atlas.check()) return bounds;  // one that was moved from has no pages
     for (const auto& r : atlas.rectangles) {
         const auto& view = atlas.views[static_cast<std::size_t>(r.view)];
         const auto& depth = atlas.pages[static_cast<std::size_t>(r.page)].depth;
@@ -75,6 +76,7 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
         bundle = unpack(*atlas, job);
     } else {
         bundle = std::move(std::get<Bundle>(model));
+        STX_CHECK(bundle->check());
     }
     if (!bundle) return bundle;
     if (!settings.title.empty()) bundle->title = settings.title;

@@ -1,3 +1,4 @@
+#include "formats/files/messages.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
@@ -63,8 +64,18 @@ Result<Frame> render(const Model& model, const Camera& camera, const RenderSetti
 
 Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
     STX_TRY(const auto bytes, readFile(path, job.limits));
-    STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
     Picture picture;
+    if (probeImage(bytes)) {
+        STX_TRY(picture.coded, decodeRgba8(bytes, path.string(), job.limits));
+        return picture;
+    }
+    STX_TRY(const auto decoded, decodeImage(bytes, path.string(), job.limits));
+    const auto pixels = static_cast<std::uint64_t>(decoded.width) * decoded.height;
+    const std::uint64_t bytesEach =
+        static_cast<std::uint64_t>(decoded.channels) * decoded.bits() / 8;
+    STX_CHECK(within(
+        inQuotes(path.string()),
+        job.limits.checkAllocation(pixels, bytesEach + (decoded.linear ? 20 : 4), "the picture")));
     if (decoded.linear) picture.linear = rgbaFloatFrom(decoded);
     picture.coded = rgba8From(decoded);
     return picture;

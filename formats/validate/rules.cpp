@@ -48,6 +48,7 @@ constexpr Rule kRules[] = {
     {2028, error, kOd, "no two streams have the same ES_ID"},
     {2030, error, kBifs, "the first command replaces the scene"},
     {2031, error, kBifs, "each command fits the scene that it changes"},
+    {2032, error, kBifs, "each later moment can be read"},
 
     {3001, error, kDibr, "nearPlane is less than farPlane"},
     {3002, error, kDibr, "nearPlane is 0 or more"},

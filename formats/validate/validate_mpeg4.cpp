@@ -1,5 +1,6 @@
 #include "formats/validate/validate_mpeg4.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <map>
@@ -13,6 +14,7 @@
 #include "formats/mpeg4/scene/scene_walk.hpp"
 #include "formats/validate/findings.hpp"
 #include "formats/validate/validate_background.hpp"
+#include "formats/validate/validate_moments.hpp"
 #include "formats/validate/validate_movies.hpp"
 
 namespace stx {
@@ -542,7 +544,13 @@ class DocumentValidator {
 
 std::vector<Finding> validate(const Mpeg4Document& document, const ValidateOptions& options,
                               const PresentationImages& images, Job& job) {
-    return DocumentValidator(document, options, images, job).run();
+    Findings findings;
+    findings.list = DocumentValidator(document, options, images, job).run();
+    const bool sound = std::ranges::none_of(
+        findings.list, [](const Finding& f) { return f.rule->severity == Rule::Severity::error; });
+    if (options.pixels && sound && changesLater(document))
+        checkLaterMoments(document, images.folder, findings, job);
+    return findings.list;
 }
 
 Result<std::vector<Finding>> validateMpeg4File(const std::filesystem::path& path,

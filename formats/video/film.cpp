@@ -50,6 +50,68 @@ std::uint64_t endOfBoxes(const Looker& look, std::uint64_t size) {
     return at;
 }
 
+/// What a track of an ISO file (.mp4, .mov) says of where its data are.
+struct DataPlace {
+    bool video = false, elsewhere = false;
+};
+
+/// Looks through the boxes between two places, as deep as those of a data reference lie. Calls
+/// `track` for each track.
+template <class OnTrack>
+void lookThroughBoxes(const Looker& look, std::uint64_t at, std::uint64_t end, DataPlace* place,
+                      const OnTrack& track, int depth = 0) {
+    constexpr int kDeepest = 5;  // moov/trak/mdia/minf/dinf
+    if (depth > kDeepest) return;
+    const auto code = [](const char(&type)[5]) {
+        return std::uint64_t{static_cast<unsigned char>(type[0])} << 24 |
+               std::uint64_t{static_cast<unsigned char>(type[1])} << 16 |
+               std::uint64_t{static_cast<unsigned char>(type[2])} << 8 |
+               static_cast<unsigned char>(type[3]);
+    };
+    constexpr int kMostBoxes = 100'000;
+    for (int i = 0; i < kMostBoxes && at + 8 <= end; ++i) {
+        std::uint64_t length = look.number(at, 4), head = 8;
+        const std::uint64_t type = look.number(at + 4, 4);
+        if (length == 1) {
+            length = look.number(at + 8, 8);
+            head = 16;
+        }
+        if (length == 0) length = end - at;
+        if (length < head || length > end - at) return;
+        const std::uint64_t inside = at + head, next = at + length;
+        if (type == code("trak")) {
+            DataPlace own;
+            lookThroughBoxes(look, inside, next, &own, track, depth + 1);
+            track(own);
+        } else if (type == code("moov") || type == code("mdia") || type == code("minf") ||
+                   type == code("dinf")) {
+            lookThroughBoxes(look, inside, next, place, track, depth + 1);
+        } else if (type == code("hdlr") && place && !place->video) {
+            place->video = look.number(inside + 8, 4) == code("vide");
+        } else if (type == code("dref") && place) {
+            // Of the first reference: bit 0 of its flags says that the data are here (8.7.2).
+            place->elsewhere =
+                look.number(inside + 4, 4) > 0 && (look.number(inside + 16, 4) & 1) == 0;
+        }
+        at = next;
+    }
+}
+
+/// Readers of films take what lies here for data that another file holds.
+Result<void> checkDataAreHere(const Descriptor& file, std::string_view format,
+                              const std::string& where) {
+    struct stat facts = {};
+    if (format != "mov" || ::fstat(file.get(), &facts) != 0) return {};
+    bool elsewhere = false;
+    lookThroughBoxes(
+        Looker(file.get()), 0, static_cast<std::uint64_t>(facts.st_size), nullptr,
+        [&](const DataPlace& place) { elsewhere = elsewhere || (place.video && place.elsewhere); });
+    if (!elsewhere) return {};
+    return failAt(where, ErrorCode::unsupported,
+                  "the data of its video are in another file, which is not opened; make one file "
+                  "of both: ffmpeg -enable_drefs 1 -i IN -c copy OUT.mp4");
+}
+
 /// Where the segment of a Matroska file ends (RFC 8794, RFC 9559); 0 when it does not tell, as of a
 /// recording that was broken off.
 std::uint64_t endOfSegment(const Looker& look) {
@@ -125,6 +187,7 @@ Result<std::unique_ptr<Film>> Film::open(const fs::path& path, const Limits& lim
     if (const auto module = loadVideo(); !module)
         return tl::unexpected(module.error().at(film->where()));
     STX_CHECK(checkWhole(file, format, film->where()));
+    STX_CHECK(checkDataAreHere(file, format, film->where()));
     auto process = VideoProcess::start(limits, std::move(file));
     if (!process) return tl::unexpected(process.error().at(film->where()));
     film->process_ = std::move(*process);

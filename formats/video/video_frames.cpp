@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
+#include <mutex>
 
 #include "formats/files/messages.hpp"
+#include "formats/files/not_there.hpp"
 #include "formats/images/images.hpp"
 #include "formats/video/film.hpp"
 #include "formats/video/numbered_pictures.hpp"
 #include "formats/yuv/y4m_reader.hpp"
 #include "lib/base/counted.hpp"
+#include "lib/model/sequence.hpp"
 
 namespace stx {
 namespace {
@@ -20,26 +24,28 @@ class PictureFrames final : public VideoFrames {
     PictureFrames(std::vector<fs::path> files, std::string what, Job& job)
         : files_(std::move(files)), what_(std::move(what)), job_(job) {}
 
-    /// Takes the size from the first picture.
-    Result<void> open() {
-        STX_TRY(const auto picture, read(0));
-        size_ = picture.size();
+    /// Takes the size from the first picture that can be read; not further on when `strict`.
+    Result<void> open(bool strict) {
+        auto picture = read(0);
+        for (std::size_t k = 1; !picture && !strict && isDamage(picture.error()); ++k) {
+            if (k == files_.size()) break;
+            if (auto later = read(k)) picture = std::move(later);
+        }
+        if (!picture) return propagate(picture);
+        size_ = picture->size();
         return {};
     }
     [[nodiscard]] glm::ivec2 size() const override { return size_; }
     [[nodiscard]] int count() const override { return static_cast<int>(files_.size()); }
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
         STX_TRY(auto picture, read(static_cast<std::size_t>(k)));
-        if (picture.size() != size_)
-            return failAt(inQuotes(files_[static_cast<std::size_t>(k)].string()),
-                          ErrorCode::invalidInput,
-                          "it is {}x{}, but the first frame, '{}', is {}x{}; all frames must have "
-                          "one size",
-                          picture.width(), picture.height(), files_[0].string(), size_.x, size_.y);
         return std::make_shared<const Rgba8Image>(std::move(picture));
     }
     [[nodiscard]] std::string name(int k) const override {
         return files_[static_cast<std::size_t>(k)].stem().string();
+    }
+    [[nodiscard]] std::string place(int k) const override {
+        return inQuotes(files_[static_cast<std::size_t>(k)].string());
     }
     [[nodiscard]] std::string description() const override {
         return fmt::format("{} ({})", what_, counted(files_.size(), "picture"));
@@ -72,6 +78,9 @@ class Y4mFrames final : public VideoFrames {
     [[nodiscard]] std::string name(int k) const override {
         return fmt::format("{}_{:04}", file_.stem().string(), k);
     }
+    [[nodiscard]] std::string place(int k) const override {
+        return fmt::format("{}: frame {}", inQuotes(file_.string()), k);
+    }
     [[nodiscard]] std::string description() const override {
         return fmt::format("{} ({})", file_.filename().string(), counted(count(), "frame"));
     }
@@ -94,16 +103,14 @@ class FilmFrames final : public VideoFrames {
     [[nodiscard]] int count() const override { return film_->count(); }
     [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
         STX_TRY(const auto picture, film_->picture(k));
-        const std::string where = fmt::format("{}: frame {}", inQuotes(film_->path().string()), k);
-        STX_TRY(auto colour, within(where, picture.colour(job_.limits)));
-        if (colour.size() != size_)
-            return failAt(where, ErrorCode::invalidInput,
-                          "it is {}x{}, but the track is {}x{}; all frames must have one size",
-                          colour.width(), colour.height(), size_.x, size_.y);
+        STX_TRY(auto colour, within(place(k), picture.colour(job_.limits)));
         return std::make_shared<const Rgba8Image>(std::move(colour));
     }
     [[nodiscard]] std::string name(int k) const override {
         return fmt::format("{}_{:04}", film_->path().stem().string(), k);
+    }
+    [[nodiscard]] std::string place(int k) const override {
+        return fmt::format("{}: frame {}", inQuotes(film_->path().string()), k);
     }
     [[nodiscard]] std::string description() const override {
         return fmt::format("{} ({})", film_->path().filename().string(), counted(count(), "frame"));
@@ -113,6 +120,60 @@ class FilmFrames final : public VideoFrames {
     std::unique_ptr<Film> film_;
     Job& job_;
     glm::ivec2 size_{0};
+};
+
+/// Frames of one size, gone on with where some are damaged.
+class SteadyFrames final : public VideoFrames {
+  public:
+    SteadyFrames(std::unique_ptr<VideoFrames> frames, bool strict, Job& job)
+        : frames_(std::move(frames)), strict_(strict), job_(job) {}
+    ~SteadyFrames() override {
+        if (damaged_.empty()) return;
+        job_.note(fmt::format(
+            "{} of {} cannot be used, and the frame before stands for each; stx "
+            "background --strict stops there; the first: {}",
+            damaged_.size(), counted(count(), "frame"), damaged_.begin()->second.text()));
+    }
+    SteadyFrames(const SteadyFrames&) = delete;
+    SteadyFrames& operator=(const SteadyFrames&) = delete;
+
+    [[nodiscard]] glm::ivec2 size() const override { return frames_->size(); }
+    [[nodiscard]] int count() const override { return frames_->count(); }
+    [[nodiscard]] Result<std::shared_ptr<const Rgba8Image>> frame(int k) override {
+        auto picture = frames_->frame(k);
+        if (!picture && !strict_ && isDamage(picture.error())) {
+            {
+                const std::lock_guard lock(mutex_);
+                damaged_.emplace(k, picture.error());
+            }
+            for (int other = k - 1; !picture && other >= 0; --other) tryInstead(other, picture);
+            for (int other = k + 1; !picture && other < count(); ++other)
+                tryInstead(other, picture);
+        }
+        if (!picture) return picture;
+        const auto found = (*picture)->size(), wanted = size();
+        if (found != wanted)
+            return failAt(
+                place(k), ErrorCode::invalidInput,
+                "it is {}x{}, but the first frame, {}, is {}x{}; all frames must have one "
+                "size",
+                found.x, found.y, place(0), wanted.x, wanted.y);
+        return picture;
+    }
+    [[nodiscard]] std::string name(int k) const override { return frames_->name(k); }
+    [[nodiscard]] std::string place(int k) const override { return frames_->place(k); }
+    [[nodiscard]] std::string description() const override { return frames_->description(); }
+
+  private:
+    void tryInstead(int k, Result<std::shared_ptr<const Rgba8Image>>& picture) {
+        if (auto other = frames_->frame(k)) picture = std::move(other);
+    }
+
+    std::unique_ptr<VideoFrames> frames_;
+    bool strict_;
+    Job& job_;
+    std::mutex mutex_;
+    std::map<int, Error> damaged_;
 };
 
 Result<std::unique_ptr<VideoFrames>> openFilm(const fs::path& input, Job& job) {
@@ -154,37 +215,34 @@ std::string headOfFile(const fs::path& path) {
 }
 
 Result<std::unique_ptr<VideoFrames>> openPictures(std::vector<fs::path> files, std::string what,
-                                                  Job& job) {
+                                                  bool strict, Job& job) {
     auto frames = std::make_unique<PictureFrames>(std::move(files), std::move(what), job);
-    STX_CHECK(frames->open());
+    STX_CHECK(frames->open(strict));
     return frames;
 }
 
 Result<std::unique_ptr<VideoFrames>> openSequence(Result<std::vector<NumberedFile>> pictures,
-                                                  const fs::path& input, Job& job) {
+                                                  const fs::path& input, bool strict, Job& job) {
     if (!pictures) return propagate(pictures);
     std::vector<fs::path> files;
     for (auto& picture : *pictures) files.push_back(std::move(picture.path));
-    return openPictures(std::move(files), input.string(), job);
+    return openPictures(std::move(files), input.string(), strict, job);
 }
 
-}  // namespace
-
-Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>& inputs,
-                                                     Job& job) {
+Result<std::unique_ptr<VideoFrames>> openAnyFrames(const std::vector<fs::path>& inputs, bool strict,
+                                                   Job& job) {
     if (inputs.empty()) return fail(ErrorCode::usage, "no frames are named");
     std::error_code ec;
     for (const fs::path& input : inputs) {
         const bool folder = fs::is_directory(input, ec);
         const bool there = fs::exists(fs::status(input, ec));
         if (inputs.size() == 1) {
-            if (folder) return openSequence(numberedPictures(input, job), input, job);
+            if (folder) return openSequence(numberedPictures(input, job), input, strict, job);
             if (!there && isSequencePattern(input))
-                return openSequence(picturesOfPattern(input, job), input, job);
+                return openSequence(picturesOfPattern(input, job), input, strict, job);
         }
         if (!there)
-            return fail(ErrorCode::io, "cannot read '{}': the file or folder does not exist",
-                        input.string());
+            return fail(ErrorCode::io, "cannot read '{}': {}", input.string(), whyNotThere(input));
         if (inputs.size() == 1 && input.extension() == ".json")
             return failAt(inQuotes(input.string()), ErrorCode::usage,
                           "plain frames are expected, but this may be a set of images with depth; "
@@ -205,7 +263,15 @@ Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>
                 within(inQuotes(input.string()), Y4mReader::open(std::move(source), job)));
         return std::make_unique<Y4mFrames>(std::move(reader), input, job);
     }
-    return openPictures(inputs, inputs.size() == 1 ? inputs[0].string() : "pictures", job);
+    return openPictures(inputs, inputs.size() == 1 ? inputs[0].string() : "pictures", strict, job);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VideoFrames>> openVideoFrames(const std::vector<fs::path>& inputs, Job& job,
+                                                     bool strict) {
+    STX_TRY(auto frames, openAnyFrames(inputs, strict, job));
+    return std::make_unique<SteadyFrames>(std::move(frames), strict, job);
 }
 
 }  // namespace stx

@@ -201,7 +201,14 @@ class Viewer {
     }
 
     readAddress() {
-        const fields = new Map(location.hash.slice(1).split("&").map((part) => part.split("=").map(decodeURIComponent)));
+        const decoded = (text) => {
+            try {
+                return decodeURIComponent(text);
+            } catch (error) {
+                return text;  // a % that codes nothing
+            }
+        };
+        const fields = new Map(location.hash.slice(1).split("&").map((part) => part.split("=").map(decoded)));
         const numbers = (name, count) => {
             const list = (fields.get(name) || "").split(",").map(Number);
             return fields.has(name) && list.length === count && list.every(Number.isFinite) ? list : null;

@@ -1,5 +1,6 @@
 #include "lib/background/still_frames.hpp"
 
+#include <algorithm>
 #include <optional>
 
 #include "lib/base/parallel.hpp"
@@ -37,16 +38,25 @@ std::vector<int> spreadFrames(int count, int wanted) {
     return which;
 }
 
-Result<void> takeFrames(StillFrames& frames, std::span<const int> which,
+Result<void> takeFrames(StillFrames& frames, std::span<const int> which, std::uint64_t bytes,
                         const std::function<void(std::size_t, const Rgba8Image&)>& take) {
     std::vector<std::optional<Error>> errors(which.size());
-    parallelFor(0, static_cast<std::int64_t>(which.size()), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
-        const auto picture = frames.frame(which[at]);
-        if (picture)
-            take(at, **picture);
-        else
-            errors[at] = picture.error();
+    const auto count = static_cast<std::int64_t>(which.size());
+    const auto size = frames.size();
+    const std::uint64_t one = static_cast<std::uint64_t>(size.x) * size.y * kFrameBytesPerPixel;
+    const auto atOnce = static_cast<std::int64_t>(
+        std::clamp<std::uint64_t>(bytes / one, 1, static_cast<std::uint64_t>(count)));
+    // As many pieces as may be in memory at a time, where those are fewer than there are threads.
+    const std::int64_t grain = atOnce >= threadCount() ? 1 : (count + atOnce - 1) / atOnce;
+    parallelForBlocks(0, count, grain, [&](std::int64_t begin, std::int64_t end) {
+        for (auto i = begin; i < end; ++i) {
+            const auto at = static_cast<std::size_t>(i);
+            const auto picture = frames.frame(which[at]);
+            if (picture)
+                take(at, **picture);
+            else
+                errors[at] = picture.error();
+        }
     });
     for (auto& error : errors)
         if (error) return tl::unexpected(std::move(*error));

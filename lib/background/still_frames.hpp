@@ -47,10 +47,14 @@ class KeptFrames : public StillFrames {
 /// not more. `wanted` is 0 (all) or at least 2.
 [[nodiscard]] std::vector<int> spreadFrames(int count, int wanted);
 
-/// Calls take(i, picture) for frame which[i] of each i, on several threads. The error is that of
-/// the first frame that has one.
+/// What a frame takes while it is read, decoded and made RGBA.
+inline constexpr std::uint64_t kFrameBytesPerPixel = 8;
+
+/// Calls take(i, picture) for frame which[i] of each i, on several threads, but of frames that are
+/// being read no more at a time than fit into `bytes`. The error is that of the first frame that
+/// has one.
 [[nodiscard]] Result<void> takeFrames(
-    StillFrames& frames, std::span<const int> which,
+    StillFrames& frames, std::span<const int> which, std::uint64_t bytes,
     const std::function<void(std::size_t, const Rgba8Image&)>& take);
 
 /// Luma of BT.601, 0..255: what every method here sees of a frame.

@@ -87,15 +87,16 @@ class BandSelector {
         for (std::size_t from = 0; from < which_.size(); from += block_.size()) {
             STX_CHECK(job_.checkCancelled());
             const std::size_t n = std::min(block_.size(), which_.size() - from);
-            STX_CHECK(takeFrames(
-                frames_, which_.subspan(from, n), [&](std::size_t i, const Rgba8Image& picture) {
-                    BandFrame& f = block_[i];
-                    const auto* at = picture.data() + static_cast<std::size_t>(first_) * width;
-                    f.colour.assign(at, at + pixels_);
-                    if (moving)
-                        f.luma.take(picture, window_.firstNeeded(first_),
-                                    window_.rowsNeeded(first_, rows_));
-                }));
+            STX_CHECK(takeFrames(frames_, which_.subspan(from, n), job_.limits.maxMemoryBytes / 4,
+                                 [&](std::size_t i, const Rgba8Image& picture) {
+                                     BandFrame& f = block_[i];
+                                     const auto* at =
+                                         picture.data() + static_cast<std::size_t>(first_) * width;
+                                     f.colour.assign(at, at + pixels_);
+                                     if (moving)
+                                         f.luma.take(picture, window_.firstNeeded(first_),
+                                                     window_.rowsNeeded(first_, rows_));
+                                 }));
             if (moving) {
                 parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t k) {
                     const auto i = static_cast<std::size_t>(k);
@@ -194,6 +195,9 @@ class BandSelector {
 Result<StillBackground> selectBackground(StillFrames& frames, std::span<const int> which,
                                          const StillSettings& settings, Job& job) {
     const auto size = frames.size();
+    // What comes out, and one frame that is being read; the rest adapts to what is left.
+    STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(size.x) * size.y,
+                                         2 * (5 + kFrameBytesPerPixel), "a background"));
     const std::uint64_t frameBytes = std::uint64_t{sizeof(glm::u8vec4)} * size.x * size.y;
     const std::uint64_t keptBytes = job.limits.maxMemoryBytes / 2;
     // Frames that stay in memory cost little to look at again: then bands are small enough for a

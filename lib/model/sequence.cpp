@@ -11,7 +11,11 @@ namespace {
 class Still : public Sequence {
   public:
     explicit Still(Bundle bundle) : bundle_(std::move(bundle)) {}
-    Result<Bundle> frame(std::size_t, Job&) override { return bundle_; }
+    Result<Bundle> frame(std::size_t index, Job&) override {
+        if (index > 0)
+            return fail(ErrorCode::usage, "frame {} is asked for, but there is one (0)", index);
+        return bundle_;
+    }
 
   private:
     Bundle bundle_;

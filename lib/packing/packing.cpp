@@ -180,9 +180,10 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     if (layout.rectangles.empty())
         return fail(ErrorCode::invalidInput, "none of the {} views has a point to pack",
                     bundle.views.size());
+    // The views, their pages, and a page while its picture is packed.
     STX_CHECK(job.limits.checkAllocation(
         static_cast<std::uint64_t>(layout.width) * layout.height * layout.pages,
-        contents.bytesPerPixel(), "the atlas"));
+        2 * contents.bytesPerPixel() + 12, "an atlas"));
 
     Atlas atlas;
     atlas.layout = tight ? "tight" : "grid";

@@ -121,6 +121,16 @@ def touched(test, browser):
     test.check(found >= LEAST, f"the command's picture: {found:.1f} dB")
 
 
+def odd_addresses(test, browser):
+    """What codes nothing is passed over; nothing that the page does is against its own policy."""
+    for address in ("%", "eye=%E0%A4%A&fov=%", "eye=1,2&up=x&=&&"):
+        show(browser, test.path("amphora.html"), address)
+        test.check(browser.ask("viewer.camera.fov > 0"), f"a page draws at #{address}")
+    policy = browser.ask("document.querySelector('meta[http-equiv=Content-Security-Policy]').content")
+    test.check("default-src 'none'" in policy, "a page asks for nothing outside of itself")
+    test.check(not [f for f in browser.faults if "Content Security Policy" in str(f)], str(browser.faults))
+
+
 def phone(test, browser):
     browser.size(360, 640, phone=True)
     show(browser, test.path("amphora.html"), "")
@@ -151,6 +161,7 @@ def main():
             browser.size(640, 400)
             models(test, browser, args)
             touched(test, browser)
+            odd_addresses(test, browser)
             phone(test, browser)
             test.check(not browser.faults, f"no fault is logged: {browser.faults[:3]}")
             outside = [r for r in browser.requests if not r.startswith(("file:", "about:", "blob:", "data:"))]

@@ -3,31 +3,27 @@
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
-#include <webp/encode.h>
 
-#include <cstdio>
 #include <cstring>
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "formats/images/codec_table.hpp"
+#include "formats/images/oiio/bmp.hpp"
+#include "formats/images/oiio/failed.hpp"
+#include "formats/images/oiio/tiff.hpp"
+#include "formats/images/oiio/webp.hpp"
 #include "lib/base/result.hpp"
 
-/// The only file that knows OpenImageIO and libwebp. Its exceptions and geterror() end here, in
-/// `adapt`.
+/// The only file that knows OpenImageIO. Its exceptions and geterror() end here, in `adapt`.
 namespace stx::codecs {
 
 namespace {
-
-/// Stands for every way in which the library can fail.
-struct Failed {
-    ErrorCode code;
-    std::string message;
-};
 
 template <class Work>
 bool adapt(Failure& failure, const Work& work) {
@@ -134,9 +130,11 @@ class MemoryFile {
 }
 
 void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
-    setUpOnce();
+    const std::span file(static_cast<const std::byte*>(request.bytes), request.size);
     const std::string_view head(static_cast<const char*>(request.bytes),
                                 std::min<std::size_t>(request.size, 16));
+    if (formatByContent(head) == std::string_view("webp") && decodeWebp(request, failure)) return;
+    setUpOnce();
     std::string format = formatByContent(head);
     if (format.empty()) {
         const std::string_view name = request.name;
@@ -157,8 +155,10 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
         throw Failed{ErrorCode::invalidInput,
                      fmt::format("it is not an image of a known kind ('{}')", format)};
     }
-    OIIO::Filesystem::IOMemReader reader(const_cast<void*>(request.bytes), request.size);
-    std::unique_ptr<MemoryFile> file;
+    const auto mended = format == "tiff" ? mendedTiff(file) : std::vector<std::byte>();
+    const std::span bytes = mended.empty() ? file : std::span<const std::byte>(mended);
+    OIIO::Filesystem::IOMemReader reader(const_cast<std::byte*>(bytes.data()), bytes.size());
+    std::unique_ptr<MemoryFile> memory;
     OIIO::ImageSpec spec;
     bool opened = false;
     if (input->supports("ioproxy")) {
@@ -166,8 +166,8 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
         config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
         opened = input->open("image." + format, spec, config);
     } else {
-        file = std::make_unique<MemoryFile>(request.bytes, request.size);
-        opened = input->open(file->path(), spec, config);
+        memory = std::make_unique<MemoryFile>(bytes.data(), bytes.size());
+        opened = input->open(memory->path(), spec, config);
     }
     if (!opened) failWith(input->geterror(), "the image cannot be opened");
     if (spec.deep) throw Failed{ErrorCode::unsupported, "deep images are not supported"};
@@ -199,36 +199,29 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     header.displayWidth = spec.full_width;
     header.displayHeight = spec.full_height;
     header.linear = header.bits == 32;
-    header.premultiplied =
-        spec.alpha_channel >= 0 && spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+    header.premultiplied = spec.alpha_channel >= 0 && format != "bmp" &&
+                           spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
     header.channelNames = names.data();
+    const BmpPixel pixel =
+        format == "bmp" && spec.nchannels == 4 && header.bits == 8 ? bmpPixelOf(file) : BmpPixel{};
+    if (pixel.channels != 0) header.channels = pixel.channels;
     if (spec.depth > 1) throw Failed{ErrorCode::unsupported, "volume images are not supported"};
 
     void* values = request.allocate(request.context, header, failure);
     if (!values) throw Failed{static_cast<ErrorCode>(failure.code), failure.message};
-    if (!input->read_image(0, 0, 0, spec.nchannels, type, values))
+    std::vector<std::uint8_t> whole;  // all four bytes of a BMP's pixels
+    if (pixel.channels != 0)
+        whole.resize(static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) *
+                     4);
+    const TiffErrors tiffErrors;
+    if (!input->read_image(0, 0, 0, spec.nchannels, type, whole.empty() ? values : whole.data()))
         failWith(input->geterror(), "the pixels cannot be decoded");
+    // It paints black what it cannot decode, and says nothing.
+    if (!tiffErrors.first().empty())
+        throw Failed{ErrorCode::invalidInput,
+                     fmt::format("the TIFF is damaged: {}", tiffErrors.first())};
     input->close();
-}
-
-[[noreturn]] void cannotWrite(const std::string& reason) {
-    throw Failed{ErrorCode::io, reason.empty() ? "the picture cannot be written" : reason};
-}
-
-/// OpenImageIO's own writer loses something at every quality.
-void encodeWebp(const EncodeRequest& request) {
-    std::uint8_t* bytes = nullptr;
-    const int stride = request.width * request.channels;
-    const std::size_t size =
-        request.channels == 4
-            ? WebPEncodeLosslessRGBA(request.values, request.width, request.height, stride, &bytes)
-            : WebPEncodeLosslessRGB(request.values, request.width, request.height, stride, &bytes);
-    const std::unique_ptr<std::uint8_t, void (*)(void*)> owner(bytes, &WebPFree);
-    if (size == 0) throw Failed{ErrorCode::failed, "the picture cannot be coded as WebP"};
-    std::FILE* file = std::fopen(request.path, "wb");
-    if (!file) cannotWrite("the file cannot be opened");
-    const bool written = std::fwrite(bytes, 1, size, file) == size;
-    if (std::fclose(file) != 0 || !written) cannotWrite("the file cannot be written");
+    if (!whole.empty()) pixel.take(whole, static_cast<std::uint8_t*>(values));
 }
 
 void encodeOrThrow(const EncodeRequest& request) {

@@ -1,20 +1,40 @@
 #include "formats/mpeg4/text/scene_text.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 #include "formats/mpeg4/text/text_values.hpp"
 
 namespace stx::mpeg4 {
 namespace {
 
+/// In the order of the text: each at its time would move all that are later, once for each command.
 template <class Frame, class Item>
 void addTo(std::vector<Frame>& frames, std::uint64_t time, Item item) {
-    auto at = frames.end();
-    while (at != frames.begin() && (at - 1)->time > time) --at;
-    if (at == frames.begin() || (at - 1)->time != time) {
+    if (frames.empty() || frames.back().time != time) {
         Frame frame;
         frame.time = time;
-        at = frames.insert(at, std::move(frame)) + 1;
+        frames.push_back(std::move(frame));
     }
-    (at - 1)->commands.push_back(std::move(item));
+    frames.back().commands.push_back(std::move(item));
+}
+
+/// In the order of time; what the text says of one moment at several places is one frame.
+template <class Frame>
+void sortFrames(std::vector<Frame>& frames) {
+    std::stable_sort(frames.begin(), frames.end(),
+                     [](const Frame& a, const Frame& b) { return a.time < b.time; });
+    std::size_t kept = 0;
+    for (std::size_t i = 1; i < frames.size(); ++i) {
+        Frame &last = frames[kept], &next = frames[i];
+        if (last.time != next.time) {
+            if (++kept != i) frames[kept] = std::move(next);
+            continue;
+        }
+        std::move(next.commands.begin(), next.commands.end(), std::back_inserter(last.commands));
+        last.randomAccess = last.randomAccess || next.randomAccess;
+    }
+    if (!frames.empty()) frames.resize(kept + 1);
 }
 
 }  // namespace
@@ -70,6 +90,8 @@ Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view ow
 
 Result<void> finishDocument(Document& document, NodeNames& names) {
     STX_CHECK(names.resolve());
+    sortFrames(document.frames);
+    sortFrames(document.odFrames);
     for (CommandFrame& frame : document.frames)
         for (Command& command : frame.commands)
             if (auto* replace = std::get_if<ReplaceScene>(&command))

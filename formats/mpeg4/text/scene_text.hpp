@@ -30,20 +30,18 @@ enum class FieldUse { in, out };
 [[nodiscard]] Result<void> checkNodePlace(const Node* child, Ndt expected, std::string_view owner,
                                           std::string_view fieldName, const std::string& where);
 
-/// The commands at a time, and a mark on them as a place where a reader may begin.
+/// The commands at the time that the text is at, and a mark on them as a place where a reader may
+/// begin.
 template <class Frame>
 [[nodiscard]] std::size_t commandsAt(const std::vector<Frame>& frames, std::uint64_t time) {
-    for (const Frame& frame : frames)
-        if (frame.time == time) return frame.commands.size();
-    return 0;
+    return frames.empty() || frames.back().time != time ? 0 : frames.back().commands.size();
 }
 template <class Frame>
 void markRandomAccess(std::vector<Frame>& frames, std::uint64_t time) {
-    for (Frame& frame : frames)
-        if (frame.time == time) frame.randomAccess = true;
+    if (!frames.empty() && frames.back().time == time) frames.back().randomAccess = true;
 }
 
-/// What every text ends with: names resolved, streams and ids filled in as writers need them.
+/// Frames in the order of time, names resolved, streams and ids filled in as writers need them.
 [[nodiscard]] Result<void> finishDocument(Document& document, NodeNames& names);
 
 /// The DEF names that a writer gives: each node that has a name or id, or needs one, has one, and

@@ -9,6 +9,7 @@
 #include "formats/mpeg4/text/text_descriptors.hpp"
 #include "formats/mpeg4/text/text_reader.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
+#include "formats/mpeg4/text/xml_checks.hpp"
 #include "formats/mpeg4/text/xmt.hpp"
 #include "formats/mpeg4/text/xmt_lines.hpp"
 
@@ -38,6 +39,15 @@ class XmtReader : private TextReader {
         if (!parsed)
             return failAt(lines_.at(fileName_, parsed.offset), ErrorCode::invalidInput,
                           "not well-formed XML: {}", parsed.description());
+        if (const auto bad = findBadReference(text_))
+            return failAt(lines_.at(fileName_, static_cast<std::ptrdiff_t>(bad->offset)),
+                          ErrorCode::invalidInput,
+                          "not well-formed XML: '{}' stands for no character", excerpt(bad->text));
+        std::string twice;
+        if (const xml_node node = findDoubleAttribute(xml_, twice))
+            return failAt(where(node), ErrorCode::invalidInput,
+                          "not well-formed XML: <{}> has the attribute '{}' twice",
+                          excerpt(node.name()), excerpt(twice));
         const xml_node root = xml_.document_element();
         if (localName(root) != "XMT-A")
             return failAt(where(root), ErrorCode::invalidInput,

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <random>
 
+#include "formats/images/damage.hpp"
 #include "formats/images/images.hpp"
 
 namespace stx {
@@ -79,6 +81,75 @@ TEST(JpegReader, CutOffFilesAreErrors) {
     EXPECT_EQ(half.error().message,
               fmt::format("the JPEG ends at byte {} before its last pixels; it is cut off",
                           baseline.size() - 100));
+}
+
+/// A baseline file of noise, 200x120.
+Bytes noisyJpeg() {
+    std::mt19937 random(3);
+    std::vector<std::uint8_t> values(200 * 120 * 3);
+    for (auto& v : values) v = static_cast<std::uint8_t>(random());
+    return encodeJpeg(200, 120, 3, values.data(), 80).value();
+}
+
+/// Files whose middle lacks or says nothing. The library paints over it, and only warns.
+std::vector<std::pair<std::string, Bytes>> damagedJpegs() {
+    std::vector<std::pair<std::string, Bytes>> damaged;
+    const auto with = [&](const std::string& name, const Bytes& whole) {
+        const auto at = [&](std::size_t part) {
+            return static_cast<std::ptrdiff_t>(whole.size() * part / 8);
+        };
+        Bytes zeroed = whole, cut = whole, ended = whole;
+        std::fill(zeroed.begin() + at(4), zeroed.begin() + at(7), std::byte{0});
+        cut.erase(cut.begin() + at(4), cut.begin() + at(7));
+        ended[static_cast<std::size_t>(at(5))] = std::byte{0xff};
+        ended[static_cast<std::size_t>(at(5)) + 1] = std::byte{0xd9};
+        damaged.emplace_back(name + " zeroed", zeroed);
+        damaged.emplace_back(name + " cut", cut);
+        damaged.emplace_back(name + " ended", ended);
+    };
+    with("noise", noisyJpeg());
+    // The first scans alone, with an end marker.
+    const auto progressive = sample("progressive.jpg");
+    std::size_t scan = find(progressive, 0xda);
+    for (int i = 0; i < 2; ++i) scan = find(progressive, 0xda, scan + 2);
+    Bytes first(progressive.begin(), progressive.begin() + static_cast<std::ptrdiff_t>(scan));
+    first.insert(first.end(), {std::byte{0xff}, std::byte{0xd9}});
+    damaged.emplace_back("first scans", first);
+    return damaged;
+}
+
+TEST(JpegReader, DamagedFilesAreErrors) {
+    EXPECT_TRUE(decodeImage(noisyJpeg(), "a.jpg", Limits()));
+    for (const auto& [name, bytes] : damagedJpegs()) {
+        const auto image = decodeImage(bytes, "a.jpg", Limits());
+        ASSERT_FALSE(image) << name;
+        EXPECT_EQ(image.error().code, ErrorCode::invalidInput) << name;
+        EXPECT_NE(image.error().text().find("damaged: "), std::string::npos)
+            << image.error().text();
+        EXPECT_FALSE(decodeRgba8(bytes, "a.jpg", Limits())) << name;
+    }
+}
+
+TEST(JpegReader, DamagedFilesAreKeptOnRequestAndNoted) {
+    for (const auto& [name, bytes] : damagedJpegs()) {
+        std::vector<std::string> notes;
+        const KeepDamaged keep([&](std::string note) { notes.push_back(std::move(note)); });
+        const auto image = decodeImage(bytes, "a.jpg", Limits());
+        ASSERT_TRUE(image) << name << ": " << image.error().text();
+        ASSERT_EQ(notes.size(), 1u) << name;
+        EXPECT_TRUE(notes[0].starts_with("'a.jpg': the JPEG is damaged (")) << notes[0];
+        EXPECT_TRUE(decodeRgba8(bytes, "a.jpg", Limits()));
+        EXPECT_FALSE(decodeImage(ByteSpan(bytes).first(40), "a.jpg", Limits()));  // no pixel yet
+        (void)decodeImage(sample("baseline.jpg"), "b.jpg", Limits());
+        EXPECT_EQ(notes.size(), 2u) << "of whole files nothing is said";
+    }
+}
+
+/// "1 extraneous bytes before marker 0xd9", as some cameras write.
+TEST(JpegReader, AByteOfPaddingBeforeTheEndIsNoDamage) {
+    auto bytes = noisyJpeg();
+    bytes.insert(bytes.end() - 2, std::byte{0});
+    EXPECT_TRUE(decodeImage(bytes, "a.jpg", Limits()));
 }
 
 TEST(JpegReader, TwelveBitsAreRefused) {

@@ -323,15 +323,50 @@ TEST(Xmt, RefusesWhatIsNoXmt) {
     EXPECT_NE(xmtErrorOf(body(deep)).find("nest deeper"), std::string::npos);
 }
 
-TEST(Xmt, EntitiesAreNeverExpanded) {
-    std::string lol =
-        "<?xml version=\"1.0\"?><!DOCTYPE x [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;\">"
-        "<!ENTITY f SYSTEM \"file:///etc/passwd\">]>"
-        "<XMT-A><Body><Replace><Scene><Group><children><WorldInfo title=\"&b;&f;&amp;\"/>"
-        "</children></Group></Scene></Replace></Body></XMT-A>";
-    const Document d = mustReadXmt(lol);
+TEST(Xmt, ReferencesThatStandForNothingAreErrors) {
+    const auto titled = [](const std::string& title) {
+        return "<?xml version=\"1.0\"?><!DOCTYPE x [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b "
+               "\"&a;&a;&a;\"><!ENTITY f SYSTEM \"file:///etc/passwd\">]><!-- &none; -->"
+               "<XMT-A><Body><Replace><Scene><Group><children><WorldInfo title=\"" +
+               title + "\"/></children></Group></Scene></Replace></Body></XMT-A>";
+    };
+    // Entities are never expanded, not even those that the file declares.
+    for (const char* title : {"&b;", "&f;", "a &#0; b", "&#xd800;", "&#x110000;", "&#12a;"})
+        EXPECT_NE(xmtErrorOf(titled(title)).find("stands for no character"), std::string::npos)
+            << title;
+    // A & that begins no reference is one.
+    const Document d = mustReadXmt(titled("&amp;&lt;&#65;&#x42; R&D & co"));
     ASSERT_TRUE(rootOf(d));
-    EXPECT_EQ(child(rootOf(d), 0)->get<std::string>("title"), "&b;&f;&");
+    EXPECT_EQ(child(rootOf(d), 0)->get<std::string>("title"), "&<AB R&D & co");
+}
+
+TEST(Xmt, AnAttributeThatIsThereTwiceIsAnError) {
+    const std::string xmt =
+        "<XMT-A><Body><Replace><Scene><Group><children><DepthImage nearPlane=\"1\" farPlane=\"9\" "
+        "nearPlane=\"2\"/></children></Group></Scene></Replace></Body></XMT-A>";
+    EXPECT_NE(xmtErrorOf(xmt).find("<DepthImage> has the attribute 'nearPlane' twice"),
+              std::string::npos)
+        << xmtErrorOf(xmt);
+}
+
+/// Two hundred thousand moments, the last one first.
+TEST(Bt, MomentsAreReadInAnyOrderInTheTimeThatTheyTake) {
+    std::string text = "Group { children [ DEF T Transform { } ] }\n";
+    constexpr int kCount = 200'000;
+    for (int i = kCount; i > 0; --i)
+        text += fmt::format("{}AT {} {{ REPLACE T.translation BY {} 0 0 }}\n", i % 2 ? "RAP " : "",
+                            i * 10, i);
+    // Of one moment in two places.
+    text += "AT 10 { REPLACE T.scale BY 2 2 2 }\n";
+    Job job;
+    const auto d = readBt(text, "a.bt", job);
+    ASSERT_TRUE(d) << d.error().text();
+    ASSERT_EQ(d->frames.size(), kCount + 1u);
+    for (std::size_t i = 1; i < d->frames.size(); ++i) {
+        ASSERT_EQ(d->frames[i].time, i * 10);
+        ASSERT_EQ(d->frames[i].randomAccess, i % 2 == 1);
+    }
+    EXPECT_EQ(d->frames[1].commands.size(), 2u);
 }
 
 TEST(Xmt, StringIdsOfDescriptorsWin) {

@@ -89,6 +89,28 @@ TEST(Stx, ConvertsAtlasToItsViews) {
     EXPECT_NEAR(glm::distance(fromAtlas.max, fromBundle.max), 0, 1e-9);
 }
 
+TEST(Stx, WhatIsNotSoundIsRefused) {
+    Job job;
+    Bundle wrong = smallBundle(2, 8, false, false);
+    wrong.views[1].camera.width += 1;
+    const auto converted = convert(Model(wrong), {}, job);
+    ASSERT_FALSE(converted);
+    EXPECT_EQ(converted.error().code, ErrorCode::invalidInput);
+
+    const auto still = sequenceOf(smallBundle(1, 8, false, false));
+    EXPECT_TRUE(still->frame(0, job));
+    const auto beyond = still->frame(99, job);
+    ASSERT_FALSE(beyond);
+    EXPECT_EQ(beyond.error().code, ErrorCode::usage);
+
+    auto atlas = pack(smallBundle(2, 16, false, false), {}, job);
+    ASSERT_TRUE(atlas);
+    atlas->bounds.reset();
+    EXPECT_FALSE(boundsOf(Model(*atlas)).empty());
+    atlas->pages.clear();
+    EXPECT_TRUE(boundsOf(Model(*atlas)).empty());
+}
+
 TEST(Stx, NotesWhatDepthInEightBitsCosts) {
     Job job;
     ConvertSettings settings;

@@ -123,6 +123,18 @@ std::map<int, std::function<Document()>> brokenDocuments() {
         d.frames.push_back(
             {1, {DeleteIndexed{rootOf(d), rootOf(d)->info->find("children"), Position{77}}}});
     });
+    broken[2032] = [] {
+        Job job;
+        auto document = readBt(
+            "Group { children [ DepthImage { orthographic FALSE diTexture SimpleTexture { texture "
+            "DEF "
+            "P PixelTexture { image 1 1 3 0xFFFFFF } depth PixelTexture { image 1 1 1 200 } } } ] "
+            "} "
+            "AT 100 { REPLACE P.image BY 2 1 3 0 0 }",
+            "test.bt", job);
+        if (!document) ADD_FAILURE() << document.error().text();
+        return document ? std::move(*document) : Document();
+    };
     const auto text = [&broken](int number, const std::string& nodes) {
         broken[number] = [nodes] { return fromText(nodes); };
     };

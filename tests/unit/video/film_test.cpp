@@ -315,5 +315,25 @@ TEST(Films, MemoryIsBounded) {
     }
 }
 
+/// The data reference of a film that names another file: what lies here is not its data.
+TEST(Film, DataInAnotherFileAreNotReadFromThisOne) {
+    REQUIRE_VIDEO();
+    const TemporaryFolder folder;
+    films::ffmpeg(folder.path(),
+                  "-f lavfi -i testsrc=size=48x32:rate=10:duration=1 -pix_fmt yuv420p a.mp4");
+    auto bytes = readFile(folder / "a.mp4", Limits());
+    ASSERT_TRUE(bytes);
+    ASSERT_TRUE(Film::open(folder / "a.mp4", {}));
+    const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    const auto url = text.find("url ");
+    ASSERT_NE(url, text.npos);
+    (*bytes)[url + 7] = std::byte{0};  // its flags: no longer "in this file"
+    ASSERT_TRUE(writeFile(folder / "b.mp4", *bytes));
+    const auto film = Film::open(folder / "b.mp4", {});
+    ASSERT_FALSE(film);
+    EXPECT_EQ(film.error().code, ErrorCode::unsupported);
+    EXPECT_NE(film.error().text().find("in another file"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace stx

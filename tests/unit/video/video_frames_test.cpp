@@ -92,13 +92,37 @@ TEST(VideoFrames, SeveralSequencesInAFolderAreAQuestion) {
     EXPECT_TRUE(has(errorOf({empty.path()}, ErrorCode::invalidInput), "no numbered pictures"));
 }
 
+TEST(VideoFrames, TheFrameBeforeADamagedOneStandsForIt) {
+    TemporaryFolder folder;
+    writeText(folder / "f1.png", "damaged");
+    for (const int k : {2, 3, 5}) writePng(folder / fmt::format("f{}.png", k), ramp(8, 6, k));
+    writeText(folder / "f4.png", "\x89PNG\r\n\x1a\n and then nothing");
+    Job job;
+    {
+        const auto frames = openVideoFrames({folder.path()}, job);
+        ASSERT_TRUE(frames) << frames.error().text();
+        ASSERT_EQ((*frames)->count(), 5);
+        const int shown[] = {2, 2, 3, 3, 5};  // before the first there is the one after
+        for (int k = 0; k < 5; ++k) {
+            const auto frame = (*frames)->frame(k);
+            ASSERT_TRUE(frame) << frame.error().text();
+            EXPECT_EQ((*frame)->at(0, 0).r, 40 + shown[k]);
+        }
+    }
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_TRUE(has(notes[0], "2 of 5 frames cannot be used, and the frame before stands for each"))
+        << notes[0];
+    EXPECT_FALSE(openVideoFrames({folder.path()}, job, true));
+}
+
 TEST(VideoFrames, ASizeThatChangesAndABrokenPictureAreNamed) {
     TemporaryFolder folder;
     writePng(folder / "f1.png", ramp(8, 6));
     writePng(folder / "f2.png", ramp(6, 8));
     writeText(folder / "f3.png", "\x89PNG\r\n\x1a\n and then nothing");
     Job job;
-    const auto frames = openVideoFrames({folder.path()}, job);
+    const auto frames = openVideoFrames({folder.path()}, job, true);
     ASSERT_TRUE(frames);
     const auto other = (*frames)->frame(1);
     ASSERT_FALSE(other);

@@ -1,0 +1,147 @@
+#include "formats/images/oiio/tiff.hpp"
+
+#include <tiffio.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdarg>
+#include <cstdint>
+#include <cstdio>
+#include <string_view>
+
+namespace stx::codecs {
+namespace {
+
+struct Kept {
+    std::string first;
+    TIFFErrorHandler outerError = nullptr, outerWarning = nullptr;
+};
+
+Kept& kept() {
+    static Kept one;
+    return one;
+}
+
+void keep(const char* format, std::va_list values) {
+    if (!kept().first.empty()) return;
+    std::array<char, 512> text{};
+    std::vsnprintf(text.data(), text.size(), format, values);
+    kept().first = text.data();
+}
+
+void onError(const char* module, const char* format, std::va_list values) {
+    std::va_list again;
+    va_copy(again, values);
+    keep(format, again);
+    va_end(again);
+    if (kept().outerError) kept().outerError(module, format, values);
+}
+
+/// The decoders of JPEG and fax warn of pixels that they made up.
+void onWarning(const char* module, const char* format, std::va_list values) {
+    const std::string_view from = module ? module : "";
+    const bool madeUp = from == "JPEGLib" ||
+                        std::string_view(format).find("Premature EOF") != std::string_view::npos;
+    std::va_list again;
+    va_copy(again, values);
+    if (madeUp) keep(format, again);
+    va_end(again);
+    if (kept().outerWarning) kept().outerWarning(module, format, values);
+}
+
+/// Numbers of a TIFF of either order of bytes; 0 past the end.
+class Numbers {
+  public:
+    explicit Numbers(std::span<const std::byte> file)
+        : file_(file), little_(!file.empty() && file[0] == std::byte{'I'}) {}
+    [[nodiscard]] std::uint64_t at(std::uint64_t offset, std::size_t bytes) const {
+        std::uint64_t value = 0;
+        for (std::size_t i = 0; i < bytes; ++i) {
+            const std::uint64_t from = offset + (little_ ? bytes - 1 - i : i);
+            value = value << 8 |
+                    (from < file_.size() ? std::to_integer<std::uint64_t>(file_[from]) : 0u);
+        }
+        return value;
+    }
+    void write(std::byte* to, std::uint64_t value, std::size_t bytes) const {
+        for (std::size_t i = 0; i < bytes; ++i)
+            to[i] = static_cast<std::byte>(value >> 8 * (little_ ? i : bytes - 1 - i));
+    }
+
+  private:
+    std::span<const std::byte> file_;
+    bool little_;
+};
+
+/// Sizes of what a directory is made of, in bytes.
+struct DirectoryLayout {
+    std::size_t start, count, entry, offset;  ///< of its place in the header, of its fields
+};
+constexpr DirectoryLayout kClassic = {4, 2, 12, 4}, kBig = {8, 8, 20, 8};
+
+}  // namespace
+
+TiffErrors::TiffErrors() {
+    kept().first.clear();
+    kept().outerError = TIFFSetErrorHandler(onError);
+    kept().outerWarning = TIFFSetWarningHandler(onWarning);
+}
+
+TiffErrors::~TiffErrors() {
+    TIFFSetErrorHandler(kept().outerError);
+    TIFFSetWarningHandler(kept().outerWarning);
+}
+
+const std::string& TiffErrors::first() {
+    return kept().first;
+}
+
+std::vector<std::byte> mendedTiff(std::span<const std::byte> file) {
+    constexpr std::uint64_t kBitsPerSample = 258, kCompression = 259, kSamplesPerPixel = 277;
+    constexpr std::uint64_t kShort = 3, kAdobeDeflate = 8, kDeflate = 32946;
+    const Numbers numbers(file);
+    const std::uint64_t version = numbers.at(2, 2);
+    if (version != 42 && version != 43) return {};
+    const DirectoryLayout& layout = version == 42 ? kClassic : kBig;
+    const std::uint64_t directory = numbers.at(layout.start, layout.offset);
+    const std::uint64_t count = numbers.at(directory, layout.count);
+    if (directory > file.size() || count == 0 || count > file.size() / layout.entry) return {};
+    const std::uint64_t first = directory + layout.count, end = first + count * layout.entry;
+    const std::size_t valueAt = 4 + layout.offset;  // in an entry, behind tag, type and count
+    if (end + layout.offset > file.size() || file.size() > 0xffff0000u) return {};
+    std::uint64_t before = 0, deflated = 0;  // entries of smaller tags, which are in order
+    bool hasBits = false, several = false;
+    for (std::uint64_t i = 0; i < count; ++i) {
+        const std::uint64_t entry = first + i * layout.entry;
+        const std::uint64_t tag = numbers.at(entry, 2), value = numbers.at(entry + valueAt, 2);
+        hasBits = hasBits || tag == kBitsPerSample;
+        // Of several samples the tag would be a list; nobody leaves that out.
+        several = several || (tag == kSamplesPerPixel && value != 1);
+        if (tag == kCompression && value == kAdobeDeflate) deflated = entry + valueAt;
+        if (tag < kBitsPerSample) before = i + 1;
+    }
+    const bool addBits = !hasBits && !several;
+    if (!addBits && deflated == 0) return {};
+    std::vector<std::byte> mended(file.begin(), file.end());
+    if (deflated != 0) numbers.write(mended.data() + deflated, kDeflate, 2);
+    if (!addBits) return mended;
+    // The directory is written anew behind the rest, to which its entries go on pointing.
+    const std::vector<std::byte> old(
+        mended.begin() + static_cast<std::ptrdiff_t>(directory),
+        mended.begin() + static_cast<std::ptrdiff_t>(end + layout.offset));
+    const std::size_t at = file.size() + file.size() % 2;
+    mended.resize(at + old.size() + layout.entry);
+    numbers.write(mended.data() + layout.start, at, layout.offset);
+    std::byte* const to = mended.data() + at;
+    const std::size_t upTo = layout.count + before * layout.entry;
+    std::copy(old.begin(), old.begin() + static_cast<std::ptrdiff_t>(upTo), to);
+    std::copy(old.begin() + static_cast<std::ptrdiff_t>(upTo), old.end(), to + upTo + layout.entry);
+    numbers.write(to, count + 1, layout.count);
+    numbers.write(to + upTo, kBitsPerSample, 2);
+    numbers.write(to + upTo + 2, kShort, 2);
+    numbers.write(to + upTo + 4, 1, layout.offset);
+    numbers.write(to + upTo + valueAt, 1, 2);
+    return mended;
+}
+
+}  // namespace stx::codecs

@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""Standard streams that are closed or cannot be written, and a system that gives no threads: the work goes
+on, or ends with an exit code and a message, and never by a signal."""
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+
+import harness
+
+
+def run(command, cwd, closed=(), stderr=None, stdout=None, processes=None):
+    def before():
+        for stream in closed:
+            os.close(stream)
+        if processes is not None:
+            if os.geteuid() == 0:  # root is not counted
+                os.setgid(65534)
+                os.setuid(65534)
+            resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
+
+    return subprocess.run(command, cwd=cwd, stdin=subprocess.DEVNULL, stdout=stdout or subprocess.PIPE,
+                          stderr=stderr or subprocess.PIPE, preexec_fn=before, timeout=120)
+
+
+def main():
+    args = harness.arguments(__doc__)
+    wrong = []
+
+    def expect(name, done, code):
+        if done.returncode != code:
+            wrong.append(f"{name}: exit code {done.returncode} instead of {code}: {done.stderr}")
+
+    with tempfile.TemporaryDirectory() as folder, open("/dev/full", "wb") as full:
+        os.chmod(folder, 0o777)
+        model = harness.quad(folder)
+        convert = [args.stx, "convert", model, "--views", "ring:2", "--size", "24x24", "-o"]
+        video = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../fuzz/corpus/y4m/420jpeg.y4m")
+
+        expect("error on a full disk", run([args.stx, "info", "none"], folder, stderr=full), 2)
+        expect("error without stderr", run([args.stx, "info", "none"], folder, closed=[2]), 2)
+        expect("work without stderr", run(convert + ["a.mp4"], folder, closed=[2]), 0)
+        expect("work without any stream", run(convert + ["b.mp4"], folder, closed=[0, 1, 2]), 0)
+        for name in ("a.mp4", "b.mp4"):
+            expect(f"validate {name}", run([args.stx, "validate", name], folder), 0)
+        gone, pipe = os.pipe()
+        os.close(gone)
+        expect("error into a closed pipe", run([args.stx, "info", "none"], folder, stderr=pipe), 2)
+        for words in (["--help"], ["--version"], ["convert", "--help"], ["info", model]):
+            expect(f"{words} on a full disk", run([args.stx] + words, folder, stdout=full), 2)
+            expect(f"{words} without stdout", run([args.stx] + words, folder, closed=[1]), 2)
+        # What is opened first does not become stdin.
+        expect("film without stdin", run([args.stx, "background", video, "-o", "c.png"], folder, closed=[0]), 0)
+
+        harness.write(os.path.join(folder, "list"), "quad.obj\nnone.obj\n")
+        batch = [args.stx, "convert", "@list", "-o", "batch_{stem}.mp4", "--views", "ring:2", "--size", "24x24",
+                 "--keep-going", "--report", "batch.jsonl"]
+        for name, stream in (("full", full), ("pipe", pipe)):
+            expect(f"batch, {name}", run(batch, folder, stderr=stream), 2)
+            for output in ("batch_quad.mp4", "batch.jsonl"):
+                path = os.path.join(folder, output)
+                if not os.path.exists(path):
+                    wrong.append(f"batch, {name}: no {output}")
+                else:
+                    os.remove(path)
+
+        # With no threads, or a few only.
+        for processes in (0, 1, 2, 3):
+            done = run(convert + [f"t{processes}.mp4", "--threads", "4"], folder, processes=processes)
+            if done.returncode not in (0, 4) or (processes == 0 and done.returncode != 0):
+                wrong.append(f"{processes} processes: exit code {done.returncode}: {done.stderr}")
+            done = run([args.stx, "render", "a.mp4", "--orbit", "3", "--size", "24x24", "--backend", "cpu", "-o", "p_%d.png"],
+                       folder, processes=processes)
+            if done.returncode not in (0, 4):
+                wrong.append(f"{processes} processes, sequence: exit code {done.returncode}: {done.stderr}")
+    print("\n".join(wrong))
+    sys.exit(1 if wrong else 0)
+
+
+if __name__ == "__main__":
+    main()

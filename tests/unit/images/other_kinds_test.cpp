@@ -1,0 +1,191 @@
+// TIFF, BMP and WebP: what OpenImageIO reads wrong, or paints black without a word.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <random>
+#include <string_view>
+#include <vector>
+
+#include "formats/files/deflate.hpp"
+#include "formats/images/codec_module.hpp"
+#include "formats/images/images.hpp"
+#include "tests/temporary_folder.hpp"
+
+namespace stx {
+namespace {
+
+void append(Bytes& to, std::uint32_t value, int bytes) {
+    for (int i = 0; i < bytes; ++i) to.push_back(static_cast<std::byte>(value >> (8 * i)));
+}
+
+struct Tag {
+    std::uint32_t tag, value;
+    int type = 3;
+};
+
+constexpr std::uint32_t kWidth = 40, kHeight = 30;
+
+/// A little-endian TIFF of one strip, which lies at byte 8.
+Bytes tiffOf(const Bytes& strip, std::vector<Tag> tags) {
+    Bytes file;
+    append(file, 0x2a4949, 4);
+    append(file, static_cast<std::uint32_t>(8 + strip.size()), 4);
+    file.insert(file.end(), strip.begin(), strip.end());
+    append(file, static_cast<std::uint32_t>(tags.size()), 2);
+    for (const auto& tag : tags) {
+        append(file, tag.tag, 2);
+        append(file, static_cast<std::uint32_t>(tag.type), 2);
+        append(file, 1, 4);
+        append(file, tag.value, 4);
+    }
+    append(file, 0, 4);
+    return file;
+}
+
+Bytes greyTiff(const Bytes& strip, std::uint32_t compression, std::uint32_t offset = 8) {
+    return tiffOf(strip, {{256, kWidth},
+                          {257, kHeight},
+                          {258, 8},
+                          {259, compression},
+                          {262, 1},
+                          {273, offset, 4},
+                          {277, 1},
+                          {278, kHeight},
+                          {279, static_cast<std::uint32_t>(strip.size()), 4}});
+}
+
+Bytes noise(std::size_t size) {
+    std::mt19937 random(5);
+    Bytes bytes(size);
+    for (auto& b : bytes) b = static_cast<std::byte>(random());
+    return bytes;
+}
+
+void expectDamaged(const Bytes& bytes, const char* what) {
+    const auto image = decodeImage(bytes, "a.tif", Limits());
+    ASSERT_FALSE(image) << what;
+    EXPECT_EQ(image.error().code, ErrorCode::invalidInput) << what;
+}
+
+TEST(Tiff, PixelsThatAreNotThereAreErrors) {
+    const Bytes pixels = noise(kWidth * kHeight);
+    const auto whole = decodeImage(greyTiff(pixels, 1), "a.tif", Limits());
+    ASSERT_TRUE(whole) << whole.error().text();
+    EXPECT_EQ(std::get<0>(whole->values)[77], std::to_integer<std::uint8_t>(pixels[77]));
+    expectDamaged(greyTiff(pixels, 1, 0xffffffff), "strip past the end");
+    expectDamaged(greyTiff({pixels.begin(), pixels.begin() + 500}, 1), "half a strip");
+    expectDamaged(greyTiff(pixels, 5), "garbage under LZW");
+    expectDamaged(greyTiff(pixels, 7), "garbage under JPEG");
+    expectDamaged(greyTiff(pixels, 8), "garbage under deflate");
+    Bytes packed(zlibBound(pixels.size()));
+    packed.resize(compressZlib(pixels, 6, packed));
+    const auto deflated = decodeImage(greyTiff(packed, 8), "a.tif", Limits());
+    ASSERT_TRUE(deflated) << deflated.error().text();
+    EXPECT_EQ(deflated->values, whole->values);
+}
+
+/// Without BitsPerSample it is 1, as Pillow writes masks.
+TEST(Tiff, OneBitIsWhatATiffHasWithoutATag) {
+    Bytes strip(kWidth / 8 * kHeight);
+    for (std::size_t i = 0; i < strip.size(); ++i) strip[i] = std::byte{0xa7};
+    for (const std::uint32_t zeroIs : {0u, 1u}) {  // white, black
+        const auto image =
+            decodeImage(tiffOf(strip, {{256, kWidth},
+                                       {257, kHeight},
+                                       {259, 1},
+                                       {262, zeroIs},
+                                       {273, 8, 4},
+                                       {278, kHeight},
+                                       {279, static_cast<std::uint32_t>(strip.size()), 4}}),
+                        "mask.tif", Limits());
+        ASSERT_TRUE(image) << image.error().text();
+        ASSERT_EQ(image->channels, 1);
+        const auto& values = std::get<0>(image->values);
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const bool bit = 0xa7u >> (7 - i % 8) & 1u;
+            ASSERT_EQ(values[i], bit == (zeroIs == 1) ? 255 : 0) << i;
+        }
+    }
+}
+
+/// Two rows of pixels whose bytes are 1, 2, 3, 4, 5, ...; `masks` of a BITMAPV4HEADER.
+Bytes bmpOf(const std::vector<std::uint32_t>& masks) {
+    const bool v4 = masks.size() == 4;
+    const std::uint32_t header = v4 ? 108 : 40;
+    const auto start = 14 + header + (masks.size() == 3 ? 12u : 0u);
+    Bytes file = {std::byte{'B'}, std::byte{'M'}};
+    append(file, start + 32, 4);
+    append(file, 0, 4);
+    append(file, start, 4);
+    append(file, header, 4);
+    append(file, 4, 4);
+    append(file, static_cast<std::uint32_t>(-2), 4);  // the first row is on top
+    append(file, 1, 2);
+    append(file, 32, 2);
+    append(file, masks.empty() ? 0 : 3, 4);
+    append(file, 32, 4);
+    for (int i = 0; i < 4; ++i) append(file, 0, 4);
+    for (const auto mask : masks) append(file, mask, 4);
+    file.resize(start);
+    for (std::uint32_t i = 1; i <= 32; ++i) append(file, i, 1);
+    return file;
+}
+
+std::vector<std::uint8_t> firstPixelOf(const Bytes& bytes) {
+    const auto image = decodeImage(bytes, "a.bmp", Limits());
+    EXPECT_TRUE(image) << image.error().text();
+    if (!image) return {};
+    EXPECT_FALSE(image->premultiplied);
+    const auto& values = std::get<0>(image->values);
+    EXPECT_EQ(values[static_cast<std::size_t>(image->channels)], values[0] + 4);
+    return {values.begin(), values.begin() + image->channels};
+}
+
+TEST(Bmp, FourBytesAreWhatTheMasksSay) {
+    using Values = std::vector<std::uint8_t>;
+    EXPECT_EQ(firstPixelOf(bmpOf({})), (Values{3, 2, 1}));  // the fourth is padding
+    EXPECT_EQ(firstPixelOf(bmpOf({0xff0000, 0xff00, 0xff})), (Values{3, 2, 1}));
+    EXPECT_EQ(firstPixelOf(bmpOf({0xff, 0xff00, 0xff0000})), (Values{1, 2, 3}));
+    EXPECT_EQ(firstPixelOf(bmpOf({0xff0000, 0xff00, 0xff, 0xff000000})), (Values{3, 2, 1, 4}));
+    EXPECT_EQ(firstPixelOf(bmpOf({0xff000000, 0xff0000, 0xff00, 0xff})), (Values{4, 3, 2, 1}));
+    EXPECT_EQ(firstPixelOf(bmpOf({0xff0000, 0xff00, 0xff, 0})), (Values{3, 2, 1}));
+    const auto odd = decodeImage(bmpOf({0x3ff00000, 0xffc00, 0x3ff, 0}), "a.bmp", Limits());
+    ASSERT_FALSE(odd);
+    EXPECT_EQ(odd.error().code, ErrorCode::unsupported);
+}
+
+/// Colours under thin alpha come back as they are.
+TEST(Webp, AlphaCostsNoColour) {
+    const Bytes pixels = noise(std::size_t{kWidth} * kHeight * 4);
+    const TemporaryFolder folder;
+    const auto path = (folder / "a.webp").string();
+    const auto table = loadCodecs();
+    ASSERT_TRUE(table) << table.error().text();
+    codecs::EncodeRequest request;
+    request.path = path.c_str();
+    request.format = "webp";
+    request.width = kWidth;
+    request.height = kHeight;
+    request.channels = 4;
+    request.values = reinterpret_cast<const std::uint8_t*>(pixels.data());
+    codecs::Failure failure;
+    ASSERT_TRUE((*table)->encode(request, failure)) << failure.message;
+    const auto bytes = readFile(path, Limits());
+    ASSERT_TRUE(bytes);
+    const auto image = decodeImage(*bytes, "a.webp", Limits());
+    ASSERT_TRUE(image) << image.error().text();
+    ASSERT_EQ(image->channels, 4);
+    EXPECT_FALSE(image->premultiplied);
+    const auto& values = std::get<0>(image->values);
+    // Colours of pixels of no alpha are not kept by the coder.
+    for (std::size_t i = 0; i < values.size(); i += 4) {
+        if (values[i + 3] == 0) continue;
+        for (std::size_t c = 0; c < 4; ++c)
+            ASSERT_EQ(values[i + c], std::to_integer<std::uint8_t>(pixels[i + c])) << i;
+    }
+    EXPECT_FALSE(decodeImage(ByteSpan(*bytes).first(bytes->size() / 2), "a.webp", Limits()));
+}
+
+}  // namespace
+}  // namespace stx
