@@ -93,8 +93,7 @@ glm::vec3 colourOf(const Layer<Sample>& layer, float noise) {
     // The mean of the middle half: as steady as a median against what does not belong, with less
     // noise.
     glm::vec3 colour;
-    // (That there are no more than kSamples is said for GCC, which warns of the sort below.)
-    const int used = std::min(count - first, kSamples), cut = used / 4;
+    const int used = count - first, cut = used / 4;
     for (int channel = 0; channel < 3; ++channel) {
         std::array<float, kSamples> sorted{};
         for (int i = 0; i < used; ++i)
