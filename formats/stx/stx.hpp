@@ -179,8 +179,9 @@ struct OrbitSettings {
                                                        const CameraSettings& settings);
 
 /// The renderer of any model, which it keeps: for more than one picture. A mesh is rasterised
-/// itself, on the processor: the truth to compare with. The job must outlive the renderer; backend,
-/// device and errors are those of makeRenderer(), which borrows a bundle or an atlas instead.
+/// itself, on the processor: the truth to compare with. Backend::automatic takes a hardware GPU
+/// when there is one, else cpu; `device` chooses among the GPUs (-1 = the best). The job must
+/// outlive the renderer. Errors: a model that fails check(); unsupported, with what was tried.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> rendererOf(Model model,
                                                            const RenderSettings& settings, Job& job,
                                                            Backend backend = Backend::automatic,

@@ -15,12 +15,14 @@ constexpr float kShadow = 6, kShadowTimes = 6;
 constexpr float kLightShare = 0.25f;
 /// Samples of the best worth are enough by themselves when there are these.
 constexpr int kEnough = 3;
-/// Neighbours within this share of their distance, or this many tolerances, are of one piece.
+/// Neighbours whose distances differ by less than this share, or by less than this many tolerances
+/// of DepthNoise, belong to one piece of surface.
 constexpr float kSurfaceShare = 0.03f, kSurfaceTolerances = 2;
-/// A piece goes on in what is within this share of its distance; along this share of its outline,
-/// it is a part of something that moves.
+/// A piece goes on beyond its outline where a neighbouring pixel had something before its
+/// background at the same distance, within this share. A piece that does so along this share of its
+/// outline is a part of something that moves.
 constexpr float kGhostShare = 0.08f, kGhostOutline = 0.5f;
-/// Of a piece of fewer pixels any part of the outline is enough.
+/// For a piece of fewer pixels than this one place of its outline is enough.
 constexpr std::uint32_t kSpeck = 24;
 /// Fewer pixels than these, which nothing beside them agrees with, are flying ones of the sensor.
 constexpr std::uint32_t kFlying = 4;
@@ -133,7 +135,7 @@ void Vote::decide(const PixelLayers<Sample>& layers, std::size_t pixel, Backgrou
     // Beside edges depth flickers, and where the sensor mostly saw nothing it is not to be trusted.
     float farthest = layer ? layer->q : 0;
     if (!layer) {
-        // The farthest may be the background all the same, only seen too seldom.
+        // The farthest layer may be the background, seen by too few frames to be believed.
         for (const auto& other : layers.layers)
             if (other.count() > 0 && (farthest == 0 || other.q < farthest)) farthest = other.q;
     }
@@ -189,7 +191,8 @@ void dropGhosts(BackgroundModel& model, const InFront& inFront, const DepthNoise
             }
         }
     }
-    // Their outlines against what is farther, and where those go on in front of it.
+    // How long the outline of each piece is, where something farther is beside it, and along how
+    // much of it the piece goes on in what was before that.
     struct Outline {
         std::uint32_t pixels = 0, length = 0, goesOn = 0;
     };

@@ -98,14 +98,16 @@ struct PixelLayers {
     void add(const Measurement& m);
 
   private:
-    /// A layer's place for a surface that none of them is; null when none can be given up.
+    /// Room for a surface that no layer has yet: an empty layer, or the one that is worth least,
+    /// which is forgotten. Null when none may be forgotten.
     [[nodiscard]] Layer<Sample>* roomFor(const Measurement& m);
     static void keep(Layer<Sample>& layer, int known, const Sample& sample, bool heads);
-    /// Joins layers that came within the tolerance of this one.
+    /// Joins all layers whose depth is within the tolerance of this layer's into it.
     void merge(Layer<Sample>& layer, float tolerance);
 };
 
-/// A sample among those of a layer, of which `known` are there.
+/// Puts a sample among the `known` samples of a layer. Of a full layer it replaces the one with the
+/// highest key, unless its own key is higher.
 template <class Sample>
 void PixelLayers<Sample>::keep(Layer<Sample>& layer, int known, const Sample& sample, bool heads) {
     if (known < kSamples) {
@@ -149,7 +151,7 @@ void PixelLayers<Sample>::merge(Layer<Sample>& layer, float tolerance) {
             keep(layer, ours, other.samples[static_cast<std::size_t>(i)], false);
             ours = std::min(ours + 1, kSamples);
         }
-        // Mixed depth counts only where there is nothing else.
+        // Measurements beside edges count only when both layers have no others.
         const auto weight = [&](const Layer<Sample>& l) {
             return static_cast<float>(layer.strong + other.strong > 0 ? l.strong : l.weak);
         };
@@ -182,7 +184,7 @@ void PixelLayers<Sample>::add(const Measurement& m) {
     std::uint32_t& count = m.weak ? best->weak : best->strong;
     ++count;
     best->last = m.time;
-    // The first sample away from edges replaces what those beside them said.
+    // Depth beside edges may be a mixture: the first measurement away from them replaces it.
     if (m.weak && best->strong > 0) return;
     best->q = count == 1 ? m.q : best->q + (m.q - best->q) / static_cast<float>(count);
     merge(*best, m.tolerance);

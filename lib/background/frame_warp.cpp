@@ -14,8 +14,8 @@ namespace {
 
 /// Inverse distances of neighbours that differ by less than this share are of one surface.
 constexpr float kSurface = 0.03f;
-/// Whoever looks through a place must see nothing near it within so many pixels: edges of still
-/// things move by a pixel where poses are not exact.
+/// A frame looks through a place only when all its pixels within this reach are farther than the
+/// place (pixels): where poses are not exact, edges of still things are off by one.
 constexpr int kClear = 2;
 /// Alpha of a pixel that its surface covers in full, in 0..255.
 constexpr float kFullAlpha = 254.5f;

@@ -19,9 +19,11 @@ namespace {
 constexpr double kMeasured = 6000;
 /// Depths that disagree by more are of different surfaces.
 constexpr float kSameSurface = 0.05f;
-/// A frame's pixel reaches this far beyond its half in the pose's pixels, and no farther than this.
+/// A point of a frame is drawn as a square in the pose's pixels: half as wide as the frame's pixel
+/// is there and this much more to either side, at most the second (pixels of the pose).
 constexpr float kOverlap = 0.15f, kMostReach = 4;
-/// Steps towards where a ray meets what a frame sees, and when it has met it.
+/// A ray is followed to what a frame sees in at most so many steps, and has met it when the two
+/// distances differ by less than this share.
 constexpr int kSteps = 4;
 constexpr float kMet = 2e-4f;
 /// Rays that run along a frame's picture plane are left out.
@@ -264,8 +266,9 @@ void KeyBackground::carve(const WarpFrame& frame, const DepthNoise& noise) {
 template <class Sample>
 void KeyBackground::Impl::decide(const PixelLayers<Sample>& layers, std::size_t pixel,
                                  const Vote& vote, BackgroundModel& model, InFront& inFront) const {
-    // What stays: seen by two frames, and not looked through; of that the nearest. Beside edges of
-    // still things all samples are weak: such a layer must be seen half as often as others.
+    // The background is the nearest layer that two frames saw and that not too many looked
+    // through. Beside edges of still things all samples are weak: a layer of weak samples alone
+    // must have been seen half as often as the layer that was seen most.
     std::array<bool, kLayers> moved{}, stays{};
     double most = 0;
     for (std::size_t k = 0; k < kLayers; ++k) {

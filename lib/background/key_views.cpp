@@ -29,7 +29,8 @@ bool sees(const Glimpse& g, const glm::dmat3& turn, const Point& point) {
     if (g.camera.sampleSpacing(at.z).x > kMostCoarser * point.spacing) return false;
     const int x = static_cast<int>(at.x * g.depth.width() / g.camera.width);
     const int y = static_cast<int>(at.y * g.depth.height() / g.camera.height);
-    // The farthest around is what the grid can vouch for.
+    // The grid is coarse: a point counts as seen unless it is behind the farthest of the places
+    // around it.
     float farthest = 0;
     for (int j = std::max(y - 1, 0); j <= std::min(y + 1, g.depth.height() - 1); ++j)
         for (int i = std::max(x - 1, 0); i <= std::min(x + 1, g.depth.width() - 1); ++i)

@@ -23,12 +23,13 @@ struct Glimpse {
 
 [[nodiscard]] Glimpse glimpseOf(const ReferenceView& view);
 
-/// How many points of one glimpse the other sees, too, as fine.
+/// How many points of `one` are also seen by `other`, with pixels that are about as fine there.
 [[nodiscard]] std::int64_t sharedPoints(const Glimpse& one, const Glimpse& other);
 
-/// Numbers of the glimpses, `most` at most, that together see what all of them see, as fine as any
-/// of them does (greedy cover of the points): those that add most first. Stops where one more would
-/// add less than a hundredth of all points. Empty when none sees anything.
+/// Chooses at most `most` glimpses that together show the points of all glimpses, each point with
+/// pixels about as fine as those of the glimpse that shows it finest. A greedy cover: the glimpse
+/// that adds most points comes first, and it ends when one more would add less than a hundredth of
+/// all points. Gives their indices; empty when no glimpse has a point.
 [[nodiscard]] std::vector<int> chooseKeys(std::span<const Glimpse> glimpses, int most);
 
 }  // namespace stx::temporal

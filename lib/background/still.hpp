@@ -36,7 +36,7 @@ struct StillSettings {
 struct StillBackground {
     Rgba8Image colour;  ///< opaque
     /// How far the frames that a pixel is made of agree with it, 0..255. select and median: the
-    /// share of them within kAgrees levels in the worst channel; n2pg: the share of all frames
+    /// share of them within kStillAgrees levels in the worst channel; n2pg: the share of all frames
     /// that the pixel has been steady for since it was last replaced.
     Image<std::uint8_t> confidence;
     int framesUsed = 0;

@@ -24,6 +24,30 @@ constexpr std::size_t kPixelsOfFeature = 350, kFewestFeatures = 450, kMostFeatur
 constexpr double kWrongPairPixels = 8;
 /// Focal length of most cameras, halves of the diagonal: 29 mm for 36x24 mm.
 constexpr double kUsualFocal = 1.35;
+/// How well a focal length is known beforehand, standard deviation of its logarithm: one that a
+/// picture's EXIF tells, and the usual one.
+constexpr double kHintSpread = 0.04, kUsualSpread = 0.35;
+/// Pairs that turn out to be mistakes are dropped and the order is found anew, at most so often.
+constexpr int kMostRounds = 6;
+/// Matches that a pair of pictures must have to count for anything.
+constexpr std::size_t kFewestMatches = 4;
+/// Pairs with fewer matches of patches take those of features, too.
+constexpr std::size_t kFewPatches = 10;
+/// Differences beyond which matches count less (Huber), work pixels, one adjustment for each: from
+/// what a first order may be off by down to what a match may be.
+constexpr double kCoarseToFine[] = {60, 15, 4, 2};
+/// The lens is taken for one without distortion while differences above this count in full, work
+/// pixels.
+constexpr double kDistortionBelow = 20;
+/// How far patches may move, work pixels: after features, and once more after the first patches.
+constexpr double kPatchReaches[] = {8, 3};
+constexpr double kAfterPatches[] = {4, 1};  ///< as kCoarseToFine
+/// Matches farther off are dropped, work pixels, one adjustment after each: what is left is as good
+/// as patches are aligned.
+constexpr double kFits[] = {3, 2, 1.3, 0.75};
+constexpr double kFitHuber = 0.5;  ///< in these adjustments, as kCoarseToFine
+/// Parallax below this is not told: pixels, and a share of the diagonal.
+constexpr double kLeastParallax = 2, kParallaxShare = 1e-3;
 
 /// What is known and found while pictures are aligned.
 struct Series {
@@ -45,10 +69,10 @@ std::vector<double> focalsToTry(double hint) {
 }
 
 /// Rotations, focal length and distortion of all that belong together, from coarse to fine.
-void adjustCoarseToFine(Series& s, bool fixDistortion) {
-    for (const double pixels : {60.0, 15.0, 4.0, 2.0}) {
+void adjustCoarseToFine(Series& s) {
+    for (const double pixels : kCoarseToFine) {
         s.adjusting.huberPixels = pixels;
-        s.adjusting.fixDistortion = fixDistortion || pixels > 20;
+        s.adjusting.fixDistortion = pixels > kDistortionBelow;
         adjust(s.model, s.pairs, s.adjusting);
     }
 }
@@ -119,10 +143,10 @@ Result<void> matchPatches(Series& s, const std::vector<Pair>& fromFeatures,
             return pair.a == old.a && pair.b == old.b;
         });
         if (it == pairs.end()) continue;
-        if (it->matches.size() < 10)
+        if (it->matches.size() < kFewPatches)
             it->matches.insert(it->matches.end(), old.matches.begin(), old.matches.end());
     }
-    std::erase_if(pairs, [](const Pair& pair) { return pair.matches.size() < 4; });
+    std::erase_if(pairs, [](const Pair& pair) { return pair.matches.size() < kFewestMatches; });
     s.pairs = std::move(pairs);
     return {};
 }
@@ -135,7 +159,7 @@ void keepWhatFits(Series& s, double most) {
             return differenceOf(s.model, pair, m, s.adjusting.pixel) > limit;
         });
     }
-    std::erase_if(s.pairs, [](const Pair& pair) { return pair.matches.size() < 4; });
+    std::erase_if(s.pairs, [](const Pair& pair) { return pair.matches.size() < kFewestMatches; });
 }
 
 /// What differs between two pictures is parallax and shapes of lenses more than noise: matches of a
@@ -279,26 +303,12 @@ void tellParallax(const std::vector<PanoramaPair>& pairs, PictureSource& source,
         focalGiven ? "its field of view is another one, or " : "or "));
 }
 
-}  // namespace
-
-int PanoramaAlignment::used() const {
-    return static_cast<int>(
-        std::count_if(cameras.begin(), cameras.end(), [](const auto& c) { return c.used; }));
-}
-
-Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSettings& settings,
-                                        Job& job) {
+/// Reads the pictures and finds their features. Gives for each the picture that it is equal to, -1
+/// = none; such pictures get no features. Errors: what reading gives, all equal, cancelled.
+Result<std::vector<int>> readPictures(PictureSource& source, Series& s, Job& job) {
     const int count = source.count();
-    if (count < 2)
-        return fail(ErrorCode::invalidInput,
-                    "a panorama is made of at least 2 pictures, and {} is here", count);
-    if (count > kMostPictures)
-        return fail(ErrorCode::invalidInput,
-                    "{} pictures are too many for one panorama; {} are possible", count,
-                    kMostPictures);
-    Series s;
     STX_TRY(s.copies, readWorkCopies(source, job));
-    STX_TRY(const auto twins, sameAs(s.copies, job));
+    STX_TRY(auto twins, sameAs(s.copies, job));
     std::vector<std::string> equal;
     for (int k = 0; k < count; ++k)
         if (twins[static_cast<std::size_t>(k)] >= 0) equal.push_back(source.name(k));
@@ -321,27 +331,42 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
         job.progress(++done, count, "looking for features");
     });
     STX_CHECK(job.checkCancelled());
+    return twins;
+}
 
-    const bool given = settings.fieldOfView > 0;
+/// The focal length that is given or that pictures tell, halves of the diagonal; 0 = none.
+double focalHintOf(PictureSource& source, const PanoramaSettings& settings, const Series& s) {
+    if (settings.fieldOfView > 0)
+        return s.copies[0].extent().x / std::tan(0.5 * settings.fieldOfView);
     std::vector<double> hints;
-    for (int k = 0; k < count; ++k)
+    for (int k = 0; k < source.count(); ++k)
         if (const double hint = source.focalHint(k); hint > 0) hints.push_back(hint);
-    double hint = medianOf(hints);
-    if (given) hint = s.copies[0].extent().x / std::tan(0.5 * settings.fieldOfView);
+    return medianOf(hints);
+}
+
+/// What features say, before patches say it better.
+struct Start {
+    std::vector<Pair> pairs;
+    std::vector<std::pair<int, int>> forbidden;  ///< pairs that go all around, of an open series
+    double focal = 1;                            ///< that most matches agree with
+};
+
+/// Finds pairs by features, their order, and a first model; again while pairs turn out to be
+/// mistakes. Errors: no two pictures that show the same, cancelled.
+Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, double hint, Job& job) {
+    const bool given = settings.fieldOfView > 0;
+    const auto count = static_cast<int>(s.copies.size());
     STX_TRY(auto search, searchPairs(s.copies, s.features,
                                      given ? std::vector<double>{hint} : focalsToTry(hint), job));
     s.pairs = std::move(search.pairs);
-    double pixel = 1;
-    for (const WorkCopy& copy : s.copies) pixel = std::min(pixel, 1 / copy.halfDiagonal());
-    s.adjusting.pixel = pixel;
     s.adjusting.fixFocal = given;
-
-    // Order, start, adjustment; again while pairs turn out to be mistakes.
+    s.adjusting.expectedFocal = hint > 0 ? hint : kUsualFocal;
+    s.adjusting.focalSpread = hint > 0 ? kHintSpread : kUsualSpread;
+    Start start;
+    start.focal = search.focal;
     double focal = search.focal;
-    std::vector<std::pair<int, int>> forbidden;
-    PictureTree tree;
-    for (int round = 0; round < 6; ++round) {
-        tree = treeOf(count, s.pairs);
+    for (int round = 0; round < kMostRounds; ++round) {
+        const PictureTree tree = treeOf(count, s.pairs);
         if (tree.order.size() < 2)
             return fail(ErrorCode::invalidInput,
                         "no two of the {} pictures show the same from one place; neighbours must "
@@ -353,46 +378,54 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
             const auto closing = pairsThatClose(tree, s.pairs, s.model);
             for (auto p = closing.rbegin(); p != closing.rend(); ++p) {
                 const Pair& pair = s.pairs[static_cast<std::size_t>(*p)];
-                forbidden.emplace_back(pair.a, pair.b);
+                start.forbidden.emplace_back(pair.a, pair.b);
                 s.pairs.erase(s.pairs.begin() + *p);
             }
             if (!closing.empty()) continue;
         }
-        s.adjusting.expectedFocal = hint > 0 ? hint : kUsualFocal;
-        s.adjusting.focalSpread = hint > 0 ? 0.04 : 0.35;
-        adjustCoarseToFine(s, false);
+        adjustCoarseToFine(s);
         focal = s.model.lens.focal;
         if (!dropWrongPairs(s)) break;
     }
-    const std::vector<Pair> fromFeatures = s.pairs;
-    const double pairsFocal = search.focal;
+    start.pairs = s.pairs;
+    return start;
+}
 
+/// Adjusts by matches of patches, and drops those that do not fit. Gives the pairs with all their
+/// matches. Errors: cancelled.
+Result<std::vector<Pair>> adjustByPatches(Series& s, const Start& start, bool focalGiven,
+                                          Job& job) {
     s.pyramids.resize(s.copies.size());
-    parallelFor(0, count, [&](std::int64_t i) {
+    parallelFor(0, static_cast<std::int64_t>(s.copies.size()), [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
         if (s.model.known[k]) s.pyramids[k] = pyramidOf(s.copies[k].grey);
     });
-    std::vector<Pair> before;  // what does not fit is dropped
-    for (const double reach : {8.0, 3.0}) {
-        STX_CHECK(matchPatches(s, fromFeatures, forbidden, reach, job));
-        if (before.empty()) before = s.pairs;
-        for (const double pixels : {4.0, 1.0}) {
+    std::vector<Pair> all;
+    for (const double reach : kPatchReaches) {
+        STX_CHECK(matchPatches(s, start.pairs, start.forbidden, reach, job));
+        if (all.empty()) all = s.pairs;
+        for (const double pixels : kAfterPatches) {
             s.adjusting.noisePixels = noiseOf(s);
             s.adjusting.huberPixels = pixels;
             adjust(s.model, s.pairs, s.adjusting);
         }
         adjustToMost(s);
-        if (!given && !s.adjusting.ownFocals) tryOwnFocals(s);
+        if (!focalGiven && !s.adjusting.ownFocals) tryOwnFocals(s);
     }
-    for (const double most : {3.0, 2.0, 1.3, 0.75}) {
+    for (const double most : kFits) {
         keepWhatFits(s, most);
-        s.adjusting.huberPixels = 0.5;
+        s.adjusting.huberPixels = kFitHuber;
         adjust(s.model, s.pairs, s.adjusting);
     }
+    return all;
+}
 
-    PanoramaAlignment out;
-    describePairs(s, before, out);
-    tree = treeOf(count, s.pairs);
+/// Leaves out pictures that are in no pair any more, with a note; the tree of the others. Errors:
+/// fewer than two are left.
+Result<PictureTree> leaveOutStrangers(PictureSource& source, const std::vector<int>& twins,
+                                      Series& s, Job& job) {
+    const int count = source.count();
+    PictureTree tree = treeOf(count, s.pairs);
     std::vector<std::string> strangers;
     for (int k = 0; k < count; ++k) {
         const auto i = static_cast<std::size_t>(k);
@@ -408,32 +441,69 @@ Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSet
         job.note(fmt::format("{} left out, since nothing in {} fits to the others: {}",
                              counted(strangers.size(), "picture is", "pictures are"),
                              strangers.size() == 1 ? "it" : "them", listOf(strangers)));
-    const auto closing = pairsThatClose(tree, s.pairs, s.model);
-    out.closed = !closing.empty();
-    if (out.closed) {
-        const TurnModel byPairs = chain(tree, s.pairs, {pairsFocal, 0});
-        out.gapBefore = gapOf(byPairs, s.pairs, closing, true);
-        out.gapAfter = gapOf(s.model, s.pairs, closing, false);
-    }
-    const glm::dquat turn = settings.up == PanoramaUp::first
-                                ? glm::inverse(s.model.worldFromCamera[static_cast<std::size_t>(
-                                      std::find(s.model.known.begin(), s.model.known.end(), true) -
-                                      s.model.known.begin())])
-                                : levelTurn(s.model, upOf(s.model), out.closed);
+    return tree;
+}
+
+/// The cameras of the model in the world that `up` asks for.
+void describeCameras(const Series& s, PanoramaUp up, PanoramaAlignment& out) {
+    const auto first = static_cast<std::size_t>(
+        std::find(s.model.known.begin(), s.model.known.end(), true) - s.model.known.begin());
+    const glm::dquat turn = up == PanoramaUp::first ? glm::inverse(s.model.worldFromCamera[first])
+                                                    : levelTurn(s.model, upOf(s.model), out.closed);
     out.focal = s.model.lens.focal;
     out.k1 = s.model.lens.k1;
-    double largest = 0;
     for (std::size_t k = 0; k < s.copies.size(); ++k) {
         PanoramaCamera camera;
         camera.used = s.model.known[k];
         camera.size = s.copies[k].fullSize;
         camera.focal = s.model.lensOf(static_cast<int>(k)).focal * s.copies[k].fullHalfDiagonal();
-        largest = std::max(largest, s.copies[k].fullHalfDiagonal());
         if (camera.used) camera.worldFromCamera = glm::normalize(turn * s.model.worldFromCamera[k]);
         out.cameras.push_back(camera);
     }
-    // A thousandth of the diagonal, two pixels at least.
-    tellParallax(out.pairs, source, std::max(2.0, 2e-3 * largest), given, job);
+}
+
+}  // namespace
+
+int PanoramaAlignment::used() const {
+    return static_cast<int>(
+        std::count_if(cameras.begin(), cameras.end(), [](const auto& c) { return c.used; }));
+}
+
+Result<PanoramaAlignment> alignPanorama(PictureSource& source, const PanoramaSettings& settings,
+                                        Job& job) {
+    const int count = source.count();
+    if (count < 2)
+        return fail(ErrorCode::invalidInput,
+                    "a panorama is made of at least 2 pictures, and {} is here", count);
+    if (count > kMostPictures)
+        return fail(ErrorCode::invalidInput,
+                    "{} pictures are too many for one panorama; {} are possible", count,
+                    kMostPictures);
+    Series s;
+    STX_TRY(const auto twins, readPictures(source, s, job));
+    double pixel = 1, largest = 0;
+    for (const WorkCopy& copy : s.copies) {
+        pixel = std::min(pixel, 1 / copy.halfDiagonal());
+        largest = std::max(largest, copy.fullHalfDiagonal());
+    }
+    s.adjusting.pixel = pixel;
+    STX_TRY(const auto start, startByFeatures(s, settings, focalHintOf(source, settings, s), job));
+    const bool focalGiven = settings.fieldOfView > 0;
+    STX_TRY(const auto all, adjustByPatches(s, start, focalGiven, job));
+
+    PanoramaAlignment out;
+    describePairs(s, all, out);
+    STX_TRY(const auto tree, leaveOutStrangers(source, twins, s, job));
+    const auto closing = pairsThatClose(tree, s.pairs, s.model);
+    out.closed = !closing.empty();
+    if (out.closed) {
+        const TurnModel byPairs = chain(tree, s.pairs, {start.focal, 0});
+        out.gapBefore = gapOf(byPairs, s.pairs, closing, true);
+        out.gapAfter = gapOf(s.model, s.pairs, closing, false);
+    }
+    describeCameras(s, settings.up, out);
+    tellParallax(out.pairs, source, std::max(kLeastParallax, 2 * kParallaxShare * largest),
+                 focalGiven, job);
     return out;
 }
 

@@ -202,14 +202,14 @@ void draw(const Drawn& picture, const Footprint& print, int index, const Image<i
                 whole -= cx < whole;
                 if (whole != cellAt) goTo(whole);
                 if (!some) {
-                    // On to the next cell, but for rounding.
+                    // The step to the next cell of the grid; rounding may make it one pixel late.
                     x = std::max(x, static_cast<int>(std::floor((whole + 1.5) / cells - 0.5)) - 1);
                     continue;
                 }
                 const auto tx = static_cast<float>(cx - whole);
                 const std::array<float, 4> shares = {(1 - tx) * (1 - ty), tx * (1 - ty),
                                                      (1 - tx) * ty, tx * ty};
-                // How far the cells around are this picture's.
+                // The share that this picture has in the cells around.
                 float weight = 0;
                 for (std::size_t c = 0; c < 4; ++c)
                     if (mine[c]) weight += shares[c];

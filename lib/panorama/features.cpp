@@ -7,8 +7,11 @@ namespace stx::panorama {
 namespace {
 
 constexpr int kLevels = 4;
-constexpr int kMargin = 10;       ///< pixels of a level without corners
-constexpr int kCells = 8;         ///< parts along each side that share the corners
+constexpr int kMargin = 10;  ///< pixels of a level without corners
+constexpr int kCells = 8;    ///< parts along each side that share the corners
+/// Corners weaker than this are noise of a good picture: square codes of luma for a pixel (the
+/// harmonic mean of the structure tensor's eigenvalues).
+constexpr float kWeakest = 2;
 constexpr float kSpacing = 1.2f;  ///< pixels between the 16 x 16 samples of a descriptor
 
 Image<float> floatOf(const Image<std::uint8_t>& grey) {
@@ -109,7 +112,7 @@ std::vector<Feature> cornersOf(const Image<float>& strength, std::size_t most) {
     for (int y = kMargin; y < h - kMargin; ++y) {
         for (int x = kMargin; x < w - kMargin; ++x) {
             const float s = strength.at(x, y);
-            if (s < 2.0f) continue;  // codes: noise of a good picture
+            if (s < kWeakest) continue;
             bool highest = true;
             for (int dy = -2; dy <= 2 && highest; ++dy)
                 for (int dx = -2; dx <= 2 && highest; ++dx)
@@ -179,7 +182,7 @@ std::vector<float> directionsOf(const Gradients& g, glm::vec2 pixel) {
     static_assert(kReach + 2 <= kMargin);
     static const auto weights = bell<65>(1.0f / 32);  // by the square of the distance
     std::array<float, kBins> bins{}, smooth{};
-    // All places lie between pixels in the same way.
+    // All samples are whole pixels apart, so they share their fractions between pixels.
     const int x0 = static_cast<int>(pixel.x - 0.5f), y0 = static_cast<int>(pixel.y - 0.5f);
     const float tx = pixel.x - 0.5f - static_cast<float>(x0),
                 ty = pixel.y - 0.5f - static_cast<float>(y0);
@@ -325,7 +328,7 @@ Descriptor describe(const Gradients& g, glm::vec2 pixel, float direction) {
 }  // namespace
 
 Features findFeatures(const WorkCopy& copy, int most) {
-    // Finer levels have more to say, and are more exact.
+    // Finer levels get more corners: theirs are more, and more exact.
     constexpr std::array<double, kLevels> kShares = {0.45, 0.27, 0.18, 0.10};
     Features out;
     Image<float> even = floatOf(copy.grey);

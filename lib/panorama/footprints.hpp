@@ -29,7 +29,7 @@ struct Footprint {
     Image<float> inside;
     /// Square of the distance from the picture's middle, halves of its diagonal; of cells it sees.
     Image<float> radius2;
-    /// By which light is to be multiplied, since the lens is darker there; empty = 1.
+    /// The factor that makes up for the lens, which is darker towards its edge; empty = 1.
     Image<float> clearing;
     /// Cells that the picture fills wholly, so that seams may be in them.
     Image<std::uint8_t> whole;
@@ -58,7 +58,7 @@ struct Footprint {
 /// lower halves of overlaps do not say the same.
 [[nodiscard]] Vignetting findVignetting(const std::vector<Footprint>& footprints, int gridWidth);
 
-/// Puts it into the footprints.
+/// Sets Footprint::clearing by a vignetting.
 void clearVignetting(std::vector<Footprint>& footprints, const Vignetting& vignetting);
 
 /// Gains of linear light that make pictures agree where they overlap, least squares over the

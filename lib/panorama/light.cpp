@@ -9,7 +9,7 @@
 namespace stx::panorama {
 namespace {
 
-/// Mean of a square around each pixel, by its weight; three times, which is nearly a bell.
+/// The weighted mean of a square around each pixel, taken three times: that is nearly a Gaussian.
 /// `around`: rows end where they begin.
 void smooth(Image<glm::vec4>& image, int radius, bool around) {
     const int w = image.width(), h = image.height();
@@ -37,7 +37,8 @@ void smooth(Image<glm::vec4>& image, int radius, bool around) {
     }
 }
 
-/// Logarithms of a picture's light with its gain; darkness counts for little.
+/// Logarithms of a picture's linear light after its gain. A floor keeps differences in the dark,
+/// which are mostly noise, small.
 Image<glm::vec3> logsOf(const Footprint& f, glm::vec3 gain) {
     Image<glm::vec3> out(f.box.width, f.box.height);
     for (std::size_t i = 0; i < out.count(); ++i)
@@ -47,8 +48,8 @@ Image<glm::vec3> logsOf(const Footprint& f, glm::vec3 gain) {
     return out;
 }
 
-/// What is smooth over a picture's box, kept for blocks of cells: sums and counts come in, means
-/// around each block go out.
+/// A smooth function over a picture's box, one value for each block of cells: values are summed up
+/// by block, then each block gets the mean of those around it.
 class SmoothBlocks {
   public:
     explicit SmoothBlocks(const GridBox& box, int gridWidth)
@@ -68,7 +69,7 @@ class SmoothBlocks {
         smooth(blocks_, reach, around_);
         for (glm::vec4& block : blocks_.pixels()) block /= block.a;
     }
-    /// 0 where nothing was added at all.
+    /// The value of a cell; 0 when nothing was added anywhere.
     [[nodiscard]] glm::vec3 at(glm::ivec2 cell) const {
         const glm::vec2 p = (glm::vec2(cell) + 0.5f) / static_cast<float>(kBlock) - 0.5f;
         const glm::vec2 floor = glm::floor(p), t = p - floor;
@@ -90,14 +91,14 @@ class SmoothBlocks {
     Image<glm::vec4> blocks_;
 };
 
-/// By how much `b` is lighter than `a` where both look (logarithms): what is there to be seen is in
-/// both and cancels out, what is left are the light and the lens.
+/// The logarithm of `b`'s light over `a`'s, where both pictures look. What the scene shows is in
+/// both and cancels out; what is left is a change of the light, or the lens.
 SmoothBlocks lightDifference(const Footprint& a, const Image<glm::vec3>& logsA, const Footprint& b,
                              const Image<glm::vec3>& logsB, int gridWidth) {
-    // What differs by more is something else, not another light.
+    // Natural logarithms of R, G and B: a larger difference is of another thing, not of the light.
     constexpr float kMost = 0.9f;
-    // A bell of 6 cells, a thirtieth of a picture: wider ones leave steps where pictures are darker
-    // at their edges.
+    // Blocks to either side: with three passes a Gaussian of some 6 cells, a thirtieth of a
+    // picture. Wider ones leave steps where a lens darkens the edges of pictures.
     constexpr int kReach = 1;
     SmoothBlocks out(a.box, gridWidth);
     shared(a, b, gridWidth, [&](glm::ivec2 pa, glm::ivec2 pb) {
@@ -108,8 +109,8 @@ SmoothBlocks lightDifference(const Footprint& a, const Image<glm::vec3>& logsA, 
     return out;
 }
 
-/// How much of what each cell of a box comes to is this picture's: what is shown of it, with
-/// borders that are an eighth of a picture wide, and nothing where it ends.
+/// The weight of a picture in the mean light of each cell of its box: 1 where it is shown, falling
+/// to 0 over an eighth of a picture beyond its seams, and 0 where it ends.
 Image<float> weightsOf(const Footprint& f, int index, const Image<int>& labels) {
     constexpr int kReach = 3;
     const int gridWidth = labels.width();
@@ -193,9 +194,10 @@ std::vector<Image<glm::vec3>> findCorrections(const std::vector<Footprint>& prin
         logs[k] = logsOf(prints[k], gains[k]);
         weights[k] = weightsOf(prints[k], static_cast<int>(k), labels);
     });
-    // Each picture is brought to the mean of all that look at a place, each of which weighs more
-    // the nearer the place is to what is shown of it. Differences are smoothed before they are
-    // weighed: all pictures then come to the same light, and where one ends nothing is seen of it.
+    // At each place every picture is brought to the mean light of all pictures that look there. A
+    // picture weighs more the nearer the place is to the part of it that is shown. Differences
+    // are smoothed before they are weighed, so that all pictures come to the same light and no
+    // step is seen where one of them ends.
     parallelFor(0, static_cast<std::int64_t>(n), [&](std::int64_t i) {
         const auto k = static_cast<std::size_t>(i);
         const Footprint& f = prints[k];

@@ -11,22 +11,23 @@
 namespace stx::panorama {
 namespace {
 
-// Costs are in codes of 8 bits.
+// All costs are differences of sRGB-coded colour, 0..255, so that they can be added up.
 
-/// What a seam costs for each cell it passes, whatever is there: short ones are better.
+/// Cost of a seam for each cell that it passes, whatever the pictures show: of two seams that are
+/// seen as little the shorter one wins.
 constexpr float kSeamLength = 2;
-/// What a seam costs where one of its pictures ends.
+/// Cost of a seam in a cell where one of its two pictures ends.
 constexpr float kEndOfPicture = 60;
-/// What a picture's edge costs against its middle.
+/// Cost of showing a cell at a picture's edge; it falls to 0 towards the picture's middle.
 constexpr float kEdge = 1.5f;
-/// What clipped light costs against light that another picture has.
+/// Cost of showing a cell whose light is clipped: another picture may have it.
 constexpr float kClipped = 4;
 /// A cell shows a mover where nothing within this many cells of another picture is like it, while
 /// all that the other one shows there is also in this one: leaves, waves and parallax are in both.
 constexpr int kMoverReach = 3;
-/// It then costs what the difference is above this.
+/// A mover costs its difference of colour less this.
 constexpr float kMoverDifference = 25;
-/// Movers of less (sum of costs) may be noise.
+/// Movers whose costs sum up to less than this may be noise.
 constexpr float kWeakMover = 250;
 /// Cells around a mover that belong to it.
 constexpr int kMoverMargin = 2;
@@ -143,7 +144,8 @@ class SeamGrid {
                 cells.emplace_back(x, y);
             }
         MaxFlow flow(static_cast<int>(cells.size()));
-        // A cell on the sink's side is taken; it then pays what comes from the source.
+        // Cells on the sink's side of the cut are taken by the picture; they pay for their edge
+        // from the source.
         for (std::size_t i = 0; i < cells.size(); ++i) {
             const auto n = static_cast<int>(i);
             const glm::ivec2 cell = cells[i];
@@ -258,7 +260,7 @@ class SeamGrid {
                                     left.at(c.x + dx, c.y + dy) > 0)
                                     open.emplace_back(c.x + dx, c.y + dy);
                     }
-                    // Whoever is in the middle of a picture is whole.
+                    // A mover in the middle of a picture is seen whole; one at its edge is cut off.
                     mover.strength *= std::min(1.0f, 0.2f + 2 * inside / mover.strength);
                     movers.push_back(std::move(mover));
                 }
@@ -267,9 +269,10 @@ class SeamGrid {
                          [](const Mover& a, const Mover& b) { return a.strength > b.strength; });
         return movers;
     }
-    /// One picture's movers are kept: the strongest one's. They were there at one moment, so none
-    /// of them is there twice; colours do not tell who is who. Other pictures then cost more where
-    /// they are, and movers of others cost in their own.
+    /// Keeps the movers of one picture, the one whose movers are strongest, and drops those of all
+    /// others: at one moment nobody is in two places, and colours cannot tell whether two movers
+    /// are one person. Where the kept movers are, all other pictures cost more; where the others
+    /// are, their own picture does.
     void drawOnce(const std::vector<Mover>& movers) {
         std::vector<float> strengths(prints_.size(), 0.0f);
         for (const Mover& mover : movers)
@@ -305,8 +308,8 @@ class SeamGrid {
         const glm::ivec2 c = cellOf(k, p);
         return c.x >= 0 && prints_[k].inside.at(c.x, c.y) > 0;
     }
-    /// How far a cell's colour in one picture is from all that another one shows around it; some
-    /// number below `enough` when it is nearer than that.
+    /// The least difference between a cell's colour in one picture and the colours that another
+    /// picture shows around that cell. The search stops at the first one below `enough`.
     [[nodiscard]] float newIn(std::size_t k, std::size_t other, glm::ivec2 p, float enough) const {
         const glm::ivec2 own = cellOf(k, p), there = cellOf(other, p);
         const Footprint& f = prints_[other];
@@ -317,7 +320,7 @@ class SeamGrid {
             const glm::vec3 d = colour - coded_[other].at(c.x, c.y);
             least = std::min(least, glm::dot(d, d));
         };
-        // What is like it is mostly where it should be.
+        // The cell itself is looked at first: mostly it is the one that is alike.
         look(there);
         const int top = std::max(0, there.y - kMoverReach);
         const int bottom = std::min(f.box.height - 1, there.y + kMoverReach);
@@ -331,7 +334,7 @@ class SeamGrid {
         if (label < 0) return 1e6f;
         const glm::ivec2 c = cellOf(static_cast<std::size_t>(label), p);
         const auto k = static_cast<std::size_t>(label);
-        // Edges that are not whole are only kept where nothing else is.
+        // Cells that a picture fills in part are shown only where no picture fills them.
         if (c.x < 0 || !prints_[k].whole.at(c.x, c.y)) return 1e6f;
         return cost_[k].at(c.x, c.y);
     }
@@ -382,7 +385,8 @@ Result<Image<int>> findSeams(const std::vector<Footprint>& prints,
     if (hideSeams) {
         grid.avoidMovers();
         const auto groups = grid.groups();
-        // Who has nothing new in or beside its cells has nothing to take.
+        // A picture is tried again only after a cell in or beside its box has changed: before that
+        // it would take nothing.
         std::vector<std::uint8_t> open(prints.size(), 1), changed(prints.size(), 0);
         std::atomic<std::int64_t> done = 0;
         const auto total = static_cast<std::int64_t>(prints.size()) * kRounds;

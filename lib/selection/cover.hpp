@@ -11,8 +11,9 @@ struct CoverItem {
     float quality = 0;  ///< 0..1
 };
 
-/// Views to choose among: F(S) = sum over samples of weight * max over views in S of quality
-/// (paper.md, "The smallest reference set"). Monotone and submodular.
+/// Views to choose among, and what a set S of them is worth: F(S) = sum over samples of weight *
+/// max over views in S of quality. F is monotone and submodular, so that a greedy choice is near
+/// the best (Nemhauser, Wolsey and Fisher 1978).
 struct CoverProblem {
     std::vector<double> weights;                ///< area of each sample
     std::vector<std::vector<CoverItem>> views;  ///< per view its samples, ascending

@@ -38,7 +38,7 @@ struct Selection {
     int candidates = 0;
 };
 
-/// Chooses among the views of a bundle (paper.md, "The smallest reference set"). Views without
+/// Chooses the fewest views of a bundle that still cover its surface (CoverProblem). Views without
 /// points are never chosen (said with a note). Errors: settings out of range, a bundle that fails
 /// check() or has no point, cancelled.
 [[nodiscard]] Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settings,

@@ -14,13 +14,15 @@ CONSTANT uint kShadeGroup = 128u;
 // Drawing the sources.
 // Room that neighbouring pieces overlap by, in samples, so that rounding opens no crack.
 CONSTANT float kCrack = 0.004f;
-// Leaves are on fitted planes, a little beside their neighbours' corners: pixels. Less than the
-// parallax that a leaf may be off by (kPlanarPixels, 0.08).
+// Quads of a source that are drawn as one plane (leaves) do not quite meet the corners of their neighbours:
+// each is drawn larger by this to either side, pixels of the source. It is less than the parallax by which
+// a plane may be off (kPlanarPixels, 0.08).
 CONSTANT float kLeafGrow = 0.06f;
-// Half the side of an extension, pixels: at inner edges the half pixel that the source's own mesh
-// leaves, beside background a little more, since alpha cuts it there.
+// An extension is a square around a pixel at an edge, which the source's mesh of pixel centres covers by half
+// only. Half its side, pixels: that half pixel at edges inside of the object; beside background a little more,
+// since alpha ends the surface there.
 CONSTANT float kHalfBesideBackground = 0.6f, kHalfInside = 0.5f;
-// The corners of an extension leave its pixel's q by no more.
+// The q of an extension's corners differs from that of its pixel by at most this share.
 CONSTANT float kExtensionReach = 0.02f;
 // An extension beside background is drawn over what its source shows behind it (by kLinkedSamples), so that faces
 // that views see one by one meet at their edge. Not where its q changes by this share over its half side: there
@@ -39,7 +41,8 @@ CONSTANT int kFittedSamples = 6;
 CONSTANT float kOneSurface = 0.01f;
 // Neighbouring samples of one source are linked within this.
 CONSTANT float kLinkedSamples = 0.03f;
-// What an extension counts beside a mesh: its depth is used only where no mesh is.
+// Weight of an extension beside a mesh in the mean depth: next to none, so that it decides only where no
+// source has a mesh.
 CONSTANT float kExtensionWeight = 0.01f;
 // Outline level below which a point is outside the object. Points tangent to a silhouette have one
 // half, and a threshold of one half or more removes them; this is clearly less. Among pruned
@@ -62,7 +65,7 @@ CONSTANT float kBehindNoises = 1.0f;
 CONSTANT float kSeesBetter = 2.0f;
 // A point this share of its depth in front of a surface is in front of it.
 CONSTANT float kClearlyBehind = 0.0002f;
-// And this share of the change of q over a pixel more, where the surface is steep.
+// On steep surfaces that margin grows by this share of the change of q over a pixel.
 CONSTANT float kSlopeDoubt = 0.0625f;
 // Votes that reject a sample, beside one for each other source that shows it: one where it is near an
 // edge of its source, else two.

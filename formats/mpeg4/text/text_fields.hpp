@@ -105,7 +105,8 @@ class NodeNames {
     Result<int> heightOf(const NodePtr& node, int depth,
                          std::unordered_map<const Node*, int>& known) const;
 
-    /// What has a name, here or around; null: nothing has.
+    /// The node that a DEF gave this name, in this scope or in one around it; null when there is
+    /// none.
     [[nodiscard]] const Entry* find(const std::string& name) const;
     [[nodiscard]] std::optional<int> heightOfNamed(const Node& node) const;
 

@@ -61,7 +61,7 @@ class StageTimer {
 template <class Run>
 void finishStage(StageLog* log, std::string_view name, const Image<glm::vec4>& colour, Run&& run) {
     if (!log) return run();
-    const Image<glm::vec4> before = colour;
+    const Image<glm::vec4> before = colour;  // NOLINT: run() changes colour
     StageTimer timer(log, name);
     run();
     std::int64_t changed = 0;

@@ -18,7 +18,7 @@ class EnvironmentRenderer final : public Renderer {
     Result<Frame> render(const Camera& camera) override {
         STX_TRY(Frame frame, inner_->render(camera));
         const auto start = std::chrono::steady_clock::now();
-        putBehind(frame, camera, *environment_);
+        putEnvironmentBehind(frame, camera, *environment_);
         frame.milliseconds +=
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
                 .count();
@@ -36,7 +36,7 @@ class EnvironmentRenderer final : public Renderer {
 
 }  // namespace
 
-void putBehind(Frame& frame, const Camera& camera, const EnvironmentMap& environment) {
+void putEnvironmentBehind(Frame& frame, const Camera& camera, const EnvironmentMap& environment) {
     const glm::mat3 fromCamera =
         environment.environmentFromWorld() * glm::mat3(glm::mat3_cast(camera.orientation));
     const glm::vec3 right = fromCamera[0], up = fromCamera[1], forward = -fromCamera[2];

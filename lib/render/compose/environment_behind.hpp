@@ -11,7 +11,7 @@ namespace stx {
 /// in the frame's own colour space, as a background colour is. Alpha becomes that of both together;
 /// depth, normals and albedo stay those of what was drawn. An orthographic camera sees one
 /// direction, so one colour.
-void putBehind(Frame& frame, const Camera& camera, const EnvironmentMap& environment);
+void putEnvironmentBehind(Frame& frame, const Camera& camera, const EnvironmentMap& environment);
 
 /// A renderer that shows an environment where `inner` shows nothing.
 [[nodiscard]] std::unique_ptr<Renderer> withEnvironment(

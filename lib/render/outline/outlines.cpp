@@ -190,73 +190,61 @@ OutlineDepths Outlines::depthsOf(const OutlineBlock& block) const {
     return {page.depth->data() + static_cast<std::size_t>(r.pageY) * stride + r.pageX, stride};
 }
 
-void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& covered,
-                       const Extent& within) {
+void Outlines::beginBand(std::size_t n, const Frame& frame, const Camera& camera,
+                         const Image<float>& covered, const Extent& part, bool sides,
+                         Image<std::uint8_t>& tiles) {
     const int w = frame.depth.width(), h = frame.depth.height();
-    const Extent part = within.grown(0, w, h);
-    const int tilesX = (w + kTile - 1) / kTile, tilesY = (h + kTile - 1) / kTile;
-    static_assert(kBandRows % kTile == 0);
-    Image<std::uint8_t> tiles(tilesX, tilesY);
-    bands_.resize(static_cast<std::size_t>((h + kBandRows - 1) / kBandRows));
-    // Pruned views share the surface among them: all are needed.
-    const bool choose = set_.views().size() > kMostViews && !set_.pruned();
     // Points beside the part tell of what is in it, too.
     const Extent around = part.grown(1, w, h);
-    parallelFor(0, static_cast<std::int64_t>(bands_.size()), [&](std::int64_t n) {
-        Band& band = bands_[static_cast<std::size_t>(n)];
-        band.left = around.x0;
-        band.top = static_cast<int>(n) * kBandRows;
-        band.rows = std::min(kBandRows, h - band.top);
-        band.width = around.x1 - around.x0;
-        band.any = false;
-        band.blocks.clear();
-        band.sides = {};
-        const int last = std::min(part.y1, band.top + band.rows);
-        for (int y = std::max(part.y0, band.top); y < last; ++y) {
-            const auto prepare = [&](int column) {
-                const int x = part.x0 + column;
-                const glm::vec2 out = outwardAt(frame.depth, x, y);
-                if (out == glm::vec2(0.0f)) return;
-                if (!band.any) band.make();
-                if (const float dist = frame.depth.at(x, y); choose && hasPoint(dist)) {
-                    const glm::dvec3 place = camera.unproject(x + 0.5, y + 0.5, dist);
-                    band.sides[Side::of(out)].add({place, {out.x, -out.y, 0}, 1});
-                }
-                const std::size_t at = band.element(x, y);
-                band.outX[at] = out.x;
-                band.outY[at] = out.y;
-                for (int j = 0; j <= 2; ++j)
-                    for (int i = x - 1; i <= x + 1; ++i)
-                        band.near[band.element(i, y + j - 1)] |= static_cast<std::uint8_t>(4 >> j);
-                tiles.at(x / kTile, y / kTile) = 1;
-            };
-            forWhere(
-                covered.row(y).subspan(static_cast<std::size_t>(part.x0),
-                                       static_cast<std::size_t>(part.x1 - part.x0)),
-                [](float c) { return c == kAsked; }, prepare);
-        }
-    });
-
-    std::vector<PixelMap> maps;
-    std::vector<std::array<glm::vec3, 6>> coarseMaps;  // near enough for the reach of a block
-    for (const PageRectangle& r : set_.rectangles()) {
-        const auto& m = maps.emplace_back(pixelMap(r.window, camera));
-        coarseMaps.push_back({m.a0, m.au, m.av, m.b0, m.bu, m.bv});
+    Band& band = bands_[n];
+    band.left = around.x0;
+    band.top = static_cast<int>(n) * kBandRows;
+    band.rows = std::min(kBandRows, h - band.top);
+    band.width = around.x1 - around.x0;
+    band.any = false;
+    band.blocks.clear();
+    band.sides = {};
+    const int last = std::min(part.y1, band.top + band.rows);
+    for (int y = std::max(part.y0, band.top); y < last; ++y) {
+        const auto prepare = [&](int column) {
+            const int x = part.x0 + column;
+            const glm::vec2 out = outwardAt(frame.depth, x, y);
+            if (out == glm::vec2(0.0f)) return;
+            if (!band.any) band.make();
+            if (const float dist = frame.depth.at(x, y); sides && hasPoint(dist)) {
+                const glm::dvec3 place = camera.unproject(x + 0.5, y + 0.5, dist);
+                band.sides[Side::of(out)].add({place, {out.x, -out.y, 0}, 1});
+            }
+            const std::size_t at = band.element(x, y);
+            band.outX[at] = out.x;
+            band.outY[at] = out.y;
+            for (int j = 0; j <= 2; ++j)
+                for (int i = x - 1; i <= x + 1; ++i)
+                    band.near[band.element(i, y + j - 1)] |= static_cast<std::uint8_t>(4 >> j);
+            tiles.at(x / kTile, y / kTile) = 1;
+        };
+        forWhere(
+            covered.row(y).subspan(static_cast<std::size_t>(part.x0),
+                                   static_cast<std::size_t>(part.x1 - part.x0)),
+            [](float c) { return c == kAsked; }, prepare);
     }
+}
 
-    // Asked for above and to the left of a tile: few blocks reach any, and the others must not
-    // cost.
-    Image<std::uint32_t> before(tilesX + 1, tilesY + 1);
-    for (int y = 0; y < tilesY; ++y) {
+void Outlines::findBlocks(const Camera& camera, const std::vector<PixelMap>& maps,
+                          const std::vector<std::uint8_t>& asked, const Image<std::uint8_t>& tiles,
+                          glm::ivec2 size) {
+    std::vector<std::array<glm::vec3, 6>> coarseMaps;  // near enough for the reach of a block
+    for (const PixelMap& m : maps) coarseMaps.push_back({m.a0, m.au, m.av, m.b0, m.bu, m.bv});
+    // How many tiles above and to the left of each are marked: few blocks reach any, and the
+    // others must not cost.
+    Image<std::uint32_t> before(tiles.width() + 1, tiles.height() + 1);
+    for (int y = 0; y < tiles.height(); ++y) {
         std::uint32_t row = 0;
-        for (int x = 0; x < tilesX; ++x) {
+        for (int x = 0; x < tiles.width(); ++x) {
             row += tiles.at(x, y);
             before.at(x + 1, y + 1) = before.at(x + 1, y) + row;
         }
     }
-    std::vector<std::uint8_t> asked;
-    if (choose) asked = askedViews(camera);
-    // Which blocks have points there.
     struct Rows {
         int from = 0, to = -1;  // inclusive
     };
@@ -266,7 +254,7 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
             for (auto n = static_cast<std::size_t>(from); n < static_cast<std::size_t>(to); ++n) {
                 const OutlineBlock& b = blocks_[n];
                 const PageRectangle& r = set_.rectangles()[b.rectangle];
-                if (choose && !asked[static_cast<std::size_t>(r.view)]) continue;
+                if (!asked.empty() && !asked[static_cast<std::size_t>(r.view)]) continue;
                 const auto& [a0, au, av, b0, bu, bv] = coarseMaps[b.rectangle];
                 // Eight corners side by side, so that compilers make vectors of it.
                 std::array<float, 8> x, y, along;
@@ -286,13 +274,15 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
                 // What reaches behind the camera is too near to draw an outline.
                 if (!(least > 0)) continue;
                 constexpr float kRoom = 1.5f;
-                if (!(x1 >= -kRoom && y1 >= -kRoom && x0 <= static_cast<float>(w) + kRoom &&
-                      y0 <= static_cast<float>(h) + kRoom))
+                if (!(x1 >= -kRoom && y1 >= -kRoom && x0 <= static_cast<float>(size.x) + kRoom &&
+                      y0 <= static_cast<float>(size.y) + kRoom))
                     continue;
                 const int left = static_cast<int>(std::max(0.0f, x0 - kRoom));
-                const int right = static_cast<int>(std::min(static_cast<float>(w - 1), x1 + kRoom));
+                const int right =
+                    static_cast<int>(std::min(static_cast<float>(size.x - 1), x1 + kRoom));
                 const int above = static_cast<int>(std::max(0.0f, y0 - kRoom));
-                const int below = static_cast<int>(std::min(static_cast<float>(h - 1), y1 + kRoom));
+                const int below =
+                    static_cast<int>(std::min(static_cast<float>(size.y - 1), y1 + kRoom));
                 const int endX = right / kTile + 1, endY = below / kTile + 1;
                 if (before.at(endX, endY) - before.at(left / kTile, endY) !=
                     before.at(endX, above / kTile) - before.at(left / kTile, above / kTile))
@@ -303,30 +293,53 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         for (int b = reached[n].from / kBandRows; b <= reached[n].to / kBandRows; ++b)
             if (reached[n].to >= 0 && bands_[static_cast<std::size_t>(b)].any)
                 bands_[static_cast<std::size_t>(b)].blocks.push_back(static_cast<std::uint32_t>(n));
+}
 
-    parallelFor(0, static_cast<std::int64_t>(bands_.size()), [&](std::int64_t n) {
-        Band& band = bands_[static_cast<std::size_t>(n)];
-        if (!band.any) return;
-        const OutlineRows rows = band.arrays();
-        for (std::size_t k = 0; k < band.blocks.size(); ++k) {
-            const OutlineBlock& block = blocks_[band.blocks[k]];
-            const bool last = k + 1 == band.blocks.size();
-            const OutlineBlock& next = last ? block : blocks_[band.blocks[k + 1]];
-            addOutlinePoints(block, depthsOf(block), maps[block.rectangle], camera.orthographic,
-                             next, last ? OutlineDepths{} : depthsOf(next), rows);
-        }
-        for (int y = band.top; y < band.top + band.rows; ++y) {
-            const std::size_t first = band.element(band.left, y);
-            const auto measured = [&](int column) {
-                const std::size_t at = first + static_cast<std::size_t>(column);
-                const float nx = band.outX[at], ny = band.outY[at];
-                covered.at(band.left + column, y) = std::max(
-                    0.0f, areaBelow(band.high[at], nx, ny) - areaBelow(band.low[at], nx, ny));
-            };
-            forWhere(
-                std::span(band.count).subspan(first, static_cast<std::size_t>(band.width)),
-                [](float points) { return points >= kEnoughPoints; }, measured);
-        }
+void Outlines::measureBand(std::size_t n, const Camera& camera, const std::vector<PixelMap>& maps,
+                           Image<float>& covered) {
+    Band& band = bands_[n];
+    if (!band.any) return;
+    const OutlineRows rows = band.arrays();
+    for (std::size_t k = 0; k < band.blocks.size(); ++k) {
+        const OutlineBlock& block = blocks_[band.blocks[k]];
+        const bool last = k + 1 == band.blocks.size();
+        const OutlineBlock& next = last ? block : blocks_[band.blocks[k + 1]];
+        addOutlinePoints(block, depthsOf(block), maps[block.rectangle], camera.orthographic, next,
+                         last ? OutlineDepths{} : depthsOf(next), rows);
+    }
+    for (int y = band.top; y < band.top + band.rows; ++y) {
+        const std::size_t first = band.element(band.left, y);
+        const auto measured = [&](int column) {
+            const std::size_t at = first + static_cast<std::size_t>(column);
+            const float nx = band.outX[at], ny = band.outY[at];
+            covered.at(band.left + column, y) =
+                std::max(0.0f, areaBelow(band.high[at], nx, ny) - areaBelow(band.low[at], nx, ny));
+        };
+        forWhere(
+            std::span(band.count).subspan(first, static_cast<std::size_t>(band.width)),
+            [](float points) { return points >= kEnoughPoints; }, measured);
+    }
+}
+
+void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& covered,
+                       const Extent& within) {
+    const int w = frame.depth.width(), h = frame.depth.height();
+    const Extent part = within.grown(0, w, h);
+    static_assert(kBandRows % kTile == 0);
+    Image<std::uint8_t> tiles((w + kTile - 1) / kTile, (h + kTile - 1) / kTile);
+    bands_.resize(static_cast<std::size_t>((h + kBandRows - 1) / kBandRows));
+    const auto bands = static_cast<std::int64_t>(bands_.size());
+    // Pruned views share the surface among them: all are needed.
+    const bool choose = set_.views().size() > kMostViews && !set_.pruned();
+    parallelFor(0, bands, [&](std::int64_t n) {
+        beginBand(static_cast<std::size_t>(n), frame, camera, covered, part, choose, tiles);
+    });
+    std::vector<PixelMap> maps;
+    for (const PageRectangle& r : set_.rectangles()) maps.push_back(pixelMap(r.window, camera));
+    const auto asked = choose ? askedViews(camera) : std::vector<std::uint8_t>();
+    findBlocks(camera, maps, asked, tiles, {w, h});
+    parallelFor(0, bands, [&](std::int64_t n) {
+        measureBand(static_cast<std::size_t>(n), camera, maps, covered);
     });
 }
 

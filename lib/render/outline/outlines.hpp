@@ -48,6 +48,19 @@ class Outlines {
     [[nodiscard]] OutlineDepths depthsOf(const OutlineBlock& block) const;
     /// By view: 1 for those whose points are asked about what bands_ have.
     [[nodiscard]] std::vector<std::uint8_t> askedViews(const Camera& camera) const;
+    /// Begins band `n`: the pixels of `part` that `covered` asks for, and which way is out there;
+    /// marks their tiles. With `sides` it notes the sides of the object that they are on.
+    void beginBand(std::size_t n, const Frame& frame, const Camera& camera,
+                   const Image<float>& covered, const Extent& part, bool sides,
+                   Image<std::uint8_t>& tiles);
+    /// Gives each band the blocks of views in `asked` (empty: of all) that may have points in its
+    /// marked tiles.
+    void findBlocks(const Camera& camera, const std::vector<PixelMap>& maps,
+                    const std::vector<std::uint8_t>& asked, const Image<std::uint8_t>& tiles,
+                    glm::ivec2 size);
+    /// Adds the points of its blocks to band `n`, and writes what they measure.
+    void measureBand(std::size_t n, const Camera& camera, const std::vector<PixelMap>& maps,
+                     Image<float>& covered);
 
     PageSet set_;
     std::vector<OutlineBlock> blocks_;

@@ -8,15 +8,16 @@
 
 namespace stx::splat {
 
-/// Finds for each quarter of each block without edges which other views show all of it, inside of a
-/// surface (BlockInfo::shownBy, PreparedRectangle::others). Costs nothing where all views look from
-/// about the same place. `prepared` must hold the slopes of `set`.
+/// Finds, for each quarter of each block that has no edges, the other views that show all of it
+/// away from their own edges (BlockInfo::shownBy, PreparedRectangle::others). It does nothing where
+/// all views look from about the same place. `prepared` must hold the slopes of `set`.
 void findOthers(const PageSet& set, PreparedPages& prepared);
 
-/// The quarters of a block that a frame needs, a bit for each: not those that other views show from
-/// so much nearer to where the novel camera looks from that the block's own points would hardly
-/// count. `quality` is the weight of its own view by that angle, BlockTask::quality. What is left
-/// out depends on no other block, and the views that count most are never left out: nothing opens.
+/// The quarters of a block that a frame has to draw, one bit each. A quarter is left out when other
+/// views show all of it, from directions so much nearer to the novel camera's that the points of
+/// this view would have next to no weight in the blend. `quality` is the weight of the block's own
+/// view (BlockTask::quality). Each quarter is decided by itself, and the views of the most weight
+/// always draw theirs, so no hole can open.
 [[nodiscard]] std::uint8_t neededQuarters(const PreparedRectangle& rectangle,
                                           const BlockInfo& block, const Camera& novel,
                                           float quality);

@@ -56,7 +56,7 @@ class SurfaceRenderer final : public Renderer {
     [[nodiscard]] std::string device() const override { return backend_->device(); }
     [[nodiscard]] Result<void> prepareBackend() { return backend_->prepare(scene_, effort_, job_); }
     /// What is drawn where this renderer's views show nothing.
-    void putBehind(std::unique_ptr<SurfaceRenderer> behind) { behind_ = std::move(behind); }
+    void setBackground(std::unique_ptr<SurfaceRenderer> behind) { behind_ = std::move(behind); }
 
   private:
     /// Whether the outermost points lie at the outline: those of faulty depth and of coarse depth
@@ -335,7 +335,7 @@ Result<void> SurfaceRenderer::drawBehind(const SurfaceFrame& work, Frame& frame,
     if (!any) return {};
     STX_TRY(const Frame background, behind_->drawTiles(space.camera, open));
     frame.depth = depthOf(q, space.axis);
-    stx::putBehind(frame, background, [&](int x, int y, float depth) {
+    putBehind(frame, background, [&](int x, int y, float depth) {
         const auto at = static_cast<float>(space.axis.q(depth));
         return std::none_of(work.sources.begin(), work.sources.end(), [&](const FrameSource& f) {
             return seesPast({f.source, f.sourceFromPixel}, static_cast<float>(x) + 0.5f,
@@ -433,7 +433,7 @@ Result<std::unique_ptr<Renderer>> makeSurfaceRenderer(const PageSet& set,
         auto background =
             std::make_unique<SurfaceRenderer>(*set.behind(), settings, job, std::move(behind));
         STX_CHECK(background->prepareBackend());
-        renderer->putBehind(std::move(background));
+        renderer->setBackground(std::move(background));
     }
     return std::unique_ptr<Renderer>(std::move(renderer));
 }

@@ -31,7 +31,7 @@ TEST(EnvironmentBehind, OpenPixelsShowWhatIsInTheirDirection) {
              {glm::dvec3(0, 0, -1), {1, 0.2, 0.1}, {0.1, 1, 0.1}, {0, -1, 0.3}, {0, 0.1, 1}}) {
             const Camera camera = lookingAlong(along);
             Frame frame = openFrame(camera);
-            putBehind(frame, camera, **map);
+            putEnvironmentBehind(frame, camera, **map);
             for (int y = 0; y < camera.height; ++y) {
                 for (int x = 0; x < camera.width; ++x) {
                     const glm::vec4 c = frame.colour.at(x, y);
@@ -57,7 +57,7 @@ TEST(EnvironmentBehind, CoveredPixelsStayAndEdgesAreMixed) {
         frame.colour.at(0, 0) = {0.5, 0, 0, 1};
         frame.colour.at(1, 0) = {0.25, 0, 0, 0.5};  // premultiplied
         frame.depth.at(0, 0) = 3;
-        putBehind(frame, camera, **map);
+        putEnvironmentBehind(frame, camera, **map);
         EXPECT_EQ(frame.colour.at(0, 0), glm::vec4(0.5, 0, 0, 1));
         EXPECT_LT(glm::distance(frame.colour.at(1, 0), glm::vec4(0.25, 0.5, 0, 1)), 1e-5);
         EXPECT_LT(glm::distance(frame.colour.at(1, 1), glm::vec4(0, 1, 0, 1)), 1e-5);
@@ -73,8 +73,8 @@ TEST(EnvironmentBehind, IsInTheColourSpaceOfTheFrame) {
     ASSERT_TRUE(map);
     const Camera camera = lookingAlong({1, 1, 1}, 2);
     Frame coded = openFrame(camera), linear = openFrame(camera, true);
-    putBehind(coded, camera, **map);
-    putBehind(linear, camera, **map);
+    putEnvironmentBehind(coded, camera, **map);
+    putEnvironmentBehind(linear, camera, **map);
     EXPECT_NEAR(coded.colour.at(1, 1).r, 188 / 255.0, 1e-4);
     EXPECT_NEAR(linear.colour.at(1, 1).r, linearFromSrgb(188 / 255.0f), 1e-4);
 }
@@ -86,7 +86,7 @@ TEST(EnvironmentBehind, AnOrthographicCameraSeesOneDirection) {
     const glm::dvec3 along = camera.forward();
     camera = Camera::fromFieldOfView({0, 0, 0}, camera.orientation, {2, 2}, true, 8, 8);
     Frame frame = openFrame(camera);
-    putBehind(frame, camera, **map);
+    putEnvironmentBehind(frame, camera, **map);
     for (const glm::vec4& c : frame.colour.pixels())
         EXPECT_LT(glm::distance(glm::dvec3(c), paintedColour(along)), 0.01);
 }

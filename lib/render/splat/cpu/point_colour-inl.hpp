@@ -1,4 +1,4 @@
-// What points add to the picture: four values at a time. Included by splat_kernels.cpp once for
+// What points add to the picture: four values at a time. Included by kernels.cpp once for
 // each SIMD target.
 
 #if defined(STX_SPLAT_POINT_COLOUR_INL_HPP) == defined(HWY_TARGET_TOGGLE)

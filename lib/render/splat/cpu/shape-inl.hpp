@@ -1,4 +1,4 @@
-// The size and shape of splats in the picture. Included by splat_kernels.cpp once for each SIMD
+// The size and shape of splats in the picture. Included by kernels.cpp once for each SIMD
 // target.
 
 #if defined(STX_SPLAT_SHAPE_INL_HPP) == defined(HWY_TARGET_TOGGLE)

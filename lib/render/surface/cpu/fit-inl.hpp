@@ -1,5 +1,7 @@
-// The quadratic that is fitted to the taps of pieces: moments, what is solved, and what each tap
-// counts. Included by shade.cpp once for each SIMD target.
+// How a piece gets its colour: a quadratic function of the place is fitted to the texels (taps)
+// around the piece in all its sources, by weighted least squares. Here are the moments of the taps,
+// the solution, and the weight that it gives to each tap. Included by shade.cpp once for each SIMD
+// target.
 
 #if defined(STX_SURFACE_FIT_INL_HPP) == defined(HWY_TARGET_TOGGLE)
 #ifdef STX_SURFACE_FIT_INL_HPP

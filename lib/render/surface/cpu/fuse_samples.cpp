@@ -66,8 +66,8 @@ struct SampleFuser {
             d, hn::Ne(hn::And(hn::BitCast(du, q), hn::Set(du, flags)), hn::Zero(du)));
     }
 
-    /// rejected() of the shared code, of the points of `asked` at q, which `owner` shows, by number
-    /// in `pixel`.
+    /// rejected() of shaders/shared, for the points of `asked`: they are at depth `q` and are shown
+    /// by the source that `owner` is the index of among the sources of `pixel`.
     HWY_INLINE PointMask rejected(Points q, Counts owner, PointMask asked) const {
         const PointTag d;
         const CountTag di;
@@ -115,7 +115,7 @@ struct SampleFuser {
         Counts enough =
             hn::IfThenElse(asCounts(nearEdge), hn::Set(di, Votes::kWholeVote * kVotesNearEdge),
                            hn::Set(di, Votes::kWholeVote * kVotesElsewhere));
-        // Who does not show it: sources that show something else, and those that show nothing.
+        // Lanes in which a source does not show the point: it shows another surface there, or none.
         std::uint32_t others[kMostTileSources];
         std::uint32_t listed = 0;
         std::uint32_t closelyBehind[kMostTileSources] = {};
@@ -123,7 +123,8 @@ struct SampleFuser {
         const Points close =
             hn::Mul(hn::Set(d, kLinkedSamples), tile.axis.inverse ? q : hn::Set(d, 1.0f));
         const Points farthest = hn::Max(hn::Sub(q, close), hn::Zero(d));
-        std::uint32_t mayGiveWay = 0;  // lanes that something is closely behind
+        std::uint32_t mayGiveWay =
+            0;  // lanes in which another sample lies closely behind the point
         for (int i = 0; i < pixel.count; ++i) {
             const int k = pixel.owner[i];
             listed |= 1u << k;
@@ -151,7 +152,7 @@ struct SampleFuser {
             }
             enough = hn::Add(enough, hn::IfThenElseZero(asCounts(supports), whole));
         }
-        // What those that are left to be asked may say at most.
+        // The most votes against the point that sources not asked yet could still give.
         const int count = static_cast<int>(tile.sources.size());
         const Counts each = hn::Set(di, mostOfOne);
         Counts most = hn::Set(di, mostOfOne * (count - pixel.count));
@@ -166,8 +167,8 @@ struct SampleFuser {
             waits[k] = waits[k + 1] | closelyBehind[k];
         }
         for (int k = 0; k < count; ++k) {
-            // Those that have enough need no other, nor those that cannot have it any more, unless
-            // what is closely behind them may replace them.
+            // A point with enough votes against it is rejected and asks no more. So does a point
+            // that cannot get enough any more, unless a sample closely behind may still replace it.
             open &=
                 lanesOf(hn::RebindMask(d, hn::Gt(enough, against))) &
                 (~lanesOf(hn::RebindMask(d, hn::Gt(enough, hn::Add(against, most)))) | waits[k]);

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <type_traits>
 
 #include "lib/render/surface/cpu/shade_groups.hpp"
 #include "lib/render/surface/prepare/constants.hpp"
@@ -23,9 +22,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Sources that a piece takes colours from, at most.
 constexpr int kMostShaded = 8;
-/// Taps a side: all that the kernel reaches, or those within kNarrowReach.
-using Wide = std::integral_constant<int, kTaps>;
-using Narrow = std::integral_constant<int, 3>;
+/// Taps a side within kNarrowReach; kTaps are all that the kernel reaches.
+constexpr int kNarrow = 3;
 
 /// Info::ownColour() at the position of each lane. Lanes without texels lose their
 /// weight.
@@ -241,183 +239,190 @@ HWY_INLINE const Rgba8Image* findRows(const Source& source, const View& view, co
     return bytes;
 }
 
-void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
-                const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
-    const hn::ScalableTag<float> d;
-    using V = hn::Vec<decltype(d)>;
-    const int n = static_cast<int>(hn::Lanes(d));
+/// The sources of a group, and the taps of each; one for each thread.
+struct GroupTaps {
+    View views[32];  ///< by source
+    int list[32];    ///< sources that some lane takes colours from
+    int count = 0;   ///< of the list
+    // By source: the first tap of each lane (column, row), what taps count, and whether they do.
+    Lanes bases[32][2];
+    Lanes kernels[32][kTaps * kTaps];
+    Lanes masks[32][kTaps * kTaps];
+};
 
+/// Fills the list with the sources that see some lane, and places them.
+HWY_INLINE void placeSources(const Group& g, std::span<const ShadeSource> sources,
+                             const Ray& fromEye, GroupTaps& t) {
     std::uint32_t seen = 0;
     for (int l = 0; l < g.count; ++l) seen |= g.sources[l];
-    static thread_local View views[32];
-    int list[32];
-    int count = 0;
+    t.count = 0;
     for (std::uint32_t left = seen; left; left &= left - 1) {
         const int s = std::countr_zero(left);
-        place(sources[static_cast<std::size_t>(s)], fromEye, g, 1u << s, views[s]);
-        if (views[s].active) list[count++] = s;
+        place(sources[static_cast<std::size_t>(s)], fromEye, g, 1u << s, t.views[s]);
+        if (t.views[s].active) t.list[t.count++] = s;
     }
+}
+
+/// The source of the most weight in each lane, -1 = none.
+HWY_INLINE void findBest(const Group& g, const GroupTaps& t, std::int8_t* best) {
     alignas(64) std::int32_t top[kGroup];
     Lanes topWeight;
     for (int l = 0; l < kGroup; ++l) {
         top[l] = -1;
         topWeight[l] = 0.0f;
     }
-    for (int k = 0; k < count; ++k) {
-        const View& view = views[list[k]];
+    for (int k = 0; k < t.count; ++k) {
+        const View& view = t.views[t.list[k]];
         for (int l = 0; l < kGroup; ++l) {
             const bool better = view.weight[l] > topWeight[l];
             topWeight[l] = better ? view.weight[l] : topWeight[l];
-            top[l] = better ? list[k] : top[l];
+            top[l] = better ? t.list[k] : top[l];
         }
     }
     for (int l = 0; l < g.count; ++l) best[l] = static_cast<std::int8_t>(top[l]);
-    if (count > settings.mostSources) {
-        const int most = settings.mostSources;
-        for (int l = 0; l < kGroup; l += n) {
-            V heaviest[kMostShaded + 1];
-            for (int i = 0; i <= most; ++i) heaviest[i] = hn::Zero(d);
-            for (int k = 0; k < count; ++k) {
-                V weight = hn::LoadU(d, &views[list[k]].weight[l]);
-                for (int i = 0; i <= most; ++i) {
-                    const V heavier = hn::Max(heaviest[i], weight);
-                    weight = hn::Min(heaviest[i], weight);
-                    heaviest[i] = heavier;
-                }
-            }
-            const V dropped = heaviest[most], least = heaviest[most - 1];
-            for (int k = 0; k < count; ++k) {
-                Lanes& weights = views[list[k]].weight;
-                const V weight = hn::LoadU(d, &weights[l]);
-                const V ratio = hn::Div(dropped, hn::Max(weight, hn::Set(d, 1e-20f)));
-                const V kept = hn::Max(hn::NegMulAdd(ratio, ratio, hn::Set(d, 1.0f)),
-                                       hn::Set(d, kLeastKeptWeight));
-                hn::StoreU(hn::IfThenElseZero(hn::Ge(weight, least), hn::Mul(weight, kept)), d,
-                           &weights[l]);
+}
+
+/// Leaves the `most` heaviest sources to each lane. They weigh less the heavier the first one is
+/// that was left out, so that none comes or goes at once.
+HWY_INLINE void keepHeaviest(const Group& g, int most, GroupTaps& t) {
+    const hn::ScalableTag<float> d;
+    using V = hn::Vec<decltype(d)>;
+    for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
+        V heaviest[kMostShaded + 1];
+        for (int i = 0; i <= most; ++i) heaviest[i] = hn::Zero(d);
+        for (int k = 0; k < t.count; ++k) {
+            V weight = hn::LoadU(d, &t.views[t.list[k]].weight[l]);
+            for (int i = 0; i <= most; ++i) {
+                const V heavier = hn::Max(heaviest[i], weight);
+                weight = hn::Min(heaviest[i], weight);
+                heaviest[i] = heavier;
             }
         }
-    }
-
-    if (count > settings.mostSources) {
-        // Neighbours mostly leave out the same sources.
-        const auto used = [&](int s) {
-            const View& view = views[s];
-            for (int l = 0; l < g.count; ++l)
-                if (view.weight[l] > 0.0f) return true;
-            return false;
-        };
-        count = static_cast<int>(std::stable_partition(list, list + count, used) - list);
-    }
-
-    static thread_local Lanes bases[32][2];
-    static thread_local Lanes kernels[32][kTaps * kTaps];
-    static thread_local Lanes masks[32][kTaps * kTaps];
-    Lanes moments[kMoments] = {};
-    for (int k = 0; k < count; ++k) {
-        const int s = list[k];
-        View& view = views[s];
-        for (int l = 0; l < kGroup; l += n) {
-            const V shift = hn::Set(d, view.narrow ? -1.0f : -1.5f);
-            hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.u[l]), shift)), d, &bases[s][0][l]);
-            hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.v[l]), shift)), d, &bases[s][1][l]);
+        const V dropped = heaviest[most], least = heaviest[most - 1];
+        for (int k = 0; k < t.count; ++k) {
+            Lanes& weights = t.views[t.list[k]].weight;
+            const V weight = hn::LoadU(d, &weights[l]);
+            const V ratio = hn::Div(dropped, hn::Max(weight, hn::Set(d, 1e-20f)));
+            const V kept = hn::Max(hn::NegMulAdd(ratio, ratio, hn::Set(d, 1.0f)),
+                                   hn::Set(d, kLeastKeptWeight));
+            hn::StoreU(hn::IfThenElseZero(hn::Ge(weight, least), hn::Mul(weight, kept)), d,
+                       &weights[l]);
         }
-        fetchAhead(*sources[static_cast<std::size_t>(s)].source, bases[s], g.count);
-        if (view.rough) {
-            for (Lanes& tap : masks[s]) std::fill(tap.v, tap.v + kGroup, 1.0f);
-            for (std::uint32_t left = view.rough; left; left &= left - 1) {
-                const int l = std::countr_zero(left);
-                if (l >= g.count || !(view.weight[l] > 0.0f)) continue;
-                alignas(16) float mask[kTaps * kTaps];
-                maskTaps(sources[static_cast<std::size_t>(s)], g, l, view.u[l], view.v[l], view,
-                         static_cast<int>(bases[s][0][l]), static_cast<int>(bases[s][1][l]), mask);
-                for (int t = 0; t < kTaps * kTaps; ++t) masks[s][t][l] = mask[t];
-            }
-        }
-        const auto addMoments = [&](auto taps) HWY_ATTR {
-            for (int l = 0; l < kGroup; l += n) {
-                V m[kMoments];
-                for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
-                const Taps<decltype(d), decltype(taps)::value> at(d, view, bases[s][0], bases[s][1],
-                                                                  l);
-                at.addMoments(d, 1.0f / settings.kernel, hn::LoadU(d, &view.weight[l]),
-                              hn::LoadU(d, &view.reach[l]), view.rough ? masks[s] : nullptr,
-                              kernels[s], l, m);
-                for (int i = 0; i < kMoments; ++i) hn::StoreU(m[i], d, &moments[i][l]);
-            }
-        };
-        if (view.narrow)
-            addMoments(Narrow());
-        else
-            addMoments(Wide());
     }
+    // Neighbours mostly leave out the same sources.
+    const auto used = [&](int s) {
+        const View& view = t.views[s];
+        for (int l = 0; l < g.count; ++l)
+            if (view.weight[l] > 0.0f) return true;
+        return false;
+    };
+    t.count = static_cast<int>(std::stable_partition(t.list, t.list + t.count, used) - t.list);
+}
 
-    Lanes rows[6];
-    for (int l = 0; l < kGroup; l += n) {
-        V m[kMoments], row[6];
+/// The first taps of a source, and which of them lie on the surface of their lane.
+HWY_INLINE void findTaps(const Group& g, const ShadeSource& source, int s, GroupTaps& t) {
+    const hn::ScalableTag<float> d;
+    using V = hn::Vec<decltype(d)>;
+    const View& view = t.views[s];
+    for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
+        const V shift = hn::Set(d, view.narrow ? -1.0f : -1.5f);
+        hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.u[l]), shift)), d, &t.bases[s][0][l]);
+        hn::StoreU(hn::Floor(hn::Add(hn::LoadU(d, &view.v[l]), shift)), d, &t.bases[s][1][l]);
+    }
+    fetchAhead(*source.source, t.bases[s], g.count);
+    if (!view.rough) return;
+    for (Lanes& tap : t.masks[s]) std::fill(tap.v, tap.v + kGroup, 1.0f);
+    for (std::uint32_t left = view.rough; left; left &= left - 1) {
+        const int l = std::countr_zero(left);
+        if (l >= g.count || !(view.weight[l] > 0.0f)) continue;
+        alignas(16) float mask[kTaps * kTaps];
+        maskTaps(source, g, l, view.u[l], view.v[l], view, static_cast<int>(t.bases[s][0][l]),
+                 static_cast<int>(t.bases[s][1][l]), mask);
+        for (int i = 0; i < kTaps * kTaps; ++i) t.masks[s][i][l] = mask[i];
+    }
+}
+
+/// The kernels of a source's taps, and their moments added to `moments`.
+template <int kSide>
+HWY_INLINE void addMoments(int s, float kernel, GroupTaps& t, Lanes* moments) {
+    const hn::ScalableTag<float> d;
+    const View& view = t.views[s];
+    for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
+        hn::Vec<decltype(d)> m[kMoments];
+        for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
+        const Taps<decltype(d), kSide> at(d, view, t.bases[s][0], t.bases[s][1], l);
+        at.addMoments(d, 1.0f / kernel, hn::LoadU(d, &view.weight[l]), hn::LoadU(d, &view.reach[l]),
+                      view.rough ? t.masks[s] : nullptr, t.kernels[s], l, m);
+        for (int i = 0; i < kMoments; ++i) hn::StoreU(m[i], d, &moments[i][l]);
+    }
+}
+
+/// The polynomials of all lanes out of their moments: what makes the fit's middle of the taps.
+HWY_INLINE void solveGroup(const Lanes* moments, float ridge, Lanes* rows) {
+    const hn::ScalableTag<float> d;
+    for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
+        hn::Vec<decltype(d)> m[kMoments], row[6];
         for (int i = 0; i < kMoments; ++i) m[i] = hn::LoadU(d, &moments[i][l]);
         m[0] = hn::Max(m[0], hn::Set(d, 1e-12f));
-        solveFirstRow(d, m, hn::Set(d, settings.ridge), row);
+        solveFirstRow(d, m, hn::Set(d, ridge), row);
         for (int i = 0; i < 6; ++i) hn::StoreU(row[i], d, &rows[i][l]);
     }
+}
 
-    ColourSum sums[kGroup] = {};
-    alignas(64) float total[kGroup] = {};
-    TapWeights weights;
+/// What the taps of a source count, with their sums added to `total`.
+template <int kSide>
+HWY_INLINE void weighTaps(int s, const GroupTaps& t, const Lanes* rows, TapWeights& weights,
+                          float* total) {
+    const hn::ScalableTag<float> d;
+    using V = hn::Vec<decltype(d)>;
+    for (int l = 0; l < kGroup; l += static_cast<int>(hn::Lanes(d))) {
+        V row[6];
+        for (int i = 0; i < 6; ++i) row[i] = hn::LoadU(d, &rows[i][l]);
+        const Taps<decltype(d), kSide> at(d, t.views[s], t.bases[s][0], t.bases[s][1], l);
+        const V sum = at.weigh(d, row, t.kernels[s], l, weights);
+        hn::StoreU(hn::Add(sum, hn::LoadU(d, &total[l])), d, &total[l]);
+    }
+}
+
+/// The colours of a source's taps by these weights, added to `sums`.
+template <int kSide>
+HWY_INLINE void fetchTaps(const Group& g, const Source& source, int s, const GroupTaps& t,
+                          const TapWeights& weights, ColourSum* sums) {
+    const View& view = t.views[s];
     alignas(64) std::int32_t rowsFrom[kGroup];
-    for (int k = 0; k < count; ++k) {
-        const int s = list[k];
-        const View& view = views[s];
-        const Source& source = *sources[static_cast<std::size_t>(s)].source;
-        const auto weigh = [&](auto taps) HWY_ATTR {
-            for (int l = 0; l < kGroup; l += n) {
-                V row[6];
-                for (int i = 0; i < 6; ++i) row[i] = hn::LoadU(d, &rows[i][l]);
-                const Taps<decltype(d), decltype(taps)::value> at(d, view, bases[s][0], bases[s][1],
-                                                                  l);
-                const V sum = at.weigh(d, row, kernels[s], l, weights);
-                hn::StoreU(hn::Add(sum, hn::LoadU(d, &total[l])), d, &total[l]);
-            }
-        };
-        if (view.narrow)
-            weigh(Narrow());
-        else
-            weigh(Wide());
-        const int tapRows = view.narrow ? Narrow::value : Wide::value;
-        if (const Rgba8Image* bytes = findRows(source, view, bases[s], rowsFrom)) {
-            const auto fetch = [&](auto taps) HWY_ATTR {
-                for (int l = 0; l < g.count; ++l)
-                    fetchRows(bytes->data() + rowsFrom[l], source.width, decltype(taps)::value,
-                              weights, l, sums[l]);
-            };
-            if (view.narrow)
-                fetch(Narrow());
-            else
-                fetch(Wide());
-            continue;
-        }
-        for (int l = 0; l < g.count; ++l) {
-            if (!(view.weight[l] > 0.0f)) continue;
-            const int baseU = static_cast<int>(bases[s][0][l]);
-            const int baseV = static_cast<int>(bases[s][1][l]);
-            const TapPlace taps = view.tapsOf(source, l, baseU, baseV);
-            const Rgba8Image* bytes = taps.page->texture->rgba8();
-            if (!bytes) {
-                fetchFloats(*taps.page->texture->rgbaFloat(), taps, baseU, baseV, tapRows, weights,
-                            l, sums[l]);
-            } else if (taps.stepX == 1 && baseU >= taps.x0 && baseV >= taps.y0 &&
-                       baseU + kTaps <= taps.x1 && baseV + kTaps <= taps.y1) {
-                fetchRows(bytes->data() + taps.first, static_cast<int>(taps.stepY), tapRows,
-                          weights, l, sums[l]);
-            } else {
-                glm::u8vec4 gathered[kTaps * kTaps];
-                gatherTaps(*bytes, taps, baseU, baseV, gathered);
-                fetchRows(gathered, kTaps, tapRows, weights, l, sums[l]);
-            }
-        }
+    if (const Rgba8Image* bytes = findRows(source, view, t.bases[s], rowsFrom)) {
+        for (int l = 0; l < g.count; ++l)
+            fetchRows(bytes->data() + rowsFrom[l], source.width, kSide, weights, l, sums[l]);
+        return;
     }
     for (int l = 0; l < g.count; ++l) {
-        const bool bytes = !sources.empty() && !sources[0].source->set->linear();
-        const float scale = bytes ? 1.0f / 255.0f : 1.0f;
+        if (!(view.weight[l] > 0.0f)) continue;
+        const int baseU = static_cast<int>(t.bases[s][0][l]);
+        const int baseV = static_cast<int>(t.bases[s][1][l]);
+        const TapPlace taps = view.tapsOf(source, l, baseU, baseV);
+        const Rgba8Image* bytes = taps.page->texture->rgba8();
+        if (!bytes) {
+            fetchFloats(*taps.page->texture->rgbaFloat(), taps, baseU, baseV, kSide, weights, l,
+                        sums[l]);
+        } else if (taps.stepX == 1 && baseU >= taps.x0 && baseV >= taps.y0 &&
+                   baseU + kTaps <= taps.x1 && baseV + kTaps <= taps.y1) {
+            fetchRows(bytes->data() + taps.first, static_cast<int>(taps.stepY), kSide, weights, l,
+                      sums[l]);
+        } else {
+            glm::u8vec4 gathered[kTaps * kTaps];
+            gatherTaps(*bytes, taps, baseU, baseV, gathered);
+            fetchRows(gathered, kTaps, kSide, weights, l, sums[l]);
+        }
+    }
+}
+
+/// The colours out of their sums; where no tap lies on the surface, that of the nearest pixel.
+HWY_INLINE void writeColours(const Group& g, std::span<const ShadeSource> sources,
+                             const GroupTaps& t, const ColourSum* sums, const float* total,
+                             const std::int8_t* best, glm::vec3* colours) {
+    const bool bytes = !sources.empty() && !sources[0].source->set->linear();
+    const float scale = bytes ? 1.0f / 255.0f : 1.0f;
+    for (int l = 0; l < g.count; ++l) {
         if (total[l] > 0.5f) {
             const float f = scale / total[l];
             glm::vec3 value;
@@ -428,8 +433,7 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             if (bytes) value = glm::min(value, glm::vec3(1.0f));
             colours[l] = value;
         } else if (best[l] >= 0) {
-            // No tap on the surface: the nearest pixel that is one.
-            const View& view = views[best[l]];
+            const View& view = t.views[best[l]];
             const Source& source = *sources[static_cast<std::size_t>(best[l])].source;
             colours[l] = glm::vec3(
                 source.colour(std::clamp(static_cast<int>(view.u[l]), 0, source.width - 1),
@@ -438,6 +442,42 @@ void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray&
             colours[l] = glm::vec3(0.0f);
         }
     }
+}
+
+void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
+                const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
+    static thread_local GroupTaps t;
+    placeSources(g, sources, fromEye, t);
+    findBest(g, t, best);
+    if (t.count > settings.mostSources) keepHeaviest(g, settings.mostSources, t);
+
+    Lanes moments[kMoments] = {};
+    for (int k = 0; k < t.count; ++k) {
+        const int s = t.list[k];
+        findTaps(g, sources[static_cast<std::size_t>(s)], s, t);
+        if (t.views[s].narrow)
+            addMoments<kNarrow>(s, settings.kernel, t, moments);
+        else
+            addMoments<kTaps>(s, settings.kernel, t, moments);
+    }
+    Lanes rows[6];
+    solveGroup(moments, settings.ridge, rows);
+
+    ColourSum sums[kGroup] = {};
+    alignas(64) float total[kGroup] = {};
+    TapWeights weights;
+    for (int k = 0; k < t.count; ++k) {
+        const int s = t.list[k];
+        const Source& source = *sources[static_cast<std::size_t>(s)].source;
+        if (t.views[s].narrow) {
+            weighTaps<kNarrow>(s, t, rows, weights, total);
+            fetchTaps<kNarrow>(g, source, s, t, weights, sums);
+        } else {
+            weighTaps<kTaps>(s, t, rows, weights, total);
+            fetchTaps<kTaps>(g, source, s, t, weights, sums);
+        }
+    }
+    writeColours(g, sources, t, sums, total, best, colours);
 }
 
 void ShadePieces(const Pieces& p, std::span<const ShadeSource> sources, const Ray& fromEye,

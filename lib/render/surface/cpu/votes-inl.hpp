@@ -187,8 +187,8 @@ struct Window {
                                                 hn::InterleaveLower(rows, row(0), row(1)));
         return hn::PromoteTo(CountTag(), hn::BitCast(hn::FixedTag<std::uint8_t, 16>(), bytes));
     }
-    /// Of what was read, what is (x, y) from the upper left of the pixels around each point, from
-    /// -1 to 1.
+    /// For each point, the value of one pixel in what read() gave: the pixel (x, y) beside the
+    /// upper left one of the four around the point, x and y from -1 to 1.
     template <class D, class V = hn::Vec<D>>
     HWY_INLINE V at(D d, V table, int x, int y) const {
         const CountTag di;
@@ -283,9 +283,10 @@ HWY_INLINE PointMask areBackground(shared::Votes& votes, const VotingSource& fro
     return maskOf(background);
 }
 
-/// Of the points of `asked`, those that the upper left of the pixels around them tells to have no
-/// vote of a source, from its depth there and how that changes. `qAt(x, y, lanes)`,
-/// `infoAt(x, y, lanes)`: of the pixel so far from that one.
+/// Which points of `asked` can get no vote from a source, as one of its pixels already tells: the
+/// upper left one of the four around the point. Its depth, and how depth changes beside it, are
+/// compared with the point's. `qAt(x, y, lanes)` and `infoAt(x, y, lanes)` read the pixel that is
+/// (x, y) beside that one.
 template <class Depths, class Infos>
 HWY_INLINE PointMask withoutVote(const VotingSource& from, const SourcePoints& p, const Depths& qAt,
                                  const Infos& infoAt, Counts info, float clearlyBehind,

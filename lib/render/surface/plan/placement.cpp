@@ -83,8 +83,8 @@ struct Corners {
         const auto [y0, y1] = std::ranges::minmax(v);
         return {x0, y0, x1, y1};
     }
-    /// Where what is before the camera is: what is behind is cut off, and what is next to nothing
-    /// before it, nearer than `cut`.
+    /// The box of the part that is in front of the camera: edges that go behind it are cut off
+    /// where their depth is `cut`.
     [[nodiscard]] Box inFront(float cut) const {
         Box box;
         for (std::size_t k = 0; k < 8; ++k) {

@@ -30,14 +30,14 @@ void addBounds(const Source& s, Bounds& bounds) {
     }
 }
 
-/// By tile: q in the middle of the blocks of all sources that fall in it, 0 = none.
+/// For each tile the mean q of the blocks of all sources that may be drawn in it, 0 = none.
 std::vector<double> middlesOf(const SurfaceFrame& frame,
                               std::span<const std::vector<PlacedBlocks>> placed) {
     struct Sum {
         double q = 0;
         int blocks = 0;
     };
-    // Where some of them is behind the camera, only without others.
+    // Blocks that are partly behind the camera count only in tiles that have no others.
     const std::size_t tiles = static_cast<std::size_t>(frame.tilesX) * frame.tilesY;
     std::vector<std::array<Sum, 2>> sums(tiles);
     for (const auto& ofSource : placed) {
@@ -59,8 +59,8 @@ std::vector<double> middlesOf(const SurfaceFrame& frame,
     return middles;
 }
 
-/// The sources, `wanted` of them, that a tile of many is built from; `q`: in the middle of what
-/// falls in it.
+/// Chooses the `wanted` sources that a tile is built from, where more fall in it than it can take. `q` is
+/// the mean depth of what falls in it (middlesOf()).
 std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, int wanted) {
     const glm::dvec4 h =
         frame.space.worldFromPixel *
@@ -76,7 +76,8 @@ std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, in
         return at.w > 0 && at.x >= 0 && at.y >= 0 && at.x <= at.w * s.width &&
                at.y <= at.w * s.height;
     };
-    // The first of what is left, by rank; those that show nothing there come last, by theirs.
+    // Sources by the angle between their line of sight and the novel one, the least first. Those
+    // that show nothing in the tile are put off until all others are taken.
     using Ranked = std::pair<double, int>;
     std::vector<Ranked> left, idle;
     left.reserve(frame.sources.size());

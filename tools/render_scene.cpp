@@ -1,0 +1,121 @@
+#include "tools/render_scene.hpp"
+
+#include "formats/any/sequences.hpp"
+
+namespace stx::tools {
+namespace {
+
+/// Notes options that do not matter to this model and mode: scripts pass them to all.
+void noteUnused(const Model& model, const RenderOptions& o, const Command& command,
+                Program& program) {
+    const auto note = [&](const std::vector<std::string>& options, const char* why) {
+        if (!options.empty())
+            program.job.note(fmt::format("{} {} not used: {}", fmt::join(options, ", "),
+                                         options.size() == 1 ? "is" : "are", why));
+    };
+    if (std::holds_alternative<Mesh>(model)) {
+        note(command.given({"--mode", "--backend", "--device", "--pipeline", "--splat",
+                            "--splat-coefficient", "--fill", "--match-colours", "--refine",
+                            "--without", "--explain"}),
+             "a mesh is rasterised itself, on the processor");
+        return;
+    }
+    note(command.given({"--texture"}), "only meshes take a texture");
+    if (o.settings.mode == RenderMode::splat)
+        note(command.given({"--quality"}), "it is of --mode surface");
+    else
+        note(command.given({"--splat", "--splat-coefficient", "--pipeline"}),
+             "they are of --mode splat");
+}
+
+}  // namespace
+
+Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
+                             const Command& command, Program& program) {
+    DrawnScene scene;
+    if (o.time.any()) {
+        STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+        scene.moving = std::make_unique<MovingPictures>(std::move(frames), settings, o.backend,
+                                                        o.device, program.job);
+        if (lightsByEnvironment(o)) scene.moving->lightByEnvironment();
+        STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
+        STX_CHECK(scene.moving->at(times.front(), {}));
+        scene.context.views = scene.moving->views();
+        scene.context.bounds = scene.moving->bounds();
+        scene.context.origin = scene.moving->origin();
+        scene.environment = settings.environment || scene.moving->environment();
+        noteUnused(Bundle(), o, command, program);
+        return scene;
+    }
+    STX_TRY(scene.model, stx::open(o.input, o.open, program.job));
+    noteUnused(scene.model, o, command, program);
+    const auto addViews = [&](const auto& seen) {
+        for (const auto& v : seen.views) scene.context.views.push_back(v.camera);
+        scene.points = seen.pointCount();
+        scene.environment = settings.ownEnvironment && seen.environment;
+    };
+    if (const auto* mesh = std::get_if<Mesh>(&scene.model)) STX_CHECK(mesh->check());
+    if (const auto* bundle = std::get_if<Bundle>(&scene.model)) addViews(*bundle);
+    if (const auto* atlas = std::get_if<Atlas>(&scene.model)) addViews(*atlas);
+    scene.environment = scene.environment || settings.environment;
+    scene.context.bounds = boundsOf(scene.model);
+    scene.context.origin = originOf(scene.model);
+    return scene;
+}
+
+Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnScene& scene,
+                                            Program& program) {
+    STX_TRY(auto cameras, makeCameras(o.camera, scene.context, program));
+    if (!scene.moving) return cameras;
+    const auto noted = [&](std::vector<NovelCamera> pictures) {
+        std::vector<double> times;
+        for (const NovelCamera& picture : pictures) times.push_back(*picture.time);
+        noteOutside(times, scene.moving->timeline(), program.job);
+        return pictures;
+    };
+    const bool timed =
+        std::ranges::all_of(cameras, [](const auto& c) { return c.time.has_value(); });
+    // `--times cameras`: a file of cameras may say when.
+    if (o.time.times == "cameras") {
+        if (timed) return noted(std::move(cameras));
+        return fail(ErrorCode::usage, "--times cameras: the cameras have no times of their own");
+    }
+    STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
+    if (cameras.size() > 1 && times.size() > 1 && cameras.size() != times.size())
+        return fail(ErrorCode::usage,
+                    "{} cameras and {} times; one camera, one time, or as many of both are "
+                    "expected",
+                    cameras.size(), times.size());
+    std::vector<NovelCamera> pictures;
+    for (std::size_t i = 0; i < std::max(cameras.size(), times.size()); ++i) {
+        pictures.push_back(cameras[cameras.size() == 1 ? 0 : i]);
+        pictures.back().time = times[times.size() == 1 ? 0 : i];
+    }
+    return noted(std::move(pictures));
+}
+
+std::optional<Timeline> clockOf(const std::vector<NovelCamera>& pictures) {
+    Timeline line;
+    line.times.clear();
+    for (const NovelCamera& picture : pictures) line.times.push_back(picture.time.value_or(0));
+    line.end = line.times.empty() ? 0 : line.times.back();
+    if (!line.moves() || !line.check()) return std::nullopt;
+    line.findTick();
+    return line;
+}
+
+Result<void> lightBy(const Model& model, RenderSettings& settings, Job& job) {
+    std::shared_ptr<const Environment> own;
+    if (const auto* bundle = std::get_if<Bundle>(&model)) own = bundle->environment;
+    if (const auto* atlas = std::get_if<Atlas>(&model)) own = atlas->environment;
+    auto map = settings.environment;
+    if (!map && own) {
+        STX_TRY(map, EnvironmentMap::make(*own, job.limits));
+        if (settings.ownEnvironment) settings.environment = map;
+    }
+    STX_TRY(settings.lighting.environment,
+            environmentLight(std::move(map), settings.lighting, job.limits));
+    return {};
+}
+
+}  // namespace stx::tools

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/stx/stx.hpp"
+#include "tools/camera_options.hpp"
+#include "tools/environment_options.hpp"
+#include "tools/picture_times.hpp"
+#include "tools/shard.hpp"
+
+namespace stx::tools {
+
+/// What `stx render` was asked for.
+struct RenderOptions {
+    std::string input, output;
+    CameraOptions camera;
+    TimeOptions time;
+    Backend backend = Backend::automatic;
+    RenderSettings settings;  ///< without the lighting
+    std::string background;   ///< empty: not given
+    EnvironmentOptions environment;
+    bool around = false;  ///< equirectangular pictures
+    std::vector<std::string> lights;
+    std::string ambient = "0.2", specular = "0";
+    std::string refine = "auto", without;
+    bool matchColours = true, explain = false;
+    double shininess = 32;
+    std::string fileFormat;
+    std::string framesPerSecond;  ///< empty: that of the input, else 25
+    int compression = 1;
+    bool skipExisting = false, listDevices = false;
+    Shard shard;
+    int device = -1;
+    OpenOptions open;
+};
+
+/// The word for --light that is not a Light.
+inline constexpr const char* kEnvironmentLight = "environment";
+[[nodiscard]] inline bool lightsByEnvironment(const RenderOptions& o) {
+    return std::ranges::find(o.lights, kEnvironmentLight) != o.lights.end();
+}
+
+/// What is drawn.
+struct DrawnScene {
+    Model model;  ///< of what stands still
+    std::unique_ptr<Renderer> still;
+    std::unique_ptr<MovingPictures> moving;
+    CameraContext context;
+    std::int64_t points = 0;
+    bool environment = false;  ///< pixels without the object show one
+};
+
+/// Opens the input: as a sequence when times are asked for. Notes options that do not matter to it.
+[[nodiscard]] Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
+                                           const Command& command, Program& program);
+
+/// A picture for each camera, for each time, or for each pair of them.
+[[nodiscard]] Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o,
+                                                          const DrawnScene& scene,
+                                                          Program& program);
+
+/// The times of pictures as a clock; nothing where they do not ascend.
+[[nodiscard]] std::optional<Timeline> clockOf(const std::vector<NovelCamera>& pictures);
+
+/// Lights by an environment: the one that is shown, else the model's own.
+[[nodiscard]] Result<void> lightBy(const Model& model, RenderSettings& settings, Job& job);
+
+}  // namespace stx::tools
