@@ -1,4 +1,3 @@
-#include <chrono>
 #include <optional>
 #include <set>
 
@@ -12,6 +11,7 @@
 #include "formats/video/video_frames.hpp"
 #include "lib/background/sequence_background.hpp"
 #include "lib/background/still.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "tools/commands.hpp"
 
 namespace stx::tools {
@@ -130,7 +130,7 @@ bool holdsVideo(const std::string& input, const Job& job) {
 
 /// What the cameras of a bundle with time see behind all that moves, as views of the bundle.
 Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     if (o.inputs.size() != 1)
         return fail(ErrorCode::usage, "{} inputs for '{}'; one bundle with time is expected",
                     o.inputs.size(), o.output);
@@ -169,8 +169,7 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
             "the video of '{}' ({}) is written as pictures ({}), without further loss; "
             "--video h264 writes video",
             o.inputs[0], humanBytes(bytesOf(o.inputs[0])), humanBytes(bytesOf(o.output))));
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} → {} ({}), {} of {}, {}",
                             std::filesystem::path(o.inputs[0]).filename().string(),
@@ -189,7 +188,7 @@ Result<int> backgroundOfBundle(const BackgroundOptions& o, Program& program) {
 
 /// The background of plain frames.
 Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(frameFormat(o.output));
     if (!o.confidence.empty()) {
@@ -210,8 +209,7 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
     const std::string description = frames->description();
     const int count = frames->count();
     frames.reset();  // which says what of them was damaged
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} → {} ({}), {}x{} of {}, {}", description,
                             std::filesystem::path(o.output).filename().string(),

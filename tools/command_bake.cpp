@@ -1,11 +1,10 @@
-#include <chrono>
-
 #include <nlohmann/json.hpp>
 
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/surface/normals.hpp"
 #include "tools/commands.hpp"
 
@@ -19,7 +18,7 @@ struct BakeOptions {
 };
 
 Result<int> bakeBundle(const BakeOptions& o, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
@@ -42,8 +41,7 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveSequence(*frames, o.output, save, program.job));
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format(
         "{} ({}) → {} ({}), {} with normals and splats, {}",

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/stx/mesh_views.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/render/around/around.hpp"
 #include "tools/batch.hpp"
@@ -186,7 +186,7 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
 Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
                                           const std::filesystem::path& target,
                                           const ConvertOptions& o, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     STX_CHECK(checkTarget(target, program));
     STX_CHECK(containerOf(target));
     // Only the report has the points, for which the images must be decoded.
@@ -225,8 +225,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     if (timeline.moves())
         sizes += fmt::format(", {} over {:.4g} s", counted(timeline.count(), "frame"),
                              timeline.duration());
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}){}, {}", input.filename().string(),
                             humanBytes(bytesOf(input)), target.filename().string(),

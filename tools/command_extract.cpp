@@ -1,4 +1,3 @@
-#include <chrono>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -8,6 +7,7 @@
 #include "formats/imagesets/export.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
 #include "tools/picture_times.hpp"
@@ -60,7 +60,7 @@ Points pointsOf(const Bundle& bundle) {
 }
 
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     ExtractOptions o = options;
     STX_TRY(o.output, folderTarget(options.output, {".glb", ".html", ".ply", ".drc"},
                                    "a folder, .glb, .html, .ply or .drc"));
@@ -131,8 +131,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         what = counted(views, "view");
         if (count > 1) what += " of " + counted(count, "frame");
     }
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}), {}, {}",
                             std::filesystem::path(o.input).filename().string(),

@@ -1,4 +1,3 @@
-#include <chrono>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -7,6 +6,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/files/numbered.hpp"
 #include "formats/images/images.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/period.hpp"
 #include "lib/quality/prune_quality.hpp"
@@ -77,7 +77,7 @@ Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, Job& job) {
 /// One bundle into one atlas; of a film like the others of its period.
 Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPeriod* period,
                        Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     if (!opened) return propagate(opened);
     Bundle bundle = std::move(*opened);
     PackSettings settings = o.settings;
@@ -105,8 +105,7 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPe
     if (!atlas) return tl::unexpected(atlas.error().at(fmt::format("'{}'", o.input)));
     STX_CHECK(program.job.checkCancelled());
     STX_CHECK(writeAtlas(*atlas, o.output, program.job, save));
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format(
         "{} ({}) → {} ({}), {} in {} {}x{}, {:.1f} % used{}, {}",

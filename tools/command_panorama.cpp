@@ -1,4 +1,3 @@
-#include <chrono>
 #include <numbers>
 
 #include <nlohmann/json.hpp>
@@ -7,6 +6,7 @@
 #include "formats/any/save.hpp"
 #include "formats/images/images.hpp"
 #include "formats/panorama/panorama_files.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/panorama/panorama.hpp"
 #include "tools/commands.hpp"
 
@@ -96,7 +96,7 @@ nlohmann::ordered_json reportOf(const PanoramaOptions& o, const PanoramaAlignmen
 }
 
 Result<int> makePanorama(const PanoramaOptions& options, const Command& command, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     PanoramaOptions o = options;
     const PanoramaFormat format = panoramaFormat(o.output);
     if (!o.into.empty()) {
@@ -149,8 +149,7 @@ Result<int> makePanorama(const PanoramaOptions& options, const Command& command,
         STX_CHECK(writePanorama(std::move(panorama), o.output, write, program.job));
     else
         STX_CHECK(writePanoramaInto(std::move(panorama), o.into, o.output, write, program.job));
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     double across = 0;
     for (const PanoramaCamera& c : found.cameras)

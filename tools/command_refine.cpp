@@ -1,11 +1,10 @@
-#include <chrono>
-
 #include <nlohmann/json.hpp>
 
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/refine/refine.hpp"
 #include "tools/commands.hpp"
 
@@ -32,7 +31,7 @@ nlohmann::ordered_json stepsJson(const RefineReport& report) {
 }
 
 Result<int> refineInput(const RefineOptions& o, const Command& command, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     if (!o.only.empty())
         STX_CHECK(command.refuse({"--without"}, "does not go with --only; give one of them"));
     STX_TRY(const auto settings, o.only.empty() && o.without.empty() ? RefineSettings()
@@ -64,8 +63,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     if (before) program.job.note("views that were refined before are left as they are");
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format(
         "{} ({}) → {} ({}), {}: {}, {}", std::filesystem::path(o.input).filename().string(),

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -8,6 +7,7 @@
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/render/around/around.hpp"
 #include "lib/render/factory.hpp"
 #include "tools/commands.hpp"
@@ -251,14 +251,13 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
         } else if (more && !o.around) {
             drawn.renderer->expect(pictures[i + 1].camera);
         }
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         auto frame = o.around ? renderAround(*drawn.renderer, camera, camera.width, camera.height,
                                              program.job)
                               : drawn.renderer->render(camera);
         if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
         const double milliseconds =
-            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                .count();
+            watch.milliseconds();
         drawn.milliseconds += milliseconds;
         ++drawn.count;
         drawn.views.push_back({{"output", name}, {"milliseconds", milliseconds}});

@@ -1,4 +1,3 @@
-#include <chrono>
 #include <numeric>
 
 #include <nlohmann/json.hpp>
@@ -7,6 +6,7 @@
 #include "formats/any/save.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/selection/selection.hpp"
 #include "tools/commands.hpp"
 #include "tools/mesh_views.hpp"
@@ -23,7 +23,7 @@ struct SelectOptions {
 /// A mesh has no views to choose from: the best ones around it are captured.
 Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, const Command& command,
                              Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     STX_CHECK(command.refuse({"--share", "--density"},
                              fmt::format("is of bundles, but '{}' is a mesh", o.input)));
     if (o.settings.count == 0)
@@ -39,8 +39,7 @@ Result<int> selectAroundMesh(const Mesh& mesh, const SelectOptions& o, const Com
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveBundle(*bundle, o.output, save, program.job));
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} → {}, {}, {}", std::filesystem::path(o.input).filename().string(),
                             o.output, counted(bundle->views.size(), "view"),
@@ -97,7 +96,7 @@ Result<Selection> selectInFront(const Bundle& bundle, const SelectSettings& sett
 }
 
 Result<int> select(const SelectOptions& o, const Command& command, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
@@ -137,8 +136,7 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
         STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
     }
     const double quality = selection.quality.empty() ? 0.0 : selection.quality.back();
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format(
         "{} → {}, {} of {} views, {:.1f} % of the quality of all, at least {:.1f} % of the best "

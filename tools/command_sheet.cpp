@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <chrono>
 
 #include <nlohmann/json.hpp>
 
@@ -10,6 +9,7 @@
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/base/printable.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/sheet/sheet.hpp"
 #include "tools/commands.hpp"
 #include "tools/stage_options.hpp"
@@ -140,7 +140,7 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
 }
 
 Result<int> sheet(const SheetOptions& options, Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     SheetOptions o = options;
     if (o.inputs.size() > 2)
         return fail(ErrorCode::usage, "{} inputs; one, or two to compare, are expected",
@@ -164,8 +164,7 @@ Result<int> sheet(const SheetOptions& options, Program& program) {
     STX_TRY(const auto png,
             encodePng(picture.width(), picture.height(), 3, 8, picture.data(), true));
     STX_CHECK(writeFile(o.output, png, program.outputOptions()));
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} → {} ({}), {}x{}, {} of {} shown, {}", o.settings.title, o.output,
                             humanBytes(png.size()), picture.width(), picture.height(), made.shown,

@@ -1,7 +1,5 @@
 #include "tools/extract_shown.hpp"
 
-#include <chrono>
-
 #include <nlohmann/json.hpp>
 
 #include "formats/any/open.hpp"
@@ -9,6 +7,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/stage_options.hpp"
 
@@ -75,12 +74,11 @@ bool isShown(const std::string& ending) {
 Result<int> extractShown(const std::string& input, const std::string& output,
                          const std::optional<double>& time, const std::string& refine,
                          Program& program) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
                                   ? writeModel(input, output, time, refine, program)
                                   : writePage(input, output, refine, program));
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}), {}, {}",
                             std::filesystem::path(input).filename().string(),

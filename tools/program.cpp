@@ -15,6 +15,7 @@
 #include "formats/images/damage.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
+#include "lib/base/whole_number.hpp"
 #include "tools/standard_streams.hpp"
 #include "tools/stop_signals.hpp"
 
@@ -274,12 +275,10 @@ Result<glm::vec3> parseColour(std::string_view text, std::string_view option) {
     for (const auto& known : kColours)
         if (known.name == text) return colourOf(known.rgb);
     if (text.starts_with('#') && (text.size() == 4 || text.size() == 7)) {
-        unsigned rgb = 0;
-        const auto parsed = std::from_chars(text.data() + 1, text.data() + text.size(), rgb, 16);
-        if (parsed.ec == std::errc() && parsed.ptr == text.data() + text.size()) {
+        if (auto rgb = wholeNumber<unsigned>(text.substr(1), 16)) {
             if (text.size() == 4)
-                rgb = (rgb >> 8 & 15) * 0x110000 + (rgb >> 4 & 15) * 0x1100 + (rgb & 15) * 0x11;
-            return colourOf(rgb);
+                rgb = (*rgb >> 8 & 15) * 0x110000 + (*rgb >> 4 & 15) * 0x1100 + (*rgb & 15) * 0x11;
+            return colourOf(*rgb);
         }
     }
     const auto v = parseNumbers(text, 3, option);
@@ -300,21 +299,16 @@ Result<glm::vec3> parseColour(std::string_view text, std::string_view option) {
 
 Result<glm::ivec2> parseSize(std::string_view text, const Limits& limits) {
     const auto x = text.find_first_of("xX");
-    long width = 0, height = 0;
-    bool ok = x != std::string_view::npos && x > 0;
-    if (ok) {
-        const auto a = std::from_chars(text.data(), text.data() + x, width);
-        const auto b = std::from_chars(text.data() + x + 1, text.data() + text.size(), height);
-        ok = a.ec == std::errc() && a.ptr == text.data() + x && b.ec == std::errc() &&
-             b.ptr == text.data() + text.size() && x + 1 < text.size();
-    }
-    if (!ok)
+    const auto width = wholeNumber<long>(text.substr(0, x));
+    const auto height =
+        x == std::string_view::npos ? std::nullopt : wholeNumber<long>(text.substr(x + 1));
+    if (!width || !height)
         return fail(ErrorCode::usage, "--size is '{}'; WIDTHxHEIGHT is expected, as in 512x512",
                     text);
-    if (width < 1 || height < 1 || width > limits.maxImageSide || height > limits.maxImageSide)
+    if (*width < 1 || *height < 1 || *width > limits.maxImageSide || *height > limits.maxImageSide)
         return fail(ErrorCode::usage, "--size is {}; each side must be 1 to {}", text,
                     limits.maxImageSide);
-    return glm::ivec2(static_cast<int>(width), static_cast<int>(height));
+    return glm::ivec2(static_cast<int>(*width), static_cast<int>(*height));
 }
 
 std::string textOf(const Error& error) {

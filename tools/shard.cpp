@@ -1,8 +1,8 @@
 #include "tools/shard.hpp"
 
-#include <charconv>
-
 #include <nlohmann/json.hpp>
+
+#include "lib/base/whole_number.hpp"
 
 namespace stx::tools {
 namespace {
@@ -11,15 +11,12 @@ constexpr std::int64_t kMostShards = 1000000;
 
 Result<void> parseShard(const std::string& text, Shard& shard) {
     const auto slash = text.find('/');
-    std::int64_t number = 0, count = 0;
-    const auto whole = [](std::string_view part, std::int64_t& to) {
-        const auto parsed = std::from_chars(part.data(), part.data() + part.size(), to);
-        return parsed.ec == std::errc() && parsed.ptr == part.data() + part.size();
-    };
     const std::string_view view = text;
-    if (slash == std::string::npos || !whole(view.substr(0, slash), number) ||
-        !whole(view.substr(slash + 1), count) || number < 1 || count < number ||
-        count > kMostShards)
+    const auto number = wholeNumber<std::int64_t>(view.substr(0, slash)).value_or(0);
+    const auto count = slash == std::string::npos
+                           ? 0
+                           : wholeNumber<std::int64_t>(view.substr(slash + 1)).value_or(0);
+    if (number < 1 || count < number || count > kMostShards)
         return fail(ErrorCode::usage,
                     "it is '{}'; K/N with 1 <= K <= N <= {} is expected, as in 3/8", text,
                     kMostShards);

@@ -1,5 +1,8 @@
 #include "formats/atlas/atlas_floats.hpp"
 
+#include <initializer_list>
+#include <type_traits>
+
 #include "formats/exr/exr_colour.hpp"
 
 namespace stx {
@@ -8,39 +11,36 @@ namespace {
 
 using Type = ExrChannel::Type;
 
-template <class Pixels, class Pointer>
-void addVectors(std::vector<Pixels>& pixels, const std::string& name, Pointer first) {
-    pixels.push_back({name + ".X", first, 3});
-    pixels.push_back({name + ".Y", first + 1, 3});
-    pixels.push_back({name + ".Z", first + 2, 3});
+using Names = std::initializer_list<const char*>;
+
+/// Calls add(image, names of its channels) for the images of one attribute.
+template <class Page, class Colour, class Add>
+void forImages(Page& page, const std::string& attribute, Colour& colour, const Add& add) {
+    if (attribute == "colour") add(colour, Names{"R", "G", "B", "A"});
+    if (attribute == "depth") add(page.depth, Names{"Z"});
+    if (attribute == "normal") add(page.normal, Names{"N.X", "N.Y", "N.Z"});
+    if (attribute == "splat") {
+        add(page.splatU, Names{"splatU.X", "splatU.Y", "splatU.Z"});
+        add(page.splatV, Names{"splatV.X", "splatV.Y", "splatV.Z"});
+    }
+    if (attribute == "metallic_roughness")
+        add(page.metallicRoughness, Names{"surface.metallic", "surface.roughness"});
+    if (attribute == "emissive")
+        add(page.emissive, Names{"emissive.R", "emissive.G", "emissive.B"});
+}
+
+template <class Pixels, class Picture>
+void addChannels(std::vector<Pixels>& pixels, Picture& image, Names names) {
+    auto* values = reinterpret_cast<decltype(Pixels::values)>(image.data());
+    for (const char* name : names) pixels.push_back({name, values++, names.size()});
 }
 
 }  // namespace
 
 void addAttribute(const AtlasPage& page, const std::string& attribute,
                   const Image<glm::vec4>& colour, std::vector<ExrConstPixels>& pixels) {
-    if (attribute == "colour") {
-        const float* rgba = &colour.data()->x;
-        pixels.insert(pixels.end(),
-                      {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}, {"A", rgba + 3, 4}});
-    }
-    if (attribute == "depth") pixels.push_back({"Z", page.depth.data(), 1});
-    if (attribute == "normal") addVectors(pixels, "N", &page.normal.data()->x);
-    if (attribute == "splat") {
-        addVectors(pixels, "splatU", &page.splatU.data()->x);
-        addVectors(pixels, "splatV", &page.splatV.data()->x);
-    }
-    if (attribute == "metallic_roughness") {
-        const float* values = &page.metallicRoughness.data()->x;
-        pixels.insert(pixels.end(),
-                      {{"surface.metallic", values, 2}, {"surface.roughness", values + 1, 2}});
-    }
-    if (attribute == "emissive") {
-        const float* rgb = &page.emissive.data()->x;
-        pixels.insert(
-            pixels.end(),
-            {{"emissive.R", rgb, 3}, {"emissive.G", rgb + 1, 3}, {"emissive.B", rgb + 2, 3}});
-    }
+    forImages(page, attribute, colour,
+              [&](const auto& image, Names names) { addChannels(pixels, image, names); });
 }
 
 ExrPart exrPartOf(const AtlasHeader& header, const std::vector<ExrConstPixels>& pixels) {
@@ -70,44 +70,13 @@ Result<void> writeFloatImage(const AtlasHeader& header, const AtlasPage& page,
 Result<void> readFloats(const ExrReader& reader, int part,
                         const std::vector<std::string>& attributes, bool linear, AtlasPage& page) {
     const ExrPart& header = reader.parts()[part];
-    const int width = header.width, height = header.height;
     std::vector<ExrPixels> pixels;
     Image<glm::vec4> colour;
-    const auto vectors = [&](const char* name, Image<glm::vec3>& image) {
-        image = Image<glm::vec3>(width, height);
-        addVectors(pixels, name, &image.data()->x);
-    };
-    for (const auto& attribute : attributes) {
-        if (attribute == "colour") {
-            colour = Image<glm::vec4>(width, height);
-            float* rgba = &colour.data()->x;
-            pixels.insert(
-                pixels.end(),
-                {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}, {"A", rgba + 3, 4}});
-        }
-        if (attribute == "depth") {
-            page.depth = Image<float>(width, height);
-            pixels.push_back({"Z", page.depth.data(), 1});
-        }
-        if (attribute == "normal") vectors("N", page.normal);
-        if (attribute == "splat") {
-            vectors("splatU", page.splatU);
-            vectors("splatV", page.splatV);
-        }
-        if (attribute == "metallic_roughness") {
-            page.metallicRoughness = Image<glm::vec2>(width, height);
-            float* values = &page.metallicRoughness.data()->x;
-            pixels.insert(pixels.end(),
-                          {{"surface.metallic", values, 2}, {"surface.roughness", values + 1, 2}});
-        }
-        if (attribute == "emissive") {
-            page.emissive = Image<glm::vec3>(width, height);
-            float* rgb = &page.emissive.data()->x;
-            pixels.insert(
-                pixels.end(),
-                {{"emissive.R", rgb, 3}, {"emissive.G", rgb + 1, 3}, {"emissive.B", rgb + 2, 3}});
-        }
-    }
+    for (const auto& attribute : attributes)
+        forImages(page, attribute, colour, [&](auto& image, Names names) {
+            image = std::remove_reference_t<decltype(image)>(header.width, header.height);
+            addChannels(pixels, image, names);
+        });
     for (const auto& p : pixels) {
         if (!header.channel(p.channel))
             return failAt(reader.where(), ErrorCode::invalidInput, "part {} lacks the channel '{}'",

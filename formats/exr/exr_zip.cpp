@@ -7,7 +7,6 @@
 
 #include "formats/files/deflate.hpp"
 #include "lib/base/byte_planes.hpp"
-#include "lib/base/halves.hpp"
 
 namespace stx::exr {
 namespace {
@@ -22,16 +21,35 @@ inline float floatOf(std::uint16_t half) {
                                 beyond);
 }
 
+/// The inverse, likewise. Sizes have no sign, so they are signed numbers, which more processors
+/// compare.
+inline std::uint16_t halfOf(float value) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    const auto size = static_cast<std::int32_t>(bits & 0x7fffffffu);
+    // From 2^-14 on: the exponent's bias changes by 112, and 13 bits are rounded away.
+    const std::int32_t normal = (size + (0xfff - (112 << 23)) + (size >> 13 & 1)) >> 13;
+    // Below: the sum with 1/2 rounds at a half's smallest step, 2^-24.
+    const std::int32_t denormal =
+        std::bit_cast<std::int32_t>(std::bit_cast<float>(size) + 0.5f) - (126 << 23);
+    const std::int32_t beyond = size > 0x7f800000 ? 0x7e00 : 0x7c00;  // NaN, infinity
+    // All bits set where it is so: a choice by `?` would become a branch around the sum above.
+    const std::int32_t large = -(size >= 143 << 23), small = -(size < 113 << 23);
+    const std::int32_t finite = (denormal & small) | (normal & ~small);
+    return static_cast<std::uint16_t>(
+        (bits >> 16 & 0x8000u) | static_cast<std::uint32_t>((beyond & large) | (finite & ~large)));
+}
+
 }  // namespace
 
 void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> to) {
-    if (stride == 1) return stx::halvesFrom(from, to);
     constexpr std::size_t kPiece = 256;
     float piece[kPiece];
     for (std::size_t begin = 0; begin < to.size(); begin += kPiece) {
         const std::size_t count = std::min(kPiece, to.size() - begin);
-        for (std::size_t i = 0; i < count; ++i) piece[i] = from[(begin + i) * stride];
-        stx::halvesFrom(piece, to.subspan(begin, count));
+        const float* values = stride == 1 ? from + begin : piece;
+        for (std::size_t i = 0; stride != 1 && i < count; ++i)
+            piece[i] = from[(begin + i) * stride];
+        for (std::size_t i = 0; i < count; ++i) to[begin + i] = halfOf(values[i]);
     }
 }
 

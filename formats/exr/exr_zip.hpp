@@ -11,7 +11,8 @@ namespace stx::exr {
 /// Scan lines of a chunk of zip compression (OpenEXR file layout, "Scan line blocks").
 constexpr int kZipRows = 16;
 
-/// Half floats of every `stride`-th of `from`, as stx::halvesFrom() makes them.
+/// Half floats of every `stride`-th of `from`, rounded to the nearest, ties to even; beyond their
+/// range infinity. The same as Imath's half, except for the bits of NaN.
 void halvesFrom(const float* from, std::size_t stride, std::span<std::uint16_t> to);
 
 /// A chunk as zip compression stores it: its bytes, split and subtracted as splitAndSubtract()

@@ -1,9 +1,9 @@
 #include "formats/files/numbered.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 #include "formats/files/files.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx {
 namespace {
@@ -50,13 +50,12 @@ Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
             continue;
         const std::string_view digits = std::string_view(found).substr(
             before.size(), found.size() - before.size() - after.size());
-        NumberedFile file;
-        const auto [last, wrong] =
-            std::from_chars(digits.data(), digits.data() + digits.size(), file.number);
+        const auto number = wholeNumber<decltype(NumberedFile::number)>(digits);
         // As the pattern writes it: `%04d` does not name a_5.exr.
-        if (wrong != std::errc() || last != digits.data() + digits.size() || file.number < 0 ||
-            fmt::format("{:0{}}", file.number, place->width) != digits)
+        if (!number || *number < 0 || fmt::format("{:0{}}", *number, place->width) != digits)
             continue;
+        NumberedFile file;
+        file.number = *number;
         // Names are those of the pattern, without "./" in front.
         file.path = path.parent_path() / found;
         files.push_back(std::move(file));

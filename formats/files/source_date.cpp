@@ -1,11 +1,12 @@
 #include "formats/files/source_date.hpp"
 
-#include <charconv>
 #include <chrono>
 #include <cstdlib>
 #include <string_view>
 
 #include <fmt/format.h>
+
+#include "lib/base/whole_number.hpp"
 
 namespace stx {
 namespace {
@@ -17,12 +18,8 @@ constexpr std::uint64_t kEndOf9999 = 253402300799;
 std::optional<std::uint64_t> sourceDate() {
     const char* text = std::getenv("SOURCE_DATE_EPOCH");
     if (text == nullptr) return std::nullopt;
-    const std::string_view view(text);
-    std::uint64_t seconds = 0;
-    const auto parsed = std::from_chars(view.data(), view.data() + view.size(), seconds);
-    if (parsed.ec != std::errc{} || parsed.ptr != view.data() + view.size() || seconds > kEndOf9999)
-        return std::nullopt;
-    return seconds;
+    const auto seconds = wholeNumber<std::uint64_t>(text);
+    return seconds && *seconds <= kEndOf9999 ? seconds : std::nullopt;
 }
 
 Result<void> checkSourceDate() {

@@ -9,10 +9,10 @@
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/exr/exr_file.hpp"
+#include "formats/exr/exr_zip.hpp"
 #include "formats/files/source_date.hpp"
 #include "formats/images/codec_module.hpp"
 #include "formats/images/images.hpp"
-#include "lib/base/halves.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/linear_planes.hpp"
 #include "lib/model/texture.hpp"
@@ -32,6 +32,8 @@ bool toLinearPlanes(const Image<glm::vec4>& image, bool linear,
     parallelForBlocks(0, image.height(), 16, [&](std::int64_t begin, std::int64_t end) {
         std::vector<glm::vec4> shown(background ? width : 0);
         std::vector<float> light(linear ? 0 : 4 * width);
+        std::array<float*, 4> channels{};
+        for (std::size_t c = 0; c < 4; ++c) channels[c] = light.data() + c * width;
         for (auto y = static_cast<int>(begin); y < end; ++y) {
             std::span<const glm::vec4> from = image.row(y);
             if (other && same &&
@@ -42,17 +44,11 @@ bool toLinearPlanes(const Image<glm::vec4>& image, bool linear,
                                        [&](glm::vec4 p) { return over(p, background); });
                 from = shown;
             }
-            std::array<std::uint16_t*, 4> to{};
+            if (!linear) linearPlanes(from.data(), width, channels);
             for (std::size_t c = 0; c < 4; ++c)
-                to[c] = planes + c * image.count() + static_cast<std::size_t>(y) * width;
-            if (linear) {
-                halfPlanes(&from.data()->x, 4, width, to.data());
-                continue;
-            }
-            std::array<float*, 4> values{};
-            for (std::size_t c = 0; c < 4; ++c) values[c] = light.data() + c * width;
-            linearPlanes(from.data(), width, values);
-            for (std::size_t c = 0; c < 4; ++c) halvesFrom(values[c], {to[c], width});
+                exr::halvesFrom(
+                    linear ? &from.data()->x + c : channels[c], linear ? 4 : 1,
+                    {planes + c * image.count() + static_cast<std::size_t>(y) * width, width});
         }
     });
     return same;
@@ -200,8 +196,9 @@ ExrFrame exrFrameOf(const Frame& frame, const std::optional<glm::vec3>& backgrou
         parallelForBlocks(0, out.height, 16, [&](std::int64_t begin, std::int64_t end) {
             for (auto y = static_cast<int>(begin); y < end; ++y) {
                 std::uint16_t* const to = first + static_cast<std::size_t>(y) * width;
-                const std::array<std::uint16_t*, 3> rows = {to, to + pixels, to + 2 * pixels};
-                halfPlanes(&frame.normal.row(y).data()->x, 3, width, rows.data());
+                for (std::size_t c = 0; c < 3; ++c)
+                    exr::halvesFrom(&frame.normal.row(y).data()->x + c, 3,
+                                    {to + c * pixels, width});
             }
         });
     }

@@ -18,22 +18,8 @@ using Lanes = std::uint8_t __attribute__((vector_size(kBytes)));
 /// A pixel as one number, and as many of them as fill Lanes. Pixels of 3 and 6 bytes leave some
 /// idle.
 template <class T>
-struct PixelsOf;
-template <>
-struct PixelsOf<std::uint8_t> {
-    using Type = std::uint8_t __attribute__((vector_size(kBytes)));
-};
-template <>
-struct PixelsOf<std::uint16_t> {
-    using Type = std::uint16_t __attribute__((vector_size(kBytes)));
-};
-template <>
-struct PixelsOf<std::uint32_t> {
-    using Type = std::uint32_t __attribute__((vector_size(kBytes)));
-};
-template <>
-struct PixelsOf<std::uint64_t> {
-    using Type = std::uint64_t __attribute__((vector_size(kBytes)));
+struct PixelsOf {
+    typedef T Type __attribute__((vector_size(kBytes)));
 };
 
 enum Filter : std::uint8_t { kNone, kSub, kUp, kAverage, kPaeth };

@@ -3,7 +3,6 @@
 // our world and differ along +X.
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "formats/files/messages.hpp"
@@ -11,6 +10,7 @@
 #include "formats/imagesets/middlebury.hpp"
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/text_lines.hpp"
+#include "lib/base/whole_number.hpp"
 #include "lib/registration/disparity_shift.hpp"
 
 namespace stx::imagesets {
@@ -69,11 +69,8 @@ Result<SetDescription> describeCalibrated(const path& file, Job& job) {
 /// The number at the end of `stem` after `prefix`.
 std::optional<int> numberAfter(const std::string& stem, std::string_view prefix) {
     if (!stem.starts_with(prefix)) return std::nullopt;
-    int value = 0;
-    const char* end = stem.data() + stem.size();
-    const auto [next, error] = std::from_chars(stem.data() + prefix.size(), end, value);
-    if (error != std::errc() || next != end || value < 0 || value > 99) return std::nullopt;
-    return value;
+    const auto value = wholeNumber<int>(std::string_view(stem).substr(prefix.size()));
+    return value && *value >= 0 && *value <= 99 ? value : std::nullopt;
 }
 
 /// A picture of an older set, from which disparities of others are looked at.

@@ -4,7 +4,6 @@
 #include "formats/imagesets/rgbd.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
@@ -14,6 +13,7 @@
 #include "formats/imagesets/poses.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/imagesets/two_cameras.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -131,10 +131,8 @@ std::vector<std::pair<int, std::string>> numbered(const path& folder, const std:
     std::vector<std::pair<int, std::string>> out;
     for (const std::string& name : filesIn(folder / under)) {
         const std::string stem = path(name).stem().string();
-        int number = 0;
-        const auto [next, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
-        if (error == std::errc() && next == stem.data() + stem.size() && number >= 0)
-            out.emplace_back(number, fmt::format("{}/{}", under, name));
+        if (const auto number = wholeNumber<int>(stem); number && *number >= 0)
+            out.emplace_back(*number, fmt::format("{}/{}", under, name));
     }
     std::sort(out.begin(), out.end());
     return out;

@@ -1,7 +1,8 @@
 #include "formats/imagesets/text_lines.hpp"
 
-#include <charconv>
 #include <cmath>
+
+#include "lib/base/whole_number.hpp"
 
 namespace stx::imagesets {
 
@@ -35,14 +36,11 @@ std::string_view textOf(ByteSpan bytes) {
 }
 
 Result<double> numberOf(std::string_view word, const std::string& where) {
-    double value = 0;
-    std::string_view digits = word;
-    if (digits.starts_with('+')) digits.remove_prefix(1);
-    const auto [next, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error != std::errc() || next != digits.data() + digits.size() || !std::isfinite(value))
+    const auto value = wholeNumber<double>(word.substr(word.starts_with('+') ? 1 : 0));
+    if (!value || !std::isfinite(*value))
         return failAt(where, ErrorCode::invalidInput, "'{}' where a finite number is expected",
                       word.substr(0, 40));
-    return value;
+    return *value;
 }
 
 Result<std::vector<double>> numbersOf(const std::vector<std::string_view>& words, std::size_t first,

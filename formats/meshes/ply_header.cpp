@@ -1,10 +1,10 @@
 #include "formats/meshes/ply_header.hpp"
 
-#include <charconv>
 #include <optional>
 #include <string_view>
 
 #include "formats/meshes/text_encoding.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx {
 namespace {
@@ -140,11 +140,11 @@ Result<PlyHeader> readPlyHeader(ByteSpan file) {
             PlyElement element;
             element.name = word(line);
             const auto count = word(line);
-            const auto [stop, error] =
-                std::from_chars(count.data(), count.data() + count.size(), element.count);
-            if (error != std::errc() || stop != count.data() + count.size())
+            const auto known = wholeNumber<decltype(element.count)>(count);
+            if (!known)
                 return fail(ErrorCode::invalidInput, "line {}: '{}' is not a number of {} elements",
                             number, count.substr(0, 40), element.name);
+            element.count = *known;
             header.elements.push_back(std::move(element));
         } else if (key == "property") {
             if (header.elements.empty())

@@ -1,9 +1,9 @@
 #include "formats/stx/mesh_views.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 #include "lib/base/counted.hpp"
+#include "lib/base/whole_number.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/capture/rasterizer.hpp"
 #include "lib/quality/capture_quality.hpp"
@@ -81,10 +81,10 @@ Result<std::optional<AutoViews>> parseAutoViews(std::string_view views) {
     };
     if (views.size() < 6 || views[4] != ':') return complain();
     std::string_view number = views.substr(5);
-    const auto parse = [&](auto& value) {
-        const auto end = number.data() + number.size();
-        const auto parsed = std::from_chars(number.data(), end, value);
-        return parsed.ec == std::errc() && parsed.ptr == end;
+    const auto parse = [&]<class T>(T& value) {
+        const auto parsed = wholeNumber<T>(number);
+        value = parsed.value_or(T{});
+        return parsed.has_value();
     };
     AutoViews result;
     if (number.size() > 2 && (number.ends_with("dB") || number.ends_with("db"))) {

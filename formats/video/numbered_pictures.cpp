@@ -1,11 +1,11 @@
 #include "formats/video/numbered_pictures.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <optional>
 
 #include "lib/base/counted.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx {
 namespace {
@@ -17,15 +17,6 @@ constexpr std::string_view kPictureEndings[] = {".png", ".jpg", ".jpeg", ".tif",
 
 bool isDigit(char c) {
     return c >= '0' && c <= '9';
-}
-
-/// The number that digits stand for; nothing when it is too large.
-std::optional<std::int64_t> numberOf(std::string_view digits) {
-    std::int64_t n = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
-    if (digits.empty() || error != std::errc() || end != digits.data() + digits.size())
-        return std::nullopt;
-    return n;
 }
 
 Result<std::vector<std::string>> namesIn(const fs::path& folder) {
@@ -85,7 +76,7 @@ Result<std::vector<NumberedFile>> numberedPictures(const fs::path& folder, Job& 
         const std::string stem = path.stem().string();
         std::size_t digits = stem.size();
         while (digits > 0 && isDigit(stem[digits - 1])) --digits;
-        if (const auto number = numberOf(std::string_view(stem).substr(digits)))
+        if (const auto number = wholeNumber<std::int64_t>(std::string_view(stem).substr(digits)))
             sequences[stem.substr(0, digits) + "#" + ending].push_back({*number, folder / name});
     }
     if (sequences.empty())

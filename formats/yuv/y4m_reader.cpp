@@ -1,9 +1,9 @@
 #include "formats/yuv/y4m_reader.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 #include "lib/base/printable.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx {
 namespace {
@@ -68,10 +68,8 @@ Result<Y4mHeaderLine> parseHeader(std::string_view line, const Limits& limits) {
         const auto value = word.substr(1);
         if (word[0] == 'W' || word[0] == 'H') {
             int& side = word[0] == 'W' ? width : height;
-            const auto [end, error] =
-                std::from_chars(value.data(), value.data() + value.size(), side);
-            if (error != std::errc() || end != value.data() + value.size() || side < 1 ||
-                side > limits.maxImageSide)
+            side = wholeNumber<int>(value).value_or(0);
+            if (side < 1 || side > limits.maxImageSide)
                 return failAt(atByte(0), ErrorCode::invalidInput,
                               "the {} of the frames is '{}'; 1 to {} is expected",
                               word[0] == 'W' ? "width" : "height", value, limits.maxImageSide);

@@ -60,39 +60,6 @@ void depthSummaryImpl(std::span<const float> distances, DepthSummary& summary) {
     }
 }
 
-/// The operations of DepthCode, in its order.
-HWY_INLINE hn::Vec<DD> roundedToCode(hn::Vec<DD> dist, const DepthCode& code) {
-    const DD d;
-    const auto one = hn::Set(d, 1.0), most = hn::Set(d, static_cast<double>(code.dmax)),
-               steps = hn::Set(d, code.dmax - 1.0);
-    const auto range = hn::Set(d, code.farPlane - code.nearPlane);
-    const auto exact =
-        hn::Add(one, hn::Div(hn::Mul(steps, hn::Sub(hn::Set(d, code.farPlane), dist)), range));
-    // As std::round() does what is above 0: halves go up. Others become 1.
-    const auto below = hn::Floor(exact);
-    const auto half = hn::Ge(hn::Sub(exact, below), hn::Set(d, 0.5));
-    const auto number = hn::Min(hn::Max(hn::Add(below, hn::IfThenElseZero(half, one)), one), most);
-    const auto share = hn::Sub(one, hn::Div(hn::Sub(number, one), steps));
-    return hn::Add(hn::Set(d, code.nearPlane), hn::Mul(share, range));
-}
-
-void roundToCodeImpl(std::span<float> distances, const DepthCode& code) {
-    const DD d;
-    const hn::Rebind<float, DD> df;
-    const std::size_t lanes = hn::Lanes(d);
-    const auto none = hn::Set(df, kNoDepth);
-    std::size_t i = 0;
-    for (; i + lanes <= distances.size(); i += lanes) {
-        const auto v = hn::LoadU(df, distances.data() + i);
-        const auto point = hn::Lt(v, none);
-        const auto rounded = hn::DemoteTo(df, roundedToCode(hn::PromoteTo(d, v), code));
-        hn::StoreU(hn::IfThenElse(point, rounded, v), df, distances.data() + i);
-    }
-    for (; i < distances.size(); ++i)
-        if (hasPoint(distances[i]))
-            distances[i] = static_cast<float>(code.decode(code.encode(distances[i])));
-}
-
 using VD = hn::Vec<DD>;
 
 /// As many points or directions as a vector has lanes.
@@ -182,7 +149,6 @@ HWY_AFTER_NAMESPACE();
 namespace stx {
 
 HWY_EXPORT(depthSummaryImpl);
-HWY_EXPORT(roundToCodeImpl);
 HWY_EXPORT(boundsImpl);
 HWY_EXPORT(lanesOfBounds);
 
@@ -203,7 +169,8 @@ Bounds boundsOfPoints(const Image<float>& distances, const Camera& camera) {
 }
 
 void roundToCode(std::span<float> distances, const DepthCode& code) {
-    HWY_DYNAMIC_DISPATCH(roundToCodeImpl)(distances, code);
+    for (float& distance : distances)
+        if (hasPoint(distance)) distance = static_cast<float>(code.decode(code.encode(distance)));
 }
 
 }  // namespace stx

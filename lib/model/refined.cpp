@@ -1,7 +1,7 @@
-#include <charconv>
 
 #include <fmt/format.h>
 
+#include "lib/base/whole_number.hpp"
 #include "lib/model/reference_view.hpp"
 
 namespace stx {
@@ -16,12 +16,9 @@ std::optional<Refined> Refined::from(std::string_view text) {
     if (space == std::string_view::npos || steps.empty() ||
         steps.find_first_not_of("abcdefghijklmnopqrstuvwxyz,") != std::string_view::npos)
         return std::nullopt;
-    Refined refined{std::string(steps), 0};
-    const char* end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data() + space + 1, end, refined.doubt);
-    if (error != std::errc() || stop != end || !(refined.doubt >= 0 && refined.doubt <= 1))
-        return std::nullopt;
-    return refined;
+    const auto doubt = wholeNumber<decltype(Refined::doubt)>(text.substr(space + 1));
+    if (!doubt || !(*doubt >= 0 && *doubt <= 1)) return std::nullopt;
+    return Refined{std::string(steps), *doubt};
 }
 
 }  // namespace stx

@@ -180,13 +180,13 @@ class SeamGrid {
                 flow.addTerminal(n, theirs - both, 0);
                 flow.addTerminal(m, -theirs, 0);
                 if (const float capacity = mine + theirs - both; capacity > 0)
-                    flow.addEdge(n, m, capacity, 0);
+                    flow.addEdge(n, m, capacity);
             }
         }
-        flow.solve();
+        const std::vector<bool> taken = flow.sinkSide();
         bool changed = false;
         for (std::size_t i = 0; i < cells.size(); ++i) {
-            if (!flow.onSinkSide(static_cast<int>(i))) continue;
+            if (!taken[i]) continue;
             const glm::ivec2 p = wrapped({f.box.x + cells[i].x, f.box.y + cells[i].y});
             changed = changed || labels_.at(p.x, p.y) != own;
             labels_.at(p.x, p.y) = own;

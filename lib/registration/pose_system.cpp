@@ -1,5 +1,8 @@
 #include "lib/registration/pose_system.hpp"
 
+#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/SparseCore>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -13,57 +16,6 @@ constexpr double kPrior = 0.1;
 /// Levenberg's damping, as a share of the diagonal.
 constexpr double kDamping = 1e-4;
 constexpr double kSolved = 1e-10;
-
-using Vector = std::vector<Twist>;
-
-double dot(const Vector& a, const Vector& b) {
-    double sum = 0;
-    for (std::size_t i = 0; i < a.size(); ++i)
-        for (int k = 0; k < 6; ++k) sum += a[i][k] * b[i][k];
-    return sum;
-}
-
-void addScaled(Vector& to, double factor, const Vector& what) {
-    for (std::size_t i = 0; i < to.size(); ++i)
-        for (int k = 0; k < 6; ++k) to[i][k] += factor * what[i][k];
-}
-
-Twist times(const std::array<std::array<double, 6>, 6>& m, const Twist& v) {
-    Twist out{};
-    for (int r = 0; r < 6; ++r)
-        for (int c = 0; c < 6; ++c) out[r] += m[r][c] * v[c];
-    return out;
-}
-
-/// Solves matrix * x = right by conjugate gradients with a diagonal preconditioner; `apply` gives
-/// matrix * v.
-template <class Apply>
-Vector conjugateGradients(const Vector& right, const Vector& diagonal, Apply&& apply) {
-    const auto precondition = [&](const Vector& v) {
-        Vector out = v;
-        for (std::size_t i = 0; i < v.size(); ++i)
-            for (int k = 0; k < 6; ++k) out[i][k] /= diagonal[i][k];
-        return out;
-    };
-    Vector x(right.size(), Twist{}), rest = right, direction = precondition(rest);
-    double size = dot(rest, direction);
-    const double enough = kSolved * kSolved * size;
-    const std::size_t most = 20 * right.size() * 6;
-    for (std::size_t i = 0; i < most && size > enough && size > 0; ++i) {
-        const Vector image = apply(direction);
-        const double along = size / dot(direction, image);
-        if (!std::isfinite(along)) break;
-        addScaled(x, along, direction);
-        addScaled(rest, -along, image);
-        const Vector next = precondition(rest);
-        const double nextSize = dot(rest, next);
-        Vector turned = next;
-        addScaled(turned, nextSize / size, direction);
-        direction = std::move(turned);
-        size = nextSize;
-    }
-    return x;
-}
 
 }  // namespace
 
@@ -101,50 +53,41 @@ Twist PoseSystem::jacobian(glm::dvec3 point, glm::dvec3 gradient) const {
 double PoseSystem::solveAndMove(const std::vector<Pair>& pairs,
                                 const std::vector<PairEquations>& equations, Bundle& bundle) {
     const double prior = 1 / (kPrior * kPrior);
-    Vector right(moved_.size(), Twist{}), diagonal(moved_.size(), Twist{});
-    for (std::size_t i = 0; i < moved_.size(); ++i) {
-        for (int k = 0; k < 6; ++k) {
-            right[i][k] = -prior * moved_[i][k];
-            diagonal[i][k] = prior;
-        }
-    }
+    const auto unknowns = static_cast<Eigen::Index>(6 * moved_.size());
+    Eigen::VectorXd right =
+        -prior * Eigen::Map<const Eigen::VectorXd>(moved_.front().data(), unknowns);
+    Eigen::VectorXd diagonal = Eigen::VectorXd::Constant(unknowns, prior);
+    std::vector<Eigen::Triplet<double>> terms;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-        const auto from = static_cast<std::size_t>(pairs[i].from);
-        const auto to = static_cast<std::size_t>(pairs[i].to);
-        for (int k = 0; k < 6; ++k) {
-            right[from][k] -= equations[i].right[k];
-            right[to][k] += equations[i].right[k];
-            diagonal[from][k] += equations[i].matrix[k][k];
-            diagonal[to][k] += equations[i].matrix[k][k];
-        }
-    }
-    Vector damping = diagonal;
-    for (std::size_t i = 0; i < diagonal.size(); ++i) {
-        for (int k = 0; k < 6; ++k) {
-            damping[i][k] = prior + kDamping * diagonal[i][k];
-            diagonal[i][k] += kDamping * diagonal[i][k];
-        }
-    }
-    Vector twist = conjugateGradients(right, diagonal, [&](const Vector& v) {
-        Vector out(v.size());
-        for (std::size_t i = 0; i < v.size(); ++i)
-            for (int k = 0; k < 6; ++k) out[i][k] = damping[i][k] * v[i][k];
-        for (std::size_t i = 0; i < pairs.size(); ++i) {
-            const auto from = static_cast<std::size_t>(pairs[i].from);
-            const auto to = static_cast<std::size_t>(pairs[i].to);
-            Twist apart = v[from];
-            for (int k = 0; k < 6; ++k) apart[k] -= v[to][k];
-            const Twist pull = times(equations[i].matrix, apart);
-            for (int k = 0; k < 6; ++k) {
-                out[from][k] += pull[k];
-                out[to][k] -= pull[k];
+        const int from = 6 * pairs[i].from, to = 6 * pairs[i].to;
+        for (int r = 0; r < 6; ++r) {
+            right[from + r] -= equations[i].right[r];
+            right[to + r] += equations[i].right[r];
+            diagonal[from + r] += equations[i].matrix[r][r];
+            diagonal[to + r] += equations[i].matrix[r][r];
+            for (int c = 0; c < 6; ++c) {
+                const double pull = equations[i].matrix[r][c];
+                terms.emplace_back(from + r, from + c, pull);
+                terms.emplace_back(to + r, to + c, pull);
+                terms.emplace_back(from + r, to + c, -pull);
+                terms.emplace_back(to + r, from + c, -pull);
             }
         }
-        return out;
-    });
+    }
+    for (int k = 0; k < static_cast<int>(unknowns); ++k)
+        terms.emplace_back(k, k, prior + kDamping * diagonal[k]);
+    Eigen::SparseMatrix<double> matrix(unknowns, unknowns);
+    matrix.setFromTriplets(terms.begin(), terms.end());
+    Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper> solver;
+    solver.setTolerance(kSolved);
+    solver.setMaxIterations(20 * unknowns);
+    const Eigen::VectorXd solved = solver.compute(matrix).solve(right);
+    if (!solved.allFinite()) return 0;
+    std::vector<Twist> twist(moved_.size());
+    std::copy(solved.begin(), solved.end(), twist.front().begin());
 
     // A common motion of connected views changes no difference: take it out.
-    Vector mean(twist.size(), Twist{});
+    std::vector<Twist> mean(twist.size(), Twist{});
     std::vector<int> members(twist.size(), 0);
     for (std::size_t i = 0; i < twist.size(); ++i) {
         const auto group = static_cast<std::size_t>(group_[i]);

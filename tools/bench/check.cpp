@@ -1,11 +1,11 @@
 #include "tools/bench/check.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <map>
 #include <memory>
 #include <vector>
 
+#include "lib/base/stopwatch.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/render/api/frame_picture.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
@@ -89,11 +89,10 @@ Result<Drawn> draw(Backend backend, const Bundle& bundle, const Camera& camera, 
                    int device, Job& job) {
     STX_TRY(const auto renderer, makeRenderer(backend, bundle, settingsOf(way), device, job));
     STX_TRY(auto frame, renderer->render(camera));
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     STX_TRY(frame, renderer->render(camera));
     Drawn drawn;
-    drawn.milliseconds =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    drawn.milliseconds = watch.milliseconds();
     drawn.picture = rgba8From(frame);
     return drawn;
 }

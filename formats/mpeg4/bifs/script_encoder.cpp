@@ -1,9 +1,9 @@
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <optional>
 
 #include "formats/mpeg4/bifs/script_code.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -523,11 +523,7 @@ class ScriptWriter {
         const bool hex = text.starts_with("0x") || text.starts_with("0X");
         if (hex) text.remove_prefix(2);
         if (!hex && text.size() > 1 && text[0] == '0') return {};
-        std::uint64_t value = 0;
-        const auto [end, error] =
-            std::from_chars(text.data(), text.data() + text.size(), value, hex ? 16 : 10);
-        if (error != std::errc() || end != text.data() + text.size()) return {};
-        return value;
+        return wholeNumber<std::uint64_t>(text, hex ? 16 : 10);
     }
     Result<void> number() {
         kind(kNumber);

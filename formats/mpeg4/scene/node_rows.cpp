@@ -1,8 +1,9 @@
 #include "formats/mpeg4/scene/node_rows.hpp"
 
 #include <cassert>
-#include <charconv>
 #include <limits>
+
+#include "lib/base/whole_number.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -32,21 +33,17 @@ std::string_view takeUntil(std::string_view& text, char mark) {
 }
 
 int integerOf(std::string_view text) {
-    int value = 0;
-    [[maybe_unused]] const auto parsed =
-        std::from_chars(text.data(), text.data() + text.size(), value);
-    assert(parsed.ec == std::errc{} && parsed.ptr == text.data() + text.size());
-    return value;
+    const auto value = wholeNumber<int>(text);
+    assert(value);
+    return value.value_or(0);
 }
 
 float boundOf(std::string_view text) {
     if (text == "+I") return std::numeric_limits<float>::max();
     if (text == "-I") return -std::numeric_limits<float>::max();
-    float value = 0;
-    [[maybe_unused]] const auto parsed =
-        std::from_chars(text.data(), text.data() + text.size(), value);
-    assert(parsed.ec == std::errc{});
-    return value;
+    const auto value = wholeNumber<float>(text);
+    assert(value);
+    return value.value_or(0.0f);
 }
 
 /// `scale dynamic 0 +I`

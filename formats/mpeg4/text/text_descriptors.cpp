@@ -1,10 +1,10 @@
 #include "formats/mpeg4/text/text_descriptors.hpp"
 
-#include <charconv>
 #include <cmath>
 
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -222,12 +222,8 @@ std::optional<std::uint32_t> numberOfTextId(std::string_view text, const TextIds
         return static_cast<std::uint32_t>(*number);
     // "od10", "es10": what other tools write, meaning 10.
     if (text.size() > 2 &&
-        (equalNoCase(text.substr(0, 2), "od") || equalNoCase(text.substr(0, 2), "es"))) {
-        std::uint32_t number = 0;
-        const auto [at, error] =
-            std::from_chars(text.data() + 2, text.data() + text.size(), number);
-        if (error == std::errc() && at == text.data() + text.size()) return number;
-    }
+        (equalNoCase(text.substr(0, 2), "od") || equalNoCase(text.substr(0, 2), "es")))
+        return wholeNumber<std::uint32_t>(text.substr(2));
     return {};
 }
 
@@ -349,11 +345,9 @@ std::optional<Bytes> bytesFromPercentText(std::string_view text) {
             continue;
         }
         if (text.size() - i < 3) return {};
-        int value = 0;
-        const auto [at, error] =
-            std::from_chars(text.data() + i + 1, text.data() + i + 3, value, 16);
-        if (error != std::errc() || at != text.data() + i + 3) return {};
-        bytes.push_back(static_cast<std::byte>(value));
+        const auto value = wholeNumber<unsigned>(text.substr(i + 1, 2), 16);
+        if (!value) return {};
+        bytes.push_back(static_cast<std::byte>(*value));
         i += 3;
     }
     return bytes;

@@ -1,10 +1,10 @@
 #include "formats/mpeg4/text/text_fields.hpp"
 
-#include <charconv>
 #include <cstdio>
 
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx::mpeg4 {
 namespace {
@@ -291,9 +291,8 @@ std::string textNameOf(const Route& route) {
 std::uint32_t idFromTextName(std::string_view name, char letter) {
     if (name.size() < 2 || name.size() > 10 || name[0] != letter) return 0;
     if (name[1] == '0' && name.size() > 2) return 0;
-    std::uint32_t number = 0;
-    const auto [at, error] = std::from_chars(name.data() + 1, name.data() + name.size(), number);
-    return error == std::errc() && at == name.data() + name.size() ? number + 1 : 0;
+    const auto number = wholeNumber<std::uint32_t>(name.substr(1));
+    return number ? *number + 1 : 0;
 }
 
 bool isPlainName(std::string_view name) {

@@ -7,18 +7,10 @@
 #include <fmt/format.h>
 
 #include "formats/files/no_case.hpp"
+#include "lib/base/whole_number.hpp"
 
 namespace stx::mpeg4 {
 namespace {
-
-/// The digits of a hexadecimal integer without sign and 0x, or nothing.
-std::optional<std::uint64_t> hexFromText(std::string_view digits) {
-    std::uint64_t value = 0;
-    const auto [end, error] =
-        std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
-    if (error != std::errc() || end != digits.data() + digits.size() || digits.empty()) return {};
-    return value;
-}
 
 bool isHex(std::string_view text) {
     return text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
@@ -37,7 +29,7 @@ template <class T>
 std::optional<T> realFromText(std::string_view text) {
     if (!stripPlus(text)) return {};
     if (isHex(text)) {
-        const auto hex = hexFromText(text.substr(2));
+        const auto hex = wholeNumber<std::uint64_t>(text.substr(2), 16);
         return hex ? std::optional<T>(static_cast<T>(*hex)) : std::nullopt;
     }
     // from_chars would take "nan(17)", whose bits no decimal gives back.
@@ -82,16 +74,13 @@ std::optional<std::int64_t> integerFromText(std::string_view text) {
     const bool negative = text[0] == '-';
     const std::string_view digits = negative ? text.substr(1) : text;
     if (isHex(digits)) {
-        const auto hex = hexFromText(digits.substr(2));
+        const auto hex = wholeNumber<std::uint64_t>(digits.substr(2), 16);
         if (!hex || *hex > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
             return {};
         const auto value = static_cast<std::int64_t>(*hex);
         return negative ? -value : value;
     }
-    std::int64_t value = 0;
-    const char* const end = text.data() + text.size();
-    const auto [at, error] = std::from_chars(text.data(), end, value);
-    if (error == std::errc() && at == end) return value;
+    if (const auto value = wholeNumber<std::int64_t>(text)) return value;
     const auto real = doubleFromText(text);
     if (!real || std::nearbyint(*real) != *real || std::fabs(*real) > 9e15) return {};
     return static_cast<std::int64_t>(*real);
@@ -117,10 +106,8 @@ std::optional<int> odFromUrl(std::string_view url) {
         if (url.starts_with("//")) url.remove_prefix(2);
         if (url.size() > 2 && equalNoCase(url.substr(0, 2), "od")) url.remove_prefix(2);
     }
-    int id = 0;
-    const char* const end = url.data() + url.size();
-    const auto [at, error] = std::from_chars(url.data(), end, id);
-    if (url.empty() || error != std::errc() || at != end || id < 1 || id > 1023) return {};
+    const auto id = wholeNumber<int>(url);
+    if (!id || *id < 1 || *id > 1023) return {};
     return id;
 }
 

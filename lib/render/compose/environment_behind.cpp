@@ -1,9 +1,9 @@
 #include "lib/render/compose/environment_behind.hpp"
 
-#include <chrono>
 #include <utility>
 
 #include "lib/base/parallel.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/render/compose/behind.hpp"
 
 namespace stx {
@@ -17,11 +17,9 @@ class EnvironmentRenderer final : public Renderer {
 
     Result<Frame> render(const Camera& camera) override {
         STX_TRY(Frame frame, inner_->render(camera));
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         putEnvironmentBehind(frame, camera, *environment_);
-        frame.milliseconds +=
-            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                .count();
+        frame.milliseconds += watch.milliseconds();
         return frame;
     }
     void expect(const Camera& next) override { inner_->expect(next); }

@@ -1,9 +1,9 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
 #include "lib/base/parallel.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/render/compose/behind.hpp"
 #include "lib/render/outline/round_outlines.hpp"
 #include "lib/render/surface/backend.hpp"
@@ -405,7 +405,7 @@ Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Im
 Result<Frame> SurfaceRenderer::render(const Camera& camera) {
     const auto next = std::exchange(expected_, std::nullopt);
     STX_CHECK(checkSize(camera));
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     Frame frame;
     if (const int same = viewAt(camera); same >= 0) {
         beginExpected(next);
@@ -416,8 +416,7 @@ Result<Frame> SurfaceRenderer::render(const Camera& camera) {
     frame.linear = scene_.set.linear();
     if (settings_.wantNormals()) frame.albedo = frame.colour;
     if (settings_.lighting.on()) light(camera, frame);
-    frame.milliseconds =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    frame.milliseconds = watch.milliseconds();
     return frame;
 }
 

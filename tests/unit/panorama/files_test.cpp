@@ -155,6 +155,12 @@ TEST(PanoramaFiles, ExifTellsOrientationAndFocalLength) {
         }
     }
     EXPECT_EQ(readExif(jpegWithExif(true, 9, 28)).orientation, 1);
+    // XMP is in a segment of the same kind, often before it.
+    Bytes second = jpegWithExif(true, 6, 28);
+    constexpr std::string_view kXmp("\xff\xe1\x00\x08http:/", 10);
+    const auto xmp = std::as_bytes(std::span(kXmp));
+    second.insert(second.begin() + 2, xmp.begin(), xmp.end());
+    EXPECT_EQ(readExif(second).orientation, 6);
 }
 
 TEST(PanoramaFiles, PicturesAreTurnedUpright) {

@@ -1,7 +1,6 @@
 #include "lib/render/splat/cpu/cpu_splat.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <span>
@@ -10,6 +9,7 @@
 
 #include "lib/base/cpu_device.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/render/outline/silhouettes.hpp"
 #include "lib/render/splat/cpu/kernels.hpp"
 #include "lib/render/splat/others.hpp"
@@ -168,7 +168,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
     const auto pixels =
         static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
     STX_CHECK(limits_.checkAllocation(pixels, wantNormals_ ? 48 : 20, "the frame"));
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     Picture picture{camera, lightsInWorld(settings_.lighting, camera.worldFromCamera()), {}, {}, 0};
     parallelFor(0, 2, [&](std::int64_t part) {
         if (part == 0) {
@@ -228,8 +228,7 @@ Result<Frame> CpuSplatRenderer::render(const Camera& camera) {
             finishStage(settings_.log.get(), "coverage", colour,
                         [&] { silhouettes_.carve(picture.frame, camera, drawn); });
     }
-    picture.frame.milliseconds =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    picture.frame.milliseconds = watch.milliseconds();
     return std::move(picture.frame);
 }
 

@@ -1,10 +1,9 @@
 #include "lib/render/splat/gl/gl_renderer.hpp"
 
-#include <chrono>
-
 #include <glm/gtc/type_ptr.hpp>
 
 #include "lib/base/parallel.hpp"
+#include "lib/base/stopwatch.hpp"
 #include "lib/model/srgb8.hpp"
 #include "lib/render/device/egl_context.hpp"
 #include "lib/render/device/gl_object.hpp"
@@ -235,7 +234,7 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
     frame.colour = Image<glm::vec4>(camera.width, camera.height, glm::vec4(0));
     frame.depth = Image<float>(camera.width, camera.height, kNoDepth);
 
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     GLfloat sizes[2] = {1, 1};
     glGetFloatv(GL_ALIASED_POINT_SIZE_RANGE, sizes);
     groupPoints(points_, settings_, camera, static_cast<int>(sizes[1]), groups_);
@@ -247,8 +246,7 @@ Result<Frame> GlRenderer::render(const Camera& camera) {
             setLights(camera);
         drawGroups(lit);
     }
-    frame.milliseconds =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    frame.milliseconds = watch.milliseconds();
     STX_CHECK(context_->check("drawing"));
     if (groups_.groups.empty()) return frame;
 

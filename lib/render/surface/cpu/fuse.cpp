@@ -76,37 +76,6 @@ bool summarisePixels(const float* lines, int stride, std::uint32_t wanted, RowRa
     return all != 0;
 }
 
-/// The pixels of a row that all their sources are sure of, and agree on: what addSource() makes of
-/// them, found for the whole row at once, which vectors do.
-struct AgreedPixels {
-    std::array<float, kTile> front{}, sum{};
-    std::array<std::uint32_t, kTile> shown{}, doubtful{};
-    std::array<std::int32_t, kTile> first{};
-
-    /// `scale`, `same`: what kOneSurface is a share of, and what sameWithin() is, of a q.
-    template <class Scale, class Same>
-    void add(int k, const RowRange& range, const Scale& scale, const Same& same) {
-        const std::uint32_t bit = 1u << k;
-        for (std::size_t x = 0; x < kTile; ++x) {
-            const float low = range.low[x], high = range.high[x];
-            const float mean = 0.5f * (high + low);
-            const std::uint32_t there = high > 0.0f ? ~0u : 0u;
-            const std::uint32_t isFirst = shown[x] == 0 ? there : 0u;
-            front[x] = isFirst ? mean : front[x];
-            first[x] = isFirst ? k : first[x];
-            const float within = same(front[x]);
-            std::uint32_t doubt = low > 0.0f ? 0u : ~0u;
-            doubt |= range.any[x] & kSampleFlags;
-            doubt |= high - low > kOneSurface * scale(high) ? ~0u : 0u;
-            doubt |= mean < front[x] - within ? ~0u : 0u;
-            doubt |= mean > front[x] + within ? ~0u : 0u;
-            doubtful[x] |= there & doubt;
-            sum[x] += there ? mean : 0.0f;
-            shown[x] |= there & bit;
-        }
-    }
-};
-
 struct Fuser : Votes {
     static constexpr int SAMPLES = 16;
 
@@ -136,24 +105,6 @@ struct Fuser : Votes {
     }
 
 #include "shaders/shared/surface_fuse.glsl"
-
-    [[nodiscard]] AgreedPixels agreedPixels(const std::array<RowRange, kMostTileSources>& ranges,
-                                            std::span<const int> list) const {
-        AgreedPixels agreed;
-        const float step = tile.step, perUnit = axis.qPerUnit(1.0f);
-        for (const int k : list) {
-            const RowRange& range = ranges[static_cast<std::size_t>(k)];
-            if (axis.inverse)
-                agreed.add(
-                    k, range, [](float q) { return q; },
-                    [=](float q) { return kSame * q + step * (q * q); });
-            else
-                agreed.add(
-                    k, range, [](float) { return 1.0f; },
-                    [=](float) { return kSame * 1.0f + step * perUnit; });
-        }
-        return agreed;
-    }
 
     /// fuseSamples(), of a pixel in which only the sources `among` may have something.
     void showSamples(std::span<const int> among, int column, int row) {
@@ -225,22 +176,10 @@ struct Fuser : Votes {
         const std::span<const int> first{
             list.data(), static_cast<std::size_t>(
                              std::lower_bound(there.begin(), there.end(), core) - there.begin())};
-        const AgreedPixels agreed = agreedPixels(ranges, there);
         const auto all = static_cast<uint>(locals.size());
         const bool twice = core < static_cast<int>(all);
         for (int column = 0; column < columns; ++column) {
             if (!(wanted >> column & 1)) continue;
-            const auto x = static_cast<std::size_t>(column);
-            if (!agreed.doubtful[x]) {
-                if (!agreed.shown[x]) continue;
-                WholePixel whole = startPixel();
-                whole.shown = agreed.shown[x];
-                whole.sum = agreed.sum[x];
-                whole.first = agreed.first[x];
-                Piece piece;
-                if (simplePiece(whole, 0, column, row, piece)) pieces.add(piece, 1.0f);
-                continue;
-            }
             const std::size_t before = pieces.size();
             if (!fusePixel(ranges, there, column, row, 1.0f, pieces) || !twice) continue;
             for (std::size_t i = before; i < pieces.size(); ++i) pieces.share[i] *= kAllShare;
