@@ -256,8 +256,7 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
                                              program.job)
                               : drawn.renderer->render(camera);
         if (!frame) return tl::unexpected(frame.error().at(fmt::format("picture {}", i)));
-        const double milliseconds =
-            watch.milliseconds();
+        const double milliseconds = watch.milliseconds();
         drawn.milliseconds += milliseconds;
         ++drawn.count;
         drawn.views.push_back({{"output", name}, {"milliseconds", milliseconds}});
