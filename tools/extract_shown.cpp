@@ -10,7 +10,7 @@
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "tools/picture_times.hpp"
-#include "tools/stage_options.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {

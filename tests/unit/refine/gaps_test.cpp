@@ -1,4 +1,4 @@
-#include "lib/surface/depth_gaps.hpp"
+#include "lib/refine/gaps.hpp"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-#include "lib/refine/stray_points.hpp"
+#include "lib/refine/strays.hpp"
 
 #include <atomic>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "lib/registration/disparity_shift.hpp"
+#include "lib/refine/shift.hpp"
 
 #include <cmath>
 #include <random>

@@ -1,4 +1,4 @@
-#include "lib/registration/disparity_shift.hpp"
+#include "lib/refine/shift.hpp"
 
 #include <algorithm>
 #include <array>
@@ -19,14 +19,14 @@ constexpr int kMeanReach = 3;
 constexpr float kTexture = 0.03f;
 constexpr int kEvery = 2;
 /// Disparities of neighbours inside a surface differ by less; pixels.
-constexpr float kSameSurface = 0.75f;
+constexpr float kInsideSurface = 0.75f;
 /// Larger differences count as this large: what is hidden there.
 constexpr float kMostDifference = 0.08f;
 /// Shifts that are tried, on each side of none.
 constexpr int kTries = 12;
 /// The best must leave less than this share of the differences; fewer points tell nothing.
-constexpr double kClear = 0.98;
-constexpr std::size_t kFewPoints = 1000;
+constexpr double kBetter = 0.98;
+constexpr std::size_t kFewTextured = 1000;
 
 /// Brightness less its local mean.
 Image<float> detailOf(const Texture& texture) {
@@ -72,7 +72,7 @@ std::vector<Point> texturedPoints(const Image<float>& disparities, const Image<f
     const auto inside = [&](int x, int y, float d) {
         const auto same = [&](int u, int v) {
             const float there = disparities.at(u, v);
-            return hasPoint(there) && std::abs(there - d) < kSameSurface;
+            return hasPoint(there) && std::abs(there - d) < kInsideSurface;
         };
         return same(x - 1, y) && same(x + 1, y) && same(x, y - 1) && same(x, y + 1);
     };
@@ -99,7 +99,7 @@ double disparityShift(const Image<float>& disparities, const Texture& texture,
     if (beside.empty()) return 0;
     const Image<float> own = detailOf(texture);
     const auto points = texturedPoints(disparities, own, beside, most);
-    if (points.size() < kFewPoints) return 0;
+    if (points.size() < kFewTextured) return 0;
     std::vector<Image<float>> others;
     for (const SidePicture& p : beside) others.push_back(detailOf(p.texture));
     std::array<double, 2 * kTries + 1> differences{};
@@ -118,7 +118,7 @@ double disparityShift(const Image<float>& disparities, const Texture& texture,
     const auto best =
         static_cast<std::size_t>(std::ranges::min_element(differences) - differences.begin());
     if (best == 0 || best + 1 == differences.size() ||
-        differences[best] > kClear * differences[kTries])
+        differences[best] > kBetter * differences[kTries])
         return 0;
     const double before = differences[best - 1], after = differences[best + 1];
     const double beyond = 0.5 * (before - after) / (before + after - 2 * differences[best]);

@@ -1,4 +1,4 @@
-#include "lib/refine/colour_depth.hpp"
+#include "lib/refine/colours.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "formats/imagesets/mixed_pixels.hpp"
+#include "lib/refine/mixed.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -6,12 +6,12 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 
-namespace stx::imagesets {
+namespace stx {
 namespace {
 
 /// A step between neighbours that is an edge, as a share of the distance: above the noise of depth
 /// cameras (1.5 % at 4 m), below the edges that matter.
-constexpr float kEdge = 0.025f;
+constexpr float kStepOfEdge = 0.025f;
 /// How much larger than the slope of the surfaces beside it a step must be.
 constexpr float kBeyondSlope = 3.0f;
 
@@ -29,7 +29,7 @@ std::int64_t dropMixedPixels(Image<float>& distances) {
             for (int x = 0; x < before.width(); ++x) {
                 const float z = before.at(x, y);
                 if (!hasPoint(z)) continue;
-                const float edge = kEdge * z;
+                const float edge = kStepOfEdge * z;
                 bool mixed = false;
                 int company = 0;
                 static constexpr int kAxes[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
@@ -62,4 +62,4 @@ std::int64_t dropMixedPixels(Image<float>& distances) {
     return dropped;
 }
 
-}  // namespace stx::imagesets
+}  // namespace stx

@@ -1,4 +1,4 @@
-#include "formats/imagesets/raise_depth.hpp"
+#include "lib/refine/raise.hpp"
 
 #include <cmath>
 
@@ -6,7 +6,7 @@
 
 #include "lib/geometry/depth_code.hpp"
 
-namespace stx::imagesets {
+namespace stx {
 namespace {
 
 constexpr int kWide = 240, kHigh = 160, kFactor = 8;
@@ -50,10 +50,21 @@ bool alike(float a, float b) {
     return hasPoint(a) == hasPoint(b) && (!hasPoint(a) || std::abs(a / b - 1) < 0.02f);
 }
 
+/// The depth on the pixels of the picture, whose size is a multiple of the depth's.
+Image<float> raisedTo(const Texture& picture, const Image<float>& depth) {
+    const int width = depth.width(), factor = picture.width() / width;
+    RgbaFloatImage coarse(width, depth.height(), glm::vec4(0));
+    for (int y = 0; y < picture.height(); ++y)
+        for (int x = 0; x < picture.width(); ++x)
+            coarse.at(x / factor, y / factor) +=
+                picture.at(x, y) / static_cast<float>(factor * factor);
+    return raiseDepth(depth, picture, Texture(std::move(coarse)));
+}
+
 TEST(RaiseDepth, PutsEdgesWhereThePictureHasThem) {
     for (const bool wall : {true, false}) {
         const Scene s = scene(wall);
-        const Image<float> raised = raiseDepth(s.depth, s.picture);
+        const Image<float> raised = raisedTo(s.picture, s.depth);
         ASSERT_EQ(raised.width(), kWide);
         int wrong = 0, wrongOfNearest = 0;
         for (int y = 0; y < kHigh; ++y)
@@ -68,7 +79,7 @@ TEST(RaiseDepth, PutsEdgesWhereThePictureHasThem) {
 
 TEST(RaiseDepth, MakesNoPointBetweenSurfaces) {
     const Scene s = scene(true);
-    const Image<float> raised = raiseDepth(s.depth, s.picture);
+    const Image<float> raised = raisedTo(s.picture, s.depth);
     for (int y = 0; y < kHigh; ++y)
         for (int x = 0; x < kWide; ++x) {
             const float d = raised.at(x, y);
@@ -82,7 +93,7 @@ TEST(RaiseDepth, IsExactOnPlanes) {
     for (int y = 0; y < 20; ++y)
         for (int x = 0; x < 30; ++x)
             depth.at(x, y) = static_cast<float>(1 / (0.5 + 0.002 * (x + 0.5) + 0.001 * (y + 0.5)));
-    const Image<float> raised = raiseDepth(depth, Texture(Rgba8Image(90, 60, {9, 9, 9, 255})));
+    const Image<float> raised = raisedTo(Texture(Rgba8Image(90, 60, {9, 9, 9, 255})), depth);
     for (int y = 3; y < 57; ++y)
         for (int x = 3; x < 87; ++x)
             EXPECT_NEAR(raised.at(x, y), 1 / (0.5 + 0.002 * (x + 0.5) / 3 + 0.001 * (y + 0.5) / 3),
@@ -90,4 +101,4 @@ TEST(RaiseDepth, IsExactOnPlanes) {
 }
 
 }  // namespace
-}  // namespace stx::imagesets
+}  // namespace stx

@@ -1,4 +1,4 @@
-#include "lib/surface/depth_steps.hpp"
+#include "lib/refine/steps.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ constexpr float kLargestStair = 2.5f;
 constexpr float kHold = 0.001f;
 /// Over-relaxed sweeps: after 40 at this factor values are within 0.02 steps (rms) of those after
 /// 2000 on the Middlebury set Aloe, and further ones don't show in pictures drawn from it.
-constexpr int kSweeps = 40;
+constexpr int kSmoothings = 40;
 constexpr float kRelaxation = 1.9f;
 
 constexpr std::uint8_t kLeft = 1, kRight = 2, kUp = 4, kDown = 8, kAll = 15;
@@ -53,7 +53,7 @@ void smoothDepthSteps(Image<float>& codes) {
     Image<float> moved(w, h);
     // Red and black pixels in turn: those of one colour touch only those of the other, so that
     // neither threads nor order matter.
-    for (int half = 0; half < 2 * kSweeps; ++half) {
+    for (int half = 0; half < 2 * kSmoothings; ++half) {
         parallelForBlocks(0, h, 32, [&](std::int64_t from, std::int64_t to) {
             for (int y = static_cast<int>(from); y < to; ++y) {
                 const int up = std::max(0, y - 1), down = std::min(h - 1, y + 1);

@@ -1,4 +1,4 @@
-#include "lib/surface/depth_edges.hpp"
+#include "lib/refine/align.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -7,6 +7,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/refine/edge_colours.hpp"
 
 namespace stx {
 namespace {
@@ -16,16 +17,11 @@ namespace {
 constexpr float kEdge = 0.01f;
 /// Edges are moved by a pixel a round.
 constexpr int kRounds = 2;
-/// Colours are learnt within this many pixels.
-constexpr int kReach = 4;
 /// A pixel belongs in front from this share of the front's colour on. Below a half, because a pixel
 /// left behind by mistake is seen against the wrong surface, one taken along hardly shows.
 constexpr float kShare = 0.35f;
 /// Squared distance of two colours (0..1 each) from which on they are two surfaces.
-constexpr float kContrast = 3 * 0.01f * 0.01f;
-
-constexpr int kBeside[8][2] = {{1, 0}, {-1, 0},  {0, 1},  {0, -1},
-                               {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
+constexpr float kTellsApart = 3 * 0.01f * 0.01f;
 
 bool together(float a, float b) {
     return hasPoint(a) && hasPoint(b) && std::abs(a - b) <= kEdge * std::min(a, b);
@@ -57,28 +53,17 @@ class Round {
     /// How much of the pixel's colour is that of the surface at `front`, 0..1 and beyond.
     [[nodiscard]] float shareOf(float front, int x, int y) const {
         const float own = distances_.at(x, y);
-        glm::vec3 frontColour(0), backColour(0);
-        float frontWeight = 0, backWeight = 0;
-        for (int j = -kReach; j <= kReach; ++j) {
-            for (int i = -kReach; i <= kReach; ++i) {
-                const int u = x + i, v = y + j, away = i * i + j * j;
-                if (away == 0 || away > kReach * kReach || !distances_.contains(u, v)) continue;
-                const float d = distances_.at(u, v);
-                const bool isFront = together(d, front);
-                if ((!isFront && !together(d, own)) || besideEdge(u, v)) continue;
-                const glm::vec4 c = texture_.at(u, v);
-                if (c.a < 1) continue;
-                const float weight = 1.0f / static_cast<float>(away);
-                (isFront ? frontColour : backColour) += weight * glm::vec3(c);
-                (isFront ? frontWeight : backWeight) += weight;
-            }
-        }
-        if (frontWeight == 0 || backWeight == 0) return 0;
-        backColour /= backWeight;
-        const glm::vec3 apart = frontColour / frontWeight - backColour;
-        const float squared = glm::dot(apart, apart);
-        if (squared < kContrast) return 0;
-        return glm::dot(glm::vec3(texture_.at(x, y)) - backColour, apart) / squared;
+        const EdgeColours colours = coloursAround(texture_, x, y, [&](int u, int v) {
+            if (!distances_.contains(u, v)) return EdgeSide::neither;
+            const float d = distances_.at(u, v);
+            const bool isFront = together(d, front);
+            if ((!isFront && !together(d, own)) || besideEdge(u, v)) return EdgeSide::neither;
+            return isFront ? EdgeSide::front : EdgeSide::back;
+        });
+        if (!colours.known()) return 0;
+        const glm::vec3 apart = colours.apart();
+        if (glm::dot(apart, apart) < kTellsApart) return 0;
+        return colours.shareOf(glm::vec3(texture_.at(x, y)));
     }
     /// Its colour may be a mixture.
     [[nodiscard]] bool besideEdge(int x, int y) const {

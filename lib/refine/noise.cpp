@@ -1,13 +1,13 @@
-#include "lib/refine/depth_noise.hpp"
+#include "lib/refine/noise.hpp"
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <utility>
 #include <vector>
 
 #include "lib/base/parallel.hpp"
+#include "lib/refine/local_plane.hpp"
 
 namespace stx {
 namespace {
@@ -52,11 +52,6 @@ constexpr Bands kWideBands{4.0f, 3.0f}, kNarrowBands{1.7f, 1.2f};
 constexpr float kClutter = 0.12f, kNoClutter = 0.06f, kNotFar = 3.0f;
 /// Points that tell it: every how many columns and rows, and how far around them, pixels.
 constexpr int kClutterColumns = 3, kClutterRows = 5, kClutterRadius = 2;
-/// Neighbours that must be on one surface around a pinhole, within this share of q and so many
-/// standard deviations. (Between leaves fewer are not a surface.)
-constexpr int kLeastNeighbours = 8;
-constexpr float kPinholeBand = 0.004f, kPinholeDeviations = 2.5f;
-
 /// The q around a pixel.
 struct Around {
     const Image<float>& q;
@@ -106,67 +101,6 @@ float oneInTwenty(std::vector<float>& values) {
     const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 20);
     std::nth_element(values.begin(), place, values.end());
     return *place;
-}
-
-/// q = q0 + gx dx + gy dy around a pixel.
-struct LocalPlane {
-    float q0 = 0, gx = 0, gy = 0;
-    int points = 0;
-    float alike = 0;  ///< how many points of full weight would say as much
-};
-
-/// The weighted least-squares plane of the points around (x, y) that are near a plane; far ones
-/// count less. That plane itself, where they do not tell.
-LocalPlane fitAround(const Image<float>& q, int x, int y, int radius, const LocalPlane& near,
-                     float band) {
-    float n = 0, nn = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sq = 0, sxq = 0, syq = 0;
-    LocalPlane out = near;
-    out.points = 0;
-    const float reach = 1.0f / static_cast<float>((radius + 1) * (radius + 1));
-    const float inverseBand = 1.0f / band;
-    const int y0 = std::max(y - radius, 0), y1 = std::min(y + radius, q.height() - 1);
-    const int x0 = std::max(x - radius, 0), x1 = std::min(x + radius, q.width() - 1);
-    for (int ny = y0; ny <= y1; ++ny) {
-        const auto row = q.row(ny);
-        const auto dy = static_cast<float>(ny - y);
-        for (int nx = x0; nx <= x1; ++nx) {
-            const float there = row[static_cast<std::size_t>(nx)];
-            if (!(there > 0.0f)) continue;
-            const auto dx = static_cast<float>(nx - x);
-            const float above = there - near.q0;
-            const float e = (above - near.gx * dx - near.gy * dy) * inverseBand;
-            const float onSurface = 1.0f - e * e, close = 1.0f - (dx * dx + dy * dy) * reach;
-            if (!(onSurface > 0.0f) || !(close > 0.0f)) continue;
-            const float w = onSurface * onSurface * close;
-            ++out.points;
-            n += w;
-            nn += w * w;
-            sx += w * dx;
-            sy += w * dy;
-            sxx += w * dx * dx;
-            sxy += w * dx * dy;
-            syy += w * dy * dy;
-            sq += w * above;
-            sxq += w * dx * above;
-            syq += w * dy * above;
-        }
-    }
-    if (!(n > 0.0f)) return out;
-    const float inverse = 1.0f / n;
-    out.alike = n * n / nn;
-    const float mx = sx * inverse, my = sy * inverse, mq = sq * inverse;
-    const float xx = sxx - mx * sx, xy = sxy - mx * sy, yy = syy - my * sy;
-    const float xq = sxq - mx * sq, yq = syq - my * sq;
-    const float det = xx * yy - xy * xy;
-    if (!(det > 0.01f * xx * yy) || !(xx > 0.5f) || !(yy > 0.5f)) {
-        // Points on a line, or hardly any: their mean.
-        out.q0 = near.q0 + mq - near.gx * mx - near.gy * my;
-        return out;
-    }
-    out.gx = (xq * yy - yq * xy) / det;
-    out.gy = (yq * xx - xq * xy) / det;
-    out.q0 = near.q0 + mq - out.gx * mx - out.gy * my;
-    return out;
 }
 
 /// The bands for a view with so much noise, by how much clutter there is in it.
@@ -285,39 +219,6 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
         }
     });
     return kDoubt * static_cast<float>(meanOfRows(left, points).value_or(0));
-}
-
-std::int64_t closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& covered,
-                               const DepthAxis& axis, float noise) {
-    std::int64_t missed = 0;
-    for (std::size_t i = 0; i < q.count(); ++i)
-        missed += static_cast<int>(q.data()[i] == 0.0f) & static_cast<int>(covered.data()[i] != 0);
-    if (missed == 0) return 0;
-    const Image<float> from = q;
-    std::atomic<std::int64_t> closed = 0;
-    parallelForBlocks(1, q.height() - 1, 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 1; x + 1 < q.width(); ++x) {
-                if (from.at(x, y) != 0.0f || !covered.at(x, y)) continue;
-                float around[8];
-                int count = 0;
-                for (int k = 0; k < 9; ++k) {
-                    const float there = from.at(x - 1 + k % 3, y - 1 + k / 3);
-                    if (there > 0.0f) around[count++] = there;
-                }
-                if (count < kLeastNeighbours) continue;
-                std::nth_element(around, around + count / 2, around + count);
-                const float middle = around[count / 2];
-                const float band =
-                    (kPinholeBand + kPinholeDeviations * noise) * axis.relativeScale(middle);
-                const LocalPlane plane = fitAround(from, x, y, 1, {middle}, band);
-                if (plane.points < kLeastNeighbours || !(plane.q0 > 0.0f)) continue;
-                q.at(x, y) = plane.q0;
-                ++closed;
-            }
-        }
-    });
-    return closed;
 }
 
 }  // namespace stx

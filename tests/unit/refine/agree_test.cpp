@@ -1,13 +1,13 @@
-#include "lib/refine/noisy_views.hpp"
+#include "lib/refine/agree.hpp"
 
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "lib/refine/colour_depth.hpp"
-#include "lib/refine/depth_noise.hpp"
-#include "lib/refine/silhouette_points.hpp"
+#include "lib/refine/colours.hpp"
+#include "lib/refine/noise.hpp"
+#include "lib/refine/silhouettes.hpp"
 #include "tests/noisy_depth.hpp"
 
 namespace stx {

@@ -1,4 +1,4 @@
-#include "lib/surface/depth_edges.hpp"
+#include "lib/refine/align.hpp"
 
 #include <cmath>
 

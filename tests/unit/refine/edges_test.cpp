@@ -1,7 +1,7 @@
 // Depth whose surfaces in front reach over what is behind: found by the colours there, and taken
 // back; exact views stay as they are.
 
-#include "lib/refine/fat_edges.hpp"
+#include "lib/refine/edges.hpp"
 
 #include <algorithm>
 #include <cmath>

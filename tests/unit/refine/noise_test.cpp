@@ -1,9 +1,10 @@
-#include "lib/refine/depth_noise.hpp"
+#include "lib/refine/noise.hpp"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "lib/refine/pinholes.hpp"
 #include "tests/noisy_depth.hpp"
 
 namespace stx {

@@ -1,4 +1,4 @@
-#include "lib/surface/depth_steps.hpp"
+#include "lib/refine/steps.hpp"
 
 #include <cmath>
 #include <random>

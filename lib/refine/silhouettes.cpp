@@ -1,4 +1,4 @@
-#include "lib/refine/silhouette_points.hpp"
+#include "lib/refine/silhouettes.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "formats/imagesets/raise_depth.hpp"
+#include "lib/refine/raise.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,15 +6,14 @@
 
 #include <glm/glm.hpp>
 
-#include "formats/imagesets/resample.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 
-namespace stx::imagesets {
+namespace stx {
 namespace {
 
 /// Samples whose distances differ by less belong to one surface.
-constexpr float kSameSurface = 0.02f;
+constexpr float kAlikeDepth = 0.02f;
 /// Of the weights of samples: coarse pixels, and sRGB values of 0..1. Tried on four sets whose
 /// depth was taken at every sixth pixel (spheres-miv, icl-nuim, statue, oaktree): 0.34 to 0.85
 /// times as many pixels are off by more than 2 % as with the nearest sample. At 0.08, kAlike takes
@@ -58,7 +57,7 @@ float atEdge(std::array<DepthSample, 16>& samples) {
         const DepthSample* to = from + 1;
         double weight = from->weight;
         while (to != samples.data() + samples.size() &&
-               (hasPoint(to->depth) ? to->depth - to[-1].depth <= kSameSurface * to[-1].depth
+               (hasPoint(to->depth) ? to->depth - to[-1].depth <= kAlikeDepth * to[-1].depth
                                     : !hasPoint(to[-1].depth)))
             weight += (to++)->weight;
         if (weight > most) {
@@ -74,11 +73,9 @@ float atEdge(std::array<DepthSample, 16>& samples) {
 
 }  // namespace
 
-Image<float> raiseDepth(const Image<float>& depth, const Texture& picture) {
+Image<float> raiseDepth(const Image<float>& depth, const Texture& picture, const Texture& coarse) {
     const int width = picture.width(), height = picture.height();
     const int dw = depth.width(), dh = depth.height();
-    // What each sample of the depth looks like.
-    const Texture coarse = resizeTexture(picture, dw, dh);
     Image<float> out(width, height, kNoDepth);
     parallelForBlocks(0, height, 16, [&](std::int64_t firstRow, std::int64_t lastRow) {
         for (int y = static_cast<int>(firstRow); y < lastRow; ++y) {
@@ -97,7 +94,7 @@ Image<float> raiseDepth(const Image<float>& depth, const Texture& picture) {
                         inverse += (i ? px - ix : 1 - (px - ix)) * (j ? py - iy : 1 - (py - iy)) /
                                    static_cast<double>(d);
                     }
-                if (hasPoint(high) && high - low <= kSameSurface * low) {
+                if (hasPoint(high) && high - low <= kAlikeDepth * low) {
                     out.at(x, y) = static_cast<float>(1.0 / inverse);
                     continue;
                 }
@@ -122,4 +119,4 @@ Image<float> raiseDepth(const Image<float>& depth, const Texture& picture) {
     return out;
 }
 
-}  // namespace stx::imagesets
+}  // namespace stx

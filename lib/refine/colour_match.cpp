@@ -1,4 +1,4 @@
-#include "lib/render/scene/colour_match.hpp"
+#include "lib/refine/colour_match.hpp"
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 
 #include "lib/base/image.hpp"
 
-namespace stx::imagesets {
+namespace stx {
 
 /// Removes the mixed (flying) pixels of a depth image: those that hang between a near and a far
 /// surface, belonging to neither, and those without neighbours. A slanted surface is kept: a pixel
@@ -12,4 +12,4 @@ namespace stx::imagesets {
 /// `distances`: kNoDepth = none. Gives the number of pixels that were made none.
 std::int64_t dropMixedPixels(Image<float>& distances);
 
-}  // namespace stx::imagesets
+}  // namespace stx

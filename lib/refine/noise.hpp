@@ -34,9 +34,4 @@ inline constexpr float kDoubt = 2.0f;
 float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise,
                   Image<glm::vec3>* surface = nullptr);
 
-/// Gives single pixels that a sensor missed (full cover, no depth) the depth of the surface around
-/// them, when all of their neighbours are on one. `covered`: 1 = full alpha. Gives how many.
-std::int64_t closeMissedPixels(Image<float>& q, const Image<std::uint8_t>& covered,
-                               const DepthAxis& axis, float noise);
-
 }  // namespace stx

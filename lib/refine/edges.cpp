@@ -1,4 +1,4 @@
-#include "lib/refine/fat_edges.hpp"
+#include "lib/refine/edges.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -8,6 +8,7 @@
 
 #include "lib/base/median.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/refine/edge_colours.hpp"
 
 namespace stx {
 namespace {
@@ -18,8 +19,6 @@ namespace {
 constexpr float kJumpOfEdge = 0.005f, kBesideSlope = 3.0f;
 /// And of so many steps of a depth code.
 constexpr float kJumpSteps = 2.5f;
-/// Colours are learnt within so many pixels.
-constexpr int kReach = 4;
 /// Squared distance of two colours (0..1 each) that tell surfaces apart.
 constexpr float kContrast = 3 * 0.04f * 0.04f;
 /// And of so many times what the colours of both differ by among themselves (the sum of their
@@ -50,9 +49,6 @@ constexpr std::size_t kFewPoints = 200;
 constexpr float kSameSurface = 0.03f;
 /// Depths that are apart by less than this share of what they were are better.
 constexpr float kClearlyCloser = 0.8f;
-
-constexpr int kBeside[8][2] = {{1, 0}, {-1, 0},  {0, 1},  {0, -1},
-                               {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
 
 class Edges {
   public:
@@ -86,38 +82,20 @@ class Edges {
     [[nodiscard]] std::optional<float> ownShare(int x, int y, int i) const {
         const float front = q_.at(x, y), back = at(x + kBeside[i][0], y + kBeside[i][1]);
         const float half = 0.5f * (front - back);
-        struct Colours {
-            glm::vec3 sum{0};
-            float squares = 0, weight = 0;
-
-            [[nodiscard]] glm::vec3 mean() const { return sum / weight; }
-            [[nodiscard]] float variance() const {
-                return squares / weight - glm::dot(mean(), mean());
-            }
-        } ofFront, ofBack;
-        for (int v = y - kReach; v <= y + kReach; ++v) {
-            for (int u = x - kReach; u <= x + kReach; ++u) {
-                const int away = (u - x) * (u - x) + (v - y) * (v - y);
-                const float there = at(u, v);
-                if (away == 0 || away > kReach * kReach || !(there > 0.0f)) continue;
-                const bool isFront = std::abs(there - front) < half;
-                if (!isFront && !(std::abs(there - back) < half)) continue;
-                const glm::vec4 c = texture_.at(u, v);
-                if (c.a < 1.0f || besideJump(u, v, half)) continue;
-                const float weight = 1.0f / static_cast<float>(away);
-                Colours& colours = isFront ? ofFront : ofBack;
-                colours.sum += weight * glm::vec3(c);
-                colours.squares += weight * glm::dot(glm::vec3(c), glm::vec3(c));
-                colours.weight += weight;
-            }
-        }
-        if (!(ofFront.weight > 0) || !(ofBack.weight > 0)) return {};
-        const glm::vec3 apart = ofFront.mean() - ofBack.mean();
+        const EdgeColours colours = coloursAround(texture_, x, y, [&](int u, int v) {
+            const float there = at(u, v);
+            if (!(there > 0.0f)) return EdgeSide::neither;
+            const bool isFront = std::abs(there - front) < half;
+            if ((!isFront && !(std::abs(there - back) < half)) || besideJump(u, v, half))
+                return EdgeSide::neither;
+            return isFront ? EdgeSide::front : EdgeSide::back;
+        });
+        if (!colours.known()) return {};
+        const glm::vec3 apart = colours.apart();
         const float squared = glm::dot(apart, apart);
-        const float spread = ofFront.variance() + ofBack.variance();
+        const float spread = colours.front.variance() + colours.back.variance();
         if (squared < kContrast || squared < kContrastOfSpread * spread) return {};
-        return std::clamp(glm::dot(glm::vec3(texture_.at(x, y)) - ofBack.mean(), apart) / squared,
-                          0.0f, 1.0f);
+        return std::clamp(colours.shareOf(glm::vec3(texture_.at(x, y))), 0.0f, 1.0f);
     }
 
     /// What is behind at neighbour `i`, at this pixel.

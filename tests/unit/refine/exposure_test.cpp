@@ -1,7 +1,7 @@
 // Sources whose colours differ as those of cameras do that expose for themselves: what is found of
 // it, what is changed, and that nothing is where the sources agree.
 
-#include "lib/render/scene/colour_match.hpp"
+#include "lib/refine/colour_match.hpp"
 
 #include <cmath>
 
@@ -108,9 +108,9 @@ class MatchedScenes : public testing::TestWithParam<AnalyticScene> {
 
 TEST_P(MatchedScenes, ExactViewsAreTheVerySame) {
     const PageSet set(exact);
-    std::size_t changed = 1;
-    const PageSet same = set.inOneLight(changed);
-    EXPECT_EQ(changed, 0u);
+    RefineStepReport report;
+    const PageSet same = set.inOneLight({}, report);
+    EXPECT_EQ(report.views, 0);
     for (std::size_t i = 0; i < exact.views.size(); ++i) {
         EXPECT_EQ(same.pages()[i].texture, &exact.views[i].texture);
         EXPECT_EQ(&same.captured(i), &exact.views[i].texture);
@@ -126,9 +126,9 @@ TEST_P(MatchedScenes, ADarkenedViewComesBack) {
         if (c.a > 0) c = glm::u8vec4(glm::u8vec3(dark + 0.5f), c.a);
     }
     const PageSet set(bundle);
-    std::size_t changed = 0;
-    const PageSet matched = set.inOneLight(changed);
-    EXPECT_GE(changed, 1u);
+    RefineStepReport report;
+    const PageSet matched = set.inOneLight({}, report);
+    EXPECT_GE(report.views, 1);
     EXPECT_GT(difference(set, exact, 2), 5);
     for (std::size_t v = 0; v < exact.views.size(); ++v)
         EXPECT_LT(difference(matched, exact, v), 2);
@@ -149,11 +149,11 @@ TEST(MatchedAtlas, IsMatchedAsItsViewsAre) {
     ASSERT_TRUE(atlas) << atlas.error().text();
     const auto packed = PageSet::of(*atlas, job);
     ASSERT_TRUE(packed);
-    std::size_t ofViews = 0, ofAtlas = 0;
-    const PageSet a = PageSet(bundle).inOneLight(ofViews);
-    const PageSet b = packed->inOneLight(ofAtlas);
-    EXPECT_GT(ofViews, 0u);
-    EXPECT_EQ(ofViews, ofAtlas);
+    RefineStepReport ofViews, ofAtlas;
+    const PageSet a = PageSet(bundle).inOneLight({}, ofViews);
+    const PageSet b = packed->inOneLight({}, ofAtlas);
+    EXPECT_GT(ofViews.views, 0);
+    EXPECT_EQ(ofViews.views, ofAtlas.views);
     int compared = 0;
     for (std::size_t v = 0; v < bundle.views.size(); ++v) {
         for (int y = 5; y < 256; y += 10) {
@@ -177,7 +177,7 @@ TEST(MatchedPictures, AViewsOwnCameraGivesItsOwnColours) {
     Job job;
     const auto pictureAt = [&](const Camera& camera, bool match) {
         RenderSettings settings;
-        if (!match) settings.without.add(Stage::exposure);
+        settings.refine.set(RefineStep::exposure, match);
         const auto renderer = makeRenderer(Backend::cpu, bundle, settings, -1, job);
         return (*renderer)->render(camera)->colour;
     };
