@@ -200,9 +200,12 @@ TEST(Refine, MatchedColoursAreKeptAndNotMatchedAgain) {
         EXPECT_EQ(*better.views[v].texture.rgba8(), *pages.pages()[v].texture->rgba8()) << v;
         EXPECT_EQ(better.views[v].refined.steps, "exposure");
     }
+    // Whatever is seen in it later.
+    noisy::changeLight(better);
     RefineStepReport again;
     (void)PageSet(better).inOneLight({}, again);
     EXPECT_EQ(again.views, 0);
+    EXPECT_FALSE(refine(better, {}, job)->changed());
     RefineSettings without;
     without.set(RefineStep::exposure, false);
     const auto left = refine(bundle, without, job);
