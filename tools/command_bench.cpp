@@ -42,12 +42,22 @@ nlohmann::ordered_json toJson(const BenchReport& report) {
 }
 
 Result<AblationSet> ablationSetOf(const std::string& input, Program& program) {
-    STX_TRY(auto opened, openRenderable(input, {}, program.job));
+    RefineReport atImport;
+    OpenOptions open;
+    open.set.refined = [&atImport](const RefineReport& found) { atImport = found; };
+    STX_TRY(auto opened, openRenderable(input, open, program.job));
     auto set = std::holds_alternative<Mesh>(opened)
                    ? AblationSet::of(std::get<Mesh>(opened), program.job)
                    : AblationSet::of(std::move(std::get<Bundle>(opened)));
     if (!set) return tl::unexpected(set.error().at(fmt::format("'{}'", input)));
     const std::filesystem::path path(input);
+    for (const RefineStepInfo& step : refineSteps())
+        if (atImport.of(step.step).views > 0) set->atImport.push_back(step.step);
+    set->importWithout = [input](RefineStep step, Job& job) {
+        OpenOptions without;
+        without.set.refine.set(step, false);
+        return openBundle(input, without, job);
+    };
     set->name = (path.has_filename() ? path : path.parent_path()).stem().string();
     return set;
 }

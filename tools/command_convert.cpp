@@ -16,6 +16,7 @@
 #include "tools/commands.hpp"
 #include "tools/environment_options.hpp"
 #include "tools/mesh_views.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {
@@ -33,6 +34,7 @@ struct ConvertOptions {
     int bifsVersion = 0;
     OpenOptions open;
     EnvironmentOptions environment;
+    ImportRefining refining;
     bool cube = false;        ///< six faces seen from inside
     std::string frames;       ///< A-B
     bool frameGiven = false;  ///< one frame is asked for
@@ -96,6 +98,8 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
 Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptions& o,
                           Program& program) {
     OpenOptions open = o.open;
+    bool imported = false;
+    open.set.refined = [&imported](const RefineReport&) { imported = true; };
     open.set.texturePattern = open.texture;
     open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
     open.materials = o.mesh->materials;
@@ -109,6 +113,7 @@ Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptio
         return bundle;
     }
     auto& bundle = std::get<Bundle>(opened);
+    STX_CHECK(o.refining.refine(bundle, imported, program.job));
     if (o.cube) {
         STX_TRY(bundle, cubeFromInside(bundle, program.job));
     }
@@ -140,7 +145,8 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
                                                  const std::filesystem::path& target,
                                                  const ConvertOptions& o, bool countPoints,
                                                  Program& program) {
-    if (!holdsSequences(target) || o.frameGiven || o.open.set.refinePoses || o.cube)
+    if (!holdsSequences(target) || o.frameGiven || o.cube ||
+        o.open.set.refine.atImport(RefineStep::poses, false))
         return std::nullopt;
     // A mesh, an atlas and one .exr stand still.
     if (o.open.set.from.empty()) {
@@ -149,6 +155,8 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
         if (!kind && !frameName(input.string(), 0)) return std::nullopt;
     }
     OpenOptions open = o.open;
+    const auto imported = std::make_shared<bool>(false);
+    open.set.refined = [imported](const RefineReport&) { *imported = true; };
     open.set.texturePattern = open.texture;
     open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
     STX_TRY(auto frames, openSequence(input, open, program.job));
@@ -158,6 +166,11 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
         (void)program.job.takeNotes();
         return std::nullopt;
     }
+    if (o.refining.steps != "auto")
+        frames =
+            changedOnTheWay(std::move(frames), target, [imported, &o](Bundle& bundle, Job& job) {
+                return o.refining.refine(bundle, *imported, job);
+            });
     if (const auto bits = o.mesh->depthBits)
         frames = changed(std::move(frames), [bits = *bits](Bundle& bundle, Job&) -> Result<void> {
             for (ReferenceView& view : bundle.views) view.depthBits = bits;
@@ -194,7 +207,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     std::optional<Converted> done;
     std::error_code ec;
     // `name_%04d.exr` is not a file's name.
-    if (!o.environment.given() && !o.cube &&
+    if (!o.environment.given() && !o.cube && o.refining.steps == "auto" &&
         (std::filesystem::exists(input, ec) || !frameName(input.string(), 0))) {
         STX_TRY(const auto passed,
                 convertDocument(input, target, saveOptions(o, program),
@@ -317,6 +330,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     if (o.still && o.moving)
         return fail(ErrorCode::usage, "--still and --moving exclude each other; give one");
     if (o.still || o.moving) o.open.set.moving = o.moving;
+    STX_TRY(o.open.set.refine, o.refining.settings());
     o.frameGiven = !command.given({"--frame", "--frames"}).empty();
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
@@ -528,40 +542,7 @@ void addConvert(CommandLine& line, Program& program) {
              "Stored value of one pixel of disparity (default 1)")
         .positive()
         .group(sets);
-    c.choice<MixedPixels>(
-         "--mixed-pixels", set.mixedPixels,
-         {{"auto", MixedPixels::automatic},
-          {"drop", MixedPixels::drop},
-          {"keep", MixedPixels::keep}},
-         "Flying points at depth edges: auto (dropped from sensors' depth), drop, keep")
-        .group(sets);
-    c.choice<bool>(
-         "--view-size", set.raiseDepth, {{"picture", true}, {"depth", false}},
-         "Of views whose depth is smaller than their picture: picture (the depth is raised "
-         "along the picture's edges) or depth (default picture)")
-        .group(sets);
-    c.flag("--refine-poses", set.refinePoses,
-           "Move the cameras so that overlapping views agree in depth and colour")
-        .group(sets);
-    c.choice<Dequantise>(
-         "--dequantise", set.dequantise,
-         {{"auto", Dequantise::automatic}, {"off", Dequantise::off}, {"on", Dequantise::on}},
-         "Smooth the stairs of depth stored in integers, within half a step: auto (8-bit "
-         "depth), on, off")
-        .group(sets);
-    c.choice<CloseGaps>(
-         "--close-gaps", set.closeGaps,
-         {{"auto", CloseGaps::automatic}, {"off", CloseGaps::off}, {"on", CloseGaps::on}},
-         "Give pixels without depth, up to a fiftieth of the picture's longer side from known "
-         "ones, that "
-         "of the surface whose colours lead there: auto (older Middlebury sets), on, off")
-        .group(sets);
-    c.choice<AlignEdges>(
-         "--align-edges", set.alignEdges,
-         {{"auto", AlignEdges::automatic}, {"off", AlignEdges::off}, {"on", AlignEdges::on}},
-         "Move depth edges to where the picture has them, by up to 2 pixels: auto (older "
-         "Middlebury sets), on, off")
-        .group(sets);
+    addImportRefining(c, o->refining, sets);
     c.option(
          "--yuv",
          [o](const std::string& text) -> Result<void> {

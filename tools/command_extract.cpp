@@ -11,7 +11,7 @@
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
 #include "tools/picture_times.hpp"
-#include "tools/stage_options.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {

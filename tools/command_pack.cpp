@@ -12,7 +12,7 @@
 #include "lib/quality/prune_quality.hpp"
 #include "tools/commands.hpp"
 #include "tools/picture_times.hpp"
-#include "tools/stage_options.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {
@@ -176,7 +176,9 @@ Result<int> packInput(const PackOptions& options, Program& program) {
     }
     preloadCodecs(o.input);
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
-    STX_TRY(frames, refined(std::move(frames), o.refine));
+    // One atlas for each frame is made in two passes.
+    const bool twice = frames->timeline().moves() && !o.time;
+    STX_TRY(frames, refined(std::move(frames), o.refine, twice ? folderOf(o.output) : ""));
     const Timeline timeline = frames->timeline();
     const std::size_t count = timeline.count();
     const bool numbered = frameName(o.output, 0).has_value();

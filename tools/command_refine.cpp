@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include <nlohmann/json.hpp>
 
 #include "formats/any/open.hpp"
@@ -5,16 +7,29 @@
 #include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
-#include "lib/refine/refine.hpp"
 #include "tools/commands.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {
 
 struct RefineOptions {
     std::string input, output;
-    std::string only, without;
+    std::string only, with, without;
 };
+
+/// As --refine has it.
+std::string stepsOf(const RefineOptions& o) {
+    if (!o.only.empty()) return o.only;
+    std::string text = "auto";
+    for (const auto& [names, before] : {std::pair(o.with, ","), std::pair(o.without, ",-")})
+        for (std::size_t at = 0; !names.empty() && at <= names.size();) {
+            const std::size_t end = std::min(names.find(',', at), names.size());
+            text += before + names.substr(at, end - at);
+            at = end + 1;
+        }
+    return text;
+}
 
 nlohmann::ordered_json stepsJson(const RefineReport& report) {
     auto steps = nlohmann::ordered_json::array();
@@ -33,35 +48,40 @@ nlohmann::ordered_json stepsJson(const RefineReport& report) {
 Result<int> refineInput(const RefineOptions& o, const Command& command, Program& program) {
     const Stopwatch watch;
     if (!o.only.empty())
-        STX_CHECK(command.refuse({"--without"}, "does not go with --only; give one of them"));
-    STX_TRY(const auto settings, o.only.empty() && o.without.empty() ? RefineSettings()
-                                 : o.only.empty() ? RefineSettings::without(o.without)
-                                                  : RefineSettings::from(o.only));
+        STX_CHECK(
+            command.refuse({"--with", "--without"}, "does not go with --only; give one of them"));
+    STX_TRY(const auto settings, RefineSettings::from(stepsOf(o)));
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
-    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    Refining refining(settings);
+    OpenOptions open;
+    refining.import(open.set);
+    STX_TRY(auto frames, openSequence(o.input, open, program.job));
     const Timeline timeline = frames->timeline();
-    RefineReport report;
-    std::size_t views = 0, seen = 0;
+    if (timeline.moves() && settings.on(RefineStep::poses))
+        return fail(
+            ErrorCode::usage,
+            "'{}' moves, and the step 'poses' moves the cameras of one moment; leave it out",
+            o.input);
+    std::size_t views = 0;
     bool before = false;
-    frames = changed(std::move(frames), [&](Bundle& bundle, Job& job) -> Result<void> {
-        std::uint64_t pixels = 0;
-        for (const ReferenceView& view : bundle.views) {
-            before = before || !view.refined.steps.empty();
-            pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
-        }
-        // The views as they were and as they become, and their pictures while they are packed.
-        STX_CHECK(job.limits.checkAllocation(pixels, 24, "refining"));
-        STX_TRY(const auto found, refine(bundle, settings, job));
-        // Some containers are written in two passes.
-        if (seen++ < timeline.count()) report.add(found);
-        views = bundle.views.size();
-        return {};
-    });
+    frames =
+        changedOnTheWay(std::move(frames), o.output, [&](Bundle& bundle, Job& job) -> Result<void> {
+            std::uint64_t pixels = 0;
+            for (const ReferenceView& view : bundle.views) {
+                before = before || !view.refined.steps.empty();
+                pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
+            }
+            // The views as they were and as they become, and their pictures while they are packed.
+            STX_CHECK(job.limits.checkAllocation(pixels, 24, "refining"));
+            views = bundle.views.size();
+            return refining.refine(bundle, job);
+        });
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveSequence(*frames, o.output, save, program.job));
+    const RefineReport& report = refining.report();
     if (before) program.job.note("views that were refined before are left as they are");
     const double seconds = watch.seconds();
     program.sayNotes();
@@ -88,12 +108,15 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
 
 void addRefine(CommandLine& line, Program& program) {
     std::string help =
-        "Captured depth repaired: what render, pack and extract do before they draw or write, once "
-        "and kept. Exact depth stays as it is\n\n"
+        "Captured views repaired: what render, pack and extract do before they draw or write, once "
+        "and kept. Exact views stay as they are\n\n"
         "  stx refine capture.exr -o better.exr\n"
-        "  stx refine film.mp4 -o better.mp4 --without colours\n\nSteps, in this order:\n";
+        "  stx refine capture.exr -o better.exr --with poses\n"
+        "  stx refine film.mp4 -o better.mp4 --without colours\n\n"
+        "Steps, in this order; * of image sets only, as they are read:\n";
     for (const RefineStepInfo& step : refineSteps())
-        help += fmt::format("  {:<12}{}\n", step.name, step.sentence);
+        help += fmt::format("  {:<12}{} {} ({})\n", step.name,
+                            step.when == RefineWhen::import ? '*' : ' ', step.sentence, step.usual);
     Command c = line.add("refine", help);
     auto o = std::make_shared<RefineOptions>();
     c.option("IN", o->input, "Bundle, film, atlas or image set").required();
@@ -101,7 +124,8 @@ void addRefine(CommandLine& line, Program& program) {
         .required()
         .takes("OUT");
     c.option("--only", o->only, "These steps, with commas between them").takes("STEPS");
-    c.option("--without", o->without, "All but these steps and strays").takes("STEPS");
+    c.option("--with", o->with, "These steps, too").takes("STEPS");
+    c.option("--without", o->without, "None of these steps").takes("STEPS");
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return refineInput(*o, c, p); });
 }

@@ -13,6 +13,7 @@
 #include "tools/commands.hpp"
 #include "tools/frame_writer.hpp"
 #include "tools/light_options.hpp"
+#include "tools/refining.hpp"
 #include "tools/render_scene.hpp"
 #include "tools/stage_options.hpp"
 
@@ -103,9 +104,13 @@ Result<RenderSettings> settingsOf(const RenderOptions& o) {
         STX_TRY(const auto light, parseLight(text, glm::dvec3(0.0)));
         s.lighting.lights.push_back(light);
     }
-    STX_TRY(s.refine, RefineSettings::from(o.refine));
+    STX_TRY(s.refine, refineSettings(o.refine));
+    if (s.refine.on(RefineStep::poses))
+        return fail(ErrorCode::usage,
+                    "the step 'poses' moves cameras, and pictures are drawn where they are; move "
+                    "them first: stx refine --with poses");
     if (!o.without.empty()) STX_CHECK(leaveOut(o.without, s));
-    if (!o.matchColours) s.without.add(Stage::exposure);
+    if (!o.matchColours) s.refine.set(RefineStep::exposure, false);
     if (o.explain) s.log = std::make_shared<StageLog>();
     STX_TRY(s.lighting.ambient, parseGreyOrRgb(o.ambient, "--ambient"));
     STX_TRY(s.lighting.specular, parseGreyOrRgb(o.specular, "--specular"));

@@ -12,7 +12,7 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/sheet/sheet.hpp"
 #include "tools/commands.hpp"
-#include "tools/stage_options.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {

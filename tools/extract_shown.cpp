@@ -9,7 +9,7 @@
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/stopwatch.hpp"
 #include "tools/picture_times.hpp"
-#include "tools/stage_options.hpp"
+#include "tools/refining.hpp"
 
 namespace stx::tools {
 namespace {

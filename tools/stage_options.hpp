@@ -1,23 +1,12 @@
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "lib/model/sequence.hpp"
 #include "lib/render/api/renderer.hpp"
-#include "tools/command_line.hpp"
 
 namespace stx::tools {
-
-/// --refine auto|off|STEPS of commands that draw or write refined views.
-Option refineOption(Command& command, std::string& text);
-
-/// Frames whose depth is refined when they are read; a note says which steps were done. `text` is
-/// that of the option.
-[[nodiscard]] Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames,
-                                                        const std::string& text);
 
 /// Leaves out stages of rendering and steps of refining; `names` has commas between them. Errors
 /// (usage): a name that is none, with the list of those that are.

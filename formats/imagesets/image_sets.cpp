@@ -13,6 +13,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/sequence.hpp"
+#include "lib/refine/poses.hpp"
 #include "lib/registration/refine_poses.hpp"
 
 namespace stx {
@@ -80,25 +81,9 @@ constexpr double kPosesDisagree = 0.005;
 
 /// Refines the poses, or says that they want it.
 Result<void> attendToPoses(Bundle& bundle, const SetDescription& set,
-                           const ImageSetOptions& options, Job& job) {
-    if (options.refinePoses) {
-        STX_TRY(const PoseRefinement done, refinePoses(bundle, {}, job));
-        if (done.before.pairs == 0) {
-            job.note("the poses stay as they are: no two views overlap");
-            return {};
-        }
-        if (!done.kept) {
-            job.note(fmt::format(
-                "the poses stay as they are: overlapping views disagree by {:.2g} % of the "
-                "distance, and refined they would by {:.2g} %",
-                100 * done.before.relative, 100 * done.after.relative));
-            return {};
-        }
-        job.note(fmt::format(
-            "poses refined: viewpoints moved by up to {:.3g} scene units, turned by up to {:.3g} "
-            "degrees; overlapping views disagreed by {:.2g} % of the distance, now by {:.2g} %",
-            done.maxShift, glm::degrees(done.maxTurn), 100 * done.before.relative,
-            100 * done.after.relative));
+                           const ImageSetOptions& options, RefineReport& report, Job& job) {
+    if (options.refine.atImport(RefineStep::poses, false)) {
+        STX_TRY(report.of(RefineStep::poses), alignPoses(bundle, job));
     } else if (std::ranges::any_of(set.views, &SetView::sensor)) {
         const DepthDisagreement found = measureDepthDisagreement(bundle);
         if (found.relative > kPosesDisagree)
@@ -197,7 +182,8 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
 
     const auto count = static_cast<std::int64_t>(set.views.size());
     std::vector<Result<std::vector<ReferenceView>>> loaded(set.views.size());
-    // Notes in the order of the views, whichever is ready first.
+    // Notes and reports in the order of the views, whichever is ready first.
+    std::vector<RefineReport> reports(set.views.size());
     std::vector<Job> jobs(set.views.size());
     for (Job& own : jobs) own.workFor(job);
     std::atomic<std::int64_t> done = 0;
@@ -207,7 +193,7 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
         if (failed) return;
         Job& own = jobs[at];
         try {
-            loaded[at] = loadSetView(set.views[at], options, own);
+            loaded[at] = loadSetView(set.views[at], options, reports[at], own);
         } catch (const std::bad_alloc&) {
             loaded[at] = fail(ErrorCode::failed, "view '{}': there is not enough memory",
                               set.views[at].name);
@@ -232,8 +218,11 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
         STX_TRY(bundle.environment, readEnvironmentExr(set.environment, job));
     }
     findOrigin(bundle, set, job);
-    STX_CHECK(attendToPoses(bundle, set, options, job));
+    RefineReport report;
+    for (const RefineReport& ofView : reports) report.add(ofView);
+    STX_CHECK(attendToPoses(bundle, set, options, report, job));
     if (auto ok = bundle.check(); !ok) return tl::unexpected(ok.error().at(where));
+    if (options.refined) options.refined(report);
     return bundle;
 }
 
@@ -462,9 +451,6 @@ Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOpt
 Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,
                                                const ImageSetOptions& options, Job& job) {
     STX_CHECK(checkOptions(options));
-    if (options.refinePoses)
-        return fail(ErrorCode::usage,
-                    "--refine-poses moves the cameras of one moment; give --frame N or --still");
     STX_TRY(SetDescription set, describeFirst(path, options, job));
     const std::string where = inQuotes(path.string());
     STX_TRY(Motion motion, motionToRead(set, options, where, job));
@@ -472,6 +458,10 @@ Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path
         return failAt(where, ErrorCode::invalidInput, "it has no view; at least one is expected");
     if (set.frames == 1 && !motion.moves())
         return std::make_unique<StillSet>(where, options, std::move(set));
+    if (options.refine.atImport(RefineStep::poses, false))
+        return failAt(where, ErrorCode::usage,
+                      "it moves, and the step 'poses' is of one moment; give --frame N or --still, "
+                      "or leave the step out");
     return std::make_unique<SetSequence>(path, options, std::move(set), std::move(motion));
 }
 

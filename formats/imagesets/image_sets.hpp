@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,38 +12,11 @@
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/sequence.hpp"
+#include "lib/refine/refine.hpp"
 
 /// Photographs with depth and cameras, as other programs leave them. Axes, pixel centres and the
 /// meaning of depth of every kind: formats/imagesets/README.md.
 namespace stx {
-
-enum class MixedPixels {
-    automatic,  ///< dropped from sensors' and reconstructed depth (TUM, 7-Scenes, COLMAP)
-    drop,
-    keep,
-};
-
-/// What is done with depth stored in coarse integers: smoothDepthSteps() of lib/surface.
-enum class Dequantise {
-    automatic,  ///< depth in 8 bits
-    on,         ///< all integers
-    off,
-};
-
-/// Depth edges are moved to where the picture has them: alignDepthEdges() of lib/surface.
-enum class AlignEdges {
-    automatic,  ///< older Middlebury sets
-    on,
-    off,
-};
-
-/// Pixels without depth get that of the surface whose colours lead there: closeDepthGaps() of
-/// lib/surface.
-enum class CloseGaps {
-    automatic,  ///< older Middlebury sets
-    on,
-    off,
-};
 
 struct ImageSetOptions {
     std::string from;  ///< one of imageSetKinds(); empty = recognise
@@ -84,15 +58,11 @@ struct ImageSetOptions {
     /// camera (x right, y down, z forward, scene units). "none": the depth lies on the pixels of
     /// its picture. Empty: 7-Scenes' published one, where `intrinsics` are not given; else none.
     std::string depthToColour;
-    MixedPixels mixedPixels = MixedPixels::automatic;
-    /// Moves the cameras so that views that overlap agree; see lib/registration.
-    bool refinePoses = false;
-    Dequantise dequantise = Dequantise::automatic;
-    CloseGaps closeGaps = CloseGaps::automatic;
-    AlignEdges alignEdges = AlignEdges::automatic;
-    /// Depth that is smaller than its picture is raised to the picture's size along the picture's
-    /// edges; else the picture is reduced to the depth's.
-    bool raiseDepth = true;
+    /// What is repaired at the import: steps of RefineWhen::import and both. Where `raise` is left
+    /// out, pictures that are larger than their depth are reduced to its size.
+    RefineSettings refine;
+    /// Is told what they did, once for each moment that is read; null: nobody asks.
+    std::function<void(const RefineReport&)> refined;
     YuvColour yuv;
     int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
 };
@@ -120,7 +90,7 @@ struct ImageSetKind {
 /// All frames of a set, one of a set without time. Which pictures belong to one camera the set says
 /// (`camera` of transforms.json); else those of one pose do, and where no pose comes twice, one
 /// camera moves. Reads no pixel before a frame is asked for. Errors as readImageSet(); (usage)
-/// refinePoses, which is of one moment.
+/// the step `poses` of a set that moves: it is of one moment.
 [[nodiscard]] Result<std::unique_ptr<Sequence>> openImageSet(const std::filesystem::path& path,
                                                              const ImageSetOptions& options,
                                                              Job& job);

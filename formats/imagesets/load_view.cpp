@@ -1,19 +1,22 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
 
 #include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
-#include "formats/imagesets/mixed_pixels.hpp"
 #include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/pictures.hpp"
-#include "formats/imagesets/raise_depth.hpp"
 #include "formats/imagesets/resample.hpp"
 #include "formats/imagesets/set_view.hpp"
+#include "lib/base/cpu_clock.hpp"
 #include "lib/capture/capture.hpp"
-#include "lib/surface/depth_edges.hpp"
-#include "lib/surface/depth_gaps.hpp"
-#include "lib/surface/depth_steps.hpp"
+#include "lib/refine/align.hpp"
+#include "lib/refine/gaps.hpp"
+#include "lib/refine/mixed.hpp"
+#include "lib/refine/raise.hpp"
+#include "lib/refine/reproject.hpp"
+#include "lib/refine/steps.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -234,10 +237,35 @@ void dropImpossible(Image<float>& distances) {
 
 namespace {
 
+/// What a step of refining did to a view, with its time, until the end.
+class StepOfView {
+  public:
+    StepOfView(RefineReport& report, RefineStep step) : report_(report.of(step)) {}
+    ~StepOfView() { report_.milliseconds += threadMilliseconds() - start_; }
+    StepOfView(const StepOfView&) = delete;
+    StepOfView& operator=(const StepOfView&) = delete;
+    void changed(std::int64_t pixels) {
+        report_.views += pixels > 0;
+        report_.pixels += pixels;
+    }
+    void moved(std::int64_t pixels, double sumOfShares) {
+        changed(pixels);
+        report_.moved = pixels;
+        report_.meanMove = pixels > 0 ? sumOfShares / static_cast<double>(pixels) : 0;
+    }
+
+  private:
+    RefineStepReport& report_;
+    double start_ = threadMilliseconds();
+};
+
 /// Moves all depth by what other pictures of the set show. `values`: as stored, without stairs.
-Result<void> shiftTogether(const SetView& set, const Camera& camera, const Image<float>& values,
-                           StoredView& stored, Job& job) {
-    const float shift = set.shift ? set.shift(values, stored.texture, job) : 0.0f;
+Result<void> shiftTogether(const SetView& set, const ImageSetOptions& options, const Camera& camera,
+                           const Image<float>& values, StoredView& stored, RefineReport& report,
+                           Job& job) {
+    if (!set.shift || !options.refine.atImport(RefineStep::shift, true)) return {};
+    StepOfView step(report, RefineStep::shift);
+    const float shift = set.shift(values, stored.texture, job);
     if (shift == 0.0f) return {};
     Image<float> moved = values;
     for (float& v : moved.pixels())
@@ -245,9 +273,17 @@ Result<void> shiftTogether(const SetView& set, const Camera& camera, const Image
     Job notesAgain;
     STX_CHECK(set.distances(moved, camera, stored.depthBits, notesAgain));
     dropImpossible(moved);
-    for (std::size_t i = 0; i < moved.count(); ++i)
-        if (hasPoint(stored.depth.data()[i]) && hasPoint(moved.data()[i]))
-            stored.depth.data()[i] = moved.data()[i];
+    std::int64_t pixels = 0;
+    double shares = 0;
+    for (std::size_t i = 0; i < moved.count(); ++i) {
+        float& was = stored.depth.data()[i];
+        const float now = moved.data()[i];
+        if (!hasPoint(was) || !hasPoint(now)) continue;
+        ++pixels;
+        shares += std::abs(static_cast<double>(now) / was - 1);
+        was = now;
+    }
+    step.moved(pixels, shares);
     job.note(fmt::format(
         "view '{}': {:.2f} are added to its stored depth, which other pictures of the set show",
         set.name, shift));
@@ -257,18 +293,18 @@ Result<void> shiftTogether(const SetView& set, const Camera& camera, const Image
 /// Makes distances of the stored values, and smooths the stairs of coarse ones. `noDepth`: what
 /// pixels without one are; those of nothing are made transparent.
 Result<void> toDistances(const SetView& set, const ImageSetOptions& options, const Camera& camera,
-                         StoredView& stored, NoDepth& noDepth, Job& job) {
+                         StoredView& stored, NoDepth& noDepth, RefineReport& report, Job& job) {
     const int bits = stored.depthBits;
     // What we exported ourselves comes back as it was.
     const bool smooth = set.distances && bits < 32 &&
-                        (options.dequantise == Dequantise::on ||
-                         (options.dequantise == Dequantise::automatic && bits == 8 && !set.planes));
+                        options.refine.atImport(RefineStep::steps, bits == 8 && !set.planes);
     Image<float> codes = smooth ? stored.depth : Image<float>();
     if (set.distances) STX_CHECK(set.distances(stored.depth, camera, bits, job));
     noDepth = noDepthOf(set, options, stored);
     dropImpossible(stored.depth);
     if (!smooth) return {};
 
+    std::optional<StepOfView> step(std::in_place, report, RefineStep::steps);
     for (std::size_t i = 0; i < codes.count(); ++i)
         if (!hasPoint(stored.depth.data()[i])) codes.data()[i] = kNoDepth;
     smoothDepthSteps(codes);
@@ -276,19 +312,25 @@ Result<void> toDistances(const SetView& set, const ImageSetOptions& options, con
     Job notesAgain;
     STX_CHECK(set.distances(codes, camera, bits, notesAgain));
     dropImpossible(codes);
-    double most = 0;
+    double most = 0, shares = 0;
+    std::int64_t pixels = 0;
     for (std::size_t i = 0; i < codes.count(); ++i) {
         float& was = stored.depth.data()[i];
         const float now = codes.data()[i];
-        if (!hasPoint(was) || !hasPoint(now)) continue;
-        most = std::max(most, std::abs(static_cast<double>(now) - was));
+        if (!hasPoint(was) || !hasPoint(now) || now == was) continue;
+        const double move = std::abs(static_cast<double>(now) - was);
+        most = std::max(most, move);
+        shares += move / was;
+        ++pixels;
         was = now;
     }
+    step->moved(pixels, shares);
+    step.reset();
     job.note(
         fmt::format("view '{}': the stairs of its {}-bit depth are smoothed within half a step, "
                     "{:.3g} scene units at most",
                     set.name, bits, most));
-    return shiftTogether(set, camera, smoothed, stored, job);
+    return shiftTogether(set, options, camera, smoothed, stored, report, job);
 }
 
 Result<void> needDepth(const Image<float>& depth) {
@@ -301,18 +343,23 @@ Result<void> needDepth(const Image<float>& depth) {
 /// Makes distances of the values of a depth camera, seen by the camera of the picture: on its
 /// pixels, or on fewer and larger ones where the depth has fewer.
 Result<void> takeToPicture(const SetView& set, const ImageSetOptions& options, StoredView& stored,
-                           NoDepth& noDepth, Job& job) {
+                           NoDepth& noDepth, RefineReport& report, Job& job) {
     const int tw = stored.texture.width(), th = stored.texture.height();
     STX_TRY(Camera to, cameraOfSize(set, tw, th));
     Camera from = *set.depthCamera;
     from.width = stored.depth.width();
     from.height = stored.depth.height();
-    STX_CHECK(toDistances(set, options, from, stored, noDepth, job));
+    STX_CHECK(toDistances(set, options, from, stored, noDepth, report, job));
     STX_CHECK(needDepth(stored.depth));
     if (from.width < tw)
         to = to.resized(from.width,
                         std::max(1, static_cast<int>(std::lround(1.0 * th * from.width / tw))));
-    STX_TRY(stored.depth, depthSeenBy(to, set.lens, stored.depth, from, job));
+    StepOfView step(report, RefineStep::reproject);
+    RealFromIdeal lens;
+    if (!set.lens.ideal())
+        lens = [&](glm::dvec2 pixel) { return set.lens.realFromIdeal(to, pixel); };
+    STX_TRY(stored.depth, depthSeenBy(to, lens, stored.depth, from, job));
+    step.changed(static_cast<std::int64_t>(stored.depth.count()));
     if (!anyPoint(stored.depth))
         return fail(ErrorCode::invalidInput,
                     "nothing of it is in the picture of the colour camera; see --depth-intrinsics "
@@ -320,30 +367,57 @@ Result<void> takeToPicture(const SetView& set, const ImageSetOptions& options, S
     return {};
 }
 
-/// Closes gaps of the depth along the picture's colours.
-void closeGaps(const SetView& set, const ImageSetOptions& options, StoredView& stored, Job& job) {
-    if (options.closeGaps == CloseGaps::off ||
-        (options.closeGaps == CloseGaps::automatic && !set.measured))
-        return;
-    const std::int64_t closed = closeDepthGaps(stored.depth, stored.texture);
-    if (closed > 0)
-        job.note(fmt::format(
-            "view '{}': {} pixels without depth ({:.2g} %) get that of the surface "
-            "whose colours lead there",
-            set.name, closed, 100.0 * static_cast<double>(closed) / stored.depth.count()));
-}
-
-/// Moves the depth edges to the picture's.
-void align(const SetView& set, const ImageSetOptions& options, StoredView& stored, Job& job) {
-    if (options.alignEdges == AlignEdges::off ||
-        (options.alignEdges == AlignEdges::automatic && !set.measured))
-        return;
-    const std::int64_t moved = alignDepthEdges(stored.depth, stored.texture);
-    if (moved > 0)
-        job.note(fmt::format(
-            "view '{}': {} pixels ({:.2g} %) are taken to the surface in front, "
-            "whose colour they have",
-            set.name, moved, 100.0 * static_cast<double>(moved) / stored.depth.count()));
+/// The steps of refining on the pixels of the picture, as the set needs them.
+Result<void> repair(const SetView& set, const ImageSetOptions& options, StoredView& stored,
+                    RefineReport& report, Job& job) {
+    const auto does = [&](RefineStep step, bool known) {
+        return options.refine.atImport(step, known);
+    };
+    const auto share = [&](std::int64_t pixels) {
+        return 100.0 * static_cast<double>(pixels) / static_cast<double>(stored.depth.count());
+    };
+    if (does(RefineStep::mixed, set.sensor)) {
+        StepOfView step(report, RefineStep::mixed);
+        const std::int64_t dropped = dropMixedPixels(stored.depth);
+        step.changed(dropped);
+        if (dropped > 0)
+            job.note(fmt::format("view '{}': {} mixed pixels at depth edges are dropped ({:.2g} %)",
+                                 set.name, dropped, share(dropped)));
+        if (!anyPoint(stored.depth))
+            return failAt(
+                fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
+                "all of its pixels look like noise at depth edges; keep them, if they are "
+                "not");
+    }
+    const Texture& picture = stored.texture;
+    if (stored.depth.width() != picture.width()) {
+        StepOfView step(report, RefineStep::raise);
+        stored.depth =
+            raiseDepth(stored.depth, picture,
+                       resizeTexture(picture, stored.depth.width(), stored.depth.height()));
+        step.changed(static_cast<std::int64_t>(stored.depth.count()));
+    }
+    if (does(RefineStep::gaps, set.measured)) {
+        StepOfView step(report, RefineStep::gaps);
+        const std::int64_t closed = closeDepthGaps(stored.depth, picture);
+        step.changed(closed);
+        if (closed > 0)
+            job.note(
+                fmt::format("view '{}': {} pixels without depth ({:.2g} %) get that of the surface "
+                            "whose colours lead there",
+                            set.name, closed, share(closed)));
+    }
+    if (does(RefineStep::align, set.measured)) {
+        StepOfView step(report, RefineStep::align);
+        const std::int64_t moved = alignDepthEdges(stored.depth, picture);
+        step.changed(moved);
+        if (moved > 0)
+            job.note(
+                fmt::format("view '{}': {} pixels ({:.2g} %) are taken to the surface in front, "
+                            "whose colour they have",
+                            set.name, moved, share(moved)));
+    }
+    return {};
 }
 
 }  // namespace
@@ -385,17 +459,17 @@ Distances normalisedDisparity(double nearest, double farthest, bool zeroIsNone) 
 }
 
 Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSetOptions& options,
-                                               Job& job) {
+                                               RefineReport& report, Job& job) {
     STX_CHECK(job.checkCancelled());
     STX_TRY(StoredView stored, readImages(set, options, job));
     NoDepth noDepth = NoDepth::empty;
     if (set.depthCamera)
         STX_CHECK(within(fmt::format("'{}'", set.depth.name),
-                         takeToPicture(set, options, stored, noDepth, job)));
+                         takeToPicture(set, options, stored, noDepth, report, job)));
     const int tw = stored.texture.width(), th = stored.texture.height();
     const int dw = stored.depth.width(), dh = stored.depth.height();
     STX_TRY(Camera camera, cameraOfSize(set, tw, th));
-    const bool raise = options.raiseDepth && dw < tw && dh < th;
+    const bool raise = options.refine.atImport(RefineStep::raise, true) && dw < tw && dh < th;
     if (tw != dw || th != dh) {
         if (!sameShape(tw, th, dw, dh))
             return fail(ErrorCode::invalidInput,
@@ -417,27 +491,10 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     if (!set.depthCamera)
         STX_CHECK(within(fmt::format("'{}'", set.depth.name),
                          toDistances(set, options, raise ? camera.resized(dw, dh) : camera, stored,
-                                     noDepth, job)));
+                                     noDepth, report, job)));
     STX_CHECK(within(fmt::format("'{}'", set.depth.name), needDepth(stored.depth)));
 
-    const bool drop = options.mixedPixels == MixedPixels::drop ||
-                      (options.mixedPixels == MixedPixels::automatic && set.sensor);
-    if (drop) {
-        const std::int64_t dropped = dropMixedPixels(stored.depth);
-        if (dropped > 0)
-            job.note(fmt::format("view '{}': {} mixed pixels at depth edges are dropped ({:.2g} %)",
-                                 set.name, dropped,
-                                 100.0 * static_cast<double>(dropped) / stored.depth.count()));
-        if (!anyPoint(stored.depth))
-            return failAt(
-                fmt::format("'{}'", set.depth.name), ErrorCode::invalidInput,
-                "all of its pixels look like noise at depth edges; keep them, if they are "
-                "not");
-    }
-
-    if (raise) stored.depth = raiseDepth(stored.depth, stored.texture);
-    closeGaps(set, options, stored, job);
-    align(set, options, stored, job);
+    STX_CHECK(repair(set, options, stored, report, job));
 
     std::vector<ReferenceView> views;
     if (set.panorama) {

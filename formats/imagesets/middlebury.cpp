@@ -11,7 +11,7 @@
 #include "formats/imagesets/pictures.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "lib/base/whole_number.hpp"
-#include "lib/registration/disparity_shift.hpp"
+#include "lib/refine/shift.hpp"
 
 namespace stx::imagesets {
 namespace {

@@ -5,7 +5,6 @@
 #include "formats/imagesets/lens.hpp"
 #include "formats/imagesets/panorama.hpp"
 #include "lib/base/image.hpp"
-#include "lib/base/job.hpp"
 #include "lib/model/texture.hpp"
 
 /// Pictures with depth on another grid. Colour is interpolated (Catmull-Rom, or the mean of the
@@ -20,14 +19,6 @@ using TextureAndDepth = std::pair<Texture, Image<float>>;
 /// The picture that an ideal pinhole would have taken: `camera` without the lens.
 [[nodiscard]] TextureAndDepth undistort(const Texture& texture, const Image<float>& depth,
                                         const Camera& camera, const Lens& lens);
-
-/// The depth that one camera took, as another one beside it sees it: each pixel is the little face
-/// that it covers of its surface, the nearest face wins. Nothing lies between two surfaces; what
-/// the first camera did not see stays kNoDepth. `from` has the depth's size; `lens` is that of
-/// `to`. Errors: the job is cancelled.
-[[nodiscard]] Result<Image<float>> depthSeenBy(const Camera& to, const Lens& lens,
-                                               const Image<float>& depth, const Camera& from,
-                                               Job& job);
 
 /// A cube face of a panorama whose depth is ray length; the face's depth is planar. `pose` is the
 /// panorama's camera.

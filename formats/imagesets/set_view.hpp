@@ -111,10 +111,11 @@ struct SetDescription {
 };
 
 /// Reads the images of one view and does what is common to all kinds: sizes, lens, mixed pixels,
-/// coverage, planes. A panorama gives its cube faces, others one view.
+/// coverage, planes. A panorama gives its cube faces, others one view. `report` gets what the steps
+/// of refining did.
 [[nodiscard]] Result<std::vector<ReferenceView>> loadSetView(const SetView& set,
                                                              const ImageSetOptions& options,
-                                                             Job& job);
+                                                             RefineReport& report, Job& job);
 
 /// Distances that are floats in scene units: NaN, 0 and negative values (not known), infinity and
 /// huge values (1e9 and more: nothing is there) are none.

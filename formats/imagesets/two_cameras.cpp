@@ -44,7 +44,8 @@ Result<std::optional<DepthCamera>> depthCameraOf(const ImageSetOptions& options,
                                                  const DepthCamera& known, bool byDefault,
                                                  const std::string& where, Job& job) {
     const auto& k = options.depthIntrinsics;
-    if (options.depthToColour == "none") {
+    if (options.depthToColour == "none" ||
+        options.refine.of(RefineStep::reproject) == RefineSwitch::off) {
         if (k)
             return failAt(where, ErrorCode::usage,
                           "--depth-to-colour none says that the depth lies on the pixels of its "

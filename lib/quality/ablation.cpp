@@ -15,19 +15,52 @@ constexpr int kViews = 16, kSide = 512;
 /// Views of a bundle that are left out, at most, and the fewest that stay for each of them.
 constexpr std::size_t kMostTruths = 4, kFewestLeft = 2;
 
-Result<AblationCell> measured(const AblationSet& set, const RenderSettings& settings, int repeats,
-                              Job& job) {
+Result<AblationCell> measured(const Bundle& bundle, const ViewQuality& truth,
+                              const RenderSettings& settings, int repeats, Job& job) {
     AblationCell cell{0, std::numeric_limits<double>::infinity()};
     for (int i = 0; i < repeats; ++i) {
         Job quiet;
         quiet.workFor(job);
         const double start = processMilliseconds();
-        STX_TRY(const auto renderer, makeRenderer(Backend::cpu, set.bundle, settings, -1, quiet));
-        STX_TRY(const auto psnr, set.truth.measure(*renderer, job));
+        STX_TRY(const auto renderer, makeRenderer(Backend::cpu, bundle, settings, -1, quiet));
+        STX_TRY(const auto psnr, truth.measure(*renderer, job));
         cell.psnr = psnr.all;
         cell.milliseconds = std::min(cell.milliseconds, processMilliseconds() - start);
     }
     return cell;
+}
+
+/// Takes the views of a bundle out of it that are the truth: the middle one of each of `count`
+/// parts.
+std::vector<ReferenceView> takeTruths(Bundle& bundle) {
+    const std::size_t views = bundle.views.size();
+    const std::size_t count = std::min(kMostTruths, views / (kFewestLeft + 1));
+    std::vector<ReferenceView> truths, left;
+    for (std::size_t i = 0; i < views; ++i) {
+        const std::size_t part = i * count / views;
+        const std::size_t middle = (part * views + views / 2) / std::max<std::size_t>(count, 1);
+        (count > 0 && i == middle ? truths : left).push_back(std::move(bundle.views[i]));
+    }
+    bundle.views = std::move(left);
+    return truths;
+}
+
+/// A row of the sets read without a step of their import; sets whose import did not do it are as
+/// in `whole`.
+Result<AblationRow> withoutImportStep(const RefineStepInfo& step,
+                                      const std::vector<AblationSet>& sets,
+                                      const AblationRow& whole, const RenderSettings& settings,
+                                      int repeats, Job& job) {
+    AblationRow row{std::string(step.name), whole.cells};
+    for (std::size_t i = 0; i < sets.size(); ++i) {
+        if (std::ranges::find(sets[i].atImport, step.step) == sets[i].atImport.end()) continue;
+        Job quiet;
+        quiet.workFor(job);
+        STX_TRY(Bundle bundle, sets[i].importWithout(step.step, quiet));
+        (void)takeTruths(bundle);
+        STX_TRY(row.cells[i], measured(bundle, sets[i].truth, settings, repeats, job));
+    }
+    return row;
 }
 
 }  // namespace
@@ -46,23 +79,14 @@ Result<AblationSet> AblationSet::of(const Mesh& mesh, Job& job) {
 
 Result<AblationSet> AblationSet::of(Bundle bundle) {
     const std::size_t views = bundle.views.size();
-    const std::size_t count = std::min(kMostTruths, views / (kFewestLeft + 1));
-    if (count == 0)
+    if (views < kFewestLeft + 1)
         return fail(ErrorCode::usage,
                     "it has {} views; one of three is left out to compare with, so that at least "
                     "three are needed",
                     views);
     AblationSet set;
-    std::vector<ReferenceView> truths, left;
-    for (std::size_t i = 0; i < views; ++i) {
-        // The middle one of each of `count` parts.
-        const std::size_t part = i * count / views;
-        const std::size_t middle = (part * views + views / 2) / count;
-        (i == middle ? truths : left).push_back(std::move(bundle.views[i]));
-    }
-    set.truth = ViewQuality::of(truths);
+    set.truth = ViewQuality::of(takeTruths(bundle));
     set.bundle = std::move(bundle);
-    set.bundle.views = std::move(left);
     return set;
 }
 
@@ -87,11 +111,20 @@ Result<std::vector<AblationRow>> ablate(const std::vector<AblationSet>& sets,
     for (std::size_t i = 0; i < all.size(); ++i) {
         rows.push_back({all[i].first, {}});
         for (const AblationSet& set : sets) {
-            STX_TRY(const auto cell, measured(set, all[i].second, repeats, job));
+            STX_TRY(const auto cell, measured(set.bundle, set.truth, all[i].second, repeats, job));
             rows.back().cells.push_back(cell);
         }
         job.progress(static_cast<std::int64_t>(i + 1), static_cast<std::int64_t>(all.size()),
                      "leaving out stages");
+        if (i > 0) continue;
+        for (const RefineStepInfo& step : refineSteps()) {
+            if (std::ranges::none_of(sets, [&](const AblationSet& set) {
+                    return std::ranges::find(set.atImport, step.step) != set.atImport.end();
+                }))
+                continue;
+            STX_TRY(auto row, withoutImportStep(step, sets, rows[0], settings, repeats, job));
+            rows.push_back(std::move(row));
+        }
     }
     return rows;
 }

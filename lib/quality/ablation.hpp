@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,10 @@ struct AblationSet {
     std::string name;
     Bundle bundle;
     ViewQuality truth;
+    /// Of an image set: the steps of refining that its import did, and the set read again without
+    /// one of them, with all its views.
+    std::vector<RefineStep> atImport;
+    std::function<Result<Bundle>(RefineStep step, Job& job)> importWithout;
 
     /// Sixteen views of 512x512 pixels on a sphere, and the mesh itself from six sides. Errors:
     /// those of captureBundle() and of rendering.
@@ -27,14 +32,15 @@ struct AblationSet {
 
 struct AblationCell {
     double psnr = 0;          ///< RGB, dB, of all pictures of a set together
-    double milliseconds = 0;  ///< of processors: refining, preparing and drawing
+    double milliseconds = 0;  ///< of processors: refining, preparing and drawing, not the import
 };
 struct AblationRow {
     std::string stage;                ///< that is left out; empty: none
     std::vector<AblationCell> cells;  ///< by set
 };
 
-/// Draws the pictures of all sets with all stages (the first row) and without each stage of a mode.
+/// Draws the pictures of all sets with all stages (the first row), without each step of refining
+/// that is done, at the import of a set, too, and without each stage of a mode.
 /// The fastest of `repeats` times is told. On the processor. Errors: those of rendering, cancelled.
 [[nodiscard]] Result<std::vector<AblationRow>> ablate(const std::vector<AblationSet>& sets,
                                                       const RenderSettings& settings, int repeats,

@@ -44,10 +44,4 @@ struct ShownSurface {
 [[nodiscard]] std::vector<std::size_t> nearViews(std::span<const NoisyView> views,
                                                  std::size_t number, std::size_t most);
 
-/// Moves the points of each view along their rays to where the views around it show the same
-/// surface: the mean of all that agree within their noise, each weighted by one over the variance
-/// that it has along the ray. Surfaces seen from behind count only where a point lies on the wrong
-/// side of them. What is left of the noise becomes less by that. The same on any number of threads.
-void agreeOnDepth(std::span<NoisyView> views);
-
 }  // namespace stx

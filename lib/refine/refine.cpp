@@ -5,48 +5,94 @@
 
 #include <fmt/format.h>
 
+#include "lib/base/cpu_clock.hpp"
+#include "lib/refine/exposure.hpp"
+#include "lib/refine/poses.hpp"
 #include "lib/refine/refine_depth.hpp"
 
 namespace stx {
 namespace {
 
-constexpr std::array<RefineStepInfo, kRefineSteps> kSteps{{
-    {RefineStep::pinholes, "pinholes",
-     "single pixels that a sensor missed get the depth of the surface around them", ""},
-    {RefineStep::noise, "noise", "noisy depth becomes that of the planes that fit it",
-     "Goldenshluger & Nemirovski 1997"},
-    {RefineStep::edges, "edges",
-     "surfaces lose the pixels by which they reach over what is behind them", ""},
-    {RefineStep::silhouettes, "silhouettes",
-     "noisy points that other views see past move to where the fewest do", "Laurentini 1994"},
-    {RefineStep::agree, "agree",
-     "noisy points move to the mean of the views that show the same surface", ""},
-    {RefineStep::colours, "colours", "noisy points move to where views show the same colours",
-     "Lucas & Kanade 1981"},
-    {RefineStep::strays, "strays",
-     "noisy points with too few neighbours on their surface are not known (splat mode only)", ""},
-}};
+using enum RefineStep;
+using enum RefineAuto;
 
-/// Of names with commas between them.
-Result<std::vector<RefineStep>> stepsNamed(std::string_view text) {
-    std::vector<RefineStep> steps;
-    for (std::size_t at = 0; at <= text.size();) {
-        const std::size_t end = std::min(text.find(',', at), text.size());
-        const std::string_view name = text.substr(at, end - at);
-        const auto step = std::find_if(kSteps.begin(), kSteps.end(),
-                                       [&](const RefineStepInfo& s) { return s.name == name; });
-        if (step == kSteps.end()) {
-            std::string names;
-            for (const RefineStepInfo& s : kSteps)
-                names += (names.empty() ? "" : ", ") + std::string(s.name);
-            return fail(ErrorCode::usage,
-                        "there is no step '{}' of refining; it is auto, off or some of: {}", name,
-                        names);
-        }
-        steps.push_back(step->step);
+constexpr auto kImport = RefineWhen::import, kRefine = RefineWhen::refine, kBoth = RefineWhen::both;
+constexpr const char* kFound = "where it is found";
+
+// clang-format off
+constexpr std::array<RefineStepInfo, kRefineSteps> kSteps{{
+    {steps, "steps", kImport, known, "8-bit depth",
+     "stairs of depth in coarse codes are smoothed within half a step", ""},
+    {shift, "shift", kImport, known, "Middlebury 2006",
+     "disparities that were cut off instead of rounded move to where other pictures of the set show them", ""},
+    {reproject, "reproject", kImport, known, "7-Scenes; depth cameras that are given",
+     "depth that a camera of its own took is seen from the colour camera", ""},
+    {mixed, "mixed", kBoth, known, "sensors and reconstructions (TUM, 7-Scenes, COLMAP)",
+     "pixels that hang between two surfaces are not known", ""},
+    {raise, "raise", kImport, known, "depth smaller than its picture",
+     "depth gets the size of its picture, along the picture's edges", ""},
+    {gaps, "gaps", kBoth, known, "older Middlebury sets",
+     "pixels without depth get that of the surface whose colours lead there", ""},
+    {align, "align", kBoth, known, "older Middlebury sets",
+     "edges of depth move to where the picture has them", ""},
+    {poses, "poses", kBoth, never, "never",
+     "cameras move so that overlapping views agree in depth and colour", "Newcombe et al. 2011"},
+    {exposure, "exposure", kRefine, found, kFound,
+     "colours of cameras that expose for themselves are matched", ""},
+    {pinholes, "pinholes", kRefine, found, kFound,
+     "single pixels that a sensor missed get the depth of the surface around them", ""},
+    {noise, "noise", kRefine, found, kFound,
+     "noisy depth becomes that of the planes that fit it", "Goldenshluger & Nemirovski 1997"},
+    {edges, "edges", kRefine, found, kFound,
+     "surfaces lose the pixels by which they reach over what is behind them", ""},
+    {silhouettes, "silhouettes", kRefine, found, kFound,
+     "noisy points that other views see past move to where the fewest do", "Laurentini 1994"},
+    {agree, "agree", kRefine, found, kFound,
+     "noisy points move to the mean of the views that show the same surface", ""},
+    {colours, "colours", kRefine, found, kFound,
+     "noisy points move to where views show the same colours", "Lucas & Kanade 1981"},
+    {strays, "strays", kRefine, splats, "in splat mode",
+     "noisy points with too few neighbours on their surface are not known", ""},
+}};
+// clang-format on
+
+Result<RefineStep> stepNamed(std::string_view name) {
+    const auto step = std::find_if(kSteps.begin(), kSteps.end(),
+                                   [&](const RefineStepInfo& s) { return s.name == name; });
+    if (step != kSteps.end()) return step->step;
+    std::string names;
+    for (const RefineStepInfo& s : kSteps)
+        names += (names.empty() ? "" : ", ") + std::string(s.name);
+    return fail(ErrorCode::usage,
+                "there is no step '{}' of refining; it is auto, off or some of: {}", name, names);
+}
+
+/// Whether a list of names has one of a step.
+bool hasStep(std::string_view names, std::string_view name) {
+    for (std::size_t at = 0; at <= names.size();) {
+        const std::size_t end = std::min(names.find(',', at), names.size());
+        if (names.substr(at, end - at) == name) return true;
         at = end + 1;
     }
-    return steps;
+    return false;
+}
+
+/// Matches the colours of some views of a bundle.
+void matchExposure(const std::vector<ReferenceView*>& views, RefineStepReport& report) {
+    if (views.size() < 2) return;
+    const double start = processMilliseconds();
+    std::vector<Camera> cameras;
+    for (const ReferenceView* view : views) cameras.push_back(view->camera);
+    const auto maps = exposureMaps(cameras, [&](std::size_t k, int, int, int, int) {
+        return PixelPart{&views[k]->texture, &views[k]->depth, 0, 1, views[k]->camera.width};
+    });
+    for (std::size_t k = 0; k < views.size(); ++k) {
+        if (maps[k].changesNothing()) continue;
+        ReferenceView& view = *views[k];
+        ++report.views;
+        applyMap(maps[k], 0, 0, view.camera.width, view.camera.height, view.texture, report);
+    }
+    report.milliseconds += processMilliseconds() - start;
 }
 
 }  // namespace
@@ -55,52 +101,95 @@ const std::array<RefineStepInfo, kRefineSteps>& refineSteps() {
     return kSteps;
 }
 
+const RefineStepInfo& infoOf(RefineStep step) {
+    return kSteps[static_cast<std::size_t>(step)];
+}
+
+bool RefineSettings::on(RefineStep step) const {
+    const RefineStepInfo& info = infoOf(step);
+    if (info.when == RefineWhen::import) return false;
+    if (of(step) != RefineSwitch::automatic) return of(step) == RefineSwitch::on;
+    return info.automatic == found || (info.automatic == RefineAuto::splats && splats_);
+}
+
+bool RefineSettings::any() const {
+    return std::any_of(kSteps.begin(), kSteps.end(), [&](const auto& s) { return on(s.step); });
+}
+
+RefineSettings RefineSettings::asked() const {
+    RefineSettings settings = *this;
+    for (RefineSwitch& to : settings.switches_)
+        if (to == RefineSwitch::automatic) to = RefineSwitch::off;
+    return settings;
+}
+
+RefineSettings RefineSettings::afterImport() const {
+    RefineSettings settings = *this;
+    for (const RefineStepInfo& info : kSteps)
+        if (info.when == RefineWhen::both) settings.set(info.step, false);
+    return settings;
+}
+
+RefineSettings RefineSettings::after(const Refined& had) const {
+    if (had.steps.empty()) return *this;
+    const bool measured = std::any_of(kSteps.begin(), kSteps.end(), [&](const auto& info) {
+        return info.automatic == found && hasStep(had.steps, info.name);
+    });
+    RefineSettings settings = *this;
+    for (const RefineStepInfo& info : kSteps)
+        if (info.automatic == found ? measured : hasStep(had.steps, info.name))
+            settings.set(info.step, false);
+    return settings;
+}
+
 RefineSettings RefineSettings::none() {
     RefineSettings settings;
-    settings.off_.set();
-    settings.automatic_ = false;
+    settings.switches_.fill(RefineSwitch::off);
+    settings.set(reproject, RefineSwitch::automatic);
     return settings;
 }
 
 RefineSettings RefineSettings::all() {
-    RefineSettings settings;
-    settings.off_.reset();
-    settings.automatic_ = false;
+    RefineSettings settings = none();
+    for (const RefineStepInfo& info : kSteps)
+        if (info.automatic == found || info.automatic == RefineAuto::splats)
+            settings.set(info.step, true);
     return settings;
 }
 
 Result<RefineSettings> RefineSettings::from(std::string_view text) {
+    const bool more = text.starts_with("auto,");
     if (text == "auto") return RefineSettings();
     if (text == "off") return none();
-    RefineSettings settings = none();
-    STX_TRY(const auto steps, stepsNamed(text));
-    for (const RefineStep step : steps) settings.set(step, true);
+    RefineSettings settings = more ? RefineSettings() : none();
+    for (std::size_t at = more ? 5 : 0; at <= text.size();) {
+        const std::size_t end = std::min(text.find(',', at), text.size());
+        std::string_view name = text.substr(at, end - at);
+        const bool off = more && name.starts_with('-');
+        if (off) name.remove_prefix(1);
+        STX_TRY(const RefineStep step, stepNamed(name));
+        settings.set(step, !off);
+        at = end + 1;
+    }
     return settings;
 }
 
-Result<RefineSettings> RefineSettings::without(std::string_view text) {
-    RefineSettings settings;
-    STX_TRY(const auto steps, stepsNamed(text));
-    for (const RefineStep step : steps) settings.set(step, false);
-    return settings;
+void RefineStepReport::add(const RefineStepReport& other) {
+    const auto moves =
+        meanMove * static_cast<double>(moved) + other.meanMove * static_cast<double>(other.moved);
+    views += other.views;
+    pixels += other.pixels;
+    moved += other.moved;
+    milliseconds += other.milliseconds;
+    meanMove = moved > 0 ? moves / static_cast<double>(moved) : 0;
 }
 
 bool RefineReport::changed() const {
-    return std::any_of(steps.begin(), steps.end(), [](const auto& s) { return s.pixels > 0; });
+    return std::any_of(steps.begin(), steps.end(), [](const auto& s) { return s.views > 0; });
 }
 
 void RefineReport::add(const RefineReport& other) {
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-        RefineStepReport& s = steps[i];
-        const RefineStepReport& o = other.steps[i];
-        const auto moves =
-            s.meanMove * static_cast<double>(s.moved) + o.meanMove * static_cast<double>(o.moved);
-        s.views += o.views;
-        s.pixels += o.pixels;
-        s.moved += o.moved;
-        s.milliseconds += o.milliseconds;
-        s.meanMove = s.moved > 0 ? moves / static_cast<double>(s.moved) : 0;
-    }
+    for (std::size_t i = 0; i < steps.size(); ++i) steps[i].add(other.steps[i]);
     noise = std::max(noise, other.noise);
     ownColour = std::min(ownColour, other.ownColour);
 }
@@ -108,51 +197,63 @@ void RefineReport::add(const RefineReport& other) {
 std::string RefineReport::names() const {
     std::string out;
     for (const RefineStepInfo& info : kSteps)
-        if (of(info.step).pixels > 0) out += (out.empty() ? "" : ",") + std::string(info.name);
+        if (of(info.step).views > 0) out += (out.empty() ? "" : ",") + std::string(info.name);
     return out;
 }
 
+void RefineReport::record(Refined& view) const {
+    if (!changed()) return;
+    view.steps += (view.steps.empty() ? "" : ",") + names();
+}
+
 std::string RefineReport::note() const {
-    return fmt::format("depth was refined ({}); --refine off leaves it as it is", names());
+    return fmt::format("views were refined ({}); --refine off leaves them as they are", names());
 }
 
 std::string RefineReport::text() const {
     std::string out;
     for (const RefineStepInfo& info : kSteps) {
         const RefineStepReport& s = of(info.step);
-        if (s.pixels == 0) continue;
-        out += fmt::format("{}{}: {} pixels of {} view{}", out.empty() ? "" : "; ", info.name,
-                           s.pixels, s.views, s.views == 1 ? "" : "s");
-        if (s.meanMove > 0) out += fmt::format(", moved by {:.2f} % on average", 100 * s.meanMove);
+        if (s.views == 0) continue;
+        out += fmt::format("{}{}: ", out.empty() ? "" : "; ", info.name);
+        if (s.pixels > 0) out += fmt::format("{} pixels of ", s.pixels);
+        out += fmt::format("{} view{}", s.views, s.views == 1 ? "" : "s");
+        if (s.meanMove > 0)
+            out += fmt::format(", {} by {:.2f} % on average",
+                               info.step == exposure ? "changed" : "moved", 100 * s.meanMove);
     }
     return out;
 }
 
-RefineSettings RefineSettings::after(const Refined& had) const {
-    if (had.steps.empty()) return *this;
-    RefineSettings settings = none();
-    settings.set(RefineStep::strays,
-                 on(RefineStep::strays) && had.steps.find("strays") == std::string::npos);
-    return settings;
-}
-
 Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job& job) {
     STX_CHECK(bundle.check());
-    RefineReport report;
+    RefineReport report, ofAll;
+    RefineSettings once = settings;
+    for (const ReferenceView& view : bundle.views) once = once.after(view.refined);
+    if (once.on(poses)) {
+        STX_TRY(ofAll.of(poses), alignPoses(bundle, job));
+    }
+    report.add(ofAll);
     // What is behind everything is of other times: it says nothing of what is in front.
     for (const bool background : {false, true}) {
         std::vector<ReferenceView*> part;
-        std::vector<RefineView> views;
-        for (ReferenceView& view : bundle.views) {
-            if (view.background != background) continue;
-            part.push_back(&view);
-            views.push_back({&view, &view.texture, &view.depth});
-        }
+        for (ReferenceView& view : bundle.views)
+            if (view.background == background) part.push_back(&view);
+        if (part.empty()) continue;
         STX_CHECK(job.checkCancelled());
+        RefineSettings left = settings;
+        for (const ReferenceView* view : part) left = left.after(view->refined);
         RefineReport ofPart;
-        auto refined = refineDepth(views, settings, ofPart);
+        // The light of what is behind is that of its cameras in front: when it is drawn.
+        if (left.on(exposure) && (!background || part.size() == bundle.views.size()))
+            matchExposure(part, ofPart.of(exposure));
+        std::vector<RefineView> views;
+        for (ReferenceView* view : part) views.push_back({view, &view->texture, &view->depth});
+        auto refined = refineDepth(views, left, ofPart);
         report.add(ofPart);
+        ofPart.add(ofAll);
         for (std::size_t i = 0; i < part.size(); ++i) {
+            ofPart.record(refined[i].refined);
             refined[i].giveTo(*part[i]);
             if (refined[i].depth) part[i]->depth = std::move(*refined[i].depth);
         }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -11,61 +10,115 @@
 #include "lib/base/result.hpp"
 #include "lib/model/bundle.hpp"
 
-/// Captured depth repaired, before anything is drawn from it.
+/// Captured depth and colours repaired, before anything is drawn from them.
 
 namespace stx {
 
-/// The steps, in the order in which they are done. Each finds out by itself whether there is
-/// something to do: exact depth stays as it is, to the bit.
-enum class RefineStep { pinholes, noise, edges, silhouettes, agree, colours, strays };
+/// The steps, in the order in which they are done.
+enum class RefineStep {
+    steps,
+    shift,
+    reproject,
+    mixed,
+    raise,
+    gaps,
+    align,
+    poses,
+    exposure,
+    pinholes,
+    noise,
+    edges,
+    silhouettes,
+    agree,
+    colours,
+    strays
+};
+inline constexpr std::size_t kRefineSteps = 16;
+
+/// When a step can be done.
+enum class RefineWhen {
+    import,  ///< it needs what only an import knows: depth as it was stored, the depth's camera
+    refine,  ///< whenever there are views
+    both,    ///< at an import, as the set needs it; of views that are there already, when asked for
+};
+
+/// What a step does unless it is asked for or left out.
+enum class RefineAuto {
+    found,   ///< it measures whether there is something to do: exact views stay, to the bit
+    known,   ///< it is done of sets that are known to need it
+    splats,  ///< of what is drawn as splats
+    never,
+};
 
 struct RefineStepInfo {
     RefineStep step;
-    std::string_view name;      ///< as in --refine
+    std::string_view name;  ///< as in --refine
+    RefineWhen when;
+    RefineAuto automatic;
+    std::string_view usual;     ///< the same in words: "where it is found", "8-bit depth"
     std::string_view sentence;  ///< what it does
     std::string_view source;    ///< of the method; empty: our own
 };
-inline constexpr std::size_t kRefineSteps = 7;
 /// All steps, in order.
 [[nodiscard]] const std::array<RefineStepInfo, kRefineSteps>& refineSteps();
+[[nodiscard]] const RefineStepInfo& infoOf(RefineStep step);
 
-/// Which steps are done: unless said otherwise all but `strays`, which forSplats() has, too.
+enum class RefineSwitch : std::uint8_t { automatic, on, off };
+
+/// Which steps are done: unless said otherwise each as its RefineAuto says.
 class RefineSettings {
   public:
-    /// The same for what is drawn as splats; of settings that were asked for nothing changes.
+    /// The same for what is drawn as splats.
     [[nodiscard]] RefineSettings forSplats() const {
         RefineSettings settings = *this;
         settings.splats_ = true;
         return settings;
     }
-    [[nodiscard]] bool on(RefineStep step) const {
-        return !off_[static_cast<std::size_t>(step)] &&
-               (step != RefineStep::strays || splats_ || !automatic_);
+    [[nodiscard]] RefineSwitch of(RefineStep step) const {
+        return switches_[static_cast<std::size_t>(step)];
     }
-    [[nodiscard]] bool any() const { return !off_.all(); }
-    void set(RefineStep step, bool on) { off_[static_cast<std::size_t>(step)] = !on; }
-    /// What is left to do for views that were refined before: nothing but `strays`.
+    void set(RefineStep step, RefineSwitch to) { switches_[static_cast<std::size_t>(step)] = to; }
+    void set(RefineStep step, bool on) { set(step, on ? RefineSwitch::on : RefineSwitch::off); }
+
+    /// Whether a step is done of views that are there; never of RefineWhen::import.
+    [[nodiscard]] bool on(RefineStep step) const;
+    /// Some step is.
+    [[nodiscard]] bool any() const;
+    /// Whether a step is done at an import; `known`: its set is known to need it.
+    [[nodiscard]] bool atImport(RefineStep step, bool known) const {
+        return of(step) == RefineSwitch::on || (of(step) == RefineSwitch::automatic && known);
+    }
+    /// Only the steps that were asked for.
+    [[nodiscard]] RefineSettings asked() const;
+    /// What is left to do of views that these settings were imported with.
+    [[nodiscard]] RefineSettings afterImport() const;
+    /// What is left to do for views that were refined before: the steps that measure by themselves
+    /// are done together, once; any other once, too.
     [[nodiscard]] RefineSettings after(const Refined& had) const;
+
     [[nodiscard]] static RefineSettings none();
+    /// All steps that measure by themselves, and `strays`.
     [[nodiscard]] static RefineSettings all();
-    /// Of "auto", "off" (none) or names of steps with commas between them. Errors (usage): a
-    /// name that is none, with the list of those that are.
+    /// Of "auto", "off" (none) or names of steps with commas between them: only these; after
+    /// "auto,": these, too, and none that has a minus before it. `reproject` is left out by its
+    /// minus alone: depth would lie on wrong pixels without it. Errors (usage): a name that is
+    /// none, with the list of those that are.
     [[nodiscard]] static Result<RefineSettings> from(std::string_view text);
-    /// The steps that are done unless said otherwise, but for some. Errors (usage) as from().
-    [[nodiscard]] static Result<RefineSettings> without(std::string_view text);
 
   private:
-    std::bitset<kRefineSteps> off_;
-    bool automatic_ = true, splats_ = false;
+    std::array<RefineSwitch, kRefineSteps> switches_{};
+    bool splats_ = false;
 };
 
 /// What a step found and did.
 struct RefineStepReport {
     int views = 0;            ///< that it changed
     std::int64_t pixels = 0;  ///< of those; of a step that is done twice, of both times
-    std::int64_t moved = 0;   ///< pixels that had a depth before and after
-    double meanMove = 0;      ///< of those, share of the distance
+    std::int64_t moved = 0;   ///< pixels that had a depth before and after, or a colour
+    double meanMove = 0;      ///< of those, share of the distance; of colours: of white
     double milliseconds = 0;  ///< of all processors together, measuring included
+
+    void add(const RefineStepReport& other);
 };
 struct RefineReport {
     /// By RefineStep.
@@ -73,6 +126,9 @@ struct RefineReport {
     double noise = 0;      ///< largest of all views, share of the distance (one standard deviation)
     double ownColour = 1;  ///< see colourAtEdges()
 
+    [[nodiscard]] RefineStepReport& of(RefineStep step) {
+        return steps[static_cast<std::size_t>(step)];
+    }
     [[nodiscard]] const RefineStepReport& of(RefineStep step) const {
         return steps[static_cast<std::size_t>(step)];
     }
@@ -81,15 +137,17 @@ struct RefineReport {
     void add(const RefineReport& other);
     /// The steps that changed something, as Refined::steps has them: "noise,agree".
     [[nodiscard]] std::string names() const;
+    /// Adds them to what a view had before.
+    void record(Refined& view) const;
     /// For people who did not ask for it: which steps, and how to leave them out.
     [[nodiscard]] std::string note() const;
     /// A clause for each: "noise: 9120 pixels of 4 views, moved by 0.31 % on average; agree: ...".
     [[nodiscard]] std::string text() const;
 };
 
-/// Refines the depth of a bundle of one moment: exact depth stays as it is, to the bit, and so does
-/// what was refined before (ViewHeader::refined). The same on any number of threads. Errors: a
-/// bundle that fails check(), cancelled.
+/// Refines a bundle of one moment: exact views stay as they are, to the bit, and so does what was
+/// refined before (ViewHeader::refined). Steps of RefineWhen::import are passed over. The same on
+/// any number of threads. Errors: a bundle that fails check(), cancelled.
 [[nodiscard]] Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job& job);
 
 }  // namespace stx

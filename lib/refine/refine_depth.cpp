@@ -8,12 +8,16 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/depth_code.hpp"
 #include "lib/geometry/pixel_space.hpp"
-#include "lib/refine/colour_depth.hpp"
-#include "lib/refine/depth_noise.hpp"
-#include "lib/refine/fat_edges.hpp"
-#include "lib/refine/noisy_views.hpp"
-#include "lib/refine/silhouette_points.hpp"
-#include "lib/refine/stray_points.hpp"
+#include "lib/refine/agree.hpp"
+#include "lib/refine/align.hpp"
+#include "lib/refine/colours.hpp"
+#include "lib/refine/edges.hpp"
+#include "lib/refine/gaps.hpp"
+#include "lib/refine/mixed.hpp"
+#include "lib/refine/noise.hpp"
+#include "lib/refine/pinholes.hpp"
+#include "lib/refine/silhouettes.hpp"
+#include "lib/refine/strays.hpp"
 
 namespace stx {
 namespace {
@@ -131,6 +135,36 @@ class Clock {
     double start_ = processMilliseconds();
 };
 
+/// The steps of imports where they are asked for later, which know distances and a picture.
+struct Repair {
+    RefineStep step;
+    std::int64_t (*run)(Image<float>& distances, const Texture& picture);
+};
+constexpr Repair kRepairs[] = {
+    {RefineStep::mixed, [](Image<float>& d, const Texture&) { return dropMixedPixels(d); }},
+    {RefineStep::gaps, closeDepthGaps},
+    {RefineStep::align, alignDepthEdges}};
+
+/// Does one of them; the view gets new distances, kept in `distances`. Gives what it changed.
+RefineStepReport repair(const Repair& step, RefineView& view, Image<float>& distances) {
+    RefineStepReport report;
+    Image<float> now = *view.depth;
+    report.pixels = step.run(now, *view.texture);
+    report.views = report.pixels > 0;
+    for (std::size_t i = 0; i < now.count(); ++i) {
+        const float was = view.depth->data()[i], is = now.data()[i];
+        if (was == is || !hasPoint(was) || !hasPoint(is)) continue;
+        ++report.moved;
+        report.meanMove += std::abs(static_cast<double>(is) / was - 1);
+    }
+    if (report.moved > 0) report.meanMove /= static_cast<double>(report.moved);
+    if (report.views > 0) {
+        distances = std::move(now);
+        view.depth = &distances;
+    }
+    return report;
+}
+
 /// The depth of a view after refining: pixels whose q is the same keep their very value.
 std::optional<Image<float>> depthOf(const RefineView& view, const Work& w) {
     const Work before = workOn(view);
@@ -148,7 +182,7 @@ std::optional<Image<float>> depthOf(const RefineView& view, const Work& w) {
 
 void RefinedView::giveTo(ViewHeader& view) const {
     view.refined = refined;
-    if (refined.doubt > 0) view.noDepth = NoDepth::unknown;
+    if (refined.doubt > 0 || lost) view.noDepth = NoDepth::unknown;
     if (!depth) return;
     for (const float dist : depth->pixels()) {
         if (!hasPoint(dist)) continue;
@@ -157,45 +191,58 @@ void RefinedView::giveTo(ViewHeader& view) const {
     }
 }
 
-std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
+std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
                                      const RefineSettings& wanted, RefineReport& report) {
+    std::vector<RefineView> views(given.begin(), given.end());
     RefineSettings settings = wanted;
     for (const RefineView& view : views) settings = settings.after(view.header->refined);
     const auto count = static_cast<std::int64_t>(views.size());
+    std::vector<Image<float>> repaired(views.size());
     std::vector<Work> works(views.size());
     std::vector<NoisyView> noisyViews(views.size());
     std::vector<RefinedView> out(views.size());
     std::vector<float> noise(views.size(), 0.0f);
-    const auto reportOf = [&](RefineStep step) -> RefineStepReport& {
-        return report.steps[static_cast<std::size_t>(step)];
-    };
     const auto ofEach = [&](const auto& call) {
         parallelFor(0, count, [&](std::int64_t i) { call(static_cast<std::size_t>(i)); });
     };
-    ofEach([&](std::size_t k) { works[k] = workOn(views[k]); });
+    for (const Repair& step : kRepairs) {
+        if (!settings.on(step.step)) continue;
+        const Clock clock(report.of(step.step));
+        std::vector<RefineStepReport> found(views.size());
+        ofEach([&](std::size_t k) { found[k] = repair(step, views[k], repaired[k]); });
+        for (const RefineStepReport& ofView : found) report.of(step.step).add(ofView);
+    }
+    ofEach([&](std::size_t k) {
+        works[k] = workOn(views[k]);
+        // What was taken away is not empty space.
+        for (std::size_t i = 0; views[k].depth != given[k].depth && i < works[k].q.count(); ++i)
+            if (hasPoint(given[k].depth->data()[i]) && !hasPoint(views[k].depth->data()[i]))
+                works[k].q.data()[i] = -1.0f;
+        out[k].lost = report.of(RefineStep::mixed).views > 0;
+    });
     {
-        const Clock clock(reportOf(RefineStep::noise));
+        const Clock clock(report.of(RefineStep::noise));
         ofEach([&](std::size_t k) { noise[k] = depthNoise(works[k].q, works[k].space.axis); });
     }
     report.noise = views.empty() ? 0.0 : *std::max_element(noise.begin(), noise.end());
     if (settings.on(RefineStep::pinholes)) {
-        const Clock clock(reportOf(RefineStep::pinholes));
+        const Clock clock(report.of(RefineStep::pinholes));
         std::vector<std::int64_t> closed(views.size());
         ofEach([&](std::size_t k) {
             closed[k] =
                 closeMissedPixels(works[k].q, works[k].covered, works[k].space.axis, noise[k]);
         });
         for (const std::int64_t pixels : closed) {
-            reportOf(RefineStep::pinholes).views += pixels > 0;
-            reportOf(RefineStep::pinholes).pixels += pixels;
+            report.of(RefineStep::pinholes).views += pixels > 0;
+            report.of(RefineStep::pinholes).pixels += pixels;
         }
     }
     bool someNoisy = false;
     for (std::size_t k = 0; k < views.size(); ++k)
         someNoisy = someNoisy || isNoisy(noise[k], works[k].space.axis);
     if (someNoisy && settings.on(RefineStep::noise)) {
-        const Clock clock(reportOf(RefineStep::noise));
-        const Changes changes(works, reportOf(RefineStep::noise));
+        const Clock clock(report.of(RefineStep::noise));
+        const Changes changes(works, report.of(RefineStep::noise));
         ofEach([&](std::size_t k) {
             NoisyView& n = noisyViews[k];
             n.left = smoothDepth(works[k].q, works[k].space.axis, noise[k], &n.surface);
@@ -208,14 +255,14 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
         noisyViews[k].q = &works[k].q;
     });
     if (settings.on(RefineStep::edges)) {
-        const Clock clock(reportOf(RefineStep::edges));
+        const Clock clock(report.of(RefineStep::edges));
         std::vector<EdgeView> edges;
         for (std::size_t k = 0; k < views.size(); ++k)
             edges.push_back(
                 {&works[k].space, views[k].texture, &works[k].q, stepOf(*views[k].header)});
         report.ownColour = colourAtEdges(edges);
         if (edgesAreFat(static_cast<float>(report.ownColour))) {
-            const Changes changes(works, reportOf(RefineStep::edges));
+            const Changes changes(works, report.of(RefineStep::edges));
             thinFatEdges(edges);
         }
     }
@@ -229,8 +276,8 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
     if (!noisy.empty()) {
         const auto step = [&](RefineStep s, const auto& call) {
             if (!settings.on(s)) return;
-            const Clock clock(reportOf(s));
-            const Changes changes(works, reportOf(s));
+            const Clock clock(report.of(s));
+            const Changes changes(works, report.of(s));
             call();
         };
         const auto silhouettes = [&] { keepInSilhouettes(noisy, kLevels); };
@@ -244,12 +291,8 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> views,
     }
     for (std::size_t k = 0; k < views.size(); ++k) out[k].refined = views[k].header->refined;
     for (std::size_t n = 0; n < noisy.size(); ++n) out[noisyOnes[n]].refined.doubt = noisy[n].left;
-    if (!report.changed()) return out;
-    ofEach([&](std::size_t k) {
-        out[k].depth = depthOf(views[k], works[k]);
-        std::string& steps = out[k].refined.steps;
-        steps += (steps.empty() ? "" : ",") + report.names();
-    });
+    if (report.changed())
+        ofEach([&](std::size_t k) { out[k].depth = depthOf(given[k], works[k]); });
     return out;
 }
 

@@ -23,7 +23,8 @@ struct RefinedView {
     /// None: as it was. Pixels that no step changed have the very same value; those without depth
     /// that have full alpha are unknown in a view with doubt.
     std::optional<Image<float>> depth;
-    Refined refined;
+    bool lost = false;  ///< points were taken away: what is there is not known
+    Refined refined;    ///< what the view had before, and its new doubt; see RefineReport::record()
 
     /// Writes into a view's header what is said there: steps, doubt, planes around the new depth.
     void giveTo(ViewHeader& view) const;

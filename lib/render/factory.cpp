@@ -125,15 +125,15 @@ Result<std::unique_ptr<Renderer>> makePlain(Backend backend, const PageSet& set,
 /// background views only is drawn as any other.
 PageSet inFront(const PageSet& set, const RenderSettings& settings, Job& job) {
     const auto matched = [&](const PageSet& views) {
-        if (!settings.does(Stage::exposure) || views.views().size() < 2) return views;
-        const StageTimer timer(settings.log.get(), "exposure", true);
-        std::size_t changed = 0;
-        PageSet alike = views.inOneLight(changed);
-        if (changed > 0)
+        RefineStepReport report;
+        PageSet alike = views.inOneLight(settings.refine, report);
+        if (settings.log && report.milliseconds > 0)
+            settings.log->add("exposure", report.milliseconds, report.pixels, true);
+        if (report.views > 0)
             job.note(
                 fmt::format("colours of {} of {} views were matched to those of the others "
                             "(gain and offset); --match-colours off leaves them as they are",
-                            changed, views.views().size()));
+                            report.views, views.views().size()));
         return alike;
     };
     const auto views = set.views();

@@ -14,7 +14,6 @@ namespace stx {
 /// RenderSettings::does() whether it is wanted. Steps of refining are beside: lib/refine/refine.hpp.
 #define STX_STAGES(STAGE) \
     STAGE(twins, both, "views that repeat another are drawn as one", "") \
-    STAGE(exposure, both, "colours of cameras that expose for themselves are matched", "") \
     STAGE(solid, surface, "what is translucent inside of the object is drawn opaque", "") \
     STAGE(creases, surface, "pixels that mix two faces give their colour to neither", "") \
     STAGE(levels, surface, "outlines run where the covered parts of pixels tell", "Youngs 1982") \

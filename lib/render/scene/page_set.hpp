@@ -109,9 +109,10 @@ class PageSet {
     /// channel, robustly; nothing below half a step of 8 bits, nothing above a factor of two).
     [[nodiscard]] PageSet inLightOf(const PageSet& other) const;
     /// The same with the colours of its views matched where they show the same surfaces, as
-    /// cameras with exposures of their own need it (see matchColours()); the very same when they
-    /// agree already. `changed`: how many views have other colours.
-    [[nodiscard]] PageSet inOneLight(std::size_t& changed) const;
+    /// cameras with exposures of their own need it (RefineStep::exposure); the very same when they
+    /// agree already, or were refined before.
+    [[nodiscard]] PageSet inOneLight(const RefineSettings& settings,
+                                     RefineStepReport& report) const;
     /// The same with the depth of its views refined, those behind it not: the very same where depth
     /// is exact. `report`, if any, tells what was found and changed.
     [[nodiscard]] PageSet refined(const RefineSettings& settings,

@@ -68,6 +68,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
     auto data = std::make_shared<Data>(*data_);
     std::vector<std::shared_ptr<Image<float>>> depths(data->pages.size());
     for (std::size_t i = 0; i < better.size(); ++i) {
+        found.record(better[i].refined);
         better[i].giveTo(data->views[i]);
         if (!better[i].depth) continue;
         for (const PageRectangle& r : rectanglesOf(i)) {

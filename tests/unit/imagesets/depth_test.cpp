@@ -64,7 +64,7 @@ TEST(Depth, FlyingPointsOfSensorsAreDroppedUnlessKept) {
     std::string notes;
     for (const auto& note : job.takeNotes()) notes += note + "\n";
     EXPECT_NE(notes.find("64 mixed pixels"), std::string::npos) << notes;
-    options.mixedPixels = MixedPixels::keep;
+    options.refine.set(RefineStep::mixed, false);
     const auto kept = readImageSet(folder.path(), options, job);
     ASSERT_TRUE(kept);
     EXPECT_EQ(kept->views[0].pointCount(), 96 * 64);
@@ -85,7 +85,7 @@ TEST(Depth, StairsOf8BitsAreSmoothedWithinHalfAStep) {
     for (const bool smooth : {false, true}) {
         ImageSetOptions options;
         options.depthBits = 32;
-        options.dequantise = smooth ? Dequantise::automatic : Dequantise::off;
+        if (!smooth) options.refine.set(RefineStep::steps, false);
         Job job;
         const auto read = readImageSet(folder.path(), options, job);
         ASSERT_TRUE(read) << read.error().text();

@@ -4,7 +4,6 @@
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/imagesets/lens.hpp"
-#include "formats/imagesets/mixed_pixels.hpp"
 #include "formats/imagesets/msr.hpp"
 #include "formats/imagesets/panorama.hpp"
 #include "formats/imagesets/rgbd.hpp"
@@ -64,7 +63,7 @@ void writeColmap(const std::filesystem::path& root, const std::vector<ReferenceV
 
 ImageSetOptions keepAll() {
     ImageSetOptions options;
-    options.mixedPixels = MixedPixels::keep;
+    options.refine.set(RefineStep::mixed, false);
     return options;
 }
 
@@ -367,15 +366,6 @@ TEST(Panorama, FacesHoldTheRayLengths) {
             for (int x = 0; x < view.camera.width; ++x)
                 ASSERT_NEAR(glm::length(view.worldPoint(x, y) - centre), 2.0, 0.004) << view.name;
     }
-}
-
-TEST(MixedPixels, GoOnlyWhenTheyHangBetweenSurfaces) {
-    Image<float> d(40, 20);
-    for (int y = 0; y < 20; ++y)
-        for (int x = 0; x < 40; ++x)
-            d.at(x, y) = x < 20 ? 1.0f : x == 20 ? 1.6f : 2.5f + 0.15f * (x - 21);
-    EXPECT_EQ(imagesets::dropMixedPixels(d), 20);
-    for (int y = 0; y < 20; ++y) EXPECT_FALSE(hasPoint(d.at(20, y)));
 }
 
 }  // namespace

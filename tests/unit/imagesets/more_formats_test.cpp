@@ -184,7 +184,7 @@ TEST(CamerasJson, DepthImageCodesComeBackAndUnlikeSizesAreResampled) {
     json(",\"nearPlane\":0.1,\"farPlane\":40");
     EXPECT_EQ(recogniseImageSet(folder.path()).value_or(""), "cameras");
     ImageSetOptions reduced;
-    reduced.raiseDepth = false;
+    reduced.refine.set(RefineStep::raise, false);
     const auto read = readSet(folder.path(), reduced);
     ASSERT_TRUE(read) << read.error().text();
     expectSame(views[0], read->views[0], [&](double) { return code.step(); });

@@ -164,7 +164,7 @@ TEST(IclNuim, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     EXPECT_EQ(view.camera.cx, 320.0);
     EXPECT_EQ(view.camera.cy, 240.0);
     ImageSetOptions refine;
-    refine.refinePoses = true;
+    refine.refine.set(RefineStep::poses, true);
     const auto refined = readImageSet(set, refine, job);
     ASSERT_TRUE(refined) << refined.error().text();
     struct Pair {
@@ -203,9 +203,8 @@ TEST(MiddleburyAloe, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     options.baseline = 160;
     options.disparityOffset = 270;
     ImageSetOptions raw = options;
-    raw.dequantise = Dequantise::off;
-    raw.alignEdges = AlignEdges::off;
-    raw.closeGaps = CloseGaps::off;
+    for (const RefineStep step : {RefineStep::steps, RefineStep::align, RefineStep::gaps})
+        raw.refine.set(step, false);
     (void)job.takeNotes();
     const auto stored = readImageSet(set, raw, job);
     ASSERT_TRUE(stored) << stored.error().text();
@@ -255,12 +254,12 @@ TEST(MiddleburyAloe, NeighboursAreDrawnBetterThanByTheNaiveWarp) {
     }
     // Whole disparities are got back by rounding, where no edge was moved and no other picture
     // shows that all are off.
-    raw.dequantise = Dequantise::automatic;
+    raw.refine.set(RefineStep::steps, RefineSwitch::automatic);
     raw.depthBits = options.depthBits = 32;
     const auto alone = partOf(set, {"disp1", "view1"});
     const auto smooth = readImageSet(alone->path(), raw, job);
     ASSERT_TRUE(smooth) << smooth.error().text();
-    raw.dequantise = Dequantise::off;
+    raw.refine.set(RefineStep::steps, false);
     const auto exact = readImageSet(set, raw, job);
     ASSERT_TRUE(exact) << exact.error().text();
     std::int64_t points = 0;

@@ -115,7 +115,7 @@ TEST(ColmapTraps, AFisheyeIsUndoneToAThousandthOfAPixel) {
         writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
         Job job;
         ImageSetOptions options;
-        options.mixedPixels = MixedPixels::keep;
+        options.refine.set(RefineStep::mixed, false);
         const auto read = readImageSet(folder.path(), options, job);
         ASSERT_TRUE(read) << read.error().text();
         const ReferenceView& v = read->views[0];
@@ -148,7 +148,7 @@ TEST(ColmapTraps, TheNoteSaysHowMuchOfAFisheyePictureIsCutAway) {
         writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
         Job job;
         ImageSetOptions options;
-        options.mixedPixels = MixedPixels::keep;
+        options.refine.set(RefineStep::mixed, false);
         const auto read = readImageSet(folder.path(), options, job);
         ASSERT_TRUE(read) << read.error().text();
         // The other way round: points of the fisheye's picture that the pinhole's does not have.
@@ -200,7 +200,7 @@ TEST(ColmapTraps, EachLensModelIsUndoneToAThousandthOfAPixel) {
         writeText(folder / "stereo/depth_maps/a.exr.geometric.bin", depth);
         Job job;
         ImageSetOptions options;
-        options.mixedPixels = MixedPixels::keep;
+        options.refine.set(RefineStep::mixed, false);
         const auto read = readImageSet(folder.path(), options, job);
         ASSERT_TRUE(read) << read.error().text();
         const auto notes = job.takeNotes();
@@ -355,7 +355,7 @@ TEST(MiddleburyTraps, BigEndianFloatsAndOlderSetsWithUnknownPixels) {
     options.focal = 90;
     options.baseline = 0.2;
     options.disparityOffset = 30;
-    options.closeGaps = CloseGaps::off;
+    options.refine.set(RefineStep::gaps, false);
     const auto pair = readSet(older.path(), options);
     ASSERT_TRUE(pair) << pair.error().text();
     ASSERT_EQ(pair->views.size(), 2u);

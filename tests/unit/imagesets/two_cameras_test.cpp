@@ -67,7 +67,7 @@ void writeDepth(const std::filesystem::path& file, const ReferenceView& view, do
 
 ImageSetOptions optionsOf(const Recording& r, const std::filesystem::path& folder) {
     ImageSetOptions options;
-    options.mixedPixels = MixedPixels::keep;
+    options.refine.set(RefineStep::mixed, false);
     const Camera &c = r.colour.camera, &d = r.depth.camera;
     const double k[4] = {c.fx, c.fy, c.cx - 0.5, c.cy - 0.5};
     std::copy(k, k + 4, options.intrinsics);

@@ -3,7 +3,10 @@
 #include "lib/refine/refine.hpp"
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "lib/render/bench/analytic_scene.hpp"
@@ -131,6 +134,106 @@ TEST(Refine, WhatViewsHaveHadIsAText) {
         EXPECT_FALSE(Refined::from(wrong)) << wrong;
 }
 
+TEST(Refine, StepsAreTheTableOfTheirPage) {
+    std::ifstream file(STX_SOURCE_DIR "/lib/refine/README.md");
+    const std::string page((std::istreambuf_iterator<char>(file)), {});
+    std::string table;
+    for (const RefineStepInfo& s : refineSteps()) {
+        EXPECT_EQ(&infoOf(s.step), &s);
+        const char* when = s.when == RefineWhen::import   ? "import"
+                           : s.when == RefineWhen::refine ? "refine"
+                                                          : "both";
+        table += fmt::format("| `{}` | {} | {} | {}{} |\n", s.name, when, s.usual, s.sentence,
+                             s.source.empty() ? "" : fmt::format(" ({})", s.source));
+    }
+    EXPECT_NE(page.find(table), std::string::npos) << table;
+}
+
+TEST(Refine, StepsOfImportsAreAskedForThere) {
+    const auto some = RefineSettings::from("gaps,steps");
+    ASSERT_TRUE(some);
+    EXPECT_TRUE(some->atImport(RefineStep::steps, false));
+    EXPECT_FALSE(some->atImport(RefineStep::mixed, true));
+    EXPECT_TRUE(some->atImport(RefineStep::reproject, true)) << "depth would lie on wrong pixels";
+    EXPECT_FALSE(some->on(RefineStep::steps)) << "of stored depth only";
+    EXPECT_TRUE(some->on(RefineStep::gaps));
+    EXPECT_FALSE(some->afterImport().any());
+    const auto changed = RefineSettings::from("auto,gaps,-noise,-reproject");
+    ASSERT_TRUE(changed);
+    EXPECT_TRUE(changed->on(RefineStep::gaps) && changed->on(RefineStep::agree));
+    EXPECT_FALSE(changed->on(RefineStep::noise) || changed->on(RefineStep::mixed));
+    EXPECT_TRUE(changed->atImport(RefineStep::mixed, true));
+    EXPECT_FALSE(changed->atImport(RefineStep::reproject, true));
+    EXPECT_TRUE(changed->asked().on(RefineStep::gaps));
+    EXPECT_FALSE(changed->asked().on(RefineStep::agree));
+}
+
+TEST(Refine, StepsThatAreAskedForDoNotStandForTheOthers) {
+    RefineSettings settings;
+    settings.set(RefineStep::mixed, true);
+    settings.set(RefineStep::poses, true);
+    const RefineSettings left = settings.after({"mixed", 0});
+    EXPECT_FALSE(left.on(RefineStep::mixed));
+    EXPECT_TRUE(left.on(RefineStep::poses) && left.on(RefineStep::noise));
+    const RefineSettings measured = settings.after({"noise", 0.001f});
+    EXPECT_TRUE(measured.on(RefineStep::mixed) && measured.on(RefineStep::poses));
+    EXPECT_FALSE(measured.on(RefineStep::noise) || measured.on(RefineStep::exposure));
+}
+
+TEST(Refine, MatchedColoursAreKeptAndNotMatchedAgain) {
+    Bundle bundle;
+    for (int i = 0; i < 6; ++i)
+        bundle.views.push_back(
+            viewOfAnalyticScene(AnalyticScene::object,
+                                analyticCamera(AnalyticScene::object, i, 6).resized(256, 256), 2));
+    noisy::changeLight(bundle);
+    RefineStepReport ofPages;
+    const PageSet pages = PageSet(bundle).inOneLight({}, ofPages);
+    Bundle better = bundle;
+    Job job;
+    const auto report = refine(better, {}, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_EQ(report->of(RefineStep::exposure).views, ofPages.views);
+    EXPECT_GT(report->of(RefineStep::exposure).pixels, 0);
+    EXPECT_GT(report->of(RefineStep::exposure).meanMove, 0.01);
+    for (std::size_t v = 0; v < bundle.views.size(); ++v) {
+        EXPECT_EQ(*better.views[v].texture.rgba8(), *pages.pages()[v].texture->rgba8()) << v;
+        EXPECT_EQ(better.views[v].refined.steps, "exposure");
+    }
+    // Whatever is seen in it later.
+    noisy::changeLight(better);
+    RefineStepReport again;
+    (void)PageSet(better).inOneLight({}, again);
+    EXPECT_EQ(again.views, 0);
+    EXPECT_FALSE(refine(better, {}, job)->changed());
+    RefineSettings without;
+    without.set(RefineStep::exposure, false);
+    const auto left = refine(bundle, without, job);
+    ASSERT_TRUE(left);
+    EXPECT_FALSE(left->changed()) << left->text();
+}
+
+TEST(Refine, PointsThatWereDroppedAreNotSeenThrough) {
+    Bundle bundle = room();
+    bundle.views.resize(1);
+    ReferenceView& view = bundle.views[0];
+    ASSERT_EQ(view.noDepth, NoDepth::empty);
+    // Hangs far before the walls, alone.
+    view.depth.at(40, 40) *= 0.5f;
+    const float beside = view.depth.at(41, 40);
+    Job job;
+    const auto only = RefineSettings::from("mixed");
+    ASSERT_TRUE(only);
+    const auto report = refine(bundle, *only, job);
+    ASSERT_TRUE(report) << report.error().text();
+    EXPECT_EQ(report->names(), "mixed");
+    EXPECT_GE(report->of(RefineStep::mixed).pixels, 1);
+    EXPECT_FALSE(hasPoint(view.depth.at(40, 40)));
+    EXPECT_EQ(view.depth.at(41, 40), beside);
+    EXPECT_EQ(view.noDepth, NoDepth::unknown);
+    EXPECT_EQ(view.refined.steps, "mixed");
+}
+
 TEST(Refine, SettingsAreNamesOfSteps) {
     const auto two = RefineSettings::from("agree,edges");
     ASSERT_TRUE(two);
@@ -140,7 +243,8 @@ TEST(Refine, SettingsAreNamesOfSteps) {
     EXPECT_FALSE(RefineSettings::from("auto")->on(RefineStep::strays));
     EXPECT_TRUE(RefineSettings::from("auto")->forSplats().on(RefineStep::strays));
     EXPECT_FALSE(RefineSettings::from("off")->forSplats().any());
-    for (const char* wrong : {"", "all", "noise,", "noise,,agree", "Noise"}) {
+    for (const char* wrong :
+         {"", "all", "noise,", "noise,,agree", "Noise", "auto,", "auto,-", "-noise", "off,noise"}) {
         const auto made = RefineSettings::from(wrong);
         ASSERT_FALSE(made) << wrong;
         EXPECT_EQ(made.error().code, ErrorCode::usage);

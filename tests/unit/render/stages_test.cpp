@@ -96,8 +96,6 @@ TEST(Stages, AreTheTableOfThePageOfRendering) {
                              s.source.empty() ? "" : fmt::format(" ({})", s.source));
     }
     EXPECT_NE(page.find(table), std::string::npos) << table;
-    for (const RefineStepInfo& step : refineSteps())
-        EXPECT_NE(page.find(fmt::format("| `{}` |", step.name)), std::string::npos) << step.name;
 }
 
 TEST(Stages, ChangePicturesOfSomeSet) {

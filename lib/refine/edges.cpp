@@ -1,0 +1,322 @@
+#include "lib/refine/edges.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "lib/base/median.hpp"
+#include "lib/base/parallel.hpp"
+#include "lib/refine/edge_colours.hpp"
+
+namespace stx {
+namespace {
+
+// Chosen by trial on the sets of tests/bench/pictures.md with edges moved by a pixel.
+
+/// An edge is a jump of more than this share of q, and so many times what q changes by beside it.
+constexpr float kJumpOfEdge = 0.005f, kBesideSlope = 3.0f;
+/// And of so many steps of a depth code.
+constexpr float kJumpSteps = 2.5f;
+/// Squared distance of two colours (0..1 each) that tell surfaces apart.
+constexpr float kContrast = 3 * 0.04f * 0.04f;
+/// And of so many times what the colours of both differ by among themselves (the sum of their
+/// variances): a texture whose spots are a few pixels looks like an edge. With it the oak tree's
+/// exact edges have 0.75 of their own colour, moved ones 0.52.
+constexpr float kContrastOfSpread = 2.0f;
+/// Rows and edges that are looked at in a view, about, and the fewest edges that tell.
+constexpr int kRows = 128;
+constexpr std::size_t kEdges = 600, kFewEdges = 60;
+/// Edges of exact sets have 0.74 (an oak's leaves) to 1 of their own colour; with edges moved by a
+/// pixel 0.07, and the oak 0.56. Aligned stereo (Aloe) has 0.64.
+constexpr float kFat = 0.62f;
+/// Pixels with more of the colour of the surface in front stay.
+constexpr float kOwnColour = 0.6f;
+constexpr int kMostRounds = 2;
+/// The share of pixels at edges whose colour other views have on the surface in front: 0.53 to 0.66
+/// in exact views that have less than kFat of their own colour (thin bars and plates of
+/// tests/sweep), 0.71 to 0.79 in other exact sets, 0.25 and 0.37 where edges of statue and oak tree
+/// are moved by a pixel, 0.13 to 0.45 in captured sets. At least so many must tell; so many other
+/// views are asked, about.
+constexpr float kFrontInOthers = 0.48f;
+constexpr int kFewWitnesses = 20;
+constexpr std::size_t kWitnesses = 16;
+/// Points are compared on a grid of so many along the longer side of a view; the fewest that tell.
+constexpr int kPointsAcross = 24;
+constexpr std::size_t kFewPoints = 200;
+/// Views show the same surface where they are apart by less than this share of q.
+constexpr float kSameSurface = 0.03f;
+/// Depths that are apart by less than this share of what they were are better.
+constexpr float kClearlyCloser = 0.8f;
+
+class Edges {
+  public:
+    Edges(const Image<float>& q, const EdgeView& view)
+        : q_(q), texture_(*view.texture), axis_(view.space->axis), step_(view.step) {}
+
+    /// The neighbour of a pixel, of those where the surface ends, that is farthest behind; -1 =
+    /// none, the surface does not end here.
+    [[nodiscard]] int behind(int x, int y, int neighbours) const {
+        const float here = q_.at(x, y);
+        if (!(here > 0.0f)) return -1;
+        const float least = jumpAt(here);
+        int found = -1;
+        float farthest = here;
+        for (int i = 0; i < neighbours; ++i) {
+            const int dx = kBeside[i][0], dy = kBeside[i][1];
+            const float there = at(x + dx, y + dy);
+            if (!(there > 0.0f) || !(here - there > least) || !(there < farthest)) continue;
+            const float before = at(x - dx, y - dy), after = at(x + 2 * dx, y + 2 * dy);
+            const float jump = (here - there) / kBesideSlope;
+            if (before > 0.0f && before > here && before - here > jump) continue;
+            if (after > 0.0f && after < there && there - after > jump) continue;
+            farthest = there;
+            found = i;
+        }
+        return found;
+    }
+
+    /// How much of a pixel's colour is that of its surface and not of what is behind at neighbour
+    /// `i`, 0..1; nothing when they look alike.
+    [[nodiscard]] std::optional<float> ownShare(int x, int y, int i) const {
+        const float front = q_.at(x, y), back = at(x + kBeside[i][0], y + kBeside[i][1]);
+        const float half = 0.5f * (front - back);
+        const EdgeColours colours = coloursAround(texture_, x, y, [&](int u, int v) {
+            const float there = at(u, v);
+            if (!(there > 0.0f)) return EdgeSide::neither;
+            const bool isFront = std::abs(there - front) < half;
+            if ((!isFront && !(std::abs(there - back) < half)) || besideJump(u, v, half))
+                return EdgeSide::neither;
+            return isFront ? EdgeSide::front : EdgeSide::back;
+        });
+        if (!colours.known()) return {};
+        const glm::vec3 apart = colours.apart();
+        const float squared = glm::dot(apart, apart);
+        const float spread = colours.front.variance() + colours.back.variance();
+        if (squared < kContrast || squared < kContrastOfSpread * spread) return {};
+        return std::clamp(colours.shareOf(glm::vec3(texture_.at(x, y))), 0.0f, 1.0f);
+    }
+
+    /// What is behind at neighbour `i`, at this pixel.
+    [[nodiscard]] float goesOn(int x, int y, int i) const {
+        const int dx = kBeside[i][0], dy = kBeside[i][1];
+        const float there = at(x + dx, y + dy), after = at(x + 2 * dx, y + 2 * dy);
+        if (!(after > 0.0f) || !(std::abs(there - after) < jumpAt(there))) return there;
+        return std::max(2 * there - after, 0.5f * there);
+    }
+
+    /// The smallest q of 3x3 pixels.
+    [[nodiscard]] float farthestAround(int x, int y) const {
+        float least = q_.at(x, y);
+        for (const auto& d : kBeside) {
+            const float there = at(x + d[0], y + d[1]);
+            if (there > 0.0f) least = std::min(least, there);
+        }
+        return least;
+    }
+
+  private:
+    [[nodiscard]] float at(int x, int y) const { return q_.contains(x, y) ? q_.at(x, y) : 0.0f; }
+    [[nodiscard]] float jumpAt(float q) const {
+        return std::max(kJumpOfEdge * axis_.relativeScale(q),
+                        kJumpSteps * step_ * axis_.qPerUnit(q));
+    }
+    /// Its colour may be a mixture.
+    [[nodiscard]] bool besideJump(int x, int y, float jump) const {
+        const float here = q_.at(x, y);
+        for (int i = 0; i < 4; ++i) {
+            const float there = at(x + kBeside[i][0], y + kBeside[i][1]);
+            if (there > 0.0f && std::abs(there - here) > jump) return true;
+        }
+        return false;
+    }
+
+    const Image<float>& q_;
+    const Texture& texture_;
+    const DepthAxis& axis_;
+    float step_;
+};
+
+/// A view with a pixel less of what is in front: at its edges, or `everywhere`.
+Image<float> thinned(const EdgeView& view, bool everywhere) {
+    const Image<float>& from = *view.q;
+    const Edges edges(from, view);
+    Image<float> out = from;
+    parallelForBlocks(0, from.height(), 16, [&](std::int64_t first, std::int64_t last) {
+        for (int y = static_cast<int>(first); y < last; ++y) {
+            for (int x = 0; x < from.width(); ++x) {
+                const float here = from.at(x, y);
+                if (!(here > 0.0f)) continue;
+                const int i = edges.behind(x, y, 8);
+                if (i >= 0 && edges.ownShare(x, y, i).value_or(0) > kOwnColour) continue;
+                if (everywhere)
+                    out.at(x, y) = edges.farthestAround(x, y);
+                else if (i >= 0)
+                    out.at(x, y) = edges.goesOn(x, y, i);
+            }
+        }
+    });
+    return out;
+}
+
+/// q between the middles of four pixels, (0, 0) being the first one's; 0 where they are not one
+/// surface.
+float between(const Image<float>& q, float x, float y) {
+    if (!(x >= 0.0f && y >= 0.0f)) return 0.0f;
+    const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+    if (!q.contains(x0 + 1, y0 + 1)) return 0.0f;
+    const float a = q.at(x0, y0), b = q.at(x0 + 1, y0), c = q.at(x0, y0 + 1),
+                d = q.at(x0 + 1, y0 + 1);
+    const float least = std::min({a, b, c, d}), most = std::max({a, b, c, d});
+    if (!(least > 0.0f) || most - least > kSameSurface * most) return 0.0f;
+    const float tx = x - static_cast<float>(x0), ty = y - static_cast<float>(y0);
+    return (a * (1 - tx) + b * tx) * (1 - ty) + (c * (1 - tx) + d * tx) * ty;
+}
+
+/// How far apart views are where they show the same surface: the median, a share of q; nothing when
+/// they do not.
+std::optional<float> disagreement(std::span<const EdgeView> views,
+                                  const std::vector<const Image<float>*>& q) {
+    std::vector<float> apart;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const int step = std::max(1, std::max(q[i]->width(), q[i]->height()) / kPointsAcross);
+        for (std::size_t k = 0; k < views.size(); ++k) {
+            if (k == i) continue;
+            const Warp warp =
+                warpFrom(views[k].space->pixelFromWorld * views[i].space->worldFromPixel);
+            for (int y = step / 2; y < q[i]->height(); y += step) {
+                for (int x = step / 2; x < q[i]->width(); x += step) {
+                    const float here = q[i]->at(x, y);
+                    if (!(here > 0.0f)) continue;
+                    const glm::vec4 h = warp.homogeneous(static_cast<float>(x) + 0.5f,
+                                                         static_cast<float>(y) + 0.5f, here);
+                    if (!(h.w > 0.0f)) continue;
+                    const float u = h.x / h.w, v = h.y / h.w, at = h.z / h.w;
+                    const float there = between(*q[k], u - 0.5f, v - 0.5f);
+                    const float share =
+                        std::abs(there - at) / views[k].space->axis.relativeScale(at);
+                    if (there > 0.0f && share < kSameSurface) apart.push_back(share);
+                }
+            }
+        }
+    }
+    if (apart.size() < kFewPoints) return {};
+    return medianOf(std::move(apart));
+}
+
+/// A pixel at the edge of a surface, whose own colour tells.
+struct EdgePixel {
+    int x, y;
+    float front, back;  ///< q of both surfaces there
+    float ownShare;
+};
+
+std::vector<EdgePixel> edgePixels(const EdgeView& view) {
+    const Edges edges(*view.q, view);
+    std::vector<glm::ivec3> found;
+    const int height = view.q->height(), every = std::max(1, height / kRows);
+    for (int y = every / 2; y < height; y += every)
+        for (int x = 0; x < view.q->width(); ++x)
+            if (const int i = edges.behind(x, y, 4); i >= 0) found.emplace_back(x, y, i);
+    const std::size_t stride = std::max<std::size_t>(1, found.size() / kEdges);
+    std::vector<EdgePixel> pixels;
+    for (std::size_t k = 0; k < found.size(); k += stride) {
+        const int x = found[k].x, y = found[k].y, i = found[k].z;
+        if (const auto share = edges.ownShare(x, y, i))
+            pixels.push_back({x, y, view.q->at(x, y), edges.goesOn(x, y, i), *share});
+    }
+    return pixels;
+}
+
+/// The colour that a view shows at a point of another, if it shows a surface there.
+std::optional<glm::vec3> colourIn(const EdgeView& view, const Warp& warp, const EdgePixel& p,
+                                  float q) {
+    const glm::vec4 h =
+        warp.homogeneous(static_cast<float>(p.x) + 0.5f, static_cast<float>(p.y) + 0.5f, q);
+    if (!(h.w > 0.0f)) return {};
+    const float u = h.x / h.w, v = h.y / h.w, at = h.z / h.w;
+    if (!(u >= 0.0f && v >= 0.0f)) return {};
+    const int x = static_cast<int>(u), y = static_cast<int>(v);
+    if (!view.q->contains(x, y)) return {};
+    const float there = view.q->at(x, y);
+    if (!(there > 0.0f) ||
+        !(std::abs(there - at) < kSameSurface * view.space->axis.relativeScale(at)))
+        return {};
+    const glm::vec4 c = view.texture->at(x, y);
+    if (c.a < 1.0f) return {};
+    return glm::vec3(c);
+}
+
+/// Whether other views deny that edges are fat: they have the colours of the pixels there on the
+/// surface in front rather than on the one behind.
+bool othersShowTheFront(std::span<const EdgeView> views) {
+    std::atomic<int> asked = 0, front = 0;
+    const std::size_t every = std::max<std::size_t>(1, views.size() / kWitnesses);
+    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t number) {
+        const auto i = static_cast<std::size_t>(number);
+        const EdgeView& own = views[i];
+        const auto pixels = edgePixels(own);
+        for (std::size_t k = i % every; k < views.size(); k += every) {
+            if (k == i) continue;
+            const Warp warp = warpFrom(views[k].space->pixelFromWorld * own.space->worldFromPixel);
+            for (const EdgePixel& p : pixels) {
+                const auto onFront = colourIn(views[k], warp, p, p.front);
+                const auto onBack = colourIn(views[k], warp, p, p.back);
+                if (!onFront || !onBack) continue;
+                const glm::vec3 colour(own.texture->at(p.x, p.y));
+                ++asked;
+                front += glm::distance(*onFront, colour) < glm::distance(*onBack, colour);
+            }
+        }
+    });
+    return asked >= kFewWitnesses && front > kFrontInOthers * static_cast<float>(asked);
+}
+
+}  // namespace
+
+std::vector<float> sharesAtEdges(const EdgeView& view) {
+    std::vector<float> shares;
+    for (const EdgePixel& pixel : edgePixels(view)) shares.push_back(pixel.ownShare);
+    return shares;
+}
+
+float colourAtEdges(std::vector<float> shares) {
+    return shares.size() < kFewEdges ? 1.0f : medianOf(std::move(shares));
+}
+
+float colourAtEdges(std::span<const EdgeView> views) {
+    std::vector<std::vector<float>> shares(views.size());
+    parallelFor(0, static_cast<std::int64_t>(views.size()), [&](std::int64_t i) {
+        const auto k = static_cast<std::size_t>(i);
+        shares[k] = sharesAtEdges(views[k]);
+    });
+    std::vector<float> all;
+    for (const auto& part : shares) all.insert(all.end(), part.begin(), part.end());
+    return colourAtEdges(std::move(all));
+}
+
+bool edgesAreFat(float colour) {
+    return colour < kFat;
+}
+
+int thinFatEdges(std::span<const EdgeView> views) {
+    int round = 0;
+    for (; round < kMostRounds && edgesAreFat(colourAtEdges(views)) && !othersShowTheFront(views);
+         ++round) {
+        std::vector<const Image<float>*> before, after;
+        std::vector<Image<float>> eroded;
+        for (const EdgeView& view : views) {
+            before.push_back(view.q);
+            eroded.push_back(thinned(view, true));
+        }
+        for (const Image<float>& q : eroded) after.push_back(&q);
+        const auto apart = disagreement(views, before), closer = disagreement(views, after);
+        const bool everywhere = apart && closer && *closer < kClearlyCloser * *apart;
+        for (std::size_t i = 0; i < views.size(); ++i)
+            *views[i].q = everywhere ? std::move(eroded[i]) : thinned(views[i], false);
+    }
+    return round;
+}
+
+}  // namespace stx

@@ -1,0 +1,219 @@
+#include "lib/refine/exposure.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "lib/base/parallel.hpp"
+#include "lib/geometry/depth_code.hpp"
+
+namespace stx {
+namespace {
+
+/// Points of a view at which colours are compared, and those that find who shows the same.
+constexpr double kPoints = 600, kPointsOfLeaves = 5000, kRankPoints = 40;
+/// With fewer points inside of surfaces (leaves, hair) single pixels are compared.
+constexpr std::size_t kFewInside = 60;
+/// Views that a view is compared with: those that show most of it.
+constexpr std::size_t kComparedWith = 8;
+/// Views that show less of each other are not compared.
+constexpr int kLeastShown = 2;
+/// Surfaces are seen from the front when the cosine to their normal is larger.
+constexpr double kFromTheFront = 0.2;
+/// The same surface: depths that differ by no more than this share. Noise may be more; then fewer
+/// points are left.
+constexpr double kSamePlace = 0.015;
+/// Where colours of 3x3 pixels range over more than this share of their mean and this, sampling
+/// tells more than light.
+constexpr float kRange = 0.5f, kRangeOfDark = 0.02f;
+
+/// Colours of single pixels, covered in full, or the means of 3x3 on one surface.
+class Samples {
+  public:
+    Samples(std::span<const Camera> cameras, const PartOfView& partOf, int radius)
+        : cameras_(cameras), partOf_(partOf), radius_(radius) {
+        for (const Camera& c : cameras) cameraFromWorld_.push_back(c.cameraFromWorld());
+    }
+
+    struct Point {
+        glm::dvec3 world;
+        glm::dvec3 normal;  ///< of the surface; of single pixels: towards their camera
+        glm::vec3 colour;
+    };
+    [[nodiscard]] std::vector<Point> pointsOf(std::size_t view) const {
+        const Camera& c = cameras_[view];
+        const double pixels = static_cast<double>(c.width) * c.height;
+        const double wanted = radius_ > 0 ? kPoints : kPointsOfLeaves;
+        const int step = std::max(1, static_cast<int>(std::sqrt(pixels / wanted)));
+        std::vector<Point> points;
+        for (int y = step / 2; y < c.height; y += step) {
+            for (int x = step / 2; x < c.width; x += step) {
+                const float depth = depthAt(view, x, y);
+                if (!hasPoint(depth)) continue;
+                const auto colour = colourAt(view, x, y, depth);
+                if (!colour) continue;
+                const auto worldAt = [&](int i, int j) {
+                    return c.position +
+                           c.orientation * c.unproject(i + 0.5, j + 0.5, depthAt(view, i, j));
+                };
+                const glm::dvec3 world = worldAt(x, y);
+                glm::dvec3 normal = towards(c, world);
+                if (radius_ > 0)
+                    normal = glm::normalize(glm::cross(worldAt(x + 1, y) - worldAt(x - 1, y),
+                                                       worldAt(x, y - 1) - worldAt(x, y + 1)));
+                points.push_back({world, normal, *colour});
+            }
+        }
+        return points;
+    }
+
+    /// What a view shows of a point; nothing when something else is there.
+    [[nodiscard]] std::optional<glm::vec3> shownAt(std::size_t view, const Point& point) const {
+        const Camera& c = cameras_[view];
+        // The other side of a sheet is another surface.
+        if (!(glm::dot(point.normal, towards(c, point.world)) > kFromTheFront)) return {};
+        const glm::dvec3 p(cameraFromWorld_[view] * glm::dvec4(point.world, 1));
+        if (!c.orthographic && !(p.z < 0)) return {};
+        const glm::dvec3 at = c.project(p);
+        if (!(at.x >= 0 && at.y >= 0 && at.x < c.width && at.y < c.height)) return {};
+        return colourAt(view, static_cast<int>(at.x), static_cast<int>(at.y), at.z);
+    }
+
+  private:
+    [[nodiscard]] static glm::dvec3 towards(const Camera& c, glm::dvec3 world) {
+        return c.orthographic ? -c.forward() : glm::normalize(c.position - world);
+    }
+    [[nodiscard]] float depthAt(std::size_t view, int x, int y) const {
+        const PixelPart part = partOf_(view, x, y, x, y);
+        return part.texture ? part.depth->data()[part.texel(x, y)] : kNoDepth;
+    }
+    [[nodiscard]] std::optional<glm::vec3> colourAt(std::size_t view, int x, int y,
+                                                    double depth) const {
+        const Camera& c = cameras_[view];
+        const int x0 = x - radius_, y0 = y - radius_, x1 = x + radius_, y1 = y + radius_;
+        if (x0 < 0 || y0 < 0 || x1 >= c.width || y1 >= c.height) return {};
+        const PixelPart part = partOf_(view, x0, y0, x1, y1);
+        if (!part.texture) return {};
+        const auto isAt = [&](std::size_t texel, double share) {
+            const double there = part.depth->data()[texel];
+            return hasPoint(static_cast<float>(there)) && std::abs(there - depth) < share * depth;
+        };
+        if (!isAt(part.texel(x, y), kSamePlace)) return {};
+        glm::vec4 sum(0), low(1e9f), high(-1e9f);
+        for (int j = y0; j <= y1; ++j) {
+            for (int i = x0; i <= x1; ++i) {
+                const std::size_t texel = part.texel(i, j);
+                const glm::vec4 colour = part.texture->at(texel);
+                if (colour.a < 1.0f || !isAt(texel, 2 * kSamePlace)) return {};
+                sum += colour;
+                low = glm::min(low, colour);
+                high = glm::max(high, colour);
+            }
+        }
+        sum /= static_cast<float>((x1 - x0 + 1) * (y1 - y0 + 1));
+        for (int k = 0; k < 3; ++k)
+            if (high[k] - low[k] > kRange * sum[k] + kRangeOfDark) return {};
+        return glm::vec3(sum);
+    }
+
+    std::span<const Camera> cameras_;
+    const PartOfView& partOf_;
+    int radius_;
+    std::vector<glm::dmat4> cameraFromWorld_;
+};
+
+/// Pairs of views that show the same, and their colours there.
+std::vector<SharedColours> sharedColours(std::span<const Camera> cameras, const PartOfView& partOf,
+                                         int radius) {
+    const std::size_t views = cameras.size();
+    const Samples samples(cameras, partOf, radius);
+    std::vector<std::vector<Samples::Point>> points(views);
+    std::vector<std::vector<std::size_t>> partners(views);
+    const auto count = static_cast<std::int64_t>(views);
+    parallelFor(0, count, [&](std::int64_t i) {
+        const auto v = static_cast<std::size_t>(i);
+        points[v] = samples.pointsOf(v);
+        const auto step = static_cast<std::size_t>(
+            std::max(1.0, static_cast<double>(points[v].size()) / kRankPoints));
+        std::vector<std::pair<int, std::size_t>> ranked;
+        for (std::size_t other = 0; other < views; ++other) {
+            if (other == v) continue;
+            int shown = 0;
+            for (std::size_t k = step / 2; k < points[v].size(); k += step)
+                shown += samples.shownAt(other, points[v][k]) ? 1 : 0;
+            if (shown >= kLeastShown) ranked.emplace_back(-shown, other);
+        }
+        std::sort(ranked.begin(), ranked.end());
+        ranked.resize(std::min(ranked.size(), kComparedWith));
+        for (const auto& entry : ranked) partners[v].push_back(entry.second);
+    });
+    std::set<std::pair<std::size_t, std::size_t>> wanted;
+    for (std::size_t v = 0; v < views; ++v)
+        for (const std::size_t other : partners[v])
+            wanted.emplace(std::min(v, other), std::max(v, other));
+    std::vector<SharedColours> pairs;
+    for (const auto& [a, b] : wanted) pairs.push_back({a, b, {}});
+    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
+        SharedColours& pair = pairs[static_cast<std::size_t>(i)];
+        // Both ways: what is shown at a point is a little blurred beside the point's own colour.
+        for (const Samples::Point& p : points[pair.a])
+            if (const auto b = samples.shownAt(pair.b, p)) pair.points.push_back({p.colour, *b});
+        for (const Samples::Point& p : points[pair.b])
+            if (const auto a = samples.shownAt(pair.a, p)) pair.points.push_back({*a, p.colour});
+    });
+    return pairs;
+}
+
+}  // namespace
+
+std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras, const PartOfView& partOf) {
+    auto pairs = sharedColours(cameras, partOf, 1);
+    std::size_t most = 0;
+    for (const SharedColours& pair : pairs) most = std::max(most, pair.points.size());
+    if (most < kFewInside) pairs = sharedColours(cameras, partOf, 0);
+    return matchColours(cameras.size(), pairs);
+}
+
+void applyMap(const ColourMap& map, int x0, int y0, int x1, int y1, Texture& texture,
+              RefineStepReport& report) {
+    std::array<std::array<std::uint8_t, 256>, 3> table;
+    for (int value = 0; value < 256; ++value) {
+        const glm::vec3 c = map(glm::vec3(static_cast<float>(value) / 255.0f));
+        for (int k = 0; k < 3; ++k)
+            table[static_cast<std::size_t>(k)][static_cast<std::size_t>(value)] =
+                static_cast<std::uint8_t>(std::min(c[k], 1.0f) * 255.0f + 0.5f);
+    }
+    RefineStepReport change;
+    const auto put = [&change](auto& pixel, const auto& now, double white) {
+        const auto moved = [&](int k) {
+            return std::abs(static_cast<double>(now[k]) - static_cast<double>(pixel[k]));
+        };
+        const double sum = moved(0) + moved(1) + moved(2);
+        change.pixels += sum > 0;
+        change.meanMove += sum / (3 * white);
+        pixel = now;
+    };
+    const auto width = static_cast<std::size_t>(texture.width());
+    for (int y = y0; y < y1; ++y) {
+        for (int x = x0; x < x1; ++x) {
+            const std::size_t texel =
+                static_cast<std::size_t>(y) * width + static_cast<unsigned>(x);
+            if (auto* bytes = texture.rgba8()) {
+                glm::u8vec4& c = bytes->data()[texel];
+                if (c.a > 0)
+                    put(c, glm::u8vec4(table[0][c.r], table[1][c.g], table[2][c.b], c.a), 255);
+            }
+            if (auto* floats = texture.rgbaFloat()) {
+                glm::vec4& c = floats->data()[texel];
+                if (c.a > 0) put(c, glm::vec4(map(glm::vec3(c)), c.a), 1);
+            }
+        }
+    }
+    change.moved = change.pixels;
+    if (change.moved > 0) change.meanMove /= static_cast<double>(change.moved);
+    report.add(change);
+}
+
+}  // namespace stx

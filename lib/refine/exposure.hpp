@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "lib/base/image.hpp"
+#include "lib/geometry/camera.hpp"
+#include "lib/model/texture.hpp"
+#include "lib/refine/colour_match.hpp"
+#include "lib/refine/refine.hpp"
+
+/// Cameras that expose for themselves: colours of views are matched where they show the same.
+
+namespace stx {
+
+/// Where a part of a view is read: in images of its own, or in a rectangle of an atlas.
+struct PixelPart {
+    const Texture* texture = nullptr;  ///< null: nothing shows the whole part
+    const Image<float>* depth = nullptr;
+    /// Pixel (x, y) of the view is texel first + x * stepX + y * stepY.
+    std::ptrdiff_t first = 0, stepX = 1, stepY = 0;
+
+    [[nodiscard]] std::size_t texel(int x, int y) const {
+        return static_cast<std::size_t>(first + x * stepX + y * stepY);
+    }
+};
+
+/// What holds the pixels from (x0, y0) to (x1, y1), inclusive, of a view; they are in the view.
+using PartOfView = std::function<PixelPart(std::size_t view, int x0, int y0, int x1, int y1)>;
+
+/// For each view the map that brings its colours to those of the others; see matchColours(). None
+/// changes anything where the views agree. The same on any number of threads.
+[[nodiscard]] std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras,
+                                                  const PartOfView& partOf);
+
+/// Applies a map to the texels from (x0, y0) to (x1, y1), the last excluded, but for transparent
+/// ones; the report gets the pixels that changed, and by how much (a share of white).
+void applyMap(const ColourMap& map, int x0, int y0, int x1, int y1, Texture& texture,
+              RefineStepReport& report);
+
+}  // namespace stx

@@ -1,0 +1,224 @@
+#include "lib/refine/noise.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "lib/base/parallel.hpp"
+#include "lib/refine/local_plane.hpp"
+
+namespace stx {
+namespace {
+
+// Where no source is named the value was chosen by trial on the sets of tests/bench/pictures.md
+// with noise added.
+
+/// One in twenty pixels has a smaller one, where the smallest of the four second differences
+/// through a pixel is taken, of independent normal noise of standard deviation 1 (by simulation).
+/// On smooth surfaces the median would do; among leaves most differences are not noise.
+constexpr float kSmallestOfFour = 0.0416f;
+/// The same of bendWithoutCurve().
+constexpr float kSmallestOfTwo = 0.1905f;
+/// What does not bend evenly is noise up to so many times what it tells: noise is in both measures,
+/// each off by some tenths of it.
+constexpr float kMoreThanCurves = 1.5f;
+/// Rows that are looked at, about, and every how many columns of large views; the fewest pixels
+/// that tell: of fewer, one in twenty is what two or three happen to have.
+constexpr int kNoiseRows = 64, kNoiseColumns = 3;
+constexpr std::size_t kFewestBends = 100;
+/// Less noise than this share of q is left as it is: what codes and small shapes look like.
+constexpr float kLeastNoise = 0.001f;
+/// And than this share of a pixel's width: exact tori whose tubes are six pixels wide have up to
+/// 0.1, statue with 0.5 % noise has 3.5.
+constexpr float kLeastOfPixel = 0.25f;
+/// Radii of the windows that are tried, pixels.
+constexpr int kRadii[] = {1, 2, 4, 6, 8};
+/// Windows larger than one that leaves this share of q are not needed.
+constexpr float kAim = 0.001f;
+/// The window grows while all estimates so far agree within so many of their standard deviations.
+constexpr float kAgree = 2.0f;
+/// Points further from the plane than so many standard deviations are on another surface. The first
+/// round has no plane yet and measures from the point itself.
+struct Bands {
+    float first, then;
+};
+/// Wide bands leave surfaces as they are, narrow ones keep leaves apart that are no further from
+/// each other than the noise.
+constexpr Bands kWideBands{4.0f, 3.0f}, kNarrowBands{1.7f, 1.2f};
+/// A view is clutter, or not at all, where this share of the points around a point is beside its
+/// surface, but not by more than so many wide bands.
+constexpr float kClutter = 0.12f, kNoClutter = 0.06f, kNotFar = 3.0f;
+/// Points that tell it: every how many columns and rows, and how far around them, pixels.
+constexpr int kClutterColumns = 3, kClutterRows = 5, kClutterRadius = 2;
+/// The q around a pixel.
+struct Around {
+    const Image<float>& q;
+    int x, y;
+
+    /// Empty where there is no point.
+    [[nodiscard]] std::optional<float> at(int dx, int dy) const {
+        if (!q.contains(x + dx, y + dy)) return std::nullopt;
+        const float there = q.at(x + dx, y + dy);
+        return there > 0.0f ? std::optional(there) : std::nullopt;
+    }
+    /// The smallest of the four second differences through the pixel. At edges and creases one of
+    /// them runs along the edge; noise is in all.
+    [[nodiscard]] std::optional<float> bend() const {
+        std::optional<float> least;
+        for (const auto& [dx, dy] : {std::pair(1, 0), {0, 1}, {1, 1}, {1, -1}}) {
+            const auto a = at(-dx, -dy), b = at(dx, dy);
+            if (!a || !b) return std::nullopt;
+            const float bend = std::abs(*a - 2.0f * q.at(x, y) + *b);
+            least = std::min(least.value_or(bend), bend);
+        }
+        return least;
+    }
+    /// What second differences have of their own second differences across them, the smaller of
+    /// two pairs of directions: nothing of what bends evenly (the mask of Immerkaer 1996, and the
+    /// same turned by 45 degrees).
+    [[nodiscard]] std::optional<float> bendWithoutCurve() const {
+        std::optional<float> least;
+        for (const auto& [ax, ay, bx, by] : {std::array{1, 0, 0, 1}, std::array{1, 1, -1, 1}}) {
+            float sum = 0;
+            for (int i = -1; i <= 1; ++i) {
+                for (int j = -1; j <= 1; ++j) {
+                    const auto there = at(i * ax + j * bx, i * ay + j * by);
+                    if (!there) return least;
+                    sum += *there * (i ? 1.0f : -2.0f) * (j ? 1.0f : -2.0f);
+                }
+            }
+            least = std::min(least.value_or(std::abs(sum)), std::abs(sum));
+        }
+        return least;
+    }
+};
+
+/// The value that one in twenty is below; 0 of none.
+float oneInTwenty(std::vector<float>& values) {
+    if (values.empty()) return 0.0f;
+    const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 20);
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+}
+
+/// The bands for a view with so much noise, by how much clutter there is in it.
+Bands bandsFor(const Image<float>& q, const DepthAxis& axis, float noise) {
+    double beside = 0;
+    std::int64_t points = 0;
+    for (int y = 1; y < q.height(); y += kClutterRows) {
+        for (int x = 1; x < q.width(); x += kClutterColumns) {
+            const float here = q.at(x, y);
+            if (!(here > 0.0f)) continue;
+            const float sigma = noise * axis.relativeScale(here), band = kWideBands.then * sigma;
+            const LocalPlane plane = fitAround(q, x, y, 1, {here}, kWideBands.first * sigma);
+            float near = 0, off = 0;
+            for (int j = -kClutterRadius; j <= kClutterRadius; ++j) {
+                for (int i = -kClutterRadius; i <= kClutterRadius; ++i) {
+                    const float there = q.contains(x + i, y + j) ? q.at(x + i, y + j) : 0.0f;
+                    if (!(there > 0.0f)) continue;
+                    const float distance =
+                        std::abs(there - plane.q0 - plane.gx * static_cast<float>(i) -
+                                 plane.gy * static_cast<float>(j));
+                    if (distance > kNotFar * band) continue;
+                    constexpr auto kReach =
+                        static_cast<float>((kClutterRadius + 1) * (kClutterRadius + 1));
+                    const float weight =
+                        std::max(1.0f - static_cast<float>(i * i + j * j) / kReach, 0.0f);
+                    near += weight;
+                    if (distance > band) off += weight;
+                }
+            }
+            if (!(near > 0.0f)) continue;
+            beside += off / near;
+            ++points;
+        }
+    }
+    if (points == 0) return kWideBands;
+    const auto share = static_cast<float>(beside / static_cast<double>(points));
+    const float t = std::clamp((share - kNoClutter) / (kClutter - kNoClutter), 0.0f, 1.0f);
+    return {std::lerp(kWideBands.first, kNarrowBands.first, t),
+            std::lerp(kWideBands.then, kNarrowBands.then, t)};
+}
+
+}  // namespace
+
+std::optional<double> meanOfRows(const std::vector<double>& sums,
+                                 const std::vector<std::int64_t>& counts) {
+    double sum = 0;
+    std::int64_t count = 0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        sum += sums[i];
+        count += counts[i];
+    }
+    if (count == 0) return std::nullopt;
+    return sum / static_cast<double>(count);
+}
+
+float depthNoise(const Image<float>& q, const DepthAxis& axis) {
+    std::vector<float> bends, withoutCurve;
+    const int rows = std::max(1, q.height() / kNoiseRows);
+    const int columns = std::clamp(q.width() / kNoiseRows, 1, kNoiseColumns);
+    for (int y = std::max(1, rows / 2); y + 1 < q.height(); y += rows) {
+        for (int x = 1; x + 1 < q.width(); x += columns) {
+            const float here = q.at(x, y);
+            if (!(here > 0.0f)) continue;
+            const Around around{q, x, y};
+            const float scale = axis.relativeScale(here);
+            if (const auto bend = around.bend()) bends.push_back(*bend / scale);
+            if (const auto bend = around.bendWithoutCurve()) withoutCurve.push_back(*bend / scale);
+        }
+    }
+    if (bends.size() < kFewestBends) return 0.0f;
+    const float noise = oneInTwenty(bends) / kSmallestOfFour;
+    // Among leaves nine pixels in a square are hardly ever on one surface; a ball of few pixels
+    // bends everywhere.
+    if (withoutCurve.size() < bends.size() / 20) return noise;
+    return std::min(noise, kMoreThanCurves * oneInTwenty(withoutCurve) / kSmallestOfTwo);
+}
+
+bool isNoisy(float noise, const DepthAxis& axis) {
+    return noise >= kLeastNoise && noise >= kLeastOfPixel * axis.pixelShare();
+}
+
+float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm::vec3>* surface) {
+    if (!isNoisy(noise, axis)) return 0.0f;
+    const Image<float> from = q;
+    const Bands bands = bandsFor(from, axis, noise);
+    if (surface) *surface = Image<glm::vec3>(q.width(), q.height(), glm::vec3(0.0f));
+    std::vector<double> left(static_cast<std::size_t>(q.height()), 0.0);
+    std::vector<std::int64_t> points(left.size(), 0);
+    parallelForBlocks(0, q.height(), 8, [&](std::int64_t first, std::int64_t last) {
+        for (int y = static_cast<int>(first); y < last; ++y) {
+            for (int x = 0; x < q.width(); ++x) {
+                const float here = from.at(x, y);
+                if (!(here > 0.0f)) continue;
+                const float sigma = noise * axis.relativeScale(here);
+                LocalPlane plane{here};
+                float value = here, least = here - kAgree * sigma, most = here + kAgree * sigma;
+                float doubt = sigma;
+                glm::vec2 slope(0.0f);
+                for (const int radius : kRadii) {
+                    plane = fitAround(from, x, y, radius, plane,
+                                      (radius == kRadii[0] ? bands.first : bands.then) * sigma);
+                    const float deviation = sigma / std::sqrt(std::max(plane.alike, 1.0f));
+                    least = std::max(least, plane.q0 - kAgree * deviation);
+                    most = std::min(most, plane.q0 + kAgree * deviation);
+                    if (least > most) break;  // the surface bends
+                    value = plane.q0;
+                    slope = {plane.gx, plane.gy};
+                    doubt = deviation;
+                    if (deviation < kAim * axis.relativeScale(here)) break;
+                }
+                if (value > 0.0f) q.at(x, y) = value;
+                if (surface) surface->at(x, y) = glm::vec3(slope, doubt);
+                left[static_cast<std::size_t>(y)] += doubt / axis.relativeScale(here);
+                ++points[static_cast<std::size_t>(y)];
+            }
+        }
+    });
+    return kDoubt * static_cast<float>(meanOfRows(left, points).value_or(0));
+}
+
+}  // namespace stx

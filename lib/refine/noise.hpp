@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "lib/base/image.hpp"
+#include "lib/geometry/pixel_space.hpp"
+
+namespace stx {
+
+/// What smoothing leaves counts as so many of its standard deviations.
+inline constexpr float kDoubt = 2.0f;
+
+/// The mean of values that were summed row by row, so that it is the same on any number of threads:
+/// a sum and a number of values for each row. Nothing when there are no values.
+[[nodiscard]] std::optional<double> meanOfRows(const std::vector<double>& sums,
+                                               const std::vector<std::int64_t>& counts);
+
+/// How noisy the depth of a view is: the standard deviation of what each pixel has of its own, as a
+/// share of q; 0 when nothing can be told. `q` is as in PreparedPage. From second differences along
+/// four directions: at edges and creases one of them runs along the edge, noise is in all.
+[[nodiscard]] float depthNoise(const Image<float>& q, const DepthAxis& axis);
+
+/// Whether there is more noise than a code's rounding. `noise` is depthNoise().
+[[nodiscard]] bool isNoisy(float noise, const DepthAxis& axis);
+
+/// Replaces each point by the plane that fits its surroundings, without what is on another surface,
+/// when isNoisy(); else leaves all as they are. The window of each
+/// point grows until its estimates disagree (Goldenshluger & Nemirovski 1997: intersection of
+/// confidence intervals), so that creases and leaves stay. `noise` is depthNoise(). Gives how far
+/// off points may be then, a share of q; 0 when nothing was done. The same on any number of
+/// threads. `surface`, if any, gets NoisyView::surface when something was done.
+float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise,
+                  Image<glm::vec3>* surface = nullptr);
+
+}  // namespace stx

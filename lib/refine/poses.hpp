@@ -1,0 +1,14 @@
+#pragma once
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+#include "lib/refine/refine.hpp"
+
+namespace stx {
+
+/// Moves the cameras of a bundle so that overlapping views agree (refinePoses() of
+/// lib/registration), where they agree better then; a note says by how much, or why they stay. The
+/// report counts the views whose camera moved. Errors: cancelled.
+[[nodiscard]] Result<RefineStepReport> alignPoses(Bundle& bundle, Job& job);
+
+}  // namespace stx

@@ -1,0 +1,106 @@
+#include "lib/refine/noise.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lib/refine/pinholes.hpp"
+#include "tests/noisy_depth.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kSide = 96;
+
+/// q of a slanted plane, nearer by `step` (a share) in its right half, with noise (a share).
+Image<float> steppedPlane(double step, double noise) {
+    Image<float> q(kSide, kSide);
+    for (int y = 0; y < kSide; ++y) {
+        for (int x = 0; x < kSide; ++x) {
+            const double plane = (0.25 + 0.0002 * x + 0.0001 * y) * (x < kSide / 2 ? 1 : 1 + step);
+            q.at(x, y) = static_cast<float>(
+                plane * (1 + noise * noisy::normal(7, static_cast<std::uint64_t>(y * kSide + x))));
+        }
+    }
+    return q;
+}
+
+/// Root of the mean square of what differs, as a share.
+double difference(const Image<float>& a, const Image<float>& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.count(); ++i) {
+        const double d = a.data()[i] / b.data()[i] - 1;
+        sum += d * d;
+    }
+    return std::sqrt(sum / static_cast<double>(a.count()));
+}
+
+TEST(DepthNoise, IsMeasuredWhateverTheShape) {
+    EXPECT_LT(depthNoise(steppedPlane(0.1, 0), {}), 1e-5);
+    for (const double noise : {0.002, 0.005, 0.02}) {
+        EXPECT_NEAR(depthNoise(steppedPlane(0, noise), {}), noise, 0.2 * noise);
+        EXPECT_NEAR(depthNoise(steppedPlane(0.3, noise), {}), noise, 0.2 * noise);
+    }
+    EXPECT_EQ(depthNoise(Image<float>(8, 8, 0.0f), {}), 0.0f);
+}
+
+/// q of a ball so many pixels wide, from three radii away, with noise (a share).
+Image<float> ballOf(int pixels, double noise) {
+    Image<float> q(pixels, pixels, 0.0f);
+    const double radius = pixels / 2.0;
+    for (int y = 0; y < pixels; ++y) {
+        for (int x = 0; x < pixels; ++x) {
+            const double dx = (x + 0.5) / radius - 1, dy = (y + 0.5) / radius - 1;
+            if (dx * dx + dy * dy > 0.98) continue;
+            const double depth = 3 - std::sqrt(1 - dx * dx - dy * dy);
+            const double error = noisy::normal(9, static_cast<std::uint64_t>(y * pixels + x));
+            q.at(x, y) = static_cast<float>((1 + noise * error) / depth);
+        }
+    }
+    return q;
+}
+
+// The sweep found balls of thirty pixels whose bend was taken for noise of a tenth of their depth.
+TEST(DepthNoise, WhatBendsEvenlyIsNone) {
+    for (const int pixels : {16, 24, 31, 64, 200})
+        EXPECT_LT(depthNoise(ballOf(pixels, 0), {}), 0.001) << pixels;
+    for (const int pixels : {31, 64, 200})
+        EXPECT_NEAR(depthNoise(ballOf(pixels, 0.02), {}), 0.02, 0.01) << pixels;
+}
+
+TEST(DepthNoise, SmoothingLeavesAFifthOfItAndKeepsTheStep) {
+    const Image<float> exact = steppedPlane(0.05, 0);
+    Image<float> q = steppedPlane(0.05, 0.005);
+    const float noise = depthNoise(q, {});
+    const float left = smoothDepth(q, {}, noise);
+    EXPECT_LT(left, noise);
+    EXPECT_GT(left, difference(q, exact));
+    EXPECT_LT(difference(q, exact), 0.005 / 4);
+    // Nothing comes to lie between the two surfaces.
+    for (int y = 0; y < kSide; ++y)
+        for (const int x : {kSide / 2 - 1, kSide / 2})
+            EXPECT_NEAR(q.at(x, y) / exact.at(x, y), 1, 0.015) << x << " " << y;
+}
+
+TEST(DepthNoise, ExactDepthStaysAsItIs) {
+    const Image<float> exact = steppedPlane(0.05, 0);
+    Image<float> q = exact;
+    EXPECT_EQ(smoothDepth(q, {}, depthNoise(q, {})), 0.0f);
+    for (std::size_t i = 0; i < q.count(); ++i) ASSERT_EQ(q.data()[i], exact.data()[i]);
+}
+
+TEST(DepthNoise, PinholesInASurfaceAreClosedButNoOthers) {
+    const Image<float> exact = steppedPlane(0.05, 0);
+    Image<float> q = exact;
+    Image<std::uint8_t> covered(kSide, kSide, 1);
+    q.at(20, 20) = q.at(60, 30) = q.at(60, 60) = q.at(61, 60) = q.at(kSide / 2, 40) = 0;
+    covered.at(60, 30) = 0;  // background
+    closeMissedPixels(q, covered, {}, 0);
+    EXPECT_NEAR(q.at(20, 20) / exact.at(20, 20), 1, 1e-4);
+    EXPECT_EQ(q.at(60, 30), 0.0f);
+    EXPECT_EQ(q.at(60, 60), 0.0f);         // two pixels
+    EXPECT_EQ(q.at(kSide / 2, 40), 0.0f);  // on the step
+}
+
+}  // namespace
+}  // namespace stx

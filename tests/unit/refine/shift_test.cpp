@@ -1,0 +1,65 @@
+#include "lib/refine/shift.hpp"
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lib/geometry/depth_code.hpp"
+
+namespace stx {
+namespace {
+
+constexpr int kWide = 240, kHigh = 120;
+constexpr double kSlope = 0.02;
+
+/// Something with texture of several pixels' size, at any place between pixels; 0..1.
+double pattern(double x, double y) {
+    return 0.5 + 0.2 * std::sin(0.9 * x + 0.3 * y) + 0.15 * std::sin(0.37 * x - 0.5 * y + 1) +
+           0.1 * std::sin(1.3 * x + 0.11 * y * y / 40);
+}
+
+/// The pattern on a slanted surface, from `steps` beside; brighter by `gain`.
+Texture seenFrom(double steps, double gain = 1.0) {
+    Image<glm::vec4> picture(kWide, kHigh);
+    for (int y = 0; y < kHigh; ++y)
+        for (int x = 0; x < kWide; ++x) {
+            // x - steps * (20 + kSlope * x0) = x, solved for x0.
+            const double x0 = (x + steps * 20) / (1 - steps * kSlope);
+            picture.at(x, y) =
+                glm::vec4(glm::vec3(static_cast<float>(gain * pattern(x0, y))), 1.0f);
+        }
+    return picture;
+}
+
+/// Disparities that are `less` than they are.
+Image<float> disparities(double less) {
+    Image<float> d(kWide, kHigh);
+    for (int y = 0; y < kHigh; ++y)
+        for (int x = 0; x < kWide; ++x) d.at(x, y) = static_cast<float>(20 + kSlope * x - less);
+    return d;
+}
+
+TEST(DisparityShift, IsWhatPicturesOnEitherSideShow) {
+    for (const double less : {-0.4, 0.15, 0.3}) {
+        const std::vector<SidePicture> right{{seenFrom(1), 1}};
+        EXPECT_NEAR(disparityShift(disparities(less), seenFrom(0), right, 0.6), less, 0.03);
+        const std::vector<SidePicture> both{{seenFrom(0.5), 0.5}, {seenFrom(-0.25, 0.97), -0.25}};
+        EXPECT_NEAR(disparityShift(disparities(less), seenFrom(0), both, 0.6), less, 0.05);
+    }
+}
+
+TEST(DisparityShift, IsNoneWhereNothingTells) {
+    const std::vector<SidePicture> right{{seenFrom(1), 1}};
+    EXPECT_EQ(disparityShift(disparities(0), seenFrom(0), right, 0.6), 0.0) << "nothing is off";
+    EXPECT_EQ(disparityShift(disparities(2), seenFrom(0), right, 0.6), 0.0) << "off by too much";
+    EXPECT_EQ(disparityShift(disparities(0.3), seenFrom(0), {}, 0.6), 0.0);
+    const Texture plain = Image<glm::vec4>(kWide, kHigh, glm::vec4(0.5f));
+    EXPECT_EQ(disparityShift(disparities(0.3), plain, right, 0.6), 0.0) << "no texture";
+    const Image<float> unknown(kWide, kHigh, kNoDepth);
+    EXPECT_EQ(disparityShift(unknown, seenFrom(0), right, 0.6), 0.0);
+}
+
+}  // namespace
+}  // namespace stx

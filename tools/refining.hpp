@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "formats/any/options.hpp"
+#include "lib/model/sequence.hpp"
+#include "lib/refine/refine.hpp"
+#include "tools/command_line.hpp"
+
+namespace stx::tools {
+
+/// --refine auto|off|STEPS of commands that draw or write refined views.
+Option refineOption(Command& command, std::string& text);
+
+/// The settings of that option, of views that are there. Errors (usage): a step that only an import
+/// can do.
+[[nodiscard]] Result<RefineSettings> refineSettings(const std::string& text);
+
+/// Frames that are refined when they are read; a note says which steps were done. `text` is that of
+/// the option. `keepIn`: of frames that are read more than once, a folder for what became of them.
+[[nodiscard]] Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames,
+                                                        const std::string& text,
+                                                        const std::filesystem::path& keepIn = {});
+
+/// Frames on their way into a target, each changed once: MPEG-4 films are written in two passes.
+[[nodiscard]] std::unique_ptr<Sequence> changedOnTheWay(
+    std::unique_ptr<Sequence> frames, const std::filesystem::path& target,
+    std::function<Result<void>(Bundle& frame, Job& job)> change);
+
+/// Refines what a command reads: an image set at its import, and whatever is there afterwards.
+class Refining {
+  public:
+    explicit Refining(RefineSettings settings) : settings_(std::move(settings)) {}
+    Refining(const Refining&) = delete;
+    Refining& operator=(const Refining&) = delete;
+
+    /// Options by which an import does its steps and tells what they did; they use this object.
+    void import(ImageSetOptions& options);
+    /// What is left to do of a bundle. Errors: (usage) a step that only an import can do, of what
+    /// is no image set; those of refine().
+    Result<void> refine(Bundle& bundle, Job& job);
+    /// Of all that was read.
+    [[nodiscard]] const RefineReport& report() const { return report_; }
+
+  private:
+    RefineSettings settings_;
+    RefineReport report_;
+    RefineReport atImport_;  ///< of the moment that was read last
+    bool imported_ = false;
+};
+
+/// The refining of `stx convert`: what an import does, and what is named of bundles that are there.
+struct ImportRefining {
+    std::string steps = "auto";  ///< of --refine
+    /// What options of single steps say, by RefineStep; automatic: they were not given.
+    std::array<RefineSwitch, kRefineSteps> switches{};
+    bool poses = false;  ///< --refine-poses
+
+    /// What an import is to do. Errors (usage): a name that is none.
+    [[nodiscard]] Result<RefineSettings> settings() const;
+    /// Does the steps that --refine names of a bundle that is there; nothing is done by itself.
+    /// Notes say what was done, and which steps cannot be of what was not `imported` now.
+    Result<void> refine(Bundle& bundle, bool imported, Job& job) const;
+};
+
+/// --refine, and the options of single steps under the heading of image sets. `refining` must
+/// outlive the command.
+void addImportRefining(Command& command, ImportRefining& refining, const char* sets);
+
+}  // namespace stx::tools
