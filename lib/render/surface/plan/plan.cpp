@@ -59,8 +59,8 @@ std::vector<double> middlesOf(const SurfaceFrame& frame,
     return middles;
 }
 
-/// Chooses the `wanted` sources that a tile is built from, where more fall in it than it can take. `q` is
-/// the mean depth of what falls in it (middlesOf()).
+/// Chooses the `wanted` sources that a tile is built from, where more fall in it than it can take.
+/// `q` is the mean depth of what falls in it (middlesOf()).
 std::vector<int> chooseSources(const SurfaceFrame& frame, int tile, double q, int wanted) {
     const glm::dvec4 h =
         frame.space.worldFromPixel *
