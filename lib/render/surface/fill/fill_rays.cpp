@@ -48,9 +48,9 @@ const std::array<glm::vec2, kRays>& rayDirections() {
 
 }  // namespace
 
-RayBatch::RayBatch(const Image<std::uint8_t>& distances, std::int32_t surface)
+RayBatch::RayBatch(const Image<std::uint8_t>& distances)
     : start_{distances.data(), static_cast<float>(distances.width()),
-             static_cast<float>(distances.height()), surface} {}
+             static_cast<float>(distances.height())} {}
 
 void RayBatch::add(int x, int y, int distance) {
     start_.x[count_] = static_cast<float>(x) + 0.5f;

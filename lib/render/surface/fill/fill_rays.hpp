@@ -32,13 +32,12 @@ class RayBatch {
     struct Start {
         const std::uint8_t* distances;
         float width, height;
-        std::int32_t surface;
         std::array<float, kRayBatch> x{}, y{};  ///< centres of pixels
     };
 
     /// `distances`: of each pixel from surface, the larger of columns and rows, so that no ray
-    /// crosses more pixels in as many steps; 0 is surface. `surface`: any pixel that is.
-    RayBatch(const Image<std::uint8_t>& distances, std::int32_t surface);
+    /// crosses more pixels in as many steps; 0 is surface.
+    explicit RayBatch(const Image<std::uint8_t>& distances);
 
     [[nodiscard]] bool full() const { return count_ == kRayBatch; }
     [[nodiscard]] std::size_t count() const { return count_; }
