@@ -57,9 +57,7 @@ TEST(FillRays, ABatchGoesAsRaysDoOneByOne) {
     for (const auto& [width, height, surfaces] :
          {std::array{97, 61, 40}, std::array{700, 3, 1}, std::array{1, 1, 1}}) {
         const Image<std::uint8_t> distances = someDistances(width, height, surfaces, random);
-        const auto all = distances.pixels();
-        RayBatch batch(distances, static_cast<std::int32_t>(std::find(all.begin(), all.end(), 0) -
-                                                            all.begin()));
+        RayBatch batch(distances);
         // A full one and others, which are the same batch used again.
         for (const std::size_t pixels : {kRayBatch, std::size_t{1}, kRayBatch - 3}) {
             std::vector<glm::ivec2> places;

@@ -439,8 +439,7 @@ void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale
     const int height = frame.q.height();
     const Image<std::uint8_t> distances = distancesToSurface(frame);
     const auto all = distances.pixels();
-    const auto surface = std::find(all.begin(), all.end(), std::uint8_t{0}) - all.begin();
-    if (surface == std::ssize(all)) return;
+    if (std::ranges::find(all, std::uint8_t{0}) == all.end()) return;
     std::uint8_t farthest = 0;
     for (const std::uint8_t d : all) farthest = std::max(farthest, d);
     if (farthest == 0) return;
@@ -482,7 +481,7 @@ void fillLevel(OpenFrame& frame, std::span<const LocalSource> sources, int scale
             Sample beyond;
         };
         std::array<Near, kRayBatch> nearby;
-        RayBatch rays(distances, static_cast<std::int32_t>(surface));
+        RayBatch rays(distances);
         const auto putNear = [&] {
             rays.walk();
             for (std::size_t i = 0; i < rays.count(); ++i) {

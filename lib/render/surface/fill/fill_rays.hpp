@@ -12,12 +12,10 @@ namespace stx::surface {
 inline constexpr int kRays = 16;
 /// No ray is longer, pixels: what is farther weighs next to nothing beside what is near.
 inline constexpr float kLongestRay = 512;
-/// Pixels whose rays go together: enough that reading distances does not wait for the memory (32
-/// took 1.4 times as long).
+/// Pixels whose rays go together, direction by direction.
 inline constexpr std::size_t kRayBatch = 128;
 
-/// Rays from some pixels of a picture to the surface around them. Those of one direction go
-/// together, in vectors: pixels side by side take about as many steps.
+/// Rays from some pixels of a picture to the surface around them.
 class RayBatch {
   public:
     /// No pixel.
@@ -34,13 +32,12 @@ class RayBatch {
     struct Start {
         const std::uint8_t* distances;
         float width, height;
-        std::int32_t surface;
         std::array<float, kRayBatch> x{}, y{};  ///< centres of pixels
     };
 
     /// `distances`: of each pixel from surface, the larger of columns and rows, so that no ray
-    /// crosses more pixels in as many steps; 0 is surface. `surface`: any pixel that is.
-    RayBatch(const Image<std::uint8_t>& distances, std::int32_t surface);
+    /// crosses more pixels in as many steps; 0 is surface.
+    explicit RayBatch(const Image<std::uint8_t>& distances);
 
     [[nodiscard]] bool full() const { return count_ == kRayBatch; }
     [[nodiscard]] std::size_t count() const { return count_; }
