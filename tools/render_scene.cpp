@@ -69,6 +69,7 @@ Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnS
     if (!scene.moving) return cameras;
     const auto noted = [&](std::vector<NovelCamera> pictures) {
         std::vector<double> times;
+        times.reserve(pictures.size());
         for (const NovelCamera& picture : pictures) times.push_back(*picture.time);
         noteOutside(times, scene.moving->timeline(), program.job);
         return pictures;

@@ -335,6 +335,7 @@ void Outlines::measure(const Frame& frame, const Camera& camera, Image<float>& c
         beginBand(static_cast<std::size_t>(n), frame, camera, covered, part, choose, tiles);
     });
     std::vector<PixelMap> maps;
+    maps.reserve(set_.rectangles().size());
     for (const PageRectangle& r : set_.rectangles()) maps.push_back(pixelMap(r.window, camera));
     const auto asked = choose ? askedViews(camera) : std::vector<std::uint8_t>();
     findBlocks(camera, maps, asked, tiles, {w, h});
