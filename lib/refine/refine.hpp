@@ -116,7 +116,8 @@ struct RefineStepReport {
     std::int64_t pixels = 0;  ///< of those; of a step that is done twice, of both times
     std::int64_t moved = 0;   ///< pixels that had a depth before and after, or a colour
     double meanMove = 0;      ///< of those, share of the distance; of colours: of white
-    double milliseconds = 0;  ///< of all processors together, measuring included
+    /// Of all processors together, measuring included; at an import of each view's own thread.
+    double milliseconds = 0;
 
     void add(const RefineStepReport& other);
 };
