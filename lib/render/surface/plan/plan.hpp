@@ -79,11 +79,6 @@ struct SurfaceFrame {
     [[nodiscard]] const std::vector<int>& sourcesOf(int tile) const {
         return tileSources[static_cast<std::size_t>(tile)];
     }
-    /// Whether something is left of a tile's sources behind the first.
-    [[nodiscard]] bool isMean(int tile) const {
-        const auto t = static_cast<std::size_t>(tile);
-        return tileCore[t] < static_cast<int>(tileSources[t].size());
-    }
     /// Samples of a tile from pixels of the frame: what is `apron` pixels before the tile's corner
     /// to the origin, `perPixel` to the pixel, the first sample at ½.
     [[nodiscard]] glm::dmat4 sampleFromPixel(int tile, int perPixel, int apron = 0) const;
