@@ -333,14 +333,13 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         };
         // Damaged files crash its readers of these, and small ones may take any memory. What fails
         // there is not tried here.
+        const auto readOnce = [&]() -> Result<void> {
+            Assimp::Importer importer;
+            STX_CHECK(read(importer, new AssimpFiles(bytes, modelName, files)));
+            return {};
+        };
         if (format == AssimpFormat::dae || format == AssimpFormat::fbx)
-            STX_CHECK(tryApart(
-                [&]() -> Result<void> {
-                    Assimp::Importer importer;
-                    STX_CHECK(read(importer, new AssimpFiles(bytes, modelName, files)));
-                    return {};
-                },
-                files.job().limits));
+            STX_CHECK(tryApart(readOnce, files.job().limits));
         Assimp::Importer importer;
         auto* system = new AssimpFiles(bytes, modelName, files);
         STX_TRY(const aiScene* const scene, read(importer, system));

@@ -20,8 +20,8 @@
 namespace stx {
 namespace {
 
-constexpr int kWidth = 150, kHeight = 70;
-constexpr std::size_t kCount = std::size_t{kWidth} * kHeight;
+constexpr int kDamagedWidth = 150, kDamagedHeight = 70;
+constexpr std::size_t kDamagedCount = std::size_t{kDamagedWidth} * kDamagedHeight;
 constexpr Imf::Compression kAll[] = {
     Imf::NO_COMPRESSION,   Imf::RLE_COMPRESSION,   Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
     Imf::PIZ_COMPRESSION,  Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION,  Imf::B44A_COMPRESSION,
@@ -32,17 +32,18 @@ constexpr Shape kShapes[] = {Shape::lines, Shape::tiles, Shape::mipmap, Shape::r
 
 /// A smooth picture of halves, floats, integers and alpha, the window of which begins below 0.
 Bytes exrOf(Imf::Compression compression, Shape shape) {
-    const Imath::Box2i window({-3, -5}, {kWidth - 4, kHeight - 6});
+    const Imath::Box2i window({-3, -5}, {kDamagedWidth - 4, kDamagedHeight - 6});
     Imf::Header header(window, window);
     header.compression() = compression;
     header.channels().insert("R", Imf::Channel(Imf::HALF));
     header.channels().insert("A", Imf::Channel(Imf::HALF));
     header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
     header.channels().insert("id", Imf::Channel(Imf::UINT));
-    std::vector<float> values(kCount);
-    for (std::size_t i = 0; i < kCount; ++i) values[i] = static_cast<float>(i % kWidth) / 256.0f;
-    std::vector<std::uint16_t> halves(kCount, 0x3c00);
-    std::vector<std::uint32_t> ids(kCount, 7);
+    std::vector<float> values(kDamagedCount);
+    for (std::size_t i = 0; i < kDamagedCount; ++i)
+        values[i] = static_cast<float>(i % kDamagedWidth) / 256.0f;
+    std::vector<std::uint16_t> halves(kDamagedCount, 0x3c00);
+    std::vector<std::uint32_t> ids(kDamagedCount, 7);
     Imf::FrameBuffer pixels;
     pixels.insert("R", Imf::Slice::Make(Imf::HALF, halves.data(), window));
     pixels.insert("A", Imf::Slice::Make(Imf::HALF, halves.data(), window));
@@ -53,7 +54,7 @@ Bytes exrOf(Imf::Compression compression, Shape shape) {
     if (shape == Shape::lines) {
         Imf::OutputFile file(path.c_str(), header);
         file.setFrameBuffer(pixels);
-        file.writePixels(kHeight);
+        file.writePixels(kDamagedHeight);
     } else {
         header.setTileDescription({64, 32,
                                    shape == Shape::tiles    ? Imf::ONE_LEVEL
@@ -74,7 +75,7 @@ Bytes exrOf(Imf::Compression compression, Shape shape) {
 
 Result<void> readAll(const Bytes& bytes) {
     STX_TRY(const auto reader, ExrReader::open(bytes, "a.exr", Limits()));
-    std::vector<float> r(kCount), a(kCount), z(kCount), id(kCount);
+    std::vector<float> r(kDamagedCount), a(kDamagedCount), z(kDamagedCount), id(kDamagedCount);
     return reader.readPart(0,
                            {{"R", r.data()}, {"A", a.data()}, {"Z", z.data()}, {"id", id.data()}});
 }
@@ -109,7 +110,7 @@ std::size_t firstLevelChunks(Imf::Compression compression, Shape shape) {
                       : compression == Imf::ZIP_COMPRESSION || compression == Imf::PXR24_COMPRESSION
                           ? 16
                           : 32;
-    return static_cast<std::size_t>((kHeight + lines - 1) / lines);
+    return static_cast<std::size_t>((kDamagedHeight + lines - 1) / lines);
 }
 
 TEST(ExrDamage, WholeFilesOfEachKindAreRead) {

@@ -21,17 +21,17 @@ std::vector<RectangleGroup> groupsOf(const std::vector<glm::ivec2>& sizes) {
     return groups;
 }
 
-struct Page {
+struct PackedPage {
     int height = 0;
     std::vector<int> left;
     std::vector<SkylinePlace> places;
 };
 
-Page fillPage(const std::vector<RectangleGroup>& groups, int width, int maxHeight, GapRule rule,
-              bool mayTurn = false, int giveUpAbove = 1 << 30) {
+PackedPage fillPage(const std::vector<RectangleGroup>& groups, int width, int maxHeight,
+                    GapRule rule, bool mayTurn = false, int giveUpAbove = 1 << 30) {
     std::vector<int> order(groups.size());
     std::iota(order.begin(), order.end(), 0);
-    Page page;
+    PackedPage page;
     for (const auto& group : groups) page.left.push_back(static_cast<int>(group.members.size()));
     page.height = Skyline(groups).fill(width, maxHeight, order, rule, mayTurn, giveUpAbove,
                                        page.left, &page.places);
@@ -51,7 +51,7 @@ TEST(Skyline, PlacesAreInsideThePageAndApart) {
             for (unsigned n = random() % 4 + 1; n > 0; --n) group.members.push_back(next++);
             groups.push_back(group);
         }
-        const Page page = fillPage(groups, 100, 150, rule, true);
+        const PackedPage page = fillPage(groups, 100, 150, rule, true);
         Image<int> owner(100, 150, -1);
         std::vector<int> placed(groups.size(), 0);
         int top = 0;
@@ -80,7 +80,7 @@ TEST(Skyline, PlacesAreInsideThePageAndApart) {
 TEST(Skyline, WhatFitsExactlyLeavesNoGap) {
     // 40 + 60 wide below, 100 above; the order would put the 50 first.
     const auto groups = groupsOf({{40, 20}, {50, 20}, {60, 20}, {100, 10}});
-    const Page page = fillPage(groups, 100, 30, GapRule::firstFit);
+    const PackedPage page = fillPage(groups, 100, 30, GapRule::firstFit);
     EXPECT_EQ(page.height, 30);
     EXPECT_EQ(page.left, (std::vector{0, 1, 0, 0}));
 }
@@ -88,7 +88,7 @@ TEST(Skyline, WhatFitsExactlyLeavesNoGap) {
 TEST(Skyline, TurnsRectanglesOnlyWhereItMay) {
     const auto groups = groupsOf({{20, 90}, {20, 90}});
     EXPECT_EQ(fillPage(groups, 90, 60, GapRule::firstFit, false).left, (std::vector{1, 1}));
-    const Page turned = fillPage(groups, 90, 60, GapRule::firstFit, true);
+    const PackedPage turned = fillPage(groups, 90, 60, GapRule::firstFit, true);
     EXPECT_EQ(turned.left, (std::vector{0, 0}));
     EXPECT_EQ(turned.height, 40);
     EXPECT_TRUE(turned.places[0].turned && turned.places[1].turned);
@@ -103,7 +103,7 @@ TEST(Skyline, TheWidestComesFirstWhereThatIsTheRule) {
 
 TEST(Skyline, GivesUpOnceThePageIsTooHigh) {
     const auto groups = groupsOf({{100, 40}, {100, 40}, {100, 40}});
-    const Page page = fillPage(groups, 100, 1000, GapRule::firstFit, false, 50);
+    const PackedPage page = fillPage(groups, 100, 1000, GapRule::firstFit, false, 50);
     EXPECT_GT(page.height, 50);
     EXPECT_EQ(page.left[2], 1) << "it went on";
     EXPECT_EQ(fillPage(groups, 100, 1000, GapRule::firstFit, false, 120).height, 120);

@@ -10,16 +10,18 @@
 namespace stx {
 namespace {
 
-constexpr int kSide = 96;
+constexpr int kNoisySide = 96;
 
 /// q of a slanted plane, nearer by `step` (a share) in its right half, with noise (a share).
 Image<float> steppedPlane(double step, double noise) {
-    Image<float> q(kSide, kSide);
-    for (int y = 0; y < kSide; ++y) {
-        for (int x = 0; x < kSide; ++x) {
-            const double plane = (0.25 + 0.0002 * x + 0.0001 * y) * (x < kSide / 2 ? 1 : 1 + step);
+    Image<float> q(kNoisySide, kNoisySide);
+    for (int y = 0; y < kNoisySide; ++y) {
+        for (int x = 0; x < kNoisySide; ++x) {
+            const double plane =
+                (0.25 + 0.0002 * x + 0.0001 * y) * (x < kNoisySide / 2 ? 1 : 1 + step);
             q.at(x, y) = static_cast<float>(
-                plane * (1 + noise * noisy::normal(7, static_cast<std::uint64_t>(y * kSide + x))));
+                plane *
+                (1 + noise * noisy::normal(7, static_cast<std::uint64_t>(y * kNoisySide + x))));
         }
     }
     return q;
@@ -77,8 +79,8 @@ TEST(DepthNoise, SmoothingLeavesAFifthOfItAndKeepsTheStep) {
     EXPECT_GT(left, difference(q, exact));
     EXPECT_LT(difference(q, exact), 0.005 / 4);
     // Nothing comes to lie between the two surfaces.
-    for (int y = 0; y < kSide; ++y)
-        for (const int x : {kSide / 2 - 1, kSide / 2})
+    for (int y = 0; y < kNoisySide; ++y)
+        for (const int x : {kNoisySide / 2 - 1, kNoisySide / 2})
             EXPECT_NEAR(q.at(x, y) / exact.at(x, y), 1, 0.015) << x << " " << y;
 }
 
@@ -92,14 +94,14 @@ TEST(DepthNoise, ExactDepthStaysAsItIs) {
 TEST(DepthNoise, PinholesInASurfaceAreClosedButNoOthers) {
     const Image<float> exact = steppedPlane(0.05, 0);
     Image<float> q = exact;
-    Image<std::uint8_t> covered(kSide, kSide, 1);
-    q.at(20, 20) = q.at(60, 30) = q.at(60, 60) = q.at(61, 60) = q.at(kSide / 2, 40) = 0;
+    Image<std::uint8_t> covered(kNoisySide, kNoisySide, 1);
+    q.at(20, 20) = q.at(60, 30) = q.at(60, 60) = q.at(61, 60) = q.at(kNoisySide / 2, 40) = 0;
     covered.at(60, 30) = 0;  // background
     closeMissedPixels(q, covered, {}, 0);
     EXPECT_NEAR(q.at(20, 20) / exact.at(20, 20), 1, 1e-4);
     EXPECT_EQ(q.at(60, 30), 0.0f);
-    EXPECT_EQ(q.at(60, 60), 0.0f);         // two pixels
-    EXPECT_EQ(q.at(kSide / 2, 40), 0.0f);  // on the step
+    EXPECT_EQ(q.at(60, 60), 0.0f);              // two pixels
+    EXPECT_EQ(q.at(kNoisySide / 2, 40), 0.0f);  // on the step
 }
 
 }  // namespace

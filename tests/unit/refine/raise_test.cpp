@@ -19,12 +19,12 @@ double distance(double x, double y) {
     return inFront(x, y) ? 1 / (0.9 + 0.0006 * y) : 1 / (0.3 + 0.0004 * x);
 }
 
-struct Scene {
+struct RaisedScene {
     Texture picture;
     Image<float> depth, truth;
 };
 
-Scene scene(bool wallIsThere) {
+RaisedScene scene(bool wallIsThere) {
     Rgba8Image picture(kWide, kHigh);
     Image<float> truth(kWide, kHigh, kNoDepth), depth(kWide / kFactor, kHigh / kFactor, kNoDepth);
     for (int y = 0; y < kHigh; ++y)
@@ -46,7 +46,7 @@ Scene scene(bool wallIsThere) {
     return {Texture(std::move(picture)), std::move(depth), std::move(truth)};
 }
 
-bool alike(float a, float b) {
+bool nearlySame(float a, float b) {
     return hasPoint(a) == hasPoint(b) && (!hasPoint(a) || std::abs(a / b - 1) < 0.02f);
 }
 
@@ -63,14 +63,15 @@ Image<float> raisedTo(const Texture& picture, const Image<float>& depth) {
 
 TEST(RaiseDepth, PutsEdgesWhereThePictureHasThem) {
     for (const bool wall : {true, false}) {
-        const Scene s = scene(wall);
+        const RaisedScene s = scene(wall);
         const Image<float> raised = raisedTo(s.picture, s.depth);
         ASSERT_EQ(raised.width(), kWide);
         int wrong = 0, wrongOfNearest = 0;
         for (int y = 0; y < kHigh; ++y)
             for (int x = 0; x < kWide; ++x) {
-                wrong += !alike(raised.at(x, y), s.truth.at(x, y));
-                wrongOfNearest += !alike(s.depth.at(x / kFactor, y / kFactor), s.truth.at(x, y));
+                wrong += !nearlySame(raised.at(x, y), s.truth.at(x, y));
+                wrongOfNearest +=
+                    !nearlySame(s.depth.at(x / kFactor, y / kFactor), s.truth.at(x, y));
             }
         EXPECT_GT(wrongOfNearest, 300);
         EXPECT_LT(wrong, wrongOfNearest / 10);
@@ -78,7 +79,7 @@ TEST(RaiseDepth, PutsEdgesWhereThePictureHasThem) {
 }
 
 TEST(RaiseDepth, MakesNoPointBetweenSurfaces) {
-    const Scene s = scene(true);
+    const RaisedScene s = scene(true);
     const Image<float> raised = raisedTo(s.picture, s.depth);
     for (int y = 0; y < kHigh; ++y)
         for (int x = 0; x < kWide; ++x) {

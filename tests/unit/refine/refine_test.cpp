@@ -16,15 +16,15 @@
 namespace stx {
 namespace {
 
-constexpr int kViews = 3, kWidth = 160, kHeight = 120;
+constexpr int kRefinedViews = 3, kWidth = 160, kHeight = 120;
 
 /// Small views of a closed room: every pixel is a point.
 Bundle room() {
     Bundle bundle;
-    for (int i = 0; i < kViews; ++i)
+    for (int i = 0; i < kRefinedViews; ++i)
         bundle.views.push_back(viewOfAnalyticScene(
             AnalyticScene::room,
-            analyticCamera(AnalyticScene::room, i, kViews).resized(kWidth, kHeight), 2));
+            analyticCamera(AnalyticScene::room, i, kRefinedViews).resized(kWidth, kHeight), 2));
     return bundle;
 }
 
@@ -64,8 +64,8 @@ TEST(Refine, SaysWhatItFoundAndDid) {
     RefineReport report;
     const PageSet refined = PageSet(bundle).refined({}, &report);
     EXPECT_NEAR(report.noise, 0.005, 0.0015);
-    EXPECT_EQ(report.of(RefineStep::noise).views, kViews);
-    EXPECT_GT(report.of(RefineStep::noise).pixels, kViews * kWidth * kHeight * 9 / 10);
+    EXPECT_EQ(report.of(RefineStep::noise).views, kRefinedViews);
+    EXPECT_GT(report.of(RefineStep::noise).pixels, kRefinedViews * kWidth * kHeight * 9 / 10);
     EXPECT_NEAR(report.of(RefineStep::noise).meanMove, 0.004, 0.002);
     EXPECT_GT(report.of(RefineStep::agree).pixels, 0);
     EXPECT_EQ(report.of(RefineStep::strays).pixels, 0) << "of splats only";

@@ -11,7 +11,7 @@
 namespace stx {
 namespace {
 
-constexpr int kWide = 240, kHigh = 120;
+constexpr int kShiftedWidth = 240, kShiftedHeight = 120;
 constexpr double kSlope = 0.02;
 
 /// Something with texture of several pixels' size, at any place between pixels; 0..1.
@@ -22,9 +22,9 @@ double pattern(double x, double y) {
 
 /// The pattern on a slanted surface, from `steps` beside; brighter by `gain`.
 Texture seenFrom(double steps, double gain = 1.0) {
-    Image<glm::vec4> picture(kWide, kHigh);
-    for (int y = 0; y < kHigh; ++y)
-        for (int x = 0; x < kWide; ++x) {
+    Image<glm::vec4> picture(kShiftedWidth, kShiftedHeight);
+    for (int y = 0; y < kShiftedHeight; ++y)
+        for (int x = 0; x < kShiftedWidth; ++x) {
             // x - steps * (20 + kSlope * x0) = x, solved for x0.
             const double x0 = (x + steps * 20) / (1 - steps * kSlope);
             picture.at(x, y) =
@@ -35,9 +35,10 @@ Texture seenFrom(double steps, double gain = 1.0) {
 
 /// Disparities that are `less` than they are.
 Image<float> disparities(double less) {
-    Image<float> d(kWide, kHigh);
-    for (int y = 0; y < kHigh; ++y)
-        for (int x = 0; x < kWide; ++x) d.at(x, y) = static_cast<float>(20 + kSlope * x - less);
+    Image<float> d(kShiftedWidth, kShiftedHeight);
+    for (int y = 0; y < kShiftedHeight; ++y)
+        for (int x = 0; x < kShiftedWidth; ++x)
+            d.at(x, y) = static_cast<float>(20 + kSlope * x - less);
     return d;
 }
 
@@ -55,9 +56,9 @@ TEST(DisparityShift, IsNoneWhereNothingTells) {
     EXPECT_EQ(disparityShift(disparities(0), seenFrom(0), right, 0.6), 0.0) << "nothing is off";
     EXPECT_EQ(disparityShift(disparities(2), seenFrom(0), right, 0.6), 0.0) << "off by too much";
     EXPECT_EQ(disparityShift(disparities(0.3), seenFrom(0), {}, 0.6), 0.0);
-    const Texture plain = Image<glm::vec4>(kWide, kHigh, glm::vec4(0.5f));
+    const Texture plain = Image<glm::vec4>(kShiftedWidth, kShiftedHeight, glm::vec4(0.5f));
     EXPECT_EQ(disparityShift(disparities(0.3), plain, right, 0.6), 0.0) << "no texture";
-    const Image<float> unknown(kWide, kHigh, kNoDepth);
+    const Image<float> unknown(kShiftedWidth, kShiftedHeight, kNoDepth);
     EXPECT_EQ(disparityShift(unknown, seenFrom(0), right, 0.6), 0.0);
 }
 

@@ -55,10 +55,10 @@ TEST(Fuse, VotesCountHalfWhereNoiseMayPutASteepSurface) {
     SurfaceScene scene(bundle);
     const LocalSource local{&scene.sources[0], warpFrom(glm::dmat4(1.0))};
     shared::Votes votes{{{&local, 1}}};
-    constexpr int kPixel = kTile / 2;
+    constexpr int kMiddle = kTile / 2;
     const auto voteOn = [&](float pixelsBefore) {
-        return votes.voteOf(0, kPixel + 0.5f, kPixel + 0.5f,
-                            0.5f + kSlope * (kPixel + pixelsBefore));
+        return votes.voteOf(0, kMiddle + 0.5f, kMiddle + 0.5f,
+                            0.5f + kSlope * (kMiddle + pixelsBefore));
     };
     EXPECT_EQ(voteOn(1), shared::Votes::kWholeVote);
     scene.sources[0].beside = 2;

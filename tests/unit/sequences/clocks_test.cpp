@@ -15,7 +15,7 @@ using namespace stx;
 
 namespace {
 
-constexpr int kFrames = 12;
+constexpr int kClockFrames = 12;
 
 /// A film through one container.
 std::unique_ptr<Sequence> through(const std::string& target, Sequence& frames,
@@ -63,18 +63,18 @@ std::vector<std::size_t> shownAt(const Timeline& line, const std::vector<double>
 
 TEST(Clocks, TheTimesOfFramesShowEachFrameOnce) {
     std::vector<std::size_t> each;
-    for (std::size_t i = 0; i < kFrames; ++i) each.push_back(i);
+    for (std::size_t i = 0; i < kClockFrames; ++i) each.push_back(i);
     for (const double rate :
          {24000.0 / 1001, 24.0, 25.0, 29.5, 30000.0 / 1001, 30.0, 39.0, 60000.0 / 1001, 120.0})
         for (const std::string& target : containers()) {
             // Its ticks are those of other .mp4; encoding takes long.
             if (target == "h264.mp4" && rate != 39) continue;
             TemporaryFolder folder;
-            MovingViews frames(kFrames, rate, false);
+            MovingViews frames(kClockFrames, rate, false);
             const auto read = through(target, frames, folder);
             ASSERT_TRUE(read);
             std::vector<double> times;
-            for (int i = 0; i < kFrames; ++i) times.push_back(i / rate);
+            for (int i = 0; i < kClockFrames; ++i) times.push_back(i / rate);
             EXPECT_EQ(shownAt(read->timeline(), times), each) << target << " at " << rate;
             EXPECT_EQ(read->timeline().count(), each.size()) << target << " at " << rate;
             EXPECT_NEAR(read->timeline().rate(), rate, 1e-4) << target;
