@@ -34,10 +34,10 @@ measures::Outcome worseThanBefore(Pictures& pictures, const Drawn& how, const Fr
 Measure alike(const Pictures& pictures, const Drawn& how, const Frame& before, const Frame& changed,
               glm::ivec2 first = {0, 0}) {
     // Less than half a step of 8 bits: the order in which numbers are added.
-    constexpr double kSame = 54;
+    constexpr double kNoDifference = 54;
     const double between = psnrBetween(before, changed);
     const double psnrA = pictures.psnr(before, first), psnrB = pictures.psnr(changed, first);
-    return {between >= kSame ? 0 : worseBy(psnrB, psnrA),
+    return {between >= kNoDifference ? 0 : worseBy(psnrB, psnrA),
             fmt::format("{}: {:.2f} dB between the two, {:.2f} and {:.2f} dB from the truth",
                         nameOf(how), between, psnrA, psnrB),
             true};
