@@ -59,7 +59,7 @@ std::string heard(int fd) {
 }  // namespace
 
 Result<void> tryApart(const std::function<Result<void>()>& work, const Limits& limits) {
-    const std::uint64_t space = addressSpace();
+    [[maybe_unused]] const std::uint64_t space = addressSpace();
     int ends[2] = {-1, -1};
     if (::pipe2(ends, O_CLOEXEC) != 0)
         return fail(ErrorCode::failed, "no process can be made to read the model in: {}",
