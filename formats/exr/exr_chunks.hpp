@@ -17,7 +17,7 @@ struct ChunkLayout {
     int part = -1;
 };
 
-/// Scan lines of a chunk of a compression (ExrPart::compression); 0 when there is no such.
+/// Scan lines of a chunk of a compression (ExrPart::compression); 0 for any other number.
 [[nodiscard]] int linesOfChunk(std::string_view compression);
 
 /// Errors (invalidInput) when a chunk of the part is empty, not where the table says, or unpacks to

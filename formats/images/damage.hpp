@@ -5,7 +5,7 @@
 
 namespace stx {
 
-/// While one lives, a damaged JPEG is drawn as far as it goes, and `note` is told which and why,
+/// While one lives, a damaged JPEG is drawn as far as it goes, and `note` is given which and why,
 /// from any thread; else it is an error. For the whole process, as ThreadLimit is: the person who
 /// runs it says once what a damaged picture is worth (`--damaged keep`). One at a time.
 class KeepDamaged {

@@ -155,8 +155,8 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
         throw Failed{ErrorCode::invalidInput,
                      fmt::format("it is not an image of a known kind ('{}')", format)};
     }
-    const auto mended = format == "tiff" ? mendedTiff(file) : std::vector<std::byte>();
-    const std::span bytes = mended.empty() ? file : std::span<const std::byte>(mended);
+    const auto repaired = format == "tiff" ? repairedTiff(file) : std::vector<std::byte>();
+    const std::span bytes = repaired.empty() ? file : std::span<const std::byte>(repaired);
     OIIO::Filesystem::IOMemReader reader(const_cast<std::byte*>(bytes.data()), bytes.size());
     std::unique_ptr<MemoryFile> memory;
     OIIO::ImageSpec spec;

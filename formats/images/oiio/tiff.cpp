@@ -96,7 +96,7 @@ const std::string& TiffErrors::first() {
     return kept().first;
 }
 
-std::vector<std::byte> mendedTiff(std::span<const std::byte> file) {
+std::vector<std::byte> repairedTiff(std::span<const std::byte> file) {
     constexpr std::uint64_t kBitsPerSample = 258, kCompression = 259, kSamplesPerPixel = 277;
     constexpr std::uint64_t kShort = 3, kAdobeDeflate = 8, kDeflate = 32946;
     const Numbers numbers(file);

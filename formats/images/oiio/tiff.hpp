@@ -11,7 +11,7 @@ namespace stx::codecs {
 /// directory has no BitsPerSample it is 1 (TIFF 6.0, section 8), as in the masks of some programs,
 /// but taken for 8: the tag is added. Deflate gets its other number (32946 for 8): it inflates the
 /// first kind itself and goes on when that fails, while libtiff says so.
-[[nodiscard]] std::vector<std::byte> mendedTiff(std::span<const std::byte> file);
+[[nodiscard]] std::vector<std::byte> repairedTiff(std::span<const std::byte> file);
 
 /// Keeps the first error of libtiff while it lives, of any thread. One at a time.
 class TiffErrors {
