@@ -17,13 +17,6 @@ constexpr std::array kWayNames{"normal", "best", "splat"};
 /// Fewer pixels than this say nothing about a share of them.
 constexpr std::int64_t kFewest = 100;
 
-std::int64_t coveredCount(const Frame& frame, const Image<std::uint8_t>& seen, int least) {
-    std::int64_t count = 0;
-    for (std::size_t i = 0; i < seen.count(); ++i)
-        count += seen.data()[i] >= least && frame.colour.data()[i].a >= 0.5f;
-    return count;
-}
-
 }  // namespace
 
 namespace measures {
@@ -36,49 +29,35 @@ int pick(const Pictures& pictures, int salt, int below) {
 }
 
 Outcome openWhereSeen(Pictures& pictures) {
-    const std::int64_t seen = pictures.seenCount(2);
-    if (seen < kFewest) return std::nullopt;
     Measure out;
     for (std::size_t i = 0; i < kWays.size(); ++i) {
         STX_TRY(const Frame* frame, pictures.of(kWays[i]));
-        const double open =
-            100.0 * double(seen - coveredCount(*frame, pictures.seenBy(), 2)) / double(seen);
-        out.found = std::max(out.found, open);
-        out.what += fmt::format("{}{} {:.2f} %", i ? ", " : "open: ", kWayNames[i], open);
+        const auto open = pictures.openShare(*frame, 2);
+        if (!open) return std::nullopt;
+        out.found = std::max(out.found, *open);
+        out.what += fmt::format("{}{} {:.2f} %", i ? ", " : "open: ", kWayNames[i], *open);
     }
     return out;
 }
 
 Outcome drawnWhereEmpty(Pictures& pictures) {
-    std::int64_t empty = 0;
-    for (const std::uint8_t e : pictures.empty().pixels()) empty += e != 0;
-    if (empty < kFewest) return std::nullopt;
     Measure out;
     for (std::size_t i = 0; i < kWays.size(); ++i) {
         STX_TRY(const Frame* frame, pictures.of(kWays[i]));
-        const double drawn =
-            100.0 * double(coveredCount(*frame, pictures.empty(), 255)) / double(empty);
-        out.found = std::max(out.found, drawn);
-        out.what += fmt::format("{}{} {:.2f} %", i ? ", " : "drawn: ", kWayNames[i], drawn);
+        const auto drawn = pictures.drawnShare(*frame);
+        if (!drawn) return std::nullopt;
+        out.found = std::max(out.found, *drawn);
+        out.what += fmt::format("{}{} {:.2f} %", i ? ", " : "drawn: ", kWayNames[i], *drawn);
     }
     return out;
 }
 
 Outcome betterQualityCoversLess(Pictures& pictures) {
-    const std::int64_t seen = pictures.seenCount(1);
-    if (seen < kFewest) return std::nullopt;
-    Measure out;
-    double before = 0;
-    for (const auto& [how, name] : {std::pair(kNormal, "normal"), {kBest, "best"}}) {
-        STX_TRY(const Frame* frame, pictures.of(how));
-        const double covered =
-            100.0 * double(coveredCount(*frame, pictures.seenBy(), 1)) / double(seen);
-        out.found = std::max(out.found, before - covered);
-        out.what +=
-            fmt::format("{}{} {:.2f} %", out.what.empty() ? "covered: " : ", ", name, covered);
-        before = covered;
-    }
-    return out;
+    STX_TRY(const Frame* normal, pictures.of(kNormal));
+    STX_TRY(const Frame* best, pictures.of(kBest));
+    const auto n = pictures.openShare(*normal, 1), b = pictures.openShare(*best, 1);
+    if (!n || !b) return std::nullopt;
+    return Measure{*b - *n, fmt::format("open: normal {:.2f} %, best {:.2f} %", *n, *b)};
 }
 
 Outcome betterQualityIsWorse(Pictures& pictures) {

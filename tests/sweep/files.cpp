@@ -32,21 +32,45 @@ class Folder {
     std::filesystem::path path_;
 };
 
-/// How much worse a model is drawn than the bundle that it was made of.
-measures::Outcome drawnFrom(Pictures& pictures, Model model, const std::string& name, int salt) {
-    const Drawn how{measures::pick(pictures, salt, 3) == 0 ? RenderMode::splat
-                                                           : RenderMode::surface};
+/// The picture of a model, and how it is drawn.
+struct FromFile {
+    Drawn how;
+    Frame frame;
+};
+
+Result<FromFile> drawModel(const Pictures& pictures, Model model, int salt) {
+    FromFile out;
+    out.how.mode =
+        measures::pick(pictures, salt, 3) == 0 ? RenderMode::splat : RenderMode::surface;
     RenderSettings settings;
-    settings.mode = how.mode;
+    settings.mode = out.how.mode;
     settings.fill = Fill::none;
     Job job;
     STX_TRY(const auto renderer, rendererOf(std::move(model), settings, job, Backend::cpu));
-    STX_TRY(const Frame changed, renderer->render(pictures.captured().novel));
-    STX_TRY(const Frame* frame, pictures.of(how));
-    const double before = pictures.psnr(*frame), after = pictures.psnr(changed);
+    STX_TRY(out.frame, renderer->render(pictures.captured().novel));
+    return out;
+}
+
+/// How much worse a model is drawn than the bundle that it was made of.
+measures::Outcome drawnFrom(Pictures& pictures, Model model, const std::string& name, int salt) {
+    STX_TRY(const FromFile changed, drawModel(pictures, std::move(model), salt));
+    STX_TRY(const Frame* frame, pictures.of(changed.how));
+    const double before = pictures.psnr(*frame), after = pictures.psnr(changed.frame);
     return Measure{worseBy(after, before),
                    fmt::format("{}, {}: views {:.2f} dB, from the file {:.2f} dB", name,
-                               how.mode == RenderMode::splat ? "splat" : "surface", before, after)};
+                               changed.how.name(), before, after)};
+}
+
+/// The picture of the pruned atlas of a case.
+Result<FromFile> drawPruned(const Pictures& pictures) {
+    Job job;
+    Bundle bundle = pictures.captured().bundle;
+    STX_TRY(const PruneReport report, prune(bundle, {}, job));
+    PackSettings settings;
+    settings.layout = PackSettings::Layout::tight;
+    settings.sourcePixels = report.sourcePixels;
+    STX_TRY(Atlas packed, pack(bundle, settings, job));
+    return drawModel(pictures, std::move(packed), 221);
 }
 
 }  // namespace
@@ -85,14 +109,27 @@ Outcome atlas(Pictures& pictures) {
 }
 
 Outcome prunedAtlas(Pictures& pictures) {
-    Job job;
-    Bundle bundle = pictures.captured().bundle;
-    STX_TRY(const PruneReport report, prune(bundle, {}, job));
-    PackSettings settings;
-    settings.layout = PackSettings::Layout::tight;
-    settings.sourcePixels = report.sourcePixels;
-    STX_TRY(Atlas packed, pack(bundle, settings, job));
-    return drawnFrom(pictures, std::move(packed), "pruned", 221);
+    STX_TRY(const FromFile pruned, drawPruned(pictures));
+    STX_TRY(const Frame* frame, pictures.of(pruned.how));
+    const auto before = pictures.psnrAwayFromOutlines(*frame),
+               after = pictures.psnrAwayFromOutlines(pruned.frame);
+    if (!before || !after) return std::nullopt;
+    return Measure{
+        worseBy(*after, *before),
+        fmt::format("{}, away from outlines: views {:.2f} dB, from the file {:.2f} dB; in all "
+                    "{:.2f} and {:.2f} dB",
+                    pruned.how.name(), *before, *after, pictures.psnr(*frame),
+                    pictures.psnr(pruned.frame))};
+}
+
+Outcome prunedOutline(Pictures& pictures) {
+    STX_TRY(const FromFile pruned, drawPruned(pictures));
+    // What only two views show may be all that one of them keeps, at a grazing angle.
+    const auto open = pictures.openShare(pruned.frame, 3), drawn = pictures.drawnShare(pruned.frame);
+    if (!open || !drawn) return std::nullopt;
+    return Measure{std::max(*open, *drawn),
+                   fmt::format("{}: open {:.2f} %, drawn where nothing is {:.2f} %",
+                               pruned.how.name(), *open, *drawn)};
 }
 
 Outcome clock(Pictures& pictures) {

@@ -32,6 +32,7 @@ Outcome gpu(Pictures& pictures);
 Outcome container(Pictures& pictures);
 Outcome atlas(Pictures& pictures);
 Outcome prunedAtlas(Pictures& pictures);
+Outcome prunedOutline(Pictures& pictures);
 Outcome clock(Pictures& pictures);
 
 // unknown_depth.cpp: pixels that a sensor missed.

@@ -6,6 +6,9 @@ using namespace stx;
 namespace {
 
 constexpr double kSame = 99;  ///< dB of pictures without a difference
+/// Fewer pixels than this say nothing about a share of them.
+constexpr std::int64_t kFewest = 100;
+constexpr float kCovered = 0.5f;  ///< alpha from which on a pixel counts as covered
 
 double decibels(double squared, double values) {
     return squared > 0 ? std::min(kSame, -10 * std::log10(squared / values)) : kSame;
@@ -68,8 +71,10 @@ Pictures::Pictures(const Captured& captured)
     : captured_(captured),
       seenBy_(captured.novel.width, captured.novel.height, 0),
       empty_(captured.novel.width, captured.novel.height, 0),
-      guessed_(captured.novel.width, captured.novel.height, 0) {
+      guessed_(captured.novel.width, captured.novel.height, 0),
+      nearOutline_(captured.novel.width, captured.novel.height, 0) {
     findGuesses();
+    findOutlines();
     const Camera& novel = captured.novel;
     const Rgba8Image& truth = *captured.truth.texture.rgba8();
     // A texel is so many novel pixels wide, at half of it outlines may be drawn too large.
@@ -139,18 +144,79 @@ std::int64_t Pictures::seenCount(int least) const {
     return count;
 }
 
+std::optional<double> Pictures::openShare(const Frame& frame, int least) const {
+    std::int64_t open = 0, seen = 0;
+    for (std::size_t i = 0; i < seenBy_.count(); ++i) {
+        if (seenBy_.data()[i] < least) continue;
+        ++seen;
+        open += frame.colour.data()[i].a < kCovered;
+    }
+    if (seen < kFewest) return std::nullopt;
+    return 100.0 * double(open) / double(seen);
+}
+
+std::optional<double> Pictures::drawnShare(const Frame& frame) const {
+    std::int64_t drawn = 0, empty = 0;
+    for (std::size_t i = 0; i < empty_.count(); ++i) {
+        if (empty_.data()[i] == 0) continue;
+        ++empty;
+        drawn += frame.colour.data()[i].a >= kCovered;
+    }
+    if (empty < kFewest) return std::nullopt;
+    return 100.0 * double(drawn) / double(empty);
+}
+
+void Pictures::findOutlines() {
+    const Camera& novel = captured_.novel;
+    Image<int> surfaces(novel.width, novel.height);
+    for (int y = 0; y < novel.height; ++y)
+        for (int x = 0; x < novel.width; ++x)
+            surfaces.at(x, y) = captured_.scene.trace(novel, x + 0.5, y + 0.5).surface;
+    const int margin = static_cast<int>(std::ceil(captured_.from.magnification));
+    const auto mark = [&](int x, int y) {
+        for (int v = y - margin; v <= y + margin; ++v)
+            for (int u = x - margin; u <= x + margin; ++u)
+                if (nearOutline_.contains(u, v)) nearOutline_.at(u, v) = 1;
+    };
+    for (int y = 0; y < novel.height; ++y) {
+        for (int x = 0; x < novel.width; ++x) {
+            const int here = surfaces.at(x, y);
+            if ((x > 0 && surfaces.at(x - 1, y) != here) ||
+                (y > 0 && surfaces.at(x, y - 1) != here))
+                mark(x, y);
+        }
+    }
+}
+
+double Pictures::squaredError(const Frame& frame, int x, int y, glm::ivec2 first) const {
+    const glm::vec4 t =
+        glm::vec4(captured_.truth.texture.rgba8()->at(x + first.x, y + first.y)) / 255.0f;
+    const glm::vec3 d = glm::vec3(frame.colour.at(x, y)) - glm::vec3(t) * t.a;
+    return glm::dot(d, d);
+}
+
 double Pictures::psnr(const Frame& frame, glm::ivec2 first) const {
-    const Rgba8Image& truth = *captured_.truth.texture.rgba8();
     double squared = 0, judged = 0;
     for (int y = 0; y < frame.colour.height(); ++y) {
         for (int x = 0; x < frame.colour.width(); ++x) {
             if (guessed_.at(x + first.x, y + first.y)) continue;
             judged += 1;
-            const glm::vec4 t = glm::vec4(truth.at(x + first.x, y + first.y)) / 255.0f;
-            const glm::vec3 d = glm::vec3(frame.colour.at(x, y)) - glm::vec3(t) * t.a;
-            squared += glm::dot(d, d);
+            squared += squaredError(frame, x, y, first);
         }
     }
+    return decibels(squared, 3.0 * judged);
+}
+
+std::optional<double> Pictures::psnrAwayFromOutlines(const Frame& frame) const {
+    double squared = 0, judged = 0;
+    for (int y = 0; y < frame.colour.height(); ++y) {
+        for (int x = 0; x < frame.colour.width(); ++x) {
+            if (guessed_.at(x, y) || nearOutline_.at(x, y)) continue;
+            judged += 1;
+            squared += squaredError(frame, x, y);
+        }
+    }
+    if (judged < double(kFewest)) return std::nullopt;
     return decibels(squared, 3.0 * judged);
 }
 

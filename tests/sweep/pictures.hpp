@@ -14,6 +14,10 @@ struct Drawn {
     stx::Backend backend = stx::Backend::cpu;
 
     auto operator<=>(const Drawn&) const = default;
+    /// "splat" or "surface".
+    [[nodiscard]] const char* name() const {
+        return mode == stx::RenderMode::splat ? "splat" : "surface";
+    }
 };
 
 /// Draws one picture without filling (what is filled in is a guess, which no rule can judge).
@@ -38,17 +42,28 @@ class Pictures {
     [[nodiscard]] const stx::Image<std::uint8_t>& empty() const { return empty_; }
     /// Pixels of seenBy() that count at least `least`.
     [[nodiscard]] std::int64_t seenCount(int least) const;
+    /// Percent of the pixels that at least `least` views show for sure which a frame leaves open,
+    /// or of those of empty() which it covers. Nothing where they are fewer than a hundred.
+    [[nodiscard]] std::optional<double> openShare(const stx::Frame& frame, int least) const;
+    [[nodiscard]] std::optional<double> drawnShare(const stx::Frame& frame) const;
     /// PSNR of a frame against the truth, before black, without the pixels where the truth shows
     /// something that no view shows: what is drawn there is a guess. `frame` may be a part of the
     /// picture whose pixel (0, 0) is at `first`.
     [[nodiscard]] double psnr(const stx::Frame& frame, glm::ivec2 first = {0, 0}) const;
+    /// The same without what lies within a texel of an outline or of a crease of the truth.
+    /// Nothing where that leaves fewer than a hundred pixels.
+    [[nodiscard]] std::optional<double> psnrAwayFromOutlines(const stx::Frame& frame) const;
 
   private:
     const Captured& captured_;
     void findGuesses();
+    void findOutlines();
+    [[nodiscard]] double squaredError(const stx::Frame& frame, int x, int y,
+                                      glm::ivec2 first = {0, 0}) const;
 
     stx::Image<std::uint8_t> seenBy_, empty_;
-    stx::Image<std::uint8_t> guessed_;  ///< 1 = not judged
+    stx::Image<std::uint8_t> guessed_;      ///< 1 = not judged
+    stx::Image<std::uint8_t> nearOutline_;  ///< 1 = within a texel of an outline or a crease
     std::map<Drawn, stx::Frame> drawn_;
 };
 

@@ -46,7 +46,8 @@ const std::vector<SweepRule>& rules() {
         {"container", "a file keeps what is drawn", 0.3, "dB", "16 bits of depth", 0.15,
          measures::container},
         {"atlas", "an atlas is drawn like its views", 0.3, "dB", "", 0.15, measures::atlas},
-        {"pruned", "a pruned atlas is drawn almost like its views", 2, "dB", "", 0.1,
+        {"pruned", "a pruned atlas is drawn almost like its views, away from outlines", 2, "dB",
+         "fewer views know where outlines run: those may move by a part of a texel", 0.1,
          measures::prunedAtlas},
         {"clock", "each frame of a film is shown at its time", 0, "frames", "as asked", 0.1,
          measures::clock},
@@ -54,6 +55,8 @@ const std::vector<SweepRule>& rules() {
          "", 0.5, measures::unknownDepth},
         {"noisy", "noisy surfaces are not worse than noisy splats", 0.5, "dB", "as for exact depth",
          0.2, measures::noisySurfaceBelowSplats},
+        {"pruned-covers", "a pruned atlas covers what its views do, and nothing else", 0.5, "%",
+         "as for open places", 0.2, measures::prunedOutline},
     };
     return kRules;
 }

@@ -16,16 +16,12 @@ Drawn modeOf(const Pictures& pictures, int salt) {
     return {measures::pick(pictures, salt, 3) == 0 ? RenderMode::splat : RenderMode::surface};
 }
 
-const char* nameOf(const Drawn& how) {
-    return how.mode == RenderMode::splat ? "splat" : "surface";
-}
-
 /// How much a picture of a changed scene is worse against the truth than that of the scene itself.
 measures::Outcome worseThanBefore(Pictures& pictures, const Drawn& how, const Frame& changed) {
     STX_TRY(const Frame* frame, pictures.of(how));
     const double before = pictures.psnr(*frame), after = pictures.psnr(changed);
     return Measure{worseBy(after, before),
-                   fmt::format("{} {:.2f} dB, changed {:.2f} dB", nameOf(how), before, after)};
+                   fmt::format("{} {:.2f} dB, changed {:.2f} dB", how.name(), before, after)};
 }
 
 /// Two pictures of which neither has a reason to be better. Sources that show a place equally well
@@ -39,7 +35,7 @@ Measure alike(const Pictures& pictures, const Drawn& how, const Frame& before, c
     const double psnrA = pictures.psnr(before, first), psnrB = pictures.psnr(changed, first);
     return {between >= kNoDifference ? 0 : worseBy(psnrB, psnrA),
             fmt::format("{}: {:.2f} dB between the two, {:.2f} and {:.2f} dB from the truth",
-                        nameOf(how), between, psnrA, psnrB),
+                        how.name(), between, psnrA, psnrB),
             true};
 }
 
@@ -197,7 +193,7 @@ Outcome threads(Pictures& pictures) {
     std::int64_t different = 0;
     for (std::size_t i = 0; i < frames[0].colour.count(); ++i)
         different += frames[0].colour.data()[i] != frames[1].colour.data()[i];
-    return Measure{double(different), fmt::format("{}: {} pixels differ", nameOf(how), different)};
+    return Measure{double(different), fmt::format("{}: {} pixels differ", how.name(), different)};
 }
 
 Outcome gpu(Pictures& pictures) {
@@ -211,7 +207,7 @@ Outcome gpu(Pictures& pictures) {
     if (!drawn) return tl::unexpected(drawn.error());
     const double a = pictures.psnr(onProcessor), b = pictures.psnr(**drawn);
     return Measure{worseBy(b, a),
-                   fmt::format("{}: processor {:.2f} dB, GPU {:.2f} dB", nameOf(how), a, b)};
+                   fmt::format("{}: processor {:.2f} dB, GPU {:.2f} dB", how.name(), a, b)};
 }
 
 }  // namespace measures

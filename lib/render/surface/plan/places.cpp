@@ -116,8 +116,9 @@ class PlacesOf {
         BlockBuffer buffer;
         const BlockTexels texels = blockTexels(s, x0, y0, buffer);
         const int columns = std::min(kBlock, s.width - x0), rows = std::min(kBlock, s.height - y0);
-        for (int j = step / 2; j < rows; j += step) {
-            for (int i = step / 2; i < columns; i += step) {
+        // Blocks at the border of a picture may have fewer pixels than a step.
+        for (int j = std::min(step, rows) / 2; j < rows; j += step) {
+            for (int i = std::min(step, columns) / 2; i < columns; i += step) {
                 const std::ptrdiff_t texel = texels.at(i, j);
                 const float q = texels.q[texel];
                 if (!(q > 0)) continue;

@@ -77,6 +77,8 @@ bool fitPlane(const Division& v, int x0, int y0, float tolerance, Leaf& leaf) {
     const std::ptrdiff_t stride = v.s.width;
     const float* q = &v.d.q.at(x0, y0);
     const float anchor = q[0];
+    // What was pruned has no surface, however even its mark is.
+    if (!(anchor > 0.0f)) return false;
     const float limit = tolerance * v.s.space.axis.relativeScale(anchor);
     if (!mayBePlane<kSize>(q, stride, limit, v.block.qMax)) return false;
     float sum = 0, sumX = 0, sumY = 0;
