@@ -29,8 +29,8 @@ measures::Outcome worseThanBefore(Pictures& pictures, const Drawn& how, const Fr
 /// farther from the truth than the other.
 Measure alike(const Pictures& pictures, const Drawn& how, const Frame& before, const Frame& changed,
               glm::ivec2 first = {0, 0}) {
-    // Less than half a step of 8 bits: the order in which numbers are added.
-    constexpr double kNoDifference = 54;
+    // Nobody sees it: see worseBy().
+    constexpr double kNoDifference = 48;
     const double between = psnrBetween(before, changed);
     const double psnrA = pictures.psnr(before, first), psnrB = pictures.psnr(changed, first);
     return {between >= kNoDifference ? 0 : worseBy(psnrB, psnrA),
