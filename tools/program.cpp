@@ -412,6 +412,7 @@ Result<std::string> folderTarget(const std::string& target, const std::vector<st
 
 Result<void> checkTarget(const std::filesystem::path& target, const Program& program) {
     if (target == "-") return {};
+    STX_CHECK(checkPattern(target.string()));
     STX_CHECK(checkFolderOf(target));
     std::error_code ec;
     if (program.common.noClobber &&
