@@ -240,6 +240,8 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
     flag("-v,--verbose", to.verbose, "Say more").group(group);
     if (which & kOutput) {
         flag("--no-clobber", to.noClobber, "Refuse to replace existing files").group(group);
+        flag("--no-mkdir", to.noMkdir, "Refuse to make folders of outputs that are not there")
+            .group(group);
         option("--report", to.report, "Write what was done as JSON to this file")
             .takes("FILE.json")
             .group(group);
