@@ -34,8 +34,7 @@ struct MaskTarget {
     std::string path;
 };
 
-Result<void> checkPngTarget(const std::string& option, const std::string& path,
-                            Program& program) {
+Result<void> checkPngTarget(const std::string& option, const std::string& path, Program& program) {
     if (!path.ends_with(".png"))
         return fail(ErrorCode::usage, "{} is '{}'; its name must end in .png", option, path);
     return checkTarget(path, program);

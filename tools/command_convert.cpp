@@ -519,7 +519,8 @@ void addConvert(CommandLine& line, Program& program) {
         .group(sets);
     c.option("--mask", set.maskPattern,
              "Names of pictures that are white where the object is, {stem} of the colour picture's "
-             "file or {name} in them, beside the set or in the current folder; 'stx background --mask-of "
+             "file or {name} in them, beside the set or in the current folder; 'stx background "
+             "--mask-of "
              "all' makes such masks")
         .takes("PATTERN")
         .group(sets);

@@ -202,12 +202,14 @@ int Program::run(const std::function<Result<int>()>& body) {
     }
     job.onProgress = nullptr;
     sayNotes();
+    if (!code) {
+        complain("stx: " + textOf(code.error()));
+        if (!reportWritten_) reportError(code.error());
+    }
     // The innermost first; remove() leaves those that hold something.
     for (std::error_code ec; !madeFolders_.empty(); madeFolders_.pop_back())
         std::filesystem::remove(madeFolders_.back(), ec);
     if (!code) {
-        complain("stx: " + textOf(code.error()));
-        if (!reportWritten_) reportError(code.error());
         return static_cast<int>(code.error().code);
     }
     progress.erase();
