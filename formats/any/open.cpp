@@ -108,7 +108,9 @@ Result<FileKind> recognise(const fs::path& path) {
     if (startsWith(head, "\x89PNG") || startsWith(head, "\xff\xd8\xff")) return FileKind::image;
     if (isMesh(path, head)) return FileKind::mesh;
     // .freiburg: the lists of camera poses of TUM's and ICL-NUIM's recordings.
-    if (ending == ".json" || ending == ".txt" || ending == ".freiburg") return FileKind::imageSet;
+    // .log: those of Open3D's.
+    if (ending == ".json" || ending == ".txt" || ending == ".freiburg" || ending == ".log")
+        return FileKind::imageSet;
     if (ending == ".exr") return FileKind::exr;
     return FileKind::unknown;
 }
