@@ -1,9 +1,16 @@
 #!/bin/sh
 # The main job on one model: MODEL -> bundle, atlas, normal map, relit novel views in FOLDER.
-# Usage: samples/main_job.sh MODEL FOLDER      (stx must be on the PATH)
+# Usage: main_job.sh [MODEL [FOLDER]]      (stx must be on the PATH)
+# Without MODEL: the amphora that is installed beside this script; without FOLDER: stx-sample here.
 set -eu
-model=$1
-out=$2
+case "${1:-}" in
+-h | --help)
+    sed -n '2,4s/^# //p' "$0"
+    exit 0
+    ;;
+esac
+model=${1:-$(dirname "$0")/amphora.obj}
+out=${2:-stx-sample}
 mkdir -p "$out"
 
 # 1. The model as 16 reference views: colour, depth, camera each.

@@ -356,6 +356,23 @@ void addJobsOption(Command command, BatchOptions& options, const char* heading) 
         .group(heading);
 }
 
+namespace {
+
+/// A line of a list without a comment, but for a file whose name looks as if it had one.
+std::string_view withoutComment(std::string_view line) {
+    constexpr std::string_view kBlanks = " \t";
+    std::error_code ec;
+    for (auto hash = line.find('#'); hash != line.npos; hash = line.find('#', hash + 1)) {
+        if (hash > 0 && kBlanks.find(line[hash - 1]) == kBlanks.npos) continue;
+        const auto last = line.substr(0, hash).find_last_not_of(kBlanks);
+        if (last == line.npos) return {};
+        return fs::exists(line, ec) ? line : line.substr(0, last + 1);
+    }
+    return line;
+}
+
+}  // namespace
+
 Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
                                               const Limits& limits) {
     std::vector<std::string> names;
@@ -375,9 +392,7 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
             if (line.find('\0') != std::string_view::npos)
                 return fail(ErrorCode::invalidInput,
                             "'{}' holds zero bytes; a list is text, one name in each line", list);
-            const auto first = line.find_first_not_of(" \t");
-            const bool comment = first != std::string_view::npos && line[first] == '#';
-            if (!line.empty() && !comment) names.emplace_back(line);
+            if (line = withoutComment(line); !line.empty()) names.emplace_back(line);
             at = end + 1;
         }
         if (names.size() == before)
@@ -422,13 +437,18 @@ Result<int> runBatch(const std::vector<BatchItem>& items, const BatchOptions& op
                      const BatchWork& work, Program& program) {
     // What can be refused before any work is refused then; with --keep-going each input is on its
     // own.
-    if (!options.keepGoing) {
-        std::error_code ec;
-        for (const auto& item : items) {
-            if (options.skipExisting && fs::exists(item.output, ec)) continue;
+    std::error_code ec;
+    std::optional<Error> refused;
+    bool any = false;
+    for (const auto& item : items) {
+        if (!options.keepGoing && !(options.skipExisting && fs::exists(item.output, ec)))
             STX_CHECK(checkTarget(item.output, program));
-        }
+        const auto made = item.output.empty() ? Result<void>() : program.makeFolderOf(item.output);
+        any = any || made;
+        if (!made && !refused) refused = made.error();
     }
+    // What all of them would say is said once.
+    if (!any && refused) return tl::unexpected(*refused);
     return BatchRun(items, options, work, program).run();
 }
 

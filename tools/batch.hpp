@@ -30,7 +30,8 @@ struct BatchOptions {
 void addJobsOption(Command command, BatchOptions& options, const char* heading);
 
 /// Replaces `@list.txt` by the names in that file (`@-`: in stdin), one in each line, relative to
-/// the current folder; empty lines and those that begin with # are passed over. Errors: io;
+/// the current folder; empty lines and what follows a # that begins a line or comes after a blank
+/// are passed over, but for names that exist with it. Errors: io;
 /// (invalidInput) a list without a name; (usage) no input at all.
 [[nodiscard]] Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
                                                             const Limits& limits);

@@ -34,8 +34,7 @@ struct MaskTarget {
     std::string path;
 };
 
-Result<void> checkPngTarget(const std::string& option, const std::string& path,
-                            const Program& program) {
+Result<void> checkPngTarget(const std::string& option, const std::string& path, Program& program) {
     if (!path.ends_with(".png"))
         return fail(ErrorCode::usage, "{} is '{}'; its name must end in .png", option, path);
     return checkTarget(path, program);
@@ -50,7 +49,7 @@ std::string maskPattern(const BackgroundOptions& o) {
 
 /// The files of the masks; an error before the work, not after it.
 Result<std::vector<MaskTarget>> maskTargets(const BackgroundOptions& o, const VideoFrames& frames,
-                                            const Program& program) {
+                                            Program& program) {
     std::vector<MaskTarget> targets;
     if (o.maskOf.empty()) return targets;
     int first = 0, end = frames.count();
@@ -82,12 +81,12 @@ Result<std::vector<MaskTarget>> maskTargets(const BackgroundOptions& o, const Vi
 }
 
 Result<void> writeGrey(const Image<std::uint8_t>& image, const std::string& path,
-                       const Program& program) {
+                       Program& program) {
     STX_TRY(const auto png, encodePng(image.width(), image.height(), 1, 8, image.data(), false));
     return writeFile(path, png, program.outputOptions());
 }
 
-Result<void> writeColour(const Rgba8Image& image, const std::string& path, const Program& program) {
+Result<void> writeColour(const Rgba8Image& image, const std::string& path, Program& program) {
     Frame frame;
     frame.colour = Image<glm::vec4>(image.width(), image.height());
     for (std::size_t i = 0; i < image.count(); ++i)

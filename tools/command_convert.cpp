@@ -151,8 +151,9 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
     // A mesh, an atlas and one .exr stand still.
     if (o.open.set.from.empty()) {
         const auto kind = recognise(input);
-        if (kind && *kind != FileKind::imageSet && *kind != FileKind::mpeg4) return std::nullopt;
-        if (!kind && !frameName(input.string(), 0)) return std::nullopt;
+        if (!kind || (*kind != FileKind::imageSet && *kind != FileKind::mpeg4 &&
+                      *kind != FileKind::numbered))
+            return std::nullopt;
     }
     OpenOptions open = o.open;
     const auto imported = std::make_shared<bool>(false);
@@ -518,7 +519,9 @@ void addConvert(CommandLine& line, Program& program) {
         .group(sets);
     c.option("--mask", set.maskPattern,
              "Names of pictures that are white where the object is, {stem} of the colour picture's "
-             "file or {name} in them; 'stx background --mask-of all' makes such masks")
+             "file or {name} in them, beside the set or in the current folder; 'stx background "
+             "--mask-of "
+             "all' makes such masks")
         .takes("PATTERN")
         .group(sets);
     c.choice<std::optional<NoDepth>>(

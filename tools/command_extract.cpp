@@ -19,7 +19,7 @@ namespace {
 struct ExtractOptions {
     std::string input, output;
     std::string cameras = "transforms";
-    std::string depth = "exr";
+    ExportOptions::Depth depth = ExportOptions::Depth::exr;
     std::string refine = "auto";
     std::optional<double> time;
     PointWriteOptions points;
@@ -117,7 +117,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
                      : o.cameras == "colmap" ? ExportOptions::Kind::colmap
                                              : ExportOptions::Kind::transforms;
         write.noClobber = program.common.noClobber;
-        write.floatDepth = o.depth == "exr";
+        write.depth = o.depth;
         if (timeline.moves() && o.time) {
             STX_TRY(frames, someFrames(std::move(frames), {moment}));
         }
@@ -172,9 +172,12 @@ void addExtract(CommandLine& line, Program& program) {
          "Camera file in the folder: transforms (nerfstudio), miv, or colmap (a dense workspace) "
          "(default transforms)")
         .oneOf({"transforms", "miv", "colmap"});
-    c.option("--depth", o->depth,
-             "In the folder: exr (floats, exact) or png (16 bits, rounded) (default exr)")
-        .oneOf({"exr", "png"});
+    using Depth = ExportOptions::Depth;
+    c.choice<Depth>("--depth", o->depth,
+                    {{"exr", Depth::exr}, {"png", Depth::png}, {"npy", Depth::npy}},
+                    "In the folder: exr (floats, exact), png (16 bits, rounded) or npy (NumPy's "
+                    "floats, exact) (default exr). The channel of .exr is Z, which OpenCV 4.6 "
+                    "reads as zeros: take npy or png for it");
     c.option("--time", o->time, "Of a film: the moment, in seconds by its own clock (default: all)")
         .takes("T");
     refineOption(c, o->refine);

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "tools/build_text.hpp"
+#include "tools/help_text.hpp"
 #include "tools/program.hpp"
 #include "tools/standard_streams.hpp"
 
@@ -59,23 +60,6 @@ OptionRow optionRow(const CLI::Option& option) {
     return row;
 }
 
-/// Help that lists choices and ranges in words.
-class HelpFormatter : public CLI::Formatter {
-  public:
-    std::string make_option_opts(const CLI::Option* option) const override {
-        const OptionRow row = optionRow(*option);
-        std::string text;
-        if (!row.choices.empty())
-            text += fmt::format(" {}", fmt::join(row.choices, "|"));
-        else if (!row.value.empty() && !row.positional)
-            text += " " + row.value;
-        if (!row.range.empty()) text += fmt::format(" ({})", row.range);
-        if (row.many) text += " ...";
-        if (row.required) text += " (required)";
-        return text;
-    }
-};
-
 /// The command that was named, or the program itself.
 const CLI::App& chosen(const CLI::App& app) {
     const CLI::App* where = &app;
@@ -93,6 +77,18 @@ CLI::Validator numberThat(const std::function<bool(double)>& bad, const std::str
             return fmt::format("it is {}; {}", text, expected);
         },
         description);
+}
+
+/// " (did you mean 'convert'?)" where a known word is near.
+std::string meant(const std::string& word, const std::vector<std::string>& known) {
+    const auto near = nearestWord(word, known);
+    return near.empty() || near == word ? "" : fmt::format(" (did you mean '{}'?)", near);
+}
+
+Error unknownCommand(const std::string& name, const std::vector<std::string>& known) {
+    return {ErrorCode::usage,
+            fmt::format("unknown command '{}'{}. See 'stx --help'.", name, meant(name, known)),
+            {}};
 }
 
 Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
@@ -115,7 +111,8 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, ch
             known.push_back(sub->get_name());
         if (argc > 1 && argv[1][0] != '-') unknown = argv[1];
         if (!unknown.empty() && std::find(known.begin(), known.end(), unknown) == known.end())
-            message = fmt::format("unknown command '{}'", unknown);
+            return unknownCommand(unknown, known);
+        unknown.clear();
     } else if (const auto rest = where.remaining(); !rest.empty()) {
         unknown = rest[0].substr(0, rest[0].find('='));
         for (const auto* option : where.get_options()) {
@@ -126,10 +123,7 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error, int argc, ch
         else
             message = fmt::format("unexpected argument '{}'", unknown);
     }
-    if (!unknown.empty()) {
-        const auto near = nearestWord(unknown, known);
-        if (!near.empty() && near != unknown) message += fmt::format(" (did you mean '{}'?)", near);
-    }
+    if (!unknown.empty()) message += meant(unknown, known);
     const std::string name = &where == &app ? "stx" : "stx " + where.get_name();
     return {ErrorCode::usage, fmt::format("{}. See '{} --help'.", message, name), {}};
 }
@@ -181,6 +175,12 @@ Option& Option::positive() {
 
 namespace {
 
+/// Of an option that is given twice the last one counts.
+CLI::Option* lastCounts(CLI::Option* option) {
+    if (!option->get_positional()) option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    return option;
+}
+
 /// Positionals are names of inputs, or words among which - is none.
 CLI::Option* withStandardInput(CLI::Option* option) {
     if (option->get_positional())
@@ -191,34 +191,34 @@ CLI::Option* withStandardInput(CLI::Option* option) {
 }  // namespace
 
 Option Command::option(const std::string& names, std::string& to, const std::string& help) {
-    return Option(withStandardInput(app_->add_option(names, to, help)));
+    return Option(lastCounts(withStandardInput(app_->add_option(names, to, help))));
 }
 Option Command::option(const std::string& names, std::vector<std::string>& to,
                        const std::string& help) {
     return Option(withStandardInput(app_->add_option(names, to, help)));
 }
 Option Command::option(const std::string& names, int& to, const std::string& help) {
-    return Option(app_->add_option(names, to, help));
+    return Option(lastCounts(app_->add_option(names, to, help)));
 }
 Option Command::option(const std::string& names, double& to, const std::string& help) {
-    return Option(app_->add_option(names, to, help));
+    return Option(lastCounts(app_->add_option(names, to, help)));
 }
 Option Command::option(const std::string& names, std::optional<int>& to, const std::string& help) {
-    return Option(app_->add_option(names, to, help));
+    return Option(lastCounts(app_->add_option(names, to, help)));
 }
 Option Command::option(const std::string& names, std::optional<double>& to,
                        const std::string& help) {
-    return Option(app_->add_option(names, to, help));
+    return Option(lastCounts(app_->add_option(names, to, help)));
 }
 Option Command::option(const std::string& names,
                        std::function<Result<void>(const std::string&)> parse,
                        const std::string& help) {
-    return Option(app_->add_option_function<std::string>(
+    return Option(lastCounts(app_->add_option_function<std::string>(
         names,
         [names, parse = std::move(parse)](const std::string& text) {
             if (auto ok = parse(text); !ok) throw CLI::ValidationError(names, ok.error().message);
         },
-        help));
+        help)));
 }
 Option Command::flag(const std::string& names, bool& to, const std::string& help) {
     return Option(app_->add_flag(names, to, help));
@@ -232,14 +232,16 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
     option("--threads", to.threads, "Threads to use; 0 = all processors")
         .range(0, 1024)
         .group(group);
-    app_->add_option("--max-memory", to.maxMemoryMiB,
-                     "Refuse inputs that would need more memory, in MiB (default 4096)")
+    lastCounts(app_->add_option("--max-memory", to.maxMemoryMiB,
+                                "Refuse inputs that would need more memory, in MiB (default 4096)"))
         ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 24))
         ->group(group);
     flag("--quiet,-q", to.quiet, "Say nothing but errors").group(group);
     flag("-v,--verbose", to.verbose, "Say more").group(group);
     if (which & kOutput) {
         flag("--no-clobber", to.noClobber, "Refuse to replace existing files").group(group);
+        flag("--no-mkdir", to.noMkdir, "Refuse to make folders of outputs that are not there")
+            .group(group);
         option("--report", to.report, "Write what was done as JSON to this file")
             .takes("FILE.json")
             .group(group);
@@ -289,11 +291,9 @@ CommandLine::CommandLine()
     : app_(std::make_unique<CLI::App>(
           "The MPEG-4 AFX SimpleTexture toolkit: depth image-based representation of 3D objects.",
           "stx")) {
-    app_->set_version_flag("--version,-V", "stx " STX_VERSION);
+    app_->set_version_flag("--version,-V", "stx " STX_VERSION, "Print what stx this is, and stop");
     app_->set_help_flag("-h,--help", kHelp);
     app_->require_subcommand(1);
-    app_->formatter(std::make_shared<HelpFormatter>());
-    app_->get_formatter()->column_width(34);
     app_->footer(
         "Exit codes: 0 ok, 1 usage, 2 cannot read or write a file, 3 invalid input,\n"
         "4 failed while working, 5 not supported here, 7 a difference or a broken rule.");
@@ -312,7 +312,11 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         app_->parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
         const CLI::App& where = chosen(*app_);
-        return Request{where.help(&where == app_.get() ? "" : "stx"), {}, {}};
+        // A word that is no command comes before what is asked of it.
+        std::string name = argc > 1 && argv[1][0] != '-' ? argv[1] : "";
+        if (&where != app_.get()) name = where.get_name();
+        STX_TRY(const auto text, help(name, HelpDetail::brief));
+        return Request{text, {}, {}};
     } catch (const CLI::CallForVersion&) {
         return Request{versionText(), {}, {}};
     } catch (const CLI::ParseError& e) {
@@ -346,19 +350,36 @@ CommandLine::FailedRequest CommandLine::failedRequest(int argc, char** argv) con
     return request;
 }
 
+namespace {
+
+CommandRow rowOf(const CLI::App& app) {
+    const std::string text = app.get_description();
+    const auto blank = text.find("\n\n");
+    CommandRow row{app.get_name(), text.substr(0, blank), {}, {}};
+    if (blank != std::string::npos) row.examples = text.substr(blank + 2);
+    for (const CLI::Option* option : app.get_options([](const CLI::Option*) { return true; }))
+        row.options.push_back(optionRow(*option));
+    return row;
+}
+
+}  // namespace
+
 std::vector<CommandRow> CommandLine::table() const {
     std::vector<CommandRow> table;
-    for (const auto& entry : entries_) {
-        const std::string text = entry.app->get_description();
-        const auto blank = text.find("\n\n");
-        CommandRow row{entry.app->get_name(), text.substr(0, blank), {}, {}};
-        if (blank != std::string::npos) row.examples = text.substr(blank + 2);
-        for (const CLI::Option* option :
-             std::as_const(*entry.app).get_options([](const CLI::Option*) { return true; }))
-            row.options.push_back(optionRow(*option));
-        table.push_back(std::move(row));
-    }
+    for (const auto& entry : entries_) table.push_back(rowOf(std::as_const(*entry.app)));
     return table;
+}
+
+Result<std::string> CommandLine::help(const std::string& command, HelpDetail detail) const {
+    const auto all = table();
+    if (command.empty())
+        return helpOfProgram(rowOf(std::as_const(*app_)), all, exitCodes(), helpWidth());
+    std::vector<std::string> names;
+    for (const CommandRow& row : all) {
+        if (row.name == command) return helpOf(row, detail, helpWidth());
+        names.push_back(row.name);
+    }
+    return tl::unexpected(unknownCommand(command, names));
 }
 
 std::string CommandLine::exitCodes() const {

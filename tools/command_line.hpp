@@ -23,6 +23,7 @@ namespace stx::tools {
 
 class Program;
 struct CommonOptions;
+enum class HelpDetail;
 
 /// An option that was just added, to say more about it.
 class Option {
@@ -164,6 +165,9 @@ class CommandLine {
     [[nodiscard]] FailedRequest failedRequest(int argc, char** argv) const;
 
     [[nodiscard]] std::vector<CommandRow> table() const;
+    /// The help of a command, or of the program where `command` is empty, as wide as the terminal.
+    /// Errors (usage): no such command.
+    [[nodiscard]] Result<std::string> help(const std::string& command, HelpDetail detail) const;
     /// What the exit codes mean: the last lines of the help.
     [[nodiscard]] std::string exitCodes() const;
 

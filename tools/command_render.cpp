@@ -141,7 +141,7 @@ Result<int> printDevices(Program& program) {
 }
 
 /// Under --no-clobber: errors when one of the pictures exists.
-Result<void> checkFrames(const RenderOptions& o, int count, const Program& program) {
+Result<void> checkFrames(const RenderOptions& o, int count, Program& program) {
     if (!program.common.noClobber || o.skipExisting) return {};
     const auto part = o.shard.rangeOf(static_cast<std::size_t>(count));
     for (std::size_t i = part.first; i < part.end; ++i) {
@@ -172,7 +172,7 @@ Result<void> prepareAround(RenderOptions& o, const Command& command, Program& pr
 }
 
 /// Errors (usage) for several pictures without a numbered name, and (io) as checkFrames().
-Result<void> checkNames(const RenderOptions& o, int count, const Program& program) {
+Result<void> checkNames(const RenderOptions& o, int count, Program& program) {
     if (count > 1 && !frameName(o.output, 0) && o.output != "-")
         return fail(ErrorCode::usage,
                     "{} pictures need a numbered name, as in -o 'name_%04d.png' (a film: -o - "
@@ -182,7 +182,7 @@ Result<void> checkNames(const RenderOptions& o, int count, const Program& progra
 }
 
 /// How pictures are written; the rate of a stream is --fps, else 25.
-Result<FrameWriter::Settings> writingOf(const RenderOptions& o, const Program& program) {
+Result<FrameWriter::Settings> writingOf(const RenderOptions& o, Program& program) {
     FrameWriter::Settings writing;
     writing.pattern = o.output;
     STX_TRY(writing.background, parseBackground(o.background));

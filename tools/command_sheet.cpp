@@ -34,8 +34,6 @@ std::string fileName(const std::string& path) {
 
 /// A picture and no bundle: an .exr may be either.
 Result<bool> isPicture(const std::string& path, const Limits& limits) {
-    std::error_code ec;
-    if (frameName(path, 0) && !std::filesystem::exists(path, ec)) return false;
     STX_TRY(const auto kind, recognise(path));
     if (kind != FileKind::exr) return kind == FileKind::image || kind == FileKind::unknown;
     STX_TRY(const auto reader, ExrReader::open(path, limits));
@@ -124,13 +122,10 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
                     "'{}' is one picture; a sheet shows a bundle, an atlas or an image set, or "
                     "compares two pictures",
                     input);
-    std::error_code ec;
-    if (std::filesystem::exists(input, ec)) {
-        STX_TRY(const auto kind, recognise(input));
-        if (kind == FileKind::atlas) {
-            STX_TRY(const auto atlas, readAtlas(input, job));
-            return sheetOf(atlas, o.settings, job);
-        }
+    STX_TRY(const auto kind, recognise(input));
+    if (kind == FileKind::atlas) {
+        STX_TRY(const auto atlas, readAtlas(input, job));
+        return sheetOf(atlas, o.settings, job);
     }
     STX_TRY(auto frames, openSequence(input, o.open, job));
     STX_TRY(frames, refined(std::move(frames), o.refine));

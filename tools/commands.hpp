@@ -22,6 +22,7 @@ void addCompare(CommandLine& line, Program& program);
 void addBench(CommandLine& line, Program& program);
 void addReport(CommandLine& line, Program& program);
 void addDoctor(CommandLine& line, Program& program);
+void addHelp(CommandLine& line, Program& program);
 void addCompletion(CommandLine& line, Program& program);
 
 }  // namespace stx::tools

@@ -18,7 +18,7 @@ int mainProgram(int argc, char** argv) {
     // In the order of the help.
     for (const auto add : {addConvert, addSelect, addPack, addBake, addRefine, addBackground,
                            addPanorama, addRender, addInfo, addSheet, addExtract, addValidate,
-                           addCompare, addBench, addReport, addDoctor, addCompletion})
+                           addCompare, addBench, addReport, addDoctor, addHelp, addCompletion})
         add(line, program);
     const auto request = line.parse(argc, argv);
     if (!request) {

@@ -134,24 +134,36 @@ void Program::reportError(const Error& error) {
     if (!written) complain("stx: " + textOf(written.error()));
 }
 
-namespace {
-
-/// Errors when the folder of `target` is not there or cannot be written.
-Result<void> checkFolderOf(const std::filesystem::path& target) {
+Result<void> Program::makeFolderOf(const std::filesystem::path& target) {
+    namespace fs = std::filesystem;
     std::error_code ec;
-    const auto folder =
-        target.parent_path().empty() ? std::filesystem::path(".") : target.parent_path();
-    if (!std::filesystem::is_directory(folder, ec))
+    const auto folder = target.parent_path().empty() ? fs::path(".") : target.parent_path();
+    std::vector<fs::path> missing;
+    fs::path there = folder;
+    while (!fs::exists(fs::symlink_status(there, ec)) && there.has_relative_path()) {
+        missing.push_back(there);
+        there = there.parent_path().empty() ? fs::path(".") : there.parent_path();
+    }
+    if (common.noMkdir && !missing.empty())
         return fail(ErrorCode::io,
-                    "cannot write '{}': the folder '{}' does not exist; create it first",
+                    "cannot write '{}': the folder '{}' does not exist; create it, or leave "
+                    "--no-mkdir out",
                     target.string(), folder.string());
-    if (access(folder.c_str(), W_OK) != 0)
+    if (!fs::is_directory(there, ec))
+        return fail(ErrorCode::io, "cannot write '{}': '{}' is not a folder", target.string(),
+                    there.string());
+    if (access(there.c_str(), W_OK) != 0)
         return fail(ErrorCode::io, "cannot write '{}': the folder '{}' is not writable",
-                    target.string(), folder.string());
+                    target.string(), there.string());
+    // The outermost first; another process may make the same ones.
+    for (auto it = missing.rbegin(); it != missing.rend(); ++it)
+        if (fs::create_directory(*it, ec))
+            madeFolders_.push_back(*it);
+        else if (ec)
+            return fail(ErrorCode::io, "cannot write '{}': cannot make the folder '{}': {}",
+                        target.string(), it->string(), ec.message());
     return {};
 }
-
-}  // namespace
 
 int Program::run(const std::function<Result<int>()>& body) {
     job.limits.maxMemoryBytes = common.maxMemoryMiB << 20;
@@ -193,6 +205,11 @@ int Program::run(const std::function<Result<int>()>& body) {
     if (!code) {
         complain("stx: " + textOf(code.error()));
         if (!reportWritten_) reportError(code.error());
+    }
+    // The innermost first; remove() leaves those that hold something.
+    for (std::error_code ec; !madeFolders_.empty(); madeFolders_.pop_back())
+        std::filesystem::remove(madeFolders_.back(), ec);
+    if (!code) {
         return static_cast<int>(code.error().code);
     }
     progress.erase();
@@ -410,9 +427,10 @@ Result<std::string> folderTarget(const std::string& target, const std::vector<st
     return path;
 }
 
-Result<void> checkTarget(const std::filesystem::path& target, const Program& program) {
+Result<void> checkTarget(const std::filesystem::path& target, Program& program) {
     if (target == "-") return {};
-    STX_CHECK(checkFolderOf(target));
+    STX_CHECK(checkPattern(target.string()));
+    STX_CHECK(program.makeFolderOf(target));
     std::error_code ec;
     if (program.common.noClobber &&
         std::filesystem::exists(std::filesystem::symlink_status(target, ec)))

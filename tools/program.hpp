@@ -24,6 +24,7 @@ struct CommonOptions {
     bool quiet = false;
     int verbose = 0;
     bool noClobber = false;
+    bool noMkdir = false;  ///< folders of outputs must be there
     bool allowOutside = false;
     bool keepDamaged = false;  ///< `--damaged keep`
     std::uint64_t maxMemoryMiB = 4096;
@@ -69,9 +70,14 @@ class Program {
     /// (error-report.schema.json).
     [[nodiscard]] int run(const std::function<Result<int>()>& body);
 
+    /// Errors when the folder of `target` is not there and may not be made, or cannot be written.
+    /// Else makes it, and run() takes it away when nothing came to be in it.
+    [[nodiscard]] Result<void> makeFolderOf(const std::filesystem::path& target);
+
   private:
     void write(std::string_view text);
     void reportError(const Error& error);
+    std::vector<std::filesystem::path> madeFolders_;
     bool reportWritten_ = false;
     bool outputFailed_ = false;
     bool outputUnwanted_ = false;  ///< its reader has closed the pipe, as head does: not an error
@@ -109,8 +115,9 @@ class Program {
 [[nodiscard]] Result<std::string> folderTarget(const std::string& target,
                                                const std::vector<std::string>& files,
                                                std::string_view expected);
-/// Errors early when the target's folder is missing or not writable, or, under --no-clobber, when
-/// the target exists: before an hour of work, not after it.
-[[nodiscard]] Result<void> checkTarget(const std::filesystem::path& target, const Program& program);
+/// Errors early, before an hour of work and not after it: as Program::makeFolderOf(), which makes
+/// the target's folder; (io) under --no-clobber, when the target exists; (usage) several numbers in
+/// its name.
+[[nodiscard]] Result<void> checkTarget(const std::filesystem::path& target, Program& program);
 
 }  // namespace stx::tools

@@ -1,8 +1,10 @@
 #include "formats/any/info.hpp"
 
 #include "formats/any/open.hpp"
+#include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mapping/background.hpp"
@@ -17,6 +19,16 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+/// Of a file, or of those that lie in a folder.
+std::uint64_t bytesAt(const fs::path& path) {
+    std::error_code ec;
+    if (!fs::is_directory(path, ec)) return fs::file_size(path, ec);
+    std::uint64_t bytes = 0;
+    for (const auto& entry : fs::directory_iterator(path, ec))
+        if (entry.is_regular_file(ec)) bytes += entry.file_size(ec);
+    return bytes;
+}
 
 Json vectorJson(glm::dvec3 v) {
     return {v.x, v.y, v.z};
@@ -318,21 +330,26 @@ Result<void> describeSet(const fs::path& path, Json& out, Job& job) {
     return {};
 }
 
+/// The first of the files, and how long all of them take.
+Result<Json> describeNumbered(const fs::path& path, const InfoOptions& options, Job& job) {
+    STX_TRY(const auto files, numberedFiles(path.string()));
+    STX_TRY(const auto frames, openSequence(path, {}, job));
+    STX_TRY(Json out, describe(files.front().path, options, job));
+    out["file"] = path.string();
+    std::uint64_t bytes = 0;
+    for (const NumberedFile& file : files) bytes += bytesAt(file.path);
+    out["bytes"] = bytes;
+    addTime(out, frames->timeline());
+    return out;
+}
+
 }  // namespace
 
 Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job) {
     STX_TRY(const auto kind, recognise(path));
+    if (kind == FileKind::numbered) return describeNumbered(path, options, job);
     Json out = {{"$schema", "info.schema.json"}, {"file", path.string()}};
-    std::error_code ec;
-    std::uint64_t bytes = 0;
-    if (fs::is_directory(path, ec)) {
-        for (const auto& entry : fs::directory_iterator(path, ec)) {
-            if (entry.is_regular_file(ec)) bytes += entry.file_size(ec);
-        }
-    } else {
-        bytes = fs::file_size(path, ec);
-    }
-    out["bytes"] = bytes;
+    out["bytes"] = bytesAt(path);
     switch (kind) {
         case FileKind::exr:
             if (auto ok = describeExr(path, out, job); !ok) {
@@ -368,6 +385,7 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
         case FileKind::imageSet:
             STX_CHECK(describeSet(path, out, job));
             break;
+        case FileKind::numbered:  // described above
         case FileKind::image:
         case FileKind::unknown:
             return fail(ErrorCode::invalidInput,

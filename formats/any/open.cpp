@@ -6,6 +6,7 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/files/not_there.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
@@ -43,6 +44,16 @@ bool isExrBundleFile(const fs::path& path) {
     return reader && isExrBundle(*reader);
 }
 
+/// Of a name that no file has: whether it is the pattern of a film.
+Result<bool> namesFilm(const fs::path& path) {
+    const std::string name = path.filename().string();
+    if (!frameName(name, 0)) return false;
+    STX_CHECK(checkPattern(path.string()));
+    auto files = numberedFiles(path.string());
+    if (path.extension() == ".exr" && !files) return propagate(files);
+    return files && (path.extension() == ".exr" || isAtlasFolder(files->front().path));
+}
+
 Error notThere(const fs::path& path) {
     return {
         ErrorCode::io, fmt::format("cannot read '{}': {}", path.string(), whyNotThere(path)), {}};
@@ -64,6 +75,8 @@ const char* nameOf(FileKind kind) {
             return "an image set";
         case FileKind::image:
             return "a picture";
+        case FileKind::numbered:
+            return "a film of numbered files";
         case FileKind::unknown:
             break;
     }
@@ -73,7 +86,11 @@ const char* nameOf(FileKind kind) {
 Result<FileKind> recognise(const fs::path& path) {
     std::error_code ec;
     const auto status = fs::status(path, ec);
-    if (path != "-" && !fs::exists(status)) return tl::unexpected(notThere(path));
+    if (path != "-" && !fs::exists(status)) {
+        STX_TRY(const bool film, namesFilm(path));
+        if (film) return FileKind::numbered;
+        return tl::unexpected(notThere(path));
+    }
     if (fs::is_directory(status)) {
         if (fs::exists(path / "atlas.json", ec)) return FileKind::atlas;
         return FileKind::imageSet;
@@ -91,7 +108,9 @@ Result<FileKind> recognise(const fs::path& path) {
     if (startsWith(head, "\x89PNG") || startsWith(head, "\xff\xd8\xff")) return FileKind::image;
     if (isMesh(path, head)) return FileKind::mesh;
     // .freiburg: the lists of camera poses of TUM's and ICL-NUIM's recordings.
-    if (ending == ".json" || ending == ".txt" || ending == ".freiburg") return FileKind::imageSet;
+    // .log: those of Open3D's.
+    if (ending == ".json" || ending == ".txt" || ending == ".freiburg" || ending == ".log")
+        return FileKind::imageSet;
     if (ending == ".exr") return FileKind::exr;
     return FileKind::unknown;
 }
@@ -135,6 +154,10 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         case FileKind::imageSet:
             bundle = readImageSet(path, options.set, job);
             break;
+        case FileKind::numbered: {
+            STX_TRY(const auto files, numberedFiles(path.string()));
+            return openRenderable(files.front().path, options, job);
+        }
         case FileKind::image:
         case FileKind::unknown:
             return fail(ErrorCode::invalidInput,

@@ -21,10 +21,12 @@ enum class FileKind {
     atlas,     ///< a folder with atlas.json (or that file), or an atlas .exr
     imageSet,  ///< a calibrated set of images with depth: a folder or its camera file
     image,     ///< a plain picture
+    numbered,  ///< `name_%04d.exr`, `atlas_%04d`: bundles or atlases, one for each frame
     unknown,
 };
 
-/// Looks at the name and the first bytes. Errors (io) when there is nothing to read.
+/// Looks at the name and the first bytes. Errors (io) when there is nothing to read; (usage) a name
+/// with several numbers.
 [[nodiscard]] Result<FileKind> recognise(const std::filesystem::path& path);
 /// "a mesh", "an MPEG-4 file" …
 [[nodiscard]] const char* nameOf(FileKind kind);
@@ -34,7 +36,8 @@ enum class FileKind {
 [[nodiscard]] Result<Bundle> openBundle(const std::filesystem::path& path,
                                         const OpenOptions& options, Job& job);
 
-/// Opens whatever can be rendered. A bundle passes Bundle::check(), a mesh Mesh::check().
+/// Opens whatever can be rendered, of numbered files the first. A bundle passes Bundle::check(), a
+/// mesh Mesh::check().
 [[nodiscard]] Result<std::variant<Mesh, Bundle>> openRenderable(const std::filesystem::path& path,
                                                                 const OpenOptions& options,
                                                                 Job& job);

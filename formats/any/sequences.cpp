@@ -53,19 +53,6 @@ Result<Shown> shownOf(const fs::path& path, bool atlas, const Limits& limits) {
     return Shown{header.atlas.time, header.atlas.duration};
 }
 
-/// The first file that is missing between others; nothing where all are there. Numbers may count in
-/// steps: the least difference is the usual one.
-std::optional<std::int64_t> firstMissing(const std::vector<NumberedFile>& files) {
-    std::int64_t step = 0;
-    for (std::size_t i = 1; i < files.size(); ++i) {
-        const std::int64_t own = files[i].number - files[i - 1].number;
-        step = step == 0 ? own : std::min(step, own);
-    }
-    for (std::size_t i = 1; i < files.size(); ++i)
-        if (files[i].number - files[i - 1].number != step) return files[i - 1].number + step;
-    return std::nullopt;
-}
-
 /// The files that tell when they are shown. The others are left out with a note, so that those
 /// before are shown on; they are errors when `strict`, or when none is left.
 struct NumberedFilm {
@@ -154,15 +141,11 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
 /// Frames as their files have them.
 Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOptions& options,
                                              Job& job) {
-    std::error_code ec;
-    if (frameName(path.filename().string(), 0) && !fs::exists(path, ec)) {
-        auto files = numberedFiles(path.string());
-        if (isNumberedExr(path) || (files && isAtlasFolder(files->front().path))) {
-            if (!files) return propagate(files);
-            return openNumbered(std::move(*files), path, options.set.strict, job);
-        }
-    }
     STX_TRY(const auto kind, recognise(path));
+    if (kind == FileKind::numbered) {
+        STX_TRY(auto files, numberedFiles(path.string()));
+        return openNumbered(std::move(files), path, options.set.strict, job);
+    }
     if (kind == FileKind::imageSet || !options.set.from.empty())
         return openImageSet(path, options.set, job);
     if (kind == FileKind::mpeg4) {

@@ -34,6 +34,14 @@ std::optional<std::string> frameName(const std::string& pattern, int frame) {
            pattern.substr(place->end);
 }
 
+Result<void> checkPattern(const std::string& pattern) {
+    if (const auto place = placeholderOf(pattern);
+        place && placeholderOf(pattern.substr(place->end)))
+        return fail(ErrorCode::usage,
+                    "'{}' has several numbers; one is possible, as in name_%04d.png", pattern);
+    return {};
+}
+
 Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
     const std::filesystem::path path(pattern);
     const std::string name = path.filename().string();
@@ -68,6 +76,17 @@ Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern) {
                     pattern);
     std::ranges::sort(files, {}, &NumberedFile::number);
     return files;
+}
+
+std::optional<std::int64_t> firstMissing(const std::vector<NumberedFile>& files) {
+    std::int64_t step = 0;
+    for (std::size_t i = 1; i < files.size(); ++i) {
+        const std::int64_t own = files[i].number - files[i - 1].number;
+        step = step == 0 ? own : std::min(step, own);
+    }
+    for (std::size_t i = 1; i < files.size(); ++i)
+        if (files[i].number - files[i - 1].number != step) return files[i - 1].number + step;
+    return std::nullopt;
 }
 
 }  // namespace stx

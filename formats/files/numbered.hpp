@@ -12,6 +12,9 @@ namespace stx {
 /// The file of one frame of a sequence named `name_%04d.png`; nothing when the name has no number.
 [[nodiscard]] std::optional<std::string> frameName(const std::string& pattern, int frame);
 
+/// Errors (usage) when a name has more than one number: `a_%d_%d.png`.
+[[nodiscard]] Result<void> checkPattern(const std::string& pattern);
+
 /// A file of such a sequence.
 struct NumberedFile {
     std::int64_t number = 0;
@@ -20,5 +23,9 @@ struct NumberedFile {
 /// The files there are of a pattern, by number, each once. The number, from 0, is in the file's
 /// name as printf would write it, and not in a folder's. Errors (io): none is there.
 [[nodiscard]] Result<std::vector<NumberedFile>> numberedFiles(const std::string& pattern);
+
+/// The number of the first file that is missing between others; nothing where all are there.
+/// Numbers may count in steps: the least difference is the usual one.
+[[nodiscard]] std::optional<std::int64_t> firstMissing(const std::vector<NumberedFile>& files);
 
 }  // namespace stx

@@ -7,6 +7,7 @@
 #include "formats/images/damage.hpp"
 #include "formats/images/exr_image.hpp"
 #include "formats/images/isolated_decode.hpp"
+#include "formats/images/npy.hpp"
 #include "formats/images/reader.hpp"
 
 namespace stx {
@@ -146,6 +147,7 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
         return failAt(fmt::format("'{}'", name), ErrorCode::invalidInput,
                       "the image file is empty");
     if (isExr(bytes)) return decodeExr(bytes, name, limits);
+    if (isNumpy(bytes)) return at(name, decodeNumpy(bytes, limits));
     if (isOtherKind(bytes)) return at(name, decodeWithCodecs(bytes, std::string(name), limits));
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<DecodedImage>(name, tl::unexpected(reader.error()));

@@ -47,10 +47,11 @@ struct DecodedImage {
     }
 };
 
-/// Decodes an image in memory: PNG, JPEG and OpenEXR here, every other format that OpenImageIO
-/// reads in a process of its own. Header sizes are checked against the limits and against what the
-/// file can hold before pixels are allocated. `name` is for messages and for formats that
-/// only their ending shows. Safe to call from several threads, none of which waits for another.
+/// Decodes an image in memory: PNG, JPEG, OpenEXR and NumPy's arrays (npy.hpp) here, every other
+/// format that OpenImageIO reads in a process of its own. Header sizes are checked against the
+/// limits and against what the file can hold before pixels are allocated. `name` is for messages
+/// and for formats that only their ending shows. Safe to call from several threads, none of which
+/// waits for another.
 [[nodiscard]] Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name,
                                                const Limits& limits);
 

@@ -111,6 +111,10 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
                           Job& job) {
     STX_CHECK(bundle.check());
     const bool miv = options.kind == ExportOptions::Kind::miv;
+    const bool floats = options.depth != ExportOptions::Depth::png;
+    if (options.depth == ExportOptions::Depth::npy &&
+        options.kind != ExportOptions::Kind::transforms)
+        return fail(ErrorCode::usage, "depth as .npy is of transforms.json; take exr or png");
     const auto names = fileNames(bundle);
     for (const ReferenceView& view : bundle.views)
         if (view.hasNormals() || view.hasSplats())
@@ -134,7 +138,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
         for (const std::string& name : names) json["sourceCameraNames"].push_back(name);
     } else {
         json["stx:title"] = bundle.title;
-        if (!options.floatDepth) {
+        if (!floats) {
             // Millimetres where they reach, else the finest unit that does.
             if (farthest > unit * 65535) unit = farthest / 65535;
             json["integer_depth_scale"] = unit;
@@ -144,7 +148,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     const glm::dvec3& o = bundle.origin;
     if (o != glm::dvec3(0.0)) json["stx:origin"] = {o.x, o.y, o.z};
     if (bundle.environment) json["stx:environment"] = kEnvironmentFile;
-    const char* depthEnding = options.floatDepth ? ".exr" : ".png";
+    const char* depthEnding = imagesets::endingOf(options.depth);
     for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         const ReferenceView& view = bundle.views[i];
         if (!miv) {
@@ -153,7 +157,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
         }
         STX_TRY(auto camera, mivCamera(view, names[i], bundle.origin));
         json["cameras"].push_back(std::move(camera));
-        if (!options.floatDepth) {
+        if (!floats) {
             STX_TRY(const MivRange range, mivRange(view));
             job.note(fmt::format("view '{}': depth is rounded by up to {:.2g} scene units",
                                  view.name, range.errorAt(view.farPlane)));
@@ -171,7 +175,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
         const ReferenceView& view = bundle.views[i];
         if (miv) {
             own.push_back(fmt::format("{}_color{}", names[i], colourEnding(view)));
-            own.push_back(names[i] + (options.floatDepth ? "_depth.exr" : "_depth16.png"));
+            own.push_back(names[i] + (floats ? "_depth.exr" : "_depth16.png"));
         } else {
             own.push_back(fmt::format("images/{}{}", names[i], colourEnding(view)));
             own.push_back(fmt::format("depth/{}{}", names[i], depthEnding));
@@ -197,9 +201,9 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
         const auto write = [&]() -> Result<void> {
             STX_CHECK(job.checkCancelled());
             STX_CHECK(writeColour(view, root / (miv ? names[i] + "_color" : "images/" + names[i])));
-            if (options.floatDepth)
-                return writeFloatDepth(
-                    view, root / (miv ? names[i] + "_depth.exr" : "depth/" + names[i] + ".exr"));
+            if (floats)
+                return writeFloatDepth(view, root / (miv ? names[i] + "_depth.exr"
+                                                         : "depth/" + names[i] + depthEnding));
             if (!miv)
                 return writeIntegerDepth(view, root / ("depth/" + names[i] + ".png"),
                                          [&](double d) { return d / unit; });

@@ -17,9 +17,13 @@ struct ExportOptions {
                      ///< perspective cameras only, planes are fitted again when it is read
     };
     Kind kind = Kind::transforms;
-    /// Depth as OpenEXR floats, which come back exactly; else as 16-bit PNG: millimetres (or what
-    /// fits) in transforms.json, normalised disparity in MIV, with a note of the rounding.
-    bool floatDepth = true;
+    enum class Depth {
+        exr,  ///< OpenEXR floats, which come back exactly
+        png,  ///< 16 bits: millimetres (or what fits) in transforms.json, normalised disparity in
+              ///< MIV, with a note of the rounding
+        npy,  ///< NumPy's floats, as exact; transforms.json only
+    };
+    Depth depth = Depth::exr;
     bool noClobber = false;
 };
 
@@ -28,7 +32,7 @@ struct ExportOptions {
 /// with a note. Cameras are in the world's coordinates, the bundle's origin added (it is kept as
 /// stx:origin). The environment is environment.exr, named as stx:environment (not for COLMAP).
 /// readImageSet() gives the same bundle again. Errors: io; invalidInput for what the
-/// kind cannot say.
+/// kind cannot say; (usage) Depth::npy of another kind than transforms.
 [[nodiscard]] Result<void> exportImages(const Bundle& bundle, const std::filesystem::path& folder,
                                         const ExportOptions& options, Job& job);
 

@@ -7,6 +7,7 @@
 #include "formats/exr/exr_file.hpp"
 #include "formats/files/files.hpp"
 #include "formats/images/images.hpp"
+#include "formats/images/npy.hpp"
 
 namespace stx::imagesets {
 
@@ -67,12 +68,19 @@ const char* colourEnding(const ReferenceView& view) {
     return view.texture.isLinear() ? ".exr" : ".png";
 }
 
+const char* endingOf(ExportOptions::Depth depth) {
+    return depth == ExportOptions::Depth::exr   ? ".exr"
+           : depth == ExportOptions::Depth::png ? ".png"
+                                                : ".npy";
+}
+
 Result<void> writeFloatDepth(const ReferenceView& view, const path& file) {
     Image<float> depth = view.depth;
     // Infinity is nothing, for everybody; 0 is not known.
     if (view.depthMayBeUnknown())
         for (std::size_t i = 0; i < depth.count(); ++i)
             if (!hasPoint(depth.data()[i]) && view.texture.at(i).a >= 1.0f) depth.data()[i] = 0;
+    if (file.extension() == ".npy") return writeFile(file, encodeNumpy(depth));
     return writeExr(file, depth.width(), depth.height(), {{"Z", depth.data(), 1}});
 }
 

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/imagesets/export.hpp"
 #include "lib/model/bundle.hpp"
 
 /// The files of an image set that is written, one by one.
@@ -25,8 +26,10 @@ inline constexpr const char* kEnvironmentFile = "environment.exr";
                                        const std::filesystem::path& withoutEnding);
 [[nodiscard]] const char* colourEnding(const ReferenceView& view);
 
-/// Depth as OpenEXR floats, or as 16-bit PNG of code(distance), rounded to 1..65535; 0 is not a
-/// point.
+/// ".exr", ".png" or ".npy".
+[[nodiscard]] const char* endingOf(ExportOptions::Depth depth);
+/// Depth as floats of OpenEXR or NumPy, by the file's ending, or as 16-bit PNG of code(distance),
+/// rounded to 1..65535; 0 is not a point.
 [[nodiscard]] Result<void> writeFloatDepth(const ReferenceView& view,
                                            const std::filesystem::path& file);
 [[nodiscard]] Result<void> writeIntegerDepth(const ReferenceView& view,

@@ -11,6 +11,7 @@
 namespace stx {
 namespace {
 
+using imagesets::endingOf;
 using imagesets::fileNames;
 using imagesets::kEnvironmentFile;
 using imagesets::OutputJson;
@@ -77,7 +78,7 @@ class FrameExporter {
             STX_CHECK(begin(bundle));
         else
             STX_CHECK(checkSameViews(first_, bundle));
-        const char* ending = options_.floatDepth ? ".exr" : ".png";
+        const char* ending = endingOf(options_.depth);
         std::vector<Result<void>> written(bundle.views.size());
         parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
             const auto k = static_cast<std::size_t>(i);
@@ -110,7 +111,7 @@ class FrameExporter {
             header.camera = view.camera;
             first_.views.push_back(std::move(header));
         }
-        if (!options_.floatDepth) {
+        if (options_.depth == ExportOptions::Depth::png) {
             // One unit for all frames, with room for things that go away from the camera.
             if (2 * farthest > unit_ * 65535) unit_ = 2 * farthest / 65535;
             json_["integer_depth_scale"] = unit_;
@@ -131,8 +132,8 @@ class FrameExporter {
         if (index > 0 && samePictures(view, track.before)) return {};
         track.name = fmt::format("{}_{:04}", names_[k], index);
         STX_CHECK(writeColour(view, root_ / "images" / track.name));
-        if (options_.floatDepth)
-            return writeFloatDepth(view, root_ / "depth" / (track.name + ".exr"));
+        if (options_.depth != ExportOptions::Depth::png)
+            return writeFloatDepth(view, root_ / "depth" / (track.name + endingOf(options_.depth)));
         if (view.farPlane > unit_ * 65535)
             return fail(ErrorCode::invalidInput,
                         "view '{}' reaches to {:g} scene units, which the unit of the first frame "

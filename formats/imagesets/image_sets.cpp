@@ -9,6 +9,7 @@
 #include "formats/files/not_there.hpp"
 #include "formats/imagesets/kinds.hpp"
 #include "formats/imagesets/motion.hpp"
+#include "formats/imagesets/patterns.hpp"
 #include "formats/imagesets/recognise.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
@@ -17,9 +18,26 @@
 #include "lib/registration/refine_poses.hpp"
 
 namespace stx {
+namespace {
 
-Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
-                                                         const ImageSetOptions& options, Job& job) {
+using namespace imagesets;
+
+/// The masks that a pattern names, beside the set or where stx runs.
+void nameMasks(SetDescription& set, const path& from, const std::string& pattern) {
+    std::error_code ec;
+    const path folder = std::filesystem::is_directory(from, ec) ? from : folderOf(from);
+    for (SetView& view : set.views) {
+        std::string name = filled(pattern, {view.name, 0, 0, 0});
+        if (const auto at = name.find("{stem}"); at != std::string::npos)
+            name.replace(at, 6, path(view.texture.name).stem().string());
+        const path beside = folder / name;
+        view.mask.path = std::filesystem::exists(beside, ec) ? beside : path(name);
+        view.mask.name = name;
+    }
+}
+
+/// What the files say, without the options that are of every kind.
+Result<SetDescription> describeFiles(const path& path, const ImageSetOptions& options, Job& job) {
     std::string kind = options.from;
     if (kind.empty() && !namesFilms(options)) {
         STX_TRY(kind, recogniseImageSet(path));
@@ -44,10 +62,6 @@ Result<imagesets::SetDescription> imagesets::describeSet(const path& path,
             kind);
     return entry->describe(path, options, job);
 }
-
-namespace {
-
-using namespace imagesets;
 
 Result<void> checkOptions(const ImageSetOptions& o) {
     if (o.depthBits != 8 && o.depthBits != 16 && o.depthBits != 32)
@@ -422,6 +436,13 @@ class StillSet : public Sequence {
 };
 
 }  // namespace
+
+Result<SetDescription> imagesets::describeSet(const path& path, const ImageSetOptions& options,
+                                              Job& job) {
+    STX_TRY(SetDescription set, describeFiles(path, options, job));
+    if (!options.maskPattern.empty()) nameMasks(set, path, options.maskPattern);
+    return set;
+}
 
 Result<Bundle> readImageSet(const std::filesystem::path& path, const ImageSetOptions& options,
                             Job& job) {

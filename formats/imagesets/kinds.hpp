@@ -21,6 +21,7 @@ using std::filesystem::path;
 [[nodiscard]] Result<SetDescription> describeMiddlebury(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeRgbd(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeSevenScenes(const path&, const ImageSetOptions&, Job&);
+[[nodiscard]] Result<SetDescription> describeOpen3d(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeExr(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeCamerasJson(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeAzureKinect(const path&, const ImageSetOptions&, Job&);
@@ -42,6 +43,9 @@ using std::filesystem::path;
                                                                    const std::string& where);
 /// Of a camera of MIV's list.
 [[nodiscard]] Result<Distances> mivDistances(const Json& camera, const std::string& where);
+
+/// The file in `folder` with the poses of Open3D's or Redwood's recordings; empty: none.
+[[nodiscard]] std::string trajectoryLogIn(const path& folder);
 
 /// What a JSON file with cameras is.
 enum class JsonKind { transforms, miv, cameras, cameraPath, none };

@@ -125,15 +125,6 @@ bool anyPoint(const Image<float>& depth) {
                        [](float d) { return hasPoint(d); });
 }
 
-/// The file of a view's mask, of a pattern or as the set names it; empty: none.
-std::filesystem::path maskOf(const SetView& set, const std::string& pattern) {
-    if (pattern.empty()) return set.mask.path;
-    std::string name = filled(pattern, {set.name, 0, 0, 0});
-    if (const auto at = name.find("{stem}"); at != std::string::npos)
-        name.replace(at, 6, std::filesystem::path(set.texture.name).stem().string());
-    return name;
-}
-
 /// Takes away what a mask does not show: its grey is the share of a pixel that belongs to the
 /// object.
 Result<void> applyMask(const SetView& set, const std::filesystem::path& file, StoredView& stored,
@@ -175,8 +166,7 @@ Result<StoredView> readStored(const SetView& set, const ImageSetOptions& options
 
 Result<StoredView> readImages(const SetView& set, const ImageSetOptions& options, Job& job) {
     STX_TRY(auto stored, readStored(set, options, job));
-    if (const auto mask = maskOf(set, options.maskPattern); !mask.empty())
-        STX_CHECK(applyMask(set, mask, stored, job));
+    if (!set.mask.path.empty()) STX_CHECK(applyMask(set, set.mask.path, stored, job));
     return stored;
 }
 

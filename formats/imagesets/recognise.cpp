@@ -27,6 +27,8 @@ const std::vector<KindEntry>& entries() {
          describeMiddlebury},
         {{"tum", "TUM or ICL-NUIM RGB-D recording"}, describeRgbd},
         {{"7scenes", "Microsoft's 7-Scenes recording"}, describeSevenScenes},
+        {{"open3d", "recording of Open3D or Redwood: color/, depth/, trajectory.log"},
+         describeOpen3d},
         {{"exr", "OpenEXR pictures with Z: one part, several, several views"}, describeExr},
         {{"azure-kinect", "Azure Kinect's recording (.mkv); needs the module of video"},
          describeAzureKinect},
@@ -132,6 +134,7 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
                 return std::string("tum");
         }
         if (name.ends_with(".gt.freiburg")) return std::string("tum");
+        if (path.extension() == ".log") return std::string("open3d");
         if (path.extension() == ".exr") return std::string("exr");
         if (filmFormatOf(path) == "matroska") return std::string("azure-kinect");
         return failAt(
@@ -160,6 +163,9 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
     if ((has("rgb.txt") && has("depth.txt")) || has("associations.txt") || has("associated.txt") ||
         has("associate.txt") || ((has("color") || has("rgb")) && has("depth") && has("pose.txt")))
         return std::string("tum");
+    if (has("depth") && (has("color") || has("image") || has("rgb")) &&
+        !trajectoryLogIn(path).empty())
+        return std::string("open3d");
     int pictures = 0, exr = 0, disparities = 0, depths = 0;
     for (const std::string& name : files) {
         if (name.ends_with(".pose.txt")) return std::string("7scenes");

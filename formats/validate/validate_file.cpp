@@ -1,4 +1,5 @@
 #include "formats/any/open.hpp"
+#include "formats/files/numbered.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/imagesets/summary.hpp"
 #include "formats/meshes/meshes.hpp"
@@ -28,6 +29,26 @@ Result<std::vector<Finding>> validateImageSet(const std::filesystem::path& path,
     return unreadable(error);
 }
 
+/// Each file of a film, its findings with its name, and files that are missing between others.
+Result<std::vector<Finding>> validateNumbered(const std::filesystem::path& path,
+                                              const ValidateOptions& options, Job& job) {
+    STX_TRY(const auto files, numberedFiles(path.string()));
+    Findings findings;
+    if (const auto gap = firstMissing(files))
+        findings.add(1003, "", fmt::format("no file number {}", *gap),
+                     "the files between the first and the last");
+    for (const NumberedFile& file : files) {
+        STX_CHECK(job.checkCancelled());
+        STX_TRY(auto found, validateFile(file.path, options, job));
+        for (Finding& finding : found) {
+            const std::string name = fmt::format("'{}'", file.path.filename().string());
+            finding.where = finding.where.empty() ? name : name + ": " + finding.where;
+            findings.list.push_back(std::move(finding));
+        }
+    }
+    return findings.list;
+}
+
 }  // namespace
 
 Result<std::vector<Finding>> validateFile(const std::filesystem::path& path,
@@ -47,6 +68,9 @@ Result<std::vector<Finding>> validateFile(const std::filesystem::path& path,
             break;
         case FileKind::imageSet:
             findings = validateImageSet(path, options, job);
+            break;
+        case FileKind::numbered:
+            findings = validateNumbered(path, options, job);
             break;
         case FileKind::mesh: {
             const auto mesh = readMesh(path, job);

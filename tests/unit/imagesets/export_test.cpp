@@ -99,7 +99,7 @@ TEST(Export, IntegerDepthIsRoundedByNoMoreThanItsNoteSays) {
         Job job;
         ExportOptions options;
         options.kind = kind;
-        options.floatDepth = false;
+        options.depth = ExportOptions::Depth::png;
         ASSERT_TRUE(exportImages(bundle, folder / "set", options, job));
         ASSERT_FALSE(job.takeNotes().empty());
         ImageSetOptions read;

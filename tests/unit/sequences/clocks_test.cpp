@@ -26,7 +26,7 @@ std::unique_ptr<Sequence> through(const std::string& target, Sequence& frames,
     Result<void> done;
     if (target == "set") {
         ExportOptions options;
-        options.floatDepth = true;
+        options.depth = ExportOptions::Depth::exr;
         done = exportFrames(frames, path, options, job);
     } else if (target == "atlas_%02d") {
         for (std::size_t i = 0; done && i < frames.timeline().count(); ++i) {
