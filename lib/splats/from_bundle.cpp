@@ -7,6 +7,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "lib/base/parallel.hpp"
+#include "lib/splats/finest.hpp"
 #include "lib/splats/merge.hpp"
 #include "lib/surface/normals.hpp"
 
@@ -19,8 +20,8 @@ constexpr float kMostOpacity = 0.99f;  ///< its logit is finite
 /// Thickness as a share of a splat's shorter axis: a disc, for those who invert its covariance.
 constexpr float kThickness = 0.05f;
 
-/// The texels of a view as discs, in the world.
-Image<Disc> discsOf(const ReferenceView& view, glm::dvec3 origin) {
+/// The texels of a view as discs, counted from the bundle's origin.
+Image<Disc> discsOf(const ReferenceView& view) {
     Image<Disc> discs(view.depth.width(), view.depth.height());
     for (int y = 0; y < discs.height(); ++y) {
         for (int x = 0; x < discs.width(); ++x) {
@@ -31,7 +32,7 @@ Image<Disc> discsOf(const ReferenceView& view, glm::dvec3 origin) {
                 for (int k = 0; k < 3; ++k)
                     colour[k] = std::clamp(srgbFromLinear(colour[k]), 0.0f, 1.0f);
             Disc& d = discs.at(x, y);
-            d.centre = glm::vec3(view.worldPoint(x, y) + origin);
+            d.centre = glm::vec3(view.worldPoint(x, y));
             d.u = view.splatU.at(x, y);
             d.v = view.splatV.at(x, y);
             d.colour = colour;
@@ -46,7 +47,7 @@ Image<Disc> discsOf(const ReferenceView& view, glm::dvec3 origin) {
     return discs;
 }
 
-void setSplat(SplatCloud& cloud, std::size_t i, const Disc& d, float size) {
+void setSplat(SplatCloud& cloud, std::size_t i, const Disc& d, glm::dvec3 origin, float size) {
     // { a u + b v : a^2 + b^2 <= 1 } has the axes that u u^T + v v^T has: turned within (u, v).
     const double uu = glm::dot(d.u, d.u), uv = glm::dot(d.u, d.v), vv = glm::dot(d.v, d.v);
     const double angle = 0.5 * std::atan2(2 * uv, uu - vv), c = std::cos(angle),
@@ -55,7 +56,7 @@ void setSplat(SplatCloud& cloud, std::size_t i, const Disc& d, float size) {
     const double longer = glm::length(first), shorter = glm::length(second);
     const glm::dvec3 x = first / longer, y = second / shorter;
     const glm::dquat q = glm::normalize(glm::quat_cast(glm::dmat3(x, y, glm::cross(x, y))));
-    cloud.positions[i] = d.centre;
+    cloud.positions[i] = glm::vec3(glm::dvec3(d.centre) + origin);
     cloud.scales[i] = size * glm::vec3(static_cast<float>(longer), static_cast<float>(shorter),
                                        kThickness * static_cast<float>(std::min(longer, shorter)));
     cloud.rotations[i] = glm::vec4(q.x, q.y, q.z, q.w);
@@ -84,9 +85,10 @@ Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings, 
     std::vector<Image<Disc>> images(bundle.views.size());
     parallelFor(0, static_cast<std::int64_t>(images.size()), [&](std::int64_t i) {
         const auto n = static_cast<std::size_t>(i);
-        images[n] = discsOf(bundle.views[n], bundle.origin);
-        bundle.views[n] = {};
+        images[n] = discsOf(bundle.views[n]);
     });
+    splats::keepFinest(bundle, images);
+    bundle.views.clear();
     STX_CHECK(job.checkCancelled());
     std::vector<std::vector<Disc>> lists;
     if (settings.most > 0) {
@@ -121,12 +123,13 @@ Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings, 
     for (const auto& list : lists) {
         const std::size_t first = at;
         at += list.size();
-        parallelForBlocks(
-            0, static_cast<std::int64_t>(list.size()), 4096,
-            [&](std::int64_t from, std::int64_t to) {
-                for (auto i = static_cast<std::size_t>(from); i < static_cast<std::size_t>(to); ++i)
-                    setSplat(cloud, first + i, list[i], static_cast<float>(settings.size));
-            });
+        parallelForBlocks(0, static_cast<std::int64_t>(list.size()), 4096,
+                          [&](std::int64_t from, std::int64_t to) {
+                              for (auto i = static_cast<std::size_t>(from);
+                                   i < static_cast<std::size_t>(to); ++i)
+                                  setSplat(cloud, first + i, list[i], bundle.origin,
+                                           static_cast<float>(settings.size));
+                          });
     }
     return cloud;
 }

@@ -15,10 +15,10 @@ struct SplatSettings {
     std::size_t most = 0;
 };
 
-/// A Gaussian for each point of a bundle: at its place, flat in its surface, along the axes of its
-/// ellipse (those of bake() where a view has none), with its colour and 0.99 of its alpha. Splats
-/// of background views come first. The coordinates are the world's: an origin is added, with a note
-/// where floats round it.
+/// A Gaussian for each place of a bundle, of the view that shows it finest: at its point, flat in
+/// its surface, along the axes of its ellipse (those of bake() where a view has none), with its
+/// colour and 0.99 of its alpha. Splats of background views come first. The coordinates are the
+/// world's: an origin is added, with a note where floats round it.
 ///
 /// Errors: those of bake(); (invalidInput) no point, more than 2^32 - 1; (failed) flat pieces do
 /// not come down to `most`, with the least that they come to; memory over the limit, cancelled.
