@@ -15,8 +15,8 @@ struct SplatPicture {
     Image<glm::vec4> colour;
     /// Planar distance, kNoDepth where the splats let half of what is behind them through: that of
     /// the splat at which the transmittance falls below one half, where the pixel's ray comes
-    /// nearest to its centre, measured in its own standard deviations. On a flat splat that is its
-    /// plane.
+    /// nearest to its centre, measured in its own standard deviations, and no more than three of
+    /// these from it along the axis. On a flat splat that is its plane.
     Image<float> depth;
     Image<glm::vec3> normal;  ///< of that splat's shortest axis, towards the camera; may be empty
 };
