@@ -185,6 +185,11 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
         formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
     auto mesh = readFormat(format, bytes, path, job, options);
     if (!mesh) return tl::unexpected(mesh.error().at(where));
+    if (mesh->splats) {
+        // Clouds are large: not both at a time.
+        bytes = {};
+        STX_CHECK(placeSplats(*mesh, job));
+    }
 
     if (!options.texture.empty()) {
         if (mesh->uvs.empty())

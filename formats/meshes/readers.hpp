@@ -23,9 +23,12 @@ enum class AssimpFormat { obj, stl, dae, fbx };
 
 // Clouds of Gaussians, in splats/.
 
-/// A mesh that is drawn as this cloud: dropBroken() and a note of what the cloud's up is. Errors:
-/// no splat is left.
+/// A mesh that is drawn as this cloud, after dropBroken(); it has no positions yet. Errors: no
+/// splat is left.
 [[nodiscard]] Result<Mesh> meshOfSplats(SplatCloud cloud, Job& job);
+/// Gives such a mesh the centres of its splats as positions, and as points those that frame it: of
+/// splats that hide half or more of what is behind them. Errors: memory over the limit.
+[[nodiscard]] Result<void> placeSplats(Mesh& mesh, Job& job);
 
 /// Whether a PLY file is a cloud of splats: its vertices have opacity, scales, a rotation and a
 /// colour of degree 0 (INRIA's names). Without one of these it is a plain point cloud.
