@@ -7,6 +7,13 @@
 #include "lib/geometry/view_layout.hpp"
 
 namespace stx::tools {
+
+void noteSplatsUp(glm::dvec3 up, Job& job) {
+    if (up == glm::dvec3(0, -1, 0))
+        job.note(
+            "the splats are taken to stand on -Y, as trained clouds in PLY do; --up=Y if they "
+            "do not");
+}
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -162,6 +169,9 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
     glm::dvec3 target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
     if (!o.up.empty()) {
         STX_TRY(lens.up, parseDirection(o.up, "--up"));
+    } else if (context.up) {
+        lens.up = *context.up;
+        noteSplatsUp(lens.up, program.job);
     } else if (!pose) {
         lens.up = upOfCameras(context.views);
         if (lens.up != glm::dvec3(0, 1, 0))

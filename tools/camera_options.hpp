@@ -42,7 +42,11 @@ struct CameraContext {
     Bounds bounds;              ///< of the object
     glm::dvec3 origin{0.0};     ///< what bounds and views count from; options are in the world
     std::vector<Camera> views;  ///< of the reference views; empty for a mesh
+    std::optional<glm::dvec3> up = {};  ///< of a cloud of splats: SplatCloud::up
 };
+
+/// Notes that a cloud of splats is not taken to stand on +Y.
+void noteSplatsUp(glm::dvec3 up, Job& job);
 
 /// A camera of a picture, and when it is taken, in seconds, where its file says so.
 struct NovelCamera {

@@ -10,6 +10,7 @@
 #include "lib/base/stopwatch.hpp"
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
+#include "tools/extract_splats.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
 
@@ -23,6 +24,8 @@ struct ExtractOptions {
     std::string refine = "auto";
     std::optional<double> time;
     PointWriteOptions points;
+    std::string as;
+    int mostSplats = 0;
 };
 
 /// All points of a bundle, view by view, as flat arrays.
@@ -62,17 +65,24 @@ Points pointsOf(const Bundle& bundle) {
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const Stopwatch watch;
     ExtractOptions o = options;
-    STX_TRY(o.output, folderTarget(options.output, {".glb", ".html", ".ply", ".drc"},
-                                   "a folder, .glb, .html, .ply or .drc"));
+    STX_TRY(o.output, folderTarget(options.output, {".glb", ".html", ".ply", ".drc", ".spz"},
+                                   "a folder, .glb, .html, .ply, .spz or .drc"));
     const auto dotted = std::filesystem::path(o.output).extension();
     std::error_code ec;
     const bool plain = o.output == options.output && !std::filesystem::is_directory(o.output, ec);
-    const bool shown = plain && isShown(dotted),
-               points = plain && (dotted == ".ply" || dotted == ".drc");
+    STX_TRY(const auto as, extractedAs(o.as, plain ? dotted.string() : ""));
+    const bool splats = as == ExtractAs::splats, points = as == ExtractAs::points,
+               shown = plain && isShown(dotted) && !splats;
     const auto ending = points ? dotted : std::filesystem::path();
     if (shown)
         STX_CHECK(command.refuse({"--cameras", "--depth"},
                                  fmt::format("is of a folder; -o {} is a file", o.output)));
+    if (splats)
+        STX_CHECK(
+            command.refuse({"--cameras", "--depth"},
+                           fmt::format("is of a folder; -o {} is a file of splats", o.output)));
+    else
+        STX_CHECK(command.refuse({"--max-splats"}, "is of splats; give --as splats, too"));
     if (shown && dotted == ".html")
         STX_CHECK(command.refuse({"--time"}, "is of what shows one moment; a page plays the film"));
     if (points)
@@ -86,6 +96,9 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
+    if (splats)
+        return extractSplats(o.input, o.output, o.time, o.refine,
+                             {.most = static_cast<std::size_t>(o.mostSplats)}, program);
     if (shown) return extractShown(o.input, o.output, o.time, o.refine, program);
     STX_TRY(auto frames, openSequence(o.input, {}, program.job));
     STX_TRY(frames, refined(std::move(frames), o.refine));
@@ -151,12 +164,14 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
 void addExtract(CommandLine& line, Program& program) {
     Command c = line.add(
         "extract",
-        "Images and cameras of a bundle as plain files, its points as .ply or .drc, a "
-        "model of surfaces, or a page that draws it in any browser\n\n"
+        "Images and cameras of a bundle as plain files, its points as .ply or .drc, Gaussian "
+        "splats, a model of surfaces, or a page that draws it in any browser\n\n"
         "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
         "  stx extract model.mp4 -o folder --cameras miv\n"
         "  stx extract film.mp4 -o folder            all frames, with their times\n"
         "  stx extract model.mp4 -o points.ply\n"
+        "  stx extract model.mp4 -o cloud.ply --as splats    for any viewer of Gaussian splats\n"
+        "  stx extract film.mp4 -o film_%04d.spz             a file of splats for each frame\n"
         "  stx extract model.mp4 -o model.glb        surfaces with textures, for any glTF viewer\n"
         "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n\n"
         "The page is turned by dragging, by keys and by touch, under a light that moves, and "
@@ -164,7 +179,8 @@ void addExtract(CommandLine& line, Program& program) {
         "view.html#eye=0,1,3&target=0,0,0&fov=40.");
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
-    c.option("-o,--output", o->output, "Folder, points.ply, points.drc, model.glb or view.html")
+    c.option("-o,--output", o->output,
+             "Folder, points.ply, points.drc, cloud.spz, model.glb or view.html")
         .required()
         .takes("OUT");
     c.option(
@@ -181,6 +197,15 @@ void addExtract(CommandLine& line, Program& program) {
     c.option("--time", o->time, "Of a film: the moment, in seconds by its own clock (default: all)")
         .takes("T");
     refineOption(c, o->refine);
+    c.option("--as", o->as,
+             "What a file holds: points (.ply, .drc), splats (.ply, .spz, .glb) or surfaces (.glb) "
+             "(default: .ply and .drc points, .spz splats, .glb surfaces)")
+        .oneOf({"points", "splats", "surfaces"});
+    c.option("--max-splats", o->mostSplats,
+             "At most so many splats: flat pieces of one colour become larger ones (default: one "
+             "for each point; a pruned atlas has each place once)")
+        .range(1, 2000000000)
+        .takes("N");
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);

@@ -4,6 +4,7 @@
 
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/stx/mesh_views.hpp"
+#include "lib/model/splat_cloud.hpp"
 #include "tools/camera_options.hpp"
 
 namespace stx::tools {
@@ -25,7 +26,7 @@ Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
                     o.fovDeg);
     s.fovRad = glm::radians(o.fovDeg);
     s.elevationRad = glm::radians(o.elevationDeg.value_or(15.0));
-    STX_TRY(s.up, parseDirection(o.up, "--up"));
+    STX_TRY(s.up, parseDirection(o.up.empty() ? "Y" : o.up, "--up"));
     s.supersampling = o.supersampling;
     s.depthBits = o.depthBits;
     s.meshNormals = o.normals == "mesh";
@@ -98,7 +99,8 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
     command
         .option("--up", o->up,
                 "The model's up axis, on which rings, spheres and octahedra stand: Z, X,Y,Z or "
-                "with a minus --up=-Y (default Y)")
+                "with a minus --up=-Y (default Y; of Gaussian splats in PLY -Y, as trained clouds "
+                "stand)")
         .takes("AXIS")
         .group(group);
     command
@@ -153,6 +155,10 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     STX_CHECK(mesh.check());
     STX_TRY(auto settings, settingsOf(o, program));
     STX_TRY(settings.cameras, camerasOfFile(o, mesh, program));
+    if (mesh.splats && o.up.empty() && settings.cameras.empty()) {
+        settings.up = mesh.splats->up;
+        noteSplatsUp(settings.up, program.job);
+    }
     STX_TRY(auto views, chooseViews(mesh, settings, program.job));
     if (views.selection) {
         sayChoice(views, program);

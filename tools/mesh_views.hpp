@@ -21,7 +21,7 @@ struct MeshViewOptions {
     int supersampling = 4;
     std::string normals = "none";
     bool materials = false;
-    std::string up = "Y";
+    std::string up;    ///< empty: Y, except of clouds of splats, see SplatCloud::up
     std::string plot;  ///< SVG of quality against the number of views, of --views auto
     /// Heading of the help that they are under.
     static constexpr const char* kHeading = "Views of a mesh";

@@ -1,6 +1,7 @@
 #include "tools/render_scene.hpp"
 
 #include "formats/any/sequences.hpp"
+#include "lib/model/splat_cloud.hpp"
 
 namespace stx::tools {
 namespace {
@@ -54,7 +55,10 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
         scene.points = seen.pointCount();
         scene.environment = settings.ownEnvironment && seen.environment;
     };
-    if (const auto* mesh = std::get_if<Mesh>(&scene.model)) STX_CHECK(mesh->check());
+    if (const auto* mesh = std::get_if<Mesh>(&scene.model)) {
+        STX_CHECK(mesh->check());
+        if (mesh->splats) scene.context.up = mesh->splats->up;
+    }
     if (const auto* bundle = std::get_if<Bundle>(&scene.model)) addViews(*bundle);
     if (const auto* atlas = std::get_if<Atlas>(&scene.model)) addViews(*atlas);
     scene.environment = scene.environment || settings.environment;

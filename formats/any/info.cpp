@@ -1,5 +1,7 @@
 #include "formats/any/info.hpp"
 
+#include <algorithm>
+
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
@@ -12,6 +14,7 @@
 #include "formats/mpeg4/mpeg4.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/base/printable.hpp"
+#include "lib/model/splat_cloud.hpp"
 #include "lib/packing/packing.hpp"
 
 namespace stx {
@@ -111,6 +114,17 @@ void addBackground(const mpeg4::Document& document, const mpeg4::StreamImages& i
             size = {info->width, info->height};
     }
     out["environment"] = environmentJson(e, size, faces);
+}
+
+Json splatsJson(const SplatCloud& cloud) {
+    constexpr float kNearlyTransparent = 0.1f;
+    const auto faint = std::ranges::count_if(
+        cloud.opacities, [](float opacity) { return opacity < kNearlyTransparent; });
+    return {{"count", cloud.positions.size()},
+            {"degree", cloud.degree},
+            {"nearlyTransparent", faint},
+            {"colourSpace", cloud.linear ? "linear" : "sRGB"},
+            {"up", cloud.up.y < 0 ? "-Y" : "Y"}};
 }
 
 /// Fills in what only the pixels show.
@@ -378,6 +392,7 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
                                     {"width", t.pixels.width()},
                                     {"height", t.pixels.height()}});
             out["textures"] = std::move(textures);
+            if (mesh.splats) out["splats"] = splatsJson(*mesh.splats);
             addOrigin(out, mesh.origin);
             out["bounds"] = boundsJson(mesh.bounds(), mesh.origin);
             return out;
@@ -431,6 +446,14 @@ std::string describeAsText(const Json& info) {
                            info.contains("rate")
                                ? fmt::format(", {:.6g} frames a second", info["rate"].get<double>())
                                : "");
+    if (info.contains("splats")) {
+        const Json& s = info["splats"];
+        out += fmt::format(
+            "splats: {}, {} with an opacity below 0.1, harmonics of degree {}, {} colours, up is "
+            "{}\n",
+            text(s["count"]), text(s["nearlyTransparent"]), text(s["degree"]),
+            text(s["colourSpace"]), text(s["up"]));
+    }
     if (info.contains("origin")) out += fmt::format("origin: {}\n", text(info["origin"]));
     if (info.contains("bounds"))
         out += fmt::format("bounds: {} to {}\n", text(info["bounds"]["min"]),

@@ -161,7 +161,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         case FileKind::image:
         case FileKind::unknown:
             return fail(ErrorCode::invalidInput,
-                        "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC) nor "
+                        "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC, SPZ) nor "
                         "a bundle "
                         "(.mp4, .xmt, .bt, .exr) "
                         "nor an atlas nor an image set",

@@ -15,7 +15,7 @@ namespace stx {
 
 /// What a file or folder is, by its content first and its ending second.
 enum class FileKind {
-    mesh,      ///< glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC
+    mesh,      ///< glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC, SPZ
     mpeg4,     ///< .mp4, .xmt, .bt
     exr,       ///< a bundle as multi-part OpenEXR
     atlas,     ///< a folder with atlas.json (or that file), or an atlas .exr

@@ -70,4 +70,31 @@ bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to) {
                                       to.size(), nullptr) == LIBDEFLATE_SUCCESS;
 }
 
+std::vector<std::byte> compressGzip(std::span<const std::byte> from, int level) {
+    const Compressor compressor(libdeflate_alloc_compressor(level));
+    if (!compressor) throw std::bad_alloc();
+    std::vector<std::byte> to(libdeflate_gzip_compress_bound(compressor.get(), from.size()));
+    to.resize(libdeflate_gzip_compress(compressor.get(), from.data(), from.size(), to.data(),
+                                       to.size()));
+    return to;
+}
+
+std::optional<std::size_t> gzipContentSize(std::span<const std::byte> from) {
+    constexpr std::size_t kLeast = 18, kMostRatio = 1032;  // of header and end; of deflate
+    if (from.size() < kLeast || from[0] != std::byte{0x1f} || from[1] != std::byte{0x8b})
+        return std::nullopt;
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+        size |= std::to_integer<std::size_t>(from[from.size() - 4 + i]) << (8 * i);
+    if (size / kMostRatio > from.size()) return std::nullopt;
+    return size;
+}
+
+bool inflateGzip(std::span<const std::byte> from, std::span<std::byte> to) {
+    const Decompressor decompressor(libdeflate_alloc_decompressor());
+    if (!decompressor) throw std::bad_alloc();
+    return libdeflate_gzip_decompress(decompressor.get(), from.data(), from.size(), to.data(),
+                                      to.size(), nullptr) == LIBDEFLATE_SUCCESS;
+}
+
 }  // namespace stx

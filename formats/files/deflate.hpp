@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
+#include <vector>
 
 namespace stx {
 
@@ -19,5 +21,16 @@ namespace stx {
 /// False, and anything in `to`, when the stream is damaged or holds another number of bytes. Throws
 /// std::bad_alloc.
 [[nodiscard]] bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to);
+
+/// A gzip file (RFC 1952) of all of `from`, without a name and a time, by libdeflate: the same bytes
+/// in each run. Throws std::bad_alloc.
+[[nodiscard]] std::vector<std::byte> compressGzip(std::span<const std::byte> from, int level);
+
+/// The size that a gzip file's last bytes say its content has, modulo 2^32; nothing where `from` is
+/// not gzip or says more than its bytes can hold.
+[[nodiscard]] std::optional<std::size_t> gzipContentSize(std::span<const std::byte> from);
+
+/// inflateZlib() of a gzip file's first member.
+[[nodiscard]] bool inflateGzip(std::span<const std::byte> from, std::span<std::byte> to);
 
 }  // namespace stx

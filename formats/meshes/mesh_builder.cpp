@@ -75,6 +75,7 @@ Result<void> MeshBuilder::add(MeshPart part) {
     if (part.points) dropBrokenPoints(part);
     const auto count = part.positions.size();
     if (count == 0) return {};
+    ++parts_;
     for (std::size_t i = 0; i < count; ++i) {
         const auto p = part.positions[i];
         if (!finite(p))

@@ -45,6 +45,9 @@ class MeshBuilder {
     /// replaced by those of the triangles; uvs and colours that are not finite become 0.
     [[nodiscard]] Result<void> add(MeshPart part);
 
+    /// How many were appended.
+    [[nodiscard]] int parts() const { return parts_; }
+
     /// The positions of all parts count from here in the world: a reader took it away already.
     void setOrigin(glm::dvec3 origin) { mesh_.origin = origin; }
 
@@ -62,6 +65,7 @@ class MeshBuilder {
     Mesh mesh_;                          ///< its positions come at the end
     std::vector<glm::dvec3> positions_;  ///< of all parts
     std::uint64_t charged_ = 0;
+    int parts_ = 0;
     std::uint64_t flatTriangles_ = 0;
     std::uint64_t points_ = 0, brokenPoints_ = 0;
 };

@@ -11,7 +11,7 @@
 namespace stx {
 namespace {
 
-enum class Format { none, gltf, glb, obj, ply, stl, draco, off, dae, fbx };
+enum class Format { none, gltf, glb, obj, ply, stl, draco, off, dae, fbx, spz };
 
 std::string lowerCase(std::string text) {
     for (auto& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -45,6 +45,7 @@ Format formatOfEnding(const std::filesystem::path& path) {
     if (ending == ".off") return Format::off;
     if (ending == ".dae") return Format::dae;
     if (ending == ".fbx") return Format::fbx;
+    if (ending == ".spz") return Format::spz;
     return Format::none;
 }
 
@@ -110,7 +111,7 @@ Result<void> addTexture(Mesh& mesh, const std::filesystem::path& path, Job& job)
 void giveGrey(Mesh& mesh, Job& job) {
     constexpr float kGrey = 0.5f;  // linear; 188 of 255 as sRGB
     const bool hasColour =
-        !mesh.colours.empty() ||
+        mesh.splats || !mesh.colours.empty() ||
         std::any_of(mesh.materials.begin(), mesh.materials.end(), [](auto& m) {
             return m.hasColour || m.baseColourTexture >= 0 || m.emissive != glm::vec3(0.0f);
         });
@@ -149,13 +150,15 @@ Result<Mesh> readFormat(Format format, ByteSpan bytes, const std::filesystem::pa
             return readWithAssimp(bytes, AssimpFormat::dae, name, files);
         case Format::fbx:
             return readWithAssimp(bytes, AssimpFormat::fbx, name, files);
+        case Format::spz:
+            return readSpz(bytes, job);
         case Format::none:
             break;
     }
     return fail(
         ErrorCode::invalidInput,
         "the file is not a model that is known here: glTF, GLB, OBJ, PLY, STL, OFF, COLLADA "
-        "(.dae), FBX or Draco (.drc)");
+        "(.dae), FBX, Draco (.drc) or SPZ");
 }
 
 }  // namespace
@@ -182,6 +185,11 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
         formatOf(path, ByteSpan(bytes).first(std::min<std::size_t>(bytes.size(), 4096)));
     auto mesh = readFormat(format, bytes, path, job, options);
     if (!mesh) return tl::unexpected(mesh.error().at(where));
+    if (mesh->splats) {
+        // Clouds are large: not both at a time.
+        bytes = {};
+        STX_CHECK(placeSplats(*mesh, job));
+    }
 
     if (!options.texture.empty()) {
         if (mesh->uvs.empty())

@@ -8,6 +8,7 @@
 #include "formats/files/files.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/mesh.hpp"
+#include "lib/model/splat_cloud.hpp"
 
 namespace stx {
 
@@ -28,7 +29,8 @@ struct MeshOptions {
 /// Reads a model: glTF 2.0 and GLB (with Draco, quantisation, sparse accessors, texture transforms,
 /// meshopt compression, instances, skins in rest pose, morph targets at their default weights), OBJ
 /// with MTL, PLY, STL (ASCII and binary), OFF, COLLADA, FBX, Draco .drc meshes and point clouds.
-/// "-" reads stdin.
+/// Clouds of Gaussian splats, of PLY, SPZ (2, 3) and glTF (KHR_gaussian_splatting), become
+/// Mesh::splats. "-" reads stdin.
 ///
 /// The result has passed Mesh::check(): world space, all transforms applied, no triangle without
 /// area. `normals` is empty when the file has none: a triangle's own normal counts then. Colours of
@@ -76,5 +78,14 @@ struct PointWriteOptions {
 /// of range), invalidInput (no points, arrays of unlike length, values that are not finite), io.
 [[nodiscard]] Result<void> writePoints(const std::filesystem::path& path, const PointCloud& points,
                                        Job& job, const PointWriteOptions& options = {});
+
+/// Writes a cloud of splats, whole or not at all, by the ending of `path`: .ply (INRIA's binary
+/// PLY, turned by half around X where the cloud stands on +Y, as such files stand on -Y), .spz
+/// (Niantic's version 3) or .glb (KHR_gaussian_splatting, with COLOR_0 for viewers that know only
+/// points). Harmonics are left out, with a note. The same input gives the same bytes. What is
+/// rounded is said with job.note(). Errors: usage (another ending), (invalidInput) coordinates that
+/// SPZ's 24 bits do not hold, more than GLB's 4 GiB; memory over the limit, io.
+[[nodiscard]] Result<void> writeSplats(const std::filesystem::path& path, SplatCloud cloud,
+                                       OutputFile::Options options, Job& job);
 
 }  // namespace stx

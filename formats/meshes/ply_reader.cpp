@@ -516,6 +516,7 @@ class PlyReader {
 
 Result<Mesh> readPly(ByteSpan bytes, ModelFiles& files) {
     STX_TRY(auto header, readPlyHeader(bytes));
+    if (isSplatPly(header)) return readSplatPly(bytes, header, files.job());
     return PlyReader(bytes, std::move(header), files).read();
 }
 

@@ -2,6 +2,8 @@
 
 #include "formats/meshes/meshes.hpp"
 #include "formats/meshes/model_files.hpp"
+#include "formats/meshes/ply_header.hpp"
+#include "lib/model/splat_cloud.hpp"
 
 namespace stx {
 
@@ -18,5 +20,26 @@ enum class AssimpFormat { obj, stl, dae, fbx };
 /// OBJ, STL, COLLADA and FBX. `fileName` is the model's own name in its folder.
 [[nodiscard]] Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format,
                                           const std::string& fileName, ModelFiles& files);
+
+// Clouds of Gaussians, in splats/.
+
+/// A mesh that is drawn as this cloud, after dropBroken(); it has no positions yet. Errors: no
+/// splat is left.
+[[nodiscard]] Result<Mesh> meshOfSplats(SplatCloud cloud, Job& job);
+/// Gives such a mesh the centres of its splats as positions, and as points those that frame it: of
+/// splats that hide half or more of what is behind them. Errors: memory over the limit.
+[[nodiscard]] Result<void> placeSplats(Mesh& mesh, Job& job);
+
+/// Whether a PLY file is a cloud of splats: its vertices have opacity, scales, a rotation and a
+/// colour of degree 0 (INRIA's names). Without one of these it is a plain point cloud.
+[[nodiscard]] bool isSplatPly(const PlyHeader& header);
+/// Reads such a file; values may be of any type. Errors: (invalidInput) lists among the vertices,
+/// fewer bytes than vertices, harmonics of no whole degree, memory over the limit; (unsupported)
+/// text, other elements before the vertices.
+[[nodiscard]] Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job);
+
+/// Reads Niantic's SPZ, versions 2 and 3. Errors: (invalidInput) no gzip, damage, other lengths
+/// than the header says; (unsupported) other versions, degrees above 3.
+[[nodiscard]] Result<Mesh> readSpz(ByteSpan bytes, Job& job);
 
 }  // namespace stx

@@ -118,10 +118,15 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
     const auto n = static_cast<std::int64_t>(cameras.size());
     std::vector<Result<ReferenceView>> views(n, ReferenceView());
     std::atomic<std::int64_t> done = 0;
-    parallelFor(0, n, [&](std::int64_t i) {
+    const auto capture = [&](std::int64_t i) {
         views[i] = captureView(mesh, cameras[i], fmt::format("view{:03}", i), settings, job);
         job.progress(++done, n, "capturing views");
-    });
+    };
+    // All threads draw one view of a cloud: several views at a time would need the memory of each.
+    if (mesh.splats)
+        for (std::int64_t i = 0; i < n; ++i) capture(i);
+    else
+        parallelFor(0, n, capture);
     Bundle bundle;
     for (std::int64_t i = 0; i < n; ++i) {
         if (!views[i]) return tl::unexpected(views[i].error().at(fmt::format("view {}", i)));
@@ -163,6 +168,11 @@ std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {
     std::vector<glm::vec3> points;
     for (std::size_t i = 0; i < corner.size(); ++i)
         if (corner[i]) points.push_back(mesh.positions[i]);
+    if (mesh.splats) {
+        for (std::size_t i = 0; i < mesh.points.size(); ++i)
+            if (!isStray(i)) points.push_back(mesh.positions[mesh.points[i]]);
+        return points;
+    }
     // Loose points are drawn as discs, which must fit into the frame, too.
     const float radius = pointRadius(mesh);
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {

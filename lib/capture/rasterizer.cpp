@@ -13,6 +13,7 @@
 #include "lib/capture/material_sampler.hpp"
 #include "lib/capture/tile_kernels.hpp"
 #include "lib/geometry/depth_code.hpp"
+#include "lib/splats/draw.hpp"
 
 namespace stx {
 namespace {
@@ -582,6 +583,16 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                     settings.supersampling);
     STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(camera.width) * camera.height,
                                          32, "the picture"));
+    if (mesh.splats) {
+        STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
+        auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
+        return RasterImage{std::move(drawn.colour),
+                           std::move(lit),
+                           std::move(drawn.depth),
+                           std::move(drawn.normal),
+                           {},
+                           {}};
+    }
     STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
     if (!mesh.points.empty()) {
         const Mesh discs = pointsAsDiscs(mesh, camera, pointRadius(mesh));

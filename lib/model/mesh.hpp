@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,8 @@
 #include "lib/model/texture.hpp"
 
 namespace stx {
+
+struct SplatCloud;
 
 /// A picture on a mesh: 8-bit RGBA, straight alpha.
 struct MeshTexture {
@@ -61,6 +64,10 @@ struct Mesh {
     std::vector<glm::uvec3> triangles;            ///< indices into the vertex arrays
     std::vector<std::uint32_t> triangleMaterial;  ///< one per triangle, index into materials
     std::vector<std::uint32_t> points;            ///< vertices drawn as points (point clouds)
+
+    /// A cloud of Gaussians, drawn in place of everything else; `positions` are their centres then,
+    /// and `points` those that frame it. Null: none.
+    std::shared_ptr<const SplatCloud> splats;
 
     std::vector<Material> materials;  ///< at least one when there are triangles
     std::vector<MeshTexture> textures;

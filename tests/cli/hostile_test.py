@@ -29,7 +29,7 @@ RENDER = ["-o", "OUT/a.png", "--size", "24x24", "--backend", "cpu"]
 OTHERS = [["extract", "IN", "-o", "OUT/set"], ["extract", "IN", "-o", "OUT/points.ply"],
           ["extract", "IN", "-o", "OUT/set", "--cameras", "miv", "--depth", "png"],
           ["extract", "IN", "-o", "OUT/points.drc"], ["extract", "IN", "-o", "OUT/view.html"],
-          ["extract", "IN", "-o", "OUT/model.glb"],
+          ["extract", "IN", "-o", "OUT/model.glb"], ["extract", "IN", "-o", "OUT/cloud.spz", "--max-splats", "50"],
           ["select", "IN", "-o", "OUT/a.exr", "--count", "1"],
           ["bake", "IN", "-o", "OUT/a.mp4"], ["pack", "IN", "-o", "OUT/atlas"],
           ["convert", "IN", "-o", "OUT/o.mp4", "--octree-image", "4"],

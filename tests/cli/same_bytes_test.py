@@ -79,6 +79,8 @@ def main():
             "render mesh": ["render", args.model, "-o", "OUT/a.exr", "--size", "120x90"],
             "extract": ["extract", "IN/in.exr", "-o", "OUT/images"],
             "extract glb": ["extract", "IN/in.exr", "-o", "OUT/model.glb"],
+            "extract spz": ["extract", "IN/in.exr", "-o", "OUT/cloud.spz"],
+            "extract splats": ["extract", "IN/in.exr", "-o", "OUT/cloud.ply", "--as", "splats", "--max-splats", "20000"],
             "extract html": ["extract", "IN/baked.mp4", "-o", "OUT/view.html"],
             "sheet": ["sheet", "IN/baked.mp4", "-o", "OUT/a.png"],
             "sheet of two": ["sheet", "IN/in.exr", "IN/baked.mp4", "-o", "OUT/a.png"],

@@ -18,6 +18,7 @@ std::uint32_t readU32(ByteSpan bytes, std::size_t at) {
 /// Extensions that are read, or that add nothing to shape and base colour.
 constexpr std::string_view kKnownExtensions[] = {
     "KHR_draco_mesh_compression",
+    "KHR_gaussian_splatting",
     "KHR_mesh_quantization",
     "KHR_texture_basisu",  // not read: a note, and the plain colour
     "KHR_texture_transform",

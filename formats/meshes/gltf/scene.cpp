@@ -5,7 +5,9 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "formats/meshes/gltf/primitive.hpp"
+#include "formats/meshes/gltf/splats.hpp"
 #include "formats/meshes/readers.hpp"
+#include "lib/splats/transform.hpp"
 
 namespace stx {
 namespace gltf {
@@ -50,8 +52,13 @@ class SceneReader {
     Result<Mesh> read() {
         STX_CHECK(readNodes());
         STX_CHECK(readScene());
+        if (splats_.positions.empty()) {
+            say();
+            return builder_.finish();
+        }
+        if (const auto n = builder_.parts()) dropped_["primitives that are no splats"] += n;
         say();
-        return builder_.finish();
+        return meshOfSplats(std::move(splats_), model_.job());
     }
 
   private:
@@ -358,6 +365,7 @@ class SceneReader {
                          const std::vector<double>& nodeWeights,
                          const std::vector<glm::dmat4>& transforms,
                          const std::vector<glm::dmat4>* joints, bool keep) {
+        STX_CHECK(addSplatsOf(index, user, transforms));
         std::vector<Primitive> fresh;
         const std::vector<Primitive>* primitives = &fresh;
         if (const auto it = meshes_.find(index); it != meshes_.end() && nodeWeights.empty()) {
@@ -374,6 +382,8 @@ class SceneReader {
                 const auto at = fmt::format("{}.primitives[{}]", where, p);
                 if (!(*list)[p].is_object())
                     return fail(ErrorCode::invalidInput, "{} is not an object", at);
+                STX_TRY(const Json* splats, splatsIn((*list)[p], at));
+                if (splats) continue;
                 STX_TRY(auto primitive, readPrimitive(model_, builder_, materials_, (*list)[p], at,
                                                       weights, dropped_));
                 if (primitive.drawn) fresh.push_back(std::move(primitive));
@@ -396,6 +406,25 @@ class SceneReader {
         return {};
     }
 
+    /// The primitives of a mesh that are splats, with each transform.
+    Result<void> addSplatsOf(std::uint64_t index, const std::string& user,
+                             const std::vector<glm::dmat4>& transforms) {
+        STX_TRY(const Json* mesh, element(root(), "meshes", index, user));
+        const auto where = fmt::format("meshes[{}]", index);
+        STX_TRY(const Json* list, getArray(*mesh, "primitives", where));
+        for (std::size_t p = 0; list && p < list->size(); ++p) {
+            const auto at = fmt::format("{}.primitives[{}]", where, p);
+            if (!(*list)[p].is_object()) continue;  // said by those who read the others
+            STX_TRY(const Json* splats, splatsIn((*list)[p], at));
+            for (std::size_t i = 0; splats && i < transforms.size(); ++i) {
+                const std::size_t first = splats_.positions.size();
+                STX_CHECK(addSplats(model_, (*list)[p], at, splats_));
+                transformSplats(splats_, first, transforms[i]);
+            }
+        }
+        return {};
+    }
+
     /// One line about everything that was left out.
     void say() {
         if (const auto n = listSize(root(), "animations"))
@@ -413,6 +442,7 @@ class SceneReader {
     std::vector<Node> nodes_;
     std::map<std::uint64_t, std::vector<Primitive>> meshes_;
     std::map<std::string, int> dropped_;
+    SplatCloud splats_;
 };
 
 }  // namespace

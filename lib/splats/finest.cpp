@@ -1,0 +1,92 @@
+#include "lib/splats/finest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "lib/base/parallel.hpp"
+#include "lib/geometry/near_views.hpp"
+
+namespace stx::splats {
+namespace {
+
+constexpr std::size_t kMostViews = 16;
+/// Discs of one surface lie in each other's plane to within this share of the larger one's side.
+constexpr float kOff = 0.5f;
+constexpr float kLeastCosine = 0.5f;  ///< between their normals
+/// Edges cover their pixel in part: what replaces others must cover all of it.
+constexpr float kWhole = 0.995f;
+
+struct Shape {
+    glm::vec3 normal{0.0f};
+    float area = 0;
+};
+
+Shape shapeOf(const Disc& d) {
+    const glm::vec3 across = glm::cross(d.u, d.v);
+    const float area = glm::length(across);
+    return {area > 0 ? across / area : glm::vec3(0.0f), area};
+}
+
+/// Whether the disc and its four neighbours are there, none of them an edge.
+bool isInside(const Image<Disc>& discs, int x, int y) {
+    if (x < 1 || y < 1 || x + 1 >= discs.width() || y + 1 >= discs.height()) return false;
+    const auto whole = [&](int i, int j) { return discs.at(i, j).colour.w >= kWhole; };
+    return whole(x, y) && whole(x - 1, y) && whole(x + 1, y) && whole(x, y - 1) && whole(x, y + 1);
+}
+
+/// Whether another view shows the place of a disc finer; of equally fine ones the first stays.
+bool showsFiner(const ReferenceView& view, const Image<Disc>& discs, bool comesFirst,
+                const Disc& disc, const Shape& shape) {
+    const glm::dvec3 inCamera =
+        glm::transpose(glm::dmat3(glm::mat3_cast(view.camera.orientation))) *
+        (glm::dvec3(disc.centre) - view.camera.position);
+    if (!(inCamera.z < 0)) return false;
+    const glm::dvec3 at = view.camera.project(inCamera);
+    if (!(at.x >= 1 && at.y >= 1 && at.x < discs.width() - 1 && at.y < discs.height() - 1))
+        return false;
+    const int x = static_cast<int>(at.x), y = static_cast<int>(at.y);
+    const Disc& other = discs.at(x, y);
+    if (!isInside(discs, x, y)) return false;
+    const Shape theirs = shapeOf(other);
+    if (!(theirs.area < shape.area || (theirs.area == shape.area && comesFirst))) return false;
+    if (std::abs(glm::dot(theirs.normal, shape.normal)) < kLeastCosine) return false;
+    const glm::vec3 apart = disc.centre - other.centre;
+    const float side = std::sqrt(shape.area);
+    return std::abs(glm::dot(apart, theirs.normal)) <= kOff * side &&
+           glm::length(apart) <= 2.0f * side;
+}
+
+}  // namespace
+
+void keepFinest(const Bundle& bundle, std::vector<Image<Disc>>& discs) {
+    const std::size_t count = bundle.views.size();
+    std::vector<std::vector<std::uint8_t>> gone(count);
+    const auto camera = [&](std::size_t i) -> const Camera& { return bundle.views[i].camera; };
+    parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t number) {
+        const auto i = static_cast<std::size_t>(number);
+        const Image<Disc>& own = discs[i];
+        gone[i].resize(own.count());
+        Bounds bounds;
+        for (const Disc& d : own.pixels())
+            if (d.colour.w > 0) bounds.add(d.centre);
+        if (bounds.empty()) return;
+        auto others = nearViews(count, camera, i, bounds.centre(), kMostViews);
+        std::erase_if(others, [&](std::size_t j) {
+            return bundle.views[j].background != bundle.views[i].background;
+        });
+        for (std::size_t p = 0; p < own.count(); ++p) {
+            const Disc& disc = own.pixels()[p];
+            if (!(disc.colour.w > 0)) continue;
+            const Shape shape = shapeOf(disc);
+            gone[i][p] = std::ranges::any_of(others, [&](std::size_t j) {
+                return showsFiner(bundle.views[j], discs[j], j < i, disc, shape);
+            });
+        }
+    });
+    for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t p = 0; p < gone[i].size(); ++p)
+            if (gone[i][p]) discs[i].pixels()[p].colour.w = 0;
+}
+
+}  // namespace stx::splats

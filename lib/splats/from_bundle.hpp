@@ -1,0 +1,28 @@
+#pragma once
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+#include "lib/model/splat_cloud.hpp"
+
+namespace stx {
+
+struct SplatSettings {
+    /// Standard deviations of a splat for each half axis of its texel's ellipse (bake()). 0.75
+    /// draws the reference views best, see tests/bench/pictures.md.
+    double size = 0.75;
+    /// At most so many splats: flat pieces of one colour become one splat, those whose loss is
+    /// least first; 0 = one for each texel.
+    std::size_t most = 0;
+};
+
+/// A Gaussian for each place of a bundle, of the view that shows it finest: at its point, flat in
+/// its surface, along the axes of its ellipse (those of bake() where a view has none), with its
+/// colour and 0.99 of its alpha. Splats of background views come first. The coordinates are the
+/// world's: an origin is added, with a note where floats round it.
+///
+/// Errors: those of bake(); (invalidInput) no point, more than 2^32 - 1; (failed) flat pieces do
+/// not come down to `most`, with the least that they come to; memory over the limit, cancelled.
+[[nodiscard]] Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings,
+                                                Job& job);
+
+}  // namespace stx

@@ -1,0 +1,89 @@
+#include "tools/extract_splats.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "formats/any/sequences.hpp"
+#include "formats/files/numbered.hpp"
+#include "formats/meshes/meshes.hpp"
+#include "lib/base/stopwatch.hpp"
+#include "tools/picture_times.hpp"
+#include "tools/refining.hpp"
+
+namespace stx::tools {
+
+Result<std::optional<ExtractAs>> extractedAs(const std::string& as, const std::string& ending) {
+    struct Row {
+        const char* ending;
+        ExtractAs usual;
+        std::vector<const char*> words;
+    };
+    static const Row kRows[] = {{".ply", ExtractAs::points, {"points", "splats"}},
+                                {".drc", ExtractAs::points, {"points"}},
+                                {".spz", ExtractAs::splats, {"splats"}},
+                                {".glb", ExtractAs::surfaces, {"surfaces", "splats"}}};
+    for (const Row& row : kRows) {
+        if (row.ending != ending) continue;
+        if (as.empty()) return row.usual;
+        for (const char* word : row.words)
+            if (word == as)
+                return as == "splats"   ? ExtractAs::splats
+                       : as == "points" ? ExtractAs::points
+                                        : ExtractAs::surfaces;
+        return fail(ErrorCode::usage, "--as {}: a {} file is written as {} here", as, ending,
+                    fmt::join(row.words, " or "));
+    }
+    if (as.empty()) return std::nullopt;
+    return fail(ErrorCode::usage, "--as is of .ply, .spz, .drc and .glb files");
+}
+
+Result<int> extractSplats(const std::string& input, const std::string& output,
+                          const std::optional<double>& time, const std::string& refine,
+                          const SplatSettings& settings, Program& program) {
+    const Stopwatch watch;
+    STX_TRY(auto frames, openSequence(input, {}, program.job));
+    STX_TRY(frames, refined(std::move(frames), refine));
+    const Timeline timeline = frames->timeline();
+    const bool numbered = frameName(output, 0).has_value();
+    std::size_t first = 0, end = timeline.count();
+    if (!numbered || time) {
+        STX_TRY(first, momentOf(time, timeline, numbered ? nullptr : "a file of splats is", input,
+                                program.job));
+        end = first + 1;
+    } else if (timeline.moves()) {
+        program.job.note("files of splats have no times: one is written for each frame");
+    }
+    std::size_t views = 0, splats = 0;
+    std::int64_t points = 0;
+    std::uint64_t bytes = 0;
+    for (std::size_t i = first; i < end; ++i) {
+        STX_TRY(auto bundle, frames->frame(i, program.job));
+        if (i == first) {
+            views = bundle.views.size();
+            points = bundle.pointCount();
+        }
+        STX_TRY(auto cloud, splatsOfBundle(std::move(bundle), settings, program.job));
+        if (i == first) splats = cloud.positions.size();
+        const std::string target = frameName(output, static_cast<int>(i - first)).value_or(output);
+        STX_CHECK(writeSplats(target, std::move(cloud), program.outputOptions(), program.job));
+        bytes += bytesOf(target);
+        program.job.progress(static_cast<std::int64_t>(i - first) + 1,
+                             static_cast<std::int64_t>(end - first), "writing splats");
+    }
+    const double seconds = watch.seconds();
+    program.sayNotes();
+    program.say(fmt::format(
+        "{} ({}) → {} ({}), {}{}, {}", std::filesystem::path(input).filename().string(),
+        humanBytes(bytesOf(input)), output, humanBytes(bytes), counted(splats, "splat"),
+        end - first > 1 ? " in the first of " + counted(end - first, "frame") : std::string(),
+        humanSeconds(seconds)));
+    STX_CHECK(program.writeReport({{"$schema", "extract-report.schema.json"},
+                                   {"input", input},
+                                   {"output", output},
+                                   {"views", views},
+                                   {"points", points},
+                                   {"splats", splats},
+                                   {"seconds", seconds}}));
+    return 0;
+}
+
+}  // namespace stx::tools

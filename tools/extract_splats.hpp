@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "lib/splats/from_bundle.hpp"
+#include "tools/program.hpp"
+
+namespace stx::tools {
+
+/// What `stx extract` writes as a file.
+enum class ExtractAs { points, splats, surfaces };
+
+/// What a file is written as: what `as` says (empty: not given), else splats for .spz, surfaces for
+/// .glb and points for .ply and .drc; nothing for other endings, which take no --as. Errors
+/// (usage): an ending that does not hold it.
+[[nodiscard]] Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
+                                                           const std::string& ending);
+
+/// `stx extract` into a file of splats, or of a film into one for each frame where `output` has a
+/// number (%04d): says what was written and reports it. Errors: those of momentOf(), of the input,
+/// splatsOfBundle() and writeSplats().
+[[nodiscard]] Result<int> extractSplats(const std::string& input, const std::string& output,
+                                        const std::optional<double>& time,
+                                        const std::string& refine, const SplatSettings& settings,
+                                        Program& program);
+
+}  // namespace stx::tools
