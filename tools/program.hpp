@@ -26,6 +26,7 @@ struct CommonOptions {
     bool noClobber = false;
     bool allowOutside = false;
     bool keepDamaged = false;  ///< `--damaged keep`
+    bool requireIsolation = false;  ///< `--decoder-isolation required`
     std::uint64_t maxMemoryMiB = 4096;
     std::string report;           ///< path of a JSON report; empty = none
     std::string format = "text";  ///< or "json", for commands that answer on stdout
