@@ -192,8 +192,9 @@ int Program::run(const std::function<Result<int>()>& body) {
     }
     job.onProgress = nullptr;
     if (common.verbose > 0 && ranUnfiltered())
-        job.note("decoders of foreign files ran without a filter of system calls (seccomp), which "
-                 "this kernel or container does not allow");
+        job.note(
+            "decoders of foreign files ran without a filter of system calls (seccomp), which "
+            "this kernel or container does not allow");
     sayNotes();
     if (!code) {
         complain("stx: " + textOf(code.error()));

@@ -25,7 +25,7 @@ struct CommonOptions {
     int verbose = 0;
     bool noClobber = false;
     bool allowOutside = false;
-    bool keepDamaged = false;  ///< `--damaged keep`
+    bool keepDamaged = false;       ///< `--damaged keep`
     bool requireIsolation = false;  ///< `--decoder-isolation required`
     std::uint64_t maxMemoryMiB = 4096;
     std::string report;           ///< path of a JSON report; empty = none

@@ -99,8 +99,10 @@ class Templates {
             if (ask(one->control.get(), launch, socket, file)) return one->program;
             gone = one;
         }
-        return fail(ErrorCode::failed, "the decoder '{}' does not take a file; install the stx "
-                    "package anew", gone->program);
+        return fail(ErrorCode::failed,
+                    "the decoder '{}' does not take a file; install the stx "
+                    "package anew",
+                    gone->program);
     }
 
     /// The one that is there, or a new one where that is `gone`.
@@ -193,7 +195,8 @@ Result<std::unique_ptr<DecoderProcess>> DecoderProcess::start(const DecoderKind&
     auto process = over(Descriptor(ends[0]), bounds);
     std::string program;
     {
-        const Descriptor there(ends[1]);  // closed before an answer is waited for, so that its end is seen
+        const Descriptor there(
+            ends[1]);  // closed before an answer is waited for, so that its end is seen
         decoders::Launch launch;
         launch.cpuSeconds = static_cast<std::uint32_t>(bounds.cpuSeconds);
         launch.memoryBytes = bounds.memoryBytes;
@@ -249,8 +252,7 @@ Result<void> DecoderProcess::meet(const DecoderKind& kind, const std::string& pr
 }
 
 DecoderProcess::~DecoderProcess() {
-    if (process_.get() >= 0)
-        ::syscall(SYS_pidfd_send_signal, process_.get(), SIGKILL, nullptr, 0);
+    if (process_.get() >= 0) ::syscall(SYS_pidfd_send_signal, process_.get(), SIGKILL, nullptr, 0);
 }
 
 bool DecoderProcess::send(Tag tag, ByteSpan bytes) {

@@ -11,9 +11,9 @@
 
 #include "formats/files/pipes.hpp"
 
-/// What is said between this process and one that decodes (formats/decoders/README.md): messages, each
-/// behind a head that tells the protocol's version, what it is and its length. Both ends are of one
-/// machine, so values go as they are in memory. A header alone, for modules too.
+/// What is said between this process and one that decodes (formats/decoders/README.md): messages,
+/// each behind a head that tells the protocol's version, what it is and its length. Both ends are
+/// of one machine, so values go as they are in memory. A header alone, for modules too.
 namespace stx::decoders {
 
 /// Changes with every change of what is said.
@@ -69,12 +69,14 @@ struct Hello {
     std::uint8_t unused[6] = {};
 };
 
-/// What is sent with the descriptors of a socket and, at times, a file, for a process to be started.
+/// What is sent with the descriptors of a socket and, at times, a file, for a process to be
+/// started.
 struct Launch {
     std::uint32_t magic = kMagic;
     std::uint32_t cpuSeconds = 0;  ///< 0: as many as it likes
-    std::uint64_t memoryBytes = 0;  ///< of data, beside what the libraries have when they are loaded
-    std::uint8_t mustFilter = 0;    ///< fails where system calls cannot be filtered
+    std::uint64_t memoryBytes =
+        0;                        ///< of data, beside what the libraries have when they are loaded
+    std::uint8_t mustFilter = 0;  ///< fails where system calls cannot be filtered
     std::uint8_t unused[7] = {};
 };
 

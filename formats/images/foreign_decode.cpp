@@ -12,8 +12,7 @@ constexpr int kMostSeconds = 30;
 constexpr std::uint64_t kLargestHeader = 1 << 20;
 
 tl::unexpected<Error> died() {
-    return fail(ErrorCode::invalidInput,
-                "its decoder crashed or did not end; the file is damaged");
+    return fail(ErrorCode::invalidInput, "its decoder crashed or did not end; the file is damaged");
 }
 
 /// Room for the pixels that are to come, of a picture that is allowed; null when there is none.
@@ -59,8 +58,8 @@ Result<DecodedImage> receivePicture(DecoderProcess& process, std::size_t fileByt
         if (!process.receive(told.data(), told.size())) return died();
         return tl::unexpected(errorIn(told));
     }
-    const std::size_t size = std::visit(
-        [](const auto& all) { return all.size() * sizeof(all[0]); }, image.values);
+    const std::size_t size =
+        std::visit([](const auto& all) { return all.size() * sizeof(all[0]); }, image.values);
     if (head.tag != Tag::pixels || head.size != size || !process.receive(values, size))
         return died();
     return image;

@@ -56,10 +56,10 @@ class SceneConverter {
         }
         std::vector<glm::dmat4> worldFromNode;
         for (const auto& node : scene_.nodes) {
-            worldFromNode.push_back(
-                node.parent < 0 ? glm::dmat4(node.parentFromNode)
-                                : worldFromNode[static_cast<std::size_t>(node.parent)] *
-                                      glm::dmat4(node.parentFromNode));
+            worldFromNode.push_back(node.parent < 0
+                                        ? glm::dmat4(node.parentFromNode)
+                                        : worldFromNode[static_cast<std::size_t>(node.parent)] *
+                                              glm::dmat4(node.parentFromNode));
             for (const std::uint32_t mesh : node.meshes)
                 STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode.back()));
         }
@@ -320,8 +320,7 @@ Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& si
                             endingOf(format), errorIn(told).message);
             case Tag::timeUp:
                 return fail(ErrorCode::invalidInput,
-                            "the model cannot be read in {} seconds; is it damaged?",
-                            kMostSeconds);
+                            "the model cannot be read in {} seconds; is it damaged?", kMostSeconds);
             case Tag::noMemory:
                 return fail(ErrorCode::invalidInput,
                             "the model needs more than the memory limit of {} MiB; raise it with "

@@ -9,8 +9,8 @@
 
 namespace stx {
 
-/// What the process that reads a model gets of the files that the model names: those that ModelFiles
-/// opens beside it, and no others.
+/// What the process that reads a model gets of the files that the model names: those that
+/// ModelFiles opens beside it, and no others.
 class SideFiles {
   public:
     explicit SideFiles(ModelFiles& files) : files_(files) {}

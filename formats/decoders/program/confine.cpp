@@ -22,16 +22,44 @@ namespace stx::decoders {
 namespace {
 
 /// What decoding needs: memory, the time, open files, its own threads' locks, and its end.
-constexpr int kAllowed[] = {
-    SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(lseek), SCMP_SYS(close),
-    SCMP_SYS(fstat), SCMP_SYS(dup), SCMP_SYS(poll), SCMP_SYS(ppoll), SCMP_SYS(brk), SCMP_SYS(munmap),
-    SCMP_SYS(mremap), SCMP_SYS(madvise), SCMP_SYS(futex), SCMP_SYS(sched_yield),
-    SCMP_SYS(sched_getaffinity), SCMP_SYS(getcpu), SCMP_SYS(getrandom), SCMP_SYS(clock_gettime),
-    SCMP_SYS(clock_getres), SCMP_SYS(gettimeofday), SCMP_SYS(time), SCMP_SYS(times),
-    SCMP_SYS(getrusage), SCMP_SYS(sysinfo), SCMP_SYS(uname), SCMP_SYS(getpid), SCMP_SYS(gettid),
-    SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
-    SCMP_SYS(restart_syscall), SCMP_SYS(set_robust_list), SCMP_SYS(rseq), SCMP_SYS(membarrier),
-    SCMP_SYS(exit), SCMP_SYS(exit_group)};
+constexpr int kAllowed[] = {SCMP_SYS(read),
+                            SCMP_SYS(readv),
+                            SCMP_SYS(pread64),
+                            SCMP_SYS(lseek),
+                            SCMP_SYS(close),
+                            SCMP_SYS(fstat),
+                            SCMP_SYS(dup),
+                            SCMP_SYS(poll),
+                            SCMP_SYS(ppoll),
+                            SCMP_SYS(brk),
+                            SCMP_SYS(munmap),
+                            SCMP_SYS(mremap),
+                            SCMP_SYS(madvise),
+                            SCMP_SYS(futex),
+                            SCMP_SYS(sched_yield),
+                            SCMP_SYS(sched_getaffinity),
+                            SCMP_SYS(getcpu),
+                            SCMP_SYS(getrandom),
+                            SCMP_SYS(clock_gettime),
+                            SCMP_SYS(clock_getres),
+                            SCMP_SYS(gettimeofday),
+                            SCMP_SYS(time),
+                            SCMP_SYS(times),
+                            SCMP_SYS(getrusage),
+                            SCMP_SYS(sysinfo),
+                            SCMP_SYS(uname),
+                            SCMP_SYS(getpid),
+                            SCMP_SYS(gettid),
+                            SCMP_SYS(rt_sigaction),
+                            SCMP_SYS(rt_sigprocmask),
+                            SCMP_SYS(rt_sigreturn),
+                            SCMP_SYS(sigaltstack),
+                            SCMP_SYS(restart_syscall),
+                            SCMP_SYS(set_robust_list),
+                            SCMP_SYS(rseq),
+                            SCMP_SYS(membarrier),
+                            SCMP_SYS(exit),
+                            SCMP_SYS(exit_group)};
 
 void limit(int resource, std::uint64_t most) {
     const rlimit bound = {most, most};
@@ -76,7 +104,7 @@ void onFiltered(int, siginfo_t* what, void* context) {
     const bool own = [&] {
         const char* name = reinterpret_cast<const char*>(
             what->si_syscall == SYS_openat || what->si_syscall == SYS_newfstatat ? asked.second
-                                                                                : asked.first);
+                                                                                 : asked.first);
         return ownFile >= 0 && name && std::strcmp(name, ownName) == 0;
     }();
     const int before = errno;
@@ -118,7 +146,8 @@ Filter::Filter(int socket) {
     const scmp_arg_cmp memory[] = {SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0),
                                    SCMP_A3(SCMP_CMP_MASKED_EQ, MAP_SHARED, 0)};
     const auto allow = [&](int call, unsigned count, const scmp_arg_cmp* conditions) {
-        good = good && ::seccomp_rule_add_array(rules, SCMP_ACT_ALLOW, call, count, conditions) == 0;
+        good =
+            good && ::seccomp_rule_add_array(rules, SCMP_ACT_ALLOW, call, count, conditions) == 0;
     };
     allow(SCMP_SYS(sendto), 2, answer);
     allow(SCMP_SYS(write), 1, answer);

@@ -230,7 +230,8 @@ void serve(int socket, int file) {
     std::vector<std::byte> request;
     if (!decoders::receiveMessage(socket, tag, request, kLargestRequest, -1)) return;
     struct stat facts = {};
-    const std::size_t size = ::fstat(file, &facts) == 0 ? static_cast<std::size_t>(facts.st_size) : 0;
+    const std::size_t size =
+        ::fstat(file, &facts) == 0 ? static_cast<std::size_t>(facts.st_size) : 0;
     void* const mapped = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
     PictureAnswer answer(socket);
     const auto failed = adapt([&] {

@@ -121,8 +121,8 @@ class SceneTeller {
         for (const aiTexture* texture : embedded_) {
             const bool coded = texture->mHeight == 0;
             out_.put(static_cast<std::uint8_t>(coded));
-            out_.putBytes({reinterpret_cast<const std::byte*>(texture->pcData),
-                           coded ? texture->mWidth : 0});
+            out_.putBytes(
+                {reinterpret_cast<const std::byte*>(texture->pcData), coded ? texture->mWidth : 0});
         }
         Packer nodes;
         if (scene_.mRootNode) putNode(*scene_.mRootNode, -1, nodes);
@@ -204,7 +204,8 @@ class SceneTeller {
         head.colours = mesh.mColors[0] != nullptr;
         head.uvs = mesh.mTextureCoords[0] != nullptr;
         const std::span faces(mesh.mFaces, mesh.mNumFaces);
-        head.triangles = std::ranges::all_of(faces, [](const auto& f) { return f.mNumIndices == 3; });
+        head.triangles =
+            std::ranges::all_of(faces, [](const auto& f) { return f.mNumIndices == 3; });
         for (const auto& face : faces) head.corners += face.mNumIndices;
         std::vector<std::uint32_t> counts, corners;
         corners.reserve(head.corners);
@@ -287,8 +288,7 @@ const char* libraries() {
 }  // namespace stx::models
 
 extern "C" __attribute__((visibility("default"))) const stx::decoders::Module* stxDecoder() {
-    static const stx::decoders::Module module = {stx::decoders::kModuleVersion,
-                                                 stx::models::libraries, nullptr,
-                                                 stx::models::serve};
+    static const stx::decoders::Module module = {
+        stx::decoders::kModuleVersion, stx::models::libraries, nullptr, stx::models::serve};
     return &module;
 }

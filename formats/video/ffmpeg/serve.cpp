@@ -162,7 +162,7 @@ const char* libraries() {
 }  // namespace stx::video
 
 extern "C" __attribute__((visibility("default"))) const stx::decoders::Module* stxDecoder() {
-    static const stx::decoders::Module module = {
-        stx::decoders::kModuleVersion, stx::video::libraries, nullptr, stx::video::serve};
+    static const stx::decoders::Module module = {stx::decoders::kModuleVersion,
+                                                 stx::video::libraries, nullptr, stx::video::serve};
     return &module;
 }

@@ -1,5 +1,5 @@
-// The process in which foreign files are decoded: what it may do, and what becomes of one that ends,
-// hangs, lies or is not there. Its module is probe/probe.cpp.
+// The process in which foreign files are decoded: what it may do, and what becomes of one that
+// ends, hangs, lies or is not there. Its module is probe/probe.cpp.
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -33,9 +33,9 @@ class Setting {
 Result<std::unique_ptr<DecoderProcess>> startProbe(int cpuSeconds = 0) {
     const Setting module("STX_PROBE", STX_PROBE_MODULE);
     const std::string input = "input";
-    return DecoderProcess::start(
-        kProbe, DecoderBounds{.memoryBytes = 64 << 20, .cpuSeconds = cpuSeconds},
-        std::as_bytes(std::span(input)));
+    return DecoderProcess::start(kProbe,
+                                 DecoderBounds{.memoryBytes = 64 << 20, .cpuSeconds = cpuSeconds},
+                                 std::as_bytes(std::span(input)));
 }
 
 bool ask(DecoderProcess& process, const std::string& what) {
@@ -60,12 +60,27 @@ TEST(DecoderProcess, ReachesNothingButItsFile) {
     ASSERT_TRUE(process) << process.error().message;
     if (!(*process)->isolation().seccomp) GTEST_SKIP() << "this kernel has no seccomp";
     EXPECT_EQ((*process)->libraries(), "a probe");
-    for (const char* what :
-         {"open a file", "open a folder", "create a file", "open the other's memory",
-          "look at a file", "make a TCP socket", "make a local socket", "connect", "fork",
-          "run a program", "start a program", "start a thread", "trace the other",
-          "read the other's memory", "signal the other", "bound the other", "make memory that runs",
-          "share memory", "make a file in memory", "write to its input", "take much memory"})
+    for (const char* what : {"open a file",
+                             "open a folder",
+                             "create a file",
+                             "open the other's memory",
+                             "look at a file",
+                             "make a TCP socket",
+                             "make a local socket",
+                             "connect",
+                             "fork",
+                             "run a program",
+                             "start a program",
+                             "start a thread",
+                             "trace the other",
+                             "read the other's memory",
+                             "signal the other",
+                             "bound the other",
+                             "make memory that runs",
+                             "share memory",
+                             "make a file in memory",
+                             "write to its input",
+                             "take much memory"})
         EXPECT_EQ(tryIt(**process, what), Outcome::couldNot) << what;
     for (const char* what : {"take memory", "read its input", "open its input by name"})
         EXPECT_EQ(tryIt(**process, what), Outcome::could) << what;
@@ -98,8 +113,8 @@ TEST(DecoderProcess, StartsFromSeveralThreads) {
     std::vector<std::thread> threads;
     for (std::size_t i = 0; i < good.size(); ++i)
         threads.emplace_back([&good, i] {
-            const auto process = DecoderProcess::start(
-                decoders::kModels, DecoderBounds{.memoryBytes = 64 << 20});
+            const auto process =
+                DecoderProcess::start(decoders::kModels, DecoderBounds{.memoryBytes = 64 << 20});
             good[i] = process.has_value();
         });
     for (auto& thread : threads) thread.join();

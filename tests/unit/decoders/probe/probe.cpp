@@ -55,7 +55,8 @@ const std::map<std::string, std::function<bool()>> kTries = {
          to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
          return ::connect(4, reinterpret_cast<sockaddr*>(&to), sizeof(to)) == 0;
      }},
-    {"fork", [] {
+    {"fork",
+     [] {
          const pid_t made = static_cast<pid_t>(::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0));
          if (made == 0) ::_exit(0);
          return made > 0;
@@ -70,8 +71,8 @@ const std::map<std::string, std::function<bool()>> kTries = {
     {"start a thread",
      [] {
          pthread_t made{};
-         return ::pthread_create(&made, nullptr, [](void*) -> void* { return nullptr; },
-                                 nullptr) == 0;
+         return ::pthread_create(
+                    &made, nullptr, [](void*) -> void* { return nullptr; }, nullptr) == 0;
      }},
     {"trace the other", [] { return ::ptrace(PTRACE_ATTACH, parent, nullptr, nullptr) == 0; }},
     {"read the other's memory",
@@ -98,10 +99,16 @@ const std::map<std::string, std::function<bool()>> kTries = {
     {"make a file in memory", [] { return ::memfd_create("more", 0) >= 0; }},
     {"write to its input", [] { return ::write(ownFile, "x", 1) == 1; }},
     // What it may do.
-    {"take memory", [] { return ::mmap(nullptr, 1 << 20, PROT_READ | PROT_WRITE,
-                                       MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) != MAP_FAILED; }},
-    {"take much memory", [] { return ::mmap(nullptr, 1 << 30, PROT_READ | PROT_WRITE,
-                                            MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) != MAP_FAILED; }},
+    {"take memory",
+     [] {
+         return ::mmap(nullptr, 1 << 20, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1,
+                       0) != MAP_FAILED;
+     }},
+    {"take much memory",
+     [] {
+         return ::mmap(nullptr, 1 << 30, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1,
+                       0) != MAP_FAILED;
+     }},
     {"read its input",
      [] {
          char byte = 0;
@@ -110,8 +117,7 @@ const std::map<std::string, std::function<bool()>> kTries = {
     {"open its input by name",
      [] {
          char byte = 0;
-         const int fd =
-             ::open(("/proc/self/fd/" + std::to_string(ownFile)).c_str(), O_RDONLY);
+         const int fd = ::open(("/proc/self/fd/" + std::to_string(ownFile)).c_str(), O_RDONLY);
          return fd >= 0 && ::read(fd, &byte, 1) == 1 && byte == 'i';
      }},
     {"be the first to come",
@@ -121,13 +127,13 @@ const std::map<std::string, std::function<bool()>> kTries = {
      }},
     {"crash", []() -> bool { std::abort(); }},
     {"end", []() -> bool { ::_exit(0); }},
-    {"go on for ever", [] {
+    {"go on for ever",
+     [] {
          for (volatile int i = 0;; i = i + 1) {
          }
          return true;
      }},
-    {"say rubbish",
-     [] { return stx::sendAll(4, "no message has this head, whatever it is", 40); }},
+    {"say rubbish", [] { return stx::sendAll(4, "no message has this head, whatever it is", 40); }},
 };
 
 /// Text: what is tried; answers done with a byte: whether it could. Text "parent": whose memory.
