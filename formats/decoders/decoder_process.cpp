@@ -89,20 +89,17 @@ Result<Template> startTemplate(const std::vector<std::string>& modulePlaces) {
 /// One stx-decode for each module, for the life of this process: it ends when its connections do.
 class Templates {
   public:
-    /// Asks for a process at the other end of `socket`. Gives the program's path.
-    Result<std::string> launch(const DecoderKind& kind, const decoders::Launch& launch, int socket,
-                               int file) {
-        std::shared_ptr<const Template> gone;
-        // A first one may have been killed since it was used last.
+    /// Asks for a process at the other end of `socket`, of another one than `gone`. Gives the one
+    /// that was asked.
+    Result<std::shared_ptr<const Template>> launch(const DecoderKind& kind,
+                                                   const decoders::Launch& launch, int socket,
+                                                   int file, std::shared_ptr<const Template> gone) {
+        // One that has been killed since it was used last is noticed here, or when nothing answers.
         for (int i = 0; i < 2; ++i) {
-            STX_TRY(const auto one, find(kind, gone));
-            if (ask(one->control.get(), launch, socket, file)) return one->program;
-            gone = one;
+            STX_TRY(gone, find(kind, gone));
+            if (ask(gone->control.get(), launch, socket, file)) break;
         }
-        return fail(ErrorCode::failed,
-                    "the decoder '{}' does not take a file; install the stx "
-                    "package anew",
-                    gone->program);
+        return gone;
     }
 
     /// The one that is there, or a new one where that is `gone`.
@@ -155,8 +152,10 @@ Templates& templates() {
     return *all;
 }
 
+enum class First { came, ended, late };
+
 /// The first byte from a new process, and its pidfd when there is one.
-bool receiveFirst(int socket, Descriptor& process, int patienceMs) {
+First receiveFirst(int socket, Descriptor& process, int patienceMs) {
     pollfd ready = {socket, POLLIN, 0};
     int polled = 0;
     while ((polled = ::poll(&ready, 1, patienceMs)) < 0 && errno == EINTR) {
@@ -169,7 +168,8 @@ bool receiveFirst(int socket, Descriptor& process, int patienceMs) {
     message.msg_iovlen = 1;
     message.msg_control = room;
     message.msg_controllen = sizeof(room);
-    if (polled <= 0 || ::recvmsg(socket, &message, MSG_CMSG_CLOEXEC) != 1) return false;
+    if (polled <= 0) return First::late;
+    if (::recvmsg(socket, &message, MSG_CMSG_CLOEXEC) != 1) return First::ended;
     const cmsghdr* attached = CMSG_FIRSTHDR(&message);
     if (attached && attached->cmsg_type == SCM_RIGHTS &&
         attached->cmsg_len == CMSG_LEN(sizeof(int))) {
@@ -177,7 +177,7 @@ bool receiveFirst(int socket, Descriptor& process, int patienceMs) {
         std::memcpy(&fd, CMSG_DATA(attached), sizeof(fd));
         process = Descriptor(fd);
     }
-    return true;
+    return First::came;
 }
 
 }  // namespace
@@ -189,21 +189,30 @@ std::vector<std::string> placesOfDecoder() {
 Result<std::unique_ptr<DecoderProcess>> DecoderProcess::start(const DecoderKind& kind,
                                                               const DecoderBounds& bounds,
                                                               int file) {
-    int ends[2] = {-1, -1};
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-        return fail(ErrorCode::failed, "no connection to a decoder can be made");
-    auto process = over(Descriptor(ends[0]), bounds);
-    std::string program;
-    {
-        const Descriptor there(
-            ends[1]);  // closed before an answer is waited for, so that its end is seen
-        decoders::Launch launch;
-        launch.cpuSeconds = static_cast<std::uint32_t>(bounds.cpuSeconds);
-        launch.memoryBytes = bounds.memoryBytes;
-        launch.mustFilter = mustFilter;
-        STX_TRY(program, templates().launch(kind, launch, there.get(), file));
+    decoders::Launch launch;
+    launch.cpuSeconds = static_cast<std::uint32_t>(bounds.cpuSeconds);
+    launch.memoryBytes = bounds.memoryBytes;
+    launch.mustFilter = mustFilter;
+    std::unique_ptr<DecoderProcess> process;
+    std::shared_ptr<const Template> from;
+    for (bool again = false;; again = true) {
+        int ends[2] = {-1, -1};
+        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+            return fail(ErrorCode::failed, "no connection to a decoder can be made");
+        process = over(Descriptor(ends[0]), bounds);
+        Descriptor there(ends[1]);
+        STX_TRY(from, templates().launch(kind, launch, there.get(), file, from));
+        there.close();  // so that the end of the other one is seen
+        const First first =
+            receiveFirst(process->socket_.get(), process->process_, bounds.patienceMs);
+        if (first == First::came) break;
+        if (again || first == First::late)
+            return fail(ErrorCode::failed,
+                        "the decoder '{}' ended before it began, or does not answer; install the "
+                        "stx package anew",
+                        from->program);
     }
-    STX_CHECK(process->meet(kind, program));
+    STX_CHECK(process->meet(kind, from->program));
     return process;
 }
 
@@ -231,11 +240,9 @@ std::unique_ptr<DecoderProcess> DecoderProcess::over(Descriptor socket,
 Result<void> DecoderProcess::meet(const DecoderKind& kind, const std::string& program) {
     Tag tag{};
     Bytes news;
-    if (!receiveFirst(socket_.get(), process_, bounds_.patienceMs) ||
-        !receiveMessage(tag, news, kLargestNews))
+    if (!receiveMessage(tag, news, kLargestNews))
         return fail(ErrorCode::failed,
-                    "the decoder '{}' ended before it began, does not answer or is of another "
-                    "version; install the stx package anew",
+                    "the decoder '{}' is of another version; install the stx package anew",
                     program);
     if (tag == Tag::failure) {
         const Error error = errorIn(news);
