@@ -64,6 +64,8 @@ Result<Template> startTemplate(const std::vector<std::string>& modulePlaces) {
     // Libraries and the C library print about what kills them.
     for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         ::posix_spawn_file_actions_addopen(&files, fd, "/dev/null", O_RDWR, 0);
+    // It may end a moment after this process, and must not keep a disk busy.
+    ::posix_spawn_file_actions_addchdir_np(&files, "/");
     ::posix_spawn_file_actions_adddup2(&files, there.get(), kControl);
     ::posix_spawn_file_actions_addclosefrom_np(&files, kControl + 1);
     sigset_t none, all;
@@ -72,12 +74,15 @@ Result<Template> startTemplate(const std::vector<std::string>& modulePlaces) {
     ::posix_spawnattr_setsigmask(&how, &none);
     ::posix_spawnattr_setsigdefault(&how, &all);
     ::posix_spawnattr_setflags(&how, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    std::vector<char*> arguments = {made.program.data()};
+    std::error_code ec;
+    std::string program = std::filesystem::absolute(made.program, ec).string();
+    std::vector<char*> arguments = {program.data()};
     auto places = modulePlaces;
+    for (auto& place : places) place = std::filesystem::absolute(place, ec).string();
     for (auto& place : places) arguments.push_back(place.data());
     arguments.push_back(nullptr);
     const int error =
-        ::posix_spawn(&made.pid, made.program.c_str(), &files, &how, arguments.data(), environ);
+        ::posix_spawn(&made.pid, program.c_str(), &files, &how, arguments.data(), environ);
     ::posix_spawn_file_actions_destroy(&files);
     ::posix_spawnattr_destroy(&how);
     if (error != 0)
