@@ -225,13 +225,20 @@ Result<std::unique_ptr<DecoderProcess>> DecoderProcess::start(const DecoderKind&
                                                               const DecoderBounds& bounds,
                                                               ByteSpan file) {
     const Descriptor copy(::memfd_create("stx", MFD_CLOEXEC));
-    while (!file.empty()) {
-        const auto n = ::write(copy.get(), file.data(), file.size());
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return fail(ErrorCode::failed, "there is not enough memory to decode the file");
-        file = file.subspan(static_cast<std::size_t>(n));
-    }
-    return start(kind, bounds, copy.get());
+    const bool written = [&, left = file]() mutable {
+        while (!left.empty()) {
+            const auto n = ::write(copy.get(), left.data(), left.size());
+            if (n < 0 && errno == EINTR) continue;
+            if (n <= 0) return false;
+            left = left.subspan(static_cast<std::size_t>(n));
+        }
+        return true;
+    }();
+    if (written) return start(kind, bounds, copy.get());
+    // A bound on the size of files (ulimit -f) is one on this, too.
+    STX_TRY(auto process, start(kind, bounds));
+    (void)process->send(Tag::fileIs, file);
+    return process;
 }
 
 std::unique_ptr<DecoderProcess> DecoderProcess::over(Descriptor socket,

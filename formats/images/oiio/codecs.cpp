@@ -1,8 +1,6 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <exception>
@@ -15,6 +13,7 @@
 #include <vector>
 
 #include "formats/decoders/decoder_module.hpp"
+#include "formats/decoders/given_file.hpp"
 #include "formats/images/codec_table.hpp"
 #include "formats/images/oiio/bmp.hpp"
 #include "formats/images/oiio/failed.hpp"
@@ -228,18 +227,14 @@ void serve(int socket, int file) {
     constexpr std::uint64_t kLargestRequest = 1 << 20;
     Tag tag{};
     std::vector<std::byte> request;
+    const decoders::GivenFile given(socket, file);
     if (!decoders::receiveMessage(socket, tag, request, kLargestRequest, -1)) return;
-    struct stat facts = {};
-    const std::size_t size =
-        ::fstat(file, &facts) == 0 ? static_cast<std::size_t>(facts.st_size) : 0;
-    void* const mapped = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
     PictureAnswer answer(socket);
     const auto failed = adapt([&] {
-        if (tag != Tag::decodePicture || mapped == MAP_FAILED)
+        if (tag != Tag::decodePicture || !given.there())
             throw Failed{ErrorCode::failed, "the file did not come"};
         const std::string name = decoders::Unpacker(request).getText();
-        decodeOrThrow({static_cast<const std::byte*>(mapped), size}, name,
-                      fmt::format("/proc/self/fd/{}", file), answer);
+        decodeOrThrow(given.bytes(), name, fmt::format("/proc/self/fd/{}", file), answer);
     });
     if (failed)
         (void)decoders::sendFailure(socket, static_cast<int>(failed->code), failed->message);

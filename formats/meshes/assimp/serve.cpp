@@ -4,8 +4,6 @@
 #include <assimp/scene.h>
 #include <assimp/version.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <assimp/IOStream.hpp>
 #include <assimp/IOSystem.hpp>
@@ -16,6 +14,7 @@
 #include <new>
 
 #include "formats/decoders/decoder_module.hpp"
+#include "formats/decoders/given_file.hpp"
 #include "formats/decoders/wire.hpp"
 #include "formats/meshes/model_wire.hpp"
 #include "lib/base/result.hpp"
@@ -250,21 +249,19 @@ void serve(int socket, int file) {
     answers = socket;
     Tag tag{};
     std::vector<std::byte> request;
+    const decoders::GivenFile given(socket, file);
     if (!decoders::receiveMessage(socket, tag, request, kLargestRequest, -1)) return;
-    struct stat facts = {};
-    const auto size = ::fstat(file, &facts) == 0 ? static_cast<std::size_t>(facts.st_size) : 0;
-    void* const mapped = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
     const auto failed = [&](ErrorCode code, std::string text) {
         std::ranges::replace(text, '\n', ' ');
         (void)decoders::sendFailure(socket, static_cast<int>(code), text);
     };
-    if (tag != Tag::readModel || mapped == MAP_FAILED)
+    if (tag != Tag::readModel || !given.there())
         return failed(ErrorCode::failed, "the model did not come");
     std::set_new_handler(onNoMemory);
     try {
         const std::string name = kModelFolder + decoders::Unpacker(request).getText();
         Assimp::Importer importer;
-        importer.SetIOHandler(new Files({static_cast<const std::byte*>(mapped), size}, name));
+        importer.SetIOHandler(new Files(given.bytes(), name));
         const aiScene* scene = importer.ReadFile(name, 0);
         if (!scene)
             return failed(ErrorCode::invalidInput, *importer.GetErrorString() != 0
