@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/images/images.hpp"
-#include "formats/video/video_module.hpp"
+#include "formats/video/video_process.hpp"
 
 /// Films for tests, made and read by ffmpeg, which is not ours.
 namespace films {

@@ -236,6 +236,10 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
                                 "Refuse inputs that would need more memory, in MiB (default 4096)"))
         ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 24))
         ->group(group);
+    choice("--decoder-isolation", to.requireIsolation, {{"auto", false}, {"required", true}},
+           "Decode foreign files as shut in as this kernel can, or only where it filters system "
+           "calls (default auto)")
+        .group(group);
     flag("--quiet,-q", to.quiet, "Say nothing but errors").group(group);
     flag("-v,--verbose", to.verbose, "Say more").group(group);
     if (which & kOutput) {

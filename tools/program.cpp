@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/decoders/decoder_process.hpp"
 #include "formats/files/source_date.hpp"
 #include "formats/images/damage.hpp"
 #include "lib/base/parallel.hpp"
@@ -168,6 +169,7 @@ Result<void> Program::makeFolderOf(const std::filesystem::path& target) {
 int Program::run(const std::function<Result<int>()>& body) {
     job.limits.maxMemoryBytes = common.maxMemoryMiB << 20;
     job.limits.allowOutside = common.allowOutside;
+    if (common.requireIsolation) requireFiltered();
     if (!common.quiet && isatty(STDERR_FILENO) != 0)
         job.onProgress = [this](std::int64_t done, std::int64_t total, std::string_view what) {
             progress.show(done, total, what);
@@ -201,6 +203,10 @@ int Program::run(const std::function<Result<int>()>& body) {
                     noThreads ? "; with --threads 1 none but the first is needed" : "");
     }
     job.onProgress = nullptr;
+    if (common.verbose > 0 && ranUnfiltered())
+        job.note(
+            "decoders of foreign files ran without a filter of system calls (seccomp), which "
+            "this kernel or container does not allow");
     sayNotes();
     if (!code) {
         complain("stx: " + textOf(code.error()));

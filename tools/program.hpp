@@ -26,7 +26,8 @@ struct CommonOptions {
     bool noClobber = false;
     bool noMkdir = false;  ///< folders of outputs must be there
     bool allowOutside = false;
-    bool keepDamaged = false;  ///< `--damaged keep`
+    bool keepDamaged = false;       ///< `--damaged keep`
+    bool requireIsolation = false;  ///< `--decoder-isolation required`
     std::uint64_t maxMemoryMiB = 4096;
     std::string report;           ///< path of a JSON report; empty = none
     std::string format = "text";  ///< or "json", for commands that answer on stdout

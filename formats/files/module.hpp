@@ -18,13 +18,16 @@ namespace stx {
 /// and the same in the build tree.
 [[nodiscard]] std::vector<std::string> placesOfModule(const char* variable, const char* module);
 
+/// Where a program that helps may be, likewise: in libexec/stx/.
+[[nodiscard]] std::vector<std::string> placesOfHelper(const char* variable, const char* program);
+
 /// The first place of a module that opens and whose table, which its function `symbol` returns, has
 /// the version expected. It stays open for good. Error (unsupported): every place that was tried.
 template <class Table>
-[[nodiscard]] Result<const Table*> openModule(const char* variable, const char* module,
+[[nodiscard]] Result<const Table*> openModule(const std::vector<std::string>& places,
                                               const char* symbol, std::uint32_t version) {
     std::string tried;
-    for (const auto& place : placesOfModule(variable, module)) {
+    for (const auto& place : places) {
         tried += fmt::format("{}'{}' ", tried.empty() ? "" : "; ", place);
         void* opened = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
         if (!opened) {

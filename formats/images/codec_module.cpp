@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <thread>
 
+#include "formats/decoders/decoder_process.hpp"
 #include "formats/files/module.hpp"
 #include "formats/images/images.hpp"
 
@@ -18,32 +18,13 @@ namespace {
 namespace fs = std::filesystem;
 
 Result<const codecs::Table*> load() {
-    auto table = openModule<codecs::Table>("STX_CODECS", "stx_codecs.so", codecs::kTableSymbol,
-                                           codecs::kTableVersion);
+    const DecoderKind& kind = decoders::kImages;
+    auto table = openModule<codecs::Table>(placesOfModule(kind.variable, kind.module),
+                                           codecs::kTableSymbol, codecs::kTableVersion);
     if (table) return table;
-    return fail(ErrorCode::unsupported,
-                "the image codecs (stx_codecs.so, with OpenImageIO) cannot be loaded: {}; install "
-                "the stx package whole, or name the module in STX_CODECS",
-                table.error().message);
+    return fail(ErrorCode::unsupported, "{}: {}; {}", kind.missing, table.error().message,
+                kind.wayOut);
 }
-
-/// Waits for the loading at the process's end: unloading while loading crashes.
-class Preloader {
-  public:
-    Preloader() {
-        try {
-            thread_ = std::thread([] { (void)loadCodecs(); });
-        } catch (const std::system_error&) {
-            // No thread to be had: it is loaded when it is needed.
-        }
-    }
-    ~Preloader() {
-        if (thread_.joinable()) thread_.join();
-    }
-
-  private:
-    std::thread thread_;
-};
 
 bool hasEnding(const fs::path& file, std::initializer_list<std::string_view> endings) {
     std::string ending = file.extension().string();
@@ -82,9 +63,7 @@ void preloadCodecs(const fs::path& input) {
     if (hasEnding(input, {".png", ".jpg", ".jpeg", ".exr", ".mp4", ".xmt", ".bt"})) return;
     std::error_code ec;
     const fs::path folder = fs::is_directory(input, ec) ? input : folderOf(input);
-    if (needsCodecs(input) || holdsImageThatNeedsCodecs(folder)) {
-        static const Preloader preloader;
-    }
+    if (needsCodecs(input) || holdsImageThatNeedsCodecs(folder)) prepareDecoder(decoders::kImages);
 }
 
 }  // namespace stx

@@ -1,64 +1,14 @@
 #include "formats/images/images.hpp"
 
-#include <algorithm>
-#include <cstring>
-
-#include "formats/images/codec_module.hpp"
 #include "formats/images/damage.hpp"
 #include "formats/images/exr_image.hpp"
-#include "formats/images/isolated_decode.hpp"
+#include "formats/images/foreign_decode.hpp"
 #include "formats/images/npy.hpp"
 #include "formats/images/reader.hpp"
 
 namespace stx {
 
 namespace {
-
-ErrorCode codeOf(const codecs::Failure& failure) {
-    switch (failure.code) {
-        case static_cast<int>(ErrorCode::invalidInput):
-        case static_cast<int>(ErrorCode::unsupported):
-        case static_cast<int>(ErrorCode::io):
-            return static_cast<ErrorCode>(failure.code);
-        default:
-            return ErrorCode::failed;
-    }
-}
-
-/// What the module's callback works with.
-struct Decoding {
-    ByteSpan bytes;
-    const Limits& limits;
-    DecodedImage image;
-};
-
-void* allocateImage(void* context, const codecs::Header& header, codecs::Failure& failure) {
-    auto& decoding = *static_cast<Decoding*>(context);
-    const ImageInfo claimed{"other", header.width, header.height, header.channels, header.bits};
-    if (auto ok = checkImageHeader(claimed, decoding.bytes.size(), decoding.limits); !ok) {
-        failure.code = static_cast<int>(ok.error().code);
-        const auto& text = ok.error().message;
-        const auto length = std::min(text.size(), sizeof(failure.message) - 1);
-        std::memcpy(failure.message, text.data(), length);
-        failure.message[length] = 0;
-        return nullptr;
-    }
-    DecodedImage& image = decoding.image;
-    image.width = header.width;
-    image.height = header.height;
-    image.channels = header.channels;
-    image.originX = header.originX;
-    image.originY = header.originY;
-    image.displayWidth = header.displayWidth;
-    image.displayHeight = header.displayHeight;
-    image.linear = header.linear;
-    image.premultiplied = header.premultiplied;
-    image.channelNames.assign(header.channelNames, header.channelNames + header.channels);
-    const auto count = static_cast<std::size_t>(header.width) * header.height * header.channels;
-    if (header.bits == 8) return image.values.emplace<0>(count).data();
-    if (header.bits == 16) return image.values.emplace<1>(count).data();
-    return image.values.emplace<2>(count).data();
-}
 
 /// The reader of a PNG or JPEG, when what its header claims is allowed.
 Result<std::unique_ptr<ImageReader>> openDirect(ByteSpan bytes, const Limits& limits) {
@@ -104,22 +54,6 @@ Result<Image<glm::u8vec4>> readDirectRgba8(ImageReader& reader, const Limits& li
     return image;
 }
 
-Result<DecodedImage> decodeWithCodecs(ByteSpan bytes, const std::string& name,
-                                      const Limits& limits) {
-    STX_TRY(const auto* table, loadCodecs());
-    Decoding decoding{bytes, limits, {}};
-    codecs::DecodeRequest request;
-    request.bytes = bytes.data();
-    request.size = bytes.size();
-    request.name = name.c_str();
-    request.context = &decoding;
-    request.allocate = allocateImage;
-    codecs::Failure failure;
-    if (!decodeIsolated(*table, request, limits.maxMemoryBytes, failure))
-        return fail(codeOf(failure), "{}", failure.message);
-    return std::move(decoding.image);
-}
-
 /// Neither read here: then OpenImageIO may know it.
 bool isOtherKind(ByteSpan bytes) {
     const auto info = probeImage(bytes);
@@ -148,7 +82,7 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
                       "the image file is empty");
     if (isExr(bytes)) return decodeExr(bytes, name, limits);
     if (isNumpy(bytes)) return at(name, decodeNumpy(bytes, limits));
-    if (isOtherKind(bytes)) return at(name, decodeWithCodecs(bytes, std::string(name), limits));
+    if (isOtherKind(bytes)) return at(name, decodeForeign(bytes, name, limits));
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<DecodedImage>(name, tl::unexpected(reader.error()));
     auto image = readDirect(**reader);

@@ -77,10 +77,10 @@ struct DecodedImage {
 [[nodiscard]] Result<Bytes> encodeJpeg(int width, int height, int channels,
                                        const std::uint8_t* values, int quality);
 
-/// Starts loading OpenImageIO (190 ms) on another thread, while the caller does something else,
-/// when `input` is an image that it will be needed for, or a folder that holds one. More calls do
-/// nothing; errors show at the first image. For programs that decode, or end by _exit(): some of
-/// the libraries crash when a process runs their destructors while they load.
+/// Starts loading OpenImageIO (190 ms) in the process that decodes with it, while the caller does
+/// something else, when `input` is an image that it will be needed for, or a folder that holds one.
+/// More calls do nothing; errors show at the first image. For programs that decode: others would
+/// start a process for nothing.
 void preloadCodecs(const std::filesystem::path& input);
 
 }  // namespace stx

@@ -1,19 +1,15 @@
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-#include <assimp/Importer.hpp>
-
+#include <algorithm>
 #include <new>
 
 #include "formats/meshes/alpha_map.hpp"
-#include "formats/meshes/assimp_files.hpp"
+#include "formats/meshes/foreign_scene.hpp"
 #include "formats/meshes/mesh_builder.hpp"
 #include "formats/meshes/mtl_notes.hpp"
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/scene_claims.hpp"
+#include "formats/meshes/side_files.hpp"
 #include "formats/meshes/text_coordinates.hpp"
 #include "formats/meshes/triangulate.hpp"
-#include "formats/meshes/try_apart.hpp"
 #include "formats/meshes/vertex_colours.hpp"
 #include "lib/model/texture.hpp"
 
@@ -34,38 +30,41 @@ const char* endingOf(AssimpFormat format) {
     return "";
 }
 
-glm::vec3 toVec3(const aiVector3D& v) {
-    return {v.x, v.y, v.z};
-}
+using decoders::Tag;
+using models::TextureUse;
 
-glm::dmat4 toMatrix(const aiMatrix4x4& m) {
-    return glm::transpose(glm::dmat4(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2,
-                                     m.c3, m.c4, m.d1, m.d2, m.d3, m.d4));
-}
+constexpr int kMostSeconds = 120;
 
 class SceneConverter {
   public:
-    SceneConverter(const aiScene& scene, AssimpFormat format, ModelFiles& files,
-                   const AssimpFiles& system, glm::dvec3 origin)
+    SceneConverter(const ForeignScene& scene, AssimpFormat format, ModelFiles& files,
+                   const SideFiles& side, glm::dvec3 origin)
         : scene_(scene),
           format_(format),
           files_(files),
           builder_(files.job()),
-          materialFolder_(system.materialFolder()) {
-        for (const auto& text : system.sideTexts()) scanMtl(text, mtl_);
+          materialFolder_(side.materialFolder()) {
+        for (const auto& text : side.texts()) scanMtl(text, mtl_);
         builder_.setOrigin(origin);
     }
 
     Result<Mesh> convert() {
-        for (unsigned i = 0; i < scene_.mNumMaterials; ++i)
-            STX_CHECK(convertMaterial(*scene_.mMaterials[i]));
+        for (const auto& material : scene_.materials) STX_CHECK(convertMaterial(material));
         if (builder_.materials().empty()) {
             builder_.materials().push_back({.name = "default", .hasColour = false});
             mtlOf_.emplace_back();
         }
-        if (scene_.mRootNode) STX_CHECK(convertNode(*scene_.mRootNode, glm::dmat4(1.0)));
-        if (scene_.mNumAnimations > 0)
-            files_.job().note(fmt::format("dropped: animations ({})", scene_.mNumAnimations));
+        std::vector<glm::dmat4> worldFromNode;
+        for (const auto& node : scene_.nodes) {
+            worldFromNode.push_back(node.parent < 0
+                                        ? glm::dmat4(node.parentFromNode)
+                                        : worldFromNode[static_cast<std::size_t>(node.parent)] *
+                                              glm::dmat4(node.parentFromNode));
+            for (const std::uint32_t mesh : node.meshes)
+                STX_CHECK(convertMesh(scene_.meshes[mesh], worldFromNode.back()));
+        }
+        if (scene_.animations > 0)
+            files_.job().note(fmt::format("dropped: animations ({})", scene_.animations));
         if (lines_ > 0) files_.job().note(fmt::format("dropped: lines ({})", lines_));
         if (points_ > 0)
             files_.job().note(fmt::format("dropped: points in a mesh of triangles ({})", points_));
@@ -73,21 +72,21 @@ class SceneConverter {
     }
 
   private:
-    Result<void> convertMaterial(const aiMaterial& source) {
+    using Use = TextureUse;
+
+    Result<void> convertMaterial(const ForeignScene::Material& source) {
         Material m;
-        aiString name;
-        if (source.Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS) m.name = name.C_Str();
+        m.name = source.name;
         const auto known = mtl_.find(m.name);
         const MtlMaterial mtl = known == mtl_.end() ? MtlMaterial{} : known->second;
 
-        aiString path;
-        const bool hasMap = source.GetTexture(aiTextureType_DIFFUSE, 0, &path) == aiReturn_SUCCESS;
-        aiColor4D diffuse(1, 1, 1, 1);
+        const bool hasMap = textureOf(source, Use::diffuse).has_value();
         // Assimp invents a grey where the file says nothing.
         const bool scene = format_ == AssimpFormat::dae || format_ == AssimpFormat::fbx;
         const bool given = format_ == AssimpFormat::obj ? mtl.hasDiffuse : scene;
         m.hasColour = false;
-        if (given && source.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == aiReturn_SUCCESS) {
+        if (given && source.diffuse) {
+            const glm::vec4 diffuse = *source.diffuse;
             m.hasColour = true;
             if (hasMap && diffuse.r == 0 && diffuse.g == 0 && diffuse.b == 0) {
                 files_.job().note(fmt::format(
@@ -99,7 +98,7 @@ class SceneConverter {
         }
         float opacity = 1.0f;
         if (format_ == AssimpFormat::obj && (mtl.hasDissolve || mtl.hasTransparency))
-            source.Get(AI_MATKEY_OPACITY, opacity);
+            opacity = source.opacity.value_or(opacity);
         if (opacity <= 0.0f) {
             // Some programs write Tr as d; nobody means an object that cannot be seen.
             files_.job().note(
@@ -113,19 +112,19 @@ class SceneConverter {
                 fmt::format("material '{}': option {} of map_Kd is dropped", m.name, option));
 
         if (hasMap && !files_.replacesColour()) {
-            STX_TRY(m.baseColourTexture, texture(source, aiTextureType_DIFFUSE, path));
+            STX_TRY(m.baseColourTexture, texture(source, Use::diffuse));
             if (!mtl.alphaMap.empty() && mtl.alphaMap == mtl.diffuseMap)
                 m.alpha = Material::Alpha::blend;
         }
         if (!mtl.alphaMap.empty() && mtl.alphaMap != mtl.diffuseMap && !files_.replacesColour())
             STX_CHECK(addAlphaMap(source, m));
         STX_CHECK(addEmission(source, mtl, scene, m));
-        if (source.GetTexture(aiTextureType_NORMALS, 0, &path) == aiReturn_SUCCESS) {
-            STX_TRY(m.normalTexture, texture(source, aiTextureType_NORMALS, path));
+        if (textureOf(source, Use::normals)) {
+            STX_TRY(m.normalTexture, texture(source, Use::normals));
         }
-        for (const auto& [type, label] : {std::pair{aiTextureType_HEIGHT, "bump map"},
-                                          {aiTextureType_DISPLACEMENT, "displacement map"}}) {
-            if (source.GetTextureCount(type) > 0)
+        for (const auto& [has, label] : {std::pair{source.hasBump, "bump map"},
+                                         {source.hasDisplacement, "displacement map"}}) {
+            if (has)
                 files_.job().note(fmt::format("material '{}': its {} is dropped", m.name, label));
         }
         builder_.materials().push_back(std::move(m));
@@ -134,10 +133,9 @@ class SceneConverter {
     }
 
     /// map_d becomes the alpha of the base colour texture.
-    Result<void> addAlphaMap(const aiMaterial& source, Material& m) {
-        aiString path;
-        if (source.GetTexture(aiTextureType_OPACITY, 0, &path) != aiReturn_SUCCESS) return {};
-        STX_TRY(const int map, texture(source, aiTextureType_OPACITY, path));
+    Result<void> addAlphaMap(const ForeignScene::Material& source, Material& m) {
+        if (!textureOf(source, Use::opacity)) return {};
+        STX_TRY(const int map, texture(source, Use::opacity));
         if (map < 0) return {};
         auto& textures = builder_.textures();
         const auto& like = textures[static_cast<std::size_t>(
@@ -149,130 +147,121 @@ class SceneConverter {
     }
 
     /// Ke and map_Ke, and what other formats have of the kind.
-    Result<void> addEmission(const aiMaterial& source, const MtlMaterial& mtl, bool scene,
-                             Material& m) {
-        aiColor4D emission(0, 0, 0, 1);
-        const bool given = (scene || mtl.hasEmission) &&
-                           source.Get(AI_MATKEY_COLOR_EMISSIVE, emission) == aiReturn_SUCCESS;
-        aiString path;
-        const bool hasMap = source.GetTexture(aiTextureType_EMISSIVE, 0, &path) == aiReturn_SUCCESS;
+    Result<void> addEmission(const ForeignScene::Material& source, const MtlMaterial& mtl,
+                             bool scene, Material& m) {
+        const bool given = (scene || mtl.hasEmission) && source.emission;
+        glm::vec4 emission = given ? *source.emission : glm::vec4(0, 0, 0, 1);
+        const bool hasMap = textureOf(source, Use::emissive).has_value();
         if (!given && !hasMap) return {};
         if (hasMap && emission.r == 0 && emission.g == 0 && emission.b == 0)
-            emission = aiColor4D(1, 1, 1, 1);
+            emission = glm::vec4(1);
         const auto linear = [](float v) { return linearFromSrgb(std::clamp(v, 0.0f, 1.0f)); };
         m.emissive = {linear(emission.r), linear(emission.g), linear(emission.b)};
         if (!hasMap) return {};
-        STX_TRY(m.emissiveTexture, texture(source, aiTextureType_EMISSIVE, path));
+        STX_TRY(m.emissiveTexture, texture(source, Use::emissive));
         if (m.emissiveTexture < 0) m.emissive = glm::vec3(0.0f);
         return {};
     }
 
-    Result<int> texture(const aiMaterial& material, aiTextureType type, const aiString& path) {
-        const auto wrap = [](int mode) {
-            if (mode == aiTextureMapMode_Mirror) return MeshTexture::Wrap::mirror;
-            if (mode == aiTextureMapMode_Clamp) return MeshTexture::Wrap::clamp;
-            return MeshTexture::Wrap::repeat;
+    static const std::optional<ForeignScene::Texture>& textureOf(
+        const ForeignScene::Material& source, Use use) {
+        return source.textures[static_cast<std::size_t>(use)];
+    }
+
+    Result<int> texture(const ForeignScene::Material& source, Use use) {
+        const ForeignScene::Texture& named = *textureOf(source, use);
+        const auto wrap = [](std::uint8_t mode) {
+            return mode > static_cast<std::uint8_t>(MeshTexture::Wrap::clamp)
+                       ? MeshTexture::Wrap::repeat
+                       : static_cast<MeshTexture::Wrap>(mode);
         };
         SamplerState state;
-        int mode = aiTextureMapMode_Wrap;
-        if (material.Get(AI_MATKEY_MAPPINGMODE_U(type, 0), mode) == aiReturn_SUCCESS)
-            state.wrapU = wrap(mode);
-        if (material.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode) == aiReturn_SUCCESS)
-            state.wrapV = wrap(mode);
-        if (const auto* inside = scene_.GetEmbeddedTexture(path.C_Str()))
-            return embeddedTexture(*inside, path.C_Str(), state);
+        state.wrapU = wrap(named.wrapU);
+        state.wrapV = wrap(named.wrapV);
+        if (named.embedded >= 0)
+            return embeddedTexture(scene_.embedded[static_cast<std::size_t>(named.embedded)],
+                                   named.name, state);
         // Names are relative to the material file for some programs, to the model for others.
-        return files_.textureFromFile(path.C_Str(), state, builder_.textures(), materialFolder_);
+        return files_.textureFromFile(named.name, state, builder_.textures(), materialFolder_);
     }
 
     /// A picture inside the model's own file: a PNG or JPEG as it is, or plain texels.
-    Result<int> embeddedTexture(const aiTexture& inside, const std::string& name,
+    Result<int> embeddedTexture(const ForeignScene::Embedded& inside, const std::string& name,
                                 SamplerState state) {
-        if (inside.mHeight != 0) {
+        if (!inside.coded) {
             files_.job().note(fmt::format(
                 "texture '{}' inside the model is not a PNG or JPEG; the plain colour is used",
                 name));
             return -1;
         }
-        const auto* first = reinterpret_cast<const std::byte*>(inside.pcData);
-        return files_.textureFromBytes({first, inside.mWidth}, name, state, builder_.textures());
+        return files_.textureFromBytes(inside.bytes, name, state, builder_.textures());
     }
 
-    Result<void> convertNode(const aiNode& node, const glm::dmat4& parent) {
-        const auto worldFromNode = parent * toMatrix(node.mTransformation);
-        for (unsigned i = 0; i < node.mNumMeshes; ++i)
-            STX_CHECK(convertMesh(*scene_.mMeshes[node.mMeshes[i]], worldFromNode));
-        for (unsigned i = 0; i < node.mNumChildren; ++i)
-            STX_CHECK(convertNode(*node.mChildren[i], worldFromNode));
-        return {};
-    }
-
-    Result<void> convertMesh(const aiMesh& mesh, const glm::dmat4& worldFromMesh) {
+    Result<void> convertMesh(const ForeignScene::Mesh& mesh, const glm::dmat4& worldFromMesh) {
         MeshPart part;
-        part.where =
-            mesh.mName.length > 0 ? fmt::format("mesh '{}'", mesh.mName.C_Str()) : "the mesh";
-        const std::size_t count = mesh.mNumVertices;
+        part.where = mesh.name.empty() ? "the mesh" : fmt::format("mesh '{}'", mesh.name);
+        const std::size_t count = mesh.positions.size();
         STX_CHECK(builder_.charge(count, 80, part.where));
-        part.material = mesh.mMaterialIndex < builder_.materials().size() ? mesh.mMaterialIndex : 0;
+        part.material = mesh.material < builder_.materials().size() ? mesh.material : 0;
         const bool moved = worldFromMesh != glm::dmat4(1.0);
         const bool mirrored = glm::determinant(glm::dmat3(worldFromMesh)) < 0;
-        for (std::size_t i = 0; i < count; ++i) {
-            const glm::dvec3 p(toVec3(mesh.mVertices[i]));
+        for (const glm::dvec3 p : mesh.positions) {
             part.positions.push_back(moved ? glm::dvec3(worldFromMesh * glm::dvec4(p, 1.0)) : p);
         }
         // A facet's normal in STL is often wrong or zero, and says no more than its corners.
-        if (mesh.mNormals && format_ != AssimpFormat::stl) {
+        if (!mesh.normals.empty() && format_ != AssimpFormat::stl) {
             // Cofactors: the inverse transpose but for a factor.
             const glm::dmat3 m(worldFromMesh);
             const glm::dmat3 forNormals(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
                                         glm::cross(m[0], m[1]));
-            for (std::size_t i = 0; i < count; ++i) {
-                const auto n = toVec3(mesh.mNormals[i]);
+            for (const auto& n : mesh.normals) {
                 part.normals.push_back(
                     moved ? glm::vec3(forNormals * glm::dvec3(n) * (mirrored ? -1.0 : 1.0)) : n);
             }
         }
-        if (const auto* colours = mesh.mColors[0]) {
-            for (std::size_t i = 0; i < count; ++i)
-                part.colours.emplace_back(colours[i].r, colours[i].g, colours[i].b, colours[i].a);
+        if (!mesh.colours.empty()) {
+            part.colours = mesh.colours;
             linearFromSrgbColours(part.colours, true);
         }
-        if (const auto* uvs = mesh.mTextureCoords[0]) {
+        if (!mesh.uvs.empty()) {
             // v runs up in these formats, down in Mesh.
             const auto& mtl = mtlOf_[std::min<std::size_t>(part.material, mtlOf_.size() - 1)];
-            for (std::size_t i = 0; i < count; ++i) {
-                const auto uv = glm::vec2(uvs[i].x, uvs[i].y) * mtl.uvScale + mtl.uvOffset;
+            for (const auto& given : mesh.uvs) {
+                const auto uv = given * mtl.uvScale + mtl.uvOffset;
                 part.uvs.emplace_back(uv.x, 1.0f - uv.y);
             }
         }
         std::size_t points = 0;
-        part.triangles.reserve(mesh.mNumFaces);
+        const bool triangles = mesh.cornerCounts.empty();
+        const std::size_t faces = triangles ? mesh.corners.size() / 3 : mesh.cornerCounts.size();
+        part.triangles.reserve(faces);
         std::vector<glm::dvec3> corners;
         std::vector<glm::uvec3> cut;
-        for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-            const auto& face = mesh.mFaces[f];
-            if (face.mNumIndices == 3) {
-                part.triangles.emplace_back(face.mIndices[0], face.mIndices[1], face.mIndices[2]);
-            } else if (face.mNumIndices > 3) {
+        const std::uint32_t* face = mesh.corners.data();
+        for (std::size_t f = 0; f < faces; ++f) {
+            const std::uint32_t sides = triangles ? 3 : mesh.cornerCounts[f];
+            if (sides == 3) {
+                part.triangles.emplace_back(face[0], face[1], face[2]);
+            } else if (sides > 3) {
                 corners.clear();
                 cut.clear();
-                for (unsigned k = 0; k < face.mNumIndices; ++k)
-                    corners.push_back(part.positions.at(face.mIndices[k]));
+                for (std::uint32_t k = 0; k < sides; ++k)
+                    corners.push_back(part.positions[face[k]]);
                 triangulate(corners, cut);
                 for (const auto& t : cut)
-                    part.triangles.emplace_back(face.mIndices[t.x], face.mIndices[t.y],
-                                                face.mIndices[t.z]);
-            } else if (face.mNumIndices == 1) {
+                    part.triangles.emplace_back(face[t.x], face[t.y], face[t.z]);
+            } else if (sides == 1) {
                 ++points;
             } else {
                 ++lines_;
             }
+            face += sides;
         }
         if (mirrored) {
             for (auto& t : part.triangles) std::swap(t.y, t.z);
         }
         if (!part.triangles.empty()) points_ += points;
-        part.points = part.triangles.empty() && (points > 0 || mesh.mNumFaces == 0);
+        part.points = part.triangles.empty() && (points > 0 || faces == 0);
         if (part.triangles.empty() && !part.points) return {};
         const auto& material = builder_.materials()[part.material];
         if ((material.baseColourTexture >= 0 || material.emissiveTexture >= 0) &&
@@ -292,7 +281,7 @@ class SceneConverter {
         return builder_.add(std::move(part));
     }
 
-    const aiScene& scene_;
+    const ForeignScene& scene_;
     AssimpFormat format_;
     ModelFiles& files_;
     MeshBuilder builder_;
@@ -302,51 +291,80 @@ class SceneConverter {
     std::size_t lines_ = 0, points_ = 0;
 };
 
+/// What the process `of` says of the model that it was asked for.
+Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& side,
+                          const Limits& limits) {
+    const auto crashed = [] {
+        return fail(ErrorCode::invalidInput, "the file is damaged: its reader crashes on it");
+    };
+    Tag tag{};
+    Bytes told;
+    while (of.receiveMessage(tag, told, limits.maxMemoryBytes)) {
+        decoders::Packer answer;
+        const std::string name = decoders::Unpacker(told).getText();
+        switch (tag) {
+            case Tag::askExists:
+                answer.put(static_cast<std::uint8_t>(side.exists(name)));
+                break;
+            case Tag::askFile: {
+                const auto bytes = side.read(name);
+                if (side.error()) return tl::unexpected(*side.error());
+                answer.put(static_cast<std::uint8_t>(bytes.has_value()));
+                if (bytes) answer.add(bytes->data(), bytes->size());
+                break;
+            }
+            case Tag::scene:
+                return receiveScene(of, told, limits);
+            case Tag::failure:
+                return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
+                            endingOf(format), errorIn(told).message);
+            case Tag::timeUp:
+                return fail(ErrorCode::invalidInput,
+                            "the model cannot be read in {} seconds; is it damaged?", kMostSeconds);
+            case Tag::noMemory:
+                return fail(ErrorCode::invalidInput,
+                            "the model needs more than the memory limit of {} MiB; raise it with "
+                            "--max-memory if the file is to be trusted",
+                            limits.maxMemoryBytes >> 20);
+            default:
+                return crashed();
+        }
+        if (!of.send(Tag::fileIs, answer.bytes)) break;
+    }
+    return crashed();
+}
+
 }  // namespace
 
 Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::string& fileName,
                             ModelFiles& files) {
+    const Limits& limits = files.job().limits;
     // Assimp's text parsers hold a file of n bytes in some 30 n bytes.
-    STX_CHECK(files.job().limits.checkAllocation(bytes.size(), 30, "reading the model"));
-    if (format == AssimpFormat::dae) STX_CHECK(checkColladaClaims(bytes, files.job().limits));
-    if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, files.job().limits));
+    STX_CHECK(limits.checkAllocation(bytes.size(), 30, "reading the model"));
+    if (format == AssimpFormat::dae) STX_CHECK(checkColladaClaims(bytes, limits));
+    if (format == AssimpFormat::fbx) STX_CHECK(checkFbxClaims(bytes, limits));
     if (format == AssimpFormat::stl) STX_CHECK(checkStlEnd(bytes));
     try {
         std::optional<ShiftedText> shifted;
         if (format == AssimpFormat::obj) shifted = shiftLargeCoordinates(bytes, "v");
         if (format == AssimpFormat::stl) shifted = shiftLargeCoordinates(bytes, "vertex");
         if (shifted) bytes = shifted->text;
+        DecoderBounds bounds;
+        bounds.memoryBytes = limits.maxMemoryBytes;
+        bounds.cpuSeconds = kMostSeconds;
+        bounds.patienceMs = 2 * kMostSeconds * 1000;  // where others need the processor, too
+        STX_TRY(const auto process, DecoderProcess::start(decoders::kModels, bounds, bytes));
         // The importer chooses by the ending.
-        auto modelName = fileName;
-        const auto dot = modelName.find_last_of('.');
-        modelName = modelName.substr(0, dot) + "." + endingOf(format);
-        const auto read = [&](Assimp::Importer& importer,
-                              AssimpFiles* system) -> Result<const aiScene*> {
-            importer.SetIOHandler(system);  // which owns it
-            const aiScene* scene = importer.ReadFile(AssimpFiles::kFolder + modelName, 0);
-            if (system->error()) return tl::unexpected(*system->error());
-            if (scene) return scene;
-            std::string reason = importer.GetErrorString();
-            std::replace(reason.begin(), reason.end(), '\n', ' ');
-            return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
-                        endingOf(format), reason.empty() ? "no reason given" : reason);
-        };
-        // Damaged files crash its readers of these, and small ones may take any memory. What fails
-        // there is not tried here.
-        const auto readOnce = [&]() -> Result<void> {
-            Assimp::Importer importer;
-            STX_CHECK(read(importer, new AssimpFiles(bytes, modelName, files)));
-            return {};
-        };
-        if (format == AssimpFormat::dae || format == AssimpFormat::fbx)
-            STX_CHECK(tryApart(readOnce, files.job().limits));
-        Assimp::Importer importer;
-        auto* system = new AssimpFiles(bytes, modelName, files);
-        STX_TRY(const aiScene* const scene, read(importer, system));
-        if (!system->missing().empty() && system->sideTexts().empty())
+        const auto stem = fileName.substr(0, fileName.find_last_of('.'));
+        decoders::Packer request;
+        request.putText(fmt::format("{}.{}", stem, endingOf(format)));
+        (void)process->send(Tag::readModel, request.bytes);
+        SideFiles side(files);
+        STX_TRY(const auto scene, hear(*process, format, side, limits));
+        if (!side.missing().empty() && side.texts().empty())
             files.job().note(
-                fmt::format("material file {}; its materials have no colour", system->missing()));
-        return SceneConverter(*scene, format, files, *system,
+                fmt::format("material file {}; its materials have no colour", side.missing()));
+        return SceneConverter(scene, format, files, side,
                               shifted ? shifted->origin : glm::dvec3(0.0))
             .convert();
     } catch (const std::bad_alloc&) {

@@ -9,9 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "formats/decoders/decoder_process.hpp"
 #include "formats/files/module.hpp"
-#include "formats/images/codec_module.hpp"
-#include "formats/video/video_module.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/base/cpu_device.hpp"
 #include "lib/base/parallel.hpp"
@@ -42,21 +41,40 @@ Found findModule(const char* variable, const char* module) {
             fmt::format("'{}' does not exist", places.empty() ? module : places.back())};
 }
 
+/// Whether the libraries of a module are here is known when a process opens it.
+Found findDecoder(const DecoderKind& kind, PartCheck check) {
+    const auto found = findModule(kind.variable, kind.module);
+    if (check == PartCheck::quick || found.state != PartState::here) return found;
+    const auto process = DecoderProcess::start(kind, DecoderBounds{.memoryBytes = 256u << 20});
+    if (!process) return {PartState::missing, process.error().message};
+    return {PartState::here, fmt::format("{} ({})", found.detail, (*process)->libraries())};
+}
+
 Found findImageCodecs(PartCheck check, Job&) {
-    const auto found = findModule("STX_CODECS", "stx_codecs.so");
-    if (check == PartCheck::whole && found.state == PartState::here)
-        if (const auto loaded = loadCodecs(); !loaded)
-            return {PartState::missing, loaded.error().message};
-    return found;
+    return findDecoder(decoders::kImages, check);
+}
+
+Found findModels(PartCheck check, Job&) {
+    return findDecoder(decoders::kModels, check);
 }
 
 Found findVideo(PartCheck check, Job&) {
-    const auto found = findModule("STX_VIDEO", "stx_video.so");
-    if (check == PartCheck::quick || found.state != PartState::here) return found;
-    // Whether its libraries are here is known when it is opened.
-    const auto module = videoModule();
-    if (!module.present) return {PartState::missing, module.reason};
-    return {PartState::here, fmt::format("{} ({})", found.detail, module.libraries)};
+    return findDecoder(decoders::kVideo, check);
+}
+
+/// How well the process of a decoder is shut in.
+Found findIsolation(PartCheck, Job&) {
+    const auto process =
+        DecoderProcess::start(decoders::kModels, DecoderBounds{.memoryBytes = 256u << 20});
+    if (!process) return {PartState::missing, process.error().message};
+    const auto& held = (*process)->isolation();
+    const char* landlock = held.landlock ? "Landlock" : "no Landlock";
+    if (!held.seccomp)
+        return {PartState::missing,
+                fmt::format("this kernel or container lets no system calls be filtered (seccomp); "
+                            "memory, time and descriptors are bounded; {}",
+                            landlock)};
+    return {PartState::here, fmt::format("seccomp, {}", landlock)};
 }
 
 #ifdef STX_WITH_GPU
@@ -140,6 +158,9 @@ constexpr PartRow kParts[] = {
      findImageCodecs},
     {"video", "films as compressed video", "stx libavformat59 libavcodec59 libswscale6", false,
      true, findVideo},
+    {"model readers", "OBJ, STL, COLLADA and FBX", "stx libassimp5", true, false, findModels},
+    {"isolation", "foreign files decoded where they can reach nothing", "", false, false,
+     findIsolation},
     {"OpenGL", "--backend gpu and gl", "libegl1 libopengl0 libgl1-mesa-dri", false, true,
      findOpenGl},
     {"GPU", "drawing many times faster than on the processor",

@@ -8,8 +8,6 @@
 #include <bit>
 #include <fstream>
 
-#include "formats/video/video_module.hpp"
-
 namespace stx {
 namespace {
 
@@ -182,14 +180,12 @@ Result<std::unique_ptr<Film>> Film::open(const fs::path& path, const Limits& lim
         return failAt(film->where(), ErrorCode::unsupported,
                       "it is not a .mp4, .mov, .mkv, .webm or .avi, which are read; put its tracks "
                       "into one: ffmpeg -i IN -c copy OUT.mkv");
-    Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (file.get() < 0) return failAt(film->where(), ErrorCode::io, "cannot be read");
-    if (const auto module = loadVideo(); !module)
-        return tl::unexpected(module.error().at(film->where()));
+    auto process = VideoProcess::start(limits, file.get());
+    if (!process) return tl::unexpected(process.error().at(film->where()));
     STX_CHECK(checkWhole(file, format, film->where()));
     STX_CHECK(checkDataAreHere(file, format, film->where()));
-    auto process = VideoProcess::start(limits, std::move(file));
-    if (!process) return tl::unexpected(process.error().at(film->where()));
     film->process_ = std::move(*process);
     video::Packer request;
     request.putText(format);

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
-#include "formats/files/child_process.hpp"
-#include "formats/files/files.hpp"
+#include "formats/decoders/decoder_process.hpp"
 #include "formats/video/wire.hpp"
 
 namespace stx {
@@ -13,21 +13,32 @@ namespace stx {
 /// it reads, bounded memory, and dies with this object. One request at a time.
 class VideoProcess {
   public:
-    /// `file`: what it reads by itself; none where access units are sent. Errors: (unsupported) the
-    /// module is not here; (failed) no process.
+    /// `file`: what it reads by itself, open; none where access units are sent. Errors as
+    /// DecoderProcess::start().
     [[nodiscard]] static Result<std::unique_ptr<VideoProcess>> start(const Limits& limits,
-                                                                     Descriptor file = {});
+                                                                     int file = -1);
 
     /// Asks, and waits for the answer. Errors: those of the libraries, in a sentence;
     /// (invalidInput) the process died, or kept busy for half a minute.
     [[nodiscard]] Result<Bytes> ask(video::Tag request, ByteSpan bytes, video::Tag expected);
 
+    /// "libavformat 59.27.100, libavcodec 59.37.100".
+    [[nodiscard]] const std::string& libraries() const { return process_->libraries(); }
+
   private:
     VideoProcess() = default;
 
-    std::unique_ptr<ChildProcess> child_;
+    std::unique_ptr<DecoderProcess> process_;
     std::uint64_t most_ = 0;  ///< bytes of an answer
-    bool broken_ = false;
 };
+
+/// Whether compressed video can be read and written here.
+struct VideoModule {
+    bool present = false;
+    std::string libraries;
+    std::string reason;  ///< why it is not present
+};
+/// Starts a process to find out.
+[[nodiscard]] VideoModule videoModule();
 
 }  // namespace stx

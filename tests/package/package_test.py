@@ -48,13 +48,13 @@ def fields(deb):
 def check_fields(debs):
     stx = fields(debs["stx"])
     # OpenImageIO is a library of the codecs alone.
-    for library in ("libc6", "libopenexr-3-1-30", "libopenimageio2.4", "libwebp7", "libepoxy0"):
+    for library in ("libc6", "libopenexr-3-1-30", "libopenimageio2.4", "libwebp7", "libepoxy0", "libassimp5", "libseccomp2"):
         if not re.search(rf"^Depends:.*\b{re.escape(library)}\b", stx, re.M):
             sys.exit(f"stx does not depend on {library}:\n{stx}")
     if "libopenimageio" in fields(debs["libstx0.1"]):
         sys.exit("libstx0.1 depends on the libraries of the codecs, which it does not hold")
     names = run(["dpkg-deb", "-c", debs["stx"]], quiet=True)
-    for name in ("bin/stx", "lib/stx/stx_codecs.so", "share/man/man1/stx.1.gz", "share/bash-completion/completions/stx",
+    for name in ("bin/stx", "lib/stx/stx_codecs.so", "lib/stx/stx_models.so", "libexec/stx/stx-decode", "share/man/man1/stx.1.gz", "share/bash-completion/completions/stx",
                  "share/stx/schemas/info.schema.json", "share/stx/samples/main_job.sh", "share/stx/samples/slurm/submit", "share/doc/stx/copyright"):
         if f" ./usr/{name}\n" not in names:
             sys.exit(f"stx does not hold {name}")

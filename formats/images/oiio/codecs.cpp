@@ -1,21 +1,23 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
-#include <cstring>
+#include <algorithm>
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "formats/decoders/decoder_module.hpp"
+#include "formats/decoders/given_file.hpp"
 #include "formats/images/codec_table.hpp"
 #include "formats/images/oiio/bmp.hpp"
 #include "formats/images/oiio/failed.hpp"
+#include "formats/images/oiio/picture_answer.hpp"
 #include "formats/images/oiio/tiff.hpp"
 #include "formats/images/oiio/webp.hpp"
 #include "lib/base/result.hpp"
@@ -25,29 +27,31 @@ namespace stx::codecs {
 
 namespace {
 
+/// What went wrong, in one line.
+struct Reason {
+    ErrorCode code = ErrorCode::failed;
+    std::string message;
+};
+
 template <class Work>
-bool adapt(Failure& failure, const Work& work) {
-    const auto report = [&](ErrorCode code, std::string_view message) {
-        std::string line(message.substr(0, sizeof(failure.message) - 1));
-        for (char& c : line) {
-            if (c == '\n' || c == '\r') c = ' ';
-        }
+std::optional<Reason> adapt(const Work& work) {
+    const auto reason = [](ErrorCode code, std::string line) -> Reason {
+        std::ranges::replace(line, '\n', ' ');
+        std::ranges::replace(line, '\r', ' ');
         while (!line.empty() && (line.back() == ' ' || line.back() == '.')) line.pop_back();
-        failure.code = static_cast<int>(code);
-        std::memcpy(failure.message, line.c_str(), line.size() + 1);
-        return false;
+        return {code, std::move(line)};
     };
     try {
         work();
-        return true;
+        return {};
     } catch (const Failed& failed) {
-        return report(failed.code, failed.message);
+        return reason(failed.code, failed.message);
     } catch (const std::bad_alloc&) {
-        return report(ErrorCode::failed, "there is not enough memory for the image");
+        return reason(ErrorCode::failed, "there is not enough memory for the image");
     } catch (const std::exception& e) {
-        return report(ErrorCode::invalidInput, e.what());
+        return reason(ErrorCode::invalidInput, e.what());
     } catch (...) {
-        return report(ErrorCode::failed, "the image library failed without a reason");
+        return reason(ErrorCode::failed, "the image library failed without a reason");
     }
 }
 
@@ -102,42 +106,19 @@ std::string formatByEnding(std::string_view ending) {
     return {};
 }
 
-/// A file without a name, for formats that the library reads by name only.
-class MemoryFile {
-  public:
-    MemoryFile(const void* bytes, std::size_t size) : fd_(::memfd_create("stx", MFD_CLOEXEC)) {
-        const auto* from = static_cast<const char*>(bytes);
-        while (fd_ >= 0 && size > 0) {
-            const auto n = ::write(fd_, from, size);
-            if (n <= 0) throw Failed{ErrorCode::failed, "there is not enough memory for the image"};
-            from += n;
-            size -= static_cast<std::size_t>(n);
-        }
-    }
-    ~MemoryFile() {
-        if (fd_ >= 0) ::close(fd_);
-    }
-    MemoryFile(const MemoryFile&) = delete;
-    MemoryFile& operator=(const MemoryFile&) = delete;
-    [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", fd_); }
-
-  private:
-    int fd_;
-};
-
 [[noreturn]] void failWith(const std::string& reason, const char* otherwise) {
     throw Failed{ErrorCode::invalidInput, reason.empty() ? otherwise : reason};
 }
 
-void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
-    const std::span file(static_cast<const std::byte*>(request.bytes), request.size);
-    const std::string_view head(static_cast<const char*>(request.bytes),
-                                std::min<std::size_t>(request.size, 16));
-    if (formatByContent(head) == std::string_view("webp") && decodeWebp(request, failure)) return;
+/// `fileName`: what the file can be opened by, for formats that the library reads by name only.
+void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
+                   const std::string& fileName, PictureAnswer& answer) {
+    const std::string_view head(reinterpret_cast<const char*>(file.data()),
+                                std::min<std::size_t>(file.size(), 16));
+    if (formatByContent(head) == std::string_view("webp") && decodeWebp(file, answer)) return;
     setUpOnce();
     std::string format = formatByContent(head);
     if (format.empty()) {
-        const std::string_view name = request.name;
         const auto dot = name.rfind('.');
         if (dot != std::string_view::npos) format = formatByEnding(name.substr(dot + 1));
     }
@@ -158,7 +139,6 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     const auto repaired = format == "tiff" ? repairedTiff(file) : std::vector<std::byte>();
     const std::span bytes = repaired.empty() ? file : std::span<const std::byte>(repaired);
     OIIO::Filesystem::IOMemReader reader(const_cast<std::byte*>(bytes.data()), bytes.size());
-    std::unique_ptr<MemoryFile> memory;
     OIIO::ImageSpec spec;
     bool opened = false;
     if (input->supports("ioproxy")) {
@@ -166,18 +146,16 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
         config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
         opened = input->open("image." + format, spec, config);
     } else {
-        memory = std::make_unique<MemoryFile>(bytes.data(), bytes.size());
-        opened = input->open(memory->path(), spec, config);
+        opened = input->open(fileName, spec, config);
     }
     if (!opened) failWith(input->geterror(), "the image cannot be opened");
     if (spec.deep) throw Failed{ErrorCode::unsupported, "deep images are not supported"};
 
-    std::vector<const char*> names;
-    for (const auto& name : spec.channelnames) names.push_back(name.c_str());
-    names.resize(static_cast<std::size_t>(std::max(spec.nchannels, 0)), "");
+    std::vector<std::string> names = spec.channelnames;
+    names.resize(static_cast<std::size_t>(std::max(spec.nchannels, 0)));
 
     OIIO::TypeDesc type = OIIO::TypeDesc::FLOAT;
-    Header header;
+    decoders::PictureFacts header;
     header.bits = 32;
     if (spec.format == OIIO::TypeDesc::UINT8) {
         type = OIIO::TypeDesc::UINT8;
@@ -201,14 +179,12 @@ void decodeOrThrow(const DecodeRequest& request, Failure& failure) {
     header.linear = header.bits == 32;
     header.premultiplied = spec.alpha_channel >= 0 && format != "bmp" &&
                            spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
-    header.channelNames = names.data();
     const BmpPixel pixel =
         format == "bmp" && spec.nchannels == 4 && header.bits == 8 ? bmpPixelOf(file) : BmpPixel{};
     if (pixel.channels != 0) header.channels = pixel.channels;
     if (spec.depth > 1) throw Failed{ErrorCode::unsupported, "volume images are not supported"};
 
-    void* values = request.allocate(request.context, header, failure);
-    if (!values) throw Failed{static_cast<ErrorCode>(failure.code), failure.message};
+    void* values = answer.begin(header, names);
     std::vector<std::uint8_t> whole;  // all four bytes of a BMP's pixels
     if (pixel.channels != 0)
         whole.resize(static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) *
@@ -240,20 +216,57 @@ void encodeOrThrow(const EncodeRequest& request) {
         cannotWrite(output->geterror());
 }
 
+/// Loads what the library looks for when its first file comes.
+void prepare() {
+    setUpOnce();
+    (void)OIIO::ImageInput::create("tiff", false);
+}
+
+void serve(int socket, int file) {
+    using decoders::Tag;
+    constexpr std::uint64_t kLargestRequest = 1 << 20;
+    Tag tag{};
+    std::vector<std::byte> request;
+    const decoders::GivenFile given(socket, file);
+    if (!decoders::receiveMessage(socket, tag, request, kLargestRequest, -1)) return;
+    PictureAnswer answer(socket);
+    const auto failed = adapt([&] {
+        if (tag != Tag::decodePicture || !given.there())
+            throw Failed{ErrorCode::failed, "the file did not come"};
+        const std::string name = decoders::Unpacker(request).getText();
+        decodeOrThrow(given.bytes(), name, fmt::format("/proc/self/fd/{}", file), answer);
+    });
+    if (failed)
+        (void)decoders::sendFailure(socket, static_cast<int>(failed->code), failed->message);
+    else
+        answer.end();
+}
+
+bool encode(const EncodeRequest& request, Failure& failure) {
+    const auto failed = adapt([&] { encodeOrThrow(request); });
+    if (!failed) return true;
+    failure.code = static_cast<int>(failed->code);
+    failed->message.copy(failure.message, sizeof(failure.message) - 1);
+    return false;
+}
+
+const char* libraries() {
+    static const std::string text = fmt::format("OpenImageIO {}", OIIO_VERSION_STRING);
+    return text.c_str();
+}
+
 }  // namespace
 
 }  // namespace stx::codecs
 
 extern "C" __attribute__((visibility("default"))) const stx::codecs::Table* stxCodecs() {
-    using namespace stx::codecs;
-    static const Table table = {
-        kTableVersion,
-        [](const DecodeRequest& request, Failure& failure) {
-            return adapt(failure, [&] { decodeOrThrow(request, failure); });
-        },
-        [](const EncodeRequest& request, Failure& failure) {
-            return adapt(failure, [&] { encodeOrThrow(request); });
-        },
-    };
+    static const stx::codecs::Table table = {stx::codecs::kTableVersion, stx::codecs::encode};
     return &table;
+}
+
+extern "C" __attribute__((visibility("default"))) const stx::decoders::Module* stxDecoder() {
+    using namespace stx::codecs;
+    static const stx::decoders::Module module = {stx::decoders::kModuleVersion, libraries, prepare,
+                                                 serve};
+    return &module;
 }

@@ -3,7 +3,6 @@
 #include <webp/decode.h>
 #include <webp/encode.h>
 
-#include <array>
 #include <cstdio>
 #include <memory>
 
@@ -11,26 +10,25 @@
 
 namespace stx::codecs {
 
-bool decodeWebp(const DecodeRequest& request, Failure& failure) {
-    const auto* bytes = static_cast<const std::uint8_t*>(request.bytes);
+bool decodeWebp(std::span<const std::byte> file, PictureAnswer& answer) {
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(file.data());
     WebPBitstreamFeatures features;
-    if (WebPGetFeatures(bytes, request.size, &features) != VP8_STATUS_OK)
+    if (WebPGetFeatures(bytes, file.size(), &features) != VP8_STATUS_OK)
         throw Failed{ErrorCode::invalidInput, "the WebP's header is damaged or cut off"};
     if (features.has_animation) return false;
-    static constexpr std::array kNames = {"R", "G", "B", "A"};
-    Header header;
+    decoders::PictureFacts header;
     header.width = header.displayWidth = features.width;
     header.height = header.displayHeight = features.height;
     header.channels = features.has_alpha ? 4 : 3;
     header.bits = 8;
-    header.channelNames = kNames.data();
-    auto* values = static_cast<std::uint8_t*>(request.allocate(request.context, header, failure));
-    if (!values) throw Failed{static_cast<ErrorCode>(failure.code), failure.message};
+    std::vector<std::string> names = {"R", "G", "B"};
+    if (features.has_alpha) names.emplace_back("A");
+    auto* values = static_cast<std::uint8_t*>(answer.begin(header, names));
     const int stride = header.width * header.channels;
     const std::size_t size = static_cast<std::size_t>(stride) * features.height;
     const auto* done = features.has_alpha
-                           ? WebPDecodeRGBAInto(bytes, request.size, values, size, stride)
-                           : WebPDecodeRGBInto(bytes, request.size, values, size, stride);
+                           ? WebPDecodeRGBAInto(bytes, file.size(), values, size, stride)
+                           : WebPDecodeRGBInto(bytes, file.size(), values, size, stride);
     if (!done) throw Failed{ErrorCode::invalidInput, "the WebP is damaged or cut off"};
     return true;
 }

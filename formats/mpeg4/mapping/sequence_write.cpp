@@ -10,7 +10,7 @@
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/video_write.hpp"
 #include "formats/mpeg4/mapping/view_images.hpp"
-#include "formats/video/video_module.hpp"
+#include "formats/video/video_process.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/same_pictures.hpp"
 
@@ -66,7 +66,7 @@ class SequenceWriter {
                         "{} cannot move: its points are in the scene itself; write SimpleTexture",
                         options_.pointTexture ? "a PointTexture" : "an OctreeImage");
         // Before the frames are read twice.
-        if (asVideo()) STX_CHECK(loadVideo());
+        if (asVideo()) STX_CHECK(VideoProcess::start(job_.limits));
         STX_CHECK(frames_.timeline().check());
         STX_CHECK(findRanges());
         STX_CHECK(begin());

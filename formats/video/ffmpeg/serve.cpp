@@ -1,8 +1,8 @@
 #include <optional>
 
+#include "formats/decoders/decoder_module.hpp"
 #include "formats/video/ffmpeg/encoder.hpp"
 #include "formats/video/ffmpeg/film_reader.hpp"
-#include "formats/video/video_table.hpp"
 #include "formats/video/wire.hpp"
 
 /// The entry of the module: requests come in, answers go out. Every error of libav* ends here.
@@ -123,30 +123,27 @@ class Server {
     std::vector<std::unique_ptr<Encoder>> encoders_;
 };
 
-Server::Answer failure(ErrorCode code, std::string_view message) {
-    Packer out;
-    out.put(static_cast<std::int32_t>(code));
-    out.putText(message);
-    return {Tag::failure, std::move(out.bytes)};
-}
-
 void serve(int socket, int file) {
     av_log_set_level(AV_LOG_QUIET);
     Server server(file);
     Tag tag{};
     std::vector<std::byte> request;
-    while (receiveMessage(socket, tag, request, kLargestRequest, -1)) {
-        Server::Answer answer;
+    const auto failed = [&](ErrorCode code, std::string_view message) {
+        return decoders::sendFailure(socket, static_cast<int>(code), message);
+    };
+    while (decoders::receiveMessage(socket, tag, request, kLargestRequest, -1)) {
+        bool sent = false;
         try {
-            answer = server.answer(tag, request);
-        } catch (const Failed& failed) {
-            answer = failure(failed.code, failed.message);
+            const auto answer = server.answer(tag, request);
+            sent = decoders::sendMessage(socket, answer.tag, answer.bytes);
+        } catch (const Failed& error) {
+            sent = failed(error.code, error.message);
         } catch (const std::bad_alloc&) {
-            answer = failure(ErrorCode::failed, "there is not enough memory for the video");
+            sent = failed(ErrorCode::failed, "there is not enough memory for the video");
         } catch (const std::exception& e) {
-            answer = failure(ErrorCode::failed, e.what());
+            sent = failed(ErrorCode::failed, e.what());
         }
-        if (!sendMessage(socket, answer.tag, answer.bytes)) return;
+        if (!sent) return;
     }
 }
 
@@ -164,8 +161,8 @@ const char* libraries() {
 }  // namespace
 }  // namespace stx::video
 
-extern "C" __attribute__((visibility("default"))) const stx::video::Table* stxVideo() {
-    static const stx::video::Table table = {stx::video::kTableVersion, stx::video::libraries,
-                                            stx::video::serve};
-    return &table;
+extern "C" __attribute__((visibility("default"))) const stx::decoders::Module* stxDecoder() {
+    static const stx::decoders::Module module = {stx::decoders::kModuleVersion,
+                                                 stx::video::libraries, nullptr, stx::video::serve};
+    return &module;
 }

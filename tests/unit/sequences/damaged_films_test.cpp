@@ -5,7 +5,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/files/files.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "formats/video/video_module.hpp"
+#include "formats/video/video_process.hpp"
 #include "tests/shared_data.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/sequences/moving_views.hpp"

@@ -4,7 +4,7 @@
 
 #include "formats/images/images.hpp"
 #include "formats/video/numbered_pictures.hpp"
-#include "formats/video/video_module.hpp"
+#include "formats/video/video_process.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/y4m_text.hpp"
 

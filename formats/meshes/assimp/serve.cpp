@@ -1,0 +1,291 @@
+// The module that reads models with Assimp: its entry, the files that it sees, and what it tells.
+
+#include <assimp/config.h>
+#include <assimp/scene.h>
+#include <assimp/version.h>
+#include <fmt/format.h>
+#include <unistd.h>
+#include <assimp/IOStream.hpp>
+#include <assimp/IOSystem.hpp>
+#include <assimp/Importer.hpp>
+
+#include <algorithm>
+#include <map>
+#include <new>
+
+#include "formats/decoders/decoder_module.hpp"
+#include "formats/decoders/given_file.hpp"
+#include "formats/decoders/wire.hpp"
+#include "formats/meshes/model_wire.hpp"
+#include "lib/base/result.hpp"
+#include "lib/model/mesh.hpp"
+
+namespace stx::models {
+namespace {
+
+using decoders::Packer;
+using decoders::Tag;
+
+/// Where messages go to; of the one file that this process reads.
+int answers = -1;
+
+/// Parsers catch what allocations throw, and take the file for read or for damaged.
+[[noreturn]] void onNoMemory() {
+    (void)decoders::sendMessage(answers, Tag::noMemory);
+    ::_exit(1);
+}
+
+/// Asks for a file that the model names. Who does not answer is gone.
+bool ask(Tag tag, const char* name, std::vector<std::byte>& bytes) {
+    Packer question;
+    question.putText(name);
+    Tag got{};
+    std::vector<std::byte> answer;
+    if (!decoders::sendMessage(answers, tag, question.bytes) ||
+        !decoders::receiveMessage(answers, got, answer, UINT64_MAX, -1) || got != Tag::fileIs)
+        ::_exit(1);
+    decoders::Unpacker in(answer);
+    const bool there = in.get<std::uint8_t>() != 0;
+    const auto rest = in.rest();
+    bytes.assign(rest.begin(), rest.end());
+    return there;
+}
+
+class MemoryStream final : public Assimp::IOStream {
+  public:
+    explicit MemoryStream(std::span<const std::byte> bytes) : bytes_(bytes) {}
+    explicit MemoryStream(std::vector<std::byte> owned)
+        : owned_(std::move(owned)), bytes_(owned_) {}
+
+    std::size_t Read(void* to, std::size_t size, std::size_t count) override {
+        if (size == 0 || count == 0) return 0;
+        const auto n = std::min(count, (bytes_.size() - at_) / size);
+        if (n > 0) std::memcpy(to, bytes_.data() + at_, n * size);
+        at_ += n * size;
+        return n;
+    }
+    std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
+    aiReturn Seek(std::size_t offset, aiOrigin origin) override {
+        const auto base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at_ : bytes_.size();
+        if (offset > bytes_.size() - base) return aiReturn_FAILURE;
+        at_ = base + offset;
+        return aiReturn_SUCCESS;
+    }
+    std::size_t Tell() const override { return at_; }
+    std::size_t FileSize() const override { return bytes_.size(); }
+    void Flush() override {}
+
+  private:
+    std::vector<std::byte> owned_;
+    std::span<const std::byte> bytes_;
+    std::size_t at_ = 0;
+};
+
+/// The only files that Assimp sees: the model, and what is given when it is asked for.
+class Files final : public Assimp::IOSystem {
+  public:
+    Files(std::span<const std::byte> model, std::string modelName)
+        : model_(model), modelName_(std::move(modelName)) {}
+
+    bool Exists(const char* name) const override {
+        std::vector<std::byte> none;
+        return name == modelName_ || ask(Tag::askExists, name, none);
+    }
+    char getOsSeparator() const override { return '/'; }
+    Assimp::IOStream* Open(const char* name, const char*) override {
+        if (name == modelName_) return new MemoryStream(model_);
+        std::vector<std::byte> bytes;
+        if (!ask(Tag::askFile, name, bytes)) return nullptr;
+        return new MemoryStream(std::move(bytes));
+    }
+    void Close(Assimp::IOStream* stream) override { delete stream; }
+
+  private:
+    std::span<const std::byte> model_;
+    std::string modelName_;
+};
+
+constexpr aiTextureType kTypes[] = {aiTextureType_DIFFUSE, aiTextureType_OPACITY,
+                                    aiTextureType_EMISSIVE, aiTextureType_NORMALS};
+static_assert(std::size(kTypes) == kTextureUses);
+
+class SceneTeller {
+  public:
+    explicit SceneTeller(const aiScene& scene) : scene_(scene) {}
+
+    bool tell() {
+        out_.put(scene_.mNumMaterials);
+        for (unsigned i = 0; i < scene_.mNumMaterials; ++i) putMaterial(*scene_.mMaterials[i]);
+        out_.put(static_cast<std::uint32_t>(embedded_.size()));
+        for (const aiTexture* texture : embedded_) {
+            const bool coded = texture->mHeight == 0;
+            out_.put(static_cast<std::uint8_t>(coded));
+            out_.putBytes(
+                {reinterpret_cast<const std::byte*>(texture->pcData), coded ? texture->mWidth : 0});
+        }
+        Packer nodes;
+        if (scene_.mRootNode) putNode(*scene_.mRootNode, -1, nodes);
+        out_.put(static_cast<std::uint32_t>(nodes_));
+        out_.add(nodes.bytes.data(), nodes.bytes.size());
+        out_.put(scene_.mNumMeshes);
+        out_.put(scene_.mNumAnimations);
+        if (!decoders::sendMessage(answers, Tag::scene, out_.bytes)) return false;
+        for (unsigned i = 0; i < scene_.mNumMeshes; ++i)
+            if (!sendMesh(*scene_.mMeshes[i])) return false;
+        return true;
+    }
+
+  private:
+    template <class T>
+    void putOptional(bool there, const T& value) {
+        out_.put(static_cast<std::uint8_t>(there));
+        if (there) out_.put(value);
+    }
+
+    void putMaterial(const aiMaterial& from) {
+        aiString name;
+        out_.putText(from.Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS ? name.C_Str() : "");
+        aiColor4D colour(1, 1, 1, 1);
+        putOptional(from.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == aiReturn_SUCCESS, colour);
+        colour = aiColor4D(0, 0, 0, 1);
+        putOptional(from.Get(AI_MATKEY_COLOR_EMISSIVE, colour) == aiReturn_SUCCESS, colour);
+        float opacity = 1.0f;
+        putOptional(from.Get(AI_MATKEY_OPACITY, opacity) == aiReturn_SUCCESS, opacity);
+        for (const aiTextureType type : kTypes) putTexture(from, type);
+        out_.put(static_cast<std::uint8_t>(from.GetTextureCount(aiTextureType_HEIGHT) > 0));
+        out_.put(static_cast<std::uint8_t>(from.GetTextureCount(aiTextureType_DISPLACEMENT) > 0));
+    }
+
+    void putTexture(const aiMaterial& from, aiTextureType type) {
+        aiString name;
+        const bool there = from.GetTexture(type, 0, &name) == aiReturn_SUCCESS;
+        out_.put(static_cast<std::uint8_t>(there));
+        if (!there) return;
+        out_.putText(name.C_Str());
+        const auto wrap = [](int mode) {
+            const auto kind = mode == aiTextureMapMode_Mirror  ? MeshTexture::Wrap::mirror
+                              : mode == aiTextureMapMode_Clamp ? MeshTexture::Wrap::clamp
+                                                               : MeshTexture::Wrap::repeat;
+            return static_cast<std::uint8_t>(kind);
+        };
+        int mode = aiTextureMapMode_Wrap;
+        from.Get(AI_MATKEY_MAPPINGMODE_U(type, 0), mode);
+        out_.put(wrap(mode));
+        mode = aiTextureMapMode_Wrap;
+        from.Get(AI_MATKEY_MAPPINGMODE_V(type, 0), mode);
+        out_.put(wrap(mode));
+        std::int32_t number = -1;
+        if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.C_Str())) {
+            const auto [at, added] =
+                numbers_.emplace(inside, static_cast<std::int32_t>(embedded_.size()));
+            if (added) embedded_.push_back(inside);
+            number = at->second;
+        }
+        out_.put(number);
+    }
+
+    void putNode(const aiNode& node, std::int32_t parent, Packer& to) {
+        const std::int32_t self = nodes_++;
+        to.put(parent);
+        const auto& m = node.mTransformation;
+        to.put(glm::transpose(glm::mat4(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2,
+                                        m.c3, m.c4, m.d1, m.d2, m.d3, m.d4)));
+        to.putBytes(std::as_bytes(std::span(node.mMeshes, node.mNumMeshes)));
+        for (unsigned i = 0; i < node.mNumChildren; ++i) putNode(*node.mChildren[i], self, to);
+    }
+
+    static bool sendMesh(const aiMesh& mesh) {
+        MeshHead head;
+        head.positions = mesh.mNumVertices;
+        head.faces = mesh.mNumFaces;
+        head.material = mesh.mMaterialIndex;
+        head.normals = mesh.mNormals != nullptr;
+        head.colours = mesh.mColors[0] != nullptr;
+        head.uvs = mesh.mTextureCoords[0] != nullptr;
+        const std::span faces(mesh.mFaces, mesh.mNumFaces);
+        head.triangles =
+            std::ranges::all_of(faces, [](const auto& f) { return f.mNumIndices == 3; });
+        for (const auto& face : faces) head.corners += face.mNumIndices;
+        std::vector<std::uint32_t> counts, corners;
+        corners.reserve(head.corners);
+        for (const auto& face : faces)
+            corners.insert(corners.end(), face.mIndices, face.mIndices + face.mNumIndices);
+        if (!head.triangles)
+            for (const auto& face : faces) counts.push_back(face.mNumIndices);
+        std::vector<glm::vec2> uvs;
+        if (head.uvs) {
+            uvs.reserve(head.positions);
+            for (const auto& uv : std::span(mesh.mTextureCoords[0], head.positions))
+                uvs.emplace_back(uv.x, uv.y);
+        }
+        const std::string_view name = mesh.mName.C_Str();
+        const std::uint64_t length = name.size();
+        const auto send = [](const void* from, std::size_t size) {
+            return size == 0 || sendAll(answers, from, size);
+        };
+        static_assert(sizeof(aiVector3D) == sizeof(glm::vec3) &&
+                      sizeof(aiColor4D) == sizeof(glm::vec4));
+        return decoders::sendHead(answers, Tag::mesh,
+                                  sizeof(head) + sizeof(length) + length + bytesOf(head).value()) &&
+               send(&head, sizeof(head)) && send(&length, sizeof(length)) &&
+               send(name.data(), length) &&
+               send(mesh.mVertices, head.positions * sizeof(aiVector3D)) &&
+               (!head.normals || send(mesh.mNormals, head.positions * sizeof(aiVector3D))) &&
+               (!head.colours || send(mesh.mColors[0], head.positions * sizeof(aiColor4D))) &&
+               send(uvs.data(), uvs.size() * sizeof(uvs[0])) &&
+               send(counts.data(), counts.size() * sizeof(counts[0])) &&
+               send(corners.data(), corners.size() * sizeof(corners[0]));
+    }
+
+    const aiScene& scene_;
+    Packer out_;
+    std::int32_t nodes_ = 0;
+    std::vector<const aiTexture*> embedded_;
+    std::map<const aiTexture*, std::int32_t> numbers_;
+};
+
+void serve(int socket, int file) {
+    constexpr std::uint64_t kLargestRequest = 1 << 20;
+    answers = socket;
+    Tag tag{};
+    std::vector<std::byte> request;
+    const decoders::GivenFile given(socket, file);
+    if (!decoders::receiveMessage(socket, tag, request, kLargestRequest, -1)) return;
+    const auto failed = [&](ErrorCode code, std::string text) {
+        std::ranges::replace(text, '\n', ' ');
+        (void)decoders::sendFailure(socket, static_cast<int>(code), text);
+    };
+    if (tag != Tag::readModel || !given.there())
+        return failed(ErrorCode::failed, "the model did not come");
+    std::set_new_handler(onNoMemory);
+    try {
+        const std::string name = kModelFolder + decoders::Unpacker(request).getText();
+        Assimp::Importer importer;
+        importer.SetIOHandler(new Files(given.bytes(), name));
+        const aiScene* scene = importer.ReadFile(name, 0);
+        if (!scene)
+            return failed(ErrorCode::invalidInput, *importer.GetErrorString() != 0
+                                                       ? importer.GetErrorString()
+                                                       : "no reason given");
+        if (!SceneTeller(*scene).tell()) ::_exit(1);
+    } catch (const std::exception& e) {
+        failed(ErrorCode::invalidInput, e.what());
+    } catch (...) {
+        failed(ErrorCode::invalidInput, "no reason given");
+    }
+}
+
+const char* libraries() {
+    static const std::string text = fmt::format("Assimp {}.{}.{}", aiGetVersionMajor(),
+                                                aiGetVersionMinor(), aiGetVersionPatch());
+    return text.c_str();
+}
+
+}  // namespace
+}  // namespace stx::models
+
+extern "C" __attribute__((visibility("default"))) const stx::decoders::Module* stxDecoder() {
+    static const stx::decoders::Module module = {
+        stx::decoders::kModuleVersion, stx::models::libraries, nullptr, stx::models::serve};
+    return &module;
+}

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "formats/decoders/decoder_process.hpp"
+#include "formats/meshes/model_wire.hpp"
+
+namespace stx {
+
+/// A model as the library that reads it has it, before it is a Mesh: what its process tells
+/// (Tag::scene, then Tag::mesh for each mesh). Numbers of meshes and corners are checked.
+struct ForeignScene {
+    struct Texture {
+        std::string name;
+        std::uint8_t wrapU = 0, wrapV = 0;  ///< values of MeshTexture::Wrap
+        std::int32_t embedded = -1;         ///< its number among `embedded`, when it is inside
+    };
+    using Use = models::TextureUse;
+    struct Material {
+        std::string name;
+        std::optional<glm::vec4> diffuse, emission;
+        std::optional<float> opacity;
+        std::array<std::optional<Texture>, models::kTextureUses> textures;  ///< by Use
+        bool hasBump = false, hasDisplacement = false;
+    };
+    /// A picture inside the model's own file.
+    struct Embedded {
+        bool coded = false;  ///< a PNG or JPEG as it is; else plain texels, which are left out
+        Bytes bytes;
+    };
+    struct Node {
+        std::int32_t parent = -1;  ///< comes before it; -1: the root
+        glm::mat4 parentFromNode{1.0f};
+        std::vector<std::uint32_t> meshes;
+    };
+    struct Mesh {
+        std::string name;
+        std::uint32_t material = 0;
+        std::vector<glm::vec3> positions;
+        std::vector<glm::vec3> normals;  ///< as many, or none; so are the next two
+        std::vector<glm::vec4> colours;
+        std::vector<glm::vec2> uvs;
+        std::vector<std::uint32_t> cornerCounts;  ///< of each face; empty: all are triangles
+        std::vector<std::uint32_t> corners;       ///< numbers of positions, face after face
+    };
+
+    std::vector<Material> materials;
+    std::vector<Embedded> embedded;
+    std::vector<Node> nodes;
+    std::vector<Mesh> meshes;
+    std::uint32_t animations = 0;
+};
+
+/// What a process tells of a model, after Tag::scene with these bytes. Errors (invalidInput): it
+/// makes no sense, or needs more than the memory limit.
+[[nodiscard]] Result<ForeignScene> receiveScene(DecoderProcess& process, ByteSpan told,
+                                                const Limits& limits);
+
+}  // namespace stx

@@ -1,0 +1,60 @@
+#include "formats/meshes/side_files.hpp"
+
+#include "formats/meshes/model_wire.hpp"
+#include "formats/meshes/text_encoding.hpp"
+
+namespace stx {
+namespace {
+
+/// As the model names it.
+std::string relative(std::string_view name) {
+    const std::string_view folder = models::kModelFolder;
+    while (name.starts_with("./")) name.remove_prefix(2);
+    if (name.starts_with(folder)) {
+        name.remove_prefix(folder.size());
+        // Folder and name are joined with one slash too many at times.
+        while (name.starts_with('/')) name.remove_prefix(1);
+    }
+    return std::string(name);
+}
+
+Bytes bytesOf(std::string_view text) {
+    const auto bytes = std::as_bytes(std::span(text));
+    return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace
+
+std::optional<std::filesystem::path> SideFiles::find(const std::string& file) {
+    auto path = files_.find(file);
+    if (path) return std::move(*path);
+    if (missing_.empty()) missing_ = fmt::format("'{}' {}", file, whyNotThere(path.error()));
+    return std::nullopt;
+}
+
+bool SideFiles::exists(std::string_view name) {
+    return find(relative(name)).has_value();
+}
+
+std::optional<Bytes> SideFiles::read(std::string_view name) {
+    const auto file = relative(name);
+    const auto path = find(file);
+    if (!path) return std::nullopt;
+    // Files that name their materials thousands of times: once read, all is known.
+    if (!opened_.insert(path->string()).second)
+        return bytesOf("# This file has been read already.\n");
+    auto bytes = readFile(*path, files_.job().limits);
+    if (!bytes) {
+        if (!error_) error_ = bytes.error().at(fmt::format("material file '{}'", file));
+        return std::nullopt;
+    }
+    if (auto text = utf8FromMarked(*bytes)) *bytes = std::move(*text);
+    if (texts_.empty()) {
+        const auto folder = path->parent_path().lexically_relative(files_.folder());
+        if (folder != ".") materialFolder_ = folder.generic_string();
+    }
+    texts_.emplace_back(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    return std::move(*bytes);
+}
+
+}  // namespace stx

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "formats/meshes/model_files.hpp"
+
+namespace stx {
+
+/// What the process that reads a model gets of the files that the model names: those that
+/// ModelFiles opens beside it, and no others.
+class SideFiles {
+  public:
+    explicit SideFiles(ModelFiles& files) : files_(files) {}
+
+    [[nodiscard]] bool exists(std::string_view name);
+    /// The bytes of one; nothing when it is not there.
+    [[nodiscard]] std::optional<Bytes> read(std::string_view name);
+
+    /// A file that is there but cannot be read.
+    [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+    /// The first name that does not exist beside the model, and why; empty when all do.
+    [[nodiscard]] const std::string& missing() const { return missing_; }
+    /// Folder of the first material file, relative to the model's; empty when it is the same.
+    [[nodiscard]] const std::string& materialFolder() const { return materialFolder_; }
+    /// Text of the material files that were opened, in order.
+    [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
+
+  private:
+    std::optional<std::filesystem::path> find(const std::string& file);
+
+    ModelFiles& files_;
+    std::optional<Error> error_;
+    std::string missing_;
+    std::string materialFolder_;
+    std::vector<std::string> texts_;
+    std::set<std::string> opened_;  ///< paths of side files
+};
+
+}  // namespace stx
