@@ -160,12 +160,13 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         }
         case FileKind::image:
         case FileKind::unknown:
-            return fail(ErrorCode::invalidInput,
-                        "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC, SPZ) nor "
-                        "a bundle "
-                        "(.mp4, .xmt, .bt, .exr) "
-                        "nor an atlas nor an image set",
-                        path.string());
+            return fail(
+                ErrorCode::invalidInput,
+                "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC, SPZ) nor "
+                "a bundle "
+                "(.mp4, .xmt, .bt, .exr) "
+                "nor an atlas nor an image set",
+                path.string());
     }
     if (!bundle) return propagate(bundle);
     // Every reader checks what it returns: see Bundle::check().

@@ -74,8 +74,8 @@ std::vector<std::byte> compressGzip(std::span<const std::byte> from, int level) 
     const Compressor compressor(libdeflate_alloc_compressor(level));
     if (!compressor) throw std::bad_alloc();
     std::vector<std::byte> to(libdeflate_gzip_compress_bound(compressor.get(), from.size()));
-    to.resize(libdeflate_gzip_compress(compressor.get(), from.data(), from.size(), to.data(),
-                                       to.size()));
+    to.resize(
+        libdeflate_gzip_compress(compressor.get(), from.data(), from.size(), to.data(), to.size()));
     return to;
 }
 

@@ -22,8 +22,8 @@ namespace stx {
 /// std::bad_alloc.
 [[nodiscard]] bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to);
 
-/// A gzip file (RFC 1952) of all of `from`, without a name and a time, by libdeflate: the same bytes
-/// in each run. Throws std::bad_alloc.
+/// A gzip file (RFC 1952) of all of `from`, without a name and a time, by libdeflate: the same
+/// bytes in each run. Throws std::bad_alloc.
 [[nodiscard]] std::vector<std::byte> compressGzip(std::span<const std::byte> from, int level);
 
 /// The size that a gzip file's last bytes say its content has, modulo 2^32; nothing where `from` is

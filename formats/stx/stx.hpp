@@ -58,11 +58,11 @@ namespace stx {
 /// What a file or a folder holds.
 using Model = std::variant<Mesh, Bundle, Atlas>;
 
-/// Opens a mesh (glTF, GLB, OBJ, PLY, STL, DRC), a bundle (.mp4, .xmt, .bt, .exr), an image set, or
-/// an atlas (its folder, its atlas.json, or .exr). The content decides, then the name's ending.
-/// What is opened has passed check(). What is lossy or left out is in job.takeNotes(). Errors: io,
-/// invalidInput (with the byte offset, line or key), usage (an option that the set does not have),
-/// unsupported (the module of image codecs is not there).
+/// Opens a mesh (glTF, GLB, OBJ, PLY, STL, DRC, SPZ), a bundle (.mp4, .xmt, .bt, .exr), an image
+/// set, or an atlas (its folder, its atlas.json, or .exr). The content decides, then the name's
+/// ending. What is opened has passed check(). What is lossy or left out is in job.takeNotes().
+/// Errors: io, invalidInput (with the byte offset, line or key), usage (an option that the set does
+/// not have), unsupported (the module of image codecs is not there).
 [[nodiscard]] Result<Model> open(const std::filesystem::path& path, const OpenOptions& options,
                                  Job& job);
 

@@ -18,8 +18,8 @@
 namespace stx {
 namespace {
 
-constexpr int kTile =
-    32;  // pixels; with 4x4 samples a tile's buffers stay in the second-level cache
+/// Pixels; with 4x4 samples a tile's buffers stay in the second-level cache.
+constexpr int kTile = 32;
 /// Less than this of a surface is not there: half a step of 8 bits.
 constexpr float kLeastAlpha = 0.5f / 255.0f;
 /// Samples of a line that are too few to be worth more than a plain loop.
@@ -585,13 +585,8 @@ Result<RasterImage> rasterise(const Mesh& mesh, const Camera& camera,
                                          32, "the picture"));
     if (mesh.splats) {
         STX_TRY(auto drawn, drawSplats(*mesh.splats, camera, settings.normals, job));
-        auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
-        return RasterImage{std::move(drawn.colour),
-                           std::move(lit),
-                           std::move(drawn.depth),
-                           std::move(drawn.normal),
-                           {},
-                           {}};
+        const auto lit = settings.lighting.on() ? drawn.colour : Image<glm::vec4>();
+        return RasterImage{drawn.colour, lit, drawn.depth, drawn.normal, {}, {}};
     }
     STX_CHECK(job.limits.checkAllocation(mesh.triangles.size(), sizeof(SetUp), "the mesh"));
     if (!mesh.points.empty()) {

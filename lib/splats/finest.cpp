@@ -36,13 +36,11 @@ bool isInside(const Image<Disc>& discs, int x, int y) {
 }
 
 /// Whether another view shows the place of a disc finer; of equally fine ones the first stays.
-bool showsFiner(const ReferenceView& view, const Image<Disc>& discs, bool comesFirst,
-                const Disc& disc, const Shape& shape) {
-    const glm::dvec3 inCamera =
-        glm::transpose(glm::dmat3(glm::mat3_cast(view.camera.orientation))) *
-        (glm::dvec3(disc.centre) - view.camera.position);
+bool showsFiner(const Camera& camera, const glm::dmat3& cameraFromWorld, const Image<Disc>& discs,
+                bool comesFirst, const Disc& disc, const Shape& shape) {
+    const glm::dvec3 inCamera = cameraFromWorld * (glm::dvec3(disc.centre) - camera.position);
     if (!(inCamera.z < 0)) return false;
-    const glm::dvec3 at = view.camera.project(inCamera);
+    const glm::dvec3 at = camera.project(inCamera);
     if (!(at.x >= 1 && at.y >= 1 && at.x < discs.width() - 1 && at.y < discs.height() - 1))
         return false;
     const int x = static_cast<int>(at.x), y = static_cast<int>(at.y);
@@ -63,6 +61,9 @@ void keepFinest(const Bundle& bundle, std::vector<Image<Disc>>& discs) {
     const std::size_t count = bundle.views.size();
     std::vector<std::vector<std::uint8_t>> gone(count);
     const auto camera = [&](std::size_t i) -> const Camera& { return bundle.views[i].camera; };
+    std::vector<glm::dmat3> turns;
+    for (std::size_t i = 0; i < count; ++i)
+        turns.push_back(glm::transpose(glm::mat3_cast(camera(i).orientation)));
     parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t number) {
         const auto i = static_cast<std::size_t>(number);
         const Image<Disc>& own = discs[i];
@@ -80,7 +81,7 @@ void keepFinest(const Bundle& bundle, std::vector<Image<Disc>>& discs) {
             if (!(disc.colour.w > 0)) continue;
             const Shape shape = shapeOf(disc);
             gone[i][p] = std::ranges::any_of(others, [&](std::size_t j) {
-                return showsFiner(bundle.views[j], discs[j], j < i, disc, shape);
+                return showsFiner(camera(j), turns[j], discs[j], j < i, disc, shape);
             });
         }
     });
