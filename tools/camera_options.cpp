@@ -43,7 +43,7 @@ void addCameraOptions(Command command, CameraOptions& o) {
     command
         .option("--up", o.up,
                 "What is up in the picture, and the axis of an orbit: Z, X,Y,Z or with a minus "
-                "--up=-Y (default Y; of an orbit: what the reference views have)")
+                "--up=-Y (default: what the reference views have, else Y)")
         .takes("AXIS")
         .group(group);
     command
@@ -162,16 +162,17 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
     glm::dvec3 target = context.bounds.empty() ? glm::dvec3(0) : context.bounds.centre();
     if (!o.up.empty()) {
         STX_TRY(lens.up, parseDirection(o.up, "--up"));
-    } else if (!pose) {
+    } else {
         lens.up = upOfCameras(context.views);
         if (lens.up != glm::dvec3(0, 1, 0))
             program.job.note(fmt::format(
-                "the reference views stand upright along {}{}, and so does the orbit; --up changes "
+                "the reference views stand upright along {}{}, and so does the {}; --up changes "
                 "that",
                 lens.up.x + lens.up.y + lens.up.z < 0 ? "-" : "+",
                 lens.up.x != 0   ? "X"
                 : lens.up.y != 0 ? "Y"
-                                 : "Z"));
+                                 : "Z",
+                pose ? "picture" : "orbit"));
     }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));

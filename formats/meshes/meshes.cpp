@@ -174,7 +174,8 @@ Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
     const auto where = fmt::format("'{}'", path.string());
     if (bytes.empty())
         return failAt(where, ErrorCode::invalidInput, "the file is empty; expected a model");
-    if (const auto ending = formatOfEnding(path); ending == Format::obj || ending == Format::gltf) {
+    if (const auto ending = formatOfEnding(path);
+        ending == Format::obj || ending == Format::gltf || ending == Format::dae) {
         STX_CHECK(job.limits.checkAllocation(bytes.size(), 3, "the text"));
         if (auto text = utf8FromMarked(bytes)) bytes = std::move(*text);
     }
