@@ -2,6 +2,9 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
+
+#include "lib/base/job.hpp"
 
 namespace stx {
 
@@ -19,5 +22,12 @@ namespace stx {
 /// False, and anything in `to`, when the stream is damaged or holds another number of bytes. Throws
 /// std::bad_alloc.
 [[nodiscard]] bool inflateZlib(std::span<const std::byte> from, std::span<std::byte> to);
+
+/// What a gzip file (RFC 1952) of one or more members holds. Errors (invalidInput): damaged; more
+/// than the limits allow.
+[[nodiscard]] Result<std::vector<std::byte>> gunzip(std::span<const std::byte> from,
+                                                    const Limits& limits);
+/// The bytes begin as a gzip file does.
+[[nodiscard]] bool isGzip(std::span<const std::byte> bytes);
 
 }  // namespace stx
