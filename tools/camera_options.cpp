@@ -50,7 +50,7 @@ void addCameraOptions(Command command, CameraOptions& o) {
     command
         .option("--up", o.up,
                 "What is up in the picture, and the axis of an orbit: Z, X,Y,Z or with a minus "
-                "--up=-Y (default Y; of an orbit: what the reference views have)")
+                "--up=-Y (default: what the reference views have, else Y)")
         .takes("AXIS")
         .group(group);
     command
@@ -172,16 +172,17 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
     } else if (context.up) {
         lens.up = *context.up;
         noteSplatsUp(lens.up, program.job);
-    } else if (!pose) {
+    } else {
         lens.up = upOfCameras(context.views);
         if (lens.up != glm::dvec3(0, 1, 0))
             program.job.note(fmt::format(
-                "the reference views stand upright along {}{}, and so does the orbit; --up changes "
+                "the reference views stand upright along {}{}, and so does the {}; --up changes "
                 "that",
                 lens.up.x + lens.up.y + lens.up.z < 0 ? "-" : "+",
                 lens.up.x != 0   ? "X"
                 : lens.up.y != 0 ? "Y"
-                                 : "Z"));
+                                 : "Z",
+                pose ? "picture" : "orbit"));
     }
     if (!o.target.empty()) {
         STX_TRY(target, parseVec3(o.target, "--target"));

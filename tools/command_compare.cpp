@@ -1,9 +1,12 @@
 #include <cmath>
+#include <map>
+#include <tuple>
 
 #include <nlohmann/json.hpp>
 
 #include "formats/images/images.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/base/printable.hpp"
 #include "lib/metrics/compare.hpp"
 #include "lib/metrics/steadiness.hpp"
 #include "tools/commands.hpp"
@@ -61,18 +64,88 @@ Result<Comparison> comparePair(const std::string& a, const std::string& b, const
     return result;
 }
 
+/// Two pictures that belong together.
+struct Pair {
+    std::string a, b;
+    int frame = -1;    ///< of a sequence
+    std::string name;  ///< of folders
+    [[nodiscard]] std::string errorPicture(const std::string& given) const {
+        if (name.empty()) return frameName(given, frame).value_or("");
+        return given.empty() ? "" : (std::filesystem::path(given) / (name + ".png")).string();
+    }
+};
+
+/// The files in a folder by their names without endings.
+Result<std::map<std::string, std::string>> picturesIn(const std::string& folder) {
+    std::map<std::string, std::string> found;
+    std::error_code ec;
+    for (std::filesystem::directory_iterator it(folder, ec), end; !ec && it != end;
+         it.increment(ec)) {
+        if (!it->is_regular_file(ec)) continue;
+        const auto stem = it->path().stem().string();
+        if (const auto [other, fresh] = found.emplace(stem, it->path().string()); !fresh)
+            return fail(ErrorCode::invalidInput, "'{}' and '{}' have one name; each needs its own",
+                        other->second, it->path().string());
+    }
+    if (ec) return fail(ErrorCode::io, "cannot read the folder '{}': {}", folder, ec.message());
+    return found;
+}
+
+/// The pictures of two folders, which have the same names, whatever their endings.
+Result<std::vector<Pair>> pairsOfFolders(const CompareOptions& o) {
+    STX_TRY(const auto first, picturesIn(o.a));
+    STX_TRY(const auto second, picturesIn(o.b));
+    for (const auto& [these, others, folder] :
+         {std::tuple{&first, &second, &o.b}, {&second, &first, &o.a}})
+        for (const auto& [name, file] : *these)
+            if (!others->contains(name))
+                return fail(ErrorCode::io, "'{}' has no partner in '{}'", file, *folder);
+    std::vector<Pair> pairs;
+    for (const auto& [name, file] : first) pairs.push_back({file, second.at(name), -1, name});
+    if (pairs.empty())
+        return fail(ErrorCode::invalidInput, "the folder '{}' has no picture in it", o.a);
+    return pairs;
+}
+
+/// The frames of two sequences.
+std::vector<Pair> pairsOfSequences(const CompareOptions& o) {
+    std::vector<Pair> pairs;
+    for (int frame = o.firstFrame; o.frames == 0 || frame < o.firstFrame + o.frames; ++frame) {
+        Pair pair{*frameName(o.a, frame), *frameName(o.b, frame), frame, ""};
+        std::error_code ec;
+        if (o.frames == 0 && frame > o.firstFrame && !std::filesystem::exists(pair.a, ec) &&
+            !std::filesystem::exists(pair.b, ec))
+            break;
+        pairs.push_back(std::move(pair));
+    }
+    return pairs;
+}
+
 std::string decibels(std::optional<double> v) {
     return v ? fmt::format("{:.2f} dB", *v) : std::string("identical");
 }
 
+/// "PSNR 40.00 dB (Y 41.00 dB), …", or that there is no difference.
+std::string textOf(const Comparison& c, const std::string& worstOf) {
+    if (c.identical()) return "identical";
+    return fmt::format(
+        "PSNR {} (Y {}), SSIM {:.4f}, worst pixel ({}, {}){} differs by {:g}, {} of {} pixels "
+        "differ",
+        decibels(c.psnrRgb), decibels(c.psnrY), c.ssimY, c.worst.x, c.worst.y, worstOf,
+        c.worst.difference, c.differentPixels, c.pixels);
+}
+
 Result<int> compareImages(const CompareOptions& o, const Command& command, Program& program) {
     const bool sequences = frameName(o.a, 0) && frameName(o.b, 0);
+    std::error_code ec;
+    const bool folders =
+        std::filesystem::is_directory(o.a, ec) && std::filesystem::is_directory(o.b, ec);
     if (!sequences)
         STX_CHECK(command.refuse({"--first-frame", "--frames"},
                                  "is of sequences, named as in a_%04d.png"));
     if (o.errorPicture.empty())
         STX_CHECK(command.refuse({"--gain"}, "is of the error picture; give --error-picture, too"));
-    if (sequences && !o.errorPicture.empty() && !frameName(o.errorPicture, 0))
+    if (sequences && !folders && !o.errorPicture.empty() && !frameName(o.errorPicture, 0))
         return fail(ErrorCode::usage,
                     "--error-picture is '{}', one file for all frames; a numbered name is "
                     "expected, as in 'error_%04d.png'",
@@ -92,35 +165,45 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
     auto perFrame = nlohmann::ordered_json::array();
     int worstFrame = -1;
     Steadiness steadiness;
-    if (sequences) {
+    std::string worstOf;
+    if (sequences || folders) {
+        std::vector<Pair> pairs;
+        if (folders) {
+            STX_TRY(pairs, pairsOfFolders(o));
+        } else {
+            pairs = pairsOfSequences(o);
+        }
         SequenceComparison sequence(255.0);
-        for (int frame = o.firstFrame; o.frames == 0 || frame < o.firstFrame + o.frames; ++frame) {
+        for (const Pair& pair : pairs) {
             STX_CHECK(program.job.checkCancelled());
-            const auto a = *frameName(o.a, frame), b = *frameName(o.b, frame);
-            std::error_code ec;
-            if (o.frames == 0 && frame > o.firstFrame && !std::filesystem::exists(a, ec) &&
-                !std::filesystem::exists(b, ec))
-                break;
             CompareOptions one = o;
-            one.errorPicture = frameName(o.errorPicture, frame).value_or("");
-            STX_TRY(const auto c, comparePair(a, b, one, maskImage, &steadiness, program));
+            one.errorPicture = pair.errorPicture(o.errorPicture);
+            if (!one.errorPicture.empty()) STX_CHECK(checkTarget(one.errorPicture, program));
+            STX_TRY(const auto c, comparePair(pair.a, pair.b, one, maskImage,
+                                              folders ? nullptr : &steadiness, program));
             sequence.add(c);
             auto entry = toJson(c);
-            entry["frame"] = frame;
+            if (folders)
+                entry["name"] = pair.name;
+            else
+                entry["frame"] = pair.frame;
             perFrame.push_back(std::move(entry));
+            if (folders && program.common.format != "json")
+                program.print(printable(pair.name) + ": " + textOf(c, "") + "\n");
         }
         total = sequence.total();
-        worstFrame = o.firstFrame + sequence.worstFrame();
+        const Pair& worst = pairs[static_cast<std::size_t>(sequence.worstFrame())];
+        worstFrame = worst.frame;
+        worstOf = folders ? " of '" + printable(worst.name) + "'"
+                          : fmt::format(" of frame {}", worst.frame);
     } else {
         STX_TRY(total, comparePair(o.a, o.b, o, maskImage, nullptr, program));
     }
 
     nlohmann::ordered_json out = {{"$schema", "compare.schema.json"}};
     out.update(toJson(total));
-    if (worstFrame >= 0) {
-        out["worst"]["frame"] = worstFrame;
-        out["frames"] = perFrame;
-    }
+    if (worstFrame >= 0) out["worst"]["frame"] = worstFrame;
+    if (!perFrame.empty()) out[folders ? "pairs" : "frames"] = perFrame;
     if (steadiness.steps() > 0)
         out["unsteadiness"] = {
             {"mean", steadiness.mean()},
@@ -130,15 +213,8 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
     STX_CHECK(program.writeReport(out));
     if (program.common.format == "json") {
         program.printJson(out);
-    } else if (total.identical()) {
-        program.print("identical\n");
     } else {
-        program.print(fmt::format(
-            "PSNR {} (Y {}), SSIM {:.4f}, worst pixel ({}, {}){} differs by {:g}, {} of {} pixels "
-            "differ\n",
-            decibels(total.psnrRgb), decibels(total.psnrY), total.ssimY, total.worst.x,
-            total.worst.y, worstFrame >= 0 ? fmt::format(" of frame {}", worstFrame) : "",
-            total.worst.difference, total.differentPixels, total.pixels));
+        program.print((folders ? "all: " : "") + textOf(total, worstOf) + "\n");
         if (steadiness.steps() > 0)
             program.print(fmt::format(
                 "changes from frame to frame: {:.3f} beyond those of B, {:.3f} at worst (frame "
@@ -155,16 +231,19 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
 }  // namespace
 
 void addCompare(CommandLine& line, Program& program) {
-    Command c = line.add("compare",
-                         "PSNR, SSIM and the worst pixel of two images or sequences; exit "
-                         "code 7 when they differ\n\n"
-                         "  stx compare novel.png truth.png --error-picture error.png\n"
-                         "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40");
+    Command c =
+        line.add("compare",
+                 "PSNR, SSIM and the worst pixel of two images, sequences or folders; exit "
+                 "code 7 when they differ\n\n"
+                 "  stx compare novel.png truth.png --error-picture error.png\n"
+                 "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40\n"
+                 "  stx compare drawn/ truth/ --error-picture errors/   all by their names");
     auto o = std::make_shared<CompareOptions>();
-    c.option("A", o->a, "Image, or sequence as name_%04d.png").required();
+    c.option("A", o->a, "Image, sequence as name_%04d.png, or folder").required();
     c.option("B", o->b, "The same").required();
     c.option("--mask", o->mask, "Image; only pixels that are white in it count").takes("IMAGE");
-    c.option("--error-picture", o->errorPicture, "Write where they differ as a PNG")
+    c.option("--error-picture", o->errorPicture,
+             "Write where they differ as a PNG, of folders into one")
         .takes("FILE.png");
     c.option("--gain", o->gain, "Of the error picture (default 8)").range(0.001, 1e6);
     c.option(

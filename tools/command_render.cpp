@@ -173,7 +173,8 @@ Result<void> prepareAround(RenderOptions& o, const Command& command, Program& pr
 
 /// Errors (usage) for several pictures without a numbered name, and (io) as checkFrames().
 Result<void> checkNames(const RenderOptions& o, int count, Program& program) {
-    if (count > 1 && !frameName(o.output, 0) && o.output != "-")
+    const bool film = o.output == "-" && (o.fileFormat.empty() || o.fileFormat == "y4m");
+    if (count > 1 && !frameName(o.output, 0) && !film)
         return fail(ErrorCode::usage,
                     "{} pictures need a numbered name, as in -o 'name_%04d.png' (a film: -o - "
                     "--file-format y4m)",
@@ -454,10 +455,13 @@ void addLighting(Command& c, RenderOptions& o) {
 
 void addOutput(Command& c, RenderOptions& o) {
     const char* output = "Output";
-    c.option("--file-format", o.fileFormat, "Of a stream on stdout: y4m")
-        .oneOf({"y4m"})
+    c.option("--file-format", o.fileFormat,
+             "Of what goes to stdout, -o -: y4m (a film), png or exr (one picture)")
+        .oneOf({"y4m", "png", "exr"})
         .group(output);
-    c.option("--format", o.fileFormat, "The same as --file-format").oneOf({"y4m"}).group(output);
+    c.option("--format", o.fileFormat, "The same as --file-format")
+        .oneOf({"y4m", "png", "exr"})
+        .group(output);
     c.option("--compression", o.compression,
              "Of .png, 0 to 9: 1 takes least time, 9 makes files a tenth smaller (default 1)")
         .range(0, 9)

@@ -15,8 +15,8 @@ constexpr std::size_t kQueue = 2;  // frames waiting; enough to hide encoding, s
 
 Result<void> FrameWriter::check(const Settings& s) {
     if (s.pattern == "-") {
-        if (s.stream != "y4m")
-            return fail(ErrorCode::usage, "pictures on stdout need --file-format y4m");
+        if (s.stream.empty())
+            return fail(ErrorCode::usage, "pictures on stdout need --file-format y4m, png or exr");
         return {};
     }
     if (!s.stream.empty())
@@ -56,9 +56,10 @@ std::string FrameWriter::nameOf(int frame) const {
 
 Result<void> FrameWriter::write(int index, const Frame& frame, const Camera& camera) {
     Item item{index, {}, {}, camera};
-    STX_TRY(const auto format, frameFormat(settings_.pattern));
+    STX_TRY(const auto format, settings_.stream == "exr" ? Result<FrameFormat>(FrameFormat::exr)
+                                                         : frameFormat(settings_.pattern));
     // Only OpenEXR has room for more than 8 bits and colours; what waits is kept small.
-    if (settings_.pattern == "-")
+    if (settings_.stream == "y4m")
         item.picture = rgba8From(frame, settings_.background.value_or(glm::vec3(0.0f)));
     else if (format == FrameFormat::exr)
         item.frame = exrFrameOf(frame, settings_.background);
@@ -105,7 +106,7 @@ void FrameWriter::work() {
 }
 
 Result<void> FrameWriter::writeOne(const Item& item) {
-    if (settings_.pattern != "-") {
+    if (settings_.stream != "y4m") {
         FrameOptions file;
         file.background = settings_.background;
         file.noClobber = settings_.noClobber;

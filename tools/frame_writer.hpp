@@ -25,7 +25,7 @@ class FrameWriter {
     struct Settings {
         std::string pattern;  ///< file, name_%04d.png, or - for a stream
         std::optional<glm::vec3> background;
-        std::string stream;               ///< "y4m" for stdout
+        std::string stream;               ///< on stdout: "y4m", or "png", "exr" for one picture
         std::pair<int, int> rate{25, 1};  ///< frames per second, a fraction
         int compression = 1;              ///< of PNG, 0 (fast, large) to 9
         bool noClobber = false;

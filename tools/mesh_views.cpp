@@ -1,9 +1,11 @@
 #include "tools/mesh_views.hpp"
 
 #include <filesystem>
+#include <set>
 
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/stx/mesh_views.hpp"
+#include "lib/base/whole_number.hpp"
 #include "lib/model/splat_cloud.hpp"
 #include "tools/camera_options.hpp"
 
@@ -35,9 +37,9 @@ Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
 }
 
 /// The cameras of a file, where --views names one.
-Result<std::vector<Camera>> camerasOfFile(const MeshViewOptions& o, const Mesh& mesh,
-                                          Program& program) {
-    std::vector<Camera> cameras;
+Result<std::vector<NamedCamera>> camerasOfFile(const MeshViewOptions& o, const Mesh& mesh,
+                                               Program& program) {
+    std::vector<NamedCamera> cameras;
     std::error_code ec;
     if (o.views.starts_with("auto") || parseViewLayout(o.views) ||
         !std::filesystem::exists(o.views, ec))
@@ -46,12 +48,25 @@ Result<std::vector<Camera>> camerasOfFile(const MeshViewOptions& o, const Mesh& 
     if (!o.size.empty()) {
         STX_TRY(size, parseSize(o.size, program.job.limits));
     }
-    STX_TRY(const auto named, readCameraFile(o.views, program.job, size));
-    for (const auto& n : named) {
-        cameras.push_back(inPicture(n.camera, size));
-        cameras.back().position -= mesh.origin;
+    STX_TRY(cameras, readCameraFile(o.views, program.job, size));
+    for (NamedCamera& named : cameras) {
+        named.camera = inPicture(named.camera, size);
+        named.camera.position -= mesh.origin;
     }
     return cameras;
+}
+
+/// Views get the names of their cameras, where each has one of its own. A view that saw nothing has
+/// gone; the others still tell their number.
+void nameViews(Bundle& bundle, const std::vector<NamedCamera>& cameras) {
+    std::set<std::string_view> names;
+    for (const NamedCamera& named : cameras)
+        if (!named.name.empty()) names.insert(named.name);
+    if (names.size() != cameras.size()) return;
+    for (ReferenceView& view : bundle.views)
+        if (const auto number = wholeNumber<std::size_t>(std::string_view(view.name).substr(4));
+            number && *number < cameras.size())
+            view.name = cameras[*number].name;
 }
 
 /// How good the choice of `auto` views is.
@@ -154,7 +169,8 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
                            Selection* selection) {
     STX_CHECK(mesh.check());
     STX_TRY(auto settings, settingsOf(o, program));
-    STX_TRY(settings.cameras, camerasOfFile(o, mesh, program));
+    STX_TRY(const auto named, camerasOfFile(o, mesh, program));
+    for (const NamedCamera& one : named) settings.cameras.push_back(one.camera);
     if (mesh.splats && o.up.empty() && settings.cameras.empty()) {
         settings.up = mesh.splats->up;
         noteSplatsUp(settings.up, program.job);
@@ -171,6 +187,7 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     }
     if (views.cameras.size() > 1) keepFreedMemory();
     STX_TRY(auto bundle, captureViews(mesh, views.cameras, settings, program.job));
+    nameViews(bundle, named);
     noteDepthLoss(bundle, program.job);
     return bundle;
 }

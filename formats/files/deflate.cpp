@@ -79,22 +79,37 @@ std::vector<std::byte> compressGzip(std::span<const std::byte> from, int level) 
     return to;
 }
 
-std::optional<std::size_t> gzipContentSize(std::span<const std::byte> from) {
-    constexpr std::size_t kLeast = 18, kMostRatio = 1032;  // of header and end; of deflate
-    if (from.size() < kLeast || from[0] != std::byte{0x1f} || from[1] != std::byte{0x8b})
-        return std::nullopt;
-    std::size_t size = 0;
-    for (std::size_t i = 0; i < 4; ++i)
-        size |= std::to_integer<std::size_t>(from[from.size() - 4 + i]) << (8 * i);
-    if (size / kMostRatio > from.size()) return std::nullopt;
-    return size;
+bool isGzip(std::span<const std::byte> bytes) {
+    return bytes.size() > 2 && bytes[0] == std::byte{0x1f} && bytes[1] == std::byte{0x8b};
 }
 
-bool inflateGzip(std::span<const std::byte> from, std::span<std::byte> to) {
+Result<std::vector<std::byte>> gunzip(std::span<const std::byte> from, const Limits& limits) {
+    constexpr std::size_t kMostRatio = 1032;  // of deflate
     const Decompressor decompressor(libdeflate_alloc_decompressor());
     if (!decompressor) throw std::bad_alloc();
-    return libdeflate_gzip_decompress(decompressor.get(), from.data(), from.size(), to.data(),
-                                      to.size(), nullptr) == LIBDEFLATE_SUCCESS;
+    std::vector<std::byte> out;
+    std::size_t done = 0;
+    while (!from.empty()) {
+        // Most of what is packed is text, of which a fifth is left.
+        std::size_t room = std::min(from.size() * 5, from.size() * kMostRatio) + 4096;
+        std::size_t taken = 0, given = 0;
+        auto result = LIBDEFLATE_INSUFFICIENT_SPACE;
+        for (; result == LIBDEFLATE_INSUFFICIENT_SPACE; room *= 2) {
+            if (!limits.checkAllocation(done + room, 1, "the unpacked file"))
+                room = limits.maxMemoryBytes > done ? limits.maxMemoryBytes - done : 0;
+            out.resize(done + room);
+            result = libdeflate_gzip_decompress_ex(decompressor.get(), from.data(), from.size(),
+                                                   out.data() + done, room, &taken, &given);
+            if (result == LIBDEFLATE_INSUFFICIENT_SPACE)
+                STX_CHECK(limits.checkAllocation(done + room + 1, 1, "the unpacked file"));
+        }
+        if (result != LIBDEFLATE_SUCCESS)
+            return fail(ErrorCode::invalidInput, "the gzip file is damaged or cut short");
+        done += given;
+        from = from.subspan(taken);
+    }
+    out.resize(done);
+    return out;
 }
 
 }  // namespace stx

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <vector>
+
+#include "lib/base/job.hpp"
 
 namespace stx {
 
@@ -26,11 +27,11 @@ namespace stx {
 /// bytes in each run. Throws std::bad_alloc.
 [[nodiscard]] std::vector<std::byte> compressGzip(std::span<const std::byte> from, int level);
 
-/// The size that a gzip file's last bytes say its content has, modulo 2^32; nothing where `from` is
-/// not gzip or says more than its bytes can hold.
-[[nodiscard]] std::optional<std::size_t> gzipContentSize(std::span<const std::byte> from);
-
-/// inflateZlib() of a gzip file's first member.
-[[nodiscard]] bool inflateGzip(std::span<const std::byte> from, std::span<std::byte> to);
+/// What a gzip file (RFC 1952) of one or more members holds. Errors (invalidInput): damaged; more
+/// than the limits allow.
+[[nodiscard]] Result<std::vector<std::byte>> gunzip(std::span<const std::byte> from,
+                                                    const Limits& limits);
+/// The bytes begin as a gzip file does.
+[[nodiscard]] bool isGzip(std::span<const std::byte> bytes);
 
 }  // namespace stx

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cstring>
 
+#include "formats/files/deflate.hpp"
 #include "formats/images/images.hpp"
 #include "formats/meshes/readers.hpp"
 #include "formats/meshes/text_encoding.hpp"
@@ -34,8 +35,12 @@ Format formatOfBytes(ByteSpan head) {
     return Format::none;
 }
 
+bool isPacked(const std::filesystem::path& path) {
+    return lowerCase(path.extension().string()) == ".gz";
+}
+
 Format formatOfEnding(const std::filesystem::path& path) {
-    const auto ending = lowerCase(path.extension().string());
+    const auto ending = lowerCase((isPacked(path) ? path.stem() : path).extension().string());
     if (ending == ".gltf") return Format::gltf;
     if (ending == ".glb") return Format::glb;
     if (ending == ".obj") return Format::obj;
@@ -172,12 +177,20 @@ Result<Mesh> readMesh(const std::filesystem::path& path, Job& job, const MeshOpt
     return readMesh(std::move(bytes), path, job, options);
 }
 
-Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& path, Job& job,
+Result<Mesh> readMesh(Bytes bytes, const std::filesystem::path& given, Job& job,
                       const MeshOptions& options) {
-    const auto where = fmt::format("'{}'", path.string());
+    const auto where = fmt::format("'{}'", given.string());
+    std::filesystem::path path = given;
+    if (isPacked(given) && isGzip(bytes)) {
+        auto unpacked = gunzip(bytes, job.limits);
+        if (!unpacked) return tl::unexpected(unpacked.error().at(where));
+        bytes = std::move(*unpacked);
+        path.replace_extension();
+    }
     if (bytes.empty())
         return failAt(where, ErrorCode::invalidInput, "the file is empty; expected a model");
-    if (const auto ending = formatOfEnding(path); ending == Format::obj || ending == Format::gltf) {
+    if (const auto ending = formatOfEnding(path);
+        ending == Format::obj || ending == Format::gltf || ending == Format::dae) {
         STX_CHECK(job.limits.checkAllocation(bytes.size(), 3, "the text"));
         if (auto text = utf8FromMarked(bytes)) bytes = std::move(*text);
     }

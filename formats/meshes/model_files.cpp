@@ -68,6 +68,8 @@ std::optional<int> ModelFiles::known(std::string_view name, SamplerState s,
 Result<int> ModelFiles::textureFromFile(std::string_view name, SamplerState sampler,
                                         std::vector<MeshTexture>& textures,
                                         const std::string& alsoIn) {
+    if (name.size() > 2 && name.starts_with('"') && name.ends_with('"'))
+        name = name.substr(1, name.size() - 2);  // as some programs write names with blanks
     if (const auto index = known(name, sampler, textures)) return *index;
     const auto without = [&](const Error& error) {
         job_.note(fmt::format("texture '{}' {}; the plain colour is used instead", name,

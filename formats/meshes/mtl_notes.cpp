@@ -53,8 +53,12 @@ void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& material
         } else if (key == "Tr") {
             current->hasTransparency = true;
         } else if (key == "map_Kd" || key == "map_d") {
-            const auto last = value.find_last_of(" \t");
-            const auto file = last == std::string_view::npos ? value : value.substr(last + 1);
+            // The last word, or what stands in quotes at the end.
+            const bool quoted = value.size() > 1 && value.ends_with('"');
+            const auto last =
+                quoted ? value.rfind('"', value.size() - 2) : value.find_last_of(" \t");
+            auto file = last == std::string_view::npos ? value : value.substr(last + 1);
+            if (quoted) file.remove_suffix(1);
             (key == "map_Kd" ? current->diffuseMap : current->alphaMap) = file;
             if (key == "map_Kd") {
                 readVector(value, "-s ", current->uvScale);

@@ -154,10 +154,8 @@ Result<PlyHeader> readPlyHeader(ByteSpan file) {
             header.elements.back().properties.push_back(std::move(property));
         } else if (key == "end_header") {
             break;
-        } else if (!key.empty()) {
-            return fail(ErrorCode::invalidInput, "line {} of the PLY header begins with '{}'",
-                        number, key.substr(0, 40));
         }
+        // Other lines are of programs that have more to say, as comments are.
     }
     if (!hasFormat) return fail(ErrorCode::invalidInput, "the PLY header has no format line");
     header.dataOffset = at;

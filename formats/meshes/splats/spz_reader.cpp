@@ -45,16 +45,11 @@ glm::vec4 firstThree(const std::byte* from) {
 }  // namespace
 
 Result<Mesh> readSpz(ByteSpan file, Job& job) {
-    const auto size = gzipContentSize(file);
-    if (!size)
+    if (!isGzip(file))
         return fail(ErrorCode::invalidInput,
-                    "the file is not gzip, or its end is cut off; SPZ of the versions 2 and 3 is "
-                    "(splat-transform and spz make version 3 of a newer one)");
-    STX_CHECK(job.limits.checkAllocation(*size, 1, "the content of the SPZ file"));
-    Bytes bytes(*size);
-    if (!inflateGzip(file, bytes))
-        return fail(ErrorCode::invalidInput,
-                    "the gzip stream of the SPZ file is damaged or longer than its end says");
+                    "the file is not gzip; SPZ of the versions 2 and 3 is (splat-transform and spz "
+                    "make version 3 of a newer one)");
+    STX_TRY(const Bytes bytes, gunzip(file, job.limits));
     if (bytes.size() < spz::kHeaderBytes || wordAt(bytes.data(), 4) != spz::kMagic)
         return fail(ErrorCode::invalidInput,
                     "the gzip file does not hold SPZ: its content begins with 'NGSP'");

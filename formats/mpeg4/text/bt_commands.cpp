@@ -179,10 +179,16 @@ Result<void> BtReader::readReplace(std::uint64_t time) {
 Result<void> BtReader::readInsert(std::uint64_t time, bool atEnd) {
     STX_TRY(const bool isRoute, takeIf("ROUTE"));
     if (isRoute) {
-        STX_TRY(auto route, readRoute(""));
+        STX_TRY(const bool isNamed, takeIf("DEF"));
+        std::string defName;
+        if (isNamed) {
+            STX_TRY(defName, takeName("a DEF name"));
+        }
+        STX_TRY(auto route, readRoute(defName));
         addCommand(document_.frames, time, InsertRoute{std::move(route)});
         return {};
     }
+    // As this program once wrote it.
     if (isWord("DEF")) {
         STX_CHECK(takeWord("DEF"));
         STX_TRY(const auto defName, takeName("a DEF name"));

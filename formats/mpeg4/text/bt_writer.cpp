@@ -286,9 +286,8 @@ class BtWriter {
         writeValue(c.value);
     }
     void write(const InsertRoute& c) {
-        beginCommand("INSERT ");
+        beginCommand("INSERT ROUTE ");
         writeRouteName(c.route);
-        out_ += "ROUTE ";
         writeRoute(c.route);
     }
     void write(const DeleteNode& c) { beginCommand("DELETE " + nameOf(c.target)); }

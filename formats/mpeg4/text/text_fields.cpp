@@ -284,7 +284,9 @@ std::string textNameOf(const Node& node) {
 }
 
 std::string textNameOf(const Route& route) {
-    if (!route.name.empty()) return route.name;
+    // A name that would be taken for the number of another route goes.
+    if (!route.name.empty() && (route.id == 0 || idFromTextName(route.name, 'R') == 0))
+        return route.name;
     return route.id > 0 ? fmt::format("R{}", route.id - 1) : std::string();
 }
 

@@ -27,7 +27,7 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 
 /// The DEF name of a node in a text: its own, or `N<id-1>` when it has only an id. Empty: none.
 [[nodiscard]] std::string textNameOf(const Node& node);
-/// The same for routes, with R.
+/// The same for routes, with R; a name that would be the number of another route is left out.
 [[nodiscard]] std::string textNameOf(const Route& route);
 /// The id of the name `N12`: 13; 0 for all other names.
 [[nodiscard]] std::uint32_t idFromTextName(std::string_view name, char letter);

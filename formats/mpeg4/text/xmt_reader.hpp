@@ -141,7 +141,11 @@ class XmtReader : private TextReader {
     }
     Result<void> readOdRemove(xml_node node, std::uint64_t time) {
         RemoveObjectDescriptors remove;
-        std::string_view list = node.attribute("objectDescriptorID").value();
+        // Some write objectDescriptorId.
+        const auto named = node.find_attribute([](pugi::xml_attribute attribute) {
+            return equalNoCase(attribute.name(), "objectDescriptorID");
+        });
+        std::string_view list = named.value();
         while (!list.empty()) {
             const auto end = list.find_first_of(" \t\r\n,");
             const std::string_view item = list.substr(0, end);
@@ -153,6 +157,10 @@ class XmtReader : private TextReader {
                               "found '{}', expected the id of an ObjectDescriptor", excerpt(item));
             remove.ids.push_back(static_cast<int>(*id));
         }
+        if (remove.ids.empty())
+            return failAt(where(node), ErrorCode::invalidInput,
+                          "there is no objectDescriptorID; the ids of ObjectDescriptors are "
+                          "expected in it");
         addCommand(document_.odFrames, time, std::move(remove));
         return {};
     }
