@@ -300,6 +300,12 @@ bool edgesAreFat(float colour) {
     return colour < kFat;
 }
 
+std::optional<float> disagreementOf(std::span<const EdgeView> views) {
+    std::vector<const Image<float>*> q;
+    for (const EdgeView& view : views) q.push_back(view.q);
+    return disagreement(views, q);
+}
+
 int thinFatEdges(std::span<const EdgeView> views) {
     int round = 0;
     for (; round < kMostRounds && edgesAreFat(colourAtEdges(views)) && !othersShowTheFront(views);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,10 @@ struct EdgeView {
 
 /// Whether that says that surfaces reach over their edges.
 [[nodiscard]] bool edgesAreFat(float colour);
+
+/// How far apart views are where they show the same surface: the median, a share of q; nothing
+/// where hardly any two do.
+[[nodiscard]] std::optional<float> disagreementOf(std::span<const EdgeView> views);
 
 /// Takes a pixel off the surfaces in front, where stereo and filters of depth let them grow over
 /// what is behind, as long as edgesAreFat() and no other views deny it: of thin bars and fine

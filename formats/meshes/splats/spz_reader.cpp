@@ -49,7 +49,7 @@ Result<Mesh> readSpz(ByteSpan file, Job& job) {
         return fail(ErrorCode::invalidInput,
                     "the file is not gzip; SPZ of the versions 2 and 3 is (splat-transform and spz "
                     "make version 3 of a newer one)");
-    STX_TRY(const Bytes bytes, gunzip(file, job.limits));
+    STX_TRY(Bytes bytes, gunzip(file, job.limits));
     if (bytes.size() < spz::kHeaderBytes || wordAt(bytes.data(), 4) != spz::kMagic)
         return fail(ErrorCode::invalidInput,
                     "the gzip file does not hold SPZ: its content begins with 'NGSP'");

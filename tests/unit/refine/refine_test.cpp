@@ -74,6 +74,26 @@ TEST(Refine, SaysWhatItFoundAndDid) {
     EXPECT_LT(off(refined, room()), 0.6 * off(PageSet(bundle), room()));
 }
 
+// A sensor's own errors are smooth: nothing in one view tells of them.
+TEST(Refine, CapturedViewsThatDisagreeMeetInTheMiddle) {
+    const Bundle exact = room();
+    for (const NoDepth missing : {NoDepth::unknown, NoDepth::empty}) {
+        Bundle bundle = exact;
+        for (std::size_t v = 0; v < bundle.views.size(); ++v) {
+            bundle.views[v].noDepth = missing;
+            for (float& depth : bundle.views[v].depth.pixels()) depth *= v % 2 ? 1.006f : 0.994f;
+        }
+        RefineReport report;
+        const PageSet before(bundle), refined = before.refined({}, &report);
+        if (missing == NoDepth::empty) {
+            EXPECT_FALSE(report.changed()) << "a program knows: " << report.text();
+            continue;
+        }
+        EXPECT_EQ(report.of(RefineStep::agree).views, kRefinedViews);
+        EXPECT_LT(off(refined, exact), 0.8 * off(before, exact));
+    }
+}
+
 TEST(Refine, DoesTheStepsThatAreAskedFor) {
     const Bundle bundle = noisyRoom();
     RefineReport report;
