@@ -22,8 +22,8 @@
 namespace stx {
 namespace {
 
-/// Two views that are each off by one standard deviation are apart by 0.67 of the root of two in the
-/// median. Kitchen 0.0042, open3d-rgbd 0.0027 of the distance; spheres-miv, exact, 0.00002.
+/// Two views that are each off by one standard deviation are apart by 0.67 of the root of two in
+/// the median. Kitchen 0.0042, open3d-rgbd 0.0027 of the distance; spheres-miv, exact, 0.00002.
 constexpr float kDoubtOfDisagreement = 1.05f;
 
 /// Coverage below which surface mode takes a ray as free, and above which as stopped: kFreeLevel

@@ -40,8 +40,7 @@ struct FromFile {
 
 Result<FromFile> drawModel(const Pictures& pictures, Model model, int salt) {
     FromFile out;
-    out.how.mode =
-        measures::pick(pictures, salt, 3) == 0 ? RenderMode::splat : RenderMode::surface;
+    out.how.mode = measures::pick(pictures, salt, 3) == 0 ? RenderMode::splat : RenderMode::surface;
     RenderSettings settings;
     settings.mode = out.how.mode;
     settings.fill = Fill::none;
@@ -125,7 +124,8 @@ Outcome prunedAtlas(Pictures& pictures) {
 Outcome prunedOutline(Pictures& pictures) {
     STX_TRY(const FromFile pruned, drawPruned(pictures));
     // What only two views show may be all that one of them keeps, at a grazing angle.
-    const auto open = pictures.openShare(pruned.frame, 3), drawn = pictures.drawnShare(pruned.frame);
+    const auto open = pictures.openShare(pruned.frame, 3),
+               drawn = pictures.drawnShare(pruned.frame);
     if (!open || !drawn) return std::nullopt;
     return Measure{std::max(*open, *drawn),
                    fmt::format("{}: open {:.2f} %, drawn where nothing is {:.2f} %",
