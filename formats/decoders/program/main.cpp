@@ -41,13 +41,13 @@ bool loading = true;
     ::_exit(1);
 }
 
-struct Asked {
+struct Request {
     Launch launch;
     int socket = -1, file = -1;
 };
 
 /// False when nobody asks any more.
-bool receive(Asked& asked) {
+bool receive(Request& asked) {
     alignas(cmsghdr) char room[CMSG_SPACE(2 * sizeof(int))] = {};
     iovec bytes = {&asked.launch, sizeof(asked.launch)};
     msghdr message = {};
@@ -99,7 +99,7 @@ struct Held {
     pid_t maker = ::getpid();
 };
 
-[[noreturn]] void decode(const Module& module, const Asked& asked, const Held& held) {
+[[noreturn]] void decode(const Module& module, const Request& asked, const Held& held) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != held.maker) ::_exit(1);
     // Numbers that the filter knows.
@@ -166,7 +166,7 @@ int main(int count, char** arguments) {
     Held held;
     forbidCommon();
     held.landlock = forbidFiles();
-    for (Asked asked; receive(asked); asked = {}) {
+    for (Request asked; receive(asked); asked = {}) {
         const pid_t made = module ? ::fork() : -1;
         if (made == 0) decode(**module, asked, held);
         if (!module)  // the one error of reading: who asks knows what the module is for

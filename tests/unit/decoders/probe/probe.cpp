@@ -13,6 +13,7 @@
 #include <sys/syscall.h>
 #include <sys/uio.h>
 #include <unistd.h>
+#include <atomic>
 
 #include <cerrno>
 #include <cstdlib>
@@ -129,7 +130,7 @@ const std::map<std::string, std::function<bool()>> kTries = {
     {"end", []() -> bool { ::_exit(0); }},
     {"go on for ever",
      [] {
-         for (volatile int i = 0;; i = i + 1) {
+         for (std::atomic<int> i = 0;; ++i) {
          }
          return true;
      }},
