@@ -126,7 +126,7 @@ std::string decibels(std::optional<double> v) {
 }
 
 /// "PSNR 40.00 dB (Y 41.00 dB), …", or that there is no difference.
-std::string textOf(const Comparison& c, const std::string& worstOf) {
+std::string scoresOf(const Comparison& c, const std::string& worstOf) {
     if (c.identical()) return "identical";
     return fmt::format(
         "PSNR {} (Y {}), SSIM {:.4f}, worst pixel ({}, {}){} differs by {:g}, {} of {} pixels "
@@ -189,7 +189,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
                 entry["frame"] = pair.frame;
             perFrame.push_back(std::move(entry));
             if (folders && program.common.format != "json")
-                program.print(printable(pair.name) + ": " + textOf(c, "") + "\n");
+                program.print(printable(pair.name) + ": " + scoresOf(c, "") + "\n");
         }
         total = sequence.total();
         const Pair& worst = pairs[static_cast<std::size_t>(sequence.worstFrame())];
@@ -214,7 +214,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
     if (program.common.format == "json") {
         program.printJson(out);
     } else {
-        program.print((folders ? "all: " : "") + textOf(total, worstOf) + "\n");
+        program.print((folders ? "all: " : "") + scoresOf(total, worstOf) + "\n");
         if (steadiness.steps() > 0)
             program.print(fmt::format(
                 "changes from frame to frame: {:.3f} beyond those of B, {:.3f} at worst (frame "

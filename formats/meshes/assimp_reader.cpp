@@ -33,7 +33,7 @@ const char* endingOf(AssimpFormat format) {
 using decoders::Tag;
 using models::TextureUse;
 
-constexpr int kMostSeconds = 120;
+constexpr int kMostModelSeconds = 120;
 
 class SceneConverter {
   public:
@@ -320,7 +320,7 @@ Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& si
                             endingOf(format), errorIn(told).message);
             case Tag::timeUp:
                 return fail(ErrorCode::invalidInput,
-                            "the model cannot be read in {} seconds; is it damaged?", kMostSeconds);
+                            "the model cannot be read in {} seconds; is it damaged?", kMostModelSeconds);
             case Tag::noMemory:
                 return fail(ErrorCode::invalidInput,
                             "the model needs more than the memory limit of {} MiB; raise it with "
@@ -351,8 +351,8 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (shifted) bytes = shifted->text;
         DecoderBounds bounds;
         bounds.memoryBytes = limits.maxMemoryBytes;
-        bounds.cpuSeconds = kMostSeconds;
-        bounds.patienceMs = 2 * kMostSeconds * 1000;  // where others need the processor, too
+        bounds.cpuSeconds = kMostModelSeconds;
+        bounds.patienceMs = 2 * kMostModelSeconds * 1000;  // where others need the processor, too
         STX_TRY(const auto process, DecoderProcess::start(decoders::kModels, bounds, bytes));
         // The importer chooses by the ending.
         const auto stem = fileName.substr(0, fileName.find_last_of('.'));

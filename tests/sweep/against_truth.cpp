@@ -14,9 +14,6 @@ constexpr Drawn kNormal{RenderMode::surface, Quality::normal},
 constexpr std::array kWays{kNormal, kBest, kSplat};
 constexpr std::array kWayNames{"normal", "best", "splat"};
 
-/// Fewer pixels than this say nothing about a share of them.
-constexpr std::int64_t kFewest = 100;
-
 }  // namespace
 
 namespace measures {

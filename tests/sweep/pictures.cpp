@@ -5,9 +5,7 @@ using namespace stx;
 
 namespace {
 
-constexpr double kSame = 99;  ///< dB of pictures without a difference
-/// Fewer pixels than this say nothing about a share of them.
-constexpr std::int64_t kFewest = 100;
+constexpr double kSame = 99;      ///< dB of pictures without a difference
 constexpr float kCovered = 0.5f;  ///< alpha from which on a pixel counts as covered
 
 double decibels(double squared, double values) {

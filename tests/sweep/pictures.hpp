@@ -7,6 +7,9 @@
 #include "lib/render/api/renderer.hpp"
 #include "tests/sweep/sweep_case.hpp"
 
+/// Fewer pixels than this say nothing about a share of them.
+inline constexpr std::int64_t kFewest = 100;
+
 /// How a case is drawn.
 struct Drawn {
     stx::RenderMode mode = stx::RenderMode::surface;
