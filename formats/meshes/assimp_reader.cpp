@@ -320,7 +320,8 @@ Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& si
                             endingOf(format), errorIn(told).message);
             case Tag::timeUp:
                 return fail(ErrorCode::invalidInput,
-                            "the model cannot be read in {} seconds; is it damaged?", kMostModelSeconds);
+                            "the model cannot be read in {} seconds; is it damaged?",
+                            kMostModelSeconds);
             case Tag::noMemory:
                 return fail(ErrorCode::invalidInput,
                             "the model needs more than the memory limit of {} MiB; raise it with "
