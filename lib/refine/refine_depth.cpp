@@ -275,18 +275,22 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
             thinFatEdges(edges);
         }
     }
+    std::vector<char> smoothed(views.size());
+    for (std::size_t k = 0; k < views.size(); ++k) smoothed[k] = noisyViews[k].left > 0;
     if (settings.on(RefineStep::agree) && areCaptured(views)) {
         const Clock clock(report.of(RefineStep::agree));
         const float doubt = kDoubtOfDisagreement * disagreementOf(edges).value_or(0.0f);
         for (std::size_t k = 0; k < views.size(); ++k)
-            if (!(noisyViews[k].left > 0) && isNoisy(doubt, works[k].space.axis))
+            if (!smoothed[k] && isNoisy(doubt, works[k].space.axis))
                 doubtAlike(noisyViews[k], works[k], doubt);
     }
     std::vector<std::size_t> noisyOnes;
     std::vector<NoisyView> noisy;
+    std::vector<char> fromPixelToPixel;  // the noise is, so that single points stray
     for (std::size_t k = 0; k < views.size(); ++k) {
         if (!(noisyViews[k].left > 0)) continue;
         noisyOnes.push_back(k);
+        fromPixelToPixel.push_back(smoothed[k]);
         noisy.push_back(std::move(noisyViews[k]));
     }
     if (!noisy.empty()) {
@@ -302,7 +306,8 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
         step(RefineStep::colours, [&] { agreeOnColours(noisy); });
         step(RefineStep::silhouettes, silhouettes);
         step(RefineStep::strays, [&] {
-            for (const NoisyView& n : noisy) removeStrays(n);
+            for (std::size_t n = 0; n < noisy.size(); ++n)
+                if (fromPixelToPixel[n]) removeStrays(noisy[n]);
         });
     }
     for (std::size_t k = 0; k < views.size(); ++k) out[k].refined = views[k].header->refined;

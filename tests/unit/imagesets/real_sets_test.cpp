@@ -141,7 +141,8 @@ TEST(Open3dRgbd, WhatSensorsMissTakesNothingAway) {
         ASSERT_TRUE(whole);
         std::printf("open3d-rgbd: %.2f dB of Y, %.2f dB of the whole frame\n", *result->psnrY,
                     *whole->psnrY);
-        EXPECT_GE(*result->psnrY, 36.3);
+        // 37.14 in surface mode without agreement of the views.
+        EXPECT_GE(*result->psnrY, mode == RenderMode::surface ? 37.6 : 37.0);
         if (mode == RenderMode::surface) {
             EXPECT_GE(*whole->psnrY, 26.0);
         }

@@ -257,7 +257,9 @@ TEST(TwoCameras, SevenScenesAreDrawnBetter) {
     const auto then = compare(before.picture, *truth, settings);
     ASSERT_TRUE(now && then);
     std::printf("  %.2f dB of RGB, as one camera %.2f dB\n", *now->psnrRgb, *then->psnrRgb);
-    EXPECT_GE(*now->psnrRgb, *then->psnrRgb + 1.8);
+    // Without the step `agree`, which takes half a decibel of the error back, too: 1.8.
+    EXPECT_GE(*now->psnrRgb, *then->psnrRgb + 1.4);
+    EXPECT_GE(*now->psnrRgb, 26.3);
 }
 
 }  // namespace
