@@ -174,10 +174,10 @@ float between(const Image<float>& q, float x, float y) {
     return (a * (1 - tx) + b * tx) * (1 - ty) + (c * (1 - tx) + d * tx) * ty;
 }
 
-/// How far apart views are where they show the same surface: the median, a share of q; nothing when
-/// they do not.
-std::optional<float> disagreement(std::span<const EdgeView> views,
-                                  const std::vector<const Image<float>*>& q) {
+/// How far apart views are where they may show the same surface, at single points: shares of q;
+/// none when they hardly do.
+std::vector<float> pointsApart(std::span<const EdgeView> views,
+                               const std::vector<const Image<float>*>& q) {
     std::vector<float> apart;
     for (std::size_t i = 0; i < views.size(); ++i) {
         const int step = std::max(1, std::max(q[i]->width(), q[i]->height()) / kPointsAcross);
@@ -201,7 +201,15 @@ std::optional<float> disagreement(std::span<const EdgeView> views,
             }
         }
     }
-    if (apart.size() < kFewPoints) return {};
+    if (apart.size() < kFewPoints) apart.clear();
+    return apart;
+}
+
+/// Their median.
+std::optional<float> disagreement(std::span<const EdgeView> views,
+                                  const std::vector<const Image<float>*>& q) {
+    auto apart = pointsApart(views, q);
+    if (apart.empty()) return {};
     return medianOf(std::move(apart));
 }
 
@@ -303,7 +311,11 @@ bool edgesAreFat(float colour) {
 std::optional<float> disagreementOf(std::span<const EdgeView> views) {
     std::vector<const Image<float>*> q;
     for (const EdgeView& view : views) q.push_back(view.q);
-    return disagreement(views, q);
+    auto apart = pointsApart(views, q);
+    if (apart.empty()) return {};
+    const auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
+    std::nth_element(apart.begin(), quarter, apart.end());
+    return *quarter;
 }
 
 int thinFatEdges(std::span<const EdgeView> views) {

@@ -29,8 +29,9 @@ struct EdgeView {
 /// Whether that says that surfaces reach over their edges.
 [[nodiscard]] bool edgesAreFat(float colour);
 
-/// How far apart views are where they show the same surface: the median, a share of q; nothing
-/// where hardly any two do.
+/// How far apart views are where they show the same surface, a share of q: what a quarter of the
+/// points are not above, since among leaves most points of two views are of two surfaces. Nothing
+/// where hardly any are near each other.
 [[nodiscard]] std::optional<float> disagreementOf(std::span<const EdgeView> views);
 
 /// Takes a pixel off the surfaces in front, where stereo and filters of depth let them grow over

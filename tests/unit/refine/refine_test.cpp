@@ -81,7 +81,8 @@ TEST(Refine, CapturedViewsThatDisagreeMeetInTheMiddle) {
         Bundle bundle = exact;
         for (std::size_t v = 0; v < bundle.views.size(); ++v) {
             bundle.views[v].noDepth = missing;
-            for (float& depth : bundle.views[v].depth.pixels()) depth *= v % 2 ? 1.006f : 0.994f;
+            const float off = 0.992f + 0.008f * static_cast<float>(v);
+            for (float& depth : bundle.views[v].depth.pixels()) depth *= off;
         }
         RefineReport report;
         const PageSet before(bundle), refined = before.refined({}, &report);
