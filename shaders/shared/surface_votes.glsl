@@ -170,8 +170,7 @@ Facet facetOf(int s, float x, float y, float q) {
     facet.area = texel * texel;
     facet.perUnit = qPerUnit(axisOf(s), p);
     // Noise tilts facets, and puts points in front of them.
-    facet.off = kBehindNoises * max((clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p),
-                                    besideOf(s) * texel * facet.perUnit);
+    facet.off = kBehindNoises * (clearlyBehindOf(s) - kClearlyBehind) * relativeScale(axisOf(s), p);
     facet.edgeOn = kEdgeOn + facet.off / (facet.perUnit * texel);
     return facet;
 }

