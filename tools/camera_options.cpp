@@ -10,9 +10,7 @@ namespace stx::tools {
 
 void noteSplatsUp(glm::dvec3 up, Job& job) {
     if (up == glm::dvec3(0, -1, 0))
-        job.note(
-            "the splats are taken to stand on -Y, as trained clouds in PLY do; --up=Y if they "
-            "do not");
+        job.note("up is taken to be -Y, as in trained clouds in PLY; --up=Y if it is not");
 }
 namespace {
 

@@ -316,7 +316,7 @@ Result<CommandLine::Request> CommandLine::parse(int argc, char** argv) const {
         app_->parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
         const CLI::App& where = chosen(*app_);
-        // A word that is no command comes before what is asked of it.
+        // A word that is not a command comes before what is asked of it.
         std::string name = argc > 1 && argv[1][0] != '-' ? argv[1] : "";
         if (&where != app_.get()) name = where.get_name();
         STX_TRY(const auto text, help(name, HelpDetail::brief));

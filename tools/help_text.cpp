@@ -21,7 +21,7 @@ std::size_t columnsOf(std::string_view text) {
 }
 
 /// Words of `text` in lines up to `width`. The first begins at column `at`, the others at `indent`;
-/// `broken` stands at the end of each but the last.
+/// `broken` is put at the end of each but the last.
 std::string wrapped(std::string_view text, std::size_t at, std::size_t indent, std::size_t width,
                     std::string_view broken = "") {
     std::string out;
@@ -69,15 +69,15 @@ std::string entry(const std::string& name, std::string_view what, std::size_t wi
     return out + wrapped(what, column, column, width) + "\n";
 }
 
-/// The first sentence, with the default that a later one tells.
+/// The first sentence, with the default that a later one gives.
 std::string briefly(const std::string& help) {
     int depth = 0;
     for (std::size_t i = 0; i + 1 < help.size(); ++i) {
         depth += (help[i] == '(') - (help[i] == ')');
         if (depth != 0 || help[i] != '.' || help[i + 1] != ' ') continue;
         std::string out = help.substr(0, i);
-        const auto told = help.find("(default", i);
-        if (told != help.npos) out += " " + help.substr(told, help.find(')', told) + 1 - told);
+        const auto usual = help.find("(default", i);
+        if (usual != help.npos) out += " " + help.substr(usual, help.find(')', usual) + 1 - usual);
         return out;
     }
     return help;
@@ -111,7 +111,7 @@ std::string examples(std::string_view text, std::size_t width) {
         }
         flush();
         const auto indent = std::min(line.find_first_not_of(' '), line.size());
-        // What stands in a second column goes on there.
+        // A second column is wrapped within that column.
         const auto gap = line.rfind("  ");
         if (columnsOf(line) <= width)
             out += line;

@@ -114,8 +114,8 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
     command
         .option("--up", o->up,
                 "The model's up axis, on which rings, spheres and octahedra stand: Z, X,Y,Z or "
-                "with a minus --up=-Y (default Y; of Gaussian splats in PLY -Y, as trained clouds "
-                "stand)")
+                "with a minus --up=-Y (default Y; of Gaussian splats in PLY -Y, as in trained "
+                "clouds)")
         .takes("AXIS")
         .group(group);
     command

@@ -84,14 +84,13 @@ bool isGzip(std::span<const std::byte> bytes) {
 }
 
 Result<std::vector<std::byte>> gunzip(std::span<const std::byte> from, const Limits& limits) {
-    constexpr std::size_t kMostRatio = 1032;  // of deflate
     const Decompressor decompressor(libdeflate_alloc_decompressor());
     if (!decompressor) throw std::bad_alloc();
     std::vector<std::byte> out;
     std::size_t done = 0;
     while (!from.empty()) {
         // Most of what is packed is text, of which a fifth is left.
-        std::size_t room = std::min(from.size() * 5, from.size() * kMostRatio) + 4096;
+        std::size_t room = from.size() * 5 + 4096;
         std::size_t taken = 0, given = 0;
         auto result = LIBDEFLATE_INSUFFICIENT_SPACE;
         for (; result == LIBDEFLATE_INSUFFICIENT_SPACE; room *= 2) {

@@ -447,7 +447,7 @@ Result<void> OutputFolder::commit() {
 Result<void> OutputFolder::commitWith(OutputFile& file) {
     const auto& text = *file.impl_;
     // Of two runs that write the same names one comes whole after the other: else the text of one
-    // could stand beside the folder of the other. Where a file system has no locks, nothing is
+    // could be beside the folder of the other. Where a file system has no locks, nothing is
     // locked.
     const Descriptor alone(
         ::open(folderOf(impl_->real).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));

@@ -16,9 +16,9 @@ tl::unexpected<Error> died() {
 }
 
 /// Room for the pixels that are to come, of a picture that is allowed; null when there is none.
-Result<void*> prepare(ByteSpan told, std::size_t fileBytes, const Limits& limits,
+Result<void*> prepare(ByteSpan content, std::size_t fileBytes, const Limits& limits,
                       DecodedImage& image) {
-    decoders::Unpacker in(told);
+    decoders::Unpacker in(content);
     const auto facts = in.get<decoders::PictureFacts>();
     if (!in.ok() || (facts.bits != 8 && facts.bits != 16 && facts.bits != 32)) return nullptr;
     const ImageInfo claimed{"other", facts.width, facts.height, facts.channels, facts.bits};
@@ -46,17 +46,17 @@ Result<DecodedImage> receivePicture(DecoderProcess& process, std::size_t fileByt
                                     const Limits& limits) {
     DecodedImage image;
     Tag tag{};
-    Bytes told;
-    if (!process.receiveMessage(tag, told, kLargestHeader)) return died();
-    if (tag == Tag::failure) return tl::unexpected(errorIn(told));
+    Bytes content;
+    if (!process.receiveMessage(tag, content, kLargestHeader)) return died();
+    if (tag == Tag::failure) return tl::unexpected(errorIn(content));
     if (tag != Tag::pictureHeader) return died();
-    STX_TRY(void* const values, prepare(told, fileBytes, limits, image));
+    STX_TRY(void* const values, prepare(content, fileBytes, limits, image));
     decoders::MessageHead head;
     if (!values || !process.receiveHead(head)) return died();
     if (head.tag == Tag::failure && head.size <= kLargestHeader) {
-        told.resize(head.size);
-        if (!process.receive(told.data(), told.size())) return died();
-        return tl::unexpected(errorIn(told));
+        content.resize(head.size);
+        if (!process.receive(content.data(), content.size())) return died();
+        return tl::unexpected(errorIn(content));
     }
     const std::size_t size =
         std::visit([](const auto& all) { return all.size() * sizeof(all[0]); }, image.values);

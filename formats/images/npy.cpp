@@ -12,6 +12,8 @@
 #include <memory>
 #include <optional>
 
+#include <glm/gtc/packing.hpp>
+
 #include "formats/images/reader.hpp"
 #include "lib/base/whole_number.hpp"
 
@@ -110,13 +112,7 @@ double valueAt(const Header& header, const std::byte* at) {
     if (header.kind != 'f') return static_cast<double>(bits);
     if (header.size == 8) return std::bit_cast<double>(bits);
     if (header.size == 4) return std::bit_cast<float>(static_cast<std::uint32_t>(bits));
-    const double sign = bits & 0x8000 ? -1 : 1;
-    const int exponent = static_cast<int>(bits >> 10 & 31);
-    const auto fraction = static_cast<double>(bits & 1023);
-    if (exponent == 31)
-        return fraction == 0 ? sign * INFINITY : std::numeric_limits<double>::quiet_NaN();
-    return sign *
-           (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024 + fraction, exponent - 25));
+    return glm::unpackHalf1x16(static_cast<std::uint16_t>(bits));
 }
 
 Result<DecodedImage> decodeArray(ByteSpan bytes, const Limits& limits) {
@@ -243,7 +239,8 @@ Result<DecodedImage> decodeNumpy(ByteSpan bytes, const Limits& limits) {
     if (!textIn(bytes).starts_with(kArchive)) return decodeArray(bytes, limits);
     STX_TRY(const auto array, arrayIn(bytes, limits));
     if (!textIn(array).starts_with(kArray))
-        return fail(ErrorCode::invalidInput, "what the .npz archive holds is no NumPy array");
+        return fail(ErrorCode::invalidInput,
+                    "the .npz archive holds something that is not a NumPy array");
     return decodeArray(array, limits);
 }
 

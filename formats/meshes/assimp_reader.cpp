@@ -34,6 +34,12 @@ using decoders::Tag;
 using models::TextureUse;
 
 constexpr int kMostModelSeconds = 120;
+#ifdef __SANITIZE_ADDRESS__
+/// AddressSanitizer waits for ever where it has no memory to say that there is none.
+constexpr std::uint64_t kSanitizerBytes = std::uint64_t{1} << 40;
+#else
+constexpr std::uint64_t kSanitizerBytes = 0;
+#endif
 
 class SceneConverter {
   public:
@@ -298,10 +304,10 @@ Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& si
         return fail(ErrorCode::invalidInput, "the file is damaged: its reader crashes on it");
     };
     Tag tag{};
-    Bytes told;
-    while (of.receiveMessage(tag, told, limits.maxMemoryBytes)) {
+    Bytes content;
+    while (of.receiveMessage(tag, content, limits.maxMemoryBytes)) {
         decoders::Packer answer;
-        const std::string name = decoders::Unpacker(told).getText();
+        const std::string name = decoders::Unpacker(content).getText();
         switch (tag) {
             case Tag::askExists:
                 answer.put(static_cast<std::uint8_t>(side.exists(name)));
@@ -314,10 +320,10 @@ Result<ForeignScene> hear(DecoderProcess& of, AssimpFormat format, SideFiles& si
                 break;
             }
             case Tag::scene:
-                return receiveScene(of, told, limits);
+                return receiveScene(of, content, limits);
             case Tag::failure:
                 return fail(ErrorCode::invalidInput, "Assimp cannot read this {} file: {}",
-                            endingOf(format), errorIn(told).message);
+                            endingOf(format), errorIn(content).message);
             case Tag::timeUp:
                 return fail(ErrorCode::invalidInput,
                             "the model cannot be read in {} seconds; is it damaged?",
@@ -351,7 +357,7 @@ Result<Mesh> readWithAssimp(ByteSpan bytes, AssimpFormat format, const std::stri
         if (format == AssimpFormat::stl) shifted = shiftLargeCoordinates(bytes, "vertex");
         if (shifted) bytes = shifted->text;
         DecoderBounds bounds;
-        bounds.memoryBytes = limits.maxMemoryBytes;
+        bounds.memoryBytes = limits.maxMemoryBytes + kSanitizerBytes;
         bounds.cpuSeconds = kMostModelSeconds;
         bounds.patienceMs = 2 * kMostModelSeconds * 1000;  // where others need the processor, too
         STX_TRY(const auto process, DecoderProcess::start(decoders::kModels, bounds, bytes));

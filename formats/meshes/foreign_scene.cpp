@@ -49,8 +49,8 @@ ForeignScene::Node nodeIn(Unpacker& in) {
 
 /// What is before the meshes; nothing when it makes no sense. Nothing is made for a count before
 /// what it counts is there.
-std::optional<ForeignScene> sceneIn(ByteSpan told, std::uint32_t& meshes) {
-    Unpacker in(told);
+std::optional<ForeignScene> sceneIn(ByteSpan content, std::uint32_t& meshes) {
+    Unpacker in(content);
     ForeignScene scene;
     for (auto n = in.get<std::uint32_t>(); n > 0 && in.ok(); --n)
         scene.materials.push_back(materialIn(in));
@@ -122,11 +122,11 @@ Result<ForeignScene::Mesh> receiveMesh(DecoderProcess& process, const Limits& li
 
 }  // namespace
 
-Result<ForeignScene> receiveScene(DecoderProcess& process, ByteSpan told, const Limits& limits) {
+Result<ForeignScene> receiveScene(DecoderProcess& process, ByteSpan content, const Limits& limits) {
     std::uint32_t meshes = 0;
-    auto scene = sceneIn(told, meshes);
+    auto scene = sceneIn(content, meshes);
     if (!scene) return senseless();
-    std::uint64_t total = told.size();
+    std::uint64_t total = content.size();
     for (std::uint32_t i = 0; i < meshes; ++i) {
         STX_TRY(auto mesh, receiveMesh(process, limits, total));
         scene->meshes.push_back(std::move(mesh));

@@ -58,7 +58,7 @@ struct ForeignScene {
 
 /// What a process tells of a model, after Tag::scene with these bytes. Errors (invalidInput): it
 /// makes no sense, or needs more than the memory limit.
-[[nodiscard]] Result<ForeignScene> receiveScene(DecoderProcess& process, ByteSpan told,
+[[nodiscard]] Result<ForeignScene> receiveScene(DecoderProcess& process, ByteSpan content,
                                                 const Limits& limits);
 
 }  // namespace stx

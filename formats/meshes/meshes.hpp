@@ -80,7 +80,7 @@ struct PointWriteOptions {
                                        Job& job, const PointWriteOptions& options = {});
 
 /// Writes a cloud of splats, whole or not at all, by the ending of `path`: .ply (INRIA's binary
-/// PLY, turned by half around X where the cloud stands on +Y, as such files stand on -Y), .spz
+/// PLY, turned by half around X where up is +Y in the cloud, since up is -Y in such files), .spz
 /// (Niantic's version 3) or .glb (KHR_gaussian_splatting, with COLOR_0 for viewers that know only
 /// points). Harmonics are left out, with a note. The same input gives the same bytes. What is
 /// rounded is said with job.note(). Errors: usage (another ending), (invalidInput) coordinates that

@@ -12,7 +12,7 @@ namespace stx::models {
 /// A name that does not exist on any disk, so that all that is opened is asked for.
 inline constexpr const char* kModelFolder = "stx-model/";
 
-/// What textures are for, in the order in which they are told.
+/// What textures are for, in the order in which they are sent.
 enum class TextureUse : std::uint8_t { diffuse, opacity, emissive, normals };
 inline constexpr std::size_t kTextureUses = 4;
 

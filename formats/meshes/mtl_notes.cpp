@@ -53,7 +53,7 @@ void scanMtl(std::string_view text, std::map<std::string, MtlMaterial>& material
         } else if (key == "Tr") {
             current->hasTransparency = true;
         } else if (key == "map_Kd" || key == "map_d") {
-            // The last word, or what stands in quotes at the end.
+            // The last word, or what is in quotes at the end.
             const bool quoted = value.size() > 1 && value.ends_with('"');
             const auto last =
                 quoted ? value.rfind('"', value.size() - 2) : value.find_last_of(" \t");

@@ -81,11 +81,9 @@ float stepOf(const ViewHeader& view) {
     return view.depthBits < 32 ? static_cast<float>(view.depthCode().step()) : 0.0f;
 }
 
-/// Views of a camera with depth: not made by a program, which knows where nothing is.
-bool areCaptured(std::span<const RefineView> views) {
-    return views.size() > 1 && std::ranges::all_of(views, [](const RefineView& view) {
-               return view.header->noDepth == NoDepth::unknown && !view.header->pruned;
-           });
+/// Of a camera with depth: not made by a program, which knows where nothing is.
+bool isCaptured(const RefineView& view) {
+    return view.header->noDepth == NoDepth::unknown && !view.header->pruned;
 }
 
 /// Every pixel of a view may be off by the same share.
@@ -276,22 +274,21 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
             thinFatEdges(edges);
         }
     }
-    std::vector<char> smoothed(views.size());
-    for (std::size_t k = 0; k < views.size(); ++k) smoothed[k] = noisyViews[k].left > 0;
-    if (settings.on(RefineStep::agree) && areCaptured(views)) {
+    // Noise from pixel to pixel; other errors of a sensor are smooth, and only other views tell.
+    const bool grainy =
+        std::ranges::any_of(noisyViews, [](const NoisyView& n) { return n.left > 0; });
+    if (!grainy && settings.on(RefineStep::agree) && views.size() > 1 &&
+        std::ranges::all_of(views, isCaptured)) {
         const Clock clock(report.of(RefineStep::agree));
         const float doubt = kDoubtOfDisagreement * disagreementOf(edges).value_or(0.0f);
         for (std::size_t k = 0; k < views.size(); ++k)
-            if (!smoothed[k] && isNoisy(doubt, works[k].space.axis))
-                doubtAlike(noisyViews[k], works[k], doubt);
+            if (isNoisy(doubt, works[k].space.axis)) doubtAlike(noisyViews[k], works[k], doubt);
     }
     std::vector<std::size_t> noisyOnes;
     std::vector<NoisyView> noisy;
-    std::vector<char> fromPixelToPixel;  // the noise is, so that single points stray
     for (std::size_t k = 0; k < views.size(); ++k) {
         if (!(noisyViews[k].left > 0)) continue;
         noisyOnes.push_back(k);
-        fromPixelToPixel.push_back(smoothed[k]);
         noisy.push_back(std::move(noisyViews[k]));
     }
     if (!noisy.empty()) {
@@ -302,14 +299,15 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
             call();
         };
         const auto silhouettes = [&] { keepInSilhouettes(noisy, kLevels); };
-        step(RefineStep::silhouettes, silhouettes);
+        if (grainy) step(RefineStep::silhouettes, silhouettes);
         step(RefineStep::agree, [&] { agreeOnDepth(noisy); });
-        step(RefineStep::colours, [&] { agreeOnColours(noisy); });
-        step(RefineStep::silhouettes, silhouettes);
-        step(RefineStep::strays, [&] {
-            for (std::size_t n = 0; n < noisy.size(); ++n)
-                if (fromPixelToPixel[n]) removeStrays(noisy[n]);
-        });
+        if (grainy) {
+            step(RefineStep::colours, [&] { agreeOnColours(noisy); });
+            step(RefineStep::silhouettes, silhouettes);
+            step(RefineStep::strays, [&] {
+                for (const NoisyView& n : noisy) removeStrays(n);
+            });
+        }
     }
     for (std::size_t k = 0; k < views.size(); ++k) out[k].refined = views[k].header->refined;
     for (std::size_t n = 0; n < noisy.size(); ++n) out[noisyOnes[n]].refined.doubt = noisy[n].left;
@@ -320,7 +318,9 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
 
 void RefineNeeds::add(const RefineView& view) {
     if (some_) return;
-    std::vector<RefinedView> alone;
+    // Whether these agree shows only when they are side by side.
+    some_ = settings_.on(RefineStep::agree) && isCaptured(view);
+    if (some_) return;
     RefineSettings settings = settings_;
     settings.set(RefineStep::edges, false);
     RefineReport report;

@@ -36,8 +36,8 @@ struct RefinedView {
                                                    const RefineSettings& settings,
                                                    RefineReport& report);
 
-/// Tells of views that are looked at one by one whether refineDepth() would change one of them:
-/// views in the rectangles of an atlas cost memory to be side by side.
+/// Tells of views that are looked at one by one whether refineDepth() may change one of them: views
+/// in the rectangles of an atlas cost memory to be side by side.
 class RefineNeeds {
   public:
     explicit RefineNeeds(const RefineSettings& settings) : settings_(settings) {}

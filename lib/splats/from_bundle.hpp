@@ -7,9 +7,9 @@
 namespace stx {
 
 struct SplatSettings {
-    /// Standard deviations of a splat for each half axis of its texel's ellipse (bake()). 0.75
-    /// draws the reference views best, see tests/bench/pictures.md.
-    double size = 0.75;
+    /// Standard deviations of a splat for each half axis of its texel's ellipse (bake()). Of 0.5 to
+    /// 0.9, pictures are best from 0.6 to 0.7, see tests/bench/pictures.md.
+    double size = 0.65;
     /// At most so many splats: flat pieces of one colour become one splat, those whose loss is
     /// least first; 0 = one for each texel.
     std::size_t most = 0;

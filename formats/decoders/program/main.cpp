@@ -142,9 +142,10 @@ void refuse(int socket, stx::ErrorCode code, const std::string& why) {
 
 }  // namespace
 
-/// Some libraries start threads when they are loaded, which wait for work that they never get here
-/// (log4cplus, behind OpenImageIO), and a copy of this process would not have them: they are told
-/// that they have them. Later there are none to be had.
+/// Some libraries start threads when they are loaded (log4cplus, behind OpenImageIO). The threads
+/// wait for work, which they never get here, and a copy of this process would not have them. While
+/// modules are loaded this answers as if a thread had been started, and starts none; later it
+/// refuses.
 extern "C" __attribute__((visibility("default"))) int pthread_create(pthread_t* thread,
                                                                      const pthread_attr_t*,
                                                                      void* (*)(void*), void*) {

@@ -21,10 +21,11 @@ class PictureAnswer {
     /// Tells what it is, and gives room for its pixels, which are 0. Whoever does not want it ends
     /// this process.
     void* begin(const decoders::PictureFacts& facts, const std::vector<std::string>& channelNames) {
-        decoders::Packer told;
-        told.put(facts);
-        for (const auto& name : channelNames) told.putText(name);
-        if (!decoders::sendMessage(socket_, decoders::Tag::pictureHeader, told.bytes)) ::_exit(1);
+        decoders::Packer content;
+        content.put(facts);
+        for (const auto& name : channelNames) content.putText(name);
+        if (!decoders::sendMessage(socket_, decoders::Tag::pictureHeader, content.bytes))
+            ::_exit(1);
         size_ = static_cast<std::size_t>(facts.bits / 8);
         for (const std::int32_t side : {facts.width, facts.height, facts.channels})
             if (side < 1 || __builtin_mul_overflow(size_, static_cast<std::size_t>(side), &size_))

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "lib/packing/packing.hpp"
 #include "lib/render/bench/analytic_scene.hpp"
 #include "lib/render/scene/page_set.hpp"
 #include "tests/noisy_depth.hpp"
@@ -92,6 +93,14 @@ TEST(Refine, CapturedViewsThatDisagreeMeetInTheMiddle) {
         }
         EXPECT_EQ(report.of(RefineStep::agree).views, kRefinedViews);
         EXPECT_LT(off(refined, exact), 0.8 * off(before, exact));
+        // Views in the rectangles of an atlas are looked at one by one first.
+        Job job;
+        const auto packed = pack(bundle, {}, job);
+        ASSERT_TRUE(packed) << packed.error().text();
+        const auto pages = PageSet::of(*packed, job);
+        ASSERT_TRUE(pages);
+        (void)pages->refined({}, &report);
+        EXPECT_EQ(report.of(RefineStep::agree).views, kRefinedViews);
     }
 }
 
