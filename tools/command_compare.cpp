@@ -139,7 +139,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
     const bool sequences = frameName(o.a, 0) && frameName(o.b, 0);
     std::error_code ec;
     const bool folders =
-        std::filesystem::is_directory(o.a, ec) && std::filesystem::is_directory(o.b, ec);
+        std::filesystem::is_directory(o.a, ec) || std::filesystem::is_directory(o.b, ec);
     if (!sequences)
         STX_CHECK(command.refuse({"--first-frame", "--frames"},
                                  "is of sequences, named as in a_%04d.png"));

@@ -52,7 +52,7 @@ Result<Mesh> readSpz(ByteSpan file, Job& job) {
     STX_TRY(Bytes bytes, gunzip(file, job.limits));
     if (bytes.size() < spz::kHeaderBytes || wordAt(bytes.data(), 4) != spz::kMagic)
         return fail(ErrorCode::invalidInput,
-                    "the gzip file does not hold SPZ: its content begins with 'NGSP'");
+                    "the gzip file does not hold SPZ, whose content begins with 'NGSP'");
     const std::uint32_t version = wordAt(bytes.data() + 4, 4);
     if (version != 2 && version != 3)
         return fail(ErrorCode::unsupported, "the SPZ file is of version {}; 2 and 3 are read here",
