@@ -1,4 +1,7 @@
 #include "tests/sweep/pictures.hpp"
+
+#include <algorithm>
+
 #include "lib/render/factory.hpp"
 
 using namespace stx;
@@ -51,6 +54,30 @@ bool samples(const Scene& scene, const Camera& camera, const Hit& hit) {
     return scene.trace(camera, std::floor(at.x) + 0.5, std::floor(at.y) + 0.5).surface ==
            hit.surface;
 }
+
+/// Whether a view shows that nothing is at a point: it looks through it.
+bool looksThrough(const ReferenceView& view, glm::dvec3 point) {
+    const glm::dvec3 local = glm::dvec3(view.camera.cameraFromWorld() * glm::dvec4(point, 1));
+    if (!(local.z < 0)) return false;
+    const glm::dvec3 at = view.camera.project(local);
+    const int x = static_cast<int>(std::floor(at.x)), y = static_cast<int>(std::floor(at.y));
+    if (!view.depth.contains(x, y)) return false;
+    const float depth = view.depth.at(x, y);
+    return !hasPoint(depth) || depth > at.z;
+}
+
+/// A ball around all that is there.
+struct Around {
+    glm::dvec3 centre{0};
+    double radius = 0;
+
+    explicit Around(const Scene& scene) {
+        const std::vector<glm::vec3> points = scene.points();
+        for (const glm::vec3 p : points) centre += glm::dvec3(p) / double(points.size());
+        for (const glm::vec3 p : points)
+            radius = std::max(radius, glm::distance(glm::dvec3(p), centre));
+    }
+};
 
 }  // namespace
 
@@ -110,11 +137,34 @@ void Pictures::findGuesses() {
     const Camera& novel = captured_.novel;
     // What lies within half a texel of a place that no view shows may be drawn from both sides.
     const int margin = static_cast<int>(std::ceil(0.5 * captured_.from.magnification));
+    const auto& views = captured_.bundle.views;
+    const auto sampled = [&](const Hit& hit) {
+        return std::ranges::any_of(views, [&](const ReferenceView& view) {
+            return samples(captured_.scene, view.camera, hit);
+        });
+    };
+    // A hole that no view looks through may be closed for all that the views say.
+    const Around all(captured_.scene);
+    const auto knownOpen = [&](double x, double y) {
+        constexpr int kSteps = 64;
+        const glm::dvec3 from = novel.position + novel.orientation * novel.unproject(x, y, 0);
+        const glm::dvec3 along = novel.viewDirection(x, y);
+        const double middle = glm::dot(all.centre - from, along);
+        const double aside = glm::distance(all.centre, from + middle * along);
+        if (aside >= all.radius) return true;
+        const double half = std::sqrt(all.radius * all.radius - aside * aside);
+        for (int i = 0; i <= kSteps; ++i) {
+            const double t = middle + half * (2.0 * i / kSteps - 1);
+            if (t > 0 && std::ranges::none_of(views, [&](const ReferenceView& view) {
+                    return looksThrough(view, from + t * along);
+                }))
+                return false;
+        }
+        return true;
+    };
     const auto look = [&](double x, double y) {
         const Hit hit = captured_.scene.trace(novel, x, y);
-        if (!hit.any()) return;
-        for (const ReferenceView& view : captured_.bundle.views)
-            if (samples(captured_.scene, view.camera, hit)) return;
+        if (hit.any() ? sampled(hit) : knownOpen(x, y)) return;
         const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
         const bool corner = x == column;  // of four pixels
         for (int v = row - margin - corner; v <= row + margin; ++v)

@@ -50,7 +50,8 @@ class Pictures {
     [[nodiscard]] std::optional<double> openShare(const stx::Frame& frame, int least) const;
     [[nodiscard]] std::optional<double> drawnShare(const stx::Frame& frame) const;
     /// PSNR of a frame against the truth, before black, without the pixels where the truth shows
-    /// something that no view shows: what is drawn there is a guess. `frame` may be a part of the
+    /// something that no view shows, or nothing where no view looks through: what is drawn there
+    /// is a guess. `frame` may be a part of the
     /// picture whose pixel (0, 0) is at `first`.
     [[nodiscard]] double psnr(const stx::Frame& frame, glm::ivec2 first = {0, 0}) const;
     /// The same without what lies within a texel of an outline or of a crease of the truth.
