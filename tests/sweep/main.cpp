@@ -1,6 +1,7 @@
 // Checks rules on random cases; tests/sweep/run calls it, and tests/README.md says what the rules
 // are.
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -32,28 +33,51 @@ std::optional<Measure> measureOf(const SweepRule& rule, Pictures& pictures) {
     return std::move(*measured);
 }
 
+/// What several pictures say of one rule.
+struct Sample {
+    double sum = 0, squares = 0;
+    int count = 0;
+
+    void add(double value) {
+        sum += value;
+        squares += value * value;
+        ++count;
+    }
+    [[nodiscard]] double mean() const { return sum / count; }
+    /// The mean is known within this: two standard errors.
+    [[nodiscard]] double within() const {
+        return 2 * std::sqrt(std::max(0.0, squares / count - mean() * mean()) / (count - 1));
+    }
+};
+
 /// What a rule finds in a case; nothing when it holds. A few pixels at edges make one picture of
 /// some thousand pixels worse by half a decibel, and the next better: where the picture of a case
-/// is off by decibels, the mean of eight others from places beside it judges.
+/// is off by decibels, others from places beside it judge. Their mean counts by what is sure of
+/// it; when eight do not tell, more are asked.
 std::optional<Measure> findingOf(const SweepRule& rule, Pictures& pictures) {
     auto finding = measureOf(rule, pictures);
     if (!finding || finding->amount() <= rule.allowed) return std::nullopt;
     if (std::string_view(rule.unit) != "dB") return finding;
-    double sum = 0;
-    int count = 0;
+    const double here = finding->found;
+    constexpr int kFirst = 8;
+    Sample sample;
     for (const SweepCase& beside : pictures.captured().from.besides()) {
         const auto captured = capturedOf(beside);
         if (!captured) continue;
         Pictures others(*captured);
         const auto measured = measureOf(rule, others);
         if (!measured) continue;
-        sum += measured->found;
-        ++count;
+        sample.add(measured->found);
+        if (sample.count < kFirst) continue;
+        finding->found = sample.mean();
+        if (finding->amount() <= rule.allowed) return std::nullopt;
+        if (finding->amount() - sample.within() > rule.allowed) break;
     }
-    if (count == 0) return finding;
-    finding->what += fmt::format("; {:.2f} dB here, mean of {} beside", finding->found, count);
-    finding->found = sum / count;
-    if (finding->amount() <= rule.allowed) return std::nullopt;
+    if (sample.count < 2) return finding;
+    finding->found = sample.mean();
+    if (finding->amount() - sample.within() <= rule.allowed) return std::nullopt;
+    finding->what += fmt::format("; {:.2f} dB here, mean of {} beside, sure within {:.2f}", here,
+                                 sample.count, sample.within());
     return finding;
 }
 

@@ -58,7 +58,7 @@ struct SweepCase {
     /// For people: "torus, ring:5 of 48x48, orthographic, drawn at 96x80, 2.0 times magnified".
     [[nodiscard]] std::string describe() const;
     /// The same case seen from `kBesides` other places within 15 degrees.
-    static constexpr int kBesides = 8;
+    static constexpr int kBesides = 32;
     [[nodiscard]] std::vector<SweepCase> besides() const;
     /// Simpler cases of the same kind, the simplest first.
     [[nodiscard]] std::vector<SweepCase> simpler() const;
