@@ -16,6 +16,7 @@
 #include "tools/commands.hpp"
 #include "tools/environment_options.hpp"
 #include "tools/mesh_views.hpp"
+#include "tools/photo_options.hpp"
 #include "tools/refining.hpp"
 
 namespace stx::tools {
@@ -74,8 +75,8 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
                 Program& program) {
     const auto kind = recognise(input);
     // An .exr is a bundle or a picture with Z.
-    const bool set =
-        !o.open.set.from.empty() || !kind || *kind == FileKind::imageSet || *kind == FileKind::exr;
+    const bool set = !o.open.set.from.empty() || !kind || *kind == FileKind::imageSet ||
+                     *kind == FileKind::exr || *kind == FileKind::photo;
     const auto note = [&](const std::vector<std::string>& options, const char* ofWhat,
                           const char* isWhat) {
         if (options.empty()) return;
@@ -87,6 +88,7 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
         auto options = o.givenOfMeshes;
         // Of an image set it is the pattern of names.
         if (set) std::erase(options, "--texture");
+        if (kind && *kind == FileKind::photo) std::erase(options, "--fov");
         note(options, "meshes", kind ? nameOf(*kind) : "none");
     }
     if (set) return;
@@ -332,6 +334,7 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
         return fail(ErrorCode::usage, "--still and --moving exclude each other; give one");
     if (o.still || o.moving) o.open.set.moving = o.moving;
     STX_TRY(o.open.set.refine, o.refining.settings());
+    if (!command.given({"--fov"}).empty()) o.open.set.photo.fovRad = glm::radians(o.mesh->fovDeg);
     o.frameGiven = !command.given({"--frame", "--frames"}).empty();
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
@@ -384,11 +387,13 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
 void addConvert(CommandLine& line, Program& program) {
     Command c = line.add(
         "convert",
-        "Mesh, image set or bundle to bundle; the output's ending picks the container\n"
+        "Mesh, image set, photograph with depth or bundle to bundle; the output's ending picks the "
+        "container\n"
         "(.mp4, .xmt, .bt: MPEG-4; .exr: OpenEXR)\n\n"
         "  stx convert model.glb -o model.mp4 --views sphere:16 --size 512x512\n"
         "  stx convert model.mp4 -o model.xmt\n"
         "  stx convert capture/transforms.json -o capture.exr\n"
+        "  stx convert IMG_1234.HEIC -o photo.mp4\n"
         "  stx convert camera.json --texture colour.mp4 --depth depth.mkv -o film.mp4\n"
         "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
     auto o = std::make_shared<ConvertOptions>();
@@ -484,16 +489,19 @@ void addConvert(CommandLine& line, Program& program) {
     };
     auto& set = o->open.set;
     numbers("--depth-range", "MIN,MAX",
-            "What the depth of MSR 3D Video sets spans, and of films: normalised disparity",
+            "What the depth of MSR 3D Video sets spans, and of films: normalised disparity; of a "
+            "photo: the distances of its nearest and farthest depth",
             {&set.depthMin, &set.depthMax});
     c.option("--depth-unit", set.depthUnit,
              "Scene units of one step of a film's depth, as in 0.001 for millimetres (default: as "
-             "the cameras' file says)")
+             "the cameras' file says), or of depth beside a photo")
         .positive()
         .group(sets);
-    numbers("--intrinsics", "FX,FY,CX,CY",
-            "Of TUM and 7-Scenes recordings that do not hold them: the colour camera's",
-            {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
+    numbers(
+        "--intrinsics", "FX,FY,CX,CY",
+        "Of TUM and 7-Scenes recordings that do not hold them: the colour camera's; of a photo: "
+        "in pixels of the upright picture",
+        {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
     c.option(
          "--depth-intrinsics",
          [o](const std::string& text) -> Result<void> {
@@ -512,9 +520,11 @@ void addConvert(CommandLine& line, Program& program) {
              "on the pixels of its picture (default: 7-Scenes' known one)")
         .takes("FILE|none")
         .group(sets);
-    c.option("--depth", set.depthPattern,
-             "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
-             "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN")
+    c.option(
+         "--depth", set.depthPattern,
+         "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
+         "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN. Of "
+         "a photo: the picture of its depth, {stem} in it the photo's name")
         .takes("PATTERN")
         .group(sets);
     c.option("--mask", set.maskPattern,
@@ -545,6 +555,7 @@ void addConvert(CommandLine& line, Program& program) {
              "Stored value of one pixel of disparity (default 1)")
         .positive()
         .group(sets);
+    addPhotoOptions(c, set.photo, sets);
     addImportRefining(c, o->refining, sets);
     c.option(
          "--yuv",

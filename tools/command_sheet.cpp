@@ -35,7 +35,8 @@ std::string fileName(const std::string& path) {
 /// A picture and no bundle: an .exr may be either.
 Result<bool> isPicture(const std::string& path, const Limits& limits) {
     STX_TRY(const auto kind, recognise(path));
-    if (kind != FileKind::exr) return kind == FileKind::image || kind == FileKind::unknown;
+    if (kind != FileKind::exr)
+        return kind == FileKind::photo || kind == FileKind::image || kind == FileKind::unknown;
     STX_TRY(const auto reader, ExrReader::open(path, limits));
     return !isExrBundle(reader);
 }
@@ -117,12 +118,12 @@ Result<Sheet> sheetOfPair(const SheetOptions& o, Job& job) {
 Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
     const std::string& input = o.inputs[0];
     STX_TRY(const bool picture, isPicture(input, job.limits));
-    if (picture)
+    STX_TRY(const auto kind, recognise(input));
+    if (picture && kind != FileKind::photo)
         return fail(ErrorCode::invalidInput,
                     "'{}' is one picture; a sheet shows a bundle, an atlas or an image set, or "
                     "compares two pictures",
                     input);
-    STX_TRY(const auto kind, recognise(input));
     if (kind == FileKind::atlas) {
         STX_TRY(const auto atlas, readAtlas(input, job));
         return sheetOf(atlas, o.settings, job);

@@ -119,8 +119,10 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
         .takes("AXIS")
         .group(group);
     command
-        .option("--fov", o->fovDeg,
-                "Angle that the whole object fills, in degrees: sets the distance (default 35)")
+        .option(
+            "--fov", o->fovDeg,
+            "Angle that the whole object fills, in degrees: sets the distance (default 35); of a "
+            "photo: what its camera sees from bottom to top")
         .takes("DEG")
         .group(group);
     command

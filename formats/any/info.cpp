@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "formats/any/info_photo.hpp"
 #include "formats/any/open.hpp"
 #include "formats/any/sequences.hpp"
 #include "formats/atlas/atlas_files.hpp"
@@ -341,6 +342,7 @@ Result<void> describeSet(const fs::path& path, Json& out, Job& job) {
     }
     out["views"] = std::move(views);
     out["missing"] = missing;
+    if (set.photo) out["photo"] = photoJson(*set.photo, set.views.front().camera, set.cameraFrom);
     return {};
 }
 
@@ -398,13 +400,15 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
             return out;
         }
         case FileKind::imageSet:
+        case FileKind::photo:
             STX_CHECK(describeSet(path, out, job));
             break;
         case FileKind::numbered:  // described above
         case FileKind::image:
         case FileKind::unknown:
             return fail(ErrorCode::invalidInput,
-                        "'{}' is neither a mesh, a bundle, an atlas nor an image set",
+                        "'{}' is neither a mesh, a bundle, an atlas, an image set nor a photograph "
+                        "with depth",
                         path.string());
     }
     if (options.bounds && (!out.contains("bounds") || !out.contains("points"))) {
@@ -483,6 +487,7 @@ std::string describeAsText(const Json& info) {
                 t.contains("bytes") && t["bytes"] > 0 ? fmt::format(", {} bytes", text(t["bytes"]))
                                                       : "");
     }
+    if (info.contains("photo")) out += photoText(info["photo"]);
     if (info.contains("views")) {
         std::size_t i = 0;
         if (info["views"].empty()) out += "no views: the scene shows no DepthImage with images\n";

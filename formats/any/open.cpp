@@ -10,6 +10,7 @@
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/meshes/meshes.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
+#include "formats/photos/photo.hpp"
 #include "lib/packing/packing.hpp"
 
 namespace stx {
@@ -73,6 +74,7 @@ const char* nameOf(FileKind kind) {
             return "an atlas";
         case FileKind::imageSet:
             return "an image set";
+        case FileKind::photo:
         case FileKind::image:
             return "a picture";
         case FileKind::numbered:
@@ -102,10 +104,11 @@ Result<FileKind> recognise(const fs::path& path) {
         const auto reader = ExrReader::open(path, Limits());
         return reader && isExrAtlas(*reader) ? FileKind::atlas : FileKind::exr;
     }
+    if (startsWith(head, "\xff\xd8\xff") || photos::isHeif(head)) return FileKind::photo;
     // Matroska: Azure Kinect records in it.
     if (startsWith(head, "\x1a\x45\xdf\xa3")) return FileKind::imageSet;
     if (mpeg4ContainerOf(ByteSpan(head)) || mpeg4ContainerOf(path)) return FileKind::mpeg4;
-    if (startsWith(head, "\x89PNG") || startsWith(head, "\xff\xd8\xff")) return FileKind::image;
+    if (startsWith(head, "\x89PNG")) return FileKind::image;
     if (isMesh(path, head)) return FileKind::mesh;
     // .freiburg: the lists of camera poses of TUM's and ICL-NUIM's recordings.
     // .log: those of Open3D's.
@@ -128,7 +131,12 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
                                                   Job& job) {
     using Opened = std::variant<Mesh, Bundle>;
     STX_TRY(auto kind, recognise(path));
-    if (!options.set.from.empty()) kind = FileKind::imageSet;
+    OpenOptions read = options;
+    // Any picture becomes a photograph with depth by a depth picture beside it.
+    if (read.set.from.empty() && !read.set.depthPattern.empty() &&
+        (kind == FileKind::image || kind == FileKind::unknown))
+        read.set.from = "photo";
+    if (!read.set.from.empty()) kind = FileKind::imageSet;
     Result<Bundle> bundle = Bundle();
     switch (kind) {
         case FileKind::mesh: {
@@ -152,7 +160,8 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
             break;
         }
         case FileKind::imageSet:
-            bundle = readImageSet(path, options.set, job);
+        case FileKind::photo:
+            bundle = readImageSet(path, read.set, job);
             break;
         case FileKind::numbered: {
             STX_TRY(const auto files, numberedFiles(path.string()));
@@ -165,7 +174,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
                 "'{}' is neither a mesh (glTF, GLB, OBJ, PLY, STL, OFF, DAE, FBX, DRC, SPZ) nor "
                 "a bundle "
                 "(.mp4, .xmt, .bt, .exr) "
-                "nor an atlas nor an image set",
+                "nor an atlas nor an image set nor a photograph with depth",
                 path.string());
     }
     if (!bundle) return propagate(bundle);

@@ -20,7 +20,8 @@ enum class FileKind {
     exr,       ///< a bundle as multi-part OpenEXR
     atlas,     ///< a folder with atlas.json (or that file), or an atlas .exr
     imageSet,  ///< a calibrated set of images with depth: a folder or its camera file
-    image,     ///< a plain picture
+    photo,     ///< a JPEG or HEIC, which may hold depth
+    image,     ///< another plain picture
     numbered,  ///< `name_%04d.exr`, `atlas_%04d`: bundles or atlases, one for each frame
     unknown,
 };

@@ -35,6 +35,10 @@ inline constexpr DecoderKind kVideo = {
     "compressed video needs the module stx_video.so, which cannot be loaded",
     "install the Debian packages libavformat59, libavcodec59 and libswscale6, and stx with its "
     "module"};
+inline constexpr DecoderKind kHeif = {
+    "HEIC", "STX_HEIF", "stx_heif.so",
+    "HEIC needs the module stx_heif.so (with libheif), which cannot be loaded",
+    "install the Debian packages libheif1 and libde265-0, and stx with its module"};
 }  // namespace decoders
 
 /// What a decoder may take.

@@ -17,7 +17,7 @@
 namespace stx::decoders {
 
 /// Changes with every change of what is said.
-inline constexpr std::uint32_t kWireVersion = 1;
+inline constexpr std::uint32_t kWireVersion = 2;
 inline constexpr std::uint32_t kMagic = 0x57585453 + (kWireVersion << 24);  ///< "STX", version
 
 enum class Tag : std::uint32_t {
@@ -31,6 +31,7 @@ enum class Tag : std::uint32_t {
     decodePicture = 100,  ///< text: a name with the ending of the format
     pictureHeader,        ///< PictureFacts (formats/images/picture_wire.hpp), names of channels
     pixels,
+    decodeItem,  ///< uint32: an item of a HEIF file; uint8: as grey; answered like decodePicture
     // Models.
     readModel = 200,  ///< text: a name with the ending of the format
     askExists,        ///< text: does the model have this file?

@@ -18,6 +18,18 @@
 /// meaning of depth of every kind: formats/imagesets/README.md.
 namespace stx {
 
+/// What is nearest in a grey picture of depth that has no scale: two customs exist.
+enum class NearIs { unknown, white, black };
+
+/// Of photographs with depth, beside depthPattern (the depth's picture where the file has none),
+/// depthMin and depthMax (the distances of its nearest and farthest value), depthUnit and
+/// intrinsics (of the upright picture, from its corner).
+struct PhotoSetOptions {
+    NearIs nearIs = NearIs::unknown;
+    bool portrait = false;  ///< the blurred picture, where the file has a sharp one, too
+    double fovRad = 0;      ///< vertical, of the upright picture; 0 = as the file tells
+};
+
 struct ImageSetOptions {
     std::string from;  ///< one of imageSetKinds(); empty = recognise
     int frame = 0;     ///< of sets that have time, from 0
@@ -52,6 +64,7 @@ struct ImageSetOptions {
     /// fx, fy, cx, cy of TUM and 7-Scenes recordings whose folder does not have them, in pixels as
     /// these sets count them (the first pixel's centre is 0, 0); fx = 0: not given.
     double intrinsics[4] = {0, 0, 0, 0};
+    PhotoSetOptions photo;
     /// Of TUM and 7-Scenes recordings whose depth comes from a camera of its own: its fx, fy, cx,
     /// cy, counted as in `intrinsics`. Without a value: 7-Scenes' published ones, TUM's colour.
     std::optional<glm::dvec4> depthIntrinsics;

@@ -26,6 +26,8 @@ using std::filesystem::path;
 [[nodiscard]] Result<SetDescription> describeCamerasJson(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describeAzureKinect(const path&, const ImageSetOptions&, Job&);
 [[nodiscard]] Result<SetDescription> describePanorama(const path&, const ImageSetOptions&, Job&);
+/// Of one photograph. Decodes depth, but no colour, where that has no scale.
+[[nodiscard]] Result<SetDescription> describePhoto(const path&, const ImageSetOptions&, Job&);
 
 /// By options.from, or whatever kind the path is recognised as. Files that the set names and that
 /// are not there are no errors yet: PictureSource::missing.

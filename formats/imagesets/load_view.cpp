@@ -461,7 +461,7 @@ Result<std::vector<ReferenceView>> loadSetView(const SetView& set, const ImageSe
     STX_TRY(Camera camera, cameraOfSize(set, tw, th));
     const bool raise = options.refine.atImport(RefineStep::raise, true) && dw < tw && dh < th;
     if (tw != dw || th != dh) {
-        if (!sameShape(tw, th, dw, dh))
+        if (!set.stretched && !sameShape(tw, th, dw, dh))
             return fail(ErrorCode::invalidInput,
                         "'{}' is {}x{} but its depth '{}' is {}x{}; both must match, or have the "
                         "same shape",

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
 #include <optional>
 
 #include "formats/files/messages.hpp"
 #include "formats/files/not_there.hpp"
+#include "formats/photos/photo.hpp"
 #include "formats/video/film.hpp"
 
 namespace stx {
@@ -33,6 +35,9 @@ const std::vector<KindEntry>& entries() {
         {{"azure-kinect", "Azure Kinect's recording (.mkv); needs the module of video"},
          describeAzureKinect},
         {{"panorama", "a folder with an equirectangular picture and its depth"}, describePanorama},
+        {{"photo",
+          "one photograph with depth in it, as phones write them (HEIC, JPEG), or with --depth"},
+         describePhoto},
         {{"cameras", "a folder with our own cameras.json"}, describeCamerasJson},
     };
     return all;
@@ -96,6 +101,16 @@ Result<std::string> kindOfJson(const path& file) {
     return std::string();
 }
 
+/// JPEG, PNG or HEIC, by its first bytes.
+bool isPicture(const path& file) {
+    std::ifstream in(file, std::ios::binary);
+    char head[64] = {};
+    in.read(head, sizeof(head));
+    const auto bytes = std::as_bytes(std::span(head)).first(static_cast<std::size_t>(in.gcount()));
+    const std::string_view text(head, bytes.size());
+    return text.starts_with("\xff\xd8\xff") || text.starts_with("\x89PNG") || photos::isHeif(bytes);
+}
+
 }  // namespace
 
 const KindEntry* kindNamed(std::string_view name) {
@@ -137,10 +152,11 @@ Result<std::string> recogniseImageSet(const std::filesystem::path& path) {
         if (path.extension() == ".log") return std::string("open3d");
         if (path.extension() == ".exr") return std::string("exr");
         if (filmFormatOf(path) == "matroska") return std::string("azure-kinect");
+        if (isPicture(path)) return std::string("photo");
         return failAt(
             where, ErrorCode::invalidInput,
             "this is not an image set: a .json with cameras, calib.txt, calibParams-*.txt, an "
-            ".exr with Z, or a folder is expected");
+            ".exr with Z, a photograph with depth, or a folder is expected");
     }
     if (fs::is_regular_file(path / "transforms.json", ec)) return std::string("transforms");
     const std::vector<std::string> files = filesIn(path);

@@ -15,7 +15,10 @@
 
 namespace stx {
 class Film;
+namespace photos {
+struct Photo;
 }
+}  // namespace stx
 
 /// What the readers of the kinds hand to the common way from files to reference views.
 namespace stx::imagesets {
@@ -80,8 +83,9 @@ struct SetView {
     std::optional<double> time;
     std::string taker;
 
-    bool sensor = false;    ///< mixed pixels at depth edges are to be expected
-    bool measured = false;  ///< stereo's disparities: gaps, and edges beside the picture's
+    bool stretched = false;  ///< its depth covers the picture, whatever the shapes of both are
+    bool sensor = false;     ///< mixed pixels at depth edges are to be expected
+    bool measured = false;   ///< stereo's disparities: gaps, and edges beside the picture's
     /// Planes and code of an export of ours; used when they hold all points.
     std::optional<DepthCode> planes;
     int depthBits = 0;                        ///< with planes: 8, 16, 32
@@ -105,6 +109,9 @@ struct SetDescription {
     int frames = 1;
     std::optional<double> end;  ///< when its last picture ends, by the clock of the views' times
     double rate = 25;           ///< frames a second, where the set has frames without times
+    /// What the one view's file says of itself, of a photograph with depth; else null.
+    std::shared_ptr<const photos::Photo> photo;
+    std::string cameraFrom;  ///< what a photo's camera follows from: "matrix", "focal35" …
     /// Its cameras stand still or are given, so that its pictures are of a scene that moves even
     /// where a sensor took them.
     bool film = false;

@@ -31,6 +31,8 @@ Result<ImageSetSummary> summariseImageSet(const std::filesystem::path& path, Job
     }
     if (!described) return propagate(described);
     summary.title = std::move(described->title);
+    summary.photo = described->photo;
+    summary.cameraFrom = described->cameraFrom;
     STX_TRY(const Motion motion, motionOf(*described, options));
     summary.frames = motion.moves() ? static_cast<int>(motion.times.size()) : described->frames;
     if (motion.moves())

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,10 @@
 #include "lib/model/sequence.hpp"
 
 namespace stx {
+
+namespace photos {
+struct Photo;
+}
 
 /// What an image set says of itself, before a pixel is read.
 struct ImageSetSummary {
@@ -30,6 +35,10 @@ struct ImageSetSummary {
     /// The kind needs options of `convert` for its cameras (--focal, --intrinsics): cameras here
     /// have names, but no meaning.
     bool camerasKnown = true;
+    /// Of a photograph with depth what its file says; else null.
+    std::shared_ptr<const photos::Photo> photo;
+    /// What its camera follows from: "matrix", "focal35" (EXIF), "assumed".
+    std::string cameraFrom;
 };
 
 /// Reads cameras and looks for the files that a set names. Errors: (io) the file or

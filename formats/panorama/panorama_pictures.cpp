@@ -2,8 +2,8 @@
 #include <mutex>
 
 #include "formats/files/messages.hpp"
+#include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
-#include "formats/panorama/exif.hpp"
 #include "formats/panorama/panorama_files.hpp"
 #include "formats/video/numbered_pictures.hpp"
 

@@ -54,6 +54,10 @@ Found findImageCodecs(PartCheck check, Job&) {
     return findDecoder(decoders::kImages, check);
 }
 
+Found findHeif(PartCheck check, Job&) {
+    return findDecoder(decoders::kHeif, check);
+}
+
 Found findModels(PartCheck check, Job&) {
     return findDecoder(decoders::kModels, check);
 }
@@ -158,6 +162,7 @@ constexpr PartRow kParts[] = {
      findImageCodecs},
     {"video", "films as compressed video", "stx libavformat59 libavcodec59 libswscale6", false,
      true, findVideo},
+    {"HEIC", "photographs with depth of phones", "stx libheif1 libde265-0", false, true, findHeif},
     {"model readers", "OBJ, STL, COLLADA and FBX", "stx libassimp5", true, false, findModels},
     {"isolation", "foreign files decoded where they can reach nothing", "", false, false,
      findIsolation},

@@ -80,6 +80,7 @@ Result<std::vector<Finding>> validateFile(const std::filesystem::path& path,
                 findings = std::vector<Finding>();
             break;
         }
+        case FileKind::photo:
         case FileKind::image:
             return fail(ErrorCode::invalidInput,
                         "'{}' is a picture; bundles (.mp4, .xmt, .bt, .exr), atlases, image sets "

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "formats/panorama/exif.hpp"
+#include "formats/images/exif.hpp"
 #include "tests/fuzz/violated.hpp"
 
 using namespace stx;

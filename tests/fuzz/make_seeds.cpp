@@ -1,4 +1,5 @@
-// Makes the seeds of corpus/mp4, corpus/bifs and corpus/od: `make_seeds tests/fuzz/corpus`.
+// Makes the seeds of corpus/mp4, corpus/bifs, corpus/od and corpus/photos: `make_seeds
+// tests/fuzz/corpus`.
 
 #include <cstdio>
 #include <filesystem>
@@ -7,6 +8,7 @@
 #include "formats/mpeg4/bifs/descriptors.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
 #include "formats/mpeg4/text/bt.hpp"
+#include "tests/made_photos.hpp"
 
 using namespace stx;
 using namespace stx::mpeg4;
@@ -225,6 +227,17 @@ void saveDescriptors() {
     if (const auto bytes = encodeEsDescriptor(stream)) save("od/stream", withKind(2, *bytes));
 }
 
+void savePhotos() {
+    save("photos/apple.jpg", made::applePhoto(6));
+    save("photos/gdepth.jpg", made::gdepthPhoto());
+    save("photos/dynamic.jpg", made::dynamicPhoto());
+    save("photos/samsung.jpg", made::samsungPhoto());
+    save("photos/huawei.jpg", made::huaweiPhoto());
+    save("photos/two_targets.heic", made::heicBoxes(1, 2));
+    const std::string xmp = made::appleXmp();
+    save("photos/apple.xmp", std::as_bytes(std::span(xmp)));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -233,5 +246,6 @@ int main(int argc, char** argv) {
     const auto all = scenes();
     for (std::size_t i = 0; i < all.size(); ++i) saveScene(all[i], i);
     saveDescriptors();
+    savePhotos();
     return 0;
 }

@@ -17,7 +17,7 @@
 #include "formats/images/codec_table.hpp"
 #include "formats/images/oiio/bmp.hpp"
 #include "formats/images/oiio/failed.hpp"
-#include "formats/images/oiio/picture_answer.hpp"
+#include "formats/images/picture_answer.hpp"
 #include "formats/images/oiio/tiff.hpp"
 #include "formats/images/oiio/webp.hpp"
 #include "lib/base/result.hpp"

@@ -3,7 +3,7 @@
 #include <span>
 
 #include "formats/images/codec_table.hpp"
-#include "formats/images/oiio/picture_answer.hpp"
+#include "formats/images/picture_answer.hpp"
 
 namespace stx::codecs {
 

@@ -4,8 +4,8 @@
 
 #include "formats/environment/environment_files.hpp"
 #include "formats/exr/exr_file.hpp"
+#include "formats/images/exif.hpp"
 #include "formats/images/images.hpp"
-#include "formats/panorama/exif.hpp"
 #include "formats/panorama/panorama_files.hpp"
 #include "lib/model/srgb8.hpp"
 #include "tests/temporary_folder.hpp"

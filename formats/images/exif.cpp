@@ -1,4 +1,4 @@
-#include "formats/panorama/exif.hpp"
+#include "formats/images/exif.hpp"
 
 #include <libexif/exif-data.h>
 
@@ -55,14 +55,8 @@ bool hasText(ByteSpan bytes, std::size_t at, std::string_view text) {
            std::memcmp(bytes.data() + at, text.data(), text.size()) == 0;
 }
 
-/// kHeader, and the TIFF of a JPEG's segment APP1 or of a PNG's chunk eXIf; else empty.
-Bytes exifIn(ByteSpan file) {
-    const auto copied = [](ByteSpan tiff) {
-        const auto header = std::as_bytes(std::span(kHeader));
-        Bytes exif(header.begin(), header.end());
-        exif.insert(exif.end(), tiff.begin(), tiff.end());
-        return exif;
-    };
+/// The TIFF of a JPEG's segment APP1 or of a PNG's chunk eXIf; else empty.
+ByteSpan exifIn(ByteSpan file) {
     if (hasText(file, 0, "\xff\xd8")) {
         for (std::size_t at = 2; at + 4 <= file.size();) {
             if (file[at] != std::byte{0xff}) return {};
@@ -74,14 +68,14 @@ Bytes exifIn(ByteSpan file) {
             const std::size_t size = bigEndian(file, at + 2, 2);
             if (marker == 0xda || size < 2 || file.size() - at - 2 < size) return {};
             if (marker == 0xe1 && size > 8 && hasText(file, at + 4, kHeader))
-                return copied(file.subspan(at + 10, size - 8));
+                return file.subspan(at + 10, size - 8);
             at += 2 + size;
         }
     } else if (hasText(file, 0, "\x89PNG\r\n\x1a\n")) {
         for (std::size_t at = 8; at + 12 <= file.size();) {
             const std::size_t size = bigEndian(file, at, 4);
             if (file.size() - at - 12 < size) return {};
-            if (hasText(file, at + 4, "eXIf")) return copied(file.subspan(at + 8, size));
+            if (hasText(file, at + 4, "eXIf")) return file.subspan(at + 8, size);
             at += 12 + size;
         }
     }
@@ -91,25 +85,15 @@ Bytes exifIn(ByteSpan file) {
 }  // namespace
 
 ExifNotes readExif(ByteSpan file) {
-    const Bytes exif = exifIn(file);
-    return exif.empty() ? ExifNotes{} : notesOf(exif);
+    return readExifTiff(exifIn(file));
 }
 
-Rgba8Image turnedUpright(Rgba8Image picture, int orientation) {
-    if (orientation < 2 || orientation > 8) return picture;
-    const int w = picture.width(), h = picture.height();
-    const bool sideways = orientation >= 5;
-    const bool fromRight = orientation == 2 || orientation == 3 || orientation >= 7;
-    const bool fromBelow =
-        orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
-    Rgba8Image out(sideways ? h : w, sideways ? w : h);
-    for (int y = 0; y < out.height(); ++y)
-        for (int x = 0; x < out.width(); ++x) {
-            const int column = sideways ? y : x, row = sideways ? x : y;
-            out.at(x, y) =
-                picture.at(fromRight ? w - 1 - column : column, fromBelow ? h - 1 - row : row);
-        }
-    return out;
+ExifNotes readExifTiff(ByteSpan tiff) {
+    if (tiff.empty()) return {};
+    const auto header = std::as_bytes(std::span(kHeader));
+    Bytes exif(header.begin(), header.end());
+    exif.insert(exif.end(), tiff.begin(), tiff.end());
+    return notesOf(exif);
 }
 
 }  // namespace stx

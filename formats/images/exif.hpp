@@ -1,0 +1,40 @@
+#pragma once
+
+#include "formats/files/files.hpp"
+#include "lib/base/image.hpp"
+
+namespace stx {
+
+/// What a camera wrote into a picture, and panoramas and photographs with depth need.
+struct ExifNotes {
+    /// How to turn the stored picture: 1 = not at all, 3 = by half a turn, 6 = clockwise, 8 =
+    /// counter-clockwise, 2, 4, 5 and 7 = these mirrored (EXIF 2.3, tag 274).
+    int orientation = 1;
+    double focal35 = 0;  ///< focal length of a 36x24 mm camera with the same diagonal, mm; 0 = none
+};
+
+/// EXIF of a JPEG (APP1) or a PNG (eXIf); the defaults where there is none, or a damaged one.
+[[nodiscard]] ExifNotes readExif(ByteSpan file);
+/// The same of the TIFF alone that such a segment holds.
+[[nodiscard]] ExifNotes readExifTiff(ByteSpan tiff);
+
+/// The picture turned as its EXIF orientation says.
+template <class T>
+[[nodiscard]] Image<T> turnedUpright(Image<T> picture, int orientation) {
+    if (orientation < 2 || orientation > 8) return picture;
+    const int w = picture.width(), h = picture.height();
+    const bool sideways = orientation >= 5;
+    const bool fromRight = orientation == 2 || orientation == 3 || orientation >= 7;
+    const bool fromBelow =
+        orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+    Image<T> out(sideways ? h : w, sideways ? w : h);
+    for (int y = 0; y < out.height(); ++y)
+        for (int x = 0; x < out.width(); ++x) {
+            const int column = sideways ? y : x, row = sideways ? x : y;
+            out.at(x, y) =
+                picture.at(fromRight ? w - 1 - column : column, fromBelow ? h - 1 - row : row);
+        }
+    return out;
+}
+
+}  // namespace stx

@@ -1,0 +1,295 @@
+// One photograph with depth: in the same file, as phones write them (formats/photos), or in a file
+// beside it. The camera is at the origin and looks along -Z.
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/files/messages.hpp"
+#include "formats/files/not_there.hpp"
+#include "formats/images/images.hpp"
+#include "formats/imagesets/kinds.hpp"
+#include "formats/imagesets/pictures.hpp"
+#include "formats/photos/photo.hpp"
+
+namespace stx::imagesets {
+namespace {
+
+using photos::Photo;
+using photos::PhotoDepthCode;
+using photos::PhotoImage;
+using photos::PhotoIntrinsics;
+
+/// The main cameras of phones, as a 35 mm camera's focal length; where a file tells none.
+constexpr double kUsualFocal35 = 26;
+constexpr double kDiagonal35 = 43.266615;  ///< of 36x24 mm
+/// A larger difference of fx and fy is of a matrix that is wrong: pixels of phones are square.
+constexpr double kMostOblong = 0.02;
+
+/// Endings of a depth picture beside its photo, in the order in which they are looked for.
+constexpr const char* kDepthEndings[] = {"_depth.tiff", "_depth.tif", "_depth.exr",
+                                         "_depth.pfm",  "_depth.png", "_depth.jpg"};
+
+/// The depth picture that lies beside NAME_image.jpg or NAME.jpg; empty: none does.
+path depthBeside(const path& picture) {
+    std::string stem = picture.stem().string();
+    constexpr std::string_view kImage = "_image";
+    if (stem.ends_with(kImage)) stem.resize(stem.size() - kImage.size());
+    std::error_code ec;
+    for (const char* ending : kDepthEndings) {
+        const path file = folderOf(picture) / (stem + ending);
+        if (std::filesystem::is_regular_file(file, ec)) return file;
+    }
+    return {};
+}
+
+/// The file that --depth names, beside the photo or where stx runs.
+path namedDepth(const path& picture, std::string name) {
+    if (const auto at = name.find("{stem}"); at != std::string::npos)
+        name.replace(at, 6, picture.stem().string());
+    const path beside = folderOf(picture) / name;
+    std::error_code ec;
+    return std::filesystem::exists(beside, ec) ? beside : path(name);
+}
+
+/// The depth of a photo on its way, and what its values mean.
+struct PhotoDepth {
+    PictureSource source;  ///< where it is a file of its own
+    PhotoDepthCode code;   ///< of integers
+    double unit = 0;       ///< scene units of one step, where code does not matter
+    bool assumed = false;  ///< its range is a guess
+};
+
+/// A depth picture beside a photo. A JPEG may have coded its grey as colours, which are then off by
+/// some levels: their luma is what was meant.
+Result<StoredDepth> readBeside(const PictureSource& source, Job& job) {
+    STX_TRY(const auto bytes, readFile(source.path, job.limits));
+    const auto info = probeImage(bytes);
+    if (!info || info->format != "jpeg" || info->channels != 3) return readDepth(source, job);
+    STX_TRY(const auto picture, decodeRgba8(bytes, source.name, job.limits));
+    StoredDepth out;
+    out.bits = 8;
+    out.values = Image<float>(picture.width(), picture.height());
+    constexpr double kMostColour = 8;  // levels, in the mean; a photograph has more
+    double colour = 0;
+    for (std::size_t i = 0; i < picture.count(); ++i) {
+        const glm::ivec4 p = picture.data()[i];
+        colour += std::max({p.r, p.g, p.b}) - std::min({p.r, p.g, p.b});
+        out.values.data()[i] = static_cast<float>((299 * p.r + 587 * p.g + 114 * p.b + 500) / 1000);
+    }
+    if (colour > kMostColour * static_cast<double>(picture.count()))
+        return failAt(inQuotes(source.name), ErrorCode::invalidInput,
+                      "it is a picture in colours; depth is grey");
+    return out;
+}
+
+Result<StoredDepth> storedDepth(const Photo& photo, const PhotoDepth& depth, Job& job) {
+    if (!depth.source.name.empty()) return readBeside(depth.source, job);
+    STX_TRY(auto decoded, photos::decodeDepth(photo, job));
+    return StoredDepth{std::move(decoded.values), decoded.bits};
+}
+
+/// What the integers of a picture beside a photo are. Errors (usage): nobody says.
+Result<void> readBesideCode(const path& file, const ImageSetOptions& options, int bits,
+                            PhotoDepth& depth) {
+    if (bits == 32) return {};
+    if (options.depthUnit > 0) {
+        depth.unit = options.depthUnit;
+        return {};
+    }
+    if (options.photo.nearIs == NearIs::unknown)
+        return failAt(inQuotes(file.filename().string()), ErrorCode::usage,
+                      "the depth is a grey picture of {} bits, which does not tell whether white "
+                      "or black is near; --depth-near white or black says it, --depth-unit what a "
+                      "step is",
+                      bits);
+    depth.code.zeroIsNear = options.photo.nearIs == NearIs::black;
+    return {};
+}
+
+/// Depth beside the photo, with its code.
+Result<PhotoDepth> besideDepth(const path& file, const ImageSetOptions& options, Photo& photo,
+                               Job& job) {
+    PhotoDepth depth;
+    depth.source.path = file;
+    depth.source.name = file.filename().string();
+    STX_TRY(const auto stored, readBeside(depth.source, job));
+    photo.depth.width = stored.values.width();
+    photo.depth.height = stored.values.height();
+    STX_CHECK(readBesideCode(file, options, stored.bits, depth));
+    const bool floats = stored.bits == 32;
+    photo.accuracy = floats || depth.unit > 0 ? "absolute" : "relative";
+    photo.coding = floats                  ? "distance"
+                   : depth.unit > 0        ? "distance in steps"
+                   : depth.code.zeroIsNear ? "black is near"
+                                           : "white is near";
+    return depth;
+}
+
+/// Gives a range to a code without one, or the one that is asked for.
+Result<void> setRange(const Photo& photo, const ImageSetOptions& options, PhotoDepth& depth,
+                      Job& job) {
+    if (options.depthMin > 0) {
+        depth.code.setRange(options.depthMin, options.depthMax);
+        return {};
+    }
+    if (depth.code.scaled() || depth.unit > 0) return {};
+    STX_TRY(const auto stored, storedDepth(photo, depth, job));
+    if (stored.bits == 32) return {};
+    depth.code.assumeRange(stored.values, (1 << stored.bits) - 1);
+    depth.assumed = true;
+    return {};
+}
+
+/// The camera of a photo of that size, upright; `from` is what it follows from, `notes` what a
+/// person should know of it.
+Camera cameraOfPhoto(const Photo& photo, glm::ivec2 size, const ImageSetOptions& options,
+                     std::string& from, std::vector<std::string>& notes) {
+    Camera camera;
+    camera.width = size.x;
+    camera.height = size.y;
+    camera.cx = size.x * 0.5;
+    camera.cy = size.y * 0.5;
+    if (options.intrinsics[0] > 0) {
+        const auto& k = options.intrinsics;
+        camera.fx = k[0];
+        camera.fy = k[1];
+        camera.cx = k[2];
+        camera.cy = k[3];
+        from = "given";
+        return camera;
+    }
+    if (options.photo.fovRad > 0) {
+        camera.fx = camera.fy = size.y * 0.5 / std::tan(options.photo.fovRad * 0.5);
+        from = "given";
+        return camera;
+    }
+    if (photo.intrinsics) {
+        const PhotoIntrinsics& k = *photo.intrinsics;
+        if (k.fx > 0 && k.fy > 0 && std::abs(k.fx / k.fy - 1) <= kMostOblong) {
+            camera.fx = k.fx;
+            camera.fy = k.fy;
+            camera.cx = k.cx;
+            camera.cy = k.cy;
+            from = "matrix";
+            return camera;
+        }
+        notes.push_back(fmt::format(
+            "its intrinsic matrix is not used: fx {:.0f} and fy {:.0f} differ by more than {:g} %",
+            k.fx, k.fy, 100 * kMostOblong));
+    }
+    const double diagonal = std::hypot(size.x, size.y);
+    from = photo.focal35 > 0 ? "focal35" : "assumed";
+    if (photo.focal35 <= 0)
+        notes.push_back(fmt::format(
+            "it does not tell its focal length: that of phones, {:g} mm of a 35 mm camera, is "
+            "assumed; --fov or --intrinsics give another",
+            kUsualFocal35));
+    camera.fx = camera.fy =
+        (photo.focal35 > 0 ? photo.focal35 : kUsualFocal35) / kDiagonal35 * diagonal;
+    return camera;
+}
+
+/// What a person should know of the depth.
+void noteDepth(const Photo& photo, const PhotoDepth& depth, const ImageSetOptions& options,
+               std::vector<std::string>& notes) {
+    if (depth.assumed)
+        notes.emplace_back(
+            "its depth has no scale: from nearest to farthest 1 to 4 is assumed, with the median "
+            "at 1; --depth-range NEAR,FAR gives another");
+    if (photo.accuracy == "relative" && options.depthMin <= 0)
+        notes.emplace_back(
+            "its depth is relative: right for small moves to the side, not for distances, orbits "
+            "and moves forward");
+    if (photo.accuracy == "unscaled")
+        notes.emplace_back("its depth tells no unit: distances are right but for one scale");
+    if (photo.colourIs == "portrait")
+        notes.emplace_back("the picture with the blurred background is used, as --colour-of says");
+}
+
+Result<StoredView> loadPhoto(const Photo& photo, const PhotoDepth& depth,
+                             const std::vector<std::string>& notes, Job& job) {
+    for (const std::string& note : notes) job.note(note);
+    StoredView stored;
+    STX_TRY(auto values, storedDepth(photo, depth, job));
+    stored.depth = std::move(values.values);
+    stored.depthBits = values.bits;
+    std::string profile;
+    STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
+    if (!profile.empty()) job.note(profile);
+    stored.texture = std::move(picture);
+    return stored;
+}
+
+}  // namespace
+
+Result<SetDescription> describePhoto(const path& given, const ImageSetOptions& options, Job& job) {
+    const std::string where = inQuotes(given.string());
+    std::error_code ec;
+    if (std::filesystem::is_directory(given, ec))
+        return failAt(where, ErrorCode::invalidInput,
+                      "a folder; a photograph with depth is one file (many: @LIST)");
+    STX_TRY(auto bytes, readFile(given, job.limits));
+    const auto file = std::make_shared<const Bytes>(std::move(bytes));
+    photos::PhotoOptions wanted;
+    wanted.portrait = options.photo.portrait;
+    wanted.needsDepth = options.depthPattern.empty();
+    auto opened = photos::openPhoto(file, wanted, job.limits);
+    path beside;
+    if (!wanted.needsDepth) {
+        beside = namedDepth(given, options.depthPattern);
+        if (!std::filesystem::exists(beside, ec))
+            return failAt(inQuotes(beside.string()), ErrorCode::io, "{}", whyNotThere(beside));
+    } else if (!opened && opened.error().code == ErrorCode::invalidInput) {
+        // What lies beside a photo matters only where it has no depth itself.
+        beside = depthBeside(given);
+        if (!beside.empty()) {
+            wanted.needsDepth = false;
+            opened = photos::openPhoto(file, wanted, job.limits);
+        }
+    }
+    if (!opened) return tl::unexpected(opened.error().at(where));
+    auto photo = std::make_shared<Photo>(std::move(*opened));
+
+    PhotoDepth depth;
+    depth.code = photo->code;
+    SetView view;
+    view.name = "photo";
+    view.texture.path = given;
+    view.texture.name = given.filename().string();
+    view.depth.name = view.texture.name;
+    if (!beside.empty()) {
+        photo->format = "picture and depth";
+        STX_TRY(depth, besideDepth(beside, options, *photo, job));
+        view.depth = depth.source;
+    }
+    STX_CHECK(within(where, setRange(*photo, options, depth, job)));
+    photo->code = depth.code;
+
+    glm::ivec2 size = photo->uprightSize(photo->colour);
+    if (size.x == 0) {
+        STX_TRY(size, within(where, imageSizeOf(view.texture, job)));
+        photo->colour.width = size.x;
+        photo->colour.height = size.y;
+    }
+    SetDescription set;
+    std::vector<std::string> notes;
+    view.camera = cameraOfPhoto(*photo, size, options, set.cameraFrom, notes);
+    noteDepth(*photo, depth, options, notes);
+    view.stretched = beside.empty();
+    view.load = [photo, depth, notes](const SetView&, Job& own) {
+        return loadPhoto(*photo, depth, notes, own);
+    };
+    view.distances = [code = depth.code, unit = depth.unit](Image<float>& values,
+                                                            const Camera& camera, int bits,
+                                                            Job& own) -> Result<void> {
+        if (bits == 32) return {};
+        if (unit > 0) return scaledIntegers(unit)(values, camera, bits, own);
+        code.toDistances(values, camera, (1 << bits) - 1);
+        return {};
+    };
+    set.photo = photo;
+    set.views.push_back(std::move(view));
+    return set;
+}
+
+}  // namespace stx::imagesets

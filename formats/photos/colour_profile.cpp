@@ -1,0 +1,65 @@
+#include "formats/photos/colour_profile.hpp"
+
+#include <lcms2.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx::photos {
+namespace {
+
+struct CloseProfile {
+    void operator()(void* profile) const { cmsCloseProfile(profile); }
+};
+struct DeleteTransform {
+    void operator()(void* transform) const { cmsDeleteTransform(transform); }
+};
+using Profile = std::unique_ptr<void, CloseProfile>;
+using Transform = std::unique_ptr<void, DeleteTransform>;
+
+constexpr std::size_t kLargestProfile = 1 << 20;  ///< those of displays have some hundred bytes
+
+/// Whether it changes colours by no more than rounding does.
+bool keeps(const Transform& transform) {
+    for (int i = 0; i < 4096; ++i) {
+        const glm::u8vec4 in((i & 15) * 17, (i >> 4 & 15) * 17, (i >> 8) * 17, 255);
+        glm::u8vec4 out(0);
+        cmsDoTransform(transform.get(), &in, &out, 1);
+        for (int k = 0; k < 3; ++k)
+            if (std::abs(in[k] - out[k]) > 1) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+std::string toSrgb(Rgba8Image& picture, ByteSpan profile) {
+    if (profile.empty()) return {};
+    constexpr const char* kTaken =
+        "its colour profile is not one of three primaries: its colours "
+        "are taken for sRGB";
+    if (profile.size() > kLargestProfile) return kTaken;
+    const Profile from(
+        cmsOpenProfileFromMem(profile.data(), static_cast<cmsUInt32Number>(profile.size())));
+    const Profile to(cmsCreate_sRGBProfile());
+    if (!from || !to || cmsGetColorSpace(from.get()) != cmsSigRgbData ||
+        !cmsIsMatrixShaper(from.get()))
+        return kTaken;
+    // Without a cache of the last colour several threads can use it.
+    const Transform transform(cmsCreateTransform(from.get(), TYPE_RGBA_8, to.get(), TYPE_RGBA_8,
+                                                 INTENT_RELATIVE_COLORIMETRIC,
+                                                 cmsFLAGS_NOCACHE | cmsFLAGS_COPY_ALPHA));
+    if (!transform) return kTaken;
+    if (keeps(transform)) return {};
+    parallelFor(0, picture.height(), [&](std::int64_t y) {
+        const auto row = picture.row(static_cast<int>(y));
+        cmsDoTransform(transform.get(), row.data(), row.data(),
+                       static_cast<cmsUInt32Number>(row.size()));
+    });
+    return "its colours are made sRGB from its colour profile; what sRGB does not have is clipped";
+}
+
+}  // namespace stx::photos

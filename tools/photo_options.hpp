@@ -1,0 +1,11 @@
+#pragma once
+
+#include "formats/imagesets/image_sets.hpp"
+#include "tools/commands.hpp"
+
+namespace stx::tools {
+
+/// --depth-near and --colour-of, under a heading of the help.
+void addPhotoOptions(const Command& command, PhotoSetOptions& options, const char* heading);
+
+}  // namespace stx::tools
