@@ -71,21 +71,26 @@ Result<void> readFloats(const ExrReader& reader, int part,
                         const std::vector<std::string>& attributes, bool linear, AtlasPage& page) {
     const ExrPart& header = reader.parts()[part];
     std::vector<ExrPixels> pixels;
-    Image<glm::vec4> colour;
+    std::vector<std::string> wanted;
+    Image<glm::vec4> none;
+    bool colour = false;
     for (const auto& attribute : attributes)
-        forImages(page, attribute, colour, [&](auto& image, Names names) {
+        forImages(page, attribute, none, [&](auto& image, Names names) {
+            wanted.insert(wanted.end(), names.begin(), names.end());
+            if (attribute == "colour") {
+                colour = true;
+                return;
+            }
             image = std::remove_reference_t<decltype(image)>(header.width, header.height);
             addChannels(pixels, image, names);
         });
-    for (const auto& p : pixels) {
-        if (!header.channel(p.channel))
+    for (const auto& name : wanted) {
+        if (!header.channel(name))
             return failAt(reader.where(), ErrorCode::invalidInput, "part {} lacks the channel '{}'",
-                          part, p.channel);
+                          part, name);
     }
-    STX_CHECK(reader.readPart(part, pixels));
-    if (!colour.empty())
-        page.texture =
-            linear ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
+    if (!colour) return reader.readPart(part, pixels);
+    STX_TRY(page.texture, readTexture(reader, part, linear, pixels));
     return {};
 }
 

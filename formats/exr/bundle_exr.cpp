@@ -219,15 +219,8 @@ std::uint64_t exrViewBytes(const ExrReader& reader, const ExrPart& part) {
 
 Result<void> readExrView(const ExrReader& reader, int index, const ExrPart& part,
                          ReferenceView& view) {
-    std::vector<ExrPixels> pixels;
-    Image<glm::vec4> colour(part.width, part.height);
-    const bool hasColour = part.channel("R") && part.channel("G") && part.channel("B");
-    float* rgba = &colour.data()->x;
-    if (hasColour) pixels = {{"R", rgba, 4}, {"G", rgba + 1, 4}, {"B", rgba + 2, 4}};
-    if (part.channel("Y") && !hasColour) pixels.push_back({"Y", rgba, 4});
-    if (part.channel("A")) pixels.push_back({"A", rgba + 3, 4});
     view.depth = Image<float>(part.width, part.height);
-    pixels.push_back({"Z", view.depth.data(), 1});
+    std::vector<ExrPixels> pixels = {{"Z", view.depth.data(), 1}};
     const auto addVectors = [&](const char* name, Image<glm::vec3>& image) {
         if (!hasVectors(part, name)) return;
         image = Image<glm::vec3>(part.width, part.height);
@@ -244,16 +237,8 @@ Result<void> readExrView(const ExrReader& reader, int index, const ExrPart& part
         view.emissive = Image<glm::vec3>(part.width, part.height);
         addNamedPixels(pixels, kEmissive, &view.emissive.data()->x);
     }
-    STX_CHECK(reader.readPart(index, pixels));
-    if (!part.channel("A")) {
-        for (auto& p : colour.pixels()) p.a = 1.0f;
-    }
-    if (!hasColour) {
-        for (auto& p : colour.pixels()) p.g = p.b = p.r;
-    }
+    STX_TRY(view.texture, readTexture(reader, index, isLinearExr(reader), pixels));
     if (!isOurView(part)) adoptForeignDepth(view);
-    view.texture =
-        isLinearExr(reader) ? textureFromPremultiplied(colour) : textureFromPremultiplied8(colour);
     return {};
 }
 

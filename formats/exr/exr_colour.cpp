@@ -31,38 +31,108 @@ Image<glm::vec4> premultipliedLinear(const Texture& texture, int top, int rows) 
     return out;
 }
 
-Texture textureFromPremultiplied8(const Image<glm::vec4>& premultiplied) {
-    Rgba8Image out(premultiplied.width(), premultiplied.height());
+namespace {
+
+void divideByAlpha(std::span<const glm::vec4> from, std::span<glm::u8vec4> to) {
     const Srgb8Tables& t = srgb8Tables();
+    for (std::size_t x = 0; x < to.size(); ++x) {
+        const auto& p = from[x];
+        const int a = p.a >= 1.0f  ? 255
+                      : p.a > 0.0f ? static_cast<int>(p.a * 255.0f + 0.5f)
+                                   : 0;
+        const float inverse = a > 0 ? 255.0f / static_cast<float>(a) : 0.0f;
+        to[x] = a > 0 ? glm::u8vec4(t.code(p.r * inverse), t.code(p.g * inverse),
+                                    t.code(p.b * inverse), a)
+                      : glm::u8vec4(0);
+    }
+}
+
+/// In place, too.
+void divideByAlpha(std::span<const glm::vec4> from, std::span<glm::vec4> to) {
+    for (std::size_t x = 0; x < to.size(); ++x) {
+        const auto& p = from[x];
+        to[x] = p.a > 0.0f ? glm::vec4(glm::vec3(p) / p.a, p.a) : glm::vec4(0.0f);
+    }
+}
+
+template <class Pixel>
+Texture straight(const Image<glm::vec4>& premultiplied) {
+    Image<Pixel> out(premultiplied.width(), premultiplied.height());
     parallelFor(0, out.height(), [&](std::int64_t row) {
-        const auto from = premultiplied.row(static_cast<int>(row));
-        const auto to = out.row(static_cast<int>(row));
-        for (std::size_t x = 0; x < to.size(); ++x) {
-            const auto& p = from[x];
-            const int a = p.a >= 1.0f  ? 255
-                          : p.a > 0.0f ? static_cast<int>(p.a * 255.0f + 0.5f)
-                                       : 0;
-            if (a == 0) continue;
-            const float inverse = 255.0f / static_cast<float>(a);
-            to[x] = {t.code(p.r * inverse), t.code(p.g * inverse), t.code(p.b * inverse), a};
-        }
+        const int y = static_cast<int>(row);
+        divideByAlpha(premultiplied.row(y), out.row(y));
     });
     Texture texture(std::move(out));
     bleedColour(texture);
     return texture;
 }
 
-Texture textureFromPremultiplied(const Image<glm::vec4>& premultiplied) {
-    RgbaFloatImage out(premultiplied.width(), premultiplied.height());
-    parallelFor(0, out.height(), [&](std::int64_t row) {
-        const auto from = premultiplied.row(static_cast<int>(row));
-        const auto to = out.row(static_cast<int>(row));
-        for (std::size_t x = 0; x < to.size(); ++x) {
-            const auto& p = from[x];
-            if (p.a > 0.0f) to[x] = {glm::vec3(p) / p.a, p.a};
+/// R, G, B, A of a part, or Y in the place of R.
+struct ColourChannels {
+    bool colour, grey, alpha;
+
+    explicit ColourChannels(const ExrPart& part)
+        : colour(part.channel("R") && part.channel("G") && part.channel("B")),
+          grey(!colour && part.channel("Y")),
+          alpha(part.channel("A") != nullptr) {}
+
+    void add(glm::vec4* rows, std::vector<ExrPixels>& pixels) const {
+        float* at = &rows->x;
+        if (colour) pixels.insert(pixels.end(), {{"R", at, 4}, {"G", at + 1, 4}, {"B", at + 2, 4}});
+        if (grey) pixels.push_back({"Y", at, 4});
+        if (alpha) pixels.push_back({"A", at + 3, 4});
+    }
+    /// What the file has no channels for.
+    void complete(std::span<glm::vec4> row) const {
+        if (colour && alpha) return;
+        for (glm::vec4& p : row) {
+            if (!colour) p.g = p.b = p.r;
+            if (!alpha) p.a = 1.0f;
         }
-    });
-    Texture texture(std::move(out));
+    }
+};
+
+}  // namespace
+
+Texture textureFromPremultiplied8(const Image<glm::vec4>& premultiplied) {
+    return straight<glm::u8vec4>(premultiplied);
+}
+
+Texture textureFromPremultiplied(const Image<glm::vec4>& premultiplied) {
+    return straight<glm::vec4>(premultiplied);
+}
+
+Result<Texture> readTexture(const ExrReader& reader, int index, bool linear,
+                            const std::vector<ExrPixels>& others) {
+    const ExrPart& part = reader.parts()[static_cast<std::size_t>(index)];
+    const ColourChannels channels(part);
+    Texture texture = linear ? Texture(RgbaFloatImage(part.width, part.height))
+                             : Texture(Rgba8Image(part.width, part.height));
+    // A whole picture's colours as floats would be three times what is made of them.
+    Image<glm::vec4> block;
+    const auto rowOf = [&](int y, int row) {
+        return linear ? texture.rgbaFloat()->row(y + row) : block.row(row);
+    };
+    const auto place = [&](int y, int rows) {
+        if (!linear && block.height() != rows) block = Image<glm::vec4>(part.width, rows);
+        std::vector<ExrPixels> pixels;
+        channels.add(rowOf(y, 0).data(), pixels);
+        for (ExrPixels other : others) {
+            other.values += static_cast<std::size_t>(y) * part.width * other.stride;
+            pixels.push_back(std::move(other));
+        }
+        return pixels;
+    };
+    STX_CHECK(reader.readPart(index, place, [&](int y, int rows) {
+        parallelFor(0, rows, [&](std::int64_t i) {
+            const auto row = rowOf(y, static_cast<int>(i));
+            channels.complete(row);
+            if (linear)
+                divideByAlpha(row, row);
+            else
+                divideByAlpha(row, texture.rgba8()->row(y + static_cast<int>(i)));
+        });
+    }));
     bleedColour(texture);
     return texture;
 }

@@ -2,6 +2,7 @@
 
 #include <glm/glm.hpp>
 
+#include "formats/exr/exr_file.hpp"
 #include "lib/base/image.hpp"
 #include "lib/model/texture.hpp"
 
@@ -17,5 +18,11 @@ namespace stx {
 [[nodiscard]] Texture textureFromPremultiplied8(const Image<glm::vec4>& premultiplied);
 /// The inverse for linear floats: exact where alpha is 1, else to the last bit but one.
 [[nodiscard]] Texture textureFromPremultiplied(const Image<glm::vec4>& premultiplied);
+
+/// The colour of a part (R, G, B or Y; A, or covered everywhere) by the one of these that `linear`
+/// says, and with it all of `others`, whose values are those of the whole part. Takes little more
+/// memory than the texture. Errors: as ExrReader::readPart().
+[[nodiscard]] Result<Texture> readTexture(const ExrReader& reader, int part, bool linear,
+                                          const std::vector<ExrPixels>& others);
 
 }  // namespace stx

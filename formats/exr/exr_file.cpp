@@ -148,6 +148,11 @@ const ExrChannel* ExrPart::channel(std::string_view wanted) const {
 }
 
 struct ExrReader::Impl {
+    /// From row `y` on; they begin where a chunk does.
+    struct Rows {
+        int y = 0, count = 0;
+    };
+
     std::string where;
     ByteSpan bytes;
     Descriptor fd;
@@ -158,13 +163,19 @@ struct ExrReader::Impl {
     std::vector<ExrChunks> chunks;  ///< of each part; empty when they were not found
 
     Result<void> readHeaders(const Limits& limits);
-    /// The pixels of a part of scan lines and zip compression, without the library, whose zlib
-    /// would take most of the time. False, and anything in `pixels`, for other parts and for
-    /// whatever is wrong with this one: the library says what.
-    bool readZipped(int index, const std::vector<ExrPixels>& pixels) const;
-    bool readZippedChunk(int index, std::size_t chunk, int lines,
+    /// Rows of a part of scan lines and zip compression, without the library, whose zlib would take
+    /// most of the time. False, and anything in `pixels`, for other parts and for whatever is wrong
+    /// with this one: the library says what.
+    bool readZipped(int index, Rows at, const std::vector<ExrPixels>& pixels) const;
+    bool readZippedChunk(int index, std::size_t chunk, Rows at,
                          const std::vector<ExrPixels>& pixels) const;
+    exr::ChunkLayout layoutOf(int index) const;
+    /// Rows of a chunk.
+    std::int64_t stepOf(int index) const;
     Result<void> checkChunks(int index) const;
+    Result<void> checkPlausible(int index) const;
+    /// All rows, at most `rows` at a time, which is a multiple of a chunk's.
+    Result<void> readRows(int index, int rows, const Place& place, const Take& take) const;
     bool readAt(std::uint64_t offset, void* to, std::size_t count) const {
         if (offset > size || count > size - offset) return false;
         if (!stream->isMemoryMapped())
@@ -175,10 +186,11 @@ struct ExrReader::Impl {
     }
 };
 
-bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, int lines,
+bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, Rows at,
                                       const std::vector<ExrPixels>& pixels) const {
     const ExrPart& part = parts[static_cast<std::size_t>(index)];
     const auto width = static_cast<std::size_t>(part.width);
+    const int lines = exr::linesOfChunk(part.compression);
     const int top = static_cast<int>(chunk) * lines;
     const int rows = std::min(lines, part.height - top);
     std::size_t rowBytes = 0;
@@ -187,8 +199,8 @@ bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, int lines,
     // Of several parts each chunk says whose it is; then its first line, its size.
     std::int32_t head[3] = {};
     const std::size_t numbers = parts.size() > 1 ? 3 : 2;
-    const std::uint64_t at = chunks[static_cast<std::size_t>(index)].offsets[chunk];
-    if (!readAt(at, head, 4 * numbers)) return false;
+    const std::uint64_t offset = chunks[static_cast<std::size_t>(index)].offsets[chunk];
+    if (!readAt(offset, head, 4 * numbers)) return false;
     if (numbers == 3 && head[0] != index) return false;
     const int first = file->header(index).dataWindow().min.y + top;
     const std::int32_t stored = head[numbers - 1];
@@ -201,7 +213,7 @@ bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, int lines,
     std::vector<std::uint16_t> raw(rawBytes / 2);
     const auto packed =
         std::make_unique_for_overwrite<std::byte[]>(static_cast<std::size_t>(stored));
-    if (!readAt(at + 4 * numbers, packed.get(), static_cast<std::size_t>(stored)) ||
+    if (!readAt(offset + 4 * numbers, packed.get(), static_cast<std::size_t>(stored)) ||
         !exr::unzipChunk({packed.get(), static_cast<std::size_t>(stored)},
                          {reinterpret_cast<std::uint8_t*>(raw.data()), rawBytes}))
         return false;
@@ -219,7 +231,7 @@ bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, int lines,
         for (int y = 0; y < rows; ++y) {
             const std::uint16_t* from =
                 raw.data() + static_cast<std::size_t>(y) * rowBytes / 2 + before;
-            float* to = p.values + static_cast<std::size_t>(top + y) * width * p.stride;
+            float* to = p.values + static_cast<std::size_t>(top - at.y + y) * width * p.stride;
             if (channel->type == ExrChannel::Type::half)
                 exr::floatsFrom({from, width}, to, p.stride);
             else
@@ -230,13 +242,13 @@ bool ExrReader::Impl::readZippedChunk(int index, std::size_t chunk, int lines,
     return true;
 }
 
-bool ExrReader::Impl::readZipped(int index, const std::vector<ExrPixels>& pixels) const {
+bool ExrReader::Impl::readZipped(int index, Rows at, const std::vector<ExrPixels>& pixels) const {
     const ExrPart& part = parts[static_cast<std::size_t>(index)];
     const Imf::Header& header = file->header(index);
     if (header.hasTileDescription() || (header.hasType() && header.type() != Imf::SCANLINEIMAGE) ||
         (part.compression != "zip" && part.compression != "zips"))
         return false;
-    const int lines = part.compression == "zip" ? exr::kZipRows : 1;
+    const int lines = exr::linesOfChunk(part.compression);
     const auto count = static_cast<std::size_t>((part.height + lines - 1) / lines);
     if (static_cast<std::size_t>(index) >= chunks.size() ||
         chunks[static_cast<std::size_t>(index)].offsets.size() != count)
@@ -247,14 +259,14 @@ bool ExrReader::Impl::readZipped(int index, const std::vector<ExrPixels>& pixels
     }
     // Of a file that is damaged most chunks are not worth the work.
     std::atomic<bool> whole = true;
-    parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t i) {
-        if (whole && !readZippedChunk(index, static_cast<std::size_t>(i), lines, pixels))
+    parallelFor(at.y / lines, (at.y + at.count + lines - 1) / lines, [&](std::int64_t i) {
+        if (whole && !readZippedChunk(index, static_cast<std::size_t>(i), at, pixels))
             whole = false;
     });
     return whole;
 }
 
-Result<void> ExrReader::Impl::checkChunks(int index) const {
+exr::ChunkLayout ExrReader::Impl::layoutOf(int index) const {
     const Imf::Header& header = file->header(index);
     exr::ChunkLayout layout;
     layout.firstX = header.dataWindow().min.x;
@@ -266,8 +278,20 @@ Result<void> ExrReader::Impl::checkChunks(int index) const {
         layout.tileWidth = static_cast<int>(std::min(header.tileDescription().xSize, kMost));
         layout.tileHeight = static_cast<int>(std::min(header.tileDescription().ySize, kMost));
     }
+    return layout;
+}
+
+std::int64_t ExrReader::Impl::stepOf(int index) const {
+    const ExrPart& part = parts[static_cast<std::size_t>(index)];
+    const int tile = layoutOf(index).tileHeight;
+    // A compression of later days: whatever its chunks are.
+    const int lines = tile > 0 ? tile : exr::linesOfChunk(part.compression);
+    return lines > 0 ? lines : part.height;
+}
+
+Result<void> ExrReader::Impl::checkChunks(int index) const {
     const auto at = static_cast<std::size_t>(index);
-    return exr::checkChunks(parts[at], layout, at < chunks.size() ? chunks[at] : ExrChunks(),
+    return exr::checkChunks(parts[at], layoutOf(index), at < chunks.size() ? chunks[at] : ExrChunks(),
                             [this](std::uint64_t offset, void* to, std::size_t count) {
                                 return readAt(offset, to, count);
                             });
@@ -343,46 +367,84 @@ Result<ExrReader> ExrReader::open(const std::filesystem::path& path, const Limit
 }
 
 Result<void> ExrReader::checkPlausible(int index) const {
-    const ExrPart& part = parts()[index];
+    return impl_->checkPlausible(index);
+}
+
+Result<void> ExrReader::Impl::checkPlausible(int index) const {
+    const ExrPart& part = parts[static_cast<std::size_t>(index)];
     const auto values = static_cast<std::uint64_t>(part.width) * part.height * part.channels.size();
-    const std::uint64_t stored = part.bytes ? part.bytes : impl_->size;
+    const std::uint64_t stored = part.bytes ? part.bytes : size;
     // Deflate over runs gives at most some thousand for one; small claims hurt nobody.
     if (values <= (16u << 20) || values / 8192 <= stored) return {};
-    return failAt(where(), ErrorCode::invalidInput,
+    return failAt(where, ErrorCode::invalidInput,
                   "part {} claims {}x{} pixels of {} channels, more than its {} bytes can hold",
                   index, part.width, part.height, part.channels.size(), stored);
 }
 
 Result<void> ExrReader::readPart(int index, const std::vector<ExrPixels>& pixels) const {
     const ExrPart& part = parts()[index];
+    return impl_->readRows(
+        index, part.height, [&](int, int) { return pixels; }, [](int, int) {});
+}
+
+Result<void> ExrReader::readPart(int index, const Place& place, const Take& take) const {
+    const ExrPart& part = parts()[index];
+    // Enough for all threads, but for wide pictures on many processors no large part of them.
+    constexpr std::int64_t kMostPixels = 1 << 21;
+    const std::int64_t step = impl_->stepOf(index);
+    const std::int64_t most = std::max<std::int64_t>(kMostPixels / part.width / step, 1);
+    const std::int64_t rows = step * std::min<std::int64_t>(4 * threadCount(), most);
+    return impl_->readRows(index, static_cast<int>(std::min<std::int64_t>(rows, part.height)),
+                           place, take);
+}
+
+Result<void> ExrReader::Impl::readRows(int index, int rows, const Place& place,
+                                       const Take& take) const {
+    const ExrPart& part = parts[static_cast<std::size_t>(index)];
     if (part.deep)
-        return failAt(where(), ErrorCode::unsupported,
+        return failAt(where, ErrorCode::unsupported,
                       "part {} has deep pixels, which are not supported", index);
     STX_CHECK(checkPlausible(index));
-    return adapt(ErrorCode::invalidInput, where(), [&]() -> Result<void> {
-        Imf::InputPart in(*impl_->file, index);
-        const auto window = in.header().dataWindow();
+    return adapt(ErrorCode::invalidInput, where, [&]() -> Result<void> {
+        Imf::InputPart in(*file, index);
+        auto window = in.header().dataWindow();
+        const int top = window.min.y;
         const auto& channels = in.header().channels();
-        Imf::FrameBuffer buffer;
-        for (const auto& p : pixels) {
-            const auto* channel = channels.findChannel(p.channel);
-            if (!channel) {
-                const auto count = static_cast<std::size_t>(part.width) * part.height;
-                for (std::size_t i = 0; i < count; ++i) p.values[i * p.stride] = 0.0f;
-                continue;
+        bool zipped = true, checked = false;
+        for (int y = 0; y < part.height; y += rows) {
+            const Rows at{y, std::min(rows, part.height - y)};
+            window.min.y = top + y;
+            const auto pixels = place(at.y, at.count);
+            Imf::FrameBuffer buffer;
+            for (const auto& p : pixels) {
+                const auto* channel = channels.findChannel(p.channel);
+                if (!channel) {
+                    const auto count = static_cast<std::size_t>(part.width) * at.count;
+                    for (std::size_t i = 0; i < count; ++i) p.values[i * p.stride] = 0.0f;
+                    continue;
+                }
+                if (channel->xSampling != 1 || channel->ySampling != 1)
+                    return failAt(where, ErrorCode::unsupported,
+                                  "channel '{}' of part {} is subsampled, which is not supported",
+                                  p.channel, index);
+                buffer.insert(p.channel, Imf::Slice::Make(Imf::FLOAT, p.values, window,
+                                                          p.stride * sizeof(float),
+                                                          p.stride * sizeof(float) * part.width));
             }
-            if (channel->xSampling != 1 || channel->ySampling != 1)
-                return failAt(where(), ErrorCode::unsupported,
-                              "channel '{}' of part {} is subsampled, which is not supported",
-                              p.channel, index);
-            buffer.insert(p.channel,
-                          Imf::Slice::Make(Imf::FLOAT, p.values, window, p.stride * sizeof(float),
-                                           p.stride * sizeof(float) * part.width));
+            if (buffer.begin() != buffer.end()) {
+                zipped = zipped && readZipped(index, at, pixels);
+                if (!zipped && !checked) {
+                    if (auto ok = checkChunks(index); !ok)
+                        return tl::unexpected(ok.error().at(where));
+                    checked = true;
+                }
+                if (!zipped) {
+                    in.setFrameBuffer(buffer);
+                    in.readPixels(window.min.y, window.min.y + at.count - 1);
+                }
+            }
+            take(at.y, at.count);
         }
-        if (buffer.begin() == buffer.end() || impl_->readZipped(index, pixels)) return {};
-        if (auto ok = impl_->checkChunks(index); !ok) return tl::unexpected(ok.error().at(where()));
-        in.setFrameBuffer(buffer);
-        in.readPixels(window.min.y, window.max.y);
         return {};
     });
 }

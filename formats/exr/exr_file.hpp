@@ -107,6 +107,12 @@ class ExrReader {
     /// go). A channel that the part has not is filled with zeros. Several parts may be read at
     /// once, from several threads. Errors: invalidInput, unsupported (deep, subsampled).
     [[nodiscard]] Result<void> readPart(int part, const std::vector<ExrPixels>& pixels) const;
+    /// The same a few rows at a time, for images that are made of what is read: `place(y, rows)`
+    /// says where the values of `rows` rows from `y` on go, and `take(y, rows)` is called when they
+    /// are there.
+    using Place = std::function<std::vector<ExrPixels>(int y, int rows)>;
+    using Take = std::function<void(int y, int rows)>;
+    [[nodiscard]] Result<void> readPart(int part, const Place& place, const Take& take) const;
 
   private:
     struct Impl;
