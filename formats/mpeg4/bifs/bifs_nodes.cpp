@@ -254,6 +254,7 @@ Result<NodePtr> BifsNodeReader::readNode(Ndt expected, int depth, int& height) {
         node->defId = in.read(config.nodeIdBits) + 1;
         if (useNames) {
             STX_TRY(node->defName, readName());
+            if (node->defName == nameOfId('N', node->defId)) node->defName.clear();
         }
         STX_CHECK(check("a DEF"));
         const auto known = defined.find(node->defId);

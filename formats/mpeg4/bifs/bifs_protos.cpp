@@ -60,6 +60,7 @@ Result<Route> BifsNodeReader::readRoute() {
         route.id = in.read(config.routeIdBits) + 1;
         if (useNames) {
             STX_TRY(route.name, readName());
+            if (route.name == nameOfId('R', route.id)) route.name.clear();
         }
     }
     STX_CHECK(readEnds(route));

@@ -178,7 +178,8 @@ Result<void> BifsNodeWriter::writeNode(const NodePtr& node, Ndt expected, int de
         if (!definedNow.insert(id).second)
             return error("node id {} stands for two nodes of one scene", id);
         out.write(id - 1, config.nodeIdBits);
-        if (useNames) STX_CHECK(writeName(node->defName));
+        if (useNames)
+            STX_CHECK(writeName(node->defName.empty() ? nameOfId('N', id) : node->defName));
     }
     {
         const QuantisationScope::NodeGuard guard(quantisation);
@@ -455,7 +456,7 @@ Result<void> BifsNodeWriter::writeRoute(const Route& route) {
     out.flag(id != 0);
     if (id != 0) {
         STX_CHECK(writeRouteId(id));
-        if (useNames) STX_CHECK(writeName(route.name));
+        if (useNames) STX_CHECK(writeName(route.name.empty() ? nameOfId('R', id) : route.name));
     }
     return writeEnds(route);
 }

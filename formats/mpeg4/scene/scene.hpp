@@ -392,6 +392,12 @@ struct NodeIds {
     std::uint32_t highestRoute = 0;
     std::uint32_t highestProto = 0;
 };
+/// What a node ('N') or ROUTE ('R') that has a number only is called where names are coded, as in
+/// texts: `N12` for 13.
+[[nodiscard]] inline std::string nameOfId(char letter, std::uint32_t id) {
+    return fmt::format("{}{}", letter, id - 1);
+}
+
 /// An id for every node that needs one (a defId, a DEF name, more than one use, an end of a route,
 /// the target of a command): its defId where it has one, else one that no other node has, in order
 /// of appearance. The same for routes with a name. A node that replaces one of its own name takes

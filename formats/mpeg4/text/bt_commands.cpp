@@ -161,7 +161,9 @@ Result<void> BtReader::readReplace(std::uint64_t time) {
         ReplaceNode replace;
         replace.target = target.node;
         int height = 0;
+        const std::size_t named = names_.named().size();
         STX_TRY(replace.replacement, readNode(1, height, nullptr, -1, -1));
+        names_.succeed(*target.node, replace.replacement, named);
         addCommand(document_.frames, time, std::move(replace));
         return {};
     }
@@ -244,16 +246,7 @@ Result<void> BtReader::readDelete(std::uint64_t time) {
 Result<std::uint32_t> BtReader::readRouteName() {
     const std::string where = lexer_.where();
     STX_TRY(const auto routeName, takeName("the DEF name of a ROUTE"));
-    if (const auto id = idFromTextName(routeName, 'R')) return id;
-    const auto found = routeIds_.find(routeName);
-    if (found == routeIds_.end())
-        return failAt(where, ErrorCode::invalidInput, "no ROUTE has the DEF name '{}'",
-                      excerpt(routeName));
-    if (found->second == 0)
-        return failAt(where, ErrorCode::unsupported,
-                      "commands reach ROUTEs by number only: name it R0, R1, ... instead of '{}'",
-                      excerpt(routeName));
-    return found->second;
+    return routeId(routeName, where);
 }
 
 }  // namespace stx::mpeg4

@@ -15,7 +15,8 @@ Result<Document> BtReader::read() {
                       "the file ends without a scene, expected a node such as Group {{ ... }}");
     STX_CHECK(readBuffers());
     STX_CHECK(readDescriptors());
-    if (auto ok = finishDocument(document_, names_); !ok) return propagate(ok);
+    routes_.number(document_.frames);
+    STX_CHECK(finishDocument(document_, names_));
     STX_CHECK(buffers_.encode(document_));
     return std::move(document_);
 }
@@ -84,7 +85,7 @@ Result<Route> BtReader::readRoute(const std::string& defName) {
         return failAt(lexer_.where(), ErrorCode::invalidInput,
                       "the ROUTE leads from {} {} to {} {}; both must have one type",
                       name(source.type), source.name, name(target.type), target.name);
-    if (!route.name.empty() || route.id != 0) routeIds_[textNameOf(route)] = route.id;
+    routes_.define(route);
     return route;
 }
 

@@ -145,7 +145,6 @@ class BtReader : private TextReader {
     BtLexer lexer_;
     std::optional<TextDescriptor> iod_;
     std::vector<OdUpdate> odUpdates_;
-    std::map<std::string, std::uint32_t> routeIds_;
     std::uint64_t lastTime_ = 0;
     bool haveScene_ = false;
     bool rap_ = false;  ///< the block that is read is a place where a reader may begin

@@ -223,7 +223,8 @@ class BtWriter {
         return position.index == Position::kLast ? "[LAST]" : fmt::format("[{}]", position.index);
     }
     void writeRouteName(const Route& route) {
-        if (const std::string text = textNameOf(route); !text.empty()) out_ += "DEF " + text + ' ';
+        if (const std::string text = names_.define(route); !text.empty())
+            out_ += "DEF " + text + ' ';
     }
     void writeRoute(const Route& route) {
         out_ += fieldOf(route.from, route.fromField) + " TO " + fieldOf(route.to, route.toField);
@@ -267,7 +268,7 @@ class BtWriter {
         writeValue(c.value);
     }
     void write(const ReplaceRoute& c) {
-        beginCommand(fmt::format("REPLACE ROUTE R{} BY ", c.routeId - 1));
+        beginCommand("REPLACE ROUTE " + names_.routeOf(c.routeId) + " BY ");
         writeRoute(c.route);
     }
     void writeInsert(const std::string& target, Position position) {
@@ -294,9 +295,7 @@ class BtWriter {
     void write(const DeleteIndexed& c) {
         beginCommand("DELETE " + fieldOf(c.target, c.field) + indexText(c.position));
     }
-    void write(const DeleteRoute& c) {
-        beginCommand(fmt::format("DELETE ROUTE R{}", c.routeId - 1));
-    }
+    void write(const DeleteRoute& c) { beginCommand("DELETE ROUTE " + names_.routeOf(c.routeId)); }
 
     // ---- Descriptors
     template <class T>

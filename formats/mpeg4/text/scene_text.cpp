@@ -186,28 +186,13 @@ void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
     const NodeIds ids = assignNodeIds(frames);
     for (const CommandFrame& frame : frames) {
         for (const Command& command : frame.commands) {
-            // A node in another's place with its id has its name, too: what comes later means it.
-            const auto* replace = std::get_if<ReplaceNode>(&command);
-            const auto isSuccessor = [&](const NodePtr& node) {
-                if (!replace || node != replace->replacement) return false;
-                const auto was = ids.nodes.find(replace->target.get());
-                const auto is = ids.nodes.find(node.get());
-                return was != ids.nodes.end() && is != ids.nodes.end() &&
-                       was->second == is->second &&
-                       textNameOf(*node) == textNameOf(*replace->target) &&
-                       names_.contains(replace->target.get());
-            };
             forEachNode(command, [&](const NodePtr& node) {
                 if (names_.contains(node.get())) return;
-                if (isSuccessor(node)) {
-                    names_[node.get()] = std::string(names_.at(replace->target.get()));
-                    return;
-                }
                 std::string text = textNameOf(*node);
                 if (text.empty()) {
                     const auto id = ids.nodes.find(node.get());
                     if (id == ids.nodes.end()) return;
-                    text = fmt::format("N{}", id->second - 1);
+                    text = nameOfId('N', id->second);
                 }
                 names_[node.get()] = uniqueName(std::move(text));
             });
@@ -215,18 +200,39 @@ void TextNames::nameAll(const std::vector<CommandFrame>& frames) {
     }
 }
 
+/// A name that would not read back as itself: other characters give way to '_'.
+static std::string plainName(std::string text) {
+    if (isPlainName(text)) return text;
+    for (char& c : text)
+        if (!isPlainName(std::string("a") + c)) c = '_';
+    return isPlainName(text) ? text : fmt::format("_{}", text);
+}
+
 std::string TextNames::uniqueName(std::string text) const {
-    // A name that would not read back as itself: other characters give way to '_'.
-    if (!isPlainName(text)) {
-        for (char& c : text)
-            if (!isPlainName(std::string("a") + c)) c = '_';
-        if (!isPlainName(text)) text = fmt::format("_{}", text);
-    }
-    const std::string base = text;
-    // Two nodes of one name are different nodes only when commands replaced one.
+    const std::string base = text = plainName(std::move(text));
+    // Two nodes of one name are different nodes only when commands replaced one: see succeed().
     while (taken_.contains(text)) text = fmt::format("{}_{}", base, ++taken_[base]);
     taken_[text] = 1;
     return text;
+}
+
+std::string TextNames::define(const Route& route) {
+    std::string text = textNameOf(route);
+    if (text.empty()) return text;
+    text = plainName(std::move(text));
+    const std::string base = text;
+    // The same name for another number, as commands may bring it.
+    for (int i = 2; routeIds_.contains(text) && routeIds_[text] != route.id; ++i)
+        text = fmt::format("{}_{}", base, i);
+    routeIds_[text] = route.id;
+    if (route.id != 0) routes_[route.id] = text;
+    return text;
+}
+
+std::string TextNames::routeOf(std::uint32_t id) const {
+    const auto found = routes_.find(id);
+    if (found != routes_.end()) return found->second;
+    return outer_ != nullptr ? outer_->routeOf(id) : nameOfId('R', id);
 }
 
 TextNames TextNames::inside(const TextNames& outer) {

@@ -66,6 +66,10 @@ class TextNames {
     [[nodiscard]] const std::string* find(const Node& node) const;
     /// Whether a node is met for the first time, and is written as DEF; later ones are USE.
     [[nodiscard]] bool firstTime(const Node& node);
+    /// The DEF name of a ROUTE that is written now; empty: none.
+    [[nodiscard]] std::string define(const Route& route);
+    /// The name that a command reaches a ROUTE by.
+    [[nodiscard]] std::string routeOf(std::uint32_t id) const;
 
   private:
     void nameAll(const std::vector<CommandFrame>& frames);
@@ -79,6 +83,8 @@ class TextNames {
     std::vector<BufferScene> scenes_;
     std::size_t scene_ = 0;  ///< scenes begun
     std::unordered_set<const Node*> written_;
+    std::unordered_map<std::uint32_t, std::string> routes_;  ///< names of those that were defined
+    std::unordered_map<std::string, std::uint32_t> routeIds_;
 };
 
 /// The commands of a buffer that is nested in `depth` others. Where they have no text they are left

@@ -1,6 +1,7 @@
 #include "formats/mpeg4/text/text_fields.hpp"
 
 #include <cstdio>
+#include <set>
 
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
@@ -280,14 +281,14 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 
 std::string textNameOf(const Node& node) {
     if (!node.defName.empty()) return node.defName;
-    return node.defId > 0 ? fmt::format("N{}", node.defId - 1) : std::string();
+    return node.defId > 0 ? nameOfId('N', node.defId) : std::string();
 }
 
 std::string textNameOf(const Route& route) {
     // A name that would be taken for the number of another route goes.
     if (!route.name.empty() && (route.id == 0 || idFromTextName(route.name, 'R') == 0))
         return route.name;
-    return route.id > 0 ? fmt::format("R{}", route.id - 1) : std::string();
+    return route.id > 0 ? nameOfId('R', route.id) : std::string();
 }
 
 std::uint32_t idFromTextName(std::string_view name, char letter) {
@@ -322,9 +323,72 @@ Result<void> NodeNames::define(const std::string& name, const NodePtr& node,
         node->defId = id;
     } else {
         node->defName = name;
-        anyNames_ = true;
+        ++nameCount_;
     }
     return {};
+}
+
+void NodeNames::succeed(const Node& target, const NodePtr& replacement, std::size_t namedBefore) {
+    if (named_.size() <= namedBefore || named_.back() != replacement) return;  // a USE, no name
+    const std::string before = textNameOf(target) + '_';
+    const std::string_view name = replacement->defName;
+    if (!name.starts_with(before) || !wholeNumber<std::uint32_t>(name.substr(before.size())))
+        return;
+    bool holds = false;
+    forEachNode(replacement, [&](const NodePtr& node) { holds = holds || node.get() == &target; });
+    if (holds) return;
+    if (target.defName.empty()) --nameCount_;
+    replacement->defName = target.defName;
+    replacement->defId = target.defId;
+}
+
+void RouteNames::define(const Route& route) {
+    if (const std::string name = textNameOf(route); !name.empty()) ids_[name] = route.id;
+}
+
+/// Above all numbers that a name can have.
+static constexpr std::uint32_t kStandIn = 1u << 31;
+
+Result<std::uint32_t> RouteNames::idOf(const std::string& name, const std::string& where) {
+    if (const std::uint32_t id = idFromTextName(name, 'R')) return id;
+    const auto found = ids_.find(name);
+    if (found == ids_.end())
+        return failAt(where, ErrorCode::invalidInput, "no ROUTE has the DEF name '{}'",
+                      excerpt(name));
+    if (found->second == 0) {
+        found->second = kStandIn + static_cast<std::uint32_t>(reached_.size());
+        reached_.push_back(name);
+    }
+    return found->second;
+}
+
+void RouteNames::number(std::vector<CommandFrame>& frames) const {
+    if (reached_.empty()) return;
+    const auto eachRoute = [&](const auto& visit) {
+        for (CommandFrame& frame : frames)
+            for (Command& command : frame.commands)
+                std::visit(
+                    [&](auto& c) {
+                        if constexpr (requires { c.routes; })
+                            for (Route& route : c.routes) visit(route.id, route.name);
+                        if constexpr (requires { c.routeId; }) visit(c.routeId, std::string());
+                        if constexpr (requires { c.route; }) visit(c.route.id, c.route.name);
+                    },
+                    command);
+    };
+    std::set<std::uint32_t> taken;
+    eachRoute([&](std::uint32_t id, const std::string&) { taken.insert(id); });
+    std::map<std::string, std::uint32_t> numbers;
+    std::uint32_t next = 1;
+    for (const std::string& name : reached_) {
+        while (taken.contains(next)) ++next;
+        numbers[name] = next++;
+    }
+    eachRoute([&](std::uint32_t& id, const std::string& name) {
+        if (id >= kStandIn) id = numbers.at(reached_[id - kStandIn]);
+        if (const auto found = numbers.find(name); id == 0 && found != numbers.end())
+            id = found->second;
+    });
 }
 
 void NodeNames::closed(const NodePtr& node, int height) {

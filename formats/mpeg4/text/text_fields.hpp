@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -34,6 +35,21 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
 /// Whether a name can be written as a word of BT and as an attribute of XMT-A.
 [[nodiscard]] bool isPlainName(std::string_view name);
 
+/// The ROUTEs of a text by their DEF names, while it is read. Commands reach them by number in
+/// BIFS, so those that commands name get one at the end.
+class RouteNames {
+  public:
+    void define(const Route& route);
+    /// What a command that names a route has as its id until number(). Errors when there is none.
+    [[nodiscard]] Result<std::uint32_t> idOf(const std::string& name, const std::string& where);
+    /// Gives the routes that idOf() was asked for numbers that no other has.
+    void number(std::vector<CommandFrame>& frames) const;
+
+  private:
+    std::map<std::string, std::uint32_t> ids_;  ///< 0: has a name only
+    std::vector<std::string> reached_;
+};
+
 /// The nodes of a text by their DEF names, while it is read.
 class NodeNames {
   public:
@@ -49,7 +65,7 @@ class NodeNames {
     /// Goes on where the names of a buffer ended.
     void goOn(const NodeNames& buffer) {
         count_ = buffer.count_;
-        anyNames_ = anyNames_ || buffer.anyNames_;
+        nameCount_ += buffer.nameCount_;
     }
     /// The nodes that were named, in the order in which they ended.
     [[nodiscard]] const std::vector<NodePtr>& named() const { return named_; }
@@ -70,6 +86,12 @@ class NodeNames {
                                       const std::string& where, bool again);
     void closed(const NodePtr& node, int height);
 
+    /// Texts write a node that replaces `m0` as `m0_2`, and the next as `m0_3`: other programs take
+    /// a second DEF of one name for another node. Such a node has the name and the id of the one
+    /// that it replaces, unless that is in it. `namedBefore`: how many named() there were before it
+    /// was read.
+    void succeed(const Node& target, const NodePtr& replacement, std::size_t namedBefore);
+
     /// USE of a name at a nesting depth. Null: not defined yet, call useLater(). Errors when the
     /// node is open (it would hold itself) or its tree would nest too deeply here. Gives the tree's
     /// height.
@@ -88,7 +110,7 @@ class NodeNames {
     /// Errors when the nodes made so far are more than memory allows.
     [[nodiscard]] Result<void> countNode();
     /// Whether a DEF name was given that is not of the form N12.
-    [[nodiscard]] bool anyNames() const { return anyNames_; }
+    [[nodiscard]] bool anyNames() const { return nameCount_ > 0; }
 
   private:
     struct Entry {
@@ -117,7 +139,7 @@ class NodeNames {
     std::unordered_map<const Node*, int> heights_;  ///< of DEF'd nodes; absent while open
     std::vector<Pending> pending_;
     std::uint64_t count_ = 0;
-    bool anyNames_ = false;
+    std::uint64_t nameCount_ = 0;  ///< DEF names that are not of the form N12
 };
 
 }  // namespace stx::mpeg4

@@ -114,6 +114,15 @@ Result<int> TextReader::addOwnField(Node& script, const FieldInfo& field,
     return script.info->find(field.name);
 }
 
+Result<std::uint32_t> TextReader::routeId(const std::string& name, const std::string& where) {
+    if (bufferDepth_ > 0 && idFromTextName(name, 'R') == 0)
+        return failAt(where, ErrorCode::unsupported,
+                      "commands in a buffer reach ROUTEs by number only: name it R0, R1, ... "
+                      "instead of '{}'",
+                      excerpt(name));
+    return routes_.idOf(name, where);
+}
+
 Result<void> TextReader::addBuffer(std::size_t number, const std::string& where,
                                    std::function<Result<void>()> read) {
     if (bufferDepth_ >= kMaxBufferNesting)

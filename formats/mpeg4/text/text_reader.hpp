@@ -57,6 +57,9 @@ class TextReader {
     [[nodiscard]] Result<int> addOwnField(Node& script, const FieldInfo& field,
                                           const std::string& where) const;
 
+    /// RouteNames::idOf(); in a buffer only routes that have a number can be reached.
+    [[nodiscard]] Result<std::uint32_t> routeId(const std::string& name, const std::string& where);
+
     // ---- Buffers of commands
     /// Remembers a buffer until readBuffers(): `read` then adds its commands to document_.frames.
     [[nodiscard]] Result<void> addBuffer(std::size_t number, const std::string& where,
@@ -66,6 +69,7 @@ class TextReader {
 
     Job& job_;
     NodeNames names_;
+    RouteNames routes_;
     Document document_;
     TextBuffers buffers_;
     std::vector<std::vector<ProtoPtr>> protoScopes_ = std::vector<std::vector<ProtoPtr>>(1);

@@ -66,6 +66,7 @@ class XmtReader : private TextReader {
             return failAt(where(root), ErrorCode::invalidInput,
                           "the file has no scene, expected <Body><Replace><Scene>");
         STX_CHECK(readBuffers());
+        routes_.number(document_.frames);
         STX_CHECK(finishDocument(document_, names_));
         STX_CHECK(buffers_.encode(document_));
         return std::move(document_);
@@ -209,16 +210,7 @@ class XmtReader : private TextReader {
         return {};
     }
 
-    Result<std::uint32_t> routeId(xml_node node) const {
-        const std::string_view text = node.attribute("atRoute").value();
-        const auto id = idFromTextName(text, 'R');
-        if (id == 0)
-            return failAt(where(node), ErrorCode::unsupported,
-                          "commands reach ROUTEs by number only: R0, R1, ... and not '{}'",
-                          excerpt(text));
-        return id;
-    }
-    Result<Route> readRoute(xml_node node) const {
+    Result<Route> readRoute(xml_node node) {
         Route route;
         const std::string defName = node.attribute("DEF").value();
         route.id = idFromTextName(defName, 'R');
@@ -235,13 +227,14 @@ class XmtReader : private TextReader {
             return failAt(where(node), ErrorCode::invalidInput,
                           "the ROUTE leads from {} {} to {} {}; both must have one type",
                           name(source.type), source.name, name(target.type), target.name);
+        routes_.define(route);
         return route;
     }
 
     Result<void> readCommand(xml_node node, std::string_view type, std::uint64_t time) {
         const auto children = elements(node);
         if (!node.attribute("atRoute").empty()) {
-            STX_TRY(const auto id, routeId(node));
+            STX_TRY(const auto id, routeId(node.attribute("atRoute").value(), where(node)));
             if (type == "Delete") {
                 addCommand(document_.frames, time, DeleteRoute{id});
                 return {};
@@ -313,7 +306,9 @@ class XmtReader : private TextReader {
             NodePtr replacement;
             int height = 0;
             if (!children.empty()) {
+                const std::size_t named = names_.named().size();
                 STX_TRY(replacement, readNode(children[0], 1, height, nullptr, -1, -1));
+                names_.succeed(*target, replacement, named);
             }
             addCommand(document_.frames, time, ReplaceNode{target, std::move(replacement)});
             return {};

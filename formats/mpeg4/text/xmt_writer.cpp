@@ -312,7 +312,7 @@ class XmtWriter {
     }
     void writeRoute(const Route& route) {
         Attributes attributes;
-        if (std::string text = textNameOf(route); !text.empty())
+        if (std::string text = names_.define(route); !text.empty())
             attributes.push_back({"DEF", std::move(text)});
         attributes.push_back({"fromNode", nameOf(route.from)});
         attributes.push_back({"fromField", fieldName(route.from, route.fromField)});
@@ -364,7 +364,7 @@ class XmtWriter {
                        c.value);
     }
     void write(const ReplaceRoute& c) {
-        open("Replace", {{"atRoute", fmt::format("R{}", c.routeId - 1)}});
+        open("Replace", {{"atRoute", names_.routeOf(c.routeId)}});
         writeRoute(c.route);
         close("Replace");
     }
@@ -391,9 +391,7 @@ class XmtWriter {
                          {"atField", fieldName(c.target, c.field)},
                          {"position", positionText(c.position)}});
     }
-    void write(const DeleteRoute& c) {
-        empty("Delete", {{"atRoute", fmt::format("R{}", c.routeId - 1)}});
-    }
+    void write(const DeleteRoute& c) { empty("Delete", {{"atRoute", names_.routeOf(c.routeId)}}); }
 
     // ---- Descriptors
     template <class T>
