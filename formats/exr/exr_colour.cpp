@@ -37,9 +37,7 @@ void divideByAlpha(std::span<const glm::vec4> from, std::span<glm::u8vec4> to) {
     const Srgb8Tables& t = srgb8Tables();
     for (std::size_t x = 0; x < to.size(); ++x) {
         const auto& p = from[x];
-        const int a = p.a >= 1.0f  ? 255
-                      : p.a > 0.0f ? static_cast<int>(p.a * 255.0f + 0.5f)
-                                   : 0;
+        const int a = p.a >= 1.0f ? 255 : p.a > 0.0f ? static_cast<int>(p.a * 255.0f + 0.5f) : 0;
         const float inverse = a > 0 ? 255.0f / static_cast<float>(a) : 0.0f;
         to[x] = a > 0 ? glm::u8vec4(t.code(p.r * inverse), t.code(p.g * inverse),
                                     t.code(p.b * inverse), a)

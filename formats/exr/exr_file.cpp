@@ -291,7 +291,8 @@ std::int64_t ExrReader::Impl::stepOf(int index) const {
 
 Result<void> ExrReader::Impl::checkChunks(int index) const {
     const auto at = static_cast<std::size_t>(index);
-    return exr::checkChunks(parts[at], layoutOf(index), at < chunks.size() ? chunks[at] : ExrChunks(),
+    return exr::checkChunks(parts[at], layoutOf(index),
+                            at < chunks.size() ? chunks[at] : ExrChunks(),
                             [this](std::uint64_t offset, void* to, std::size_t count) {
                                 return readAt(offset, to, count);
                             });

@@ -249,8 +249,7 @@ std::optional<glm::vec3> colourIn(const EdgeView& view, const Warp& warp, const 
     const int x = static_cast<int>(u), y = static_cast<int>(v);
     if (!view.q->contains(x, y)) return {};
     const float there = view.q->at(x, y);
-    if (!(there > 0.0f) ||
-        !(std::abs(there - at) < same * view.space->axis.relativeScale(at)))
+    if (!(there > 0.0f) || !(std::abs(there - at) < same * view.space->axis.relativeScale(at)))
         return {};
     const glm::vec4 c = view.texture->at(x, y);
     if (c.a < 1.0f) return {};
