@@ -17,9 +17,9 @@
 #include "formats/images/codec_table.hpp"
 #include "formats/images/oiio/bmp.hpp"
 #include "formats/images/oiio/failed.hpp"
-#include "formats/images/picture_answer.hpp"
 #include "formats/images/oiio/tiff.hpp"
 #include "formats/images/oiio/webp.hpp"
+#include "formats/images/picture_answer.hpp"
 #include "lib/base/result.hpp"
 
 /// The only file that knows OpenImageIO. Its exceptions and geterror() end here, in `adapt`.
