@@ -13,7 +13,7 @@ In > and ! lines, {*} stands for any text within the line; a line {...} for any 
 $MODEL is the sample model, $SHARED the folder of real inputs, $SOURCE the checkout. A line
 `needs: path` skips the case (exit code 77) when the path under $SHARED is missing; `needs-program:
 name` when the program is not installed; `needs-gpu:` when stx finds no OpenGL without a display;
-`needs-video:` when the module of video was not built.
+`needs-video:` and `needs-heif:` when the module of video or of HEIC was not built.
 """
 import glob
 import os
@@ -22,6 +22,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
+
+
+# What a line asks for: the module, and the package that it is built with.
+MODULES = {"needs-video:": ("stx_video.so", "libavformat-dev"), "needs-heif:": ("stx_heif.so", "libheif-dev")}
 
 
 def matcher(line):
@@ -38,7 +42,7 @@ def matches(expected, got):
 
 
 def parse(path):
-    steps, needs, programs, gpu, video = [], [], [], False, False
+    steps, needs, programs, gpu, modules = [], [], [], False, []
     for number, raw in enumerate(open(path, encoding="utf-8"), 1):
         line = raw.rstrip("\n")
         if not line or line.startswith("#"):
@@ -52,8 +56,8 @@ def parse(path):
         if line.startswith("needs-gpu:"):
             gpu = True
             continue
-        if line.startswith("needs-video:"):
-            video = True
+        if line in MODULES:
+            modules.append(line)
             continue
         kind, text = line[0], line[2:]
         if kind == "$":
@@ -64,12 +68,12 @@ def parse(path):
             steps[-1][kind].append(text)
         else:
             sys.exit(f"{path}:{number}: a line starts with $ ? > ! = or -, not '{kind}'")
-    return steps, needs, programs, gpu, video
+    return steps, needs, programs, gpu, modules
 
 
 def main():
     case, stx, model, shared, source = sys.argv[1:6]
-    steps, needs, programs, gpu, video = parse(case)
+    steps, needs, programs, gpu, modules = parse(case)
     for need in needs:
         if not os.path.exists(os.path.join(shared, need)):
             print(f"SKIPPED: needs {os.path.join(shared, need)}, which is not here")
@@ -81,9 +85,10 @@ def main():
     if gpu and subprocess.run([stx, "render", "--list-devices"], capture_output=True).returncode:
         print("SKIPPED: needs OpenGL without a display, which is not here")
         return 77
-    if video and not glob.glob(os.path.join(os.path.dirname(stx), "..", "lib*", "**", "stx_video.so"), recursive=True):
-        print("SKIPPED: needs the module of video, which was not built (libavformat-dev)")
-        return 77
+    for name, package in map(MODULES.get, modules):
+        if not glob.glob(os.path.join(os.path.dirname(stx), "..", "lib*", "**", name), recursive=True):
+            print(f"SKIPPED: needs the module {name}, which was not built ({package})")
+            return 77
     env = dict(os.environ, MODEL=model, SHARED=shared, SOURCE=source,
                PATH=os.path.dirname(stx) + ":" + os.environ["PATH"])
     failed = False

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include <gtest/gtest.h>
@@ -52,8 +54,11 @@ Rgba8Image coloursOf(const photos::Photo& photo) {
 
 glm::dvec3 meanAround(const Rgba8Image& picture, double fx, double fy) {
     // Five pixels of a picture of 400.
-    const double reach = 2.5 * std::max(picture.width(), picture.height()) / 400.0;
-    const auto at = [](double f, int size) { return f * size; };
+    const double pixel = std::max(picture.width(), picture.height()) / 400.0;
+    const double reach = 2.5 * pixel;
+    const auto at = [pixel](double f, int size) {
+        return (std::floor(f * std::round(size / pixel)) + 0.5) * pixel;
+    };
     glm::dvec3 sum(0);
     int count = 0;
     for (int y = static_cast<int>(at(fy, picture.height()) - reach);
@@ -138,10 +143,15 @@ TEST(PhotosOfPhones, MadeFilesGiveTheirDepthBack) {
         const auto read = readPhoto(truth.parent_path() / name);
         ASSERT_TRUE(read) << read.error().text();
         ASSERT_EQ(read->stored.depth.count(), values.size());
-        // The dynamic one holds it as a JPEG of its own.
-        const double slack = std::string(name) == "made_dynamic_depth.jpg" ? 4 : 0;
-        for (std::size_t i = 0; i < values.size(); ++i)
-            ASSERT_NEAR(read->stored.depth.data()[i], values[i], slack);
+        // The dynamic one holds it coded once more.
+        const bool again = std::string(name) == "made_dynamic_depth.jpg";
+        double sum = 0;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const double off = std::abs(read->stored.depth.data()[i] - values[i]);
+            sum += off;
+            ASSERT_LE(off, again ? 12 : 0);
+        }
+        EXPECT_LT(sum / static_cast<double>(values.size()), 0.5);
     }
 }
 
