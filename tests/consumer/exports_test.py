@@ -68,6 +68,10 @@ def exported(library):
     return sorted({tuple(line.split(" ", 2)[1:]) for line in lines.stdout.splitlines()})
 
 
+# What a module answers in the place of a library that it calls.
+ANSWERED = [("stx_heif.so", "de265_start_worker_threads")]
+
+
 def unlike(shown, wanted):
     """A line for each function that is shown and not declared, or the other way round."""
     classes = {name.rsplit("::", 1)[0] for name in wanted if name.count("::") > 1}
@@ -94,7 +98,7 @@ def main():
     errors = unlike(exported(library), wanted)
     for module in sorted(glob.glob(os.path.join(modules, "*.so"))):
         errors += [f"{os.path.basename(module)} shows {symbol}" for _, symbol in exported(module)
-                   if symbol not in ("stxDecoder", "stxCodecs")]
+                   if symbol not in ("stxDecoder", "stxCodecs") and (os.path.basename(module), symbol) not in ANSWERED]
     if errors:
         sys.exit("\n".join(errors))
     print(f"{sum(wanted.values())} functions are shown")
