@@ -8,6 +8,7 @@
 #include "formats/stx/stx.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/metrics/compare.hpp"
+#include "lib/metrics/immersive.hpp"
 #include "lib/metrics/steadiness.hpp"
 #include "tools/commands.hpp"
 
@@ -28,29 +29,46 @@ nlohmann::ordered_json number(std::optional<double> v) {
     return *v;
 }
 
-nlohmann::ordered_json toJson(const Comparison& c) {
-    return {{"psnr", {{"rgb", number(c.psnrRgb)}, {"y", number(c.psnrY)}}},
-            {"ssim", {{"y", c.ssimY}}},
-            {"worst", {{"x", c.worst.x}, {"y", c.worst.y}, {"difference", c.worst.difference}}},
-            {"pixels", c.pixels},
-            {"differentPixels", c.differentPixels},
-            {"identical", c.identical()}};
+/// All figures of a pair, or of several together.
+struct Scores {
+    Comparison plain;
+    ImmersiveComparison immersive;
+};
+
+nlohmann::ordered_json toJson(const Scores& scores) {
+    const Comparison& c = scores.plain;
+    nlohmann::ordered_json out = {
+        {"psnr", {{"rgb", number(c.psnrRgb)}, {"y", number(c.psnrY)}}},
+        {"ivPsnr", number(scores.immersive.ivPsnr())},
+        {"ssim", {{"y", c.ssimY}}},
+        {"worst", {{"x", c.worst.x}, {"y", c.worst.y}, {"difference", c.worst.difference}}},
+        {"pixels", c.pixels},
+        {"differentPixels", c.differentPixels},
+        {"identical", c.identical()}};
+    if (scores.immersive.panoramas()) out["wsPsnr"] = {{"y", number(scores.immersive.wsPsnrY())}};
+    return out;
 }
 
-Result<Comparison> comparePair(const std::string& a, const std::string& b, const CompareOptions& o,
-                               const Image<std::uint8_t>* mask, Steadiness* steadiness,
-                               Program& program) {
+Result<Scores> comparePair(const std::string& a, const std::string& b, const CompareOptions& o,
+                           const Image<std::uint8_t>* mask, Steadiness* steadiness,
+                           Program& program) {
     STX_TRY(const auto first, openPicture(a, program.job));
-    // Both, what of the second its decoder holds, and their luma.
-    STX_CHECK(program.job.limits.checkAllocation(first.coded.count(), first.isLinear() ? 56 : 16,
+    // Both, what of the second its decoder holds, and their luma and colour differences.
+    STX_CHECK(program.job.limits.checkAllocation(first.coded.count(), first.isLinear() ? 72 : 32,
                                                  "two pictures that are compared"));
     STX_TRY(const auto second, openPicture(b, program.job));
     CompareSettings settings;
     settings.mask = mask;
     STX_TRY(settings.background, parseColour(o.background, "--background"));
+    Scores scores;
     auto result = compare(first, second, settings, program.job);
     if (!result) return tl::unexpected(result.error().at(fmt::format("'{}' and '{}'", a, b)));
+    scores.plain = *result;
     const bool linear = first.isLinear() && second.isLinear();
+    if (linear)
+        scores.immersive.add(first.linear, second.linear, settings);
+    else
+        scores.immersive.add(first.coded, second.coded, settings);
     if (steadiness && linear) steadiness->add(first.linear, second.linear, settings);
     if (steadiness && !linear) steadiness->add(first.coded, second.coded, settings);
     if (!o.errorPicture.empty()) {
@@ -61,7 +79,7 @@ Result<Comparison> comparePair(const std::string& a, const std::string& b, const
                 encodePng(picture.width(), picture.height(), 4, 8, picture.data(), true));
         STX_CHECK(writeFile(o.errorPicture, png, program.outputOptions()));
     }
-    return result;
+    return scores;
 }
 
 /// Two pictures that belong together.
@@ -126,12 +144,16 @@ std::string decibels(std::optional<double> v) {
 }
 
 /// "PSNR 40.00 dB (Y 41.00 dB), …", or that there is no difference.
-std::string scoresOf(const Comparison& c, const std::string& worstOf) {
+std::string scoresOf(const Scores& scores, const std::string& worstOf) {
+    const Comparison& c = scores.plain;
     if (c.identical()) return "identical";
+    const auto ws = scores.immersive.wsPsnrY();
     return fmt::format(
-        "PSNR {} (Y {}), SSIM {:.4f}, worst pixel ({}, {}){} differs by {:g}, {} of {} pixels "
+        "PSNR {} (Y {}), IV-PSNR {}{}, SSIM {:.4f}, worst pixel ({}, {}){} differs by {:g}, {} of "
+        "{} pixels "
         "differ",
-        decibels(c.psnrRgb), decibels(c.psnrY), c.ssimY, c.worst.x, c.worst.y, worstOf,
+        decibels(c.psnrRgb), decibels(c.psnrY), decibels(scores.immersive.ivPsnr()),
+        ws ? ", WS-PSNR " + decibels(ws) : "", c.ssimY, c.worst.x, c.worst.y, worstOf,
         c.worst.difference, c.differentPixels, c.pixels);
 }
 
@@ -161,7 +183,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
     }
     const auto* maskImage = mask ? &*mask : nullptr;
 
-    Comparison total;
+    Scores total;
     auto perFrame = nlohmann::ordered_json::array();
     int worstFrame = -1;
     Steadiness steadiness;
@@ -181,7 +203,8 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
             if (!one.errorPicture.empty()) STX_CHECK(checkTarget(one.errorPicture, program));
             STX_TRY(const auto c, comparePair(pair.a, pair.b, one, maskImage,
                                               folders ? nullptr : &steadiness, program));
-            sequence.add(c);
+            sequence.add(c.plain);
+            total.immersive.add(c.immersive);
             auto entry = toJson(c);
             if (folders)
                 entry["name"] = pair.name;
@@ -191,7 +214,7 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
             if (folders && program.common.format != "json")
                 program.print(printable(pair.name) + ": " + scoresOf(c, "") + "\n");
         }
-        total = sequence.total();
+        total.plain = sequence.total();
         const Pair& worst = pairs[static_cast<std::size_t>(sequence.worstFrame())];
         worstFrame = worst.frame;
         worstOf = folders ? " of '" + printable(worst.name) + "'"
@@ -221,9 +244,10 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
                 "{})\n",
                 steadiness.mean(), steadiness.worst(), o.firstFrame + steadiness.worstFrame()));
     }
-    if (total.identical()) return 0;
-    const bool near = !o.minPsnr || (total.psnrRgb && *total.psnrRgb >= *o.minPsnr);
-    const bool alike = !o.minSsim || total.ssimY >= *o.minSsim;
+    if (total.plain.identical()) return 0;
+    const auto psnr = total.plain.psnrRgb;
+    const bool near = !o.minPsnr || (psnr && *psnr >= *o.minPsnr);
+    const bool alike = !o.minSsim || total.plain.ssimY >= *o.minSsim;
     if ((o.minPsnr || o.minSsim) && near && alike) return 0;
     return static_cast<int>(ErrorCode::difference);
 }
@@ -233,8 +257,8 @@ Result<int> compareImages(const CompareOptions& o, const Command& command, Progr
 void addCompare(CommandLine& line, Program& program) {
     Command c =
         line.add("compare",
-                 "PSNR, SSIM and the worst pixel of two images, sequences or folders; exit "
-                 "code 7 when they differ\n\n"
+                 "PSNR, IV-PSNR, SSIM and the worst pixel of two images, sequences or folders; "
+                 "exit code 7 when they differ\n\n"
                  "  stx compare novel.png truth.png --error-picture error.png\n"
                  "  stx compare a_%04d.png b_%04d.png --format json --min-psnr 40\n"
                  "  stx compare drawn/ truth/ --error-picture errors/   all by their names");

@@ -406,6 +406,9 @@ void addConvert(CommandLine& line, Program& program) {
         .required()
         .takes("OUT");
     addMeshViewOptions(c, o->mesh);
+    c.flag("--times-from-start", o->open.timesFromStart,
+           "MPEG-4: startTime and stopTime that come with a later access unit count from the "
+           "start, and not from that unit");
     c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group(MeshViewOptions::kHeading);

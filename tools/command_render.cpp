@@ -475,6 +475,10 @@ void addOutput(Command& c, RenderOptions& o) {
     c.flag("--skip-existing", o.skipExisting, "Leave pictures that exist as they are")
         .group(output);
     addShardOption(c, o.shard, "pictures", output);
+    c.flag("--times-from-start", o.open.timesFromStart,
+           "MPEG-4: startTime and stopTime that come with a later access unit count from the "
+           "start, and not from that unit")
+        .group(output);
     c.option("--texture", o.open.texture, "Texture of a mesh, in place of those that it names")
         .takes("IMAGE")
         .group(output);

@@ -5,7 +5,6 @@
 
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/stx/mesh_views.hpp"
-#include "lib/base/whole_number.hpp"
 #include "lib/model/splat_cloud.hpp"
 #include "tools/camera_options.hpp"
 
@@ -56,17 +55,14 @@ Result<std::vector<NamedCamera>> camerasOfFile(const MeshViewOptions& o, const M
     return cameras;
 }
 
-/// Views get the names of their cameras, where each has one of its own. A view that saw nothing has
-/// gone; the others still tell their number.
-void nameViews(Bundle& bundle, const std::vector<NamedCamera>& cameras) {
-    std::set<std::string_view> names;
+/// The names of cameras, where each has one of its own; else none.
+std::vector<std::string> namesOf(const std::vector<NamedCamera>& cameras) {
+    std::vector<std::string> names;
     for (const NamedCamera& named : cameras)
-        if (!named.name.empty()) names.insert(named.name);
-    if (names.size() != cameras.size()) return;
-    for (ReferenceView& view : bundle.views)
-        if (const auto number = wholeNumber<std::size_t>(std::string_view(view.name).substr(4));
-            number && *number < cameras.size())
-            view.name = cameras[*number].name;
+        if (!named.name.empty()) names.push_back(named.name);
+    const std::set<std::string_view> different(names.begin(), names.end());
+    if (different.size() != cameras.size()) names.clear();
+    return names;
 }
 
 /// How good the choice of `auto` views is.
@@ -173,6 +169,7 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     STX_TRY(auto settings, settingsOf(o, program));
     STX_TRY(const auto named, camerasOfFile(o, mesh, program));
     for (const NamedCamera& one : named) settings.cameras.push_back(one.camera);
+    settings.names = namesOf(named);
     if (mesh.splats && o.up.empty() && settings.cameras.empty()) {
         settings.up = mesh.splats->up;
         noteSplatsUp(settings.up, program.job);
@@ -189,7 +186,6 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     }
     if (views.cameras.size() > 1) keepFreedMemory();
     STX_TRY(auto bundle, captureViews(mesh, views.cameras, settings, program.job));
-    nameViews(bundle, named);
     noteDepthLoss(bundle, program.job);
     return bundle;
 }

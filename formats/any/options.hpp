@@ -9,7 +9,10 @@ namespace stx {
 struct OpenOptions {
     std::string texture;     ///< texture of a mesh, in place of those that it names; empty = none
     bool materials = false;  ///< of a mesh: its metallic-roughness is read, too
-    ImageSetOptions set;     ///< of image sets; with set.from whatever is given is read as one
+    /// MPEG-4: startTime and stopTime that come with a later access unit count from the start of
+    /// the scene, not from that unit.
+    bool timesFromStart = false;
+    ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
 };
 
 struct SaveOptions {

@@ -152,6 +152,7 @@ Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOpt
         STX_TRY(auto document, readMpeg4(path, job));
         mpeg4::SceneReadOptions read;
         read.folder = folderOf(path);
+        read.timesFromStart = options.timesFromStart;
         auto sequence = mpeg4::sequenceFromScene(std::move(document), read, job);
         if (!sequence)
             return tl::unexpected(sequence.error().at(fmt::format("'{}'", path.string())));

@@ -123,9 +123,16 @@ class MediaLoader {
 
   private:
     Result<void> loadNamed(ElementaryStream& stream) {
-        if (const auto hash = stream.fileName.rfind('#'); hash != std::string::npos)
-            return loadTrack(stream, stream.fileName.substr(0, hash),
-                             stream.fileName.substr(hash + 1));
+        if (const auto hash = stream.fileName.rfind('#'); hash != std::string::npos) {
+            const auto choice = trackOf(stream, stream.fileName.substr(hash + 1));
+            if (!choice)
+                return fail(ErrorCode::invalidInput,
+                            "'{}' names no track; expected FILE.mp4#NUMBER, FILE.mp4#video or "
+                            "FILE.mp4#audio",
+                            excerpt(stream.fileName));
+            STX_TRY(const auto path, find(stream.fileName.substr(0, hash)));
+            return loadTrack(stream, path, *choice);
+        }
         const auto names = sampleFileNames(stream);
         if (names.empty() || names.size() != stream.samples.size())
             return fail(ErrorCode::invalidInput, "'{}' is not a name of {} file(s)",
@@ -133,6 +140,9 @@ class MediaLoader {
         for (std::size_t i = 0; i < names.size(); ++i) {
             STX_TRY(const auto path, find(names[i]));
             STX_TRY(stream.samples[i].data, open(path));
+            if (names.size() > 1) continue;
+            STX_TRY(const bool isFilm, checkAccessUnit(path, stream.samples[i].data));
+            if (isFilm) return loadTrack(stream, path, *trackOf(stream, ""));
         }
         if (stream.samples.empty()) return {};
         ByteRange head = stream.samples[0].data;
@@ -163,15 +173,39 @@ class MediaLoader {
         STX_CHECK(job_.limits.checkAllocation(total_, 1, "the images"));
         return ByteRange::of(std::move(bytes));
     }
-    Result<void> loadTrack(ElementaryStream& stream, const std::string& file,
-                           const std::string& track) {
-        const auto id = integerFromText(track);
-        if (!id || *id < 1 || *id > 0xFFFFFFFF)
-            return fail(ErrorCode::invalidInput, "'{}' names no track; expected FILE.mp4#NUMBER",
-                        excerpt(stream.fileName));
-        STX_TRY(const auto path, find(file));
+    /// `1`, `trackID=1`, `video`, `audio`, as others write it, or nothing: by the stream's type.
+    static std::optional<TrackChoice> trackOf(const ElementaryStream& stream, std::string name) {
+        if (equalNoCase(name, "audio") || (name.empty() && stream.streamType == StreamType::audio))
+            return TrackChoice{0, "soun"};
+        if (name.empty() || equalNoCase(name, "video")) return TrackChoice{0, "vide"};
+        constexpr std::string_view kById = "trackID=";
+        if (name.size() > kById.size() && equalNoCase(name.substr(0, kById.size()), kById))
+            name.erase(0, kById.size());
+        const auto id = integerFromText(name);
+        if (!id || *id < 1 || *id > 0xFFFFFFFF) return {};
+        return TrackChoice{static_cast<std::uint32_t>(*id), {}};
+    }
+    /// Whether a file is not an access unit but an .mp4 of many. Errors (unsupported) on other
+    /// files that are more than one: a stream of their bytes would be damaged.
+    Result<bool> checkAccessUnit(const std::filesystem::path& path, ByteRange data) const {
+        data.size = std::min<std::uint64_t>(data.size, 16);
+        STX_TRY(const auto head, data.load(job_.limits));
+        if (looksLikeMp4(head)) return true;
+        const std::string ending = path.extension().string();
+        for (const std::string_view film :
+             {".264", ".h264", ".avc", ".265", ".h265", ".hevc", ".m4v", ".cmp", ".m1v", ".m2v",
+              ".mpg", ".mpeg", ".ts", ".avi", ".mkv", ".webm", ".aac", ".mp3", ".ogg"})
+            if (equalNoCase(ending, film))
+                return fail(ErrorCode::unsupported,
+                            "'{}' holds many pictures or sounds, and only an .mp4 is taken apart "
+                            "here; make one of it (ffmpeg -i {} -c copy {}.mp4) and name that",
+                            path.string(), path.filename().string(), path.stem().string());
+        return false;
+    }
+    Result<void> loadTrack(ElementaryStream& stream, const std::filesystem::path& path,
+                           const TrackChoice& choice) {
         STX_TRY(const auto source, ByteSource::open(path));
-        STX_TRY(auto found, readMp4Stream(source, static_cast<std::uint32_t>(*id), job_));
+        STX_TRY(auto found, readMp4Stream(source, choice, job_));
         // What the text says of the start of the stream delays the track.
         const double start = stream.samples.empty()
                                  ? 0

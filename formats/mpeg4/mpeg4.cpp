@@ -1,5 +1,7 @@
 #include "formats/mpeg4/mpeg4.hpp"
 
+#include <algorithm>
+
 #include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
@@ -74,6 +76,13 @@ Result<void> writeText(const Document& source, const std::filesystem::path& path
             job.note(
                 "the edit list of the scene or its object descriptors is left out: texts have "
                 "none");
+    const auto coded =
+        std::ranges::count_if(document.frames, [](const CommandFrame& f) { return !!f.coded; });
+    if (coded > 0)
+        job.note(fmt::format(
+            "{} access unit(s) of the scene have commands that are not known here; these are left "
+            "out of the text",
+            coded));
     STX_TRY(const auto text,
             container == Mpeg4Container::bt ? writeBt(document, job) : writeXmt(document, job));
     if (path == "-") {

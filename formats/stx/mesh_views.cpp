@@ -20,6 +20,7 @@ CaptureSettings captureSettings(const ConvertSettings& s) {
     capture.depthBits = s.depthBits.value_or(16);
     capture.meshNormals = s.meshNormals;
     capture.materials = s.materials;
+    if (!s.cameras.empty()) capture.names = s.names;
     return capture;
 }
 

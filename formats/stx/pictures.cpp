@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "formats/files/messages.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
@@ -44,6 +46,20 @@ class KeptRenderer final : public Renderer {
     std::unique_ptr<Renderer> renderer_;
 };
 
+/// A picture whose stored pixels are a part of it, as all of it: nothing is where none are.
+template <class P>
+Image<P> wholeOf(const Image<P>& stored, const DecodedImage& window, P nothing) {
+    Image<P> whole(window.displayWidth, window.displayHeight, nothing);
+    for (int y = 0; y < stored.height(); ++y) {
+        const int to = y + window.originY;
+        if (to < 0 || to >= whole.height()) continue;
+        const int from = std::max(0, -window.originX);
+        const int end = std::min(stored.width(), whole.width() - window.originX);
+        for (int x = from; x < end; ++x) whole.at(x + window.originX, to) = stored.at(x, y);
+    }
+    return whole;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Renderer>> rendererOf(Model model, const RenderSettings& settings, Job& job,
@@ -78,6 +94,20 @@ Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
         job.limits.checkAllocation(pixels, bytesEach + (decoded.linear ? 20 : 4), "the picture")));
     if (decoded.linear) picture.linear = rgbaFloatFrom(decoded);
     picture.coded = rgba8From(decoded);
+    const bool isPart =
+        decoded.displayWidth > 0 && decoded.displayHeight > 0 &&
+        (decoded.originX != 0 || decoded.originY != 0 || decoded.displayWidth != decoded.width ||
+         decoded.displayHeight != decoded.height);
+    if (!isPart) return picture;
+    STX_CHECK(
+        within(inQuotes(path.string()),
+               job.limits.checkAllocation(static_cast<std::uint64_t>(decoded.displayWidth) *
+                                              static_cast<std::uint64_t>(decoded.displayHeight),
+                                          40, "the picture")));
+    const bool alpha = std::ranges::find(decoded.channelNames, "A") != decoded.channelNames.end();
+    if (decoded.linear)
+        picture.linear = wholeOf(picture.linear, decoded, glm::vec4(0, 0, 0, alpha ? 0 : 1));
+    picture.coded = wholeOf(picture.coded, decoded, glm::u8vec4(0, 0, 0, alpha ? 0 : 255));
     return picture;
 }
 

@@ -109,6 +109,8 @@ struct ConvertSettings {
     /// The views themselves, in the model's coordinates (see originOf()), when there are any: then
     /// neither `views` nor the framing below, from width to elevationRad, counts.
     std::vector<Camera> cameras{};
+    /// Names of the views, one for each of `cameras`; empty: view000, view001, ...
+    std::vector<std::string> names{};
     int width = 512, height = 512;             ///< pixels of each view
     std::optional<bool> orthographic{};        ///< without a value: only the faces of a cube are
     double fovRad = glm::radians(35.0);        ///< the angle that the whole object fills
@@ -200,8 +202,9 @@ struct Picture {
     [[nodiscard]] bool isLinear() const { return !linear.empty(); }
 };
 
-/// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...). Errors: io,
-/// invalidInput, unsupported (the module of image codecs is not there).
+/// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...). OpenEXR is
+/// its display window; what is not stored of it is black, and transparent where the file has alpha.
+/// Errors: io, invalidInput, unsupported (the module of image codecs is not there).
 [[nodiscard]] Result<Picture> openPicture(const std::filesystem::path& path, Job& job);
 
 /// What save() would put into a PNG.

@@ -96,6 +96,9 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
     }
     const Mesh& mesh = rest ? *rest : whole;
     noteTranslucent(mesh, job);
+    if (!settings.names.empty() && settings.names.size() != cameras.size())
+        return fail(ErrorCode::usage, "there are {} names for {} cameras", settings.names.size(),
+                    cameras.size());
     std::uint64_t pixels = 0;
     for (const auto& c : cameras) {
         STX_CHECK(c.check());
@@ -119,7 +122,10 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
     std::vector<Result<ReferenceView>> views(n, ReferenceView());
     std::atomic<std::int64_t> done = 0;
     const auto capture = [&](std::int64_t i) {
-        views[i] = captureView(mesh, cameras[i], fmt::format("view{:03}", i), settings, job);
+        const auto at = static_cast<std::size_t>(i);
+        const std::string name =
+            settings.names.empty() ? fmt::format("view{:03}", i) : settings.names[at];
+        views[i] = captureView(mesh, cameras[i], name, settings, job);
         job.progress(++done, n, "capturing views");
     };
     // All threads draw one view of a cloud: several views at a time would need the memory of each.

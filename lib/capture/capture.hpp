@@ -16,6 +16,9 @@ struct CaptureSettings {
     bool meshNormals = false;  ///< the mesh's own normals become the view's (SimpleTextureV2)
     /// Metallic-roughness and emissive become images of the view; its colour is without emission.
     bool materials = false;
+    /// Of captureBundle(): the names of the views, one for each camera; empty: view000, view001,
+    /// ...
+    std::vector<std::string> names;
 };
 
 /// One reference view of a mesh: colour and coverage supersampled, depth at the pixel centres,

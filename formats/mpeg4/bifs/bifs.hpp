@@ -26,7 +26,7 @@ struct BufferScene {
 /// The coding of commands in a stream.
 [[nodiscard]] CommandCoding codingOf(const BifsConfig& config, bool useNames);
 
-/// Reads the access units of one stream in their order: later ones name the nodes of earlier ones.
+/// Reads the access units of a scene in their order: later ones name the nodes of earlier ones.
 class BifsDecoder {
   public:
     BifsDecoder(BifsConfig config, const Limits& limits);
@@ -35,8 +35,15 @@ class BifsDecoder {
 
     /// The commands of one access unit. Errors (invalidInput, where = "bit N") on anything that the
     /// syntax or the table does not have; (unsupported) on predictive MF coding and on extended
-    /// commands.
+    /// commands: begun() then has the commands before it.
     [[nodiscard]] Result<std::vector<Command>> decode(ByteSpan accessUnit);
+    [[nodiscard]] std::vector<Command> begun();
+    /// The access units that come now are of another stream of the scene, with a config of its own.
+    void setConfig(const BifsConfig& config);
+    /// How the last access unit is coded.
+    [[nodiscard]] CommandCoding coding() const;
+    /// Names in Scripts that no program can have, so far; they have others.
+    [[nodiscard]] std::size_t renamed() const;
     /// The commands of a buffer, whose nodes are those of `scene` and new ones. Errors as decode().
     [[nodiscard]] static Result<std::vector<Command>> decodeBuffer(const CommandBuffer& buffer,
                                                                    const BufferScene& scene,

@@ -8,6 +8,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
     using BifsNodeReader::BifsNodeReader;
 
     std::uint64_t bitsLeft = 0;
+    std::vector<Command> begun;
 
     Result<Position> readPosition(int explicitBits) {
         Position position;
@@ -175,16 +176,16 @@ struct BifsDecoder::Impl : BifsNodeReader {
 
     Result<std::vector<Command>> decode(ByteSpan accessUnit) {
         in = BitReader(accessUnit);
-        std::vector<Command> commands;
+        begun.clear();
         do {
             STX_TRY(Command next, readCommand());
-            commands.push_back(std::move(next));
+            begun.push_back(std::move(next));
             const bool more = in.flag();
             STX_CHECK(check("a command"));
             if (!more) break;
         } while (true);
         bitsLeft = in.left();
-        return commands;
+        return std::exchange(begun, {});
     }
 };
 
@@ -211,6 +212,18 @@ Result<std::vector<Command>> BifsDecoder::decodeBuffer(const CommandBuffer& buff
     impl.around = &scene;
     impl.protoScopes.front() = scene.protos;
     return impl.decode(std::as_bytes(std::span(buffer.bytes)));
+}
+std::vector<Command> BifsDecoder::begun() {
+    return std::exchange(impl_->begun, {});
+}
+void BifsDecoder::setConfig(const BifsConfig& config) {
+    impl_->config = config;
+}
+CommandCoding BifsDecoder::coding() const {
+    return codingOf(impl_->config, impl_->useNames);
+}
+std::size_t BifsDecoder::renamed() const {
+    return impl_->renamed;
 }
 CommandCoding codingOf(const BifsConfig& config, bool useNames) {
     return {config.nodeIdBits, config.routeIdBits, config.version == 2 ? config.protoIdBits : 0,

@@ -30,6 +30,7 @@ struct BifsNodeReader {
     QuantisationScope quantisation;
     std::uint64_t command = 0;  ///< counts commands over all access units
     std::uint64_t memory = 0;   ///< an estimate of what the nodes hold
+    std::size_t renamed = 0;    ///< names in Scripts that none can have
     BitReader in{ByteSpan{}};
 
     // ---- errors and budgets

@@ -133,7 +133,7 @@ Result<ScriptText> BifsNodeReader::readScriptItem(Node& script, int depth) {
     in.read(1);
     STX_TRY(std::string text,
             readScript(in, std::move(names), limits.maxNesting,
-                       limits.maxMemoryBytes - std::min(limits.maxMemoryBytes, memory)));
+                       limits.maxMemoryBytes - std::min(limits.maxMemoryBytes, memory), &renamed));
     STX_CHECK(useBudget(text.size()));
     return ScriptText{std::move(text)};
 }
@@ -142,7 +142,7 @@ Result<std::string> BifsNodeReader::readScriptField(Node& script, int depth) {
     constexpr FieldKind kKinds[] = {FieldKind::field, FieldKind::eventIn, FieldKind::eventOut};
     const std::uint32_t kind = in.read(2);
     const int code = static_cast<int>(in.read(6));
-    STX_TRY(const std::string fieldName, readName());
+    STX_TRY(std::string fieldName, readName());
     const auto type = interfaceType(code);
     if (kind > 2)
         return error(ErrorCode::invalidInput, "a field of a Script has the kind {}", kind);
@@ -151,8 +151,12 @@ Result<std::string> BifsNodeReader::readScriptField(Node& script, int depth) {
                      "a field of a Script has the type {}, which is not "
                      "supported",
                      code);
-    if (!isFieldName(fieldName))
-        return error(ErrorCode::invalidInput, "a field of a Script has an invalid name");
+    if (!isFieldName(fieldName)) {
+        fieldName = scriptNameFrom(fieldName);
+        // Programs name fields by their number in BIFS.
+        while (script.info->find(fieldName) >= 0) fieldName += '_';
+        ++renamed;
+    }
     FieldInfo field;
     field.kind = kKinds[kind];
     field.name = fieldName;

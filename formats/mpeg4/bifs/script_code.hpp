@@ -16,12 +16,16 @@ inline constexpr std::string_view kScriptPrefix = "javascript:";
 
 /// Whether a name can stand for a function, a variable or a field of a Script.
 [[nodiscard]] bool isScriptName(std::string_view name);
+/// The same name, with '_' for what names cannot have.
+[[nodiscard]] std::string scriptNameFrom(std::string name);
 
 /// Reads the functions of a program, up to the bit behind the last, as source with the prefix.
-/// `names`: the fields of the node, which identifiers may refer to. Errors (invalidInput) on what
-/// the syntax does not have, and when the source gets longer than `maxBytes`.
+/// `names`: the fields of the node, which identifiers may refer to. Names that cannot be one are
+/// changed by scriptNameFrom() and counted in `renamed`. Errors (invalidInput) on what the syntax
+/// does not have, and when the source gets longer than `maxBytes`.
 [[nodiscard]] Result<std::string> readScript(BitReader& in, std::vector<std::string> names,
-                                             int maxNesting, std::uint64_t maxBytes);
+                                             int maxNesting, std::uint64_t maxBytes,
+                                             std::size_t* renamed = nullptr);
 
 /// Codes a program. Errors: (unsupported) with the line and the word, on what has no code in BIFS.
 [[nodiscard]] Result<void> writeScript(BitWriter& out, std::string_view source,

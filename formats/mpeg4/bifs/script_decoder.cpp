@@ -8,8 +8,12 @@ using namespace script;
 class ScriptReader {
   public:
     ScriptReader(BitReader& in, std::vector<std::string> names, int maxNesting,
-                 std::uint64_t maxBytes)
-        : in_(in), names_(std::move(names)), maxNesting_(maxNesting), maxBytes_(maxBytes) {}
+                 std::uint64_t maxBytes, std::size_t* renamed)
+        : in_(in),
+          names_(std::move(names)),
+          maxNesting_(maxNesting),
+          maxBytes_(maxBytes),
+          renamed_(renamed) {}
 
     Result<std::string> read() {
         out_ = kScriptPrefix;
@@ -76,8 +80,11 @@ class ScriptReader {
             out_ += names_[index];
             return check();
         }
-        STX_TRY(const std::string name, characters());
-        if (!isScriptName(name)) return error("the program of a Script has an invalid name");
+        STX_TRY(std::string name, characters());
+        if (!isScriptName(name)) {
+            name = scriptNameFrom(name);
+            if (renamed_ != nullptr) ++*renamed_;
+        }
         names_.push_back(name);
         out_ += name;
         return check();
@@ -369,6 +376,7 @@ class ScriptReader {
     std::vector<std::string> names_;
     int maxNesting_;
     std::uint64_t maxBytes_;
+    std::size_t* renamed_;
     std::string out_;
     int depth_ = 0;
     int indent_ = 0;
@@ -390,6 +398,12 @@ bool isScriptName(std::string_view name) {
           "throw",    "try",    "catch",  "finally", "with"})
         if (name == word) return false;
     return true;
+}
+
+std::string scriptNameFrom(std::string name) {
+    for (char& c : name)
+        if (!isScriptName(std::string("a") + c)) c = '_';
+    return isScriptName(name) ? name : "_" + name;
 }
 
 std::size_t scriptNumberLength(std::string_view text) {
@@ -424,8 +438,8 @@ bool canBeQuoted(std::string_view text, char quote) {
 }
 
 Result<std::string> readScript(BitReader& in, std::vector<std::string> names, int maxNesting,
-                               std::uint64_t maxBytes) {
-    return ScriptReader(in, std::move(names), maxNesting, maxBytes).read();
+                               std::uint64_t maxBytes, std::size_t* renamed) {
+    return ScriptReader(in, std::move(names), maxNesting, maxBytes, renamed).read();
 }
 
 }  // namespace stx::mpeg4

@@ -15,10 +15,15 @@ namespace stx::mpeg4 {
 /// encrypted files and on files without a scene.
 [[nodiscard]] Result<Document> readMp4(const ByteSource& source, Job& job);
 
+/// A track by its number, or the first of a kind.
+struct TrackChoice {
+    std::uint32_t id = 0;
+    std::string handler;  ///< "vide", "soun"; empty: by number
+};
 /// One track of an .mp4 with all its samples, whatever names it: the file needs no scene. Errors as
 /// readMp4, and when there is no such track.
 [[nodiscard]] Result<ElementaryStream> readMp4Stream(const ByteSource& source,
-                                                     std::uint32_t trackId, Job& job);
+                                                     const TrackChoice& choice, Job& job);
 
 struct Mp4WriteOptions {
     BifsStyle style;  ///< mask and vector forms

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -39,13 +41,19 @@ class Reader {
         return std::move(document_);
     }
 
-    Result<ElementaryStream> readStream(std::uint32_t trackId) {
+    Result<ElementaryStream> readStream(const TrackChoice& choice) {
         STX_CHECK(readTopLevel());
         STX_CHECK(readMoov());
-        Mp4Track* track = findTrack(trackId);
+        Mp4Track* track = findTrack(choice.id);
+        for (Mp4Track& one : tracks_)
+            if (track == nullptr && !choice.handler.empty() && one.facts.handler == choice.handler)
+                track = &one;
         if (track == nullptr)
             return failAt("moov", ErrorCode::invalidInput,
-                          "the file has no track {}; its tracks are {}", trackId, trackNumbers());
+                          "the file has no track {}; its tracks are {}",
+                          choice.handler.empty() ? fmt::format("{}", choice.id)
+                                                 : fmt::format("of kind '{}'", choice.handler),
+                          trackNumbers());
         if (track->elsewhere)
             return failAt(track->path, ErrorCode::unsupported,
                           "the data of the track are in another file, which is not opened");
@@ -215,6 +223,8 @@ class Reader {
             track->facts.inIods = true;
             if (scene_ == nullptr && isScene(*track))
                 scene_ = track;
+            else if (isScene(*track) && track != scene_ && track->hasEsds)
+                moreScene_.push_back(track);
             else if (od_ == nullptr && isOd(*track))
                 od_ = track;
         }
@@ -224,7 +234,8 @@ class Reader {
                 if (facts().hasIods)
                     addDeviation(Deviation::sceneNotInIods, "the IOD does not name the scene track",
                                  track.path);
-            } else if (&track != scene_ && isScene(track)) {
+            } else if (&track != scene_ && isScene(track) &&
+                       std::ranges::find(moreScene_, &track) == moreScene_.end()) {
                 job_.note(fmt::format("scene track {} is passed over; the scene is in track {}",
                                       track.facts.trackId, scene_->facts.trackId));
             }
@@ -356,30 +367,102 @@ class Reader {
         if (!scene_->hasEsds)
             return failAt(scene_->path, ErrorCode::invalidInput,
                           "the scene track has no 'esds' box, so no BIFS config");
-        const std::uint8_t type = scene_->stream.objectTypeIndication;
-        if (type != oti::kSystemsV1 && type != oti::kSystemsV2 && type != 0xFF)
-            return failAt(scene_->path, ErrorCode::unsupported,
-                          "the scene has object type {:#04x}; BIFS is 0x01 or 0x02", type);
-        auto config = decodeBifsConfig(scene_->stream.decoderSpecificInfo, type);
-        if (!config) return tl::unexpected(config.error().at(scene_->path));
-        document_.bifsConfig = *config;
+        STX_TRY(document_.bifsConfig, configOf(*scene_));
         STX_TRY(const std::vector<Sample>* samples, samplesOf(*scene_));
         document_.sceneStream.edits = scene_->stream.edits;
         document_.sceneStream.samples = *samples;
-        BifsDecoder decoder(*config, job_.limits);
-        for (std::size_t i = 0; i < samples->size(); ++i) {
-            const Sample& sample = (*samples)[i];
-            const std::string place =
-                fmt::format("BIFS access unit {} at byte {}", i + 1, sample.data.offset);
-            STX_TRY(const Bytes bytes, sample.data.load(job_.limits));
-            auto commands = decoder.decode(bytes);
-            if (!commands) return tl::unexpected(commands.error().at(place));
-            if (decoder.bitsLeft() >= 8)
-                addDeviation(Deviation::trailingBytes,
-                             fmt::format("{} bits follow the last command", decoder.bitsLeft()),
-                             place);
-            document_.frames.push_back({sample.time, std::move(*commands), sample.sync && i > 0});
+        // Access units of all streams of the scene in the order of time; streams that build on
+        // another come behind it.
+        std::vector<SceneUnit> units;
+        for (const Sample& sample : *samples)
+            units.push_back({&sample, sample.time, document_.bifsConfig, true});
+        for (Mp4Track* track : moreScene_) {
+            auto config = configOf(*track);
+            if (!config || track->elsewhere) {
+                job_.note(
+                    fmt::format("scene track {} is passed over: {}", track->facts.trackId,
+                                config ? "its data are in another file" : config.error().text()));
+                continue;
+            }
+            STX_TRY(const std::vector<Sample>* more, samplesOf(*track));
+            const double scale = static_cast<double>(scene_->stream.timescale) /
+                                 std::max<std::uint32_t>(track->stream.timescale, 1);
+            for (const Sample& sample : *more)
+                units.push_back({&sample,
+                                 static_cast<std::uint64_t>(
+                                     std::llround(static_cast<double>(sample.time) * scale)),
+                                 *config, false});
+            // Nodes and ROUTEs have one space of ids.
+            document_.bifsConfig.nodeIdBits =
+                std::max(document_.bifsConfig.nodeIdBits, config->nodeIdBits);
+            document_.bifsConfig.routeIdBits =
+                std::max(document_.bifsConfig.routeIdBits, config->routeIdBits);
+            track->facts.referenced = true;
+            job_.note(fmt::format("scene track {} is read with track {}, as one stream",
+                                  track->facts.trackId, scene_->facts.trackId));
         }
+        std::ranges::stable_sort(units, {}, &SceneUnit::time);
+        BifsDecoder decoder(document_.bifsConfig, job_.limits);
+        for (std::size_t i = 0; i < units.size(); ++i) STX_CHECK(readUnit(decoder, units[i], i));
+        if (decoder.renamed() > 0)
+            job_.note(
+                fmt::format("{} name(s) in Scripts are not JavaScript's; they have '_' for what "
+                            "names cannot have",
+                            decoder.renamed()));
+        return {};
+    }
+
+    static Result<BifsConfig> configOf(const Mp4Track& track) {
+        const std::uint8_t type = track.stream.objectTypeIndication;
+        if (type != oti::kSystemsV1 && type != oti::kSystemsV2 && type != 0xFF)
+            return failAt(track.path, ErrorCode::unsupported,
+                          "the scene has object type {:#04x}; BIFS is 0x01 or 0x02", type);
+        auto config = decodeBifsConfig(track.stream.decoderSpecificInfo, type);
+        if (!config) return tl::unexpected(config.error().at(track.path));
+        return config;
+    }
+
+    struct SceneUnit {
+        const Sample* sample;
+        std::uint64_t time;  ///< in ticks of the scene's stream
+        BifsConfig config;
+        bool first;  ///< of the stream that the others build on
+    };
+
+    Result<void> readUnit(BifsDecoder& decoder, const SceneUnit& unit, std::size_t number) {
+        const std::string place =
+            fmt::format("BIFS access unit {} at byte {}", number + 1, unit.sample->data.offset);
+        STX_TRY(const Bytes bytes, unit.sample->data.load(job_.limits));
+        decoder.setConfig(unit.config);
+        auto commands = decoder.decode(bytes);
+        CommandFrame frame;
+        frame.time = unit.time;
+        frame.randomAccess = unit.first && unit.sample->sync && number > 0;
+        if (commands) {
+            frame.commands = std::move(*commands);
+        } else {
+            // What later ones name may come with one that was not understood.
+            const bool carried = number > 0 && (commands.error().code == ErrorCode::unsupported ||
+                                                carriedUnits_ > 0);
+            if (!carried) return tl::unexpected(commands.error().at(place));
+            if (carriedUnits_++ == 0)
+                job_.note(fmt::format(
+                    "{}: {}; it stays as it is in an .mp4, has no effect here, and texts do not "
+                    "have it, as what builds on it",
+                    place, commands.error().text()));
+            frame.commands = decoder.begun();
+            const auto* from = reinterpret_cast<const std::uint8_t*>(bytes.data());
+            frame.coded = CommandBuffer{{from, from + bytes.size()}, decoder.coding()};
+        }
+        if (commands && decoder.bitsLeft() >= 8)
+            addDeviation(Deviation::trailingBytes,
+                         fmt::format("{} bits follow the last command", decoder.bitsLeft()), place);
+        CommandFrame* last = document_.frames.empty() ? nullptr : &document_.frames.back();
+        if (!unit.first && last != nullptr && last->time == frame.time && !last->coded &&
+            !frame.coded)
+            std::ranges::move(frame.commands, std::back_inserter(last->commands));
+        else
+            document_.frames.push_back(std::move(frame));
         return {};
     }
 
@@ -393,7 +476,9 @@ class Reader {
     std::unordered_map<std::uint32_t, std::vector<Sample>> samples_;
     std::vector<std::uint32_t> initialTracks_;
     Mp4Track* scene_ = nullptr;
+    std::vector<Mp4Track*> moreScene_;  ///< further streams of the scene, which the IOD names
     Mp4Track* od_ = nullptr;
+    std::size_t carriedUnits_ = 0;  ///< access units of the scene that were not understood
     std::uint64_t spent_ = 0;
 };
 
@@ -413,8 +498,9 @@ Result<Document> readMp4(const ByteSource& source, Job& job) {
     return document;
 }
 
-Result<ElementaryStream> readMp4Stream(const ByteSource& source, std::uint32_t trackId, Job& job) {
-    auto stream = Reader(source, job).readStream(trackId);
+Result<ElementaryStream> readMp4Stream(const ByteSource& source, const TrackChoice& choice,
+                                       Job& job) {
+    auto stream = Reader(source, job).readStream(choice);
     if (!stream && !source.name().empty())
         return tl::unexpected(stream.error().at(fmt::format("'{}'", source.name())));
     return stream;

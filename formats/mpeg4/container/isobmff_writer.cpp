@@ -228,6 +228,23 @@ class Writer {
         return {};
     }
 
+    /// One that holds a command that is not known here is as it was, if ids are as wide as then.
+    static Result<Bytes> encode(BifsEncoder& encoder, const CommandFrame& frame,
+                                const BifsConfig& config) {
+        if (!frame.coded) return encoder.encode(frame.commands);
+        // For what later ones may name.
+        if (!frame.commands.empty()) STX_CHECK(encoder.encode(frame.commands));
+        const CommandCoding was = frame.coded->coding.value_or(CommandCoding());
+        if (codingOf(config, was.useNames) != was)
+            return fail(ErrorCode::unsupported,
+                        "the access unit has a command that is not known here, with ids of {} and "
+                        "{} bits for nodes and ROUTEs, but the scene is written with {} and {}; "
+                        "remove it from the presentation",
+                        was.nodeIdBits, was.routeIdBits, config.nodeIdBits, config.routeIdBits);
+        const auto bytes = std::as_bytes(std::span(frame.coded->bytes));
+        return Bytes(bytes.begin(), bytes.end());
+    }
+
     Result<Track> makeSceneTrack() {
         const NodeIds ids = assignNodeIds(document_.frames);
         const BifsConfig config = fitBifsConfig(document_.bifsConfig, ids);
@@ -247,7 +264,7 @@ class Writer {
         track.handlerName = "MPEG-4 scene description";
         BifsEncoder encoder(config, options_.style, ids);
         for (std::size_t i = 0; i < document_.frames.size(); ++i) {
-            auto bytes = encoder.encode(document_.frames[i].commands);
+            auto bytes = encode(encoder, document_.frames[i], config);
             if (!bytes)
                 return tl::unexpected(bytes.error().at(fmt::format("BIFS access unit {}", i + 1)));
             addFrame(track, std::move(*bytes), document_.frames[i]);

@@ -35,12 +35,16 @@ struct SceneReadOptions {
     std::filesystem::path folder;
     ImageDecoder decode = decodeImage;
     /// Without pixels only headers are read: the views have cameras, planes and depthBits, but
-    /// empty images.
+    /// empty images. A view that cannot be read is left out then with a note, and one that no
+    /// camera can show, for its Transforms, is as it would be without them.
     bool pixels = true;
     /// Whether the Background is read, too; without pixels it never is.
     bool environment = true;
     /// A scene that shows no view gives a bundle without any, instead of an error.
     bool mayBeEmpty = false;
+    /// startTime and stopTime that come with a later access unit count from the scene's start; see
+    /// SceneInTime.
+    bool timesFromStart = false;
     /// A note of what moves, and is read as it is at its start.
     bool noteMotion = true;
 };

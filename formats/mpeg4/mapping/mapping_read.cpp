@@ -77,9 +77,13 @@ class BundleReader {
         bundle.origin = notes.origin;
         bundle.time = notes.start;
         for (std::size_t i = 0; i < plans.size(); ++i) {
-            if (!read[i])
-                return tl::unexpected(
-                    read[i].error().at(fmt::format("view {} '{}'", i, plans[i].name)));
+            if (!read[i]) {
+                const Error error =
+                    read[i].error().at(fmt::format("view {} '{}'", i, plans[i].name));
+                if (options_.pixels) return tl::unexpected(error);
+                job_.note(error.text() + "; it is left out");
+                continue;
+            }
             for (std::size_t layer = 0; layer < read[i]->size(); ++layer) {
                 ReferenceView& view = (*read[i])[layer];
                 if (const auto said = notes.views.find(plans[i].key); said != notes.views.end())
@@ -247,12 +251,16 @@ class BundleReader {
     Result<std::vector<Plan>> makePlans(const ShownScene& shown) {
         std::vector<Plan> plans;
         for (const ShownNode& node : shown.nodes) {
-            const auto world = similarityFrom(node.worldFromLocal);
-            if (!world)
-                return tl::unexpected(world.error().at(
-                    fmt::format("{} '{}'", node.node->info->name,
-                                node.node->defName.empty() ? std::to_string(plans.size())
-                                                           : node.node->defName)));
+            auto world = similarityFrom(node.worldFromLocal);
+            if (!world) {
+                const Error error = world.error().at(fmt::format("{} '{}'", node.node->info->name,
+                                                                 node.node->defName.empty()
+                                                                     ? std::to_string(plans.size())
+                                                                     : node.node->defName));
+                if (options_.pixels) return tl::unexpected(error);
+                job_.note(error.text() + "; its camera is shown without these Transforms");
+                world = Similarity();
+            }
             if (node.node->is("OctreeImage")) {
                 auto& octree = octrees_[node.node.get()];
                 if (!octree) {

@@ -18,8 +18,9 @@ constexpr double kSmoothRate = 25;
 /// Decoded pictures that are kept, at most.
 constexpr std::uint64_t kCacheBytes = 256u << 20;
 
-/// Nodes that hold images of DepthImages and OctreeImages, wherever commands bring them.
-std::vector<NodePtr> texturesOf(const Document& document) {
+/// Nodes that hold images of DepthImages and OctreeImages, wherever commands bring them; their
+/// times as the scene has them then.
+std::vector<NodePtr> texturesOf(const Document& document, bool timesFromStart) {
     std::vector<NodePtr> textures;
     std::unordered_set<const Node*> seen;
     for (const CommandFrame& frame : document.frames)
@@ -30,8 +31,14 @@ std::vector<NodePtr> texturesOf(const Document& document) {
                 if (!texture) return;
                 for (const Node::SetField& field : texture->setFields)
                     if (const auto* image = std::get_if<NodePtr>(&field.value);
-                        image && *image && seen.insert(image->get()).second)
+                        image && *image && seen.insert(image->get()).second) {
                         textures.push_back(*image);
+                        if (timesFromStart || frame.time == 0 || !(*image)->is("MovieTexture"))
+                            continue;
+                        textures.back() = std::make_shared<Node>(**image);
+                        shiftTimes(*textures.back(), static_cast<double>(frame.time) /
+                                                         document.sceneStream.timescale);
+                    }
             });
     return textures;
 }
@@ -50,12 +57,13 @@ class SceneSequence : public Sequence {
     SceneSequence(Document document, SceneReadOptions options)
         : document_(std::move(document)),
           options_(std::move(options)),
-          moments_(document_.frames) {}
+          moments_(document_.frames,
+                   options_.timesFromStart ? 0 : document_.sceneStream.timescale) {}
 
     Result<void> prepare(Job& job) {
         STX_TRY(images_, StreamImages::make(document_, options_.folder, job.limits));
         images_.keepPictures(std::min<std::uint64_t>(kCacheBytes, job.limits.maxMemoryBytes / 4));
-        STX_TRY(timeline_, timelineOf(document_, images_));
+        STX_TRY(timeline_, timelineOf(document_, images_, options_.timesFromStart));
         STX_TRY(const auto scene, composeScene(document_.frames, document_.frames.front().time));
         start_ = startOf(scene, job.limits);
         // Once for all frames: it is what stands still.
@@ -92,12 +100,13 @@ class SceneSequence : public Sequence {
 
 // Whether an interpolator or a command reaches what views are made of or are placed by is not
 // asked: a moment at which nothing changes costs a frame and harms nothing.
-Result<Timeline> timelineOf(const Document& document, const StreamImages& images) {
+Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
+                            bool timesFromStart) {
     Timeline line;
     std::vector<double>& times = line.times;
     double end = 0, coarsest = 0;
     std::uint64_t most = document.frames.size();
-    for (const NodePtr& texture : texturesOf(document)) {
+    for (const NodePtr& texture : texturesOf(document, timesFromStart)) {
         const ElementaryStream* stream = images.stream(*texture);
         if (!stream || stream->samples.size() < 2) continue;
         const Presentation& shown = images.presentation(*stream);

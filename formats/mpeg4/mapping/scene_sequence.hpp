@@ -20,8 +20,9 @@ namespace stx::mpeg4 {
 
 /// When such a sequence changes, by the film's own clock where a note tells how that begins: at
 /// least one moment. Moments of two streams within half a tick of the coarser clock are one.
-/// Errors: (unsupported) more than four million.
-[[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images);
+/// Errors: (unsupported) more than four million. `timesFromStart`: as SceneReadOptions has it.
+[[nodiscard]] Result<Timeline> timelineOf(const Document& document, const StreamImages& images,
+                                          bool timesFromStart = false);
 
 /// The object of a presentation in a scene as it is at the moment of `images`; see
 /// bundleFromScene().

@@ -323,6 +323,9 @@ struct CommandFrame {
     std::vector<Command> commands;
     /// Whether a reader may begin here. The first of a stream always is such a place.
     bool randomAccess = false;
+    /// Of an access unit with a command that is not known here: all of it, as it is coded.
+    /// `commands` are those before that one.
+    std::optional<CommandBuffer> coded = {};
 };
 
 /// A scene at one moment.
@@ -358,6 +361,9 @@ struct SameOptions {
 /// instance where the body has a link. Null for an EXTERNPROTO. `copied`: how many nodes were.
 [[nodiscard]] NodePtr bodyOf(const Node& instance, std::size_t& copied);
 
+/// Adds seconds to the startTime and stopTime of a node where it has values for them.
+void shiftTimes(Node& node, double seconds);
+
 /// The scene after the commands of all frames with time <= `until` on copies of their nodes. Errors
 /// (invalidInput) when a command does not fit the scene it meets: an index out of range, a node
 /// that is not there, or a cycle.
@@ -368,8 +374,10 @@ struct SameOptions {
 /// starts anew.
 class SceneInTime {
   public:
-    /// `frames` must outlive this.
-    explicit SceneInTime(const std::vector<CommandFrame>& frames);
+    /// `frames` must outlive this. startTime and stopTime that come with an access unit count from
+    /// its time: BIFS has no other clock (VRML's counts from 1970), and the one widely used player
+    /// does so. `timescale`: ticks a second of the frames; 0: they count from the scene's start.
+    explicit SceneInTime(const std::vector<CommandFrame>& frames, std::uint32_t timescale = 0);
     SceneInTime(SceneInTime&&) noexcept;
     SceneInTime& operator=(SceneInTime&&) noexcept;
     ~SceneInTime();

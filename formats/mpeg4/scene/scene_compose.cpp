@@ -10,14 +10,22 @@
 namespace stx::mpeg4 {
 namespace {
 
+/// Whether a field is a moment and not a duration.
+bool isMoment(const NodeInfo& node, int field) {
+    const FieldInfo& info = node.fields[static_cast<std::size_t>(field)];
+    return info.type == FieldType::SFTime && (info.name == "startTime" || info.name == "stopTime");
+}
+
 /// Node visits that all commands together may cost, so that a small hostile file cannot keep us
 /// busy: a scene of 10,000 nodes may be restructured some thousand times.
 constexpr std::uint64_t kMaxVisits = 20'000'000;
 
 class Composer {
   public:
-    /// Applies commands to what earlier calls left.
-    Result<void> run(std::vector<Command> commands) {
+    /// Applies commands to what earlier calls left. `begin`: seconds that the times in their nodes
+    /// count from.
+    Result<void> run(std::vector<Command> commands, double begin) {
+        begin_ = begin;
         copyAll(commands);
         for (Command& command : commands) {
             ++count_;
@@ -51,6 +59,7 @@ class Composer {
                 auto& copy = copies_[node.get()];
                 if (copy) return;
                 copy = std::make_shared<Node>(*node);
+                if (begin_ != 0) shiftTimes(*copy, begin_);
                 fresh.push_back(copy.get());
             });
         for (Node* copy : fresh)
@@ -191,6 +200,9 @@ class Composer {
             return applyEvent(c);
         STX_CHECK(checkField(c.target, c.field));
         STX_CHECK(checkNotInside(c.target, c.value));
+        if (double* time = std::get_if<double>(&c.value);
+            time != nullptr && isMoment(*c.target->info, c.field))
+            *time += begin_;
         if (!c.target->set(c.field, c.value))
             return fail(ErrorCode::invalidInput, "{}.{} does not take this value",
                         c.target->info->name,
@@ -292,9 +304,17 @@ class Composer {
     std::unordered_map<const Node*, NodePtr> copies_;
     std::uint64_t visits_ = 0;
     std::size_t count_ = 0;  ///< of commands
+    double begin_ = 0;
 };
 
 }  // namespace
+
+void shiftTimes(Node& node, double seconds) {
+    for (Node::SetField& field : node.setFields)
+        if (double* time = std::get_if<double>(&field.value);
+            time != nullptr && isMoment(*node.info, field.index))
+            *time += seconds;
+}
 
 Result<Scene> composeScene(const std::vector<CommandFrame>& frames, std::uint64_t until) {
     SceneInTime moments(frames);
@@ -304,13 +324,14 @@ Result<Scene> composeScene(const std::vector<CommandFrame>& frames, std::uint64_
 
 struct SceneInTime::Impl {
     const std::vector<CommandFrame>& frames;
+    std::uint32_t timescale;
     std::vector<std::size_t> order;  ///< of frames, by time
     std::size_t next = 0;            ///< in order
     std::unique_ptr<Composer> composer;
 };
 
-SceneInTime::SceneInTime(const std::vector<CommandFrame>& frames)
-    : impl_(std::make_unique<Impl>(Impl{frames, {}, 0, nullptr})) {
+SceneInTime::SceneInTime(const std::vector<CommandFrame>& frames, std::uint32_t timescale)
+    : impl_(std::make_unique<Impl>(Impl{frames, timescale, {}, 0, nullptr})) {
     impl_->order.resize(frames.size());
     std::iota(impl_->order.begin(), impl_->order.end(), std::size_t{0});
     std::ranges::stable_sort(impl_->order, {}, [&](std::size_t i) { return frames[i].time; });
@@ -326,14 +347,13 @@ Result<Scene*> SceneInTime::at(std::uint64_t until) {
         i.composer = std::make_unique<Composer>();
         i.next = 0;
     }
-    std::vector<Command> commands;
     for (; i.next < i.order.size() && i.frames[i.order[i.next]].time <= until; ++i.next) {
-        const auto& more = i.frames[i.order[i.next]].commands;
-        commands.insert(commands.end(), more.begin(), more.end());
-    }
-    if (auto done = i.composer->run(std::move(commands)); !done) {
-        i.composer.reset();
-        return tl::unexpected(done.error());
+        const CommandFrame& frame = i.frames[i.order[i.next]];
+        const double begin = i.timescale == 0 ? 0 : static_cast<double>(frame.time) / i.timescale;
+        if (auto done = i.composer->run(frame.commands, begin); !done) {
+            i.composer.reset();
+            return tl::unexpected(done.error());
+        }
     }
     return &i.composer->scene();
 }

@@ -258,7 +258,9 @@ bool sameFrames(const std::vector<CommandFrame>& a, const std::vector<CommandFra
     GraphComparison compare(options);
     if (a.size() != b.size()) return false;
     for (std::size_t i = 0; i < a.size(); ++i) {
-        if (a[i].time != b[i].time || a[i].commands.size() != b[i].commands.size()) return false;
+        if (a[i].time != b[i].time || a[i].commands.size() != b[i].commands.size() ||
+            a[i].coded != b[i].coded)
+            return false;
         for (std::size_t k = 0; k < a[i].commands.size(); ++k) {
             const Command& x = a[i].commands[k];
             const Command& y = b[i].commands[k];

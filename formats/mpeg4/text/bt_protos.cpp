@@ -72,7 +72,10 @@ Result<void> BtReader::readValueInto(const NodePtr& node, int index, int depth, 
         value.error().message += fmt::format(" for {}.{}", type, field.name);
         return propagate(value);
     }
-    node->set(index, std::move(*value));
+    auto plain = fromText(*node->info, index, std::move(*value));
+    if (!plain)
+        return unexpected(fmt::format("base64 for {}.{}, which came before", type, field.name));
+    node->set(index, std::move(*plain));
     return {};
 }
 

@@ -110,7 +110,7 @@ class BtWriter {
             if (link != links.end())
                 out_ += "IS " + proto_->type.fields[link->second].name;
             else if (field.hasValue())
-                writeValue(node->value(field.index));
+                writeValue(toText(*node->info, field.index, node->value(field.index)));
             out_ += '\n';
         }
         --depth_;

@@ -92,6 +92,9 @@ Result<void> finishDocument(Document& document, NodeNames& names) {
     STX_CHECK(names.resolve());
     sortFrames(document.frames);
     sortFrames(document.odFrames);
+    // The first is such a place anyway.
+    if (!document.frames.empty()) document.frames.front().randomAccess = false;
+    if (!document.odFrames.empty()) document.odFrames.front().randomAccess = false;
     for (CommandFrame& frame : document.frames)
         for (Command& command : frame.commands)
             if (auto* replace = std::get_if<ReplaceScene>(&command))

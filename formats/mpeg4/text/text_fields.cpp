@@ -2,7 +2,9 @@
 
 #include <cstdio>
 #include <set>
+#include <span>
 
+#include "formats/files/base64.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/text/text_values.hpp"
 #include "lib/base/whole_number.hpp"
@@ -277,6 +279,30 @@ void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style
             }
         },
         value);
+}
+
+static bool holdsBytes(const NodeInfo& node, int field) {
+    return node.name == "BitWrapper" &&
+           node.fields[static_cast<std::size_t>(field)].name == "buffer";
+}
+
+FieldValue toText(const NodeInfo& node, int field, const FieldValue& value) {
+    const auto* bytes = std::get_if<std::string>(&value);
+    if (bytes == nullptr || bytes->empty() || !holdsBytes(node, field)) return value;
+    return "data:application/octet-string;base64," +
+           encodeBase64(std::as_bytes(std::span(bytes->data(), bytes->size())));
+}
+
+std::optional<FieldValue> fromText(const NodeInfo& node, int field, FieldValue value) {
+    auto* text = std::get_if<std::string>(&value);
+    if (text == nullptr || !holdsBytes(node, field) || !text->starts_with("data:")) return value;
+    constexpr std::string_view kCoding = ";base64,";
+    const auto at = text->find(kCoding);
+    if (at == std::string::npos) return value;
+    const auto bytes = decodeBase64(std::string_view(*text).substr(at + kCoding.size()));
+    if (!bytes) return {};
+    *text = {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
+    return value;
 }
 
 std::string textNameOf(const Node& node) {

@@ -26,6 +26,12 @@ enum class TextStyle { bt, xmt };
 /// Values read back exactly with readFieldValue.
 void appendFieldValue(std::string& out, const FieldValue& value, TextStyle style);
 
+/// What a text has as the value of a field that holds no nodes: the value, but for
+/// BitWrapper.buffer, whose bytes are "data:application/octet-string;base64,...".
+[[nodiscard]] FieldValue toText(const NodeInfo& node, int field, const FieldValue& value);
+/// The way back: of any "data:...;base64,". Nothing when it is not base64.
+[[nodiscard]] std::optional<FieldValue> fromText(const NodeInfo& node, int field, FieldValue value);
+
 /// The DEF name of a node in a text: its own, or `N<id-1>` when it has only an id. Empty: none.
 [[nodiscard]] std::string textNameOf(const Node& node);
 /// The same for routes, with R; a name that would be the number of another route is left out.

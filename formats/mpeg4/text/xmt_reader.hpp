@@ -392,6 +392,8 @@ class XmtReader : private TextReader {
         if (!inQuotes && first != std::string_view::npos) {
             if (type == FieldType::MFURL) return FieldValue(std::vector{urlOf(text)});
             if (type == FieldType::MFString) return FieldValue(std::vector{std::string(text)});
+            if (type == FieldType::MFScript)
+                return FieldValue(std::vector{ScriptText{std::string(text)}});
         }
         const auto expected = [&](const Error& error) {
             return failAt(where(node), ErrorCode::invalidInput, "{} in {}=\"{}\" of <{}>",
@@ -465,7 +467,12 @@ class XmtReader : private TextReader {
                               field.name, type);
             }
             STX_TRY(auto value, attributeValue(element, fieldName, attribute.value(), field.type));
-            node->set(index, std::move(value));
+            auto plain = fromText(*node->info, index, std::move(value));
+            if (!plain)
+                return failAt(where(element), ErrorCode::invalidInput,
+                              "{}=\"{}\" of <{}> is not base64", fieldName,
+                              excerpt(attribute.value()), type);
+            node->set(index, std::move(*plain));
         }
         int below = 0;
         if (isInstance) STX_CHECK(readFieldValues(element, node, depth, below));

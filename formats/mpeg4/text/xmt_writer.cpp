@@ -191,8 +191,8 @@ class XmtWriter {
                 std::holds_alternative<CommandBuffer>(field.value))
                 hasNodes = true;
             else
-                attributes.push_back(
-                    {node->info->fields[field.index].name, valueText(field.value)});
+                attributes.push_back({node->info->fields[field.index].name,
+                                      valueText(toText(*node->info, field.index, field.value))});
         }
         if (!hasNodes) {
             empty(type, attributes);
@@ -240,7 +240,8 @@ class XmtWriter {
     void writeDeclared(std::string_view tag, Attributes attributes, const FieldValue* value) {
         const NodePtr* node = value ? std::get_if<NodePtr>(value) : nullptr;
         const NodeList* list = value ? std::get_if<NodeList>(value) : nullptr;
-        if ((node && *node) || (list && !list->empty())) {
+        // Also without any: others need the element.
+        if (node || list) {
             open(tag, attributes);
             open(node ? "node" : "nodes");
             if (node) writeNode(*node);
@@ -250,7 +251,7 @@ class XmtWriter {
             close(tag);
             return;
         }
-        if (value && !node && !list) attributes.push_back({"value", valueText(*value)});
+        if (value) attributes.push_back({"value", valueText(*value)});
         empty(tag, attributes);
     }
     void writeDeclaration(const FieldInfo& field, const FieldValue* value) {
@@ -526,7 +527,8 @@ class XmtWriter {
     }
     Result<void> writeOdFrame(const OdFrame& frame) {
         const double seconds = static_cast<double>(frame.time) / document_.odStream.timescale;
-        const bool rap = frame.randomAccess && &frame != &document_.odFrames.front();
+        // The first, too: others look for the descriptors of the start in such an element.
+        const bool rap = frame.randomAccess || &frame == &document_.odFrames.front();
         beginTime(seconds, rap);
         for (const OdCommand& command : frame.commands) {
             if (const auto* update = std::get_if<UpdateObjectDescriptors>(&command)) {
