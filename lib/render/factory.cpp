@@ -22,9 +22,8 @@ template <class Make>
 Result<std::unique_ptr<Renderer>> splatsBefore(const PageSet& set, const Make& make) {
     STX_TRY(std::unique_ptr<Renderer> front, Result<std::unique_ptr<Renderer>>(make(set)));
     if (!set.behind()) return front;
-    STX_TRY(std::unique_ptr<Renderer> behind,
-            Result<std::unique_ptr<Renderer>>(make(*set.behind())));
-    return withBackground(std::move(front), std::move(behind));
+    STX_TRY(std::unique_ptr<Renderer> behind, splatsBefore(*set.behind(), make));
+    return withBackground(std::move(front), std::move(behind), set.behind()->farAway());
 }
 
 Result<std::unique_ptr<Renderer>> makeCpu(const PageSet& set, const RenderSettings& settings,
@@ -88,8 +87,7 @@ DeviceChoice deviceChoice(int device) {
 namespace {
 
 /// Points of one pixel, the paper's rule and conventional OpenGL stay what they are.
-bool averages(Backend backend, const RenderSettings& settings) {
-    if (!settings.does(Stage::footprint)) return false;
+bool isOurs(Backend backend, const RenderSettings& settings) {
     if (settings.mode == RenderMode::surface) return true;
     return settings.splat == SplatRule::data && backend != Backend::gl;
 }
@@ -184,14 +182,22 @@ Result<std::unique_ptr<Renderer>> makeFrom(Backend backend, const PageSet& set,
         const StageTimer timer(settings.log.get(), "twins", true);
         return settings.does(Stage::twins) ? set.distinct() : set;
     }();
-    PageSet drawn = refined(solid(inFront(distinct, settings, job)));
+    const PageSet captured = solid(inFront(distinct, settings, job));
+    PageSet drawn = refined(captured);
     if (drawn.behind()) drawn = drawn.before(refined(solid(*drawn.behind())));
+    if (settings.fill == Fill::background && settings.does(Stage::unmeasured) &&
+        isOurs(backend, settings)) {
+        StageTimer timer(settings.log.get(), "unmeasured", true);
+        std::int64_t pixels = 0;
+        drawn = drawn.withUnmeasured(captured, pixels);
+        timer.changed(pixels);
+    }
     if (translucent)
         job.note("surface mode draws translucent surfaces opaque; --mode splat keeps their alpha");
     // What is around an open place is a guess; the environment is known.
     if (environment) settings.fill = Fill::none;
     STX_TRY(auto made, makePlain(backend, drawn, settings, device, job));
-    if (averages(backend, settings))
+    if (settings.does(Stage::footprint) && isOurs(backend, settings))
         made = withFootprint(std::move(made), drawn, settings.log, job.limits);
     if (environment) made = withEnvironment(std::move(made), environment);
     return made;

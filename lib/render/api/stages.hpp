@@ -15,6 +15,8 @@ namespace stx {
 #define STX_STAGES(STAGE) \
     STAGE(twins, both, "views that repeat another are drawn as one", "") \
     STAGE(solid, surface, "what is translucent inside of the object is drawn opaque", "") \
+    STAGE(unmeasured, both, "colours without depth are drawn where nothing else is", \
+          "Bleyer, Rhemann & Rother 2011") \
     STAGE(creases, surface, "pixels that mix two faces give their colour to neither", "") \
     STAGE(levels, surface, "outlines run where the covered parts of pixels tell", "Youngs 1982") \
     STAGE(sharpen, surface, "colours are as much sharper as fitting them blurs them", "") \

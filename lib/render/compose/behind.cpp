@@ -15,13 +15,15 @@ constexpr float kOpen = 0.5f;
 
 class BackgroundRenderer final : public Renderer {
   public:
-    BackgroundRenderer(std::unique_ptr<Renderer> front, std::unique_ptr<Renderer> background)
-        : front_(std::move(front)), background_(std::move(background)) {}
+    BackgroundRenderer(std::unique_ptr<Renderer> front, std::unique_ptr<Renderer> background,
+                       double farAway)
+        : front_(std::move(front)), background_(std::move(background)), farAway_(farAway) {}
 
     Result<Frame> render(const Camera& camera) override {
         STX_TRY(Frame frame, front_->render(camera));
         STX_TRY(Frame background, background_->render(camera));
         putBehind(frame, background, [](int, int, float) { return false; });
+        forgetFar(frame.depth, farAway_);
         frame.milliseconds += background.milliseconds;
         background_->reuse(std::move(background));
         return frame;
@@ -36,6 +38,7 @@ class BackgroundRenderer final : public Renderer {
 
   private:
     std::unique_ptr<Renderer> front_, background_;
+    double farAway_;
 };
 
 }  // namespace
@@ -75,9 +78,19 @@ void putBehind(Frame& front, const Frame& background, const MayStand& mayStand) 
     });
 }
 
+void forgetFar(Image<float>& depth, double farAway) {
+    if (!(farAway > 0)) return;
+    const auto limit = static_cast<float>(0.5 * farAway);
+    parallelForBlocks(0, static_cast<std::int64_t>(depth.count()), 1 << 16,
+                      [&](std::int64_t from, std::int64_t to) {
+                          for (std::int64_t i = from; i < to; ++i)
+                              if (depth.data()[i] > limit) depth.data()[i] = kNoDepth;
+                      });
+}
+
 std::unique_ptr<Renderer> withBackground(std::unique_ptr<Renderer> front,
-                                         std::unique_ptr<Renderer> background) {
-    return std::make_unique<BackgroundRenderer>(std::move(front), std::move(background));
+                                         std::unique_ptr<Renderer> background, double farAway) {
+    return std::make_unique<BackgroundRenderer>(std::move(front), std::move(background), farAway);
 }
 
 }  // namespace stx

@@ -20,9 +20,14 @@ using MayStand = std::function<bool(int x, int y, float depth)>;
 /// behind it in sight) when it may stand there; else it is not there now, and left out.
 void putBehind(Frame& front, const Frame& background, const MayStand& mayStand);
 
+/// Pixels farther than half of `farAway` have no depth: nobody knows where they are. 0: all stay.
+/// See PageSet::farAway().
+void forgetFar(Image<float>& depth, double farAway);
+
 /// A renderer that draws the background views where the other views show nothing. Both must draw
-/// without filling holes.
+/// without filling holes. `farAway`: PageSet::farAway() of what is behind.
 [[nodiscard]] std::unique_ptr<Renderer> withBackground(std::unique_ptr<Renderer> front,
-                                                       std::unique_ptr<Renderer> background);
+                                                       std::unique_ptr<Renderer> background,
+                                                       double farAway);
 
 }  // namespace stx

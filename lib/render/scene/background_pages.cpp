@@ -48,8 +48,10 @@ PageSet PageSet::only(const std::vector<bool>& kept) const {
     auto data = std::make_shared<Data>();
     data->padding = data_->padding;
     data->bounds = data_->bounds;
+    data->farAway = data_->farAway;
     data->unpacked = data_->unpacked;
     data->changed = data_->changed;
+    data->refined = data_->refined;
     std::vector<int> pageOf(data_->pages.size(), -1);
     std::vector<std::uint32_t> rectangleOf(data_->rectangles.size(), 0);
     for (std::size_t i = 0; i < data_->views.size(); ++i) {

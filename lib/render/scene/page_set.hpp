@@ -117,6 +117,14 @@ class PageSet {
     /// is exact. `report`, if any, tells what was found and changed.
     [[nodiscard]] PageSet refined(const RefineSettings& settings,
                                   RefineReport* report = nullptr) const;
+    /// The same before another background, behind its own: what views with measured depth show
+    /// without it, where that could be found, else far away (unmeasuredDepth()). The very same
+    /// where `captured`, these views before they were refined, has no such pixels; `pixels` tells
+    /// how many.
+    [[nodiscard]] PageSet withUnmeasured(const PageSet& captured, std::int64_t& pixels) const;
+    /// Of what withUnmeasured() put behind: what is farther than half of that is far away, where
+    /// nobody knows. 0 of other sets.
+    [[nodiscard]] double farAway() const { return data_->farAway; }
     /// Whether depth is as exact as its codes: no noise, nothing that reached over its edges.
     [[nodiscard]] bool exactDepth() const;
     /// The texture of a page as it was before inOneLight().
@@ -205,6 +213,7 @@ class PageSet {
         std::vector<PageRectangle> rectangles;
         std::vector<ViewIndex> index;
         std::optional<Bounds> bounds;
+        double farAway = 0;
         int padding = 0;  ///< texels around each rectangle that may be read
         bool pruned = false;
         std::shared_ptr<const Bundle> unpacked;  ///< of an atlas without room around rectangles

@@ -2,13 +2,11 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/refine/refine_depth.hpp"
-#include "lib/render/scene/page_set.hpp"
+#include "lib/render/scene/view_images.hpp"
 
 namespace stx {
-namespace {
 
-/// A view as refineDepth() takes it. Of one in rectangles `copy` keeps the images.
-RefineView refineView(const PageSet& set, std::size_t number, ReferenceView& copy) {
+RefineView viewImages(const PageSet& set, std::size_t number, ReferenceView& copy) {
     const PageView& view = set.views()[number];
     if (view.whole) {
         const Page& page = set.pages()[static_cast<std::size_t>(set.rectanglesOf(number)[0].page)];
@@ -24,7 +22,6 @@ RefineView refineView(const PageSet& set, std::size_t number, ReferenceView& cop
     return {&view, &copy.texture, &copy.depth};
 }
 
-/// Puts the depth of a view where its rectangles are on a page, padding included.
 void putDepth(const Image<float>& depth, const PageRectangle& r, Image<float>& page) {
     const int x0 = std::max(r.x0 - PageSet::kPadding, 0),
               x1 = std::min(r.x1 + PageSet::kPadding, depth.width());
@@ -37,8 +34,6 @@ void putDepth(const Image<float>& depth, const PageRectangle& r, Image<float>& p
             if (inside || hasPoint(depth.at(x, y))) page.data()[r.texel(x, y)] = depth.at(x, y);
         }
 }
-
-}  // namespace
 
 PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) const {
     RefineReport own;
@@ -53,7 +48,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
         RefineNeeds needs(left);
         for (std::size_t i = 0; i < views().size(); ++i) {
             ReferenceView copy;
-            needs.add(refineView(*this, i, copy));
+            needs.add(viewImages(*this, i, copy));
         }
         if (!needs.any()) return *this;
     }
@@ -61,7 +56,7 @@ PageSet PageSet::refined(const RefineSettings& settings, RefineReport* report) c
     std::vector<RefineView> given(views().size());
     parallelFor(0, static_cast<std::int64_t>(given.size()), [&](std::int64_t i) {
         const auto number = static_cast<std::size_t>(i);
-        given[number] = refineView(*this, number, copies[number]);
+        given[number] = viewImages(*this, number, copies[number]);
     });
     auto better = refineDepth(given, left, found);
     if (!found.changed()) return *this;

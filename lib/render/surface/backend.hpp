@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -42,10 +43,10 @@ class SurfaceBackend {
 /// Surface mode with a backend: each reference is warped as a surface, the surfaces are fused and
 /// checked against what the other references see, and each pixel's colour is fitted to the samples
 /// of the references that see it. Prepares every view. A camera that is exactly that of a reference
-/// gets that reference's pixels. Where the set has views behind it, a second backend draws these.
+/// gets that reference's pixels. Where the set has views behind it, another backend draws these.
 /// Errors: the backends'.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> makeSurfaceRenderer(
     const PageSet& set, const RenderSettings& settings, Job& job,
-    std::unique_ptr<SurfaceBackend> backend, std::unique_ptr<SurfaceBackend> behind);
+    const std::function<Result<std::unique_ptr<SurfaceBackend>>()>& makeBackend);
 
 }  // namespace stx::surface

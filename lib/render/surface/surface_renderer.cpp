@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "lib/base/parallel.hpp"
@@ -56,7 +57,7 @@ class SurfaceRenderer final : public Renderer {
     [[nodiscard]] std::string device() const override { return backend_->device(); }
     [[nodiscard]] Result<void> prepareBackend() { return backend_->prepare(scene_, effort_, job_); }
     /// What is drawn where this renderer's views show nothing.
-    void setBackground(std::unique_ptr<SurfaceRenderer> behind) { behind_ = std::move(behind); }
+    [[nodiscard]] std::unique_ptr<SurfaceRenderer>& behind() { return behind_; }
 
   private:
     /// Whether the outermost points lie at the outline: those of faulty depth and of coarse depth
@@ -88,8 +89,11 @@ class SurfaceRenderer final : public Renderer {
     [[nodiscard]] Result<void> collect(const SurfaceFrame& work, Frame& frame, Image<float>& q);
     /// Closes holes, or fills what is around.
     void fill(const SurfaceFrame& work, Frame& frame, Image<float>& q);
-    /// Draws the background where a frame is open.
-    [[nodiscard]] Result<void> drawBehind(const SurfaceFrame& work, Frame& frame, Image<float>& q);
+    /// Not what is behind all that has a depth.
+    [[nodiscard]] bool showsMeasured() const { return !(scene_.set.farAway() > 0); }
+    /// Draws what is behind where a frame is open.
+    [[nodiscard]] Result<void> drawBehind(SurfaceRenderer& behind, const SurfaceFrame& work,
+                                          Frame& frame, Image<float>& q);
     /// Only those tiles of a frame, 32 pixels wide, that `wanted` has; its depth, too.
     [[nodiscard]] Result<Frame> drawTiles(const Camera& camera,
                                           std::span<const std::uint8_t> wanted);
@@ -122,6 +126,30 @@ Image<float> depthOf(Image<float> q, const DepthAxis& axis) {
             }
         });
     return q;
+}
+
+/// A pixel whose place is a guess, and its q.
+struct Guessed {
+    std::size_t pixel;
+    float q;  ///< 0 = far away
+};
+
+/// Gives all pixels that had another q before the q of what is farthest else: holes beside them are
+/// filled from what is measured, and sources know nothing beyond that. What is below `limit` is far
+/// away.
+std::vector<Guessed> putFarthest(const Image<float>& before, float limit, Image<float>& q) {
+    std::vector<Guessed> guessed;
+    float farthest = std::numeric_limits<float>::max();
+    for (std::size_t i = 0; i < q.count(); ++i) {
+        const float value = q.data()[i];
+        if (value != before.data()[i])
+            guessed.push_back({i, value < limit ? 0.0f : value});
+        else if (value > 0.0f)
+            farthest = std::min(farthest, value);
+    }
+    if (farthest < std::numeric_limits<float>::max())
+        for (const Guessed& g : guessed) q.data()[g.pixel] = farthest;
+    return guessed;
 }
 
 bool SurfaceRenderer::pointsAreExact() const {
@@ -288,8 +316,19 @@ Result<void> SurfaceRenderer::drawFrame(const Camera& camera, const std::optiona
         const StageTimer timer(settings_.log.get(), "draw");
         STX_CHECK(collect(*work, frame, q));
     }
-    if (behind_) STX_CHECK(drawBehind(*work, frame, q));
+    std::vector<Guessed> guessed;
+    for (SurfaceRenderer* b = behind_.get(); b; b = b->behind_.get()) {
+        if (b->showsMeasured()) {
+            STX_CHECK(drawBehind(*b, *work, frame, q));
+            continue;
+        }
+        const Image<float> before = q;
+        STX_CHECK(drawBehind(*b, *work, frame, q));
+        const double limit = space.axis.q(0.5 * b->scene_.set.farAway());
+        guessed = putFarthest(before, static_cast<float>(limit), q);
+    }
     fill(*work, frame, q);
+    for (const Guessed& g : guessed) q.data()[g.pixel] = g.q;
     frame.depth = depthOf(std::move(q), space.axis);
     if (outlines_ && !behind_)
         finishStage(settings_.log.get(), "outlines", frame.colour,
@@ -304,7 +343,7 @@ void SurfaceRenderer::fill(const SurfaceFrame& work, Frame& frame, Image<float>&
     if (fillsFrame_ && settings_.fill != Fill::none) {
         if (!settings_.does(Stage::surroundings)) return;
         // Cameras of the background looked, too.
-        if (behind_)
+        if (behind_ && behind_->showsMeasured())
             for (const Source& s : behind_->scene_.sources)
                 all.push_back(
                     {&s, warpFrom(s.space.pixelFromWorld * space.worldFromPixel), nullptr});
@@ -319,7 +358,8 @@ void SurfaceRenderer::fill(const SurfaceFrame& work, Frame& frame, Image<float>&
     }
 }
 
-Result<void> SurfaceRenderer::drawBehind(const SurfaceFrame& work, Frame& frame, Image<float>& q) {
+Result<void> SurfaceRenderer::drawBehind(SurfaceRenderer& behind, const SurfaceFrame& work,
+                                         Frame& frame, Image<float>& q) {
     const PixelSpace& space = work.space;
     const int width = frame.colour.width(), height = frame.colour.height();
     const int tilesX = (width + kTile - 1) / kTile, tilesY = (height + kTile - 1) / kTile;
@@ -333,17 +373,20 @@ Result<void> SurfaceRenderer::drawBehind(const SurfaceFrame& work, Frame& frame,
         }
     }
     if (!any) return {};
-    STX_TRY(const Frame background, behind_->drawTiles(space.camera, open));
-    frame.depth = depthOf(q, space.axis);
+    STX_TRY(const Frame background, behind.drawTiles(space.camera, open));
+    const Image<float> before = depthOf(q, space.axis);
+    frame.depth = before;
     putBehind(frame, background, [&](int x, int y, float depth) {
         const auto at = static_cast<float>(space.axis.q(depth));
-        return std::none_of(work.sources.begin(), work.sources.end(), [&](const FrameSource& f) {
-            return seesPast({f.source, f.sourceFromPixel}, static_cast<float>(x) + 0.5f,
-                            static_cast<float>(y) + 0.5f, at);
-        });
+        return behind.showsMeasured() &&
+               std::none_of(work.sources.begin(), work.sources.end(), [&](const FrameSource& f) {
+                   return seesPast({f.source, f.sourceFromPixel}, static_cast<float>(x) + 0.5f,
+                                   static_cast<float>(y) + 0.5f, at);
+               });
     });
     for (std::size_t i = 0; i < q.count(); ++i) {
         const float depth = frame.depth.data()[i];
+        if (depth == before.data()[i]) continue;
         q.data()[i] = hasPoint(depth) ? static_cast<float>(space.axis.q(depth)) : 0.0f;
     }
     return {};
@@ -422,19 +465,18 @@ Result<Frame> SurfaceRenderer::render(const Camera& camera) {
 
 }  // namespace
 
-Result<std::unique_ptr<Renderer>> makeSurfaceRenderer(const PageSet& set,
-                                                      const RenderSettings& settings, Job& job,
-                                                      std::unique_ptr<SurfaceBackend> backend,
-                                                      std::unique_ptr<SurfaceBackend> behind) {
-    auto renderer = std::make_unique<SurfaceRenderer>(set, settings, job, std::move(backend));
-    STX_CHECK(renderer->prepareBackend());
-    if (set.behind()) {
-        auto background =
-            std::make_unique<SurfaceRenderer>(*set.behind(), settings, job, std::move(behind));
-        STX_CHECK(background->prepareBackend());
-        renderer->setBackground(std::move(background));
+Result<std::unique_ptr<Renderer>> makeSurfaceRenderer(
+    const PageSet& set, const RenderSettings& settings, Job& job,
+    const std::function<Result<std::unique_ptr<SurfaceBackend>>()>& makeBackend) {
+    std::unique_ptr<SurfaceRenderer> first;
+    std::unique_ptr<SurfaceRenderer>* place = &first;
+    for (const PageSet* part = &set; part; part = part->behind()) {
+        STX_TRY(auto backend, makeBackend());
+        *place = std::make_unique<SurfaceRenderer>(*part, settings, job, std::move(backend));
+        STX_CHECK((*place)->prepareBackend());
+        place = &(*place)->behind();
     }
-    return std::unique_ptr<Renderer>(std::move(renderer));
+    return std::unique_ptr<Renderer>(std::move(first));
 }
 
 }  // namespace stx::surface

@@ -143,9 +143,8 @@ TEST(Open3dRgbd, WhatSensorsMissTakesNothingAway) {
                     *whole->psnrY);
         // 37.14 in surface mode without agreement of the views.
         EXPECT_GE(*result->psnrY, mode == RenderMode::surface ? 37.6 : 37.0);
-        if (mode == RenderMode::surface) {
-            EXPECT_GE(*whole->psnrY, 26.0);
-        }
+        // 26.04 and 14.49 where what has no depth (borders, the sky in the window) is not drawn.
+        EXPECT_GE(*whole->psnrY, mode == RenderMode::surface ? 36.5 : 35.5);
     }
 }
 

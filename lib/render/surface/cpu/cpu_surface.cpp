@@ -159,8 +159,9 @@ std::unique_ptr<Renderer> makeCpuSurfaceRenderer(const PageSet& set, const Rende
                                                  Job& job) {
     // The processor's backend cannot fail before a frame is asked for.
     return std::move(*surface::makeSurfaceRenderer(
-        set, settings, job, std::make_unique<surface::CpuSurfaceBackend>(job),
-        set.behind() ? std::make_unique<surface::CpuSurfaceBackend>(job) : nullptr));
+        set, settings, job, [&job]() -> Result<std::unique_ptr<surface::SurfaceBackend>> {
+            return std::make_unique<surface::CpuSurfaceBackend>(job);
+        }));
 }
 
 }  // namespace stx

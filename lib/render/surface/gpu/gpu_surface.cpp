@@ -461,12 +461,7 @@ Result<std::unique_ptr<Renderer>> makeGpuSurfaceRenderer(const PageSet& set,
             context->requireModern("surface mode on the GPU", "--mode splat or --backend cpu"));
         return std::make_unique<GpuSurfaceBackend>(std::move(context));
     };
-    STX_TRY(auto front, backend());
-    std::unique_ptr<surface::SurfaceBackend> behind;
-    if (set.behind()) {
-        STX_TRY(behind, backend());
-    }
-    return surface::makeSurfaceRenderer(set, settings, job, std::move(front), std::move(behind));
+    return surface::makeSurfaceRenderer(set, settings, job, backend);
 }
 
 }  // namespace stx::gpu

@@ -168,7 +168,7 @@ Effort effortOf(const RenderSettings& settings, const SurfaceScene& scene) {
         e.moreGeometry = 0;
         e.freeLevel = kFreeLevelPruned;
         e.preferShown = true;
-    } else if (valid < 1) {
+    } else if (valid < 1 && !(scene.set.farAway() > 0)) {
         // Rounding, or a pixel in a million, does not ask for another source.
         constexpr double kNothing = 1e-5;
         for (int* most : {&e.mostGeometry, &e.moreGeometry})
