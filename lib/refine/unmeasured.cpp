@@ -29,7 +29,7 @@ constexpr float kAlikeColour = 0.08f;
 /// Colours that differ by more, mean of the channels, differ altogether.
 constexpr float kMostDifferent = 0.12f;
 /// What a measured point in another view may be off by, a share of q, and be the same surface.
-constexpr float kSamePlace = 0.02f;
+constexpr float kSamePlaceThere = 0.02f;
 /// Planes that differ by this share of q are one.
 constexpr float kSamePlane = 0.0005f;
 /// A pixel without any view that tells differs by so much.
@@ -37,9 +37,9 @@ constexpr float kUntold = 0.06f;
 /// How much changes of colour on the way from the measured point count, and up to what sum.
 constexpr float kPathWeight = 0.1f, kLongestPath = 0.3f;
 /// Changes of colour up to this are noise.
-constexpr float kColourNoise = 0.02f;
+constexpr float kNoiseOfColours = 0.02f;
 /// Rounds of spreading, in both directions each.
-constexpr int kRounds = 1;
+constexpr int kRoundsOfSpreading = 1;
 /// Planes are fitted to points within so many pixels, and in the end within a share of q.
 constexpr int kPlaneRadius = 6;
 constexpr float kFirstBand = 0.03f, kPlaneBand = 0.01f;
@@ -108,7 +108,7 @@ class Spreading {
             lookAround(p.x, p.y);
             s.cost = difference(p.x, p.y, s.plane) + kPathWeight * s.path;
         }
-        for (int round = 0; round < kRounds; ++round) {
+        for (int round = 0; round < kRoundsOfSpreading; ++round) {
             for (const glm::ivec2 p : pixels_) take(p, -1);
             for (auto p = pixels_.rbegin(); p != pixels_.rend(); ++p) take(*p, 1);
         }
@@ -174,9 +174,9 @@ class Spreading {
                           v < static_cast<float>(other.q->height())))
                         continue;
                     const float shown = other.q->at(static_cast<int>(u), static_cast<int>(v));
-                    if (shown > 0.0f && shown > there * (1.0f + kSamePlace)) continue;
+                    if (shown > 0.0f && shown > there * (1.0f + kSamePlaceThere)) continue;
                     const float off =
-                        shown > 0.0f && shown < there * (1.0f - kSamePlace)
+                        shown > 0.0f && shown < there * (1.0f - kSamePlaceThere)
                             ? kMostDifferent
                             : std::min(apart(samples_[k], colourBetween(*other.colours, u, v)),
                                        kMostDifferent);
@@ -233,7 +233,7 @@ class Spreading {
                               from.plane.gx, from.plane.gy};
             if (!(plane.q > far_) || isLike(plane, s.plane)) continue;
             const float path =
-                std::min(from.path + std::max(apart(own, colour(nx, ny)) - kColourNoise, 0.0f),
+                std::min(from.path + std::max(apart(own, colour(nx, ny)) - kNoiseOfColours, 0.0f),
                          kLongestPath);
             if (kPathWeight * path >= s.cost) continue;
             if (!looked) lookAround(p.x, p.y);
