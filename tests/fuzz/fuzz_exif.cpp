@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/images/exif.hpp"
+#include "lib/model/texture.hpp"
 #include "tests/fuzz/violated.hpp"
 
 using namespace stx;
