@@ -18,6 +18,7 @@
 #include "formats/images/oiio/bmp.hpp"
 #include "formats/images/oiio/failed.hpp"
 #include "formats/images/oiio/tiff.hpp"
+#include "formats/images/oiio/tiff_strips.hpp"
 #include "formats/images/oiio/webp.hpp"
 #include "formats/images/picture_answer.hpp"
 #include "lib/base/result.hpp"
@@ -197,6 +198,9 @@ void decodeOrThrow(std::span<const std::byte> file, std::string_view name,
         throw Failed{ErrorCode::invalidInput,
                      fmt::format("the TIFF is damaged: {}", tiffErrors.first())};
     input->close();
+    if (format == "tiff")
+        if (const std::string damage = damageOfStrips(bytes); !damage.empty())
+            throw Failed{ErrorCode::invalidInput, "the TIFF is damaged: " + damage};
     if (!whole.empty()) pixel.take(whole, static_cast<std::uint8_t*>(values));
 }
 

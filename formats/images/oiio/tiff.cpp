@@ -37,11 +37,13 @@ void onError(const char* module, const char* format, std::va_list values) {
     if (kept().outerError) kept().outerError(module, format, values);
 }
 
-/// The decoders of JPEG and fax warn of pixels that they made up.
+/// The decoders of JPEG, PackBits and fax warn of pixels that they made up or left out.
 void onWarning(const char* module, const char* format, std::va_list values) {
     const std::string_view from = module ? module : "";
-    const bool madeUp = from == "JPEGLib" ||
-                        std::string_view(format).find("Premature EOF") != std::string_view::npos;
+    const std::string_view what = format;
+    const bool madeUp = from == "JPEGLib" || from == "PackBitsDecode" ||
+                        what.find("Premature EOF") != what.npos ||
+                        what.find("(got %") != what.npos;  // a row of another length
     std::va_list again;
     va_copy(again, values);
     if (madeUp) keep(format, again);

@@ -83,6 +83,34 @@ TEST(Tiff, PixelsThatAreNotThereAreErrors) {
     const auto deflated = decodeImage(greyTiff(packed, 8), "a.tif", Limits());
     ASSERT_TRUE(deflated) << deflated.error().text();
     EXPECT_EQ(deflated->values, whole->values);
+    // Its checksum alone tells that a pixel is another one.
+    packed.back() ^= std::byte{1};
+    expectDamaged(greyTiff(packed, 8), "another checksum");
+}
+
+TEST(Tiff, PackBitsThatDoesNotEndWithItsPixelsIsDamaged) {
+    constexpr std::uint32_t kPackBits = 32773;
+    Bytes packed;
+    for (std::uint32_t y = 0; y < kHeight; ++y) {  // 20 bytes as they are, one 20 times
+        packed.push_back(std::byte{19});
+        for (int i = 0; i < 20; ++i) packed.push_back(static_cast<std::byte>(y + i));
+        packed.insert(packed.end(), {static_cast<std::byte>(257 - 20), std::byte{7}});
+    }
+    const auto whole = decodeImage(greyTiff(packed, kPackBits), "a.tif", Limits());
+    ASSERT_TRUE(whole) << whole.error().text();
+    EXPECT_EQ(std::get<0>(whole->values)[41], 2);
+    EXPECT_EQ(std::get<0>(whole->values)[79], 7);
+    Bytes padded = packed;
+    padded.push_back(std::byte{0});
+    EXPECT_TRUE(decodeImage(greyTiff(padded, kPackBits), "a.tif", Limits()));
+    Bytes longer = packed;
+    longer.insert(longer.end(), 10, std::byte{3});
+    expectDamaged(greyTiff(longer, kPackBits), "bytes left over");
+    Bytes other = packed;
+    other[0] = std::byte{17};
+    expectDamaged(greyTiff(other, kPackBits), "two bytes taken for a run");
+    expectDamaged(greyTiff({packed.begin(), packed.end() - 30}, kPackBits), "cut");
+    expectDamaged(greyTiff(noise(kWidth * kHeight), kPackBits), "garbage");
 }
 
 /// Without BitsPerSample it is 1, as Pillow writes masks.
