@@ -116,8 +116,8 @@ Outcome prunedAtlas(Pictures& pictures) {
     const auto before = pictures.psnrAwayFromOutlines(*frame),
                after = pictures.psnrAwayFromOutlines(pruned.frame);
     if (!before || !after) return std::nullopt;
-    // Beside the error of the views that of what replaces their pixels, which pruning tells: colours
-    // between the texels of one view instead of several.
+    // Beside the error of the views that of what replaces their pixels, which pruning tells:
+    // colours between the texels of one view instead of several.
     const double expected =
         -10 * std::log10(std::pow(10, -*before / 10) + std::pow(10, -pruned.promised / 10));
     return Measure{

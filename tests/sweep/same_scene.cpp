@@ -84,8 +84,8 @@ Outcome crop(Pictures& pictures) {
     if (part.width < 16 || part.height < 16) return std::nullopt;
     part.cx -= left;
     part.cy -= top;
-    // The median pixel of a picture decides how much larger it is drawn and averaged: at 1.5 samples
-    // to a pixel twice, which is 3.4 dB better at the outlines of a pair of solids.
+    // The median pixel of a picture decides how much larger it is drawn and averaged: at 1.5
+    // samples to a pixel twice, which is 3.4 dB better at the outlines of a pair of solids.
     const Footprint footprint(pictures.captured().bundle);
     if (footprint.factor(whole) != footprint.factor(part)) return std::nullopt;
     const Drawn how = modeOf(pictures, 13);
