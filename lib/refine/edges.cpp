@@ -19,6 +19,8 @@ namespace {
 constexpr float kJumpOfEdge = 0.005f, kBesideSlope = 3.0f;
 /// And of so many steps of a depth code.
 constexpr float kJumpSteps = 2.5f;
+/// And of so many standard deviations of noise, of which smoothing leaves some at single pixels.
+constexpr float kJumpNoises = 3.0f;
 /// Squared distance of two colours (0..1 each) that tell surfaces apart.
 constexpr float kContrast = 3 * 0.04f * 0.04f;
 /// And of so many times what the colours of both differ by among themselves (the sum of their
@@ -54,7 +56,11 @@ constexpr float kClearlyCloser = 0.8f;
 class Edges {
   public:
     Edges(const Image<float>& q, const EdgeView& view)
-        : q_(q), texture_(*view.texture), axis_(view.space->axis), step_(view.step) {}
+        : q_(q),
+          texture_(*view.texture),
+          axis_(view.space->axis),
+          step_(view.step),
+          noise_(view.noise) {}
 
     /// The neighbour of a pixel, of those where the surface ends, that is farthest behind; -1 =
     /// none, the surface does not end here.
@@ -126,7 +132,7 @@ class Edges {
   private:
     [[nodiscard]] float at(int x, int y) const { return q_.contains(x, y) ? q_.at(x, y) : 0.0f; }
     [[nodiscard]] float jumpAt(float q) const {
-        return std::max(kJumpOfEdge * axis_.relativeScale(q),
+        return std::max(std::max(kJumpOfEdge, kJumpNoises * noise_) * axis_.relativeScale(q),
                         kJumpSteps * step_ * axis_.qPerUnit(q));
     }
     /// Its colour may be a mixture.
@@ -142,7 +148,7 @@ class Edges {
     const Image<float>& q_;
     const Texture& texture_;
     const DepthAxis& axis_;
-    float step_;
+    float step_, noise_;
 };
 
 /// A view with a pixel less of what is in front: at its edges, or `everywhere`.

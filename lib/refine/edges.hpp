@@ -16,6 +16,7 @@ struct EdgeView {
     const Texture* texture = nullptr;  ///< of the view alone, as large as its depth
     Image<float>* q = nullptr;         ///< as in PreparedPage
     float step = 0.0f;                 ///< of its depth code, scene units
+    float noise = 0.0f;                ///< depthNoise() before it was smoothed, of noisy views
 };
 
 /// Where a surface ends before another, the last pixels with its depth should have its colour, at

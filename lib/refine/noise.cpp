@@ -31,8 +31,9 @@ constexpr std::size_t kFewestBends = 100;
 /// Less noise than this share of q is left as it is: what codes and small shapes look like.
 constexpr float kLeastNoise = 0.001f;
 /// And than this share of a pixel's width: exact tori whose tubes are six pixels wide have up to
-/// 0.1, statue with 0.5 % noise has 3.5.
-constexpr float kLeastOfPixel = 0.25f;
+/// 0.1, statue with 0.5 % noise has 3.5. A torus of 34 pixels with 0.5 % has 0.2: with 0.25 here
+/// votes tear its surface, 18.2 dB instead of 25.3.
+constexpr float kLeastOfPixel = 0.15f;
 /// Radii of the windows that are tried, pixels.
 constexpr int kRadii[] = {1, 2, 4, 6, 8};
 /// Windows larger than one that leaves this share of q are not needed.
@@ -47,6 +48,14 @@ struct Bands {
 /// Wide bands leave surfaces as they are, narrow ones keep leaves apart that are no further from
 /// each other than the noise.
 constexpr Bands kWideBands{4.0f, 3.0f}, kNarrowBands{1.7f, 1.2f};
+/// A surface is steep beside noise where a point is between its two neighbours in a row or column,
+/// within so many standard deviations, which differ by more than twice so many, and the next ones
+/// differ by at least this share of what is from the point to a neighbour, which those beside a
+/// step do not. Then the first plane has that slope: in the band around one point there is no other
+/// of them, and all of them count as clutter. A room with noise of 0.5 % drawn 7 times as large
+/// 37.0 -> 46.6 dB, a box 44.4 -> 46.3; statue +0.21 to -0.04. With a share of 0.75 the box has
+/// 48.9, statue loses 0.07.
+constexpr float kBetween = 4.0f, kSteeper = 1.5f, kGoesOn = 1.0f;
 /// A view is clutter, or not at all, where this share of the points around a point is beside its
 /// surface, but not by more than so many wide bands.
 constexpr float kClutter = 0.12f, kNoClutter = 0.06f, kNotFar = 3.0f;
@@ -103,6 +112,30 @@ float oneInTwenty(std::vector<float>& values) {
     return *place;
 }
 
+/// What q changes by over a pixel along (dx, dy), on a surface that is steep beside noise of
+/// `sigma`; else 0.
+float steepSlope(const Around& around, int dx, int dy, float sigma) {
+    const auto a = around.at(-dx, -dy), b = around.at(dx, dy);
+    if (!a || !b) return 0.0f;
+    const float slope = 0.5f * (*b - *a);
+    const float here = around.q.at(around.x, around.y), within = kBetween * sigma;
+    if (!(std::abs(slope) > kSteeper * sigma) || std::abs(*a + *b - 2.0f * here) > within)
+        return 0.0f;
+    for (const int side : {-2, 2})
+        if (const auto far = around.at(side * dx, side * dy);
+            far && std::abs(*far - here) < kGoesOn * std::abs(slope))
+            return 0.0f;
+    return slope;
+}
+
+/// The plane to begin with at a pixel.
+LocalPlane planeAt(const Image<float>& q, int x, int y, float sigma) {
+    LocalPlane plane{q.at(x, y)};
+    plane.gx = steepSlope({q, x, y}, 1, 0, sigma);
+    plane.gy = steepSlope({q, x, y}, 0, 1, sigma);
+    return plane;
+}
+
 /// The bands for a view with so much noise, by how much clutter there is in it.
 Bands bandsFor(const Image<float>& q, const DepthAxis& axis, float noise) {
     double beside = 0;
@@ -112,7 +145,8 @@ Bands bandsFor(const Image<float>& q, const DepthAxis& axis, float noise) {
             const float here = q.at(x, y);
             if (!(here > 0.0f)) continue;
             const float sigma = noise * axis.relativeScale(here), band = kWideBands.then * sigma;
-            const LocalPlane plane = fitAround(q, x, y, 1, {here}, kWideBands.first * sigma);
+            const LocalPlane plane =
+                fitAround(q, x, y, 1, planeAt(q, x, y, sigma), kWideBands.first * sigma);
             float near = 0, off = 0;
             for (int j = -kClutterRadius; j <= kClutterRadius; ++j) {
                 for (int i = -kClutterRadius; i <= kClutterRadius; ++i) {
@@ -195,7 +229,7 @@ float smoothDepth(Image<float>& q, const DepthAxis& axis, float noise, Image<glm
                 const float here = from.at(x, y);
                 if (!(here > 0.0f)) continue;
                 const float sigma = noise * axis.relativeScale(here);
-                LocalPlane plane{here};
+                LocalPlane plane = planeAt(from, x, y, sigma);
                 float value = here, least = here - kAgree * sigma, most = here + kAgree * sigma;
                 float doubt = sigma;
                 glm::vec2 slope(0.0f);

@@ -265,7 +265,8 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
     });
     std::vector<EdgeView> edges;
     for (std::size_t k = 0; k < views.size(); ++k)
-        edges.push_back({&works[k].space, views[k].texture, &works[k].q, stepOf(*views[k].header)});
+        edges.push_back({&works[k].space, views[k].texture, &works[k].q, stepOf(*views[k].header),
+                         isNoisy(noise[k], works[k].space.axis) ? noise[k] : 0.0f});
     if (settings.on(RefineStep::edges)) {
         const Clock clock(report.of(RefineStep::edges));
         report.ownColour = colourAtEdges(edges);

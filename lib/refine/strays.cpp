@@ -1,7 +1,9 @@
 #include "lib/refine/strays.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "lib/base/parallel.hpp"
 
@@ -15,6 +17,11 @@ namespace {
 /// without this step 37.03, 32.39, 25.72, 24.84.
 constexpr float kDoubts = 1.0f, kPixels = 1.0f;
 constexpr int kLeastAlike = 3;
+/// On a steep surface opposite neighbours differ by more, but are as much before as behind the
+/// point: up to so many pixels' sizes, where what hangs between two surfaces does the same. Balls
+/// and plates of 40 to 60 pixels with noise of 0.2 % lost their sides without: 18.2 and 12.0 dB
+/// instead of 50.8 and 26.8.
+constexpr float kSteepest = 5.0f;
 
 }  // namespace
 
@@ -28,13 +35,26 @@ std::int64_t removeStrays(const NoisyView& view) {
                 const float q = from.at(x, y);
                 if (!(q > 0.0f)) continue;
                 const float own = view.surface.at(x, y).z;
+                const float pixel = axis.pixelShare() * axis.relativeScale(q);
                 int alike = 0;
-                for (int k = 0; k < 9; ++k) {
-                    const int u = x - 1 + k % 3, v = y - 1 + k / 3;
-                    if (k == 4 || !from.contains(u, v) || !(from.at(u, v) > 0.0f)) continue;
-                    const float doubt = std::hypot(own, view.surface.at(u, v).z);
-                    alike += std::abs(from.at(u, v) - q) <=
-                             kDoubts * doubt + kPixels * axis.pixelShare() * axis.relativeScale(q);
+                for (const auto& [dx, dy] : {std::pair(1, 0), {0, 1}, {1, 1}, {1, -1}}) {
+                    float sum = 0, most = 0, within = 0;
+                    int there = 0, near = 0;  // of both neighbours
+                    for (const int side : {-1, 1}) {
+                        const int u = x + side * dx, v = y + side * dy;
+                        if (!from.contains(u, v) || !(from.at(u, v) > 0.0f)) continue;
+                        const float apart = from.at(u, v) - q;
+                        const float allowed =
+                            kDoubts * std::hypot(own, view.surface.at(u, v).z) + kPixels * pixel;
+                        ++there;
+                        near += std::abs(apart) <= allowed;
+                        sum += apart;
+                        most = std::max(most, std::abs(apart));
+                        within = std::max(within, allowed);
+                    }
+                    const bool steep =
+                        there == 2 && most <= kSteepest * pixel && std::abs(sum) <= 2 * within;
+                    alike += steep ? 2 : near;
                 }
                 if (alike >= kLeastAlike) continue;
                 view.q->at(x, y) = -1.0f;

@@ -72,7 +72,8 @@ uint tapsOnSurface(int s, Piece piece, SourceView view) {
     float py = (mq.y + mq.z * piece.qy - p * wy) * inverse;
     float pu = px * view.xu + py * view.yu, pv = px * view.xv + py * view.yv;
     float all = coarseOf(s) * relativeScale(axisOf(s), p);
-    float allowed = kOnSurface * all + kOnSlope * min(abs(pu) + abs(pv), kSteepestTap * all);
+    float allowed = kOnSurface * all + kOnSlope * min(abs(pu) + abs(pv), kSteepestTap * all) +
+                    stepOf(s) * qPerUnit(axisOf(s), p);
     ivec2 base = firstTap(view);
     Taps place = tapPlaceOf(s, base);
     uint taps = 0u;

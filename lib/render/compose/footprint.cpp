@@ -63,9 +63,7 @@ class FootprintRenderer final : public Renderer {
         if (std::any_of(set_.views().begin(), set_.views().end(),
                         [&](const PageView& v) { return sameCamera(v.camera, camera); }))
             return 1;
-        const double ratio = footprint_.samplesPerPixel(camera);
-        if (!(ratio > kEnough)) return 1;
-        int factor = static_cast<int>(std::lround(std::min(ratio, double{kMostFactor})));
+        int factor = footprint_.factor(camera);
         const double pixels = static_cast<double>(camera.width) * camera.height;
         const auto fits = [&] {
             const double large = pixels * factor * factor;
@@ -122,6 +120,12 @@ double Footprint::samplesPerPixel(const Camera& camera) const {
     const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
     std::nth_element(ratios.begin(), middle, ratios.end());
     return *middle;
+}
+
+int Footprint::factor(const Camera& camera) const {
+    const double ratio = samplesPerPixel(camera);
+    if (!(ratio > kEnough)) return 1;
+    return static_cast<int>(std::lround(std::min(ratio, double{kMostFactor})));
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "lib/base/parallel.hpp"
@@ -171,13 +172,15 @@ std::vector<std::uint8_t> Outlines::askedViews(const Camera& camera) const {
         asked[best] = 1;
         ++count;
     }
+    // By how much they look at any side, so that the order of the views does not matter.
     std::vector<std::size_t> others;
+    std::vector<double> most(views.size(), kUnseen);
     for (std::size_t i = 0; i < views.size(); ++i) {
-        const auto shows = [&](const std::vector<double>& of) {
-            return !of.empty() && of[i] > kUnseen;
-        };
-        if (!asked[i] && std::ranges::any_of(looks, shows)) others.push_back(i);
+        for (const std::vector<double>& of : looks)
+            if (!of.empty()) most[i] = std::max(most[i], of[i]);
+        if (!asked[i] && most[i] > kUnseen) others.push_back(i);
     }
+    std::ranges::stable_sort(others, std::greater(), [&](std::size_t i) { return most[i]; });
     const std::size_t more = std::min(kMostViews - count, others.size());
     for (std::size_t k = 0; k < more; ++k) asked[others[k * others.size() / more]] = 1;
     return asked;

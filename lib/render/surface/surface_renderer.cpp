@@ -67,7 +67,8 @@ class SurfaceRenderer final : public Renderer {
     /// Unit world normal of a source at pixel position (u, v); zero where it has none.
     [[nodiscard]] glm::vec3 normalAt(const Source& source, float u, float v) const;
     /// The same of all pixels of a frame; see DrawnFrame::origin.
-    void normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>& normal) const;
+    void normalsAt(const SurfaceFrame& work, const Image<glm::vec3>& origin,
+                   Image<glm::vec3>& normal) const;
     [[nodiscard]] std::unique_ptr<SurfaceFrame> plan(const Camera& camera) const {
         const StageTimer timer(settings_.log.get(), "plan");
         auto frame = std::make_unique<SurfaceFrame>(planFrame(scene_, bounds_, effort_, camera));
@@ -404,30 +405,31 @@ Result<Frame> SurfaceRenderer::drawTiles(const Camera& camera,
     return frame;
 }
 
-void SurfaceRenderer::normalsAt(const Image<glm::vec3>& origin, Image<glm::vec3>& normal) const {
-    std::vector<ViewNormals> views(scene_.sources.size());
+void SurfaceRenderer::normalsAt(const SurfaceFrame& work, const Image<glm::vec3>& origin,
+                                Image<glm::vec3>& normal) const {
+    std::vector<ViewNormals> views(work.sources.size());
     for (std::size_t i = 0; i < views.size(); ++i) {
-        const Source& s = scene_.sources[i];
+        const Source& s = *work.sources[i].source;
         if (!s.whole) continue;
         const auto page = static_cast<std::size_t>(s.whole - scene_.pages.data());
         views[i] = {(s.view->hasNormals ? *scene_.set.pages()[page].normal : normals_[page]).data(),
                     s.width, s.height};
     }
-    parallelForBlocks(0, static_cast<std::int64_t>(origin.count()), 4096,
-                      [&](std::int64_t from, std::int64_t to) {
-                          const auto first = static_cast<std::size_t>(from),
-                                     end = static_cast<std::size_t>(to);
-                          if (normalsBetween(origin.pixels().subspan(first, end - first), views,
-                                             normal.data() + first))
-                              return;
-                          for (std::size_t i = first; i < end; ++i) {
-                              const glm::vec3 at = origin.data()[i];
-                              if (at.x < 0) continue;
-                              const auto number = static_cast<std::size_t>(at.x);
-                              if (!isBetween(views[number], at.y, at.z))
-                                  normal.data()[i] = normalAt(scene_.sources[number], at.y, at.z);
-                          }
-                      });
+    parallelForBlocks(
+        0, static_cast<std::int64_t>(origin.count()), 4096,
+        [&](std::int64_t from, std::int64_t to) {
+            const auto first = static_cast<std::size_t>(from), end = static_cast<std::size_t>(to);
+            if (normalsBetween(origin.pixels().subspan(first, end - first), views,
+                               normal.data() + first))
+                return;
+            for (std::size_t i = first; i < end; ++i) {
+                const glm::vec3 at = origin.data()[i];
+                if (at.x < 0) continue;
+                const auto number = static_cast<std::size_t>(at.x);
+                if (!isBetween(views[number], at.y, at.z))
+                    normal.data()[i] = normalAt(*work.sources[number].source, at.y, at.z);
+            }
+        });
 }
 
 Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Image<float>& q) {
@@ -441,7 +443,7 @@ Result<void> SurfaceRenderer::collect(const SurfaceFrame& work, Frame& frame, Im
     }
     STX_CHECK(backend_->finish({frame.colour, q, origin}));
     STX_CHECK(job_.checkCancelled());
-    if (work.wantOrigin) normalsAt(origin, frame.normal);
+    if (work.wantOrigin) normalsAt(work, origin, frame.normal);
     return {};
 }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "lib/refine/pinholes.hpp"
+#include "lib/refine/strays.hpp"
 #include "tests/noisy_depth.hpp"
 
 namespace stx {
@@ -82,6 +83,47 @@ TEST(DepthNoise, SmoothingLeavesAFifthOfItAndKeepsTheStep) {
     for (int y = 0; y < kNoisySide; ++y)
         for (const int x : {kNoisySide / 2 - 1, kNoisySide / 2})
             EXPECT_NEAR(q.at(x, y) / exact.at(x, y), 1, 0.015) << x << " " << y;
+}
+
+// The sweep found walls of rooms whose noise stayed: no neighbour lay in the band around a point.
+TEST(DepthNoise, SteepSurfacesLoseItToo) {
+    Image<float> exact(kNoisySide, kNoisySide), q(kNoisySide, kNoisySide);
+    constexpr double kNoise = 0.005;
+    for (int y = 0; y < kNoisySide; ++y) {
+        for (int x = 0; x < kNoisySide; ++x) {
+            const double plane = 0.25 + 0.01 * x + 0.002 * y;
+            exact.at(x, y) = static_cast<float>(plane);
+            const double own = noisy::normal(5, static_cast<std::uint64_t>(y * kNoisySide + x));
+            q.at(x, y) = static_cast<float>(plane * (1 + kNoise * own));
+        }
+    }
+    const float noise = depthNoise(q, {});
+    EXPECT_NEAR(noise, kNoise, 0.3 * kNoise);
+    smoothDepth(q, {}, noise);
+    EXPECT_LT(difference(q, exact), kNoise / 2);
+}
+
+TEST(DepthNoise, PointsOfSteepSurfacesAreNoStrays) {
+    Image<float> q(kNoisySide, kNoisySide);
+    for (int y = 0; y < kNoisySide; ++y)
+        for (int x = 0; x < kNoisySide; ++x)
+            q.at(x, y) = static_cast<float>(0.25 + 0.01 * x + 0.01 * y);
+    Camera camera;
+    camera.width = camera.height = kNoisySide;
+    camera.fx = camera.fy = kNoisySide;
+    const PixelSpace space(camera, 0.0);
+    const int stray = kNoisySide / 2;
+    q.at(stray, stray) *= 1.3f;
+    NoisyView view;
+    view.space = &space;
+    view.q = &q;
+    view.surface = Image<glm::vec3>(kNoisySide, kNoisySide, glm::vec3(0, 0, 1e-5f));
+    removeStrays(view);
+    int removed = 0;
+    for (int y = 1; y + 1 < kNoisySide; ++y)
+        for (int x = 1; x + 1 < kNoisySide; ++x) removed += !(q.at(x, y) > 0.0f);
+    EXPECT_LT(q.at(stray, stray), 0.0f);
+    EXPECT_LE(removed, 9);
 }
 
 TEST(DepthNoise, ExactDepthStaysAsItIs) {

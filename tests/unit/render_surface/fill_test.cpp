@@ -133,5 +133,39 @@ TEST(FillBackground, APictureWithoutSurfaceStaysOpen) {
     EXPECT_EQ(p.openPixels(), 70);
 }
 
+// An outline pixel of a hole, whose own ray no source sees past: the wall is behind its edge.
+TEST(FillUnseen, TheOutlineOfAHoleThatASourceSeesThroughStaysOpen) {
+    constexpr int kSide = 64, kFirst = 28, kEnd = 36;
+    Picture p(kSide, kSide);
+    ReferenceView view;
+    view.name = "source";
+    view.camera = p.space.camera;
+    view.depthBits = 32;
+    view.nearPlane = 1;
+    view.farPlane = 3;
+    Rgba8Image texture(kSide, kSide, glm::u8vec4(255));
+    view.depth = Image<float>(kSide, kSide, 2.0f);
+    for (int y = 0; y < kSide; ++y) {
+        for (int x = 0; x < kSide; ++x) {
+            if (x < kFirst || y < kFirst || x >= kEnd || y >= kEnd) {
+                p.close(x, y, glm::vec3(0.5f), 0.5f);
+                continue;
+            }
+            view.depth.at(x, y) = kNoDepth;
+            texture.at(x, y) = glm::u8vec4(0);
+        }
+    }
+    view.texture = std::move(texture);
+    for (int y = kFirst; y < kEnd; ++y) p.albedo.at(kFirst - 1, y) *= 0.4f;
+    Bundle bundle;
+    bundle.views.push_back(std::move(view));
+    const SurfaceScene scene{PageSet(bundle)};
+    const Source& s = scene.sources[0];
+    const LocalSource local{&s, warpFrom(s.space.pixelFromWorld * p.space.worldFromPixel), nullptr};
+    fillUnseen({p.albedo, p.q, p.space}, {&local, 1}, 0);
+    EXPECT_EQ(p.albedo.at(kFirst + 4, kFirst + 4).a, 0.0f);
+    for (int y = kFirst; y < kEnd; ++y) EXPECT_FLOAT_EQ(p.albedo.at(kFirst - 1, y).a, 0.4f) << y;
+}
+
 }  // namespace
 }  // namespace stx::surface

@@ -119,6 +119,30 @@ TEST_P(PlannedBlocks, AreChosenFromFewViews) {
     EXPECT_LT(placed, 2 * scene.sources.size());
 }
 
+/// Tiles are built from the same views, in the same order, however the views are ordered.
+TEST_P(PlannedBlocks, DoNotHangOnTheOrderOfViews) {
+    Bundle bundle = analyticBundle(GetParam(), 12);
+    Effort effort;
+    effort.mostGeometry = 2;
+    const Camera camera = analyticCamera(GetParam(), 0.4, 12);
+    const auto camerasOfTiles = [&] {
+        const SurfaceScene scene(bundle);
+        const SurfaceFrame frame = planFrame(scene, boundsOf(scene), effort, camera);
+        std::vector<std::vector<glm::dvec3>> places;
+        for (const std::vector<int>& tile : frame.tileSources) {
+            places.emplace_back();
+            for (const int k : tile)
+                places.back().push_back(
+                    frame.sources[static_cast<std::size_t>(k)].source->view->camera.position);
+        }
+        return places;
+    };
+    const auto before = camerasOfTiles();
+    std::ranges::reverse(bundle.views);
+    std::ranges::rotate(bundle.views, bundle.views.begin() + 5);
+    EXPECT_EQ(camerasOfTiles(), before);
+}
+
 /// What is nearest of all views is nearest of those that a tile is built from.
 TEST_P(PlannedBlocks, AreOfViewsThatShowAllThatAnyShows) {
     const Bundle bundle = analyticBundle(GetParam(), 8);

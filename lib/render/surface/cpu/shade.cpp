@@ -160,8 +160,9 @@ HWY_INLINE void maskTaps(const ShadeSource& s, const Group& g, int lane, float u
     const float pu = px * view.xu[lane] + py * view.yu[lane];
     const float pv = px * view.xv[lane] + py * view.yv[lane];
     const float scale = source.space.axis.stepScale(p);
-    const float allowed =
-        kOnSurface * scale + kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * scale);
+    const float allowed = kOnSurface * scale +
+                          kOnSlope * std::min(std::abs(pu) + std::abs(pv), kSteepestTap * scale) +
+                          source.step * source.space.axis.qPerUnit(p);
     const TapPlace taps = view.tapsOf(source, lane, baseU, baseV);
 #if HWY_TARGET != HWY_SCALAR
     const Rgba8Image* bytes = taps.page->texture->rgba8();

@@ -224,8 +224,7 @@ Batch GpuSurfaceBackend::fillBatch(const SurfaceFrame& work,
             if (!any) continue;
             const Rows warp(warpFrom(sampleFromPixel * f.pixelFromSource));
             batch.slots[slot] = {warp.x, warp.y, warp.q, warp.w, glm::ivec4(k, 0, 0, 0)};
-            const std::uint32_t firstLeaf =
-                resources_->scene.firstLeaf[static_cast<std::size_t>(k)];
+            const std::uint32_t firstLeaf = resources_->scene.firstLeaf[f.source->number];
             for (const std::uint32_t b : blocks) {
                 const surface::SourceBlock& block = f.source->blocks[b];
                 const glm::uvec4 task(slot, b, firstLeaf + block.leafBegin, 0);

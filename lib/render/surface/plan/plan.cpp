@@ -125,6 +125,28 @@ FrameSource sourceIn(const PixelSpace& space, const Source& s) {
     return f;
 }
 
+/// All sources, those that look at the middle of the scene most as the camera does first: where two
+/// are as good as each other, the one that shows more of what the camera sees is taken, and no
+/// picture hangs on the order or the pose of the views in their file.
+std::vector<const Source*> sourcesBySide(const SurfaceScene& scene, const Bounds& bounds,
+                                         const Camera& camera) {
+    std::vector<const Source*> out;
+    for (const Source& s : scene.sources) out.push_back(&s);
+    if (bounds.empty()) return out;
+    const glm::dvec3 middle = bounds.centre();
+    const auto towards = [&](const Camera& c) {
+        const glm::dvec3 away = middle - c.position;
+        const double distance = glm::length(away);
+        return c.orthographic || !(distance > 0) ? c.forward() : away / distance;
+    };
+    const glm::dvec3 look = towards(camera);
+    std::vector<double> turned(out.size());
+    for (const Source& s : scene.sources)
+        turned[s.number] = -glm::dot(look, towards(s.space.camera));
+    std::ranges::stable_sort(out, {}, [&](const Source* s) { return turned[s->number]; });
+    return out;
+}
+
 /// Places the blocks of the sources that are wanted.
 void placeAll(SurfaceFrame& frame, const std::vector<char>& wanted) {
     parallelFor(0, static_cast<std::int64_t>(wanted.size()), [&](std::int64_t i) {
@@ -213,7 +235,8 @@ SurfaceFrame planFrame(const SurfaceScene& scene, const Bounds& bounds, const Ef
     f.tilesX = (camera.width + kTile - 1) / kTile;
     f.tilesY = (camera.height + kTile - 1) / kTile;
     f.effort = effort;
-    for (const Source& s : scene.sources) f.sources.push_back(sourceIn(f.space, s));
+    for (const Source* s : sourcesBySide(scene, bounds, camera))
+        f.sources.push_back(sourceIn(f.space, *s));
     const std::size_t tiles = static_cast<std::size_t>(f.tilesX) * f.tilesY;
     f.tileSources.resize(tiles);
     const bool all = static_cast<int>(f.sources.size()) <= effort.mostGeometry;
