@@ -1,10 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <initializer_list>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -73,6 +75,11 @@ class Keywords {
         if constexpr (std::is_same_v<T, bool>) return "True or False";
         if constexpr (std::is_integral_v<T>) return "a whole number";
         if constexpr (std::is_floating_point_v<T>) return "a number";
+        if constexpr (std::is_same_v<T, std::array<double, 2>>) return "two numbers";
+        if constexpr (std::is_same_v<T, std::array<double, 4>>) return "four numbers";
+        if constexpr (std::is_same_v<T, std::vector<std::string>>) return "a list of texts";
+        if constexpr (std::is_same_v<T, std::vector<Camera>>) return "a list of stx.Camera";
+        if constexpr (std::is_same_v<T, std::vector<Light>>) return "a list of stx.Light";
         return "a text";
     }
 

@@ -203,11 +203,12 @@ def render(  # type: ignore[misc]  # the overloads leave out the keywords below
     shows: 'background', 'spatial' or 'none'. environment: a file that is shown behind everything; False: not even the
     model's own. lights: stx.Light; with them ambient and specular: grey or (r, g, b), linear, from 0; shininess: Phong
     exponent above 0. splat: of splat mode, 'data', 'paper' (with splat_coefficient, pixels times scene units, 0: fitted)
-    or 'point'. refine: repairs of captured depth, 'auto', 'off' or steps. without: stages that are left out.
+    or 'point'. refine: repairs of captured depth, 'auto', 'off' or steps. without: names of stages that are left out.
     Raises Error: usage, invalidInput (a camera), unsupported (a backend), failed.
     """
     drawing = {name: value for name, value in locals().items() if name not in ("model", "cameras", "times", "job")}
-    drawing["lights"], drawing["without"] = list(lights), list(without)
+    drawing["lights"] = list(lights)
+    drawing["without"] = without.split(",") if isinstance(without, str) else list(without)
     single = isinstance(cameras, Camera)
     path = [cameras] if isinstance(cameras, Camera) else list(cameras)
     for camera in path:
