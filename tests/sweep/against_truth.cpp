@@ -68,8 +68,11 @@ Outcome betterQualityIsWorse(Pictures& pictures) {
 Outcome exactDepthIsRepaired(Pictures& pictures) {
     const PageSet pages(pictures.captured().bundle);
     RefineReport report;
-    const PageSet refined = pages.refined({}, &report);
-    return Measure{refined.exactDepth() ? 0.0 : 1.0, report.text()};
+    RefineStepReport light;
+    const PageSet refined = pages.inOneLight({}, light).refined({}, &report);
+    report.of(RefineStep::exposure) = light;
+    const bool same = refined.exactDepth() && !report.changed();
+    return Measure{same ? 0.0 : 1.0, report.text()};
 }
 
 Outcome surfaceBelowSplats(Pictures& pictures) {
