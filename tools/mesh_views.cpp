@@ -27,7 +27,9 @@ Result<ConvertSettings> settingsOf(const MeshViewOptions& o, Program& program) {
                     o.fovDeg);
     s.fovRad = glm::radians(o.fovDeg);
     s.elevationRad = glm::radians(o.elevationDeg.value_or(15.0));
-    STX_TRY(s.up, parseDirection(o.up.empty() ? "Y" : o.up, "--up"));
+    if (!o.up.empty()) {
+        STX_TRY(s.up, parseDirection(o.up, "--up"));
+    }
     s.supersampling = o.supersampling;
     s.depthBits = o.depthBits;
     s.meshNormals = o.normals == "mesh";
@@ -170,10 +172,8 @@ Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& 
     STX_TRY(const auto named, camerasOfFile(o, mesh, program));
     for (const NamedCamera& one : named) settings.cameras.push_back(one.camera);
     settings.names = namesOf(named);
-    if (mesh.splats && o.up.empty() && settings.cameras.empty()) {
-        settings.up = mesh.splats->up;
-        noteSplatsUp(settings.up, program.job);
-    }
+    if (mesh.splats && !settings.up && settings.cameras.empty())
+        noteSplatsUp(mesh.splats->up, program.job);
     STX_TRY(auto views, chooseViews(mesh, settings, program.job));
     if (views.selection) {
         sayChoice(views, program);

@@ -6,6 +6,7 @@
 #include "lib/base/whole_number.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/capture/rasterizer.hpp"
+#include "lib/model/splat_cloud.hpp"
 #include "lib/quality/capture_quality.hpp"
 
 namespace stx {
@@ -24,7 +25,8 @@ CaptureSettings captureSettings(const ConvertSettings& s) {
     return capture;
 }
 
-Result<ViewFraming> framingOf(const ConvertSettings& s, bool cube, const Limits& limits) {
+Result<ViewFraming> framingOf(const Mesh& mesh, const ConvertSettings& s, bool cube,
+                              const Limits& limits) {
     if (s.width < 1 || s.height < 1 || s.width > limits.maxImageSide ||
         s.height > limits.maxImageSide)
         return fail(ErrorCode::usage, "views of {}x{} are asked for; 1 to {} pixels are possible",
@@ -33,7 +35,7 @@ Result<ViewFraming> framingOf(const ConvertSettings& s, bool cube, const Limits&
         return fail(ErrorCode::usage,
                     "fovRad is {:g}; it must be above 0 and below 170 degrees in radians",
                     s.fovRad);
-    if (!(glm::length(s.up) > 0))
+    if (s.up && !(glm::length(*s.up) > 0))
         return fail(ErrorCode::usage, "up is 0,0,0; it must point somewhere");
     ViewFraming framing;
     framing.width = s.width;
@@ -41,14 +43,14 @@ Result<ViewFraming> framingOf(const ConvertSettings& s, bool cube, const Limits&
     // The six faces of a cube are orthographic in the standard's own example.
     framing.orthographic = s.orthographic.value_or(cube);
     framing.fovRad = s.fovRad;
-    framing.up = s.up;
+    framing.up = s.up ? *s.up : mesh.splats ? glm::dvec3(mesh.splats->up) : framing.up;
     return framing;
 }
 
 Result<MeshViews> bestViews(const Mesh& mesh, const AutoViews& wanted, const ConvertSettings& s,
                             Job& job) {
     MeshCandidates candidates;
-    STX_TRY(candidates.framing, framingOf(s, false, job.limits));
+    STX_TRY(candidates.framing, framingOf(mesh, s, false, job.limits));
     SelectSettings select;
     select.count = wanted.count > 0 ? wanted.count : kMostAutoViews;
     candidates.directions = std::max(candidates.directions, std::min(kMostViews, 2 * select.count));
@@ -103,7 +105,8 @@ Result<MeshViews> chooseViews(const Mesh& mesh, const ConvertSettings& s, Job& j
     STX_TRY(const auto wanted, parseAutoViews(s.views));
     if (wanted) return bestViews(mesh, *wanted, s, job);
     STX_TRY(auto layout, parseViewLayout(s.views));
-    STX_TRY(const auto framing, framingOf(s, layout.kind == ViewLayout::Kind::cube, job.limits));
+    STX_TRY(const auto framing,
+            framingOf(mesh, s, layout.kind == ViewLayout::Kind::cube, job.limits));
     layout.elevationRad = s.elevationRad;
     STX_TRY(auto cameras, layoutCameras(layout, framing, drawnPoints(mesh)));
     return MeshViews{std::move(cameras), {}, {}, 0, 0.0};

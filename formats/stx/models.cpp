@@ -4,6 +4,8 @@
 #include "formats/atlas/atlas_files.hpp"
 #include "formats/imagesets/image_sets.hpp"
 #include "formats/stx/mesh_views.hpp"
+#include "lib/geometry/view_layout.hpp"
+#include "lib/model/splat_cloud.hpp"
 
 namespace stx {
 namespace {
@@ -89,6 +91,16 @@ Result<Bundle> convert(Model model, const ConvertSettings& settings, Job& job) {
 
 glm::dvec3 originOf(const Model& model) {
     return std::visit([](const auto& m) { return m.origin; }, model);
+}
+
+glm::dvec3 upOf(const Model& model) {
+    if (const auto* mesh = std::get_if<Mesh>(&model))
+        return mesh->splats ? glm::normalize(glm::dvec3(mesh->splats->up)) : glm::dvec3(0, 1, 0);
+    const auto* atlas = std::get_if<Atlas>(&model);
+    std::vector<Camera> cameras;
+    for (const auto& view : atlas ? atlas->views : std::get<Bundle>(model).views)
+        cameras.push_back(view.camera);
+    return upOfCameras(cameras);
 }
 
 Bounds boundsOf(const Model& model) {

@@ -28,10 +28,10 @@ Result<std::unique_ptr<Renderer>> borrow(const Model& model, const RenderSetting
 /// A renderer together with what it draws from.
 class KeptRenderer final : public Renderer {
   public:
-    explicit KeptRenderer(Model model) : model_(std::move(model)) {}
+    explicit KeptRenderer(std::shared_ptr<const Model> model) : model_(std::move(model)) {}
 
     Result<void> make(const RenderSettings& settings, Backend backend, int device, Job& job) {
-        STX_TRY(renderer_, borrow(model_, settings, backend, device, job));
+        STX_TRY(renderer_, borrow(*model_, settings, backend, device, job));
         return {};
     }
 
@@ -42,7 +42,7 @@ class KeptRenderer final : public Renderer {
     std::string device() const override { return renderer_->device(); }
 
   private:
-    Model model_;
+    std::shared_ptr<const Model> model_;
     std::unique_ptr<Renderer> renderer_;
 };
 
@@ -63,6 +63,13 @@ Image<P> wholeOf(const Image<P>& stored, const DecodedImage& window, P nothing) 
 }  // namespace
 
 Result<std::unique_ptr<Renderer>> rendererOf(Model model, const RenderSettings& settings, Job& job,
+                                             Backend backend, int device) {
+    return rendererOf(std::make_shared<const Model>(std::move(model)), settings, job, backend,
+                      device);
+}
+
+Result<std::unique_ptr<Renderer>> rendererOf(std::shared_ptr<const Model> model,
+                                             const RenderSettings& settings, Job& job,
                                              Backend backend, int device) {
     auto renderer = std::make_unique<KeptRenderer>(std::move(model));
     STX_CHECK(renderer->make(settings, backend, device, job));

@@ -36,6 +36,7 @@
 #include "formats/any/options.hpp"
 #include "formats/environment/environment_files.hpp"
 #include "formats/validate/validate.hpp"
+#include "lib/background/still.hpp"
 #include "lib/base/job.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/metrics/compare.hpp"
@@ -124,7 +125,8 @@ struct ConvertSettings {
     /// 8, 16 or 32 (float distances, only .exr holds them). Without a value meshes get 16 and
     /// bundles keep theirs.
     std::optional<int> depthBits{};
-    glm::dvec3 up{0, 1, 0};  ///< the mesh's up axis: what views stand on; need not be unit
+    /// The mesh's up axis: what views stand on; need not be unit. Without a value: upOf().
+    std::optional<glm::dvec3> up{};
 };
 
 /// Captures a mesh from all sides; takes the views out of an atlas; gives a bundle the depth bits
@@ -143,6 +145,30 @@ struct ConvertSettings {
 /// What a model's coordinates count from: positions and cameras here, and those of novel cameras,
 /// plus this are the world's. 0 but for models whose coordinates are too large for floats.
 [[nodiscard]] glm::dvec3 originOf(const Model& model);
+
+/// What a model stands on, unit: the axis of its reference views, of a cloud of splats what is up
+/// by the habits of its format, else +Y.
+[[nodiscard]] glm::dvec3 upOf(const Model& model);
+
+// ---- What is behind those who pass ----
+
+struct BackgroundSettings {
+    double support = 0.04;  ///< share of the frames that must show a surface, above 0, at most 1
+    int keyViews = 8;       ///< poses of moving cameras that get a background, at most; 1..64
+};
+
+/// The frames of a film with a view more for each camera that stands still, and for a few poses of
+/// those that move: what is behind everything that passes. All frames are read. Errors:
+/// invalidInput (one frame, nothing that stays), usage (settings), those of reading.
+[[nodiscard]] Result<std::unique_ptr<Sequence>> background(std::unique_ptr<Sequence> frames,
+                                                           const BackgroundSettings& settings,
+                                                           Job& job);
+
+/// The background of plain video of a camera that stands still: pictures, a folder of them,
+/// `frame_%04d.png`, or a film (.y4m; .mp4, .mov, .mkv, .webm and .avi by the module of video).
+/// Frames in memory: stillBackground(). Errors: io, unsupported, those of stillBackground().
+[[nodiscard]] Result<StillBackground> background(const std::vector<std::filesystem::path>& inputs,
+                                                 const StillSettings& settings, Job& job);
 
 // ---- Pictures ----
 
@@ -185,6 +211,12 @@ struct OrbitSettings {
 /// when there is one, else cpu; `device` chooses among the GPUs (-1 = the best). The job must
 /// outlive the renderer. Errors: a model that fails check(); unsupported, with what was tried.
 [[nodiscard]] Result<std::unique_ptr<Renderer>> rendererOf(Model model,
+                                                           const RenderSettings& settings, Job& job,
+                                                           Backend backend = Backend::automatic,
+                                                           int device = -1);
+
+/// The same of a model that others use, too.
+[[nodiscard]] Result<std::unique_ptr<Renderer>> rendererOf(std::shared_ptr<const Model> model,
                                                            const RenderSettings& settings, Job& job,
                                                            Backend backend = Backend::automatic,
                                                            int device = -1);

@@ -7,7 +7,7 @@ Makes the .deb files and the .tar.gz. The .deb have their dependencies, those of
 opened when needed among them; unpacked into an empty folder they run a small job. The .tar.gz is unpacked
 anywhere and runs. With --debian, which CTest does not give, since it takes minutes and a mirror: lintian finds
 no error, and, as root with debootstrap, a bare Debian 12 is made, `apt-get install ./stx_*.deb` installs stx
-there, the main job runs with the sample model, a program is compiled against libstx-dev, and after `apt-get
+there, the main job runs with the sample model, a program is compiled against libstx-dev, python3-stx draws, and after `apt-get
 purge` no file is left that was not there before. Where no bare Debian can be made the main job runs unpacked.
 """
 import argparse
@@ -26,6 +26,12 @@ STEP_SECONDS = 600
 # What apt and dpkg keep for themselves, and what is made when a program of Debian's runs.
 OWN_FILES = re.compile(r"^(var/(cache|log|lib/(apt|dpkg|ucf|systemd))|etc/(ld\.so\.cache|mailcap)|tmp|root|proc|sys|dev|run)(/|$)"
                        r"|__pycache__")
+# Where the Python module was built, python3-stx is made, too.
+PYTHON_MODULE = "python/stx/_stx*.so"
+PYTHON = """import stx, sys
+bundle = stx.convert(sys.argv[1], views="ring:2", size=(32, 32))
+assert stx.render(bundle, bundle.views[0].camera).depth.shape == (32, 32)
+"""
 PROGRAM = """#include <stx/stx.hpp>
 int main() { return stx::version() ? 0 : 1; }
 """
@@ -58,6 +64,20 @@ def check_fields(debs):
                  "share/stx/schemas/info.schema.json", "share/stx/samples/main_job.sh", "share/stx/samples/slurm/submit", "share/doc/stx/copyright"):
         if f" ./usr/{name}\n" not in names:
             sys.exit(f"stx does not hold {name}")
+
+
+    if "python3-stx" in debs and not re.search(r"^Depends:.*libstx0.1 \(= .*\bpython3-numpy\b", fields(debs["python3-stx"]), re.M):
+        sys.exit(f"python3-stx does not depend on libstx0.1 and numpy:\n{fields(debs['python3-stx'])}")
+
+
+def check_python(prefix, model):
+    """The Python module of an unpacked package, by Debian's Python, where there is numpy."""
+    places = glob.glob(os.path.join(prefix, "lib/python3/dist-packages"))
+    if not places or subprocess.run(["/usr/bin/python3", "-c", "import numpy"], capture_output=True).returncode != 0:
+        print("the Python module was not tried: it was not built, or there is no python3-numpy")
+        return
+    run(["/usr/bin/python3", "-B", "-c", PYTHON, model], env=dict(os.environ, PYTHONPATH=places[0]), quiet=True)
+    print("the Python module works")
 
 
 def check_lintian(debs):
@@ -139,7 +159,11 @@ def in_chroot(root, debs):
         file.write(PROGRAM)
     run(["chroot", root, "sh", "-euc",
          "g++ -std=c++20 /tmp/main.cpp -o /tmp/main $(pkg-config --cflags --libs stx) && /tmp/main"])
-    run(apt + ["purge", "--autoremove", "stx", "libstx0.1", "libstx-dev", "g++", "pkg-config"], cwd=root)
+    python = [name for name in debs if name == "python3-stx"]
+    if python:
+        run(apt + ["install", "--no-install-recommends", inside[python[0]]], cwd=root)
+        run(["chroot", root, "python3", "-c", PYTHON, "/usr/share/stx/samples/amphora.obj"], quiet=True)
+    run(apt + ["purge", "--autoremove", "stx", "libstx0.1", "libstx-dev", "g++", "pkg-config"] + python, cwd=root)
     left = files(root) - before
     if left:
         sys.exit(f"{len(left)} files stay after the packages were removed:\n" + "\n".join(sorted(left)[:40]))
@@ -160,6 +184,7 @@ def unpacked(top, debs, model, whole):
         run(["stx", "convert", model, "-o", os.path.join(job, "a.mp4"), "--views", "ring:4", "--size", "64x64"], env=env)
         run(["stx", "pack", os.path.join(job, "a.mp4"), "-o", atlas], env=env)
     run(["stx", "render", atlas, "-o", os.path.join(top, "a.tif"), "--size", "64x64"], env=env)
+    check_python(os.path.join(prefix, "usr"), model)
     print(f"unpacked: {'the main job' if whole else 'a small job'} ran")
 
 
@@ -178,6 +203,7 @@ def archive(top, path):
             sys.exit(f"the archive does not hold {name}")
     picture = os.path.join(top, "archive.tif")
     run([stx, "render", os.path.join(prefix, "share/stx/samples/amphora.obj"), "-o", picture, "--size", "64x64", "--quiet"])
+    check_python(prefix, os.path.join(prefix, "share/stx/samples/amphora.obj"))
 
 
 def main():
@@ -195,7 +221,8 @@ def main():
         # Of one run only, also when several work in one build tree.
         run([args.cpack, "--config", os.path.join(args.build, "CPackConfig.cmake"), "-B", top], cwd=top)
         debs = {os.path.basename(p).split("_")[0]: p for p in glob.glob(os.path.join(top, "*.deb"))}
-        if set(debs) != {"stx", "libstx0.1", "libstx-dev"}:
+        python = {"python3-stx"} if glob.glob(os.path.join(args.build, PYTHON_MODULE)) else set()
+        if set(debs) != {"stx", "libstx0.1", "libstx-dev"} | python:
             sys.exit(f"cpack made {sorted(debs)}")
         check_fields(debs)
         archive(top, glob.glob(os.path.join(top, "*.tar.gz"))[0])

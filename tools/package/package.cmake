@@ -1,4 +1,5 @@
-# What `cpack` makes of a build: stx, libstx0.1 and libstx-dev for Debian 12, and a .tar.gz of all of it.
+# What `cpack` makes of a build: stx, libstx0.1, libstx-dev and (where the module was built) python3-stx for
+# Debian 12, and a .tar.gz of all of it.
 # What is installed without a component of its own belongs to stx.
 set(STX_PACKAGE_CONTACT "The stx authors <stx@users.noreply.github.com>" CACHE STRING
     "Maintainer of the packages that cpack makes: Name <address>")
@@ -56,4 +57,25 @@ set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
     "${runtime} (= ${PROJECT_VERSION}-1), libglm-dev, libfmt-dev, libexpected-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION
     "The header of libstx, with a call for each command of stx, and what CMake and\npkg-config find it by.")
+
+if(TARGET stx_python)
+    list(APPEND CPACK_COMPONENTS_ALL python)
+    get_target_property(python_version stx_python STX_PYTHON_VERSION)
+    string(REGEX MATCH "[0-9]+$" minor ${python_version})
+    math(EXPR minor "${minor} + 1")
+    set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-stx)
+    set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+    set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+        "${runtime} (= ${PROJECT_VERSION}-1), python3 (>= ${python_version}), python3 (<< 3.${minor}), python3-numpy")
+    # Of libstx itself it depends by the line above.
+    set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+    set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${STX_BUILD_LIBDIR})
+    set(CPACK_COMPONENT_PYTHON_DESCRIPTION
+        "stx for Python: what the program does, on numpy arrays.")
+    # Compiled files come and go with the package.
+    set(scripts ${CMAKE_BINARY_DIR}/package/python)
+    file(WRITE ${scripts}/postinst "#!/bin/sh\nset -e\nif [ \"$1\" = configure ]; then py3compile -p python3-stx; fi\n")
+    file(WRITE ${scripts}/prerm "#!/bin/sh\nset -e\npy3clean -p python3-stx\n")
+    set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA "${scripts}/postinst;${scripts}/prerm")
+endif()
 include(CPack)

@@ -87,8 +87,12 @@ int main(int argc, char** argv) {
         return 1;
     const auto orbit = valueOf(stx::orbitCameras(sphere.centre(), sphere.radius(), 2, 0.3, lens));
     const auto renderer = valueOf(stx::rendererOf(opened, {}, job, stx::Backend::cpu));
+    const auto sharing = valueOf(
+        stx::rendererOf(std::make_shared<const stx::Model>(opened), {}, job, stx::Backend::cpu));
     for (const auto& c : orbit)
-        require(valueOf(renderer->render(c)).colour.width() == 160, "a picture of another size");
+        require(valueOf(renderer->render(c)).colour == valueOf(sharing->render(c)).colour,
+                "a shared model gives another picture");
+    require(stx::upOf(opened) == glm::dvec3(0, 1, 0), "the atlas does not stand on +Y");
 
     // Three frames, of which each has the camera a little farther on.
     auto film = stx::someFrames(stx::changed(std::make_unique<Moving>(bundle),
@@ -103,6 +107,13 @@ int main(int argc, char** argv) {
     const auto late = valueOf(again->frame(again->timeline().frameAt(0.9), job));
     require(late.views[0].camera.position.x > bundle.views[0].camera.position.x + 0.19,
             "the film's camera stands still");
+
+    // What is behind everything that passes.
+    auto behind = stx::background(valueOf(stx::openSequence("library.mp4", {}, job)), {}, job);
+    require(valueOf(valueOf(std::move(behind))->frame(0, job)).views.size() > late.views.size(),
+            "no background");
+    const std::vector<std::filesystem::path> pictures{argv[2], argv[2]};
+    require(valueOf(stx::background(pictures, {}, job)).colour.width() == 160, "no background");
 
     require(stx::open("missing.obj", {}, job).error().code == stx::ErrorCode::io,
             "a missing file is not an io error");

@@ -4,6 +4,9 @@
 
 #include <numbers>
 
+#include "formats/stx/mesh_views.hpp"
+#include "lib/geometry/view_layout.hpp"
+#include "lib/model/splat_cloud.hpp"
 #include "tests/small_bundle.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -52,6 +55,24 @@ TEST(Stx, FramesCubesOrthographicallyUnlessToldOtherwise) {
     EXPECT_TRUE(convert(quad(), settings, job)->views[0].camera.orthographic);
     settings.orthographic = false;
     EXPECT_FALSE(convert(quad(), settings, job)->views[0].camera.orthographic);
+}
+
+TEST(Stx, ViewsOfACloudStandOnWhatIsUpByItsFormat) {
+    Job job;
+    Mesh mesh = quad();
+    const auto right = convert(mesh, smallViews("ring:3"), job);
+    EXPECT_EQ(upOf(mesh), glm::dvec3(0, 1, 0));
+    SplatCloud cloud;
+    cloud.up = {0, 0, -1};
+    mesh.splats = std::make_shared<const SplatCloud>(cloud);
+    EXPECT_EQ(upOf(mesh), glm::dvec3(0, 0, -1));
+    const auto views = chooseViews(mesh, smallViews("ring:3"), job);
+    ASSERT_TRUE(right && views);
+    EXPECT_EQ(upOf(*right), glm::dvec3(0, 1, 0));
+    EXPECT_EQ(upOfCameras(views->cameras), glm::dvec3(0, 0, -1));
+    auto settings = smallViews("ring:3");
+    settings.up = {1, 0, 0};
+    EXPECT_EQ(upOfCameras(chooseViews(mesh, settings, job)->cameras), glm::dvec3(1, 0, 0));
 }
 
 TEST(Stx, RefusesSettingsOutOfRange) {

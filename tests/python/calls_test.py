@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+"""Notes, jobs, progress, threads, Ctrl-C; and an installed module that was moved."""
+import os
+import signal
+import subprocess
+import sys
+import threading
+import unittest
+import warnings
+
+from harness import MODEL, Case, np, stx
+
+# Minutes of work on any machine, which reports its progress often.
+LONG = {"views": "sphere:200", "size": (1024, 1024), "supersampling": 8}
+# Says when it works; what it prints at the end says how it ended.
+INTERRUPTED = f"""
+import stx
+begun = []
+def progress(done, total, what):
+    if not begun: print("working", flush=True)
+    begun.append(done)
+try:
+    stx.convert({MODEL!r}, **{LONG!r}, job=stx.Job(progress=progress))
+    print("done")
+except KeyboardInterrupt:
+    print("stopped")
+stx.convert({MODEL!r}, views="ring:2", size=(32, 32))
+print("works on")
+"""
+
+
+class Calls(Case):
+    def setUp(self):
+        super().setUp()
+        self.mesh = stx.open(MODEL, job=stx.Job())
+
+    def test_notes_are_warnings_of_who_calls(self):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            stx.convert(self.mesh, views="ring:2", size=(32, 32), depth_bits=8)
+        self.assertEqual([w.category for w in caught], [stx.Note])
+        self.assertIn("depth in 8 bits", str(caught[0].message))
+        self.assertEqual(caught[0].filename, __file__)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with self.assertRaises(stx.Note):
+                stx.convert(self.mesh, views="ring:2", size=(32, 32), depth_bits=8)
+
+    def test_a_job_keeps_notes_and_tells_progress(self):
+        told = []
+        job = stx.Job(threads=1, progress=lambda *news: told.append(news))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            stx.convert(self.mesh, views="sphere:30", size=(256, 256), depth_bits=8, job=job)
+        self.assertEqual(len(job.notes), 1)
+        for done, total, what in told:
+            self.assertTrue(0 <= done <= total and isinstance(what, str))
+
+    def test_the_same_on_any_number_of_threads(self):
+        depths = [stx.convert(MODEL, views="ring:2", size=(64, 64), job=stx.Job(threads=n)).views[0].depth for n in (1, 2)]
+        np.testing.assert_array_equal(*depths)
+
+    def test_what_progress_raises_stops_the_call(self):
+        def progress(done, total, what):
+            raise KeyError(what)
+        with self.assertRaises(KeyError):
+            stx.convert(MODEL, **LONG, job=stx.Job(progress=progress))
+
+    def test_another_thread_cancels(self):
+        begun = threading.Event()
+        job = stx.Job(progress=lambda *_: begun.set())
+
+        def cancel():
+            begun.wait()
+            job.cancel()
+        thread = threading.Thread(target=cancel)
+        thread.start()
+        self.fails("failed", "stopped", stx.convert, MODEL, **LONG, job=job)
+        thread.join()
+        self.fails("failed", "stopped", stx.convert, MODEL, views="ring:2", size=(32, 32), job=job)
+
+    def test_control_c(self):
+        child = subprocess.Popen([sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, text=True)
+        try:
+            self.assertEqual(child.stdout.readline(), "working\n")
+            child.send_signal(signal.SIGINT)
+            out, _ = child.communicate(timeout=300)
+        finally:
+            child.kill()
+        self.assertEqual((out, child.returncode), ("stopped\nworks on\n", 0))
+
+    def test_threads_of_python_draw_together(self):
+        bundle = stx.convert(MODEL, views="ring:4", size=(64, 64))
+        path = stx.orbit(bundle, 4, size=(48, 48))
+        alone = [frame.colour for frame in stx.render(bundle, path)]
+        together = [None] * len(path)
+
+        def draw(i):
+            together[i] = stx.render(bundle, path[i]).colour
+        threads = [threading.Thread(target=draw, args=(i,)) for i in range(len(path))]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        np.testing.assert_array_equal(alone, together)
+
+    def test_the_environment_is_shown_unless_it_is_not_wanted(self):
+        sky = np.zeros((8, 16, 3), np.uint8)
+        sky[:] = (10, 200, 30)
+        bundle = stx.convert(MODEL, views="ring:4", size=(64, 64))
+        camera = bundle.views[0].camera
+        # Any picture twice as wide as high will do.
+        stx.render(stx.Bundle([stx.View(sky, np.ones((8, 16)), stx.Camera((16, 8), 8))]), stx.Camera((16, 8), 8)).save("sky.png")
+        shown = stx.render(bundle, camera, environment="sky.png")
+        self.assertEqual(shown.alpha[0, 0], 1)
+        self.assertEqual(stx.render(bundle, camera, environment=False).alpha[0, 0], 0)
+        self.fails("io", "none.png", stx.render, bundle, camera, environment="none.png")
+        self.assertEqual(os.listdir(), ["sky.png"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""Wrong input gives stx.Error, or TypeError, in one sentence that says what was found and what is expected."""
+import unittest
+
+from harness import MODEL, Case, np, plate, stx
+
+
+class WrongInput(Case):
+    def setUp(self):
+        super().setUp()
+        self.camera = stx.Camera((6, 4), 5)
+        self.bundle = stx.Bundle([plate(self.camera)])
+
+    def test_files(self):
+        error = self.fails("io", "missing.obj", stx.open, "missing.obj")
+        self.assertEqual(str(error), f"{error.place}: {error.message}" if error.place else error.message)
+        with open("text.exr", "w", encoding="ascii") as file:
+            file.write("no picture")
+        self.fails("invalidInput", "text.exr", stx.open, "text.exr")
+        self.fails("usage", "a.xyz", self.bundle.save, "a.xyz")
+        self.fails("io", "nowhere", self.bundle.save, "nowhere/a.exr")
+        self.bundle.save("a.exr")
+        self.fails("io", "a.exr", self.bundle.save, "a.exr", no_clobber=True)
+        frame = stx.render(self.bundle, self.camera)
+        self.fails("usage", "a.xyz", frame.save, "a.xyz")
+        self.fails("usage", "quality is 0; 1 to 100", frame.save, "a.jpg", quality=0)
+        self.fails("io", "missing.png", stx.compare, "missing.png", frame)
+
+    def test_memory(self):
+        self.fails("invalidInput", "memory limit", stx.convert, MODEL, size=(4096, 4096), job=stx.Job(max_memory=16))
+        self.fails("usage", "max_memory is 0", stx.Job, max_memory=0)
+        self.fails("usage", "threads is -1", stx.Job, threads=-1)
+
+    def test_types_of_arrays(self):
+        colour, depth = np.zeros((4, 6, 3), np.uint8), np.ones((4, 6), np.float32)
+        view = stx.View
+        error = self.fails("usage", "colour is float64 of shape (4, 6, 3); an array of uint8 (sRGB) or float32", view,
+                           colour.astype(float), depth, self.camera)
+        self.assertIn("is expected", error.remedy)
+        self.fails("usage", "colour is uint8 of shape (4, 6)", view, colour[..., 0], depth, self.camera)
+        self.fails("usage", "colour is list", view, [[0]], depth, self.camera)
+        self.fails("usage", "depth is uint16 of shape (4, 6); an array of floats", view, colour, depth.astype(np.uint16), self.camera)
+        self.fails("usage", "depth is float32 of shape (4, 6, 1)", view, colour, depth[..., None], self.camera)
+        self.fails("usage", "normals is float32 of shape (4, 6)", view, colour, depth, self.camera, normals=depth)
+        self.fails("usage", "colour is uint8 of shape (0, 6, 3); each side is 1", view, colour[:0], depth[:0], self.camera)
+
+    def test_values_of_arrays(self):
+        colour, depth = np.zeros((4, 6, 3), np.uint8), np.ones((4, 6), np.float32)
+        self.fails("invalidInput", "6x4", stx.View, colour[:3], depth, self.camera)
+        self.fails("invalidInput", "6x4", stx.View, colour, depth[:, :5], self.camera)
+        for wrong in (np.nan, -1.0):
+            spoilt = depth.copy()
+            spoilt[1, 2] = wrong
+            self.fails("invalidInput", "distances are 0 or more", stx.View, colour, spoilt, self.camera)
+        linear = colour.astype(np.float32)
+        linear[0, 0, 0] = np.nan
+        self.fails("usage", "colour holds NaN", stx.View, linear, depth, self.camera)
+        self.fails("usage", "no_depth is 'none'; empty or unknown", stx.View, colour, depth, self.camera, no_depth="none")
+        self.fails("usage", "depthBits is 12", stx.View, colour, depth, self.camera, depth_bits=12)
+        one = stx.View(colour, depth, self.camera, name="a")
+        self.fails("usage", "two views have the name 'a'", stx.Bundle, [one, one])
+        self.fails("invalidInput", "view", stx.Bundle, [])
+
+    def test_cameras(self):
+        pose = np.eye(4)
+        for wrong, text in ((np.nan, "not a rotation"), (2.0, "not a rotation")):
+            spoilt = pose.copy()
+            spoilt[1, 1] = wrong
+            self.fails("usage", text, stx.Camera, (6, 4), 5, world_from_camera=spoilt)
+        mirrored = np.diag([1.0, 1, -1, 1])
+        self.fails("usage", "mirror", stx.Camera, (6, 4), 5, world_from_camera=mirrored)
+        away = pose.copy()
+        away[0, 3] = np.inf
+        self.fails("usage", "finite", stx.Camera, (6, 4), 5, world_from_camera=away)
+        self.fails("usage", "world_from_camera is float64 of shape (3, 3)", stx.Camera, (6, 4), 5, world_from_camera=np.eye(3))
+        self.fails("usage", "world_from_camera is str", stx.Camera, (6, 4), 5, world_from_camera="a")
+        self.fails("usage", "size is 0x4", stx.Camera, (0, 4), 5)
+        self.fails("usage", "size is 7; (width, height)", stx.Camera, 7, 5)
+        self.fails("usage", "axes is 'up'", stx.Camera, (6, 4), 5, axes="up")
+        self.fails("invalidInput", "", stx.Camera, (6, 4), float("nan"))
+        self.fails("invalidInput", "", stx.Camera, (6, 4), -5)
+        look = stx.Camera.look_at
+        self.fails("usage", "", look, (1, 1, 1), (1, 1, 1))
+        self.fails("usage", "eye is [1, nan, 1]; three finite numbers", look, [1, np.nan, 1], (0, 0, 0))
+        self.fails("usage", "target is (0, 0)", look, (1, 1, 1), (0, 0))
+        self.fails("usage", "fovRad", look, (1, 1, 1), (0, 0, 0), fov=180)
+        self.fails("usage", "up is", look, (1, 1, 1), (0, 0, 0), up=(0, 0, 0))
+        with self.assertRaisesRegex(TypeError, "no keyword 'fow'; it has up, size, fov and ortho"):
+            look((1, 1, 1), (0, 0, 0), fow=3)
+        self.fails("usage", "0 cameras", stx.orbit, self.bundle, 0)
+
+    def test_drawing(self):
+        render, bundle, camera = stx.render, self.bundle, self.camera
+        self.fails("usage", "mode is 'wire'; one of surface, splat is expected", render, bundle, camera, mode="wire")
+        self.fails("usage", "mode is 3; a text", render, bundle, camera, mode=3)
+        self.fails("usage", "no stage 'x'", render, bundle, camera, without=["x"])
+        self.fails("usage", "ambient is negative", render, bundle, camera, ambient=-1)
+        self.fails("usage", "shininess is 0", render, bundle, camera, shininess=0)
+        self.fails("usage", "no stage 'y'", render, bundle, camera, without="holes,y")
+        self.fails("usage", "lights is [3]; a list of stx.Light", render, bundle, camera, lights=[3])
+        self.fails("usage", "device is 1.5; a whole number", render, bundle, camera, device=1.5)
+        self.fails("usage", "kind is 'spot'; one of directional, point", stx.Light, "spot", (0, 0, 1))
+        self.fails("usage", "must point somewhere", stx.Light, "directional", (0, 0, 0))
+        # Before the first picture is asked for.
+        self.fails("usage", "mode is 'wire'", render, bundle, [camera], mode="wire")
+        with self.assertRaisesRegex(TypeError, "cameras holds ndarray; stx.Camera is expected"):
+            render(bundle, [np.eye(4)])
+        with self.assertRaisesRegex(TypeError, "times are of a stx.Film"):
+            render(bundle, camera, times=1.0)
+        with self.assertRaisesRegex(TypeError, "this is dict; stx.Mesh, stx.Bundle, stx.Atlas or the name of its file"):
+            render({}, camera)
+
+    def test_models(self):
+        mesh = stx.open(MODEL)
+        self.fails("usage", "'circle:3' is not a view layout", stx.convert, mesh, views="circle:3")
+        self.fails("usage", "size is 0x5", stx.convert, mesh, size=(0, 5))
+        self.fails("usage", "cameras is ['a']; a list of stx.Camera", stx.convert, mesh, cameras=["a"])
+        self.fails("usage", "intrinsics is (1, 2); four numbers", stx.open, MODEL, intrinsics=(1, 2))
+        self.fails("usage", "depthBits is 12", stx.convert, mesh, depth_bits=12)
+        self.fails("usage", "supersampling is 'x'; a whole number", stx.convert, mesh, supersampling="x")
+        self.fails("usage", "discontinuity", stx.bake, self.bundle, discontinuity=0)
+        self.fails("usage", "method is 'none'; one of robust, paper", stx.bake, self.bundle, method="none")
+        self.fails("usage", "padding", stx.pack, self.bundle, padding=65)
+        self.fails("usage", "budget is -1", stx.pack, self.bundle, budget=-1)
+        with self.assertRaisesRegex(TypeError, "this is Mesh; stx.Bundle or the name of its file is expected"):
+            stx.bake(mesh)
+
+    def test_films(self):
+        film = stx.Film([self.bundle, self.bundle])
+        with self.assertRaisesRegex(IndexError, "frame 2 of a film of 2"):
+            film[2]
+        self.assertEqual(film[-1].time, film.times[1])
+        self.fails("usage", "no bundles", stx.Film, [])
+        self.fails("usage", "rate is 0", stx.Film, [self.bundle], rate=0)
+        other = stx.Bundle([plate(stx.Camera((7, 4), 5))])
+        self.fails("invalidInput", "", stx.Film, [self.bundle, other])
+        self.fails("usage", "2 cameras and 3 times", stx.render, film, [self.camera] * 2, times=[0, 1, 2])
+        self.fails("usage", "h264 is 52", film.save, "a.mp4", h264=52)
+        self.fails("usage", "support is 2", stx.background, film, support=2)
+        self.fails("invalidInput", "one frame", stx.background, stx.Film([self.bundle]))
+
+    def test_backgrounds(self):
+        frames = np.zeros((5, 8, 8, 3), np.uint8)
+        self.fails("usage", "frames are float64 of shape (5, 8, 8, 3); uint8", stx.background, frames.astype(float))
+        self.fails("usage", "frames are uint8 of shape (8, 8, 3)", stx.background, frames[0])
+        self.fails("invalidInput", "", stx.background, frames[:1])
+        self.fails("io", "nowhere", stx.background, "nowhere")
+        with self.assertRaisesRegex(TypeError, "this is int; a stx.Film, an array of frames or names"):
+            stx.background(3)
+        still = stx.background(frames)
+        self.fails("invalidInput", "", still.mask, frames[0, :4])
+
+    def test_comparing(self):
+        a = np.zeros((8, 8, 3), np.uint8)
+        self.fails("invalidInput", "", stx.compare, a, a[:4])
+        self.fails("usage", "b is float64", stx.compare, a, a.astype(float))
+        self.fails("usage", "mask is float64", stx.compare, a, a, mask=np.ones((8, 8)))
+        self.fails("invalidInput", "", stx.compare, a, a, mask=np.zeros((8, 8), bool))
+        self.fails("usage", "background is 2; values of 0 to 1", stx.compare, a, a, background=2)
+
+
+if __name__ == "__main__":
+    unittest.main()
