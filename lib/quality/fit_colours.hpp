@@ -13,7 +13,7 @@ struct ColourFit {
 
 /// Fits the colours that a pruned bundle kept to the views that it was pruned from: what pictures
 /// from the source cameras (surface mode) lack is projected back onto the points that those views
-/// see, and 0.7 of its mean is added, once. The pictures are drawn again, and where they are not
+/// see, and 0.35 of its mean is added, once. The pictures are drawn again, and where they are not
 /// nearer to the source all stays as it was. Depth, alpha and what is pruned do not change.
 ///
 /// `source` has the views of `pruned`, in the same order. Errors: other views; those of rendering;

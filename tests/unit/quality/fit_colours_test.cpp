@@ -26,7 +26,7 @@ TEST(FitColours, BringsPicturesNearerToTheSource) {
     Job job;
     const auto fit = fitColours(source, pruned, job);
     ASSERT_TRUE(fit) << fit.error().text();
-    EXPECT_GT(fit->after, fit->before + 4);
+    EXPECT_GT(fit->after, fit->before + 2);
     for (std::size_t i = 0; i < pruned.views.size(); ++i) {
         const ReferenceView &a = before.views[i], &b = pruned.views[i];
         EXPECT_EQ(a.depth, b.depth);
