@@ -15,6 +15,7 @@ struct BakeOptions {
     std::string input, output;
     std::string method = "robust";
     BakeSettings settings;
+    OpenOptions open;
 };
 
 Result<int> bakeBundle(const BakeOptions& o, Program& program) {
@@ -22,7 +23,7 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     STX_CHECK(checkTarget(o.output, program));
     STX_CHECK(containerOf(o.output));
     preloadCodecs(o.input);
-    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     BakeSettings settings = o.settings;
     settings.method =
         o.method == "paper" ? BakeSettings::Method::paper : BakeSettings::Method::robust;
@@ -78,6 +79,7 @@ void addBake(CommandLine& line, Program& program) {
     c.option("--discontinuity", o->settings.discontinuity,
              "Relative depth difference beyond the slope that parts two surfaces (default 0.01)")
         .range(1e-6, 1.0);
+    c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return bakeBundle(*o, p); });
 }

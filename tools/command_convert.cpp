@@ -210,7 +210,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
     std::optional<Converted> done;
     std::error_code ec;
     // `name_%04d.exr` is not a file's name.
-    if (!o.environment.given() && !o.cube && o.refining.steps == "auto" &&
+    if (!o.environment.given() && !o.cube && o.open.object.empty() && o.refining.steps == "auto" &&
         (std::filesystem::exists(input, ec) || !frameName(input.string(), 0))) {
         STX_TRY(const auto passed,
                 convertDocument(input, target, saveOptions(o, program),
@@ -569,6 +569,7 @@ void addConvert(CommandLine& line, Program& program) {
          "Colour of YUV files (default bt709)")
         .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"})
         .group(sets);
+    c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return convert(*o, c, p); });
 }

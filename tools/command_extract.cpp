@@ -26,6 +26,7 @@ struct ExtractOptions {
     PointWriteOptions points;
     std::string as;
     int mostSplats = 0;
+    OpenOptions open;
 };
 
 /// All points of a bundle, view by view, as flat arrays.
@@ -97,10 +98,10 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
     if (splats)
-        return extractSplats(o.input, o.output, o.time, o.refine,
+        return extractSplats(o.input, o.open, o.output, o.time, o.refine,
                              {.most = static_cast<std::size_t>(o.mostSplats)}, program);
-    if (shown) return extractShown(o.input, o.output, o.time, o.refine, program);
-    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    if (shown) return extractShown(o.input, o.open, o.output, o.time, o.refine, program);
+    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     STX_TRY(frames, refined(std::move(frames), o.refine));
     const Timeline timeline = frames->timeline();
     STX_TRY(const std::size_t moment,
@@ -208,6 +209,7 @@ void addExtract(CommandLine& line, Program& program) {
         .takes("N");
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
+    c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return extract(*o, c, p); });
 }

@@ -49,6 +49,11 @@ Result<std::string> plotOf(const nlohmann::ordered_json& found, const InfoComman
         bounds.min += bundle.origin;
         bounds.max += bundle.origin;
     } else if (found.contains("views")) {
+        if (found.contains("objects"))
+            return fail(ErrorCode::usage,
+                        "'{}' has several objects, and their cameras are not in one place; give "
+                        "--object NAME",
+                        o.input);
         for (const auto& view : found["views"])
             cameras.push_back({view["name"].get<std::string>(), cameraOf(view)});
         if (found.contains("bounds")) {
@@ -99,6 +104,7 @@ void addInfo(CommandLine& line, Program& program) {
     c.option("--cameras", o->plot,
              "Draw the cameras around the object, from above and from the side, as an SVG picture")
         .takes("FILE.svg");
+    c.objectOption(o->info.object);
     c.sharedOptions(program.common, kFormat | kOutside);
     c.runs([o](Program& p) { return info(*o, p); });
 }

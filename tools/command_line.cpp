@@ -265,6 +265,10 @@ void Command::sharedOptions(CommonOptions& to, unsigned which) {
             .group(group);
 }
 
+void Command::objectOption(std::string& to) {
+    option("--object", to, "Of an atlas with several objects: the one of this name").takes("NAME");
+}
+
 void Command::runs(Body body) {
     app_->set_help_flag("-h,--help", kHelp);  // again, to be listed last
     *body_ = std::move(body);

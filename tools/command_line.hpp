@@ -95,6 +95,8 @@ class Command {
     Option flag(const std::string& names, int& count, const std::string& help);
     /// Those of SharedOptions that `which` names, and those that every command has.
     void sharedOptions(CommonOptions& to, unsigned which);
+    /// --object, of commands that open one model.
+    void objectOption(std::string& to);
     /// What it does once its options are parsed; gives the exit code.
     void runs(Body body);
 

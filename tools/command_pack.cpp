@@ -1,4 +1,5 @@
 #include <cmath>
+#include <map>
 
 #include <nlohmann/json.hpp>
 
@@ -9,7 +10,9 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/period.hpp"
+#include "lib/quality/fit_colours.hpp"
 #include "lib/quality/prune_quality.hpp"
+#include "tools/batch.hpp"
 #include "tools/commands.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
@@ -18,13 +21,18 @@ namespace stx::tools {
 namespace {
 
 struct PackOptions {
-    std::string input, output;
+    std::vector<std::string> inputs;
+    std::string input, output;  ///< of one
+    std::vector<std::string> names;
+    std::string size;
+    OpenOptions open;
     std::string refine = "auto";
     PackSettings settings;
     bool prune = false;
     std::string budget;
     PruneSettings pruning;
     double minPsnr = 0;
+    bool noFit = false;
     std::optional<double> time;
     int period = 25;  ///< as the groups of pictures of video
     std::string colour = "png";
@@ -46,6 +54,18 @@ Result<std::int64_t> parsePixels(const std::string& text) {
     return static_cast<std::int64_t>((*value)[0] * factor);
 }
 
+/// --size: of pages.
+Result<void> setSize(const std::string& text, const Limits& limits, PackSettings& settings) {
+    settings.powerOfTwo = text == "power-of-two";
+    if (text.empty() || settings.powerOfTwo) return {};
+    if (text.find_first_of("xX") == std::string::npos)
+        return fail(ErrorCode::usage,
+                    "--size is '{}'; WIDTHxHEIGHT is expected, as in 2048x2048, or power-of-two",
+                    text);
+    STX_TRY(settings.size, parseSize(text, limits));
+    return {};
+}
+
 /// Packs so that the images that are written, not only the pages, are within settings.maxSize.
 Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std::string& output,
                           const AtlasSaveOptions& save, Job& job) {
@@ -53,6 +73,11 @@ Result<Atlas> packForFile(const Bundle& bundle, PackSettings settings, const std
     if (largestImageSide(atlas, output, save) <= settings.maxSize) return atlas;
     // Some image holds two pictures of a page: beside each other, or one below the other.
     const int limit = settings.maxSize;
+    if (settings.size.x > 0)
+        return fail(ErrorCode::usage,
+                    "an image here holds two pictures, so that pages of {}x{} make one of more "
+                    "than {} pixels; take a smaller --size, or a larger --max-size",
+                    settings.size.x, settings.size.y, limit);
     settings.maxSize = limit / 2;
     Job quiet;  // the same notes again
     quiet.limits = job.limits;
@@ -67,11 +92,47 @@ bool prunes(const PackOptions& o) {
     return o.prune || o.pruning.budget > 0 || o.minPsnr > 0;
 }
 
-Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, Job& job) {
+Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, const std::string& input,
+                             Job& job) {
     auto report = o.minPsnr > 0 ? pruneToQuality(bundle, o.pruning, o.minPsnr, job)
                                 : prune(bundle, o.pruning, job);
-    if (!report) return tl::unexpected(report.error().at(fmt::format("'{}'", o.input)));
+    if (!report) return tl::unexpected(report.error().at(fmt::format("'{}'", input)));
     return report;
+}
+
+/// Fits the colours that pruning `source` left; nothing where that is not wanted or brings nothing.
+Result<std::optional<ColourFit>> fitted(const std::optional<Bundle>& source, Bundle& bundle,
+                                        Job& job) {
+    if (!source) return std::nullopt;
+    STX_TRY(const auto fit, fitColours(*source, bundle, job));
+    if (!(fit.after > fit.before)) return std::nullopt;
+    return fit;
+}
+
+AtlasSaveOptions saveOptions(const PackOptions& o, const Program& program) {
+    AtlasSaveOptions save;
+    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
+    save.output = program.outputOptions();
+    return save;
+}
+
+/// "12 views in 4 textures 2048x1024, 81.2 % used".
+std::string summaryOf(const Atlas& atlas) {
+    return fmt::format("{} in {} {}x{}, {:.1f} % used", counted(atlas.views.size(), "view"),
+                       counted(atlas.textureCount() + atlas.materialTextureCount(), "texture"),
+                       atlas.width(), atlas.height(), atlas.used() * 100);
+}
+
+/// What a report says of an atlas.
+void addReportOf(const Atlas& atlas, double seconds, nlohmann::ordered_json& report) {
+    report.update({{"views", atlas.views.size()},
+                   {"textures", atlas.textureCount()},
+                   {"materialTextures", atlas.materialTextureCount()},
+                   {"width", atlas.width()},
+                   {"height", atlas.height()},
+                   {"used", atlas.used()},
+                   {"pixels", {{"source", atlas.sourcePixels}, {"kept", atlas.keptPixels}}},
+                   {"seconds", seconds}});
 }
 
 /// One bundle into one atlas; of a film like the others of its period.
@@ -87,9 +148,12 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPe
         settings.contentOf = &content;
     }
     std::string pruned;
+    std::optional<ColourFit> fit;
     if (prunes(o)) {
-        auto report =
-            period ? Result<PruneReport>(period->prune(bundle)) : pruneOne(bundle, o, program.job);
+        std::optional<Bundle> source;
+        if (!o.noFit) source = bundle;
+        auto report = period ? Result<PruneReport>(period->prune(bundle))
+                             : pruneOne(bundle, o, o.input, program.job);
         if (!report) return propagate(report);
         settings.sourcePixels = report->sourcePixels;
         pruned = fmt::format(", {:.1f} % of the object's pixels kept",
@@ -97,34 +161,26 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPe
                                  static_cast<double>(report->sourcePixels));
         if (o.minPsnr > 0 && !period && std::isfinite(report->psnr))
             pruned += fmt::format(", {:.1f} dB measured", report->psnr);
+        STX_TRY(fit, fitted(source, bundle, program.job));
+        if (fit)
+            pruned += fmt::format(", colours fitted ({:.2f} → {:.2f} dB)", fit->before, fit->after);
     }
-    AtlasSaveOptions save;
-    save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
-    save.output = program.outputOptions();
+    const AtlasSaveOptions save = saveOptions(o, program);
     auto atlas = packForFile(bundle, settings, o.output, save, program.job);
     if (!atlas) return tl::unexpected(atlas.error().at(fmt::format("'{}'", o.input)));
     STX_CHECK(program.job.checkCancelled());
     STX_CHECK(writeAtlas(*atlas, o.output, program.job, save));
     const double seconds = watch.seconds();
     program.sayNotes();
-    program.say(fmt::format(
-        "{} ({}) → {} ({}), {} in {} {}x{}, {:.1f} % used{}, {}",
-        std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)), o.output,
-        humanBytes(bytesOf(o.output)), counted(atlas->views.size(), "view"),
-        counted(atlas->textureCount() + atlas->materialTextureCount(), "texture"), atlas->width(),
-        atlas->height(), atlas->used() * 100, pruned, humanSeconds(seconds)));
-    STX_CHECK(program.writeReport(
-        {{"$schema", "pack-report.schema.json"},
-         {"input", o.input},
-         {"output", o.output},
-         {"views", atlas->views.size()},
-         {"textures", atlas->textureCount()},
-         {"materialTextures", atlas->materialTextureCount()},
-         {"width", atlas->width()},
-         {"height", atlas->height()},
-         {"used", atlas->used()},
-         {"pixels", {{"source", atlas->sourcePixels}, {"kept", atlas->keptPixels}}},
-         {"seconds", seconds}}));
+    program.say(fmt::format("{} ({}) → {} ({}), {}{}, {}",
+                            std::filesystem::path(o.input).filename().string(),
+                            humanBytes(bytesOf(o.input)), o.output, humanBytes(bytesOf(o.output)),
+                            summaryOf(*atlas), pruned, humanSeconds(seconds)));
+    nlohmann::ordered_json report = {
+        {"$schema", "pack-report.schema.json"}, {"input", o.input}, {"output", o.output}};
+    addReportOf(*atlas, seconds, report);
+    if (fit) report["fit"] = {{"before", fit->before}, {"after", fit->after}};
+    STX_CHECK(program.writeReport(report));
     return 0;
 }
 
@@ -145,7 +201,7 @@ Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begi
             STX_TRY(const auto whole, frames.frame(i, quiet));
             Bundle pruned = whole;
             if (prunes(o)) {
-                STX_CHECK(pruneOne(pruned, o, program.job));
+                STX_CHECK(pruneOne(pruned, o, o.input, program.job));
             }
             if (auto added = period->add(whole, pruned); !added)
                 return tl::unexpected(added.error().at(fmt::format("'{}': frame {}", o.input, i)));
@@ -163,19 +219,131 @@ Result<void> packPeriod(const PackOptions& o, Sequence& frames, std::size_t begi
     return {};
 }
 
+/// The name of the object that an input becomes: its file's without the ending.
+std::string stemOf(const std::string& input) {
+    const std::filesystem::path path(input);
+    return (path.has_filename() ? path : path.parent_path()).stem().string();
+}
+
+/// A name for each input. Errors (usage): another number of --names, two of one name.
+Result<std::vector<std::string>> objectNames(const PackOptions& o) {
+    std::vector<std::string> names = o.names;
+    if (names.empty())
+        for (const auto& input : o.inputs) names.push_back(stemOf(input));
+    if (names.size() != o.inputs.size())
+        return fail(ErrorCode::usage, "--names has {}, and there are {}",
+                    counted(names.size(), "name"), counted(o.inputs.size(), "input"));
+    std::map<std::string, std::string> inputOf;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        const auto [other, isNew] = inputOf.emplace(names[i], o.inputs[i]);
+        if (!isNew)
+            return fail(ErrorCode::usage,
+                        "'{}' and '{}' would both be called '{}'; --names gives each input a name "
+                        "of its own",
+                        other->second, o.inputs[i], names[i]);
+    }
+    return names;
+}
+
+/// One input as an object: pruned, of one moment.
+Result<PackObject> openObject(const PackOptions& o, const std::string& input,
+                              const std::string& name, Job& job) {
+    preloadCodecs(input);
+    STX_TRY(auto frames, openSequence(input, o.open, job));
+    STX_TRY(frames, refined(std::move(frames), o.refine));
+    const Timeline timeline = frames->timeline();
+    std::size_t moment = 0;
+    if (timeline.moves()) {
+        if (!o.time)
+            return fail(ErrorCode::usage,
+                        "'{}' has {} frames, and objects that share an atlas stand still; give "
+                        "--time T for a moment of it, in seconds, or pack it alone",
+                        input, timeline.count());
+        STX_TRY(moment, momentOf(o.time, timeline, nullptr, input, job));
+    }
+    PackObject object;
+    object.name = name;
+    STX_TRY(object.bundle, frames->frame(moment, job));
+    if (prunes(o)) {
+        std::optional<Bundle> source;
+        if (!o.noFit) source = object.bundle;
+        STX_TRY(const auto report, pruneOne(object.bundle, o, input, job));
+        object.sourcePixels = report.sourcePixels;
+        STX_CHECK(fitted(source, object.bundle, job));
+    }
+    return object;
+}
+
+/// Several inputs into one atlas, each an object with a name.
+Result<int> packSheet(const PackOptions& o, Program& program) {
+    const Stopwatch watch;
+    if (frameName(o.output, 0))
+        return fail(ErrorCode::usage,
+                    "'{}' numbers the frames of a film, and {} share one atlas; give a name "
+                    "without a number",
+                    o.output, counted(o.inputs.size(), "input"));
+    STX_TRY(const auto names, objectNames(o));
+    if (o.inputs.size() > 1 && (!o.budget.empty() || o.minPsnr > 0))
+        program.job.note(
+            fmt::format("{} is met by each object", o.budget.empty() ? "--min-psnr" : "--budget"));
+    std::vector<PackObject> objects;
+    std::uint64_t bytes = 0, pixels = 0;
+    for (std::size_t i = 0; i < o.inputs.size(); ++i) {
+        STX_CHECK(program.job.checkCancelled());
+        STX_TRY(auto object, openObject(o, o.inputs[i], names[i], program.job));
+        bytes += bytesOf(o.inputs[i]);
+        for (const auto& view : object.bundle.views) pixels += view.depth.count();
+        // A colour and a depth, until they are in the atlas.
+        STX_CHECK(program.job.limits.checkAllocation(pixels, 8, "the views of all objects"));
+        objects.push_back(std::move(object));
+    }
+    STX_TRY(const auto joined, joinObjects(std::move(objects), program.job));
+    PackSettings settings = o.settings;
+    settings.objects = &joined.objects;
+    const AtlasSaveOptions save = saveOptions(o, program);
+    STX_TRY(const auto atlas, packForFile(joined.bundle, settings, o.output, save, program.job));
+    STX_CHECK(program.job.checkCancelled());
+    STX_CHECK(writeAtlas(atlas, o.output, program.job, save));
+    const double seconds = watch.seconds();
+    program.sayNotes();
+    program.say(fmt::format("{} ({}) → {} ({}), {}, {}", counted(names.size(), "object"),
+                            humanBytes(bytes), o.output, humanBytes(bytesOf(o.output)),
+                            summaryOf(atlas), humanSeconds(seconds)));
+    nlohmann::ordered_json report = {
+        {"$schema", "pack-report.schema.json"}, {"inputs", o.inputs}, {"output", o.output}};
+    addReportOf(atlas, seconds, report);
+    auto& listed = report["objects"] = nlohmann::ordered_json::array();
+    const double area = static_cast<double>(atlas.width()) * atlas.height() *
+                        static_cast<double>(atlas.pages.size());
+    for (const auto& object : atlas.objects)
+        listed.push_back(
+            {{"name", object.name},
+             {"views", object.views},
+             {"used",
+              static_cast<double>(coveredPixels(atlas.rectangles, object.firstView, object.views)) /
+                  area},
+             {"pixels", {{"source", object.sourcePixels}, {"kept", object.keptPixels}}}});
+    STX_CHECK(program.writeReport(report));
+    return 0;
+}
+
 /// An atlas holds one moment: that of --time, or one atlas for each frame.
 Result<int> packInput(const PackOptions& options, Program& program) {
     PackOptions o = options;
     STX_TRY(o.output, folderTarget(options.output, {".exr"}, "a folder or .exr"));
     if (o.quality && o.colour != "jpeg")
         return fail(ErrorCode::usage, "--quality is of JPEG; give --colour jpeg, too");
+    STX_CHECK(setSize(o.size, program.job.limits, o.settings));
     STX_CHECK(checkTime(o.time));
     STX_CHECK(checkTarget(o.output, program));
     if (!o.budget.empty()) {
         STX_TRY(o.pruning.budget, parsePixels(o.budget));
     }
+    STX_TRY(o.inputs, expandInputs(options.inputs, program.job.limits));
+    if (o.inputs.size() > 1 || !o.names.empty()) return packSheet(o, program);
+    o.input = o.inputs.front();
     preloadCodecs(o.input);
-    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     // One atlas for each frame is made in two passes.
     const bool twice = frames->timeline().moves() && !o.time;
     STX_TRY(frames, refined(std::move(frames), o.refine, twice ? folderOf(o.output) : ""));
@@ -213,12 +381,18 @@ void addPack(CommandLine& line, Program& program) {
         "views that have them, metallic-roughness and emissive\n\n"
         "  stx pack model.exr -o atlas           a folder: atlas.json and images\n"
         "  stx pack film.mp4 -o 'atlas_%04d'     an atlas for each frame\n"
+        "  stx pack cup.mp4 jug.mp4 -o sheet --size 2048x2048   objects that share the textures\n"
         "  stx pack model.exr -o atlas.exr --layout tight");
     auto o = std::make_shared<PackOptions>();
-    c.option("BUNDLE", o->input, "Bundle or film to pack").required();
+    c.option("BUNDLE", o->inputs,
+             "Bundle or film to pack; several, or @list.txt, become objects of one atlas")
+        .required();
     c.option("-o,--output", o->output, "Folder, or one .exr file; of a film a numbered name")
         .required()
         .takes("ATLAS");
+    c.option("--names", o->names, "A name for each input (default: its file's, without the ending)")
+        .commaSeparated()
+        .takes("A,B,...");
     c.option("--time", o->time, "Of a film: the moment to pack, in seconds by its own clock")
         .takes("T");
     c.option("--period", o->period,
@@ -238,6 +412,10 @@ void addPack(CommandLine& line, Program& program) {
     c.option("--max-size", o->settings.maxSize,
              "Largest side of an image that is written (default 16384)")
         .range(16, 65535);
+    c.option("--size", o->size,
+             "Textures of exactly this size, or power-of-two: sides of 2^N, the smallest in which "
+             "all fits (default: as large as is needed)")
+        .takes("WxH");
     c.option("--colour", o->colour,
              "png (exact) or jpeg, in a folder; alpha stays exact (default png)")
         .oneOf({"png", "jpeg"});
@@ -256,6 +434,11 @@ void addPack(CommandLine& line, Program& program) {
         .takes("DB")
         .range(0.0, 200.0)
         .group(pruning);
+    c.flag("--no-fit", o->noFit,
+           "Keep colours as they are: else those that pruning kept are fitted once to all views "
+           "(stage fit)")
+        .group(pruning);
+    c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return packInput(*o, p); });
 }

@@ -15,7 +15,7 @@ namespace {
 
 struct RefineOptions {
     std::string input, output;
-    std::string only, with, without;
+    std::string only, with, without, object;
 };
 
 /// As --refine has it.
@@ -56,6 +56,7 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     preloadCodecs(o.input);
     Refining refining(settings);
     OpenOptions open;
+    open.object = o.object;
     refining.import(open.set);
     STX_TRY(auto frames, openSequence(o.input, open, program.job));
     const Timeline timeline = frames->timeline();
@@ -126,6 +127,7 @@ void addRefine(CommandLine& line, Program& program) {
     c.option("--only", o->only, "These steps, with commas between them").takes("STEPS");
     c.option("--with", o->with, "These steps, too").takes("STEPS");
     c.option("--without", o->without, "None of these steps").takes("STEPS");
+    c.objectOption(o->object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return refineInput(*o, c, p); });
 }

@@ -519,6 +519,7 @@ void addRender(CommandLine& line, Program& program) {
     addDrawing(c, *o);
     addLighting(c, *o);
     addOutput(c, *o);
+    c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return render(*o, c, p); });
 }

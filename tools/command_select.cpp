@@ -18,6 +18,7 @@ struct SelectOptions {
     std::string input, output, plot;
     SelectSettings settings;
     std::optional<double> sharePercent;  ///< nothing: 95, or as the count says
+    OpenOptions open;
 };
 
 /// A mesh has no views to choose from: the best ones around it are captured.
@@ -102,10 +103,10 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
     preloadCodecs(o.input);
     const auto kind = recognise(o.input);
     if (kind && *kind == FileKind::mesh) {
-        STX_TRY(const auto opened, openRenderable(o.input, {}, program.job));
+        STX_TRY(const auto opened, openRenderable(o.input, o.open, program.job));
         return selectAroundMesh(std::get<Mesh>(opened), o, command, program);
     }
-    STX_TRY(auto frames, openSequence(o.input, {}, program.job));
+    STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     const Timeline timeline = frames->timeline();
     if (timeline.moves() && !holdsSequences(o.output))
         return fail(
@@ -178,6 +179,7 @@ void addSelect(CommandLine& line, Program& program) {
              "Wanted samples per scene unit (default: what the views typically have)")
         .notNegative();
     c.option("--plot", o->plot, "Draw quality against the number of views").takes("FILE.svg");
+    c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return select(*o, c, p); });
 }

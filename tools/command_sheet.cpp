@@ -125,7 +125,9 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
                     "compares two pictures",
                     input);
     if (kind == FileKind::atlas) {
-        STX_TRY(const auto atlas, readAtlas(input, job));
+        // Of all objects, or of one.
+        STX_TRY(const auto atlas,
+                o.open.object.empty() ? readAtlas(input, job) : openAtlas(input, o.open, job));
         return sheetOf(atlas, o.settings, job);
     }
     STX_TRY(auto frames, openSequence(input, o.open, job));
@@ -199,6 +201,7 @@ void addSheet(CommandLine& line, Program& program) {
         .range(1, 1000)
         .takes("N");
     refineOption(c, o->refine);
+    c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o](Program& p) { return sheet(*o, p); });
 }

@@ -22,8 +22,8 @@ struct Shown {
 };
 
 /// A page for browsers, of an atlas' own textures where it is one.
-Result<Shown> writePage(const std::string& input, const std::string& output,
-                        const std::string& refine, Program& program) {
+Result<Shown> writePage(const std::string& input, const OpenOptions& open,
+                        const std::string& output, const std::string& refine, Program& program) {
     PageOptions write;
     // Without its folder: pages of the same input are the same wherever it lies.
     const std::filesystem::path path(input);
@@ -32,10 +32,10 @@ Result<Shown> writePage(const std::string& input, const std::string& output,
     STX_TRY(const auto kind, recognise(input));
     Result<PageReport> page = PageReport();
     if (kind == FileKind::atlas) {
-        STX_TRY(const auto atlas, readAtlas(input, program.job));
+        STX_TRY(const auto atlas, openAtlas(input, open, program.job));
         page = writeViewerPage(atlas, output, write, program.job);
     } else {
-        STX_TRY(auto frames, openSequence(input, {}, program.job));
+        STX_TRY(auto frames, openSequence(input, open, program.job));
         STX_TRY(frames, refined(std::move(frames), refine));
         page = writeViewerPage(*frames, output, write, program.job);
     }
@@ -47,10 +47,10 @@ Result<Shown> writePage(const std::string& input, const std::string& output,
 }
 
 /// A model of one moment.
-Result<Shown> writeModel(const std::string& input, const std::string& output,
-                         const std::optional<double>& time, const std::string& refine,
-                         Program& program) {
-    STX_TRY(auto frames, openSequence(input, {}, program.job));
+Result<Shown> writeModel(const std::string& input, const OpenOptions& open,
+                         const std::string& output, const std::optional<double>& time,
+                         const std::string& refine, Program& program) {
+    STX_TRY(auto frames, openSequence(input, open, program.job));
     STX_TRY(frames, refined(std::move(frames), refine));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a model is", input, program.job));
@@ -71,13 +71,13 @@ bool isShown(const std::string& ending) {
     return ending == ".html" || ending == ".glb";
 }
 
-Result<int> extractShown(const std::string& input, const std::string& output,
-                         const std::optional<double>& time, const std::string& refine,
-                         Program& program) {
+Result<int> extractShown(const std::string& input, const OpenOptions& open,
+                         const std::string& output, const std::optional<double>& time,
+                         const std::string& refine, Program& program) {
     const Stopwatch watch;
     STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
-                                  ? writeModel(input, output, time, refine, program)
-                                  : writePage(input, output, refine, program));
+                                  ? writeModel(input, open, output, time, refine, program)
+                                  : writePage(input, open, output, refine, program));
     const double seconds = watch.seconds();
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}), {}, {}",

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "formats/any/options.hpp"
 #include "tools/program.hpp"
 
 namespace stx::tools {
@@ -13,8 +14,8 @@ namespace stx::tools {
 /// `stx extract` into such a file: says what was written and reports it. `time`: the moment that a
 /// model is of. `refine`: see refineOption(). Errors: those of momentOf(), of the input and of
 /// writing.
-[[nodiscard]] Result<int> extractShown(const std::string& input, const std::string& output,
-                                       const std::optional<double>& time, const std::string& refine,
-                                       Program& program);
+[[nodiscard]] Result<int> extractShown(const std::string& input, const OpenOptions& open,
+                                       const std::string& output, const std::optional<double>& time,
+                                       const std::string& refine, Program& program);
 
 }  // namespace stx::tools

@@ -36,11 +36,12 @@ Result<std::optional<ExtractAs>> extractedAs(const std::string& as, const std::s
     return fail(ErrorCode::usage, "--as is of .ply, .spz, .drc and .glb files");
 }
 
-Result<int> extractSplats(const std::string& input, const std::string& output,
-                          const std::optional<double>& time, const std::string& refine,
-                          const SplatSettings& settings, Program& program) {
+Result<int> extractSplats(const std::string& input, const OpenOptions& open,
+                          const std::string& output, const std::optional<double>& time,
+                          const std::string& refine, const SplatSettings& settings,
+                          Program& program) {
     const Stopwatch watch;
-    STX_TRY(auto frames, openSequence(input, {}, program.job));
+    STX_TRY(auto frames, openSequence(input, open, program.job));
     STX_TRY(frames, refined(std::move(frames), refine));
     const Timeline timeline = frames->timeline();
     const bool numbered = frameName(output, 0).has_value();

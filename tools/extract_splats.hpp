@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "formats/any/options.hpp"
 #include "lib/splats/from_bundle.hpp"
 #include "tools/program.hpp"
 
@@ -20,7 +21,8 @@ enum class ExtractAs { points, splats, surfaces };
 /// `stx extract` into a file of splats, or of a film into one for each frame where `output` has a
 /// number (%04d): says what was written and reports it. Errors: those of momentOf(), of the input,
 /// splatsOfBundle() and writeSplats().
-[[nodiscard]] Result<int> extractSplats(const std::string& input, const std::string& output,
+[[nodiscard]] Result<int> extractSplats(const std::string& input, const OpenOptions& open,
+                                        const std::string& output,
                                         const std::optional<double>& time,
                                         const std::string& refine, const SplatSettings& settings,
                                         Program& program);

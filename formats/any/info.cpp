@@ -259,8 +259,32 @@ Result<void> describeMpeg4(const fs::path& path, Json& out, Job& job) {
     return {};
 }
 
-Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
-    STX_TRY(const auto header, readAtlasHeader(path, job.limits));
+/// Each object of an atlas: what it has, and what share of the textures.
+Json objectsJson(const AtlasHeader& header) {
+    auto objects = Json::array();
+    const double area = static_cast<double>(header.pageWidth) * header.pageHeight * header.pages;
+    for (const auto& o : header.atlas.objects) {
+        const auto covered = coveredPixels(header.atlas.rectangles, o.firstView, o.views);
+        objects.push_back({{"name", o.name},
+                           {"firstView", o.firstView},
+                           {"views", o.views},
+                           {"used", static_cast<double>(covered) / area},
+                           {"pixels", {{"source", o.sourcePixels}, {"kept", o.keptPixels}}}});
+        Json& entry = objects.back();
+        if (!o.title.empty()) entry["title"] = o.title;
+        addOrigin(entry, o.origin);
+        if (o.bounds) entry["bounds"] = boundsJson(*o.bounds, o.origin);
+    }
+    return objects;
+}
+
+Result<void> describeAtlas(const fs::path& path, const std::string& object, Json& out, Job& job) {
+    STX_TRY(auto header, readAtlasHeader(path, job.limits));
+    if (!object.empty()) {
+        if (const auto kept = keepObject(header.atlas, object); !kept)
+            return tl::unexpected(Error(kept.error()).at(fmt::format("'{}'", path.string())));
+        out["object"] = object;
+    }
     out["container"] =
         fs::is_regular_file(path) && path.extension() == ".exr" ? "atlas-exr" : "atlas";
     bool second = false;
@@ -294,6 +318,7 @@ Result<void> describeAtlas(const fs::path& path, Json& out, Job& job) {
                               {"turned", r.turned}});
     out["rectangles"] = std::move(rectangles);
     out["used"] = header.used();
+    if (!header.atlas.objects.empty()) out["objects"] = objectsJson(header);
     out["pixels"] = {{"source", header.atlas.sourcePixels}, {"kept", header.atlas.keptPixels}};
     addOrigin(out, header.atlas.origin);
     if (header.atlas.bounds) out["bounds"] = boundsJson(*header.atlas.bounds, header.atlas.origin);
@@ -349,7 +374,9 @@ Result<void> describeSet(const fs::path& path, Json& out, Job& job) {
 /// The first of the files, and how long all of them take.
 Result<Json> describeNumbered(const fs::path& path, const InfoOptions& options, Job& job) {
     STX_TRY(const auto files, numberedFiles(path.string()));
-    STX_TRY(const auto frames, openSequence(path, {}, job));
+    OpenOptions open;
+    open.object = options.object;
+    STX_TRY(const auto frames, openSequence(path, open, job));
     STX_TRY(Json out, describe(files.front().path, options, job));
     out["file"] = path.string();
     std::uint64_t bytes = 0;
@@ -363,6 +390,9 @@ Result<Json> describeNumbered(const fs::path& path, const InfoOptions& options, 
 
 Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job) {
     STX_TRY(const auto kind, recognise(path));
+    OpenOptions open;
+    open.object = options.object;
+    STX_CHECK(checkObject(path, kind, open));
     if (kind == FileKind::numbered) return describeNumbered(path, options, job);
     Json out = {{"$schema", "info.schema.json"}, {"file", path.string()}};
     out["bytes"] = bytesAt(path);
@@ -379,7 +409,7 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
             STX_CHECK(describeMpeg4(path, out, job));
             break;
         case FileKind::atlas:
-            STX_CHECK(describeAtlas(path, out, job));
+            STX_CHECK(describeAtlas(path, options.object, out, job));
             break;
         case FileKind::mesh: {
             STX_TRY(const auto mesh, readMesh(path, job));
@@ -412,7 +442,7 @@ Result<Json> describe(const fs::path& path, const InfoOptions& options, Job& job
                         path.string());
     }
     if (options.bounds && (!out.contains("bounds") || !out.contains("points"))) {
-        STX_TRY(const auto bundle, openBundle(path, {}, job));
+        STX_TRY(const auto bundle, openBundle(path, open, job));
         addFromPixels(out, bundle);
     }
     return out;
@@ -437,8 +467,8 @@ std::string describeAsText(const Json& info) {
     };
     std::string out = fmt::format("{}: {}, {} bytes\n", text(info["file"]), text(info["container"]),
                                   text(info["bytes"]));
-    for (const char* key : {"imageSet", "nodeKind", "title", "frames", "missing", "triangles",
-                            "vertices", "materials", "points", "used"}) {
+    for (const char* key : {"object", "imageSet", "nodeKind", "title", "frames", "missing",
+                            "triangles", "vertices", "materials", "points", "used"}) {
         if (info.contains(key) && !(key == std::string_view("frames") && info[key] == 1))
             out += fmt::format("{}: {}\n", key, text(info[key]));
     }
@@ -487,6 +517,11 @@ std::string describeAsText(const Json& info) {
                 t.contains("bytes") && t["bytes"] > 0 ? fmt::format(", {} bytes", text(t["bytes"]))
                                                       : "");
     }
+    if (info.contains("objects"))
+        for (const auto& o : info["objects"])
+            out += fmt::format("object '{}': {} from view {} on, {:.1f} % of the textures\n",
+                               text(o["name"]), counted(o["views"].get<int>(), "view"),
+                               text(o["firstView"]), 100 * o["used"].get<double>());
     if (info.contains("photo")) out += photoText(info["photo"]);
     if (info.contains("views")) {
         std::size_t i = 0;

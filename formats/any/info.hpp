@@ -12,6 +12,7 @@ namespace stx {
 struct InfoOptions {
     /// Decode the pixels where the headers do not have the bounds or the points.
     bool bounds = false;
+    std::string object;  ///< as OpenOptions::object; empty: of all
 };
 
 /// What is in a file, as JSON by tools/schemas/info.schema.json: container, node kind, cameras,

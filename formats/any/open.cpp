@@ -127,6 +127,20 @@ Result<Bundle> openBundle(const fs::path& path, const OpenOptions& options, Job&
     return std::move(std::get<Bundle>(opened));
 }
 
+Result<void> checkObject(const fs::path& path, FileKind kind, const OpenOptions& options) {
+    if (options.object.empty() || kind == FileKind::atlas || kind == FileKind::numbered) return {};
+    return fail(ErrorCode::usage,
+                "'{}' is {}, and only an atlas holds objects with names; leave out --object",
+                path.string(), nameOf(kind));
+}
+
+Result<Atlas> openAtlas(const fs::path& path, const OpenOptions& options, Job& job) {
+    STX_TRY(auto atlas, readAtlas(path, job));
+    auto object = objectOf(std::move(atlas), options.object);
+    if (!object) return tl::unexpected(object.error().at(fmt::format("'{}'", path.string())));
+    return object;
+}
+
 Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const OpenOptions& options,
                                                   Job& job) {
     using Opened = std::variant<Mesh, Bundle>;
@@ -137,6 +151,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
         (kind == FileKind::image || kind == FileKind::unknown))
         read.set.from = "photo";
     if (!read.set.from.empty()) kind = FileKind::imageSet;
+    STX_CHECK(checkObject(path, kind, options));
     Result<Bundle> bundle = Bundle();
     switch (kind) {
         case FileKind::mesh: {
@@ -155,7 +170,7 @@ Result<std::variant<Mesh, Bundle>> openRenderable(const fs::path& path, const Op
             bundle = readMpeg4Bundle(path, job);
             break;
         case FileKind::atlas: {
-            STX_TRY(const auto atlas, readAtlas(path, job));
+            STX_TRY(const auto atlas, openAtlas(path, options, job));
             bundle = unpack(atlas, job);
             break;
         }

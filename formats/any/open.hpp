@@ -32,10 +32,18 @@ enum class FileKind {
 /// "a mesh", "an MPEG-4 file" …
 [[nodiscard]] const char* nameOf(FileKind kind);
 
+/// Errors (usage): the options name an object, and what is opened is not an atlas.
+[[nodiscard]] Result<void> checkObject(const std::filesystem::path& path, FileKind kind,
+                                       const OpenOptions& options);
+
 /// Opens a bundle, an atlas (unpacked) or an image set as a Bundle. Meshes: error that says to use
 /// `stx convert`.
 [[nodiscard]] Result<Bundle> openBundle(const std::filesystem::path& path,
                                         const OpenOptions& options, Job& job);
+
+/// Opens an atlas, or the object of it that the options name (objectOf()).
+[[nodiscard]] Result<Atlas> openAtlas(const std::filesystem::path& path, const OpenOptions& options,
+                                      Job& job);
 
 /// Opens whatever can be rendered, of numbered files the first. A bundle passes Bundle::check(), a
 /// mesh Mesh::check().

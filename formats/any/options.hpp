@@ -12,6 +12,8 @@ struct OpenOptions {
     /// MPEG-4: startTime and stopTime that come with a later access unit count from the start of
     /// the scene, not from that unit.
     bool timesFromStart = false;
+    /// Of an atlas with several objects: the name of the one to open.
+    std::string object;
     ImageSetOptions set;  ///< of image sets; with set.from whatever is given is read as one
 };
 

@@ -24,13 +24,15 @@ bool isNumberedExr(const fs::path& path) {
 /// One OpenEXR bundle, or one atlas, for each frame.
 class NumberedSequence : public Sequence {
   public:
-    NumberedSequence(std::vector<NumberedFile> files, bool atlases, Timeline timeline)
+    NumberedSequence(std::vector<NumberedFile> files, bool atlases, Timeline timeline,
+                     std::string object)
         : files_(std::move(files)), atlases_(atlases) {
+        open_.object = std::move(object);
         timeline_ = std::move(timeline);
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
         const auto& path = files_[index].path;
-        STX_TRY(auto bundle, atlases_ ? openBundle(path, {}, job) : readExrBundle(path, job));
+        STX_TRY(auto bundle, atlases_ ? openBundle(path, open_, job) : readExrBundle(path, job));
         setTime(bundle, index);
         return bundle;
     }
@@ -38,6 +40,7 @@ class NumberedSequence : public Sequence {
   private:
     std::vector<NumberedFile> files_;
     bool atlases_;
+    OpenOptions open_;
 };
 
 /// When a file's moment is, and how long it is shown, where it tells.
@@ -103,9 +106,11 @@ Result<NumberedFilm> usableFiles(std::vector<NumberedFile> files, const fs::path
 }
 
 Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
-                                               const fs::path& pattern, bool strict, Job& job) {
-    STX_TRY(auto film, usableFiles(std::move(all), pattern, strict, job));
+                                               const fs::path& pattern, const OpenOptions& options,
+                                               Job& job) {
+    STX_TRY(auto film, usableFiles(std::move(all), pattern, options.set.strict, job));
     auto& files = film.files;
+    if (!film.atlases) STX_CHECK(checkObject(pattern, FileKind::exr, options));
     Timeline line;
     line.times.clear();
     std::optional<double> last;
@@ -135,16 +140,18 @@ Result<std::unique_ptr<Sequence>> openNumbered(std::vector<NumberedFile> all,
     line.findTick();
     if (const auto sound = line.check(); !sound)
         return tl::unexpected(sound.error().at(fmt::format("'{}'", pattern.string())));
-    return std::make_unique<NumberedSequence>(std::move(files), film.atlases, std::move(line));
+    return std::make_unique<NumberedSequence>(std::move(files), film.atlases, std::move(line),
+                                              options.object);
 }
 
 /// Frames as their files have them.
 Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOptions& options,
                                              Job& job) {
     STX_TRY(const auto kind, recognise(path));
+    STX_CHECK(checkObject(path, kind, options));
     if (kind == FileKind::numbered) {
         STX_TRY(auto files, numberedFiles(path.string()));
-        return openNumbered(std::move(files), path, options.set.strict, job);
+        return openNumbered(std::move(files), path, options, job);
     }
     if (kind == FileKind::imageSet || !options.set.from.empty())
         return openImageSet(path, options.set, job);

@@ -60,6 +60,7 @@ AtlasHeader headerOf(const Atlas& atlas, bool inOneExr, bool jpeg = false) {
     a.duration = atlas.duration;
     a.sourcePixels = atlas.sourcePixels;
     a.keptPixels = atlas.keptPixels;
+    a.objects = atlas.objects;
     header.pages = static_cast<int>(atlas.pages.size());
     header.pageWidth = atlas.width();
     header.pageHeight = atlas.height();
@@ -435,9 +436,9 @@ void AtlasTexture::addSecond() {
 }
 
 double AtlasHeader::used() const {
-    double covered = 0;
-    for (const auto& r : atlas.rectangles) covered += static_cast<double>(r.width) * r.height;
-    return covered / (static_cast<double>(pageWidth) * pageHeight * pages);
+    const auto views = static_cast<int>(atlas.views.size());
+    return static_cast<double>(coveredPixels(atlas.rectangles, 0, views)) /
+           (static_cast<double>(pageWidth) * pageHeight * pages);
 }
 
 Result<void> writeAtlas(const Atlas& atlas, const fs::path& path, Job& job,

@@ -9,8 +9,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// 2: quaternions are x y z w, as in all JSON here; 1 had w x y z.
-constexpr int kVersion = 2;
+/// 3: several objects; 2: quaternions are x y z w, as in all JSON here; 1 had w x y z. What has one
+/// model is written as 2.
+constexpr int kVersion = 3;
 
 Json arrayOf(glm::dvec2 v) {
     return Json::array({v.x, v.y});
@@ -52,6 +53,21 @@ Json jsonOf(const AtlasRectangle& r) {
     return {{"view", r.view},     {"page", r.page},     {"viewX", r.viewX},
             {"viewY", r.viewY},   {"width", r.width},   {"height", r.height},
             {"atlasX", r.atlasX}, {"atlasY", r.atlasY}, {"turned", r.turned}};
+}
+
+Json jsonOf(const Bounds& bounds) {
+    return {{"min", arrayOf(bounds.min)}, {"max", arrayOf(bounds.max)}};
+}
+
+Json jsonOf(const AtlasObject& o) {
+    Json j = {{"name", o.name}};
+    if (!o.title.empty()) j["title"] = o.title;
+    j["firstView"] = o.firstView;
+    j["views"] = o.views;
+    if (o.bounds && !o.bounds->empty()) j["bounds"] = jsonOf(*o.bounds);
+    if (o.origin != glm::dvec3(0.0)) j["origin"] = arrayOf(o.origin);
+    j["pixels"] = {{"source", o.sourcePixels}, {"kept", o.keptPixels}};
+    return j;
 }
 
 /// The second picture of a texture.
@@ -215,6 +231,35 @@ Result<void> readView(const Reader& r, const Limits& limits, int version, bool p
     return {};
 }
 
+/// Bounds, origin and pixels of an atlas or of one of its objects.
+template <class To>
+Result<void> readPlace(const Reader& r, To& to) {
+    if (const auto bounds = r.object("bounds")) {
+        std::array<double, 3> min{}, max{};
+        STX_CHECK(bounds->vector("min", min));
+        STX_CHECK(bounds->vector("max", max));
+        to.bounds = Bounds{{min[0], min[1], min[2]}, {max[0], max[1], max[2]}};
+    }
+    if (r.has("origin")) {
+        std::array<double, 3> origin{};
+        STX_CHECK(r.vector("origin", origin));
+        to.origin = {origin[0], origin[1], origin[2]};
+    }
+    if (const auto pixels = r.object("pixels")) {
+        STX_CHECK(pixels->number("source", to.sourcePixels, 0, 1e15));
+        STX_CHECK(pixels->number("kept", to.keptPixels, 0, 1e15));
+    }
+    return {};
+}
+
+Result<void> readObject(const Reader& r, AtlasObject& o) {
+    STX_CHECK(r.text("name", o.name));
+    STX_CHECK(r.text("title", o.title, false));
+    STX_CHECK(r.number("firstView", o.firstView, 0, kAnyInt));
+    STX_CHECK(r.number("views", o.views, 0, kAnyInt));
+    return readPlace(r, o);
+}
+
 Result<void> readTexture(const Reader& r, const Limits& limits, const AtlasHeader& header,
                          AtlasTexture& t) {
     STX_CHECK(r.text("attribute", t.attribute));
@@ -322,8 +367,9 @@ Result<Json> parse(std::string_view text, const std::string& where) {
 std::string atlasJson(const AtlasHeader& header) {
     const Atlas& atlas = header.atlas;
     Json top;
-    top["$schema"] = kAtlasSchema;
-    top["version"] = kVersion;
+    const int version = atlas.objects.empty() ? 2 : kVersion;
+    top["$schema"] = fmt::format("urn:stx:schema:atlas:{}", version);  // atlas.schema.json
+    top["version"] = version;
     top["title"] = atlas.title;
     top["layout"] = atlas.layout;
     top["padding"] = atlas.padding;
@@ -331,8 +377,7 @@ std::string atlasJson(const AtlasHeader& header) {
     top["width"] = header.pageWidth;
     top["height"] = header.pageHeight;
     top["linear"] = header.linear;
-    if (atlas.bounds && !atlas.bounds->empty())
-        top["bounds"] = {{"min", arrayOf(atlas.bounds->min)}, {"max", arrayOf(atlas.bounds->max)}};
+    if (atlas.bounds && !atlas.bounds->empty()) top["bounds"] = jsonOf(*atlas.bounds);
     if (atlas.origin != glm::dvec3(0.0)) top["origin"] = arrayOf(atlas.origin);
     if (!header.environmentFile.empty()) top["environment"] = header.environmentFile;
     if (atlas.time) top["time"] = *atlas.time;
@@ -343,6 +388,7 @@ std::string atlasJson(const AtlasHeader& header) {
         text += fmt::format("  \"{}\": {},\n", key,
                             value.dump(-1, ' ', false, Json::error_handler_t::replace));
     text += linesOf("textures", header.textures) + ",\n";
+    if (!atlas.objects.empty()) text += linesOf("objects", atlas.objects) + ",\n";
     text += linesOf("views", atlas.views) + ",\n";
     text += linesOf("rectangles", atlas.rectangles) + "\n}\n";
     return text;
@@ -375,17 +421,7 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
     STX_CHECK(top.number("width", header.pageWidth, 1, limits.maxImageSide));
     STX_CHECK(top.number("height", header.pageHeight, 1, limits.maxImageSide));
     STX_CHECK(top.flag("linear", header.linear));
-    if (const auto bounds = top.object("bounds")) {
-        std::array<double, 3> min{}, max{};
-        STX_CHECK(bounds->vector("min", min));
-        STX_CHECK(bounds->vector("max", max));
-        atlas.bounds = Bounds{{min[0], min[1], min[2]}, {max[0], max[1], max[2]}};
-    }
-    if (json.contains("origin")) {
-        std::array<double, 3> origin{};
-        STX_CHECK(top.vector("origin", origin));
-        atlas.origin = {origin[0], origin[1], origin[2]};
-    }
+    STX_CHECK(readPlace(top, atlas));
     if (json.contains("environment"))
         STX_CHECK(top.text("environment", header.environmentFile, false));
     if (top.has("time")) STX_CHECK(top.finite("time", atlas.time.emplace()));
@@ -393,10 +429,6 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
         STX_CHECK(top.number("duration", atlas.duration.emplace(),
                              std::numeric_limits<double>::min(),
                              std::numeric_limits<double>::max()));
-    if (const auto pixels = top.object("pixels")) {
-        STX_CHECK(pixels->number("source", atlas.sourcePixels, 0, 1e15));
-        STX_CHECK(pixels->number("kept", atlas.keptPixels, 0, 1e15));
-    }
     STX_CHECK(
         top.list("textures", top.checksRules() ? 4 + 2 * header.pages : 256, [&](const Reader& r) {
             return readTexture(r, limits, header, header.textures.emplace_back());
@@ -406,6 +438,15 @@ Result<AtlasHeader> atlasFromJson(std::string_view text, const std::string& wher
         return readView(r, limits, version, atlas.keptPixels < atlas.sourcePixels,
                         atlas.views.emplace_back());
     }));
+    if (top.has("objects")) {
+        STX_CHECK(top.list("objects", atlas.views.size(), [&](const Reader& r) {
+            return readObject(r, atlas.objects.emplace_back());
+        }));
+        if (top.checksRules()) {
+            if (const auto ok = checkObjects(atlas.objects, atlas.views.size()); !ok)
+                return tl::unexpected(Error(ok.error()).at(where));
+        }
+    }
     const auto most = static_cast<std::size_t>(header.pageWidth) * header.pageHeight * header.pages;
     const auto readRectangle = [&](const Reader& r) -> Result<void> {
         AtlasRectangle& rect = atlas.rectangles.emplace_back();

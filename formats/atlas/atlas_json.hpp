@@ -7,9 +7,6 @@
 
 namespace stx {
 
-/// Names the schema in "$schema"; the schema itself is atlas.schema.json beside this file.
-inline constexpr const char* kAtlasSchema = "urn:stx:schema:atlas:2";
-
 /// atlas.json: views, rectangles and textures; the same input gives the same text.
 [[nodiscard]] std::string atlasJson(const AtlasHeader& header);
 /// The inverse. Every number is checked for its kind and range, sizes against the limits;

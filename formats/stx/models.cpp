@@ -39,7 +39,7 @@ const char* version() {
 Result<Model> open(const std::filesystem::path& path, const OpenOptions& options, Job& job) {
     STX_TRY(const auto kind, recognise(path));
     if (kind == FileKind::atlas && options.set.from.empty()) {
-        STX_TRY(auto atlas, readAtlas(path, job));
+        STX_TRY(auto atlas, openAtlas(path, options, job));
         return Model(std::move(atlas));
     }
     STX_TRY(auto opened, openRenderable(path, options, job));

@@ -83,6 +83,7 @@ constexpr Rule kRules[] = {
     {5002, error, "Lee & Park, 3.1", "rectangles do not overlap"},
     {5003, error, "Lee & Park, 3.1", "an atlas has at most four textures"},
     {5004, error, "Lee & Park, 3.1", "all textures of a page have the same size"},
+    {5005, error, "atlas.schema.json", "objects have names and, one after the other, all views"},
 
     {6001, error, kV2, "normal, splatU and splatV have the size of the depth"},
     {6002, error, kV2, "normal, splatU and splatV are RGB"},

@@ -41,9 +41,12 @@ void checkRectangles(const std::vector<ReferenceView>& views, int pages, glm::iv
     rectangles = std::move(good);
 }
 
-void checkViewHeaders(const std::vector<ReferenceView>& views, Findings& findings) {
-    for (std::size_t i = 0; i < views.size(); ++i)
-        checkViewHeader(views[i], viewText(i, views[i].name), findings);
+/// Those of views, and 5005.
+void checkHeaders(const Atlas& atlas, Findings& findings) {
+    for (std::size_t i = 0; i < atlas.views.size(); ++i)
+        checkViewHeader(atlas.views[i], viewText(i, atlas.views[i].name), findings);
+    if (const auto ok = checkObjects(atlas.objects, atlas.views.size()); !ok)
+        findings.add(5005, "", ok.error().message, "a name and views for each object");
 }
 
 /// 4030, over the rectangles of each view.
@@ -134,7 +137,7 @@ void checkTextures(const std::filesystem::path& path, const AtlasHeader& header,
 
 std::vector<Finding> validate(const Atlas& atlas) {
     Findings findings;
-    checkViewHeaders(atlas.views, findings);
+    checkHeaders(atlas, findings);
     const int textures = atlas.textureCount();
     if (textures > 4) findings.add(5003, "", fmt::format("{} textures", textures), "at most 4");
     const glm::ivec2 size(atlas.width(), atlas.height());
@@ -164,7 +167,7 @@ Result<std::vector<Finding>> validateAtlasFile(const std::filesystem::path& path
     auto header = readAtlasHeader(path, job.limits, AtlasChecks::format);
     if (!header) return unreadable(header.error());
     Findings findings;
-    checkViewHeaders(header->atlas.views, findings);
+    checkHeaders(header->atlas, findings);
     const auto textures =
         std::count_if(header->textures.begin(), header->textures.end(), [](const AtlasTexture& t) {
             return t.attribute != "metallic_roughness" && t.attribute != "emissive";

@@ -73,7 +73,15 @@ Result<PageImages> imagesOf(const Atlas& atlas, std::size_t number) {
     const auto* colour = page.texture.rgba8();
     if (!colour)
         return fail(ErrorCode::invalidInput, "the colour of a page must be 8-bit sRGB, not linear");
-    STX_TRY(out["colour"], encodePng(size.x, size.y, 4, 8, colour->data(), true));
+    if (std::ranges::all_of(colour->pixels(), [](glm::u8vec4 c) { return c.a == 255; })) {
+        // A tenth smaller.
+        std::vector<glm::u8vec3> rgb(colour->count());
+        std::ranges::transform(colour->pixels(), rgb.begin(),
+                               [](glm::u8vec4 c) { return glm::u8vec3(c); });
+        STX_TRY(out["colour"], encodePng(size.x, size.y, 3, 8, rgb.data(), true));
+    } else {
+        STX_TRY(out["colour"], encodePng(size.x, size.y, 4, 8, colour->data(), true));
+    }
     const DepthCodes codes = depthCodes(atlas, static_cast<int>(number));
     const bool small =
         std::ranges::all_of(atlas.views, [](const ReferenceView& v) { return v.depthBits == 8; });
@@ -130,51 +138,89 @@ void makeViewable(Bundle& bundle, Job& job) {
     job.note("depth of 32 bits becomes 16 in the page");
 }
 
-Result<Atlas> packForPage(const Bundle& bundle, Job& job) {
-    PackSettings settings;
-    settings.layout = PackSettings::Layout::tight;
-    Result<Atlas> packed = Atlas();
-    for (const int side : kSides) {
-        settings.maxSize = side;
-        packed = pack(bundle, settings, job);
-        if (packed || packed.error().code == ErrorCode::failed) break;
+Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& job) {
+    const auto packed = [&](const Bundle& views) {
+        PackSettings settings;
+        settings.layout = PackSettings::Layout::tight;
+        Result<Atlas> atlas = Atlas();
+        for (const int side : kSides) {
+            settings.maxSize = side;
+            atlas = pack(views, settings, job);
+            if (atlas || atlas.error().code == ErrorCode::failed) break;
+        }
+        return atlas;
+    };
+    const auto other = [&](const ReferenceView& v) {
+        return v.hasNormals() != bundle.views[0].hasNormals() ||
+               v.hasSplats() != bundle.views[0].hasSplats();
+    };
+    std::vector<Atlas> atlases;
+    // The textures of one scene all have the same images.
+    if (!apart || bundle.views.size() == 1 || std::ranges::any_of(bundle.views, other)) {
+        STX_TRY(auto atlas, packed(bundle));
+        atlases.push_back(std::move(atlas));
+        return atlases;
     }
-    return packed;
+    bool some = false;
+    for (const ReferenceView& view : bundle.views) {
+        Bundle one;
+        one.views.push_back(view);
+        atlases.emplace_back();
+        if (view.pointCount() == 0) continue;
+        STX_TRY(atlases.back(), packed(one));
+        some = true;
+    }
+    if (!some)
+        return fail(ErrorCode::invalidInput, "none of the {} views has a point",
+                    bundle.views.size());
+    return atlases;
 }
 
-Result<PageScene> pageScene(const Atlas& atlas, Job& job) {
-    STX_CHECK(atlas.check());
+Result<PageScene> pageScene(std::span<const Atlas> atlases, Job& job) {
     PageScene out;
     Json& j = out.description;
-    j["padding"] = atlas.padding;
-    j["pruned"] = std::ranges::any_of(atlas.views, [](const ReferenceView& v) { return v.pruned; });
-    j["partial"] = atlas.keptPixels < atlas.sourcePixels;
-    j["views"] = Json::array();
-    for (const ReferenceView& view : atlas.views) {
-        if (view.depthBits == 32)
-            return fail(ErrorCode::invalidInput, "the depth of a page has 8 or 16 bits, not 32");
-        Json v = pageCamera(view.camera, view.name);
-        v["noDepth"] = nameOf(view.noDepth);
-        v["nearPlane"] = view.nearPlane;
-        v["farPlane"] = view.farPlane;
-        v["dmax"] = view.depthCode().dmax;
-        j["views"].push_back(std::move(v));
+    bool pruned = false, partial = false;
+    Json views = Json::array(), rectangles = Json::array();
+    for (std::size_t number = 0; number < atlases.size(); ++number) {
+        const Atlas& atlas = atlases[number];
+        if (atlas.views.empty()) continue;
+        STX_CHECK(atlas.check());
+        j["padding"] = atlas.padding;
+        partial = partial || atlas.keptPixels < atlas.sourcePixels;
+        const auto firstView = static_cast<int>(views.size());
+        const auto firstPage = static_cast<int>(out.pages.size());
+        for (const ReferenceView& view : atlas.views) {
+            if (view.depthBits == 32)
+                return fail(ErrorCode::invalidInput,
+                            "the depth of a page has 8 or 16 bits, not 32");
+            pruned = pruned || view.pruned;
+            Json v = pageCamera(view.camera, view.name);
+            v["noDepth"] = nameOf(view.noDepth);
+            v["nearPlane"] = view.nearPlane;
+            v["farPlane"] = view.farPlane;
+            v["dmax"] = view.depthCode().dmax;
+            views.push_back(std::move(v));
+        }
+        for (const AtlasRectangle& r : atlas.rectangles)
+            rectangles.push_back({firstView + r.view, firstPage + r.page, r.viewX, r.viewY,
+                                  r.atlasX, r.atlasY, r.atlasWidth(), r.atlasHeight(),
+                                  r.turned ? 1 : 0});
+        std::vector<PageImages> pages(atlas.pages.size());
+        if (std::ranges::any_of(atlas.pages, [](const auto& p) { return !p.splatU.empty(); })) {
+            STX_TRY(pages, splatImages(atlas, job));
+        }
+        for (std::size_t i = 0; i < pages.size(); ++i) {
+            STX_CHECK(job.checkCancelled());
+            STX_TRY(auto images, imagesOf(atlas, i));
+            pages[i].merge(images);
+            out.pages.push_back(std::move(pages[i]));
+            out.owners.push_back(number);
+        }
     }
-    j["rectangles"] = Json::array();
-    for (const AtlasRectangle& r : atlas.rectangles)
-        j["rectangles"].push_back({r.view, r.page, r.viewX, r.viewY, r.atlasX, r.atlasY,
-                                   r.atlasWidth(), r.atlasHeight(), r.turned ? 1 : 0});
-    const bool splats = std::ranges::any_of(
-        atlas.pages, [](const AtlasPage& page) { return !page.splatU.empty(); });
-    out.pages.resize(atlas.pages.size());
-    if (splats) {
-        STX_TRY(out.pages, splatImages(atlas, job));
-    }
-    for (std::size_t i = 0; i < atlas.pages.size(); ++i) {
-        STX_CHECK(job.checkCancelled());
-        STX_TRY(auto images, imagesOf(atlas, i));
-        out.pages[i].merge(images);
-    }
+    j["pruned"] = pruned;
+    j["partial"] = partial;
+    j["views"] = std::move(views);
+    j["rectangles"] = std::move(rectangles);
     return out;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,10 +18,11 @@ namespace stx {
 /// "colour", "depth", "normal", "splat". See writeViewerPage() for what they hold.
 using PageImages = std::map<std::string, Bytes>;
 
-/// An atlas as the viewer reads it.
+/// Views as the viewer reads them.
 struct PageScene {
     nlohmann::ordered_json description;  ///< all but "pages", the numbers of the images
     std::vector<PageImages> pages;
+    std::vector<std::size_t> owners;  ///< of each page: the number of the atlas that it is of
 };
 
 /// A bundle with 8-bit sRGB colour, which `what` ("the page") has. What is lossy is noted.
@@ -28,11 +30,14 @@ void codeColours(Bundle& bundle, std::string_view what, Job& job);
 /// A bundle with 8-bit sRGB colour and depth of 8 or 16 bits, as the viewer's textures hold them.
 /// What is lossy is noted.
 void makeViewable(Bundle& bundle, Job& job);
-/// The views of a bundle, which makeViewable() has seen, in textures as small as hold them. Errors:
+/// The views of a bundle, which makeViewable() has seen, in textures as small as hold them; with
+/// `apart` those of each view in textures of their own, so that what did not change in the next
+/// frame is the same image. Then a view without content has none: an atlas without views. Errors:
 /// those of pack().
-[[nodiscard]] Result<Atlas> packForPage(const Bundle& bundle, Job& job);
-/// Errors: an atlas that fails check(), linear colour or depth of 32 bits (invalidInput), memory.
-[[nodiscard]] Result<PageScene> pageScene(const Atlas& atlas, Job& job);
+[[nodiscard]] Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& job);
+/// All atlases as one scene. Errors: one that fails check() but for those without views, linear
+/// colour or depth of 32 bits (invalidInput), memory.
+[[nodiscard]] Result<PageScene> pageScene(std::span<const Atlas> atlases, Job& job);
 
 /// A vector, as JSON has it.
 [[nodiscard]] std::vector<double> listOf(glm::dvec3 v);

@@ -37,6 +37,25 @@ function withSurroundings(alpha, stride, width, height) {
     return both;
 }
 
+// An image with room to the right and below, so that all textures of a scene are of one size.
+function withRoom(image, width, height) {
+    if (image.width === width && image.height === height) return image;
+    const {channels} = image;
+    const values = new image.values.constructor(width * height * channels);
+    for (let y = 0; y < image.height; ++y)
+        values.set(image.values.subarray(y * image.width * channels, (y + 1) * image.width * channels), y * width * channels);
+    return {width, height, channels, values};
+}
+
+// Colours with alpha: what has none is opaque.
+function withAlpha(image) {
+    if (image.channels === 4) return image;
+    const values = new Uint8Array(4 * image.width * image.height).fill(255);
+    for (let i = 0, n = image.width * image.height; i < n; ++i)
+        for (let k = 0; k < 3; ++k) values[4 * i + k] = image.values[3 * i + k];
+    return {width: image.width, height: image.height, channels: 4, values};
+}
+
 class Scene {
     // `data` is what stx wrote: views, rectangles, and the number of each page's images; `image(number)`
     // gives a decoded one.
@@ -52,8 +71,12 @@ class Scene {
         for (const page of data.pages) {
             const decoded = {};
             for (const name of Object.keys(page)) decoded[name] = await image(page[name]);
+            decoded.colour = withAlpha(decoded.colour);
             pages.push(decoded);
         }
+        const width = Math.max(...pages.map((p) => p.colour.width)), height = Math.max(...pages.map((p) => p.colour.height));
+        for (const page of pages)
+            for (const name of Object.keys(page)) page[name] = withRoom(page[name], width, height);
         scene.upload(pages);
         scene.prepare(prepare, pages, data.padding);
         scene.findBlocks(pages);
@@ -65,6 +88,7 @@ class Scene {
         const gl = this.gl, array = gl.TEXTURE_2D_ARRAY;
         this.width = pages[0].colour.width;
         this.height = pages[0].colour.height;
+        this.texels = this.width * this.height * pages.length;
         const make = (internal, format, type) =>
             makeTexture(gl, array, internal, format, type, this.width, this.height, pages.length);
         this.colour = make(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE);

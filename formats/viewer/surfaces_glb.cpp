@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
+#include <unordered_map>
 
 #include <nlohmann/json.hpp>
 
@@ -135,9 +137,65 @@ std::uint16_t linearShort(std::uint8_t coded) {
         std::lround(linearFromSrgb(static_cast<float>(coded) / 255.0f) * 65535.0f));
 }
 
+void addColour(glm::u8vec4 c, std::vector<std::uint16_t>& colours) {
+    for (const std::uint8_t part : {c.r, c.g, c.b}) colours.push_back(linearShort(part));
+    colours.push_back(65535);
+}
+
 glm::vec3 unitOr(glm::vec3 normal, glm::vec3 other) {
     const float length = glm::length(normal);
     return length > 0 ? normal / length : other;
+}
+
+/// Pixels of a view that its triangles lie on.
+Image<std::uint8_t> pixelsOf(const ViewSurface& surface, glm::ivec2 size) {
+    Image<std::uint8_t> on(size.x, size.y, 0);
+    for (std::size_t t = 0; t < surface.triangles.size(); t += 3) {
+        glm::ivec2 p[3];
+        for (std::size_t k = 0; k < 3; ++k) p[k] = surface.pixels[surface.triangles[t + k]];
+        const glm::ivec2 low = glm::min(p[0], glm::min(p[1], p[2]));
+        const glm::ivec2 high = glm::max(p[0], glm::max(p[1], p[2]));
+        const auto side = [&](int a, int b, glm::ivec2 at) {
+            return (p[b].x - p[a].x) * (at.y - p[a].y) - (p[b].y - p[a].y) * (at.x - p[a].x);
+        };
+        for (int y = low.y; y <= high.y; ++y) {
+            for (int x = low.x; x <= high.x; ++x) {
+                const int a = side(0, 1, {x, y}), b = side(1, 2, {x, y}), c = side(2, 0, {x, y});
+                if ((a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0)) on.at(x, y) = 1;
+            }
+        }
+    }
+    return on;
+}
+
+/// Whether each triangle is half of four neighbouring pixels whose fourth one is on another surface
+/// of the view: a filter would mix that one's colour in.
+std::vector<bool> cutTriangles(const ViewSurface& surface, const Image<std::uint8_t>& on) {
+    const auto keyOf = [](std::uint32_t a, std::uint32_t b) {
+        return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+    };
+    std::unordered_map<std::uint64_t, int> edges;
+    const auto& corners = surface.triangles;
+    for (std::size_t t = 0; t < corners.size(); t += 3)
+        for (std::size_t k = 0; k < 3; ++k)
+            ++edges[keyOf(corners[t + k], corners[t + (k + 1) % 3])];
+    std::vector<bool> cut(corners.size() / 3, false);
+    for (std::size_t t = 0; t < corners.size(); t += 3) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t ends[] = {corners[t + k], corners[t + (k + 1) % 3]};
+            const glm::ivec2 a = surface.pixels[ends[0]], b = surface.pixels[ends[1]];
+            const glm::ivec2 third = surface.pixels[corners[t + (k + 2) % 3]];
+            if (std::abs(a.x - b.x) != 1 || std::abs(a.y - b.y) != 1 ||
+                edges[keyOf(ends[0], ends[1])] > 1)
+                continue;
+            const glm::ivec2 fourth = a + b - third;
+            if (glm::min(a, b) != glm::min(glm::min(a, b), third) ||
+                glm::max(a, b) != glm::max(glm::max(a, b), third))
+                continue;  // a larger triangle: little of it is beside this edge
+            cut[t / 3] = on.contains(fourth.x, fourth.y) && on.at(fourth.x, fourth.y) != 0;
+        }
+    }
+    return cut;
 }
 
 /// Errors where a place does not fit into glTF's floats.
@@ -168,8 +226,7 @@ class Writer {
             const glm::u16vec2 at = surface.lonePixels[i];
             const glm::u8vec4 c = view.texture.rgba8()->at(at.x, at.y);
             positions_.push_back(surface.lonePositions[i]);
-            for (const std::uint8_t part : {c.r, c.g, c.b}) colours_.push_back(linearShort(part));
-            colours_.push_back(65535);
+            addColour(c, colours_);
             if (lit_) normals_.push_back(normalAt(view, at));
         }
         report.triangles += static_cast<std::int64_t>(surface.triangles.size() / 3);
@@ -214,7 +271,13 @@ class Writer {
     }
 
     Result<void> addSurface(const ReferenceView& view, const ViewSurface& surface) {
-        const Rgba8Image& colour = *view.texture.rgba8();
+        // What is on no triangle here has the colour of what is, for filters and small copies.
+        const Image<std::uint8_t> on = pixelsOf(surface, view.depth.size());
+        Texture filled = view.texture;
+        for (std::size_t i = 0; i < on.count(); ++i)
+            filled.rgba8()->data()[i].a = on.data()[i] ? 255 : 0;
+        bleedColour(filled);
+        const Rgba8Image& colour = *filled.rgba8();
         std::vector<glm::u8vec3> rgb(colour.count());
         std::ranges::transform(colour.pixels(), rgb.begin(),
                                [](glm::u8vec4 c) { return glm::u8vec3(c); });
@@ -247,11 +310,46 @@ class Writer {
                 places.push_back(static_cast<std::uint16_t>(std::lround(share[k] * 65535.0)));
         }
         attributes["TEXCOORD_0"] = model_.addUnits(places, 2, "VEC2");
-        const std::size_t indices = model_.addIndices(surface.triangles, surface.positions.size());
-        model_.addNode(view.name, Json::array({{{"attributes", std::move(attributes)},
-                                                {"indices", indices},
-                                                {"material", material}}}));
+        const std::vector<bool> cut = cutTriangles(surface, on);
+        std::vector<std::uint32_t> whole, edges;
+        for (std::size_t i = 0; i < surface.triangles.size(); ++i)
+            (cut[i / 3] ? edges : whole).push_back(surface.triangles[i]);
+        Json primitives = Json::array();
+        if (!whole.empty())
+            primitives.push_back({{"attributes", std::move(attributes)},
+                                  {"indices", model_.addIndices(whole, surface.positions.size())},
+                                  {"material", material}});
+        if (!edges.empty()) primitives.push_back(colouredTriangles(view, surface, edges));
+        model_.addNode(view.name, std::move(primitives));
         return {};
+    }
+
+    /// Triangles beside other surfaces, with colours of their corners.
+    Json colouredTriangles(const ReferenceView& view, const ViewSurface& surface,
+                           const std::vector<std::uint32_t>& corners) {
+        if (!edgeMaterial_) edgeMaterial_ = addMaterial(Json::object(), "edges");
+        std::unordered_map<std::uint32_t, std::uint32_t> numbers;
+        std::vector<std::uint32_t> indices;
+        std::vector<glm::vec3> positions, normals;
+        std::vector<std::uint16_t> colours;
+        for (const std::uint32_t corner : corners) {
+            const auto [known, isNew] =
+                numbers.emplace(corner, static_cast<std::uint32_t>(positions.size()));
+            indices.push_back(known->second);
+            if (!isNew) continue;
+            const glm::u16vec2 at = surface.pixels[corner];
+            positions.push_back(surface.positions[corner]);
+            addColour(view.texture.rgba8()->at(at.x, at.y), colours);
+            if (lit_) normals.push_back(normalAt(view, at));
+        }
+        Json attributes{{"POSITION", model_.addPositions(positions)}};
+        if (lit_)
+            attributes["NORMAL"] =
+                model_.addNumbers(bytesOfList(normals), normals.size(), "VEC3", kFloat, kVertices);
+        attributes["COLOR_0"] = model_.addUnits(colours, 4, "VEC4");
+        const std::size_t list = model_.addIndices(indices, positions.size());
+        return {
+            {"attributes", std::move(attributes)}, {"indices", list}, {"material", *edgeMaterial_}};
     }
 
     void addPoints() {
@@ -270,6 +368,7 @@ class Writer {
     const Bundle& bundle_;
     Job& job_;
     bool lit_ = false;
+    std::optional<std::size_t> edgeMaterial_;
     Model model_;
     std::vector<glm::vec3> positions_, normals_;
     std::vector<std::uint16_t> colours_;

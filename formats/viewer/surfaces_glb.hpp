@@ -16,10 +16,11 @@ struct SurfacesReport {
 };
 
 /// Writes a bundle as binary glTF 2.0, whole or not at all: for each view a mesh (viewSurfaces())
-/// with the view's colour as texture, and one of points for what is on no surface. Bundles with
-/// normals (SimpleTextureV2) have them in the model and take the viewer's light; others show their
-/// colours as they are (KHR_materials_unlit). The coordinates are the bundle's; one with an origin
-/// stays at it, and the origin is in `asset.extras.origin`.
+/// with the view's colour as texture (triangles beside another surface, whose colour a filter would
+/// mix in, have colours of their corners), and one of points for what is on no surface. Bundles
+/// with normals (SimpleTextureV2) have them in the model and take the viewer's light; others show
+/// their colours as they are (KHR_materials_unlit). The coordinates are the bundle's; one with an
+/// origin stays at it, and the origin is in `asset.extras.origin`.
 ///
 /// Notes: an origin, colours of linear light. Errors: a bundle that fails check(), no surface and
 /// no point, points beyond floats, more than GLB's 4 GiB, memory over the limit, files, cancelled.

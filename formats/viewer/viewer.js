@@ -50,7 +50,7 @@ class Viewer {
         this.scenes.set(number, loading);
         const scene = await loading;
         // About 20 bytes a pixel: half a gigabyte of moments.
-        const most = Math.max(4, Math.floor(25e6 / (scene.width * scene.height)));
+        const most = Math.max(4, Math.floor(25e6 / scene.texels));
         for (const [old, kept] of this.scenes) {
             if (this.scenes.size <= most) break;
             if (this.shownNumbers && this.shownNumbers.includes(old) || old === number) continue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <tuple>
 
 #include "embedded_viewer.hpp"
 #include "formats/stx/stx.hpp"
@@ -99,11 +100,12 @@ class PageWriter {
         Json pages = Json::array();
         if (slots_.size() <= slot) slots_.resize(slot + 1);
         Slot& before = slots_[slot];
-        before.pages.resize(scene.pages.size());
         for (std::size_t i = 0; i < scene.pages.size(); ++i) {
             Json numbers = Json::object();
+            const std::size_t owner = scene.owners[i];
+            const std::size_t page = i > 0 && scene.owners[i - 1] == owner ? 1 : 0;
             for (auto& [name, bytes] : scene.pages[i]) {
-                Image& last = before.pages[i][name];
+                Image& last = before.images[{owner, page, name}];
                 if (last.number < 0 || last.bytes != bytes) {
                     last = {images_++, std::move(bytes)};
                     report.imageBytes += last.bytes.size();
@@ -137,7 +139,8 @@ class PageWriter {
         Bytes bytes;
     };
     struct Slot {
-        std::vector<std::map<std::string, Image>> pages;
+        /// By the atlas, its page and the name.
+        std::map<std::tuple<std::size_t, std::size_t, std::string>, Image> images;
         int number = -1;
         std::string text;
     };
@@ -300,8 +303,8 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         parts.push_back(part(bundle, true));
         std::erase_if(parts, [](const Bundle& b) { return b.views.empty(); });
         for (std::size_t k = 0; k < parts.size(); ++k) {
-            STX_TRY(const Atlas atlas, packForPage(parts[k], job));
-            STX_TRY(auto scene, pageScene(atlas, job));
+            STX_TRY(const auto atlases, packForPage(parts[k], line.moves(), job));
+            STX_TRY(auto scene, pageScene(atlases, job));
             STX_TRY(const int number, writer->add(k, std::move(scene)));
             numbers.push_back(number);
         }
@@ -333,7 +336,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
     STX_TRY(Json data,
             dataOf(atlas.views, set.bounds(), atlas.origin, Timeline(), options, writer.report));
-    STX_TRY(auto scene, pageScene(atlas, job));
+    STX_TRY(auto scene, pageScene({&atlas, 1}, job));
     STX_TRY(const int number, writer.add(0, std::move(scene)));
     data["frames"] = {{number}};
     STX_CHECK(writer.finish(data));

@@ -35,11 +35,12 @@ void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environmen
 
 /// Writes one HTML file, whole or not at all, that draws a bundle in any browser with WebGL 2 and
 /// needs nothing else: Lee & Park's path with stx's splats (formats/viewer). The views of each
-/// frame are merged into at most four textures (pack(), tight), each a PNG: colour in 8 bits with
-/// alpha, depth as DepthImage codes of 8 or 16 bits, normals in 8 bits, tilts and sizes of splats
-/// in 8 bits. Background views have textures of their own. Images that are the same as those of the
-/// frame before are written once. The page takes 1.23 bytes for each of the images (pageText())
-/// and about 30 kB: from 190 kB of images on less than 1.4 times as much.
+/// frame are merged into at most four textures (pack(), tight), each a PNG: colour in 8 bits,
+/// with alpha where some is not full, depth as DepthImage codes of 8 or 16 bits, normals in 8 bits,
+/// tilts and sizes of splats in 8 bits. Background views have textures of their own, and in films
+/// all views do: images that are the same as those of the frame before are written once. The page
+/// takes 1.23 bytes for each of the images (pageText()) and about 30 kB: from 190 kB of images on
+/// less than 1.4 times as much.
 ///
 /// Notes: colours of linear light become 8-bit sRGB, depth of 32 bits becomes 16; a page that
 /// browsers find hard to hold. Errors: those of the sequence and of pack(); files; cancelled.

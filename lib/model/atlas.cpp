@@ -116,9 +116,18 @@ int Atlas::materialTextureCount() const {
     return count;
 }
 
+std::int64_t coveredPixels(const std::vector<AtlasRectangle>& rectangles, int first, int views) {
+    std::int64_t covered = 0;
+    for (const auto& r : rectangles) {
+        if (r.view >= first && r.view - first < views)
+            covered += static_cast<std::int64_t>(r.width) * r.height;
+    }
+    return covered;
+}
+
 double Atlas::used() const {
-    double covered = 0;
-    for (const auto& r : rectangles) covered += static_cast<double>(r.width) * r.height;
+    const auto covered =
+        static_cast<double>(coveredPixels(rectangles, 0, static_cast<int>(views.size())));
     const double area = static_cast<double>(width()) * height() * static_cast<double>(pages.size());
     return area > 0 ? covered / area : 0.0;
 }
@@ -143,6 +152,7 @@ Result<void> Atlas::check() const {
     if (views.empty()) return fail(ErrorCode::invalidInput, "the atlas has no reference view");
     if (pages.empty()) return fail(ErrorCode::invalidInput, "the atlas has no page");
     if (padding < 0) return fail(ErrorCode::invalidInput, "the atlas' padding is {}", padding);
+    STX_CHECK(checkObjects(objects, views.size()));
     for (std::size_t i = 0; i < views.size(); ++i) {
         if (auto ok = views[i].camera.check(); !ok)
             return tl::unexpected(ok.error().at(fmt::format("view {}", i)));

@@ -51,10 +51,25 @@ struct AtlasPage {
     Image<glm::vec3> emissive;           ///< as in views; empty when absent
 };
 
-/// The reference views of a bundle merged into at most four textures: colour, depth, normal and
-/// splat (Lee & Park, section 3.1). A page of an atlas has up to four textures; an atlas with
-/// several pages keeps pages x textures-per-page at most four. What an engine needs beside them,
-/// metallic-roughness and emissive, are further textures with the same rectangles.
+/// One of the models that share an atlas: a run of its views, in coordinates of their own.
+struct AtlasObject {
+    std::string name;  ///< not empty, and no other object's
+    std::string title;
+    int firstView = 0, views = 0;   ///< 1 view or more
+    std::optional<Bounds> bounds;   ///< as Atlas::bounds
+    glm::dvec3 origin{0.0};         ///< as Bundle::origin
+    std::int64_t sourcePixels = 0;  ///< object pixels before and after pruning
+    std::int64_t keptPixels = 0;
+};
+
+/// Pixels of the rectangles of `views` views from view `first` on.
+[[nodiscard]] std::int64_t coveredPixels(const std::vector<AtlasRectangle>& rectangles, int first,
+                                         int views);
+
+/// The reference views of a bundle, or of several, merged into at most four textures: colour,
+/// depth, normal and splat (Lee & Park, section 3.1). A page of an atlas has up to four textures;
+/// an atlas with several pages keeps pages x textures-per-page at most four. What an engine needs
+/// beside them, metallic-roughness and emissive, are further textures with the same rectangles.
 struct Atlas {
     /// Cameras, planes and names of the views; their images are empty.
     std::vector<ReferenceView> views;
@@ -70,6 +85,9 @@ struct Atlas {
     /// Object pixels before and after pruning.
     std::int64_t sourcePixels = 0;
     std::int64_t keptPixels = 0;
+    /// Several models: one after the other they have all views, and bounds and origin. Empty: there
+    /// is one model, without a name. What draws or unpacks an atlas wants one: objectOf().
+    std::vector<AtlasObject> objects;
 
     [[nodiscard]] int width() const { return pages.empty() ? 0 : pages[0].depth.width(); }
     [[nodiscard]] int height() const { return pages.empty() ? 0 : pages[0].depth.height(); }
@@ -84,8 +102,21 @@ struct Atlas {
     /// Each rectangle has this many texels of padding on each side to itself, or as many as its
     /// view has pixels there. The atlas must pass check().
     [[nodiscard]] bool paddingHolds(int texels) const;
-    /// Errors when a rectangle leaves its view or page, two overlap, or sizes disagree.
+    /// Errors when a rectangle leaves its view or page, two overlap, sizes disagree, or objects do
+    /// not have all views.
     [[nodiscard]] Result<void> check() const;
 };
+
+/// Errors (invalidInput): names that are empty or the same, or objects that do not have `views`
+/// views, one after the other. No objects are right.
+[[nodiscard]] Result<void> checkObjects(const std::vector<AtlasObject>& objects, std::size_t views);
+
+/// Takes the views and rectangles of all other objects away, and leaves the pages as they are.
+/// `name` is empty where there is one object or none; then nothing may be taken away (false).
+/// Errors (usage): no object of that name, or no name among several, with the names that there are.
+[[nodiscard]] Result<bool> keepObject(Atlas& atlas, const std::string& name);
+/// The same with a part of the pages alone: what the rectangles that are left and their padding
+/// lie on.
+[[nodiscard]] Result<Atlas> objectOf(Atlas atlas, const std::string& name);
 
 }  // namespace stx

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "lib/packing/packing.hpp"
+#include "lib/packing/rectangles.hpp"
 
 namespace stx {
 
@@ -12,6 +13,18 @@ struct AtlasLayout {
     int pages = 1;
     std::vector<AtlasRectangle> rectangles;
 };
+
+/// Points, and pixels of full alpha without a distance.
+[[nodiscard]] std::int64_t objectPixels(const Bundle& bundle);
+
+/// The least power of two that is not below, of 1 .. 2^30.
+[[nodiscard]] int powerOfTwoFrom(int size);
+/// The largest page that the settings allow.
+[[nodiscard]] glm::ivec2 mostPage(const PackSettings& settings);
+[[nodiscard]] RectangleLimits rectangleLimits(const PackSettings& settings, int maxPages);
+/// packRectangles(), with what to change in its errors.
+[[nodiscard]] Result<RectanglePacking> packForAtlas(const std::vector<glm::ivec2>& sizes,
+                                                    const RectangleLimits& limits);
 
 /// Whole views in equal cells, see PackSettings::Layout::grid. `maxPages` >= 1.
 [[nodiscard]] Result<AtlasLayout> gridLayout(const Bundle& bundle, const PackSettings& settings,

@@ -87,16 +87,6 @@ ReferenceView withoutImages(const ReferenceView& view) {
     return v;
 }
 
-/// Pixels that belong to the object: points, and those of full alpha without a distance.
-std::int64_t objectPixels(const ReferenceView& view) {
-    std::int64_t n = 0;
-    for (int y = 0; y < view.depth.height(); ++y) {
-        for (int x = 0; x < view.depth.width(); ++x)
-            n += hasPoint(view.depth.at(x, y)) || view.texture.at(x, y).a >= 1.0f ? 1 : 0;
-    }
-    return n;
-}
-
 /// Pixels of a view that neither rectangles nor padding show: full alpha where other views show
 /// something, else background.
 void fillOutside(const Atlas& atlas, const Image<std::uint8_t>& given, std::size_t view,
@@ -146,6 +136,20 @@ std::vector<int> keptViews(const Bundle& bundle, bool drop, std::vector<AtlasRec
     return kept;
 }
 
+/// The objects of an atlas, of those of its bundle; `source` is the view of that for each that is
+/// left.
+std::vector<AtlasObject> keptObjects(std::vector<AtlasObject> objects,
+                                     const std::vector<int>& source) {
+    std::size_t next = 0;
+    for (AtlasObject& o : objects) {
+        const int end = o.firstView + o.views;
+        o.firstView = static_cast<int>(next);
+        while (next < source.size() && source[next] < end) ++next;
+        o.views = static_cast<int>(next) - o.firstView;
+    }
+    return objects;
+}
+
 template <class T>
 void dropIfZero(Image<T>& image) {
     for (const auto& p : image.pixels()) {
@@ -156,6 +160,17 @@ void dropIfZero(Image<T>& image) {
 
 }  // namespace
 
+std::int64_t objectPixels(const Bundle& bundle) {
+    std::int64_t n = 0;
+    for (const auto& view : bundle.views) {
+        for (int y = 0; y < view.depth.height(); ++y) {
+            for (int x = 0; x < view.depth.width(); ++x)
+                n += hasPoint(view.depth.at(x, y)) || view.texture.at(x, y).a >= 1.0f ? 1 : 0;
+        }
+    }
+    return n;
+}
+
 Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job) {
     if (settings.padding < 0 || settings.padding > 64)
         return fail(ErrorCode::usage, "the padding is {} pixels; 0 to 64 is possible",
@@ -163,7 +178,13 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     if (settings.maxSize < 1 || settings.maxSize > 65535)
         return fail(ErrorCode::usage, "the largest texture size is {}; 1 to 65535 is possible",
                     settings.maxSize);
+    const glm::ivec2 size = settings.size;
+    if (size != glm::ivec2(0) &&
+        (size.x < 1 || size.y < 1 || std::max(size.x, size.y) > settings.maxSize))
+        return fail(ErrorCode::usage, "textures of {}x{} are asked for; 1 to {} is possible",
+                    size.x, size.y, settings.maxSize);
     STX_CHECK(bundle.check());
+    if (settings.objects) STX_CHECK(checkObjects(*settings.objects, bundle.views.size()));
     const Bundle& content = settings.contentOf ? *settings.contentOf : bundle;
     bool alike = content.views.size() == bundle.views.size();
     for (std::size_t i = 0; alike && i < content.views.size(); ++i)
@@ -195,6 +216,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     atlas.time = bundle.time;
     atlas.duration = bundle.duration;
     const std::vector<int> source = keptViews(bundle, tight, layout.rectangles, job);
+    if (settings.objects) atlas.objects = keptObjects(*settings.objects, source);
     for (const int i : source) atlas.views.push_back(withoutImages(bundle.views[i]));
     atlas.rectangles = std::move(layout.rectangles);
     for (int i = 0; i < layout.pages; ++i) {
@@ -209,8 +231,12 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
         const auto& r = atlas.rectangles[i];
         fillPage(bundle.views[source[r.view]], r, settings.padding, atlas.pages[r.page]);
     });
-    for (const auto& view : bundle.views) atlas.sourcePixels += objectPixels(view);
+    atlas.sourcePixels = objectPixels(bundle);
     if (settings.sourcePixels > 0) atlas.sourcePixels = settings.sourcePixels;
+    if (settings.objects) {
+        atlas.sourcePixels = 0;
+        for (const auto& o : atlas.objects) atlas.sourcePixels += o.sourcePixels;
+    }
     atlas.keptPixels = bundle.pointCount();
     return atlas;
 }
@@ -266,6 +292,9 @@ std::vector<std::uint64_t> outsideBits(const Atlas& atlas, std::size_t of) {
 
 Result<Bundle> unpack(const Atlas& atlas, Job& job) {
     STX_CHECK(atlas.check());
+    if (!atlas.objects.empty())
+        return fail(ErrorCode::usage, "the atlas has {} objects; take one out of it to unpack it",
+                    atlas.objects.size());
     const AtlasPage& first = atlas.pages[0];
     const Contents contents{first.texture.isLinear(), !first.normal.empty(), !first.splatU.empty(),
                             !first.metallicRoughness.empty(), !first.emissive.empty()};

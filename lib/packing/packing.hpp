@@ -11,8 +11,9 @@ struct PackSettings {
         /// Whole views in equal cells, in view order, row by row from the top left: view i lies in
         /// column i % columns and row i / columns of its page (i counted from the page's first);
         /// columns is the least number whose square holds the views of a page (N x N views: N),
-        /// unless maxSize forbids it. A cell is the largest view and `padding` on each side; a
-        /// view's pixel (0,0) is at (padding, padding) of its cell.
+        /// unless the size forbids it. A cell is the largest view and `padding` on each side; a
+        /// view's pixel (0,0) is at (padding, padding) of its cell. Of several objects each has
+        /// such a grid on one page, and the grids are fitted closely.
         grid,
         /// Views trimmed to their content (points, and pixels with partial coverage), cut into
         /// patches where that saves room, fitted closely, turned where that makes the textures
@@ -25,6 +26,12 @@ struct PackSettings {
     /// Pixels around each rectangle, 0..64. 2^L - 1 keep neighbours out of mip level L: 1, 3, 7.
     int padding = 2;
     int maxSize = 16384;  ///< largest width and height of a texture: what a GPU takes; 1..65535
+    /// Each page is exactly this large, whatever is left of it; {0, 0}: as large as is needed.
+    glm::ivec2 size{0};
+    /// Width and height of pages are powers of two, the smallest in which all fits.
+    bool powerOfTwo = false;
+    /// Of several models in one bundle (joinObjects()): which views are whose; null: it is one.
+    const std::vector<AtlasObject>* objects = nullptr;
     /// Object pixels before pruning (PruneReport::sourcePixels), for Atlas::sourcePixels; 0 = the
     /// points and the pixels of full alpha without a depth.
     std::int64_t sourcePixels = 0;
@@ -39,9 +46,27 @@ struct PackSettings {
 /// they would see in the view.
 ///
 /// Errors: settings out of range; a bundle that fails check(), or other views than contentOf; views
-/// that cannot fit, with the size that would be needed and what to change; cancelled; memory over
-/// the limit.
+/// that cannot fit, with a size in which they do and what to change; cancelled; memory over the
+/// limit.
 [[nodiscard]] Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job);
+
+/// A model among those that are to share an atlas.
+struct PackObject {
+    std::string name;  ///< not empty
+    Bundle bundle;
+    std::int64_t sourcePixels = 0;  ///< as PackSettings::sourcePixels
+};
+/// All their views, for pack() with PackSettings::objects.
+struct JoinedObjects {
+    Bundle bundle;
+    std::vector<AtlasObject> objects;
+};
+
+/// Puts models into one bundle, each in coordinates of its own. Environments, times and durations
+/// are left out, the first with a note.
+/// Errors: a bundle that fails check(); (usage) two objects of one name; (invalidInput) one without
+/// a point, or in another colour space than the first.
+[[nodiscard]] Result<JoinedObjects> joinObjects(std::vector<PackObject> objects, Job& job);
 
 /// A bit for each pixel of a view, row by row: set where the object is, or may be, even where no
 /// rectangle shows it. That is where points of other views fall, a little generously, and

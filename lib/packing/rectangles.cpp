@@ -14,6 +14,8 @@
 namespace stx {
 namespace {
 
+constexpr int kLargest = 65535;
+
 /// Look-ups of a rectangle in a gap that the whole search may cost.
 constexpr std::int64_t kWork = 12'000'000;
 
@@ -49,7 +51,13 @@ struct Problem {
     std::int64_t area = 0;
     std::int64_t rectangles = 0;
     int maxSize = 0;
+    int width = 0;   ///< of the page; 0: what gives the smallest
+    int height = 0;  ///< of the page, where its width is given
 
+    /// Nothing better is looked for.
+    [[nodiscard]] bool done(const Attempt& attempt) const {
+        return width > 0 ? attempt.height > 0 && attempt.height <= height : attempt.area() <= area;
+    }
     /// Look-ups of one run, about.
     [[nodiscard]] std::int64_t cost() const {
         const auto g = static_cast<std::int64_t>(groups.size());
@@ -105,6 +113,7 @@ std::vector<std::vector<int>> sortOrders(const std::vector<RectangleGroup>& grou
 
 /// Page widths worth trying: around the square, and whole multiples of frequent sizes.
 std::vector<int> pageWidths(const Problem& problem, bool turn, int steps) {
+    if (problem.width > 0) return {problem.width};
     int least = 1;
     std::vector<std::pair<int, int>> frequent;  // count, size
     for (std::size_t i = 0; i < problem.groups.size(); ++i) {
@@ -210,7 +219,8 @@ void improve(const Problem& problem, std::int64_t work, std::uint64_t seed, Atte
             }
         }
         if (next.rule == GapRule::widest) next.rule = GapRule::avoidWaste;
-        if (random(2)) {
+        if (problem.done(best)) return;
+        if (problem.width == 0 && random(2)) {
             const int span = std::max(best.width / 24, 2);
             const int moved = best.width + static_cast<int>(random(2 * span + 1)) - span;
             next.width = std::clamp(moved, 1, problem.maxSize);
@@ -224,7 +234,7 @@ void improve(const Problem& problem, std::int64_t work, std::uint64_t seed, Atte
 std::optional<Attempt> bestPage(const Problem& problem, bool turn, std::int64_t work) {
     auto starts = explore(problem, turn, work / 2);
     if (starts.empty()) return std::nullopt;
-    if (starts[0].area() > problem.area) {
+    if (!problem.done(starts[0])) {
         if (starts.size() > 4) starts.resize(4);
         const auto share = work / 2 / static_cast<std::int64_t>(starts.size());
         parallelFor(0, static_cast<std::int64_t>(starts.size()), [&](std::int64_t i) {
@@ -294,28 +304,108 @@ std::optional<RectanglePacking> severalPages(const Problem& problem, int pages, 
     return best;
 }
 
+/// Pages of exactly this size, at most `most` of them.
+std::optional<RectanglePacking> pagesOf(const Problem& problem, glm::ivec2 size, int most,
+                                        bool tryTurns) {
+    const auto pageArea = static_cast<std::int64_t>(size.x) * size.y;
+    // How the search for a page of this width goes on: a lower one is better, above the height,
+    // too.
+    Problem fixed = problem;
+    fixed.width = size.x;
+    fixed.height = size.y;
+    fixed.maxSize = kLargest;
+    for (int pages = 1; pages <= most; ++pages) {
+        if (problem.area > pages * pageArea) continue;
+        for (const bool turn : {false, true}) {
+            if (turn && !tryTurns) continue;
+            if (pages == 1) {
+                const auto best = bestPage(fixed, turn, kWork / 4);
+                if (!best || !fixed.done(*best)) continue;
+                return toPacking(
+                    problem, size.x, size.y,
+                    fillPages(problem, size.x, kLargest, 1, best->rule, turn, best->order));
+            }
+            for (const auto rule : {GapRule::avoidWaste, GapRule::widest, GapRule::firstFit}) {
+                for (const auto& order : sortOrders(problem.groups)) {
+                    const auto filled =
+                        fillPages(problem, size.x, size.y, pages, rule, turn, order);
+                    if (!filled.empty()) return toPacking(problem, size.x, size.y, filled);
+                }
+            }
+        }
+    }
+    return std::nullopt;
+}
+
+/// The smallest pages whose sides are powers of two, none four times the other.
+std::optional<RectanglePacking> powerOfTwoPages(const Problem& problem, int maxPages,
+                                                bool tryTurns) {
+    for (int pages = 1; pages <= maxPages; ++pages) {
+        for (std::int64_t area = 1; area <= std::int64_t{kLargest} * kLargest; area *= 2) {
+            if (area * pages < problem.area) continue;
+            std::int64_t width = 1;
+            while (width * width < area) width *= 2;
+            const std::int64_t height = area / width;
+            for (const glm::ivec2 size : {glm::ivec2(width, height), glm::ivec2(height, width)}) {
+                if (std::max(size.x, size.y) > problem.maxSize) break;
+                if (auto found = pagesOf(problem, size, pages, tryTurns)) return found;
+                if (size.x == size.y) break;
+            }
+        }
+    }
+    return std::nullopt;
+}
+
+/// "1300x1290 would do", of what was refused; empty where nothing does.
+std::string whatWouldDo(const std::vector<glm::ivec2>& sizes, RectangleLimits limits) {
+    if (limits.size.x == 0 && limits.maxSize == kLargest) return {};
+    limits.size = {0, 0};
+    limits.maxSize = kLargest;
+    const auto free = packRectangles(sizes, limits);
+    if (!free) return {};
+    return fmt::format("; {}{}x{} would do", free->pages > 1 ? "two of " : "", free->width,
+                       free->height);
+}
+
 }  // namespace
 
 Result<RectanglePacking> packRectangles(const std::vector<glm::ivec2>& sizes,
                                         const RectangleLimits& limits) {
-    if (limits.maxSize < 1 || limits.maxSize > 65535 || limits.maxPages < 1)
+    const bool exact = limits.size.x > 0;
+    if (limits.maxSize < 1 || limits.maxSize > kLargest || limits.maxPages < 1 ||
+        std::max(limits.size.x, limits.size.y) > limits.maxSize)
         return fail(ErrorCode::usage, "pages of {} pixels, {} of them, cannot be packed",
                     limits.maxSize, limits.maxPages);
+    const glm::ivec2 most = exact ? limits.size : glm::ivec2(limits.maxSize);
     for (std::size_t i = 0; i < sizes.size(); ++i) {
         if (sizes[i].x < 1 || sizes[i].y < 1)
             return fail(ErrorCode::invalidInput, "rectangle {} is {}x{}", i, sizes[i].x,
                         sizes[i].y);
-        if (std::max(sizes[i].x, sizes[i].y) > limits.maxSize)
+        const auto fits = [&](int w, int h) { return w <= most.x && h <= most.y; };
+        if (!fits(sizes[i].x, sizes[i].y) && !(limits.mayTurn && fits(sizes[i].y, sizes[i].x)))
             return fail(ErrorCode::invalidInput,
-                        "a rectangle of {}x{} (padding included) is larger than a texture of {}x{}",
-                        sizes[i].x, sizes[i].y, limits.maxSize, limits.maxSize);
+                        "a rectangle of {}x{} (padding included) is larger than a texture of "
+                        "{}x{}{}",
+                        sizes[i].x, sizes[i].y, most.x, most.y, whatWouldDo(sizes, limits));
     }
-    if (sizes.empty()) return RectanglePacking{0, 0, 1, {}};
+    if (sizes.empty()) return RectanglePacking{limits.size.x, limits.size.y, 1, {}};
     const Problem problem = groupSizes(sizes, limits.maxSize);
 
     const bool square =
         std::all_of(sizes.begin(), sizes.end(), [](glm::ivec2 s) { return s.x == s.y; });
     const bool tryTurns = limits.mayTurn && !square;
+    if (exact || limits.powerOfTwo) {
+        auto packing = exact ? pagesOf(problem, limits.size, limits.maxPages, tryTurns)
+                             : powerOfTwoPages(problem, limits.maxPages, tryTurns);
+        if (packing) return *packing;
+        return fail(ErrorCode::invalidInput,
+                    "{} rectangles with {} pixels do not fit on {} of {}{}", problem.rectangles,
+                    problem.area,
+                    limits.maxPages > 1 ? fmt::format("{} textures", limits.maxPages) : "a texture",
+                    exact ? fmt::format("{}x{}", most.x, most.y)
+                          : fmt::format("at most {}x{}", most.x, most.y),
+                    whatWouldDo(sizes, limits));
+    }
     auto best = bestPage(problem, false, tryTurns ? kWork / 2 : kWork);
     if (tryTurns && (!best || best->area() > problem.area)) {
         const auto turned = bestPage(problem, true, kWork / 2);

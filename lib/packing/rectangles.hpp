@@ -13,6 +13,9 @@ struct RectangleLimits {
     int maxSize = 16384;  ///< largest width and height of a page, pixels, 1..65535
     int maxPages = 1;     ///< >= 1
     bool mayTurn = true;  ///< quarter turns, taken only when the pages get smaller by them
+    /// Of each page, exactly; {0, 0}: the smallest within maxSize.
+    glm::ivec2 size{0};
+    bool powerOfTwo = false;  ///< of width and height of a page, where they are free
 };
 
 /// Where one rectangle went.
@@ -36,7 +39,8 @@ struct RectanglePacking {
 /// then the best are improved step by step. The work is bounded, the result depends on nothing but
 /// the sizes: their order only says which of two equal rectangles is which.
 ///
-/// Errors (invalidInput): a size out of range, or more than the pages hold, with the size needed.
+/// Errors (invalidInput): a size out of range, or more than the pages hold, with a size that would
+/// do.
 [[nodiscard]] Result<RectanglePacking> packRectangles(const std::vector<glm::ivec2>& sizes,
                                                       const RectangleLimits& limits);
 

@@ -1,9 +1,40 @@
+#include <bit>
+
 #include "lib/base/parallel.hpp"
 #include "lib/packing/layout.hpp"
 #include "lib/packing/patches.hpp"
 #include "lib/packing/rectangles.hpp"
 
 namespace stx {
+
+int powerOfTwoFrom(int size) {
+    return static_cast<int>(std::bit_ceil(static_cast<unsigned>(size)));
+}
+
+glm::ivec2 mostPage(const PackSettings& settings) {
+    if (settings.size.x > 0) return settings.size;
+    const auto most = static_cast<unsigned>(settings.maxSize);
+    return glm::ivec2(static_cast<int>(settings.powerOfTwo ? std::bit_floor(most) : most));
+}
+
+RectangleLimits rectangleLimits(const PackSettings& settings, int maxPages) {
+    RectangleLimits limits;
+    limits.maxSize = settings.maxSize;
+    limits.size = settings.size;
+    limits.powerOfTwo = settings.powerOfTwo;
+    limits.maxPages = maxPages;
+    return limits;
+}
+
+Result<RectanglePacking> packForAtlas(const std::vector<glm::ivec2>& sizes,
+                                      const RectangleLimits& limits) {
+    auto packing = packRectangles(sizes, limits);
+    if (packing) return packing;
+    packing.error().message +=
+        fmt::format("; use fewer or smaller views, prune them, or allow larger textures ({})",
+                    limits.size.x > 0 ? "--size" : "--max-size");
+    return packing;
+}
 
 Result<AtlasLayout> tightLayout(const Bundle& bundle, const PackSettings& settings, int maxPages) {
     std::vector<std::vector<Patch>> patches(bundle.views.size());
@@ -24,20 +55,12 @@ Result<AtlasLayout> tightLayout(const Bundle& bundle, const PackSettings& settin
             sizes.push_back(glm::ivec2(p.width, p.height) + 2 * settings.padding);
         }
     }
-    RectangleLimits limits;
-    limits.maxSize = settings.maxSize;
-    limits.maxPages = maxPages;
-    auto packing = packRectangles(sizes, limits);
-    if (!packing) {
-        packing.error().message +=
-            "; use fewer or smaller views, prune them, or allow larger textures (--max-size)";
-        return propagate(packing);
-    }
-    layout.width = packing->width;
-    layout.height = packing->height;
-    layout.pages = packing->pages;
+    STX_TRY(const auto packing, packForAtlas(sizes, rectangleLimits(settings, maxPages)));
+    layout.width = packing.width;
+    layout.height = packing.height;
+    layout.pages = packing.pages;
     for (std::size_t i = 0; i < sizes.size(); ++i) {
-        const auto& place = packing->places[i];
+        const auto& place = packing.places[i];
         auto& r = layout.rectangles[i];
         r.page = place.page;
         r.atlasX = place.x + settings.padding;

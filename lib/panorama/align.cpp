@@ -49,6 +49,12 @@ constexpr double kFitHuber = 0.5;  ///< in these adjustments, as kCoarseToFine
 /// Parallax below this is not told: pixels, and a share of the diagonal.
 constexpr double kLeastParallax = 2, kParallaxShare = 1e-3;
 
+/// A field of view that is given is another one than that of a closed turn from this share of the
+/// focal length on: by features that is found to 0.2 % (ten series of the tests, with distortion).
+constexpr double kOtherFocal = 0.01;
+/// What a closed turn may be off by with the best focal length, radians; mistakes are more.
+constexpr double kClosedGap = 0.02;
+
 /// What is known and found while pictures are aligned.
 struct Series {
     std::vector<WorkCopy> copies;
@@ -217,29 +223,6 @@ void tryOwnFocals(Series& s) {
     s.model = one;
 }
 
-/// By which angle pairs that close a turn disagree with `model`: the strongest pair, or the mean by
-/// matches.
-double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
-             const std::vector<int>& closing, bool strongest) {
-    double gap = 0, sum = 0, all = 0;
-    std::size_t most = 0;
-    for (const int p : closing) {
-        const Pair& pair = pairs[static_cast<std::size_t>(p)];
-        const auto& a = model.worldFromCamera[static_cast<std::size_t>(pair.a)];
-        const auto& b = model.worldFromCamera[static_cast<std::size_t>(pair.b)];
-        const double off = angleBetween(
-            turnOf(pair.matches, model.lensOf(pair.a), model.lensOf(pair.b), pair.bFromA),
-            glm::inverse(b) * a);
-        const auto weight = static_cast<double>(pair.matches.size());
-        sum += weight * off;
-        all += weight;
-        if (pair.matches.size() <= most) continue;
-        most = pair.matches.size();
-        gap = off;
-    }
-    return strongest ? gap : sum / std::max(all, 1.0);
-}
-
 /// What pairs have in common, from the matches that fit and those that were found `before`.
 void describePairs(const Series& s, const std::vector<Pair>& before, PanoramaAlignment& out) {
     double squares = 0;
@@ -351,6 +334,67 @@ struct Start {
     double focal = 1;                            ///< that most matches agree with
 };
 
+/// By which angle pairs that close a turn disagree with `model`: the strongest pair, or the mean by
+/// matches.
+double gapOf(const TurnModel& model, const std::vector<Pair>& pairs,
+             const std::vector<int>& closing, bool strongest) {
+    double gap = 0, sum = 0, all = 0;
+    std::size_t most = 0;
+    for (const int p : closing) {
+        const Pair& pair = pairs[static_cast<std::size_t>(p)];
+        const auto& a = model.worldFromCamera[static_cast<std::size_t>(pair.a)];
+        const auto& b = model.worldFromCamera[static_cast<std::size_t>(pair.b)];
+        const double off = angleBetween(
+            turnOf(pair.matches, model.lensOf(pair.a), model.lensOf(pair.b), pair.bFromA),
+            glm::inverse(b) * a);
+        const auto weight = static_cast<double>(pair.matches.size());
+        sum += weight * off;
+        all += weight;
+        if (pair.matches.size() <= most) continue;
+        most = pair.matches.size();
+        gap = off;
+    }
+    return strongest ? gap : sum / std::max(all, 1.0);
+}
+
+/// The focal length with which a turn that is closed fits best to itself, whatever is given: by the
+/// matches of features. Nothing where no turn is closed.
+std::optional<double> focalOfClosedTurn(const Series& s, const PairSearch& search) {
+    const PictureTree tree = treeOf(static_cast<int>(s.copies.size()), search.pairs);
+    if (tree.order.size() < 3) return std::nullopt;
+    const double start = focalByClosing(tree, search.pairs, search.focal);
+    TurnModel model = chain(tree, search.pairs, {start, 0});
+    const auto closing = pairsThatClose(tree, search.pairs, model);
+    if (closing.empty()) return std::nullopt;
+    AdjustSettings adjusting = s.adjusting;
+    adjusting.fixFocal = false;
+    adjusting.expectedFocal = model.lens.focal;
+    adjusting.focalSpread = kUsualSpread;
+    for (const double pixels : kCoarseToFine) {
+        adjusting.huberPixels = pixels;
+        adjusting.fixDistortion = pixels > kDistortionBelow;
+        adjust(model, search.pairs, adjusting);
+    }
+    if (gapOf(model, search.pairs, closing, false) > kClosedGap) return std::nullopt;
+    return model.lens.focal;
+}
+
+/// Says when a field of view that was given is not that of a closed turn: by pairs of their own,
+/// since few agree with one that is far off. Errors: cancelled.
+Result<void> tellOtherFocal(const Series& s, double given, Job& job) {
+    STX_TRY(const auto found, searchPairs(s.copies, s.features, focalsToTry(given), job));
+    const auto focal = focalOfClosedTurn(s, found);
+    if (!focal || std::abs(*focal / given - 1) < kOtherFocal) return {};
+    const auto degrees = [&](double f) {
+        return 2 * std::atan(s.copies[0].extent().x / f) * 180 / M_PI;
+    };
+    job.note(
+        fmt::format("a field of view of {:.1f}° is given, but the pictures close a full turn at "
+                    "{:.1f}°; leave --fov out, and that is used",
+                    degrees(given), degrees(*focal)));
+    return {};
+}
+
 /// Finds pairs by features, their order, and a first model; again while pairs turn out to be
 /// mistakes. Errors: no two pictures that show the same, cancelled.
 Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, double hint, Job& job) {
@@ -358,6 +402,7 @@ Result<Start> startByFeatures(Series& s, const PanoramaSettings& settings, doubl
     const auto count = static_cast<int>(s.copies.size());
     STX_TRY(auto search, searchPairs(s.copies, s.features,
                                      given ? std::vector<double>{hint} : focalsToTry(hint), job));
+    if (given && settings.closeLoop) STX_CHECK(tellOtherFocal(s, hint, job));
     s.pairs = std::move(search.pairs);
     s.adjusting.fixFocal = given;
     s.adjusting.expectedFocal = hint > 0 ? hint : kUsualFocal;

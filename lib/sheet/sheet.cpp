@@ -5,6 +5,7 @@
 
 #include "lib/base/counted.hpp"
 #include "lib/base/printable.hpp"
+#include "lib/model/same_pictures.hpp"
 #include "lib/sheet/layout.hpp"
 #include "lib/sheet/tiles.hpp"
 
@@ -178,30 +179,77 @@ Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& jo
     return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
 }
 
+namespace {
+
+/// A view at one of the moments that are shown.
+struct SequenceCell {
+    std::size_t view = 0;
+    int moment = 0;
+    bool still = false;
+};
+
+/// Rows of a sheet: of each view that may change all moments, then background that stands still,
+/// once each.
+std::vector<std::vector<SequenceCell>> rowsOfViews(const Bundle& first, const Bundle& last,
+                                                   int moments) {
+    std::vector<std::vector<SequenceCell>> rows;
+    std::vector<SequenceCell> still;
+    for (std::size_t i = 0; i < first.views.size(); ++i) {
+        const ReferenceView& view = first.views[i];
+        if (view.background && i < last.views.size() && view.camera == last.views[i].camera &&
+            samePictures(view, last.views[i])) {
+            still.push_back({i, 0, true});
+            continue;
+        }
+        rows.emplace_back();
+        for (int m = 0; m < moments; ++m) rows.back().push_back({i, m, false});
+    }
+    for (std::size_t i = 0; i < still.size(); ++i) {
+        if (i % static_cast<std::size_t>(moments) == 0) rows.emplace_back();
+        rows.back().push_back(still[i]);
+    }
+    return rows;
+}
+
+}  // namespace
+
 Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job) {
     const Timeline timeline = frames.timeline();
-    auto first = frames.frame(0, job);
-    if (!first) return propagate(first);
-    const std::size_t views = first->views.size();
     const int all = static_cast<int>(timeline.count());
     const int moments = std::min(settings.columns > 0 ? settings.columns : kMoments, all);
+    STX_TRY(auto first, frames.frame(0, job));
+    const std::size_t views = first.views.size();
+    const auto points = static_cast<std::size_t>(first.pointCount());
+    Bundle last;
+    if (std::ranges::any_of(first.views, &ReferenceView::background)) {
+        Job quiet;  // its notes come with the moments
+        quiet.workFor(job);
+        STX_TRY(last, frames.frame(static_cast<std::size_t>(all - 1), quiet));
+    }
+    const auto wanted = rowsOfViews(first, last, moments);
+    last = {};
     SheetContent content;
-    content.groups = static_cast<int>(views) * moments;
+    content.groups = 0;
+    for (const auto& row : wanted) content.groups += static_cast<int>(row.size());
     content.tiles = 2;
     content.lines = 2;
     content.headerLines = 2;
-    content.largest = largestOf(first->views);
+    content.largest = largestOf(first.views);
     content.what = "views at a time";
     SheetSettings fixed = settings;
     fixed.columns = moments;
     STX_TRY(auto plan, planSheet(content, fixed, job.limits));
-    // Rows are whole.
-    const int rows = plan.shown / moments;
-    plan.shown = rows * moments;
-    std::vector<SheetGroup> groups(static_cast<std::size_t>(plan.shown));
-    std::vector<Image<float>> depths(groups.size());
-    std::vector<ValueRange> ranges(static_cast<std::size_t>(rows));
-    std::int64_t points = 0;
+    // Rows are whole, and those of the moments come before what stands still.
+    const auto rows = static_cast<std::size_t>((plan.shown + moments - 1) / moments);
+    std::vector<SequenceCell> cells;
+    for (std::size_t r = 0; r < rows; ++r) {
+        const auto& row = wanted[r * wanted.size() / rows];
+        cells.insert(cells.end(), row.begin(), row.end());
+    }
+    plan.shown = static_cast<int>(cells.size());
+    std::vector<SheetGroup> groups(cells.size());
+    std::vector<Image<float>> depths(cells.size());
+    std::vector<ValueRange> ranges(views);
     for (int m = 0; m < moments; ++m) {
         STX_CHECK(job.checkCancelled());
         // From the first frame to the last.
@@ -209,36 +257,36 @@ Result<Sheet> sheetOf(Sequence& frames, const SheetSettings& settings, Job& job)
             moments == 1 ? 0 : static_cast<std::int64_t>(m) * (all - 1) / (moments - 1));
         Result<Bundle> bundle = Bundle();
         if (frame == 0)
-            bundle = std::move(*first);
+            bundle = std::move(first);
         else
             bundle = frames.frame(frame, job);
         if (!bundle)
             return tl::unexpected(
                 bundle.error().at(fmt::format("at {:g} s", timeline.times[frame])));
-        if (m == 0) points = bundle->pointCount();
-        for (int row = 0; row < rows; ++row) {
-            const auto number = static_cast<std::size_t>(row) * views / static_cast<unsigned>(rows);
-            const ReferenceView& view = bundle->views[number];
-            const auto at = static_cast<std::size_t>(row * moments + m);
-            groups[at].lines = {nameText(view, number),
-                                fmt::format("{:.3f} s, frame {}", timeline.times[frame], frame)};
-            groups[at].tiles.push_back(colourTile(view.texture, plan.cell));
-            ranges[static_cast<std::size_t>(row)].add(rangeOf(view.depth));
-            depths[at] = shrunkValues(view.depth, plan.cell);
+        for (std::size_t i = 0; i < cells.size(); ++i) {
+            if (cells[i].moment != m) continue;
+            const ReferenceView& view = bundle->views[cells[i].view];
+            groups[i].lines = {
+                nameText(view, cells[i].view),
+                cells[i].still ? std::string("background that stands still")
+                               : fmt::format("{:.3f} s, frame {}", timeline.times[frame], frame)};
+            groups[i].tiles.push_back(colourTile(view.texture, plan.cell));
+            ranges[cells[i].view].add(rangeOf(view.depth));
+            depths[i] = shrunkValues(view.depth, plan.cell);
         }
         job.progress(m + 1, moments, "moments");
     }
     for (std::size_t i = 0; i < groups.size(); ++i) {
-        const ValueRange& range = ranges[i / static_cast<std::size_t>(moments)];
+        const ValueRange& range = ranges[cells[i].view];
         groups[i].tiles.push_back({falseColour(depths[i], range, kEmptyColour),
                                    rangeText("depth", range), !range.empty()});
     }
-    const auto header = headerOf(
-        plan, settings,
-        fmt::format("{} of {} over {:.4g} s, {}, {} in the first",
-                    counted(static_cast<std::size_t>(moments), "moment"),
-                    counted(timeline.count(), "frame"), timeline.duration(), counted(views, "view"),
-                    counted(static_cast<std::size_t>(points), "point")));
+    const auto header =
+        headerOf(plan, settings,
+                 fmt::format("{} of {} over {:.4g} s, {}, {} in the first",
+                             counted(static_cast<std::size_t>(moments), "moment"),
+                             counted(timeline.count(), "frame"), timeline.duration(),
+                             counted(views, "view"), counted(points, "point")));
     return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
 }
 

@@ -40,8 +40,9 @@ class Files(http.server.SimpleHTTPRequestHandler):
         pass
 
 
-def three(test, browser, port, grid, eye, target):
-    browser.open(f"http://127.0.0.1:{port}/three/index.html?atlas=/{grid}&eye={eye}&target={target}&fov=40&size={SIZE}")
+def three(test, browser, port, grid, eye, target, name=""):
+    browser.open(f"http://127.0.0.1:{port}/three/index.html?atlas=/{grid}&object={name}&eye={eye}&target={target}&fov=40"
+                 f"&size={SIZE}")
     browser.until("document.title === 'ready' || document.title.startsWith('failed')")
     title = browser.ask("document.title")
     if title != "ready":
@@ -49,14 +50,14 @@ def three(test, browser, port, grid, eye, target):
     browser.picture(test.path("shot.png"), *map(int, SIZE.split("x")))
 
 
-def godot(test, grid, eye, target):
+def godot(test, grid, eye, target, name=""):
     project = test.path("project")
     shutil.rmtree(project, ignore_errors=True)
     shutil.copytree(os.path.join(ENGINES, "godot3"), project)
     shutil.copytree(test.path(grid), os.path.join(project, "atlas"))
     open(os.path.join(project, "atlas", ".gdignore"), "w").close()
     done = subprocess.run(["xvfb-run", "-a", "-s", f"-screen 0 {SIZE}x24", "godot3", "--path", project, "--resolution", SIZE,
-                           "--audio-driver", "Dummy", "--picture", test.path("shot.png"), eye, target],
+                           "--audio-driver", "Dummy", "--picture", test.path("shot.png"), eye, target, name],
                           capture_output=True, text=True, timeout=300, env=dict(os.environ, HOME=test.folder))
     if "SHADER ERROR" in done.stdout + done.stderr or done.returncode:
         test.check(False, f"Godot, {grid}: {(done.stdout + done.stderr)[-2000:]}")
@@ -87,6 +88,8 @@ def main():
             test.stx_run("pack", f"{grid}.mp4", "-o", grid)
             test.stx_run("render", grid, "-o", f"{grid}.png", f"--eye={eye}", f"--target={target}", "--fov", "40", "--size", SIZE,
                          "--background", "black", "--backend", "cpu")
+        # Both share one sheet; each is drawn as from an atlas of its own.
+        test.stx_run("pack", "octahedral.mp4", "hemi-octahedral.mp4", "-o", "sheet", "--size", "power-of-two")
         if has_three:
             server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, folder=folder))
             threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -95,6 +98,8 @@ def main():
                 for grid, (eye, target) in cameras.items():
                     three(test, browser, server.server_port, grid, eye, target)
                     compare(test, "three.js", grid)
+                    three(test, browser, server.server_port, "sheet", eye, target, grid)
+                    compare(test, "three.js, from a sheet", grid)
                 # Light in a texture of its own; in the truth it is in the colour.
                 eye, target = "3.9,3.1,6.5", "0,0,0"
                 material_model.make(test.path("glowing.gltf"))
@@ -113,6 +118,8 @@ def main():
             for grid, (eye, target) in cameras.items():
                 godot(test, grid, eye, target)
                 compare(test, "Godot 3", grid)
+                godot(test, "sheet", eye, target, grid)
+                compare(test, "Godot 3, from a sheet", grid)
         return 1 if test.failed else 0
 
 

@@ -26,6 +26,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 SHARDS = 8
@@ -109,13 +110,17 @@ def processes(*words):
     return sorted(found)
 
 
+def parent_of(pid):
+    with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+        return int(file.read().rpartition(")")[2].split()[1])
+
+
 def children_of(roots):
     parents = {}
     for name in os.listdir("/proc"):
         if name.isdigit():
             try:
-                with open(f"/proc/{name}/stat", encoding="ascii", errors="replace") as file:
-                    parents[int(name)] = int(file.read().rpartition(")")[2].split()[1])
+                parents[int(name)] = parent_of(name)
             except OSError:
                 continue
     found = set(roots)
@@ -126,12 +131,18 @@ def children_of(roots):
         found |= more
 
 
+def send(pid, number):
+    """Whether the process is there to get a signal."""
+    try:
+        os.kill(pid, number)
+        return True
+    except ProcessLookupError:
+        return False
+
+
 def kill_all(pids):
     for pid in pids:
-        try:
-            os.kill(pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
+        send(pid, signal.SIGKILL)
 
 
 class Cluster:
@@ -220,16 +231,61 @@ def done(job):
     return shown.returncode == 0 and not shown.stdout.strip() or "Invalid job id" in shown.stderr
 
 
+class Pace(threading.Thread):
+    """Stops every stx as soon as `most` outputs are there, so that what is to happen then happens to a job that is
+    still at work, however fast the machine is."""
+
+    def __init__(self, folder):
+        super().__init__(daemon=True)
+        self.folder, self.most, self.over, self.spared, self.held = folder, 0, False, None, set()
+        self.lock = threading.Lock()
+        self.start()
+
+    def count(self):
+        """Whole outputs that are there."""
+        return sum(not n.startswith(".") for n in os.listdir(self.folder)) if os.path.isdir(self.folder) else 0
+
+    def run(self):
+        while not self.over:
+            with self.lock:
+                if not self.over and self.count() >= self.most:
+                    self.hold()
+            time.sleep(0.005)
+
+    def hold(self):
+        spared = of_shard(self.spared) if self.spared else set()
+        for pid in children_of(processes("--shard", "--skip-existing")) - self.held - spared:
+            if send(pid, signal.SIGSTOP):
+                self.held.add(pid)
+
+    def let(self, shard):
+        """Lets this shard alone go on: what is stopped hears no signal."""
+        with self.lock:
+            self.spared = shard
+            for pid in of_shard(shard) & self.held:
+                send(pid, signal.SIGCONT)
+                self.held.discard(pid)
+
+    def go_on(self, most):
+        """Lets all run until `most` outputs are there; None: to the end."""
+        with self.lock:
+            self.most, self.over, self.spared = most, most is None, None
+            for pid in self.held:
+                send(pid, signal.SIGCONT)
+            self.held.clear()
+
+
+def of_shard(shard):
+    return children_of(processes(f"--shard {shard}/{SHARDS} "))
+
+
 def submit(work, kind, source, pattern, options):
     out = run(os.path.join(SOURCE, "samples/slurm/submit"), kind, source, pattern, str(SHARDS), *options, cwd=work)
     return out.split()
 
 
-def disturb(cluster, job, folder, total):
+def disturb(cluster, job, pace, total):
     """Everything that happens to clusters, at moments told by how much is done. Gives the cancelled shard."""
-
-    def count():
-        return sum(not n.startswith(".") for n in os.listdir(folder))
 
     def stx_of():
         """A shard that runs stx now: its number and the process."""
@@ -241,13 +297,16 @@ def disturb(cluster, job, folder, total):
         return None
 
     def at(share, what, act):
-        until(f"{share:.0%} of the outputs", lambda: count() >= share * total or done(job))
+        pace.go_on(math.ceil(share * total))
+        until(f"{share:.0%} of the outputs", lambda: pace.count() >= pace.most or done(job))
         while True:
-            expect(not done(job), f"the job was done before: {what}; make it longer")
+            expect(not done(job), f"the job was done before: {what}")
             running = stx_of()
             # The shard may have ended since, or be about to start; then it is another's turn.
+            if running:
+                pace.let(running[0])
             if running and act(*running) is not False:
-                print(f"  at {count()} of {total}: {what} (shard {running[0]})", flush=True)
+                print(f"  at {pace.count()} of {total}: {what} (shard {running[0]})", flush=True)
                 return running[0]
             time.sleep(0.1)
 
@@ -258,9 +317,11 @@ def disturb(cluster, job, folder, total):
     until("the end of the cancelled shard", lambda: not processes(f"{cancelled}/{SHARDS}"), 60)
     at(0.15, "kill -9 of stx", lambda _, pid: kill_all([pid]))
     at(0.22, "kill -9 of its newest process", lambda _, pid: kill_all([max(children_of([pid]))]))
-    at(0.30, "its time is up", lambda k, _: slurm("scancel", "--batch", "--signal=USR1", f"{job}_{k}"))
+    # What --signal=B:USR1@60 does; scancel would send it again and again while the job is put back, and take a minute.
+    at(0.30, "its time is up", lambda _, pid: send(parent_of(pid), signal.SIGUSR1))
     at(0.40, "scontrol requeue", lambda k, _: slurm("scontrol", "requeue", f"{job}_{k}"))
     at(0.55, "the node dies", lambda _k, _p: cluster.node_dies())
+    pace.go_on(None)
     return cancelled
 
 
@@ -306,10 +367,10 @@ def campaign(cluster, work, kind, source, pattern, options, total, names, output
     start = time.monotonic()
     folder = os.path.join(work, os.path.dirname(outputs[0]))
     log = folder + ".stx"
+    pace = Pace(folder)
     job, verify = submit(work, kind, source, pattern, options)
     print(f"{kind}: job {job}, {total} outputs, {SHARDS} shards", flush=True)
-    until("a first output", lambda: os.path.isdir(folder))
-    cancelled = disturb(cluster, job, folder, total)
+    cancelled = disturb(cluster, job, pace, total)
     until("the end of the job and of verify", lambda: done(job) and done(verify))
     check(work, log, kind, total, names, outputs, truth, cancelled)
     os.remove(os.path.join(log, "verify.log"))

@@ -2,6 +2,7 @@
 extends MeshInstance
 
 export(String, DIR) var folder = "res://atlas"
+export(String) var object = ""  # of an atlas with several objects, the one to draw
 
 func image_of(name):
 	var image = Image.new()
@@ -14,6 +15,11 @@ func texture_of(image, flags):
 	texture.create_from_image(image, flags)
 	return texture
 
+func texture_named(atlas, attribute, page, flags):
+	for t in atlas.textures:
+		if t.attribute == attribute and t.page == page:
+			return texture_of(image_of(t.file), flags)
+
 func vector(list):
 	return Vector3(list[0], list[1], list[2])
 
@@ -21,39 +27,50 @@ func _ready():
 	var file = File.new()
 	assert(file.open(folder.plus_file("atlas.json"), File.READ) == OK)
 	var atlas = JSON.parse(file.get_as_text()).result
-	var side = int(round(sqrt(atlas.views.size())))
-	assert(side * side == atlas.views.size() and side > 2 and atlas.pages == 1)
+	var one = {"name": "", "firstView": 0, "views": atlas.views.size(), "bounds": atlas.get("bounds")}
+	for o in atlas.get("objects", []):
+		if o.name == object or (object == "" and atlas.objects.size() == 1):
+			one = o
+	assert(one.name == object or object == "")
+	var side = int(round(sqrt(one.views)))
+	assert(side * side == one.views and side > 2)
 	# Five texels for each view, see impostor.shader.
 	var table = Image.new()
 	table.create(5, side * side, false, Image.FORMAT_RGBAF)
 	table.lock()
 	var lowest = 1.0
+	var page = -1
 	for r in atlas.rectangles:
+		var row = r.view - one.firstView
+		if row < 0 or row >= one.views:
+			continue
+		assert(page < 0 or page == r.page)
+		page = r.page
 		var v = atlas.views[r.view]
 		assert(v.orthographic and v.depthBits == 8 and r.width == v.width and r.width == r.height)
 		var axes = Basis(Quat(v.quaternion[0], v.quaternion[1], v.quaternion[2], v.quaternion[3]))
 		var p = v.position
-		table.set_pixel(0, r.view, Color(axes.x.x, axes.x.y, axes.x.z, v.nearPlane))
-		table.set_pixel(1, r.view, Color(axes.y.x, axes.y.y, axes.y.z, v.farPlane))
-		table.set_pixel(2, r.view, Color(axes.z.x, axes.z.y, axes.z.z, 255))
-		table.set_pixel(3, r.view, Color(r.atlasX, r.atlasY, v.fx, r.width))
-		table.set_pixel(4, r.view, Color(p[0], p[1], p[2], 0))
+		table.set_pixel(0, row, Color(axes.x.x, axes.x.y, axes.x.z, v.nearPlane))
+		table.set_pixel(1, row, Color(axes.y.x, axes.y.y, axes.y.z, v.farPlane))
+		table.set_pixel(2, row, Color(axes.z.x, axes.z.y, axes.z.z, 255))
+		table.set_pixel(3, row, Color(r.atlasX, r.atlasY, v.fx, r.width))
+		table.set_pixel(4, row, Color(p[0], p[1], p[2], 0))
 		lowest = min(lowest, axes.z.y)
 	table.unlock()
-	var low = vector(atlas.bounds.min)
-	var high = vector(atlas.bounds.max)
+	var low = vector(one.bounds.min)
+	var high = vector(one.bounds.max)
 	# All views look at one point: where the lines of sight of a high and a low one meet.
 	var half = side / 2
-	var top = atlas.views[half * side + half]
-	var rim = atlas.views[half]
+	var top = atlas.views[one.firstView + half * side + half]
+	var rim = atlas.views[one.firstView + half]
 	var u = Basis(Quat(top.quaternion[0], top.quaternion[1], top.quaternion[2], top.quaternion[3])).z
 	var w = Basis(Quat(rim.quaternion[0], rim.quaternion[1], rim.quaternion[2], rim.quaternion[3])).z
 	var between = vector(rim.position) - vector(top.position)
 	var along = (between.dot(u) - u.dot(w) * between.dot(w)) / (1 - u.dot(w) * u.dot(w))
 	var material = ShaderMaterial.new()
 	material.shader = load("res://impostor.shader")
-	material.set_shader_param("colour_texture", texture_of(image_of("colour.png"), Texture.FLAG_FILTER))
-	material.set_shader_param("depth_texture", texture_of(image_of("depth.png"), 0))
+	material.set_shader_param("colour_texture", texture_named(atlas, "colour", page, Texture.FLAG_FILTER))
+	material.set_shader_param("depth_texture", texture_named(atlas, "depth", page, 0))
 	material.set_shader_param("view_table", texture_of(table, 0))
 	material.set_shader_param("side", side)
 	material.set_shader_param("hemi", lowest > -0.1)

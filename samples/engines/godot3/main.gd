@@ -1,9 +1,16 @@
-# Turns the impostor. `godot3 -- --picture FILE EYE TARGET` (numbers with commas) draws one picture instead.
+# Turns the impostor. `godot3 -- --picture FILE EYE TARGET [OBJECT]` (numbers with commas) draws one picture instead.
 extends Spatial
 
 func numbers(text):
 	var parts = text.split_floats(",")
 	return Vector3(parts[0], parts[1], parts[2])
+
+# Before the impostor is ready.
+func _enter_tree():
+	var words = Array(OS.get_cmdline_args())
+	var at = words.find("--picture")
+	if at >= 0 and words.size() > at + 4:
+		$Impostor.object = words[at + 4]
 
 func _ready():
 	var words = Array(OS.get_cmdline_args())

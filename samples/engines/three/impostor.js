@@ -12,27 +12,44 @@ async function texture(url, colorSpace, filter) {
     return result;
 }
 
-// `folder`: the atlas' address. Throws what is wrong with it.
-export async function loadImpostor(folder) {
-    const atlas = await (await fetch(`${folder}/atlas.json`)).json();
-    const side = Math.round(Math.sqrt(atlas.views.length));
-    if (side * side !== atlas.views.length || side < 3 || atlas.pages !== 1)
-        throw new Error(`${folder} has ${atlas.views.length} views on ${atlas.pages} pages; a grid of N x N on one is expected`);
+// An atlas' index and textures, read once for all objects that share them.
+const sheets = new Map();
+
+export function loadSheet(folder) {
+    if (!sheets.has(folder)) sheets.set(folder, fetch(`${folder}/atlas.json`).then((answer) => answer.json()).then(
+        (atlas) => ({atlas, textures: new Map(), texture(t, colorSpace, filter) {
+            if (!this.textures.has(t.file)) this.textures.set(t.file, texture(`${folder}/${t.file}`, colorSpace, filter));
+            return this.textures.get(t.file);
+        }})));
+    return sheets.get(folder);
+}
+
+// `folder`: the atlas' address; `name`: of an atlas of several objects, the one to draw. Throws what is wrong with it.
+export async function loadImpostor(folder, name) {
+    const sheet = await loadSheet(folder), {atlas} = sheet;
+    const objects = atlas.objects || [{firstView: 0, views: atlas.views.length, bounds: atlas.bounds}];
+    const object = objects.find((o) => o.name === name) || (objects.length === 1 && !name && objects[0]);
+    if (!object) throw new Error(`${folder} has no object '${name || ""}'; it has ${objects.map((o) => o.name).join(", ")}`);
+    const views = atlas.views.slice(object.firstView, object.firstView + object.views);
+    const rectangles = atlas.rectangles.filter((r) => views.includes(atlas.views[r.view]));
+    const side = Math.round(Math.sqrt(views.length)), {page} = rectangles[0];
+    if (side * side !== views.length || side < 3 || rectangles.some((r) => r.page !== page))
+        throw new Error(`${folder} has ${views.length} views; a grid of N x N on one page is expected`);
     const table = new Float32Array(side * side * 20);
-    for (const {view, atlasX, atlasY, width, height} of atlas.rectangles) {
+    for (const {view, atlasX, atlasY, width, height} of rectangles) {
         const v = atlas.views[view], [x, y, z, w] = v.quaternion;
         if (!v.orthographic || v.depthBits !== 8 || width !== height || width !== v.width)
             throw new Error(`view ${view}: square views with --projection orthographic and --depth-bits 8 are expected`);
         const matrix = new THREE.Matrix4().makeRotationFromQuaternion(new THREE.Quaternion(x, y, z, w)).elements;
         table.set([...matrix.slice(0, 3), v.nearPlane, ...matrix.slice(4, 7), v.farPlane, ...matrix.slice(8, 11), 255,
-                   atlasX, atlasY, v.fx, width, ...v.position, 0], view * 20);
+                   atlasX, atlasY, v.fx, width, ...v.position, 0], (view - object.firstView) * 20);
     }
     const viewTable = new THREE.DataTexture(table, 5, side * side, THREE.RGBAFormat, THREE.FloatType);
     viewTable.needsUpdate = true;
     // The lowest views of a hemi-octahedral grid are at the horizon; of an octahedral one, below.
     const up = new THREE.Vector3(0, 1, 0);
-    const lowest = Math.min(...atlas.views.map((v, i) => up.dot(new THREE.Vector3(...table.slice(i * 20 + 8, i * 20 + 11)))));
-    const low = new THREE.Vector3(...atlas.bounds.min), high = new THREE.Vector3(...atlas.bounds.max);
+    const lowest = Math.min(...views.map((v, i) => up.dot(new THREE.Vector3(...table.slice(i * 20 + 8, i * 20 + 11)))));
+    const low = new THREE.Vector3(...object.bounds.min), high = new THREE.Vector3(...object.bounds.max);
     const size = high.clone().sub(low);
     // All views look at one point: where the lines of sight of a high and a low one meet.
     const at = (i, k) => new THREE.Vector3(...table.slice(i * 20 + 4 * k, i * 20 + 4 * k + 3));
@@ -40,20 +57,20 @@ export async function loadImpostor(folder) {
     const cosine = u.dot(v), between = b.clone().sub(a);
     const along = (between.dot(u) - cosine * between.dot(v)) / (1 - cosine * cosine);
     const centre = a.addScaledVector(u, along);
+    const of = (attribute) => atlas.textures.find((t) => t.attribute === attribute && t.page === page);
     const material = new THREE.ShaderMaterial({
         vertexShader, fragmentShader, side: THREE.BackSide,
         uniforms: {
-            colourTexture: {value: await texture(`${folder}/colour.png`, THREE.SRGBColorSpace, THREE.LinearFilter)},
-            depthTexture: {value: await texture(`${folder}/depth.png`, THREE.NoColorSpace, THREE.NearestFilter)},
+            colourTexture: {value: await sheet.texture(of("colour"), THREE.SRGBColorSpace, THREE.LinearFilter)},
+            depthTexture: {value: await sheet.texture(of("depth"), THREE.NoColorSpace, THREE.NearestFilter)},
             viewTable: {value: viewTable}, side: {value: side}, hemi: {value: lowest > -0.1}, centre: {value: centre},
             radius: {value: size.length() / 2}, eye: {value: new THREE.Vector3()}}});
     // What gives off light has it in a texture of its own (stx convert --materials).
-    const glow = atlas.textures.find((t) => t.attribute === "emissive" && t.coding === "sRGB8-emissive");
-    if (glow) {
+    const glow = of("emissive");
+    if (glow && glow.coding === "sRGB8-emissive") {
         material.defines = {EMISSIVE: true};
         material.uniforms.emissiveScale = {value: glow.scale};
-        material.uniforms.emissiveTexture =
-            {value: await texture(`${folder}/${glow.file}`, THREE.SRGBColorSpace, THREE.LinearFilter)};
+        material.uniforms.emissiveTexture = {value: await sheet.texture(glow, THREE.SRGBColorSpace, THREE.LinearFilter)};
     }
     const box = new THREE.BoxGeometry(size.x, size.y, size.z).translate(...low.clone().add(high).multiplyScalar(0.5).toArray());
     const mesh = new THREE.Mesh(box, material);

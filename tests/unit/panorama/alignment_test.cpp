@@ -101,6 +101,38 @@ TEST(AlignPanorama, FindsRotationsFocalLengthAndDistortion) {
     EXPECT_GT(psnrOfPanorama(camera, found, 2048), 35);
 }
 
+TEST(AlignPanorama, AGivenFieldOfViewThatAClosedTurnContradictsIsNoted) {
+    TurningCamera camera;
+    camera.sphere = &discs();
+    camera.size = {240, 320};
+    camera.lens = {2.0, -0.04 * 4};
+    for (int k = 0; k < 16; ++k) camera.add(22.5 * kDegree * k, 3 * kDegree, 0);
+    const double right = 2 * std::atan(0.6 / camera.lens.focal);
+    const auto notesWith = [&](double fieldOfView, bool closeLoop = true) {
+        PanoramaSettings settings;
+        settings.fieldOfView = fieldOfView;
+        settings.closeLoop = closeLoop;
+        Job job;
+        EXPECT_TRUE(alignPanorama(camera, settings, job));
+        std::string all;
+        for (const auto& note : job.takeNotes()) all += note + "\n";
+        return all;
+    };
+    EXPECT_EQ(notesWith(right).find("field of view of"), std::string::npos) << notesWith(right);
+    for (const double wrong : {0.85 * right, 0.97 * right, 1.03 * right, 1.15 * right}) {
+        const std::string notes = notesWith(wrong);
+        EXPECT_NE(notes.find(fmt::format("{:.1f}° is given, but the pictures close a full turn at "
+                                         "{:.1f}°",
+                                         wrong / kDegree, right / kDegree)),
+                  std::string::npos)
+            << notes;
+    }
+    EXPECT_EQ(notesWith(1.15 * right, false).find("full turn"), std::string::npos);
+    // Part of a turn tells nothing.
+    camera.worldFromCamera.resize(6);
+    EXPECT_EQ(notesWith(1.15 * right).find("full turn"), std::string::npos);
+}
+
 TEST(AlignPanorama, ClosesATurnOfPortraits) {
     TurningCamera camera;
     camera.sphere = &discs();

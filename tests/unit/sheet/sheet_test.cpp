@@ -160,6 +160,31 @@ TEST(Sheet, OfASequenceSpreadsItsMoments) {
         EXPECT_TRUE(holdsText(sheet->picture, text)) << text;
 }
 
+TEST(Sheet, OfASequenceShowsBackgroundThatStandsStillOnce) {
+    class Film : public Sequence {
+      public:
+        bool flickers = false;
+        Film() { timeline_ = steadyTimeline(11, 10); }
+        Result<Bundle> frame(std::size_t index, Job&) override {
+            Bundle b = evenBundle(5, 120);
+            for (std::size_t i = 1; i < 5; ++i) b.views[i].background = true;
+            for (const std::size_t i : {0, 4})
+                if (i == 0 || flickers)
+                    for (auto& d : b.views[i].depth.pixels()) d += 0.1f * static_cast<float>(index);
+            return b;
+        }
+    } film;
+    Job job;
+    SheetSettings settings;
+    settings.columns = 3;
+    const auto sheet = sheetOf(film, settings, job);
+    ASSERT_TRUE(sheet) << sheet.error().text();
+    EXPECT_EQ(sheet->shown, 3 + 4);
+    EXPECT_TRUE(holdsText(sheet->picture, "background that stands still"));
+    film.flickers = true;
+    EXPECT_EQ(sheetOf(film, settings, job)->shown, 3 + 3 + 3);
+}
+
 TEST(Sheet, OfAPairTellsTheSameAsCompare) {
     Rgba8Image a(150, 150, {10, 200, 90, 255}), b = a;
     for (int i = 0; i < 150; ++i) b.at(i, i) = {60, 200, 90, 255};

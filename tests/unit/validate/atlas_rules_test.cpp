@@ -47,6 +47,15 @@ TEST(ValidateAtlas, AtlasesInMemoryKeepTheRules) {
     atlas = good;
     for (float& d : atlas.pages[0].depth.pixels()) d = kNoDepth;
     EXPECT_EQ(numbersOf(validate(atlas)), Numbers{4007});
+    atlas = good;
+    atlas.objects.resize(2);
+    atlas.objects[0] = {"cup", "", 0, 1, {}, {}, 1, 1};
+    atlas.objects[1] = {"jug", "", 1, 1, {}, {}, 1, 1};
+    EXPECT_TRUE(validate(atlas).empty());
+    atlas.objects[1].name = "cup";
+    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5005});
+    atlas.objects.pop_back();
+    EXPECT_EQ(numbersOf(validate(atlas)), Numbers{5005});
 }
 
 std::string textOfFile(const fs::path& path) {
@@ -60,6 +69,32 @@ std::string replaced(std::string text, const std::string& from, const std::strin
     const auto at = text.find(from);
     if (at == std::string::npos) ADD_FAILURE() << from << " is not in\n" << text;
     return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+TEST(ValidateAtlas, ObjectsOfAFileHaveAllViews) {
+    const TemporaryFolder folder;
+    Job job;
+    Atlas good = goodAtlas();
+    good.objects.resize(2);
+    good.objects[0] = {"cup", "", 0, 1, {}, {}, 1, 1};
+    good.objects[1] = {"jug", "", 1, 1, Bounds{{0, 0, 0}, {1, 2, 3}}, {4, 5, 6}, 9, 8};
+    ASSERT_TRUE(writeAtlas(good, folder / "a", job));
+    EXPECT_EQ(numbersOf(validateFile(folder / "a", {}, job)), Numbers{});
+    const auto read = readAtlas(folder / "a", job);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->objects[1].name, "jug");
+    EXPECT_EQ(read->objects[1].bounds->max, glm::dvec3(1, 2, 3));
+    EXPECT_EQ(read->objects[1].origin, glm::dvec3(4, 5, 6));
+    EXPECT_EQ(read->objects[1].keptPixels, 8);
+    const std::string index = textOfFile(folder / "a/atlas.json");
+    for (const auto& [from, to] : {std::pair("\"name\":\"jug\"", "\"name\":\"cup\""),
+                                   std::pair("\"firstView\":1", "\"firstView\":0"),
+                                   std::pair("\"name\":\"cup\"", "\"name\":\"\""),
+                                   std::pair("\"views\":1", "\"views\":0")}) {
+        std::ofstream(folder / "a/atlas.json", std::ios::binary) << replaced(index, from, to);
+        EXPECT_EQ(numbersOf(validateFile(folder / "a", {}, job)), Numbers{5005}) << to;
+        EXPECT_FALSE(readAtlas(folder / "a", job)) << to;
+    }
 }
 
 /// What the index of an atlas of two views and one page says after a change.

@@ -81,6 +81,56 @@ TEST(SurfacesGlb, IsReadBackAsTheSameSurfaces) {
     for (const glm::vec3& p : mesh->positions) EXPECT_LT(fromTorus(p), 0.01);
 }
 
+/// A grey disc before a red wall: filters find no red on the disc.
+TEST(SurfacesGlb, MixesNoColoursAcrossEdges) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle;
+    ReferenceView& view = bundle.views.emplace_back();
+    view.name = "front";
+    view.camera = Camera::fromFieldOfView({0, 0, 4}, {1, 0, 0, 0}, {0.8, 0.8}, false, 64, 64);
+    view.nearPlane = 1;
+    view.farPlane = 10;
+    view.depth = Image<float>(64, 64, 6.0f);
+    view.texture = Rgba8Image(64, 64, glm::u8vec4(255, 0, 0, 255));
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+            if (std::hypot(x - 31.7, y - 32.4) > 20) continue;
+            view.depth.at(x, y) = 3.0f;
+            view.texture.rgba8()->at(x, y) = {90, 90, 90, 255};
+        }
+    }
+    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {}, job));
+    const auto mesh = readMesh(folder.path() / "a.glb", job);
+    ASSERT_TRUE(mesh) << mesh.error().text();
+    ASSERT_EQ(mesh->textures.size(), 1u);
+    const Rgba8Image& picture = mesh->textures[0].pixels;
+    int textured = 0, coloured = 0;
+    for (std::size_t t = 0; t < mesh->triangles.size(); ++t) {
+        const auto& corners = mesh->triangles[t];
+        // Of the disc.
+        if (mesh->positions[corners[0]].z < 0) continue;
+        if (mesh->materials[mesh->triangleMaterial[t]].baseColourTexture < 0) {
+            ++coloured;
+            continue;
+        }
+        ++textured;
+        // Along each side the four texels around are grey.
+        for (int k = 0; k < 3; ++k) {
+            const glm::vec2 at = 0.5f * (mesh->uvs[corners[k]] + mesh->uvs[corners[(k + 1) % 3]]);
+            const glm::vec2 texel = at * 64.0f - 0.5f;
+            for (int i = 0; i < 4; ++i) {
+                const glm::vec2 next(
+                    i % 2 ? std::ceil(texel.x - 0.02f) : std::floor(texel.x + 0.02f),
+                    i / 2 ? std::ceil(texel.y - 0.02f) : std::floor(texel.y + 0.02f));
+                EXPECT_EQ(picture.at(static_cast<int>(next.x), static_cast<int>(next.y)).g, 90);
+            }
+        }
+    }
+    EXPECT_GT(textured, 20);
+    EXPECT_GT(coloured, 20);
+}
+
 TEST(SurfacesGlb, HasNormalsWhereTheBundleDoes) {
     const TemporaryFolder folder;
     Job job;

@@ -237,6 +237,33 @@ TEST(ViewerPage, WritesWhatStaysOfAFilmOnce) {
     EXPECT_EQ(page.json("data")["times"].size(), 3u);
 }
 
+/// Three cameras, each with a new picture every frame, every second and every third one.
+class ThreeRates : public Sequence {
+  public:
+    ThreeRates() { timeline_ = steadyTimeline(4, 10); }
+    Result<Bundle> frame(std::size_t index, Job&) override {
+        Bundle bundle = smallBundle(3, 16, false, false);
+        for (std::size_t k = 0; k < 3; ++k)
+            bundle.views[k].texture.rgba8()->at(5, 5) = {index / (k + 1), 2, 3, 255};
+        bundle.time = timeline_.times[index];
+        return bundle;
+    }
+};
+
+TEST(ViewerPage, WritesEachPictureOfAFilmOnce) {
+    const TemporaryFolder folder;
+    Job job;
+    ThreeRates film;
+    ASSERT_TRUE(writeViewerPage(film, folder.path() / "a.html", {"film.mp4", {}, {}}, job));
+    const ReadPage page = readPage(folder.path() / "a.html");
+    // 4, 2 and 2 colours and the depths.
+    EXPECT_EQ(page.count("image"), 4 + 2 + 2 + 3);
+    const Json scene = page.json("scene3");
+    ASSERT_EQ(scene["pages"].size(), 3u);
+    ASSERT_EQ(scene["views"].size(), 3u);
+    for (const Json& r : scene["rectangles"]) EXPECT_EQ(r[0], r[1]) << "each has its own page";
+}
+
 TEST(ViewerPage, TakesAnAtlasAsItIs) {
     const TemporaryFolder folder;
     Job job;
