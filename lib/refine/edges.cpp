@@ -84,12 +84,6 @@ class Edges {
         return found;
     }
 
-    /// Whether what is behind at neighbour `i` goes on. A strip of one pixel does not: it may be
-    /// the side of a plate that is seen from the front, which no edge in front of it hides.
-    [[nodiscard]] bool isWideBehind(int x, int y, int i) const {
-        return at(x + 2 * kBeside[i][0], y + 2 * kBeside[i][1]) > 0.0f;
-    }
-
     /// How much of a pixel's colour is that of its surface and not of what is behind at neighbour
     /// `i`, 0..1; nothing when they look alike.
     [[nodiscard]] std::optional<float> ownShare(int x, int y, int i) const {
@@ -239,8 +233,7 @@ std::vector<EdgePixel> edgePixels(const EdgeView& view) {
     const int height = view.q->height(), every = std::max(1, height / kRows);
     for (int y = every / 2; y < height; y += every)
         for (int x = 0; x < view.q->width(); ++x)
-            if (const int i = edges.behind(x, y, 4); i >= 0 && edges.isWideBehind(x, y, i))
-                found.emplace_back(x, y, i);
+            if (const int i = edges.behind(x, y, 4); i >= 0) found.emplace_back(x, y, i);
     const std::size_t stride = std::max<std::size_t>(1, found.size() / kEdges);
     std::vector<EdgePixel> pixels;
     for (std::size_t k = 0; k < found.size(); k += stride) {
