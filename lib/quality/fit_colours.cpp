@@ -12,7 +12,7 @@ namespace {
 /// Share of what is missing that is added. Six novel views of four models (16 views of 256x256)
 /// against the models: 0.7 changes fuze by +0.15 dB, the milk truck by +0.17, spot by -0.06 and the
 /// amphora by -0.07; 0.35 by +0.05, +0.11, -0.01 and -0.01.
-constexpr float kGain = 0.35f;
+constexpr float kFitGain = 0.35f;
 /// A source view sees a point where its depth is that of the point within this share, as
 /// PruneSettings::depthTolerance and a pixel of slope.
 constexpr double kSameDepth = 0.01;
@@ -107,7 +107,7 @@ Result<Bundle> withMissing(const Bundle& source, const Bundle& pruned, const Lac
                 glm::vec3 sum(0);
                 float weight = 0;
                 for (const Seen& s : seen) s.add(world, sum, weight);
-                if (weight > 0) addColour(view.texture, x, y, sum * (kGain / weight));
+                if (weight > 0) addColour(view.texture, x, y, sum * (kFitGain / weight));
             }
         });
     }
