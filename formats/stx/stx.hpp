@@ -125,7 +125,8 @@ struct ConvertSettings {
     /// 8, 16 or 32 (float distances, only .exr holds them). Without a value meshes get 16 and
     /// bundles keep theirs.
     std::optional<int> depthBits{};
-    /// The mesh's up axis: what views stand on; need not be unit. Without a value: upOf().
+    /// The up axis of the mesh, around which views are placed; need not be unit. Without a value:
+    /// upOf().
     std::optional<glm::dvec3> up{};
 };
 
@@ -146,7 +147,7 @@ struct ConvertSettings {
 /// plus this are the world's. 0 but for models whose coordinates are too large for floats.
 [[nodiscard]] glm::dvec3 originOf(const Model& model);
 
-/// What a model stands on, unit: the axis of its reference views, of a cloud of splats what is up
+/// The up axis of a model, unit: the axis of its reference views, of a cloud of splats what is up
 /// by the habits of its format, else +Y.
 [[nodiscard]] glm::dvec3 upOf(const Model& model);
 

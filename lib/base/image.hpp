@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <span>
@@ -45,6 +46,16 @@ class Image {
     [[nodiscard]] std::span<const T> row(int y) const {
         return {pixels_.data() + static_cast<std::size_t>(y) * width_,
                 static_cast<std::size_t>(width_)};
+    }
+    /// Columns `left` to left + width - 1 of rows `top` to top + height - 1, which are in the
+    /// image; of an empty one: empty.
+    [[nodiscard]] Image part(int left, int top, int width, int height) const {
+        if (empty()) return {};
+        assert(contains(left, top) && left + width <= width_ && top + height <= height_);
+        Image out(width, height);
+        for (int y = 0; y < height; ++y)
+            std::copy_n(row(top + y).begin() + left, width, out.row(y).begin());
+        return out;
     }
     [[nodiscard]] std::span<T> pixels() { return pixels_; }
     [[nodiscard]] std::span<const T> pixels() const { return pixels_; }

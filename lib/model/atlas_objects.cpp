@@ -22,29 +22,21 @@ struct PageBox {
     glm::ivec2 low, high;
 };
 
-template <class T>
-Image<T> cropped(const Image<T>& image, const PageBox& box) {
-    if (image.empty()) return {};
-    const glm::ivec2 size = box.high - box.low;
-    Image<T> part(size.x, size.y);
-    for (int y = 0; y < size.y; ++y) {
-        const auto from = image.row(box.low.y + y).subspan(static_cast<std::size_t>(box.low.x));
-        std::copy_n(from.begin(), size.x, part.row(y).begin());
-    }
-    return part;
-}
-
 AtlasPage cropped(const AtlasPage& page, const PageBox& box) {
-    AtlasPage part;
-    if (const auto* colour = page.texture.rgba8()) part.texture = cropped(*colour, box);
-    if (const auto* colour = page.texture.rgbaFloat()) part.texture = cropped(*colour, box);
-    part.depth = cropped(page.depth, box);
-    part.normal = cropped(page.normal, box);
-    part.splatU = cropped(page.splatU, box);
-    part.splatV = cropped(page.splatV, box);
-    part.metallicRoughness = cropped(page.metallicRoughness, box);
-    part.emissive = cropped(page.emissive, box);
-    return part;
+    const auto part = [&](const auto& image) {
+        const glm::ivec2 size = box.high - box.low;
+        return image.part(box.low.x, box.low.y, size.x, size.y);
+    };
+    AtlasPage out;
+    if (const auto* colour = page.texture.rgba8()) out.texture = part(*colour);
+    if (const auto* colour = page.texture.rgbaFloat()) out.texture = part(*colour);
+    out.depth = part(page.depth);
+    out.normal = part(page.normal);
+    out.splatU = part(page.splatU);
+    out.splatV = part(page.splatV);
+    out.metallicRoughness = part(page.metallicRoughness);
+    out.emissive = part(page.emissive);
+    return out;
 }
 
 /// Takes the rectangles and pages that are not of the atlas' views away, and what is around them.

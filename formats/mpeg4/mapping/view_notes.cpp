@@ -34,15 +34,6 @@ std::vector<double> numbers(std::string_view text, std::size_t count) {
     return list;
 }
 
-template <class T>
-Image<T> cropped(const Image<T>& image, int left, int top, int width, int height) {
-    if (image.empty()) return image;
-    Image<T> out(width, height);
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) out.at(x, y) = image.at(x + left, y + top);
-    return out;
-}
-
 }  // namespace
 
 ViewNotes ViewNotes::parse(const std::vector<std::string>& info) {
@@ -134,12 +125,12 @@ void removePadding(ReferenceView& view, const ViewNotes::Pad& pad) {
     if (width < 1 || height < 1 || !(std::abs(pad.cx + pad.left - c.cx) <= 0.5 + 1e-6) ||
         !(std::abs(pad.cy + pad.top - c.cy) <= 0.5 + 1e-6))
         return;
-    view.depth = cropped(view.depth, pad.left, pad.top, width, height);
+    view.depth = view.depth.part(pad.left, pad.top, width, height);
     if (const Rgba8Image* image = view.texture.rgba8())
-        view.texture = cropped(*image, pad.left, pad.top, width, height);
-    view.normal = cropped(view.normal, pad.left, pad.top, width, height);
-    view.splatU = cropped(view.splatU, pad.left, pad.top, width, height);
-    view.splatV = cropped(view.splatV, pad.left, pad.top, width, height);
+        view.texture = image->part(pad.left, pad.top, width, height);
+    view.normal = view.normal.part(pad.left, pad.top, width, height);
+    view.splatU = view.splatU.part(pad.left, pad.top, width, height);
+    view.splatV = view.splatV.part(pad.left, pad.top, width, height);
     c.width = width;
     c.height = height;
     c.cx = pad.cx;
