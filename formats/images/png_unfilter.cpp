@@ -73,7 +73,7 @@ class Wave {
         : row_(row), above_(above), size_(size), rows_(rows) {
         std::uint8_t masks[5][kBytes] = {};
         for (std::size_t k = 0; k < rows; ++k) {
-            const std::uint8_t filter = row[k * (size + 1) - 1];
+            const std::uint8_t filter = (row - 1)[k * (size + 1)];
             allPaeth_ = allPaeth_ && filter == kPaeth;
             std::memset(masks[filter] + k * sizeof(Pixel), 0xff, sizeof(Pixel));
         }
@@ -126,7 +126,7 @@ class Wave {
         return k < rows_ && t >= k && (t - k) * kStep < size_;
     }
     [[nodiscard]] std::uint8_t* at(std::size_t t, std::size_t k) const {
-        return row_ + k * (size_ + 1 - kStep) + t * kStep;
+        return row_ + k * (size_ + 1) + (t - k) * kStep;
     }
     static Pixel load(const std::uint8_t* from) {
         // What a pixel does not fill comes from behind it, which is quicker and does not matter.

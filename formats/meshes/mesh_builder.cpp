@@ -72,6 +72,15 @@ Result<void> MeshBuilder::charge(std::uint64_t count, std::uint64_t bytesEach,
 
 Result<void> MeshBuilder::add(MeshPart part) {
     STX_CHECK(job_.checkCancelled());
+    const auto fits = [&](const auto& values) {
+        return values.empty() || values.size() == part.positions.size();
+    };
+    if (!fits(part.normals) || !fits(part.tangents) || !fits(part.colours) || !fits(part.uvs) ||
+        !std::ranges::all_of(kOwnUvs, [&](const auto& own) { return fits(part.*own.first); }))
+        return fail(ErrorCode::invalidInput,
+                    "{}: normals, colours or texture coordinates are not as many as the {} "
+                    "positions",
+                    part.where, part.positions.size());
     if (part.points) dropBrokenPoints(part);
     const auto count = part.positions.size();
     if (count == 0) return {};

@@ -186,6 +186,9 @@ class PlyReader {
     Result<Mesh> read() {
         for (const auto& element : header_.elements) {
             if (element.name == "vertex") {
+                if (!positions_.empty())
+                    return fail(ErrorCode::invalidInput,
+                                "the PLY header has two lists of 'vertex'; one is expected");
                 STX_CHECK(readVertices(element));
             } else if (element.name == "face" || element.name == "tristrips") {
                 STX_CHECK(readFaces(element));

@@ -133,7 +133,7 @@ Result<bool> readHuawei(const JpegPhoto& jpeg, Photo& photo) {
         return fail(ErrorCode::invalidInput, "its Huawei trailer (DepthEn) is damaged: {}", what);
     };
     const std::size_t length = littleEndian(file, file.size() - kEnd, 4);
-    if (length < kHead || length > file.size() - kEnd - kBefore)
+    if (length < kHead || file.size() < kEnd + kBefore || length > file.size() - kEnd - kBefore)
         return damaged(
             fmt::format("its block claims {} bytes of a file of {}", length, file.size()));
     const std::size_t at = file.size() - kEnd - length;

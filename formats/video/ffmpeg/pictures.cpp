@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstring>
 
 #include "formats/video/ffmpeg/decoder.hpp"
 #include "formats/video/wire.hpp"
@@ -34,6 +35,16 @@ void addPlane(std::vector<std::byte>& to, const AVFrame& frame, int plane, int w
         if (!bigEndian || bytes == 1) continue;
         for (std::size_t i = at; i + 1 < to.size(); i += 2) std::swap(to[i], to[i + 1]);
     }
+}
+
+/// What a stream says, which libav hands on as it is: it may be a value that its enumeration does
+/// not have, and that may not be read as one.
+template <class Enumeration>
+int saidValue(const Enumeration& said) {
+    int value = 0;
+    static_assert(sizeof(value) == sizeof(said));
+    std::memcpy(&value, &said, sizeof(value));
+    return value;
 }
 
 struct FreeScaler {
@@ -76,17 +87,17 @@ std::vector<std::byte> packed(const AVFrame& frame, const AVCodecContext& codec)
         format->nb_components - ((format->flags & AV_PIX_FMT_FLAG_ALPHA) ? 1 : 0) == 1;
     const bool jpegPixels = pixels == AV_PIX_FMT_YUVJ420P || pixels == AV_PIX_FMT_YUVJ422P ||
                             pixels == AV_PIX_FMT_YUVJ444P || pixels == AV_PIX_FMT_YUVJ440P;
-    header.limitedSaid = frame.color_range == AVCOL_RANGE_MPEG;
+    const int range = saidValue(frame.color_range), space = saidValue(frame.colorspace);
+    header.limitedSaid = range == AVCOL_RANGE_MPEG;
     // Where it is not said, luma alone is of full range, and luma with chroma is not.
-    header.fullRange = frame.color_range == AVCOL_RANGE_JPEG || jpegPixels ||
-                       (grey && frame.color_range == AVCOL_RANGE_UNSPECIFIED);
-    header.bt601 = frame.colorspace == AVCOL_SPC_BT470BG ||
-                   frame.colorspace == AVCOL_SPC_SMPTE170M || frame.colorspace == AVCOL_SPC_FCC ||
+    header.fullRange =
+        range == AVCOL_RANGE_JPEG || jpegPixels || (grey && range == AVCOL_RANGE_UNSPECIFIED);
+    header.bt601 = space == AVCOL_SPC_BT470BG || space == AVCOL_SPC_SMPTE170M ||
+                   space == AVCOL_SPC_FCC ||
                    // As players take it.
-                   (frame.colorspace == AVCOL_SPC_UNSPECIFIED && frame.height < 720);
-    const AVChromaLocation chroma = frame.chroma_location != AVCHROMA_LOC_UNSPECIFIED
-                                        ? frame.chroma_location
-                                        : codec.chroma_sample_location;
+                   (space == AVCOL_SPC_UNSPECIFIED && frame.height < 720);
+    int chroma = saidValue(frame.chroma_location);
+    if (chroma == AVCHROMA_LOC_UNSPECIFIED) chroma = saidValue(codec.chroma_sample_location);
     header.chromaLeft = chroma == AVCHROMA_LOC_UNSPECIFIED
                             ? codec.codec_id != AV_CODEC_ID_MJPEG && !jpegPixels
                             : chroma != AVCHROMA_LOC_CENTER && chroma != AVCHROMA_LOC_TOP &&

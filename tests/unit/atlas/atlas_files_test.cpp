@@ -357,8 +357,8 @@ TEST(AtlasFiles, ErrorsNameThePlaceInTheDocument) {
     EXPECT_EQ(errorOf("\"viewX\":0", "\"viewX\":0.5"),
               "'a': rectangles[0].viewX must be a whole number");
     EXPECT_EQ(errorOf("\"pages\": 1", "\"pages\": 3"), "'a': pages is 3; 1 to 2 is possible");
-    EXPECT_EQ(errorOf("\"version\": 2", "\"version\": 3"),
-              "'a': it was written by a newer stx (version 3; this one knows 1 to 2)");
+    EXPECT_EQ(errorOf("\"version\": 2", "\"version\": 4"),
+              "'a': it was written by a newer stx (version 4; this one knows 1 to 3)");
     EXPECT_EQ(errorOf("{", "{,"), "'a': it is not valid JSON at byte 2");
     EXPECT_EQ(atlasFromJson(std::string(100000, '['), "'a'", Limits()).error().text(),
               "'a': the JSON is nested more than 16 deep at byte 16");
@@ -399,16 +399,28 @@ TEST(AtlasSchema, HoldsForWhatIsWritten) {
     Job job;
     ASSERT_TRUE(writeAtlas(smallAtlas(3, 16, true, false), folder / "v2", job));
     ASSERT_TRUE(writeAtlas(smallAtlas(3, 8, false, true, 2), folder / "linear", job));
+    // The newest version is that of atlases with objects, others stay at version 2.
+    Atlas sheet = smallAtlas(3, 16, true, false);
+    sheet.objects.resize(2);
+    sheet.objects[0].name = "jug";
+    sheet.objects[0].views = 1;
+    sheet.objects[1].name = "cup";
+    sheet.objects[1].firstView = 1;
+    sheet.objects[1].views = 2;
+    ASSERT_TRUE(writeAtlas(sheet, folder / "sheet", job));
     const std::string schema = STX_SOURCE_DIR "/formats/atlas/atlas.schema.json";
     const std::string script =
         "import json,sys,jsonschema\n"
         "s=json.load(open(sys.argv[1]))\n"
-        "assert s['$id']==json.load(open(sys.argv[2]))['$schema']\n"
+        "named=[json.load(open(f))['$schema'] for f in sys.argv[2:]]\n"
+        "assert s['$id']==named[0]\n"
+        "assert named[1:]==['urn:stx:schema:atlas:2']*2\n"
         "for f in sys.argv[2:]: jsonschema.validate(json.load(open(f)),s)\n";
     put(folder / "check.py", script);
     if (std::system("python3 -c 'import jsonschema' 2>/dev/null") != 0)
         GTEST_SKIP() << "python3-jsonschema is not installed";
     const std::string command = "python3 " + (folder / "check.py").string() + " " + schema + " " +
+                                (folder / "sheet/atlas.json").string() + " " +
                                 (folder / "v2/atlas.json").string() + " " +
                                 (folder / "linear/atlas.json").string();
     EXPECT_EQ(std::system(command.c_str()), 0);

@@ -179,6 +179,13 @@ TEST(Malformed, PlyClaimsAreHeldAgainstTheData) {
                 ErrorCode::invalidInput, "line 4: unknown property type 'floot'");
     expectError(readBadText("ply\nformat ascii 1.0\nelement vertex 3\n", "a.ply"),
                 ErrorCode::invalidInput, "end_header");
+    // Points of the second list have colours, those of the first do not; one has no place.
+    const std::string place = "property float x\nproperty float y\nproperty float z\n";
+    expectError(readBadText(head + "element vertex 2\n" + place + "element vertex 1\n" + place +
+                                "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                                "end_header\n0 0 0\n1e999 0 0\n1 0 0 9 9 9\n",
+                            "a.ply"),
+                ErrorCode::invalidInput, "two lists of 'vertex'");
 }
 
 TEST(Malformed, DracoStreamsCutShort) {
