@@ -10,7 +10,6 @@
 #include "lib/base/stopwatch.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/packing/period.hpp"
-#include "lib/quality/fit_colours.hpp"
 #include "lib/quality/prune_quality.hpp"
 #include "tools/batch.hpp"
 #include "tools/commands.hpp"
@@ -32,7 +31,6 @@ struct PackOptions {
     std::string budget;
     PruneSettings pruning;
     double minPsnr = 0;
-    bool noFit = false;
     std::optional<double> time;
     int period = 25;  ///< as the groups of pictures of video
     std::string colour = "png";
@@ -100,15 +98,6 @@ Result<PruneReport> pruneOne(Bundle& bundle, const PackOptions& o, const std::st
     return report;
 }
 
-/// Fits the colours that pruning `source` left; nothing where that is not wanted or brings nothing.
-Result<std::optional<ColourFit>> fitted(const std::optional<Bundle>& source, Bundle& bundle,
-                                        Job& job) {
-    if (!source) return std::nullopt;
-    STX_TRY(const auto fit, fitColours(*source, bundle, job));
-    if (!(fit.after > fit.before)) return std::nullopt;
-    return fit;
-}
-
 AtlasSaveOptions saveOptions(const PackOptions& o, const Program& program) {
     AtlasSaveOptions save;
     save.jpegQuality = o.colour == "jpeg" ? o.quality.value_or(92) : 0;
@@ -148,10 +137,7 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPe
         settings.contentOf = &content;
     }
     std::string pruned;
-    std::optional<ColourFit> fit;
     if (prunes(o)) {
-        std::optional<Bundle> source;
-        if (!o.noFit) source = bundle;
         auto report = period ? Result<PruneReport>(period->prune(bundle))
                              : pruneOne(bundle, o, o.input, program.job);
         if (!report) return propagate(report);
@@ -161,9 +147,6 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPe
                                  static_cast<double>(report->sourcePixels));
         if (o.minPsnr > 0 && !period && std::isfinite(report->psnr))
             pruned += fmt::format(", {:.1f} dB measured", report->psnr);
-        STX_TRY(fit, fitted(source, bundle, program.job));
-        if (fit)
-            pruned += fmt::format(", colours fitted ({:.2f} → {:.2f} dB)", fit->before, fit->after);
     }
     const AtlasSaveOptions save = saveOptions(o, program);
     auto atlas = packForFile(bundle, settings, o.output, save, program.job);
@@ -179,7 +162,6 @@ Result<int> packBundle(const PackOptions& o, Result<Bundle> opened, const PackPe
     nlohmann::ordered_json report = {
         {"$schema", "pack-report.schema.json"}, {"input", o.input}, {"output", o.output}};
     addReportOf(*atlas, seconds, report);
-    if (fit) report["fit"] = {{"before", fit->before}, {"after", fit->after}};
     STX_CHECK(program.writeReport(report));
     return 0;
 }
@@ -265,11 +247,8 @@ Result<PackObject> openObject(const PackOptions& o, const std::string& input,
     object.name = name;
     STX_TRY(object.bundle, frames->frame(moment, job));
     if (prunes(o)) {
-        std::optional<Bundle> source;
-        if (!o.noFit) source = object.bundle;
         STX_TRY(const auto report, pruneOne(object.bundle, o, input, job));
         object.sourcePixels = report.sourcePixels;
-        STX_CHECK(fitted(source, object.bundle, job));
     }
     return object;
 }
@@ -433,10 +412,6 @@ void addPack(CommandLine& line, Program& program) {
          "the worst of up to 12, rendered from poses of the views and half way between them")
         .takes("DB")
         .range(0.0, 200.0)
-        .group(pruning);
-    c.flag("--no-fit", o->noFit,
-           "Keep colours as they are: else those that pruning kept are fitted once to all views "
-           "(stage fit)")
         .group(pruning);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
