@@ -176,6 +176,9 @@ Result<Worker> BatchRun::startWorker() {
     const int threads = std::max(1, all / std::max(1, options_.jobs));
     const pid_t parent = ::getpid();
     std::fflush(nullptr);
+    // A copy has this thread only, and locks that another held would stay held in it. There is one
+    // other: it sleeps in sigwait(), or ends the program. This process does no work itself, so that
+    // no pool of threads is started (tests/cli/streams_test.py counts them).
     worker.pid = ::fork();
     if (worker.pid < 0)
         return fail(ErrorCode::failed, "cannot start a process: {}", std::strerror(errno));

@@ -5,6 +5,7 @@
 #include "formats/any/sequences.hpp"
 #include "formats/images/images.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/surface/normals.hpp"
 #include "tools/commands.hpp"
 
@@ -21,7 +22,7 @@ struct BakeOptions {
 Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     const Stopwatch watch;
     STX_CHECK(checkTarget(o.output, program));
-    STX_CHECK(containerOf(o.output));
+    STX_TRY(const auto container, containerOf(o.output));
     preloadCodecs(o.input);
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     BakeSettings settings = o.settings;
@@ -32,6 +33,8 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     std::size_t views = 0;
     std::int64_t points = 0;
     frames = changed(std::move(frames), [&](Bundle& bundle, Job& job) -> Result<void> {
+        if (container == FileKind::mpeg4)
+            STX_CHECK(checkPeak(peak::kBakeToMpeg4, bundle.views, job.limits));
         STX_CHECK(bake(bundle, settings, job));
         if (views == 0) {
             views = bundle.views.size();

@@ -10,6 +10,7 @@
 #include "lib/metrics/compare.hpp"
 #include "lib/metrics/immersive.hpp"
 #include "lib/metrics/steadiness.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "tools/commands.hpp"
 
 namespace stx::tools {
@@ -54,8 +55,8 @@ Result<Scores> comparePair(const std::string& a, const std::string& b, const Com
                            Program& program) {
     STX_TRY(const auto first, openPicture(a, program.job));
     // Both, what of the second its decoder holds, and their luma and colour differences.
-    STX_CHECK(program.job.limits.checkAllocation(first.coded.count(), first.isLinear() ? 72 : 32,
-                                                 "two pictures that are compared"));
+    STX_CHECK(checkPeak(first.isLinear() ? peak::kComparedLinear : peak::kCompared,
+                        first.coded.count(), 0, 0, program.job.limits));
     STX_TRY(const auto second, openPicture(b, program.job));
     CompareSettings settings;
     settings.mask = mask;

@@ -8,6 +8,7 @@
 #include "formats/meshes/meshes.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "tools/commands.hpp"
 #include "tools/extract_shown.hpp"
 #include "tools/extract_splats.hpp"
@@ -102,7 +103,10 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
                              {.most = static_cast<std::size_t>(o.mostSplats)}, program);
     if (shown) return extractShown(o.input, o.open, o.output, o.time, o.refine, program);
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
-    STX_TRY(frames, refined(std::move(frames), o.refine));
+    STX_TRY(frames, refined(std::move(frames), o.refine,
+                            !points            ? peak::kExport
+                            : ending == ".drc" ? peak::kPointsDraco
+                                               : peak::kPoints));
     const Timeline timeline = frames->timeline();
     STX_TRY(const std::size_t moment,
             momentOf(o.time, timeline, points ? "points are" : nullptr, o.input, program.job));
@@ -113,8 +117,8 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_TRY(const auto bundle, frames->frame(moment, program.job));
         views = bundle.views.size();
         pointCount = bundle.pointCount();
-        STX_CHECK(program.job.limits.checkAllocation(
-            static_cast<std::uint64_t>(bundle.pointCount()), 28, "the points"));
+        STX_CHECK(checkPeak(ending == ".drc" ? peak::kPointsDraco : peak::kPoints, bundle.views,
+                            program.job.limits));
         const auto found = pointsOf(bundle);
         PointCloud cloud;
         cloud.positions = found.positions;
@@ -136,7 +140,8 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
             STX_TRY(frames, someFrames(std::move(frames), {moment}));
         }
         const std::size_t count = frames->timeline().count();
-        frames = changed(std::move(frames), [&](Bundle& bundle, Job&) -> Result<void> {
+        frames = changed(std::move(frames), [&](Bundle& bundle, Job& job) -> Result<void> {
+            STX_CHECK(checkPeak(peak::kExport, bundle.views, job.limits));
             if (views == 0) pointCount = bundle.pointCount();
             views = bundle.views.size();
             return {};

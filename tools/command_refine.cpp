@@ -69,13 +69,8 @@ Result<int> refineInput(const RefineOptions& o, const Command& command, Program&
     bool before = false;
     frames =
         changedOnTheWay(std::move(frames), o.output, [&](Bundle& bundle, Job& job) -> Result<void> {
-            std::uint64_t pixels = 0;
-            for (const ReferenceView& view : bundle.views) {
+            for (const ReferenceView& view : bundle.views)
                 before = before || !view.refined.steps.empty();
-                pixels += static_cast<std::uint64_t>(view.camera.width) * view.camera.height;
-            }
-            // The views as they were and as they become, and their pictures while they are packed.
-            STX_CHECK(job.limits.checkAllocation(pixels, 24, "refining"));
             views = bundle.views.size();
             return refining.refine(bundle, job);
         });

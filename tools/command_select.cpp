@@ -124,12 +124,13 @@ Result<int> select(const SelectOptions& o, const Command& command, Program& prog
     if (timeline.moves()) {
         bundle = {};
         frames = changed(std::move(frames), [&](Bundle& frame, Job&) -> Result<void> {
-            frame = keepViews(frame, selection.views);
+            frame = keepViews(std::move(frame), selection.views);
             return {};
         });
         STX_CHECK(saveSequence(*frames, o.output, save, program.job));
     } else {
-        STX_CHECK(saveBundle(keepViews(bundle, selection.views), o.output, save, program.job));
+        bundle = keepViews(std::move(bundle), selection.views);
+        STX_CHECK(saveBundle(bundle, o.output, save, program.job));
     }
     if (!o.plot.empty()) {
         const std::string svg =

@@ -10,6 +10,7 @@
 #include "formats/stx/stx.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/sheet/sheet.hpp"
 #include "tools/commands.hpp"
 #include "tools/refining.hpp"
@@ -49,8 +50,8 @@ Texture textureOf(Picture picture) {
 Result<std::vector<SheetPair>> pairsOfPictures(const SheetOptions& o, Job& job) {
     STX_TRY(auto a, openPicture(o.inputs[0], job));
     // Both, as they are and for the sheet, and their difference.
-    STX_CHECK(job.limits.checkAllocation(a.coded.count(), a.isLinear() ? 64 : 24,
-                                         "two pictures that are compared"));
+    STX_CHECK(checkPeak(a.isLinear() ? peak::kComparedLinear : peak::kCompared, a.coded.count(), 0,
+                        0, job.limits));
     STX_TRY(auto b, openPicture(o.inputs[1], job));
     std::vector<SheetPair> pairs(1);
     pairs[0].title = fileName(o.inputs[0]) + " | " + fileName(o.inputs[1]);
@@ -62,6 +63,10 @@ Result<std::vector<SheetPair>> pairsOfPictures(const SheetOptions& o, Job& job) 
 /// The views of two inputs, by their numbers; of what moves at some moments.
 Result<std::vector<SheetPair>> pairsOfViews(const SheetOptions& o, Job& job) {
     STX_TRY(const auto a, openSequence(o.inputs[0], o.open, job));
+    // Before the other one is read.
+    auto first = a->frame(0, job);
+    if (!first) return propagate(first);
+    STX_CHECK(checkPeak(peak::kSheetOfTwo, first->views, job.limits));
     STX_TRY(const auto b, openSequence(o.inputs[1], o.open, job));
     const auto count = std::min(a->timeline().count(), b->timeline().count());
     if (a->timeline().count() != b->timeline().count())
@@ -76,15 +81,16 @@ Result<std::vector<SheetPair>> pairsOfViews(const SheetOptions& o, Job& job) {
     for (std::size_t m = 0; m < moments; ++m) {
         STX_CHECK(job.checkCancelled());
         const std::size_t frame = moments == 1 ? 0 : m * (count - 1) / (moments - 1);
-        STX_TRY(auto first, a->frame(frame, job));
+        if (m > 0) first = a->frame(frame, job);
+        if (!first) return propagate(first);
         STX_TRY(auto second, b->frame(frame, job));
-        const auto views = std::min(first.views.size(), second.views.size());
-        if (m == 0 && first.views.size() != second.views.size())
+        const auto views = std::min(first->views.size(), second.views.size());
+        if (m == 0 && first->views.size() != second.views.size())
             job.note(fmt::format("one has {}, the other {}; the first {} are compared",
-                                 counted(first.views.size(), "view"),
+                                 counted(first->views.size(), "view"),
                                  counted(second.views.size(), "view"), views));
         for (std::size_t i = 0; i < views; ++i) {
-            ReferenceView &va = first.views[i], &vb = second.views[i];
+            ReferenceView &va = first->views[i], &vb = second.views[i];
             SheetPair pair;
             pair.title = fmt::format("{} {}{}{}", i, printable(va.name),
                                      va.name == vb.name ? "" : " | " + printable(vb.name),
@@ -131,7 +137,7 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
         return sheetOf(atlas, o.settings, job);
     }
     STX_TRY(auto frames, openSequence(input, o.open, job));
-    STX_TRY(frames, refined(std::move(frames), o.refine));
+    STX_TRY(frames, refined(std::move(frames), o.refine, peak::kSheet));
     if (frames->timeline().moves()) return sheetOf(*frames, o.settings, job);
     STX_TRY(const auto bundle, frames->frame(0, job));
     return sheetOf(bundle, o.settings, job);

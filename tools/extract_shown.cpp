@@ -36,7 +36,7 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
         page = writeViewerPage(atlas, output, write, program.job);
     } else {
         STX_TRY(auto frames, openSequence(input, open, program.job));
-        STX_TRY(frames, refined(std::move(frames), refine));
+        STX_TRY(frames, refined(std::move(frames), refine, peak::kPage));
         page = writeViewerPage(*frames, output, write, program.job);
     }
     if (!page) return propagate(page);
@@ -51,7 +51,7 @@ Result<Shown> writeModel(const std::string& input, const OpenOptions& open,
                          const std::string& output, const std::optional<double>& time,
                          const std::string& refine, Program& program) {
     STX_TRY(auto frames, openSequence(input, open, program.job));
-    STX_TRY(frames, refined(std::move(frames), refine));
+    STX_TRY(frames, refined(std::move(frames), refine, peak::kSurfaces));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a model is", input, program.job));
     STX_TRY(auto bundle, frames->frame(moment, program.job));

@@ -13,7 +13,6 @@
 
 #include "formats/decoders/decoder_process.hpp"
 #include "formats/files/source_date.hpp"
-#include "formats/images/damage.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/base/printable.hpp"
 #include "lib/base/whole_number.hpp"
@@ -175,9 +174,8 @@ int Program::run(const std::function<Result<int>()>& body) {
             progress.show(done, total, what);
         };
     const ThreadLimit threads(common.threads);
-    std::optional<KeepDamaged> keeping;
     if (common.keepDamaged)
-        keeping.emplace([this](std::string note) { job.note(std::move(note)); });
+        job.limits.keepDamaged = [this](std::string note) { job.note(std::move(note)); };
     Result<int> code = 0;
     try {
         // A report that cannot be written is an error before the work, not after it.

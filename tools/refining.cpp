@@ -43,10 +43,14 @@ Result<RefineSettings> refineSettings(const std::string& text) {
 }
 
 Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames, const std::string& text,
+                                          const PeakMemory& then,
                                           const std::filesystem::path& keepIn) {
     STX_TRY(const auto settings, refineSettings(text));
     if (!settings.any()) return frames;
-    const auto refine = [settings](Bundle& bundle, Job& job) -> Result<void> {
+    const auto refine = [settings, then](Bundle& bundle, Job& job) -> Result<void> {
+        // Before the work, and not after it.
+        const bool thenMore = then.perPixel + then.perPixelOfLargest > peak::kRefine.perPixel;
+        STX_CHECK(checkPeak(thenMore ? then : peak::kRefine, bundle.views, job.limits));
         STX_TRY(const auto report, stx::refine(bundle, settings, job));
         if (report.changed()) job.note(report.note());
         return {};

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/any/options.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/model/sequence.hpp"
 #include "lib/refine/refine.hpp"
 #include "tools/command_line.hpp"
@@ -21,9 +22,11 @@ Option refineOption(Command& command, std::string& text);
 [[nodiscard]] Result<RefineSettings> refineSettings(const std::string& text);
 
 /// Frames that are refined when they are read; a note says which steps were done. `text` is that of
-/// the option. `keepIn`: of frames that are read more than once, a folder for what became of them.
+/// the option. `then` is what they are for: errors (invalidInput) where they are too large for it.
+/// `keepIn`: of frames that are read more than once, a folder for what became of them.
 [[nodiscard]] Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames,
                                                         const std::string& text,
+                                                        const PeakMemory& then,
                                                         const std::filesystem::path& keepIn = {});
 
 /// Frames on their way into a target, each changed once: MPEG-4 films are written in two passes.

@@ -4,6 +4,7 @@
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
+#include "lib/model/peak_memory.hpp"
 
 namespace stx {
 
@@ -27,6 +28,12 @@ Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const Save
     if (container == FileKind::exr && options.octreeLevels > 0)
         return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
                     target.string());
+    const bool vectors = std::ranges::any_of(
+        bundle.views, [](const auto& v) { return v.hasNormals() || v.hasSplats(); });
+    // OpenEXR is written a few rows at a time.
+    if (container == FileKind::mpeg4)
+        STX_CHECK(
+            checkPeak(vectors ? peak::kMpeg4Vectors : peak::kMpeg4, bundle.views, job.limits));
     if (container == FileKind::exr) return writeExrBundle(bundle, target, job, {options.noClobber});
     return writeMpeg4Bundle(bundle, target, job, mpeg4Scene(options), mpeg4Write(options));
 }

@@ -1,5 +1,8 @@
 #include "formats/any/sequences.hpp"
 
+#include <optional>
+#include <utility>
+
 #include "formats/any/open.hpp"
 #include "formats/any/save.hpp"
 #include "formats/atlas/atlas_files.hpp"
@@ -41,6 +44,28 @@ class NumberedSequence : public Sequence {
     std::vector<NumberedFile> files_;
     bool atlases_;
     OpenOptions open_;
+};
+
+/// A file of one moment. Its bundle is given away when it is asked for first, since two would be
+/// twice the memory, and read again for who asks again.
+class StillFile : public Sequence {
+  public:
+    StillFile(Bundle bundle, fs::path path, OpenOptions options)
+        : bundle_(std::move(bundle)), path_(std::move(path)), options_(std::move(options)) {}
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        if (index > 0)
+            return fail(ErrorCode::usage, "frame {} is asked for, but there is one (0)", index);
+        if (auto first = std::exchange(bundle_, std::nullopt)) return std::move(*first);
+        // Its notes have been said.
+        Job quiet;
+        quiet.workFor(job);
+        return openBundle(path_, options_, quiet);
+    }
+
+  private:
+    std::optional<Bundle> bundle_;
+    fs::path path_;
+    OpenOptions options_;
 };
 
 /// When a file's moment is, and how long it is shown, where it tells.
@@ -166,7 +191,7 @@ Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOpt
         return sequence;
     }
     STX_TRY(auto bundle, openBundle(path, options, job));
-    return sequenceOf(std::move(bundle));
+    return std::make_unique<StillFile>(std::move(bundle), path, options);
 }
 
 }  // namespace

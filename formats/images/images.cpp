@@ -1,6 +1,5 @@
 #include "formats/images/images.hpp"
 
-#include "formats/images/damage.hpp"
 #include "formats/images/exr_image.hpp"
 #include "formats/images/foreign_decode.hpp"
 #include "formats/images/npy.hpp"
@@ -68,9 +67,10 @@ Result<T> at(std::string_view name, Result<T> result) {
 
 /// The same, and says what is wrong with pixels that are given all the same.
 template <class T>
-Result<T> at(std::string_view name, const ImageReader& reader, Result<T> result) {
+Result<T> at(std::string_view name, const ImageReader& reader, const Limits& limits,
+             Result<T> result) {
     if (result && !reader.damage().empty())
-        noteDamaged(fmt::format("'{}': {}", name, reader.damage()));
+        limits.keepDamaged(fmt::format("'{}': {}", name, reader.damage()));
     return at(name, std::move(result));
 }
 
@@ -86,7 +86,7 @@ Result<DecodedImage> decodeImage(ByteSpan bytes, std::string_view name, const Li
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<DecodedImage>(name, tl::unexpected(reader.error()));
     auto image = readDirect(**reader);
-    return at(name, **reader, std::move(image));
+    return at(name, **reader, limits, std::move(image));
 }
 
 Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
@@ -98,7 +98,7 @@ Result<Image<glm::u8vec4>> decodeRgba8(ByteSpan bytes, std::string_view name,
     const auto reader = openDirect(bytes, limits);
     if (!reader) return at<Image<glm::u8vec4>>(name, tl::unexpected(reader.error()));
     auto image = readDirectRgba8(**reader, limits);
-    return at(name, **reader, std::move(image));
+    return at(name, **reader, limits, std::move(image));
 }
 
 }  // namespace stx

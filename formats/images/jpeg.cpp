@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 
-#include "formats/images/damage.hpp"
 #include "formats/images/reader.hpp"
 
 namespace stx {
@@ -69,7 +68,9 @@ constexpr int kMaxScans = 100;
 
 class JpegReader final : public ImageReader {
   public:
-    explicit JpegReader(ByteSpan file) : file_(file) { info_.format = "jpeg"; }
+    JpegReader(ByteSpan file, bool keepsDamaged) : file_(file), keepsDamaged_(keepsDamaged) {
+        info_.format = "jpeg";
+    }
     ~JpegReader() override { jpeg_destroy_decompress(&jpeg_); }
     JpegReader(const JpegReader&) = delete;
     JpegReader& operator=(const JpegReader&) = delete;
@@ -197,7 +198,7 @@ class JpegReader final : public ImageReader {
         if (damage.empty()) return {};
         if (!hasRows_ && errors_.code() == ErrorCode::failed)
             return fail(ErrorCode::failed, "the JPEG cannot be decoded: {}", damage);
-        if (hasRows_ && keepsDamaged()) {
+        if (hasRows_ && keepsDamaged_) {
             damage_ = fmt::format("the JPEG is damaged ({}) and drawn as far as it goes", damage);
             return {};
         }
@@ -218,6 +219,7 @@ class JpegReader final : public ImageReader {
     }
 
     ByteSpan file_;
+    bool keepsDamaged_;
     bool cmyk_ = false;
     bool hasRows_ = false;  ///< all rows were decoded, though perhaps painted over
     bool scansLack_ = false;
@@ -258,7 +260,7 @@ bool encodeRows(jpeg_compress_struct& jpeg, Errors& errors, int width, int heigh
 }  // namespace
 
 Result<std::unique_ptr<ImageReader>> openJpeg(ByteSpan bytes, const Limits& limits) {
-    auto reader = std::make_unique<JpegReader>(bytes);
+    auto reader = std::make_unique<JpegReader>(bytes, limits.keepDamaged != nullptr);
     STX_CHECK(reader->open(limits));
     return reader;
 }

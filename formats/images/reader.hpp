@@ -23,7 +23,8 @@ class ImageReader {
     [[nodiscard]] virtual bool givesRgba8() const = 0;
     /// The same pixels as 8-bit RGBA: grey spread, missing alpha 255.
     [[nodiscard]] virtual Result<void> readRgba8(glm::u8vec4* pixels) = 0;
-    /// What is wrong with pixels that were read though they are damaged (KeepDamaged); else empty.
+    /// What is wrong with pixels that were read though they are damaged (Limits::keepDamaged); else
+    /// empty.
     [[nodiscard]] const std::string& damage() const { return damage_; }
 
   protected:

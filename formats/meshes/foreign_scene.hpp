@@ -12,14 +12,17 @@
 
 namespace stx {
 
+/// Outside of what it is a part of: clang makes none of a nested class before its outer one ends.
+struct ForeignTexture {
+    std::string name;
+    std::uint8_t wrapU = 0, wrapV = 0;  ///< values of MeshTexture::Wrap
+    std::int32_t embedded = -1;         ///< its number among ForeignScene::embedded, when inside
+};
+
 /// A model as the library that reads it has it, before it is a Mesh: what its process tells
 /// (Tag::scene, then Tag::mesh for each mesh). Numbers of meshes and corners are checked.
 struct ForeignScene {
-    struct Texture {
-        std::string name;
-        std::uint8_t wrapU = 0, wrapV = 0;  ///< values of MeshTexture::Wrap
-        std::int32_t embedded = -1;         ///< its number among `embedded`, when it is inside
-    };
+    using Texture = ForeignTexture;
     using Use = models::TextureUse;
     struct Material {
         std::string name;

@@ -11,6 +11,7 @@
 #include "formats/viewer/page_text.hpp"
 #include "lib/base/counted.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/render/scene/page_set.hpp"
 
@@ -283,6 +284,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
                      "writing frames");
         STX_CHECK(job.checkCancelled());
         STX_TRY(Bundle bundle, frames.frame(i, job));
+        STX_CHECK(checkPeak(peak::kPage, bundle.views, job.limits));
         makeViewable(bundle, job);
         if (!writer) {
             bundle.noteMaterialLeftOut(job);

@@ -4,6 +4,7 @@
 #include "lib/background/still_methods.hpp"
 #include "lib/background/still_motion.hpp"
 #include "lib/base/parallel.hpp"
+#include "lib/model/peak_memory.hpp"
 
 namespace stx {
 namespace {
@@ -196,8 +197,8 @@ Result<StillBackground> selectBackground(StillFrames& frames, std::span<const in
                                          const StillSettings& settings, Job& job) {
     const auto size = frames.size();
     // What comes out, and one frame that is being read; the rest adapts to what is left.
-    STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(size.x) * size.y,
-                                         2 * (5 + kFrameBytesPerPixel), "a background"));
+    STX_CHECK(checkPeak(peak::kBackground, static_cast<std::uint64_t>(size.x) * size.y, 0, 0,
+                        job.limits));
     const std::uint64_t frameBytes = std::uint64_t{sizeof(glm::u8vec4)} * size.x * size.y;
     const std::uint64_t keptBytes = job.limits.maxMemoryBytes / 2;
     // Frames that stay in memory cost little to look at again: then bands are small enough for a

@@ -4,13 +4,14 @@ namespace stx {
 
 Result<void> Limits::checkAllocation(std::uint64_t count, std::uint64_t bytesEach,
                                      std::string_view what) const {
-    if (bytesEach != 0 && count > maxMemoryBytes / bytesEach) {
-        return fail(ErrorCode::invalidInput,
-                    "{} would need {} x {} bytes, more than the memory limit of {} MiB; "
-                    "raise it with --max-memory if the file is to be trusted",
-                    what, count, bytesEach, maxMemoryBytes >> 20);
-    }
-    return {};
+    if (bytesEach == 0 || count <= maxMemoryBytes / bytesEach) return {};
+    // In whole MiB; nobody has what does not fit into 64 bits.
+    const bool sane = count <= UINT64_MAX / 2 / bytesEach;
+    return fail(ErrorCode::invalidInput,
+                "{} would need {} x {} bytes, more than the memory limit of {} MiB; raise it with "
+                "--max-memory{} if the file is to be trusted",
+                what, count, bytesEach, maxMemoryBytes >> 20,
+                sane ? fmt::format(" {}", ((count * bytesEach - 1) >> 20) + 1) : "");
 }
 
 void Job::note(std::string text) {

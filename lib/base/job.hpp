@@ -20,6 +20,9 @@ struct Limits {
     int maxNesting = 256;  ///< nodes, boxes, groups
     /// Image and buffer names may leave the folder of the file that names them (`--allow-outside`).
     bool allowOutside = false;
+    /// Given, a damaged JPEG is drawn as far as it goes and this is called, from any thread, with
+    /// which and why (`--damaged keep`). Empty: it is an error.
+    std::function<void(std::string note)> keepDamaged;
 
     /// Errors with the claim, the size and the limit when `count * bytesEach` is more than allowed.
     /// Never overflows.

@@ -204,7 +204,7 @@ Result<Atlas> pack(const Bundle& bundle, const PackSettings& settings, Job& job)
     // The views, their pages, and a page while its picture is packed.
     STX_CHECK(job.limits.checkAllocation(
         static_cast<std::uint64_t>(layout.width) * layout.height * layout.pages,
-        2 * contents.bytesPerPixel() + 12, "an atlas"));
+        2 * contents.bytesPerPixel() + 24, "an atlas"));
 
     Atlas atlas;
     atlas.layout = tight ? "tight" : "grid";

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "lib/base/cpu_clock.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/refine/exposure.hpp"
 #include "lib/refine/poses.hpp"
 #include "lib/refine/refine_depth.hpp"
@@ -227,6 +228,7 @@ std::string RefineReport::text() const {
 
 Result<RefineReport> refine(Bundle& bundle, const RefineSettings& settings, Job& job) {
     STX_CHECK(bundle.check());
+    STX_CHECK(checkPeak(peak::kRefine, bundle.views, job.limits));
     RefineReport report, ofAll;
     RefineSettings once = settings;
     for (const ReferenceView& view : bundle.views) once = once.after(view.refined);

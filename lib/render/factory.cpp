@@ -1,5 +1,6 @@
 #include "lib/render/factory.hpp"
 
+#include "lib/model/peak_memory.hpp"
 #include "lib/render/compose/behind.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/compose/fallback.hpp"
@@ -209,6 +210,8 @@ Result<std::unique_ptr<Renderer>> makeRenderer(Backend backend, const Bundle& bu
                                                const RenderSettings& settings, int device,
                                                Job& job) {
     STX_CHECK(bundle.check());
+    STX_CHECK(checkPeak(settings.mode == RenderMode::splat ? peak::kSplatMode : peak::kSurfaceMode,
+                        bundle.views, job.limits));
     return makeFrom(backend, bundle, settings, bundle.environment, device, job);
 }
 

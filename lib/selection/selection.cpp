@@ -7,6 +7,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/capture/capture.hpp"
 #include "lib/capture/rasterizer.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/selection/coverage.hpp"
 
 namespace stx {
@@ -67,6 +68,7 @@ Selection solve(const CoverProblem& problem, const SelectSettings& settings) {
 Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settings, Job& job) {
     STX_CHECK(checkSettings(settings));
     STX_CHECK(bundle.check());
+    STX_CHECK(checkPeak(peak::kSelect, bundle.views, job.limits));
     std::vector<CandidateView> candidates;
     int empty = 0;
     for (const auto& v : bundle.views) {
@@ -91,18 +93,13 @@ Result<Selection> selectViews(const Bundle& bundle, const SelectSettings& settin
     return solve(problem, settings);
 }
 
-Bundle keepViews(const Bundle& bundle, const std::vector<int>& views) {
+Bundle keepViews(Bundle bundle, const std::vector<int>& views) {
     std::vector<int> sorted = views;
     std::sort(sorted.begin(), sorted.end());
-    Bundle kept;
-    kept.title = bundle.title;
-    kept.bounds = bundle.bounds;
-    kept.origin = bundle.origin;
-    kept.environment = bundle.environment;
-    kept.time = bundle.time;
-    kept.duration = bundle.duration;
-    for (const int v : sorted) kept.views.push_back(bundle.views[v]);
-    return kept;
+    std::vector<ReferenceView> kept;
+    for (const int v : sorted) kept.push_back(std::move(bundle.views[v]));
+    bundle.views = std::move(kept);
+    return bundle;
 }
 
 Result<MeshSelection> selectMeshViews(const Mesh& mesh, const MeshCandidates& candidates,

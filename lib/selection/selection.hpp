@@ -45,7 +45,7 @@ struct Selection {
                                             Job& job);
 
 /// The bundle with only the chosen views, in their old order.
-[[nodiscard]] Bundle keepViews(const Bundle& bundle, const std::vector<int>& views);
+[[nodiscard]] Bundle keepViews(Bundle bundle, const std::vector<int>& views);
 
 /// Candidate directions around a mesh.
 struct MeshCandidates {

@@ -5,6 +5,7 @@
 
 #include "lib/base/counted.hpp"
 #include "lib/base/printable.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/model/same_pictures.hpp"
 #include "lib/sheet/layout.hpp"
 #include "lib/sheet/tiles.hpp"
@@ -94,6 +95,7 @@ Tile withRectangles(Tile tile, const Atlas& atlas, int page) {
 
 Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& job) {
     STX_CHECK(bundle.check());
+    STX_CHECK(checkPeak(peak::kSheet, bundle.views, job.limits));
     bool normals = false, splats = false, surface = false, glow = false;
     for (const auto& v : bundle.views) {
         surface = surface || !v.metallicRoughness.empty();

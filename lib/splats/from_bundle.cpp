@@ -7,6 +7,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/splats/finest.hpp"
 #include "lib/splats/merge.hpp"
 #include "lib/surface/normals.hpp"
@@ -73,10 +74,8 @@ bool lacksAxes(const Bundle& bundle) {
 
 Result<SplatCloud> splatsOfBundle(Bundle bundle, const SplatSettings& settings, Job& job) {
     std::ranges::stable_partition(bundle.views, [](const auto& v) { return v.background; });
-    std::uint64_t pixels = 0;
-    for (const ReferenceView& view : bundle.views) pixels += view.depth.count();
-    STX_CHECK(job.limits.checkAllocation(pixels, sizeof(Disc) + (settings.most > 0 ? 88 : 0),
-                                         "the texels as discs"));
+    STX_CHECK(checkPeak(settings.most > 0 ? peak::kFewerSplats : peak::kSplats, bundle.views,
+                        job.limits));
     if (lacksAxes(bundle)) {
         BakeSettings axes;
         axes.keepNormals = true;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/surface/depth_gradient.hpp"
 
 namespace stx {
@@ -63,9 +64,7 @@ Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job) {
                     "the depth discontinuity is {:g}; it must be over 0 and at most 1",
                     settings.discontinuity);
     STX_CHECK(bundle.check());
-    std::uint64_t pixels = 0;
-    for (const auto& view : bundle.views) pixels += view.depth.count();
-    STX_CHECK(job.limits.checkAllocation(pixels, 3 * sizeof(glm::vec3), "normals and splats"));
+    STX_CHECK(checkPeak(peak::kBake, bundle.views, job.limits));
     const auto count = static_cast<std::int64_t>(bundle.views.size());
     for (std::int64_t i = 0; i < count; ++i) {
         STX_CHECK(job.checkCancelled());

@@ -6,6 +6,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import time
 
 import harness
 
@@ -64,6 +65,22 @@ def main():
                     wrong.append(f"batch, {name}: no {output}")
                 else:
                     os.remove(path)
+
+        # Workers are copies of a process whose only other thread waits for signals.
+        harness.write(os.path.join(folder, "many"), "".join(f"many{i}.obj\n" for i in range(40)))
+        for i in range(40):
+            os.link(model, os.path.join(folder, f"many{i}.obj"))
+        many = subprocess.Popen([args.stx, "convert", "@many", "-o", "{stem}.mp4", "--views", "ring:2", "--size", "24x24", "--jobs", "2"],
+                                cwd=folder, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        threads = 0
+        while many.poll() is None:
+            try:
+                threads = max(threads, len(os.listdir(f"/proc/{many.pid}/task")))
+            except OSError:
+                pass
+            time.sleep(0.002)
+        if many.returncode != 0 or threads > 2:
+            wrong.append(f"batch of 40: exit code {many.returncode}, {threads} threads: {many.stderr.read()}")
 
         # With no threads, or a few only.
         for processes in (0, 1, 2, 3):

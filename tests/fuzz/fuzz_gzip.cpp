@@ -8,7 +8,7 @@ using namespace stx;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     Limits limits;
-    limits.maxMemoryBytes = 1 << 20;
+    limits.maxMemoryBytes = 1 << 16;
     const auto unpacked = gunzip({reinterpret_cast<const std::byte*>(data), size}, limits);
     if (!unpacked) {
         if (unpacked.error().message.empty()) violated("an error says what is wrong");

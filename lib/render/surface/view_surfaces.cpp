@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/render/surface/prepare/cells.hpp"
 
 namespace stx {
@@ -262,10 +263,7 @@ class Maker {
 
 Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job) {
     STX_CHECK(bundle.check());
-    std::uint64_t pixels = 0;
-    for (const ReferenceView& view : bundle.views) pixels += view.depth.count();
-    // What surface mode keeps of a pixel, two triangles and a corner.
-    STX_CHECK(job.limits.checkAllocation(pixels, 80, "the surfaces"));
+    STX_CHECK(checkPeak(peak::kSurfaces, bundle.views, job.limits));
     RenderSettings settings;
     settings.without.add(Stage::sharpen);
     const SurfaceScene scene(bundle, settings);

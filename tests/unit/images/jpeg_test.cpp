@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <random>
 
-#include "formats/images/damage.hpp"
 #include "formats/images/images.hpp"
 
 namespace stx {
@@ -133,14 +132,16 @@ TEST(JpegReader, DamagedFilesAreErrors) {
 TEST(JpegReader, DamagedFilesAreKeptOnRequestAndNoted) {
     for (const auto& [name, bytes] : damagedJpegs()) {
         std::vector<std::string> notes;
-        const KeepDamaged keep([&](std::string note) { notes.push_back(std::move(note)); });
-        const auto image = decodeImage(bytes, "a.jpg", Limits());
+        Limits keep;
+        keep.keepDamaged = [&](std::string note) { notes.push_back(std::move(note)); };
+        const auto image = decodeImage(bytes, "a.jpg", keep);
         ASSERT_TRUE(image) << name << ": " << image.error().text();
+        EXPECT_FALSE(decodeImage(bytes, "a.jpg", Limits())) << "another's limits";
         ASSERT_EQ(notes.size(), 1u) << name;
         EXPECT_TRUE(notes[0].starts_with("'a.jpg': the JPEG is damaged (")) << notes[0];
-        EXPECT_TRUE(decodeRgba8(bytes, "a.jpg", Limits()));
-        EXPECT_FALSE(decodeImage(ByteSpan(bytes).first(40), "a.jpg", Limits()));  // no pixel yet
-        (void)decodeImage(sample("baseline.jpg"), "b.jpg", Limits());
+        EXPECT_TRUE(decodeRgba8(bytes, "a.jpg", keep));
+        EXPECT_FALSE(decodeImage(ByteSpan(bytes).first(40), "a.jpg", keep));  // no pixel yet
+        (void)decodeImage(sample("baseline.jpg"), "b.jpg", keep);
         EXPECT_EQ(notes.size(), 2u) << "of whole files nothing is said";
     }
 }

@@ -1,5 +1,6 @@
 #include "lib/render/splat/gpu/gpu_scene.hpp"
 
+#include "lib/model/peak_memory.hpp"
 #include "lib/render/splat/others.hpp"
 
 namespace stx::gpu {
@@ -76,6 +77,9 @@ Result<GpuScene> GpuScene::upload(const PageSet& set, const EglContext& context,
     STX_CHECK(job.limits.checkAllocation(static_cast<std::uint64_t>(texels),
                                          static_cast<std::uint64_t>(bytesEach),
                                          "the textures of the reference views"));
+    if (context.device().software)
+        STX_CHECK(checkPeak(peak::kSplatsBySoftware, static_cast<std::uint64_t>(texels), 0, 0,
+                            job.limits));
     STX_CHECK(context.check("starting"));
     scene.colour = scene.linear ? makeTexture(GL_RGBA16F, GL_RGBA, GL_FLOAT, layout)
                                 : makeTexture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, layout);

@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "lib/base/parallel.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/render/surface/prepare/cells.hpp"
 
 namespace stx::gpu {
@@ -162,6 +163,11 @@ Result<GpuSurfaceScene> GpuSurfaceScene::upload(const surface::SurfaceScene& fro
     STX_CHECK(job.limits.checkAllocation(
         static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) * from.pages.size(),
         linear ? 32 : 20, "the textures of the reference views"));
+    if (context.device().software)
+        STX_CHECK(checkPeak(peak::kSurfacesBySoftware,
+                            static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
+                                from.pages.size(),
+                            0, 0, job.limits));
     if (static_cast<std::int64_t>(leafCount * sizeof(glm::uvec4)) >
         context.abilities().maxStorageBytes)
         return fail(ErrorCode::unsupported,

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/model/reference_view.hpp"
+
+namespace stx {
+
+/// What a step of work takes at its peak beside the images of the views that it is given.
+struct PeakMemory {
+    std::string_view what;  ///< for the message: "drawing"
+    /// Bytes for each pixel of all views, and of the largest one, which is worked on by itself.
+    std::uint64_t perPixel, perPixelOfLargest = 0;
+};
+
+/// Each step's, rounded up: the largest memory of the process with one view of 16 million pixels
+/// that are all points, and with four of 4 million, less what the views' images take and less the
+/// 60 MiB that the program takes for nothing (a driver in software: 270 MiB; tests/cli/peak_test.py
+/// --measure 1).
+namespace peak {
+inline constexpr PeakMemory kAtlas = {"an atlas", 36};
+inline constexpr PeakMemory kBake = {"baking", 36, 24};  // the vectors that it adds
+inline constexpr PeakMemory kBakeToMpeg4 = {"baking into MPEG-4", 76};
+inline constexpr PeakMemory kBackground = {"a background", 32};
+inline constexpr PeakMemory kCompared = {"two pictures that are compared", 36};
+inline constexpr PeakMemory kComparedLinear = {"two pictures that are compared", 76};
+inline constexpr PeakMemory kExport = {"writing pictures", 0, 16};
+inline constexpr PeakMemory kFewerSplats = {"merging splats", 140};
+inline constexpr PeakMemory kMpeg4 = {"writing MPEG-4", 16};
+inline constexpr PeakMemory kMpeg4Vectors = {"writing MPEG-4", 40};
+inline constexpr PeakMemory kPage = {"a page", 36};
+inline constexpr PeakMemory kPoints = {"points", 40};
+inline constexpr PeakMemory kPointsDraco = {"points in Draco", 88};
+inline constexpr PeakMemory kRefine = {"refining", 24};
+inline constexpr PeakMemory kSelect = {"selecting", 20};
+inline constexpr PeakMemory kSheet = {"a sheet", 0, 12};
+inline constexpr PeakMemory kSheetOfTwo = {"a sheet of two", 34};
+inline constexpr PeakMemory kSplatMode = {"drawing splats", 8};
+inline constexpr PeakMemory kSplats = {"splats", 118};
+inline constexpr PeakMemory kSurfaceMode = {"drawing", 14};
+inline constexpr PeakMemory kSurfaces = {"surfaces", 96};
+// Where the memory of a device is that of the process.
+inline constexpr PeakMemory kSplatsBySoftware = {"drawing by a software driver", 32};
+inline constexpr PeakMemory kSurfacesBySoftware = {"drawing by a software driver", 70};
+}  // namespace peak
+
+/// Error (invalidInput) when a step on these views would take more than the limits allow; it says
+/// how much would do.
+[[nodiscard]] Result<void> checkPeak(const PeakMemory& step,
+                                     const std::vector<ReferenceView>& views, const Limits& limits);
+/// The same of other pixels, whose own images take `held` bytes.
+[[nodiscard]] Result<void> checkPeak(const PeakMemory& step, std::uint64_t pixels,
+                                     std::uint64_t largest, std::uint64_t held,
+                                     const Limits& limits);
+
+}  // namespace stx
