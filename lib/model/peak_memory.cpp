@@ -39,7 +39,7 @@ Result<void> checkPeak(const PeakMemory& step, std::uint64_t pixels, std::uint64
     constexpr std::uint64_t kMiB = 1 << 20;
     return fail(ErrorCode::invalidInput,
                 "{} with views of {} pixels needs {} MiB, more than the memory limit of {} MiB; "
-                "give --max-memory {} if the file is to be trusted",
+                "raise it with --max-memory {} if the file is to be trusted",
                 step.what, pixels, (bytes + kMiB - 1) / kMiB, limits.maxMemoryBytes / kMiB,
                 (bytes + kMiB - 1) / kMiB);
 }

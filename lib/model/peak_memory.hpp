@@ -36,12 +36,12 @@ inline constexpr PeakMemory kPoints = {"points", 40};
 inline constexpr PeakMemory kPointsDraco = {"points in Draco", 88};
 inline constexpr PeakMemory kRefine = {"refining", 24};
 inline constexpr PeakMemory kSelect = {"selecting", 20};
-inline constexpr PeakMemory kSheet = {"a sheet", 0, 12};
-inline constexpr PeakMemory kSheetOfTwo = {"a sheet of two", 34};
+inline constexpr PeakMemory kSheet = {"the sheet", 0, 12};
+inline constexpr PeakMemory kSheetOfTwo = {"the sheet of two", 34};
 inline constexpr PeakMemory kSplatMode = {"drawing splats", 8};
 inline constexpr PeakMemory kSplats = {"splats", 118};
 inline constexpr PeakMemory kSurfaceMode = {"drawing", 14};
-inline constexpr PeakMemory kSurfaces = {"surfaces", 96};
+inline constexpr PeakMemory kSurfaces = {"surfaces", 76, 94};
 // Where the memory of a device is that of the process.
 inline constexpr PeakMemory kSplatsBySoftware = {"drawing by a software driver", 32};
 inline constexpr PeakMemory kSurfacesBySoftware = {"drawing by a software driver", 70};
