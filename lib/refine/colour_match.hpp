@@ -34,7 +34,7 @@ struct SharedColours {
 /// line for each pair of views and channel (reduced major axis, which treats both alike; Tukey's
 /// biweight), then gains and offsets that fit all pairs best, the median view staying as it is.
 /// Views that cannot be told apart from the others keep their colours: no map changes anything
-/// unless that of some view moves a typical colour by more than five steps of 8 bits (ten where no
+/// unless that of some view moves a typical colour by more than six steps of 8 bits (ten where no
 /// pair can contradict another) and by more than four times what pairs contradict each other by. Up
 /// to half as much again the maps grow from nothing to all of it.
 [[nodiscard]] std::vector<ColourMap> matchColours(std::size_t views,
