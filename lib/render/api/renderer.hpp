@@ -79,6 +79,9 @@ class Renderer {
     /// that frame while it reads back and finishes the one before. Only a hint: frames are the same
     /// without it.
     virtual void expect(const Camera& next) { (void)next; }
+    /// Says that frames are averaged by so much along each side from now on (1 = not at all), and
+    /// that what is finer need not be guessed.
+    virtual void averagedBy(int factor) { (void)factor; }
     /// Takes a frame that is not needed any more; its memory may serve for the next one.
     virtual void reuse(Frame&& frame) { (void)frame; }
     /// "cpu", "gpu" or "gl".

@@ -19,9 +19,14 @@ class FallbackRenderer final : public Renderer {
         job_.note(fmt::format("the {} backend failed ({}); the {} backend draws from here on",
                               current_->backend(), frame.error().text(), second->backend()));
         current_ = std::move(second);
+        current_->averagedBy(factor_);
         return current_->render(camera);
     }
     void expect(const Camera& next) override { current_->expect(next); }
+    void averagedBy(int factor) override {
+        factor_ = factor;
+        current_->averagedBy(factor);
+    }
     void reuse(Frame&& frame) override { current_->reuse(std::move(frame)); }
     std::string backend() const override { return current_->backend(); }
     std::string device() const override { return current_->device(); }
@@ -30,6 +35,7 @@ class FallbackRenderer final : public Renderer {
     std::unique_ptr<Renderer> current_;
     std::function<Result<std::unique_ptr<Renderer>>()> makeSecond_;
     Job& job_;
+    int factor_ = 1;  ///< see averagedBy()
 };
 
 }  // namespace

@@ -35,6 +35,7 @@ class FootprintRenderer final : public Renderer {
         STX_CHECK(camera.check());
         const int factor = factorOf(camera);
         large_ = factor > 1;
+        inner_->averagedBy(factor);
         if (!large_) return inner_->render(camera);
         STX_TRY(Frame large, inner_->render(enlarged(camera, factor)));
         StageTimer timer(log_.get(), "footprint");

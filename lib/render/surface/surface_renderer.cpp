@@ -53,6 +53,7 @@ class SurfaceRenderer final : public Renderer {
     void expect(const Camera& next) override {
         if (backend_->drawsAhead()) expected_ = next;
     }
+    void averagedBy(int factor) override { averagedBy_ = factor; }
     [[nodiscard]] std::string backend() const override { return backend_->name(); }
     [[nodiscard]] std::string device() const override { return backend_->device(); }
     [[nodiscard]] Result<void> prepareBackend() { return backend_->prepare(scene_, effort_, job_); }
@@ -111,6 +112,7 @@ class SurfaceRenderer final : public Renderer {
     /// By page: of views that bring no normals, when frames want them.
     std::vector<Image<glm::vec3>> normals_;
     bool fillsFrame_ = false;
+    int averagedBy_ = 1;
     std::optional<Outlines> outlines_;  ///< where points are exact enough to tell
     std::optional<Camera> expected_;
     std::unique_ptr<SurfaceFrame> begun_;  ///< under way before it was asked for
@@ -349,7 +351,7 @@ void SurfaceRenderer::fill(const SurfaceFrame& work, Frame& frame, Image<float>&
                 all.push_back(
                     {&s, warpFrom(s.space.pixelFromWorld * space.worldFromPixel), nullptr});
         finishStage(settings_.log.get(), "surroundings", frame.colour, [&] {
-            fillBackground({frame.colour, q, space}, all);
+            fillBackground({frame.colour, q, space}, all, averagedBy_);
         });
     } else if (settings_.does(Stage::holes)) {
         finishStage(settings_.log.get(), "holes", frame.colour, [&] {

@@ -57,7 +57,8 @@ TEST(FillRays, ABatchGoesAsRaysDoOneByOne) {
     for (const auto& [width, height, surfaces] :
          {std::array{97, 61, 40}, std::array{700, 3, 1}, std::array{1, 1, 1}}) {
         const Image<std::uint8_t> distances = someDistances(width, height, surfaces, random);
-        RayBatch batch(distances);
+        const DistanceWords words(distances);
+        RayBatch batch(words);
         // A full one and others, which are the same batch used again.
         for (const std::size_t pixels : {kRayBatch, std::size_t{1}, kRayBatch - 3}) {
             std::vector<glm::ivec2> places;

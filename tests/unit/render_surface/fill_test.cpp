@@ -26,7 +26,7 @@ struct Picture {
         q.at(x, y) = depth;
     }
     /// With one source that saw nothing farther than `hider` away, and its own far plane there.
-    void fill(const Camera& source, float hider, double farPlane) {
+    void fill(const Camera& source, float hider, double farPlane, int averagedBy = 1) {
         Bundle bundle;
         ReferenceView view;
         view.name = "source";
@@ -41,7 +41,7 @@ struct Picture {
         const Source& s = scene.sources[0];
         const LocalSource local{&s, warpFrom(s.space.pixelFromWorld * space.worldFromPixel),
                                 nullptr};
-        fillBackground({albedo, q, space}, {&local, 1});
+        fillBackground({albedo, q, space}, {&local, 1}, averagedBy);
     }
     /// Everything is hidden from the source.
     void fill() { fill(space.camera, 0.1f, 1000); }
@@ -67,6 +67,39 @@ TEST(FillBackground, FarFromSurfaceItIsSmooth) {
     EXPECT_LT(roughest, 0.03f);
     EXPECT_NEAR(p.albedo.at(kWidth - 50, kHeight / 2).r, 0.5f, 0.1f);
     EXPECT_NEAR(p.q.at(kWidth - 50, kHeight / 2), 0.5f, 1e-4f);
+}
+
+TEST(FillBackground, WhatIsAveragedAfterwardsIsFilledAsTheAverageIs) {
+    // A wall with a hole in it of 20 pixels; a surface before it ends in the middle of a pixel of
+    // the average.
+    constexpr int kWide = 96;
+    const auto draw = [](int averagedBy) {
+        Picture p(kWide, kWide);
+        for (int y = 0; y < kWide; ++y) {
+            for (int x = 0; x < kWide; ++x) {
+                if (x < 33)
+                    p.close(x, y, {1.0f, 0.0f, 0.0f}, 1.0f);
+                else if (x >= 53)
+                    p.close(x, y, {0.0f, 0.0f, 1.0f}, 0.1f);
+            }
+        }
+        p.fill(p.space.camera, 0.1f, 1000, averagedBy);
+        return p;
+    };
+    const Picture fine = draw(1);
+    for (const int factor : {2, 3}) {
+        const Picture average = draw(factor);
+        EXPECT_EQ(average.openPixels(), 0);
+        for (int y = 20; y < kWide - 20; ++y) {
+            for (int x = 0; x < kWide; ++x) {
+                const glm::vec4 a = average.albedo.at(x, y), b = fine.albedo.at(x, y);
+                if (x < 33 || x >= 53) EXPECT_EQ(a, b);
+                // Nothing of the surface before it.
+                EXPECT_LT(glm::distance(a, b), 0.1f) << factor << " " << x << " " << y;
+                EXPECT_NEAR(average.q.at(x, y), fine.q.at(x, y), 0.06f);
+            }
+        }
+    }
 }
 
 TEST(FillBackground, AGapTakesTheColourAndTheDepthOfTheFartherSide) {

@@ -29,7 +29,8 @@ void fillUnseen(OpenFrame frame, std::span<const LocalSource> sources, int wides
 /// in its frustum, before its far plane, and it does not see past it; with a border of a twentieth
 /// of its picture. The rest stays open. Near surface along rays through the picture, beyond from a
 /// picture of half the size that was filled before, so that the time grows with the pixels however
-/// large the openings are. Without any surface nothing is filled.
-void fillBackground(OpenFrame frame, std::span<const LocalSource> sources);
+/// large the openings are. Without any surface nothing is filled. Of frames that are averaged by
+/// `averagedBy` along each side afterwards, which must divide their sizes, the average is filled.
+void fillBackground(OpenFrame frame, std::span<const LocalSource> sources, int averagedBy = 1);
 
 }  // namespace stx::surface

@@ -1,38 +1,74 @@
 #include "lib/render/surface/fill/fill_rays.hpp"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lib/render/surface/fill/fill_rays.cpp"
+#include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
+#include <hwy/highway.h>
+
 #include <cmath>
+
+HWY_BEFORE_NAMESPACE();
+namespace stx::surface::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using DF = hn::ScalableTag<float>;
+using DI = hn::RebindToSigned<DF>;
+using VF = hn::Vec<DF>;
+using VI = hn::Vec<DI>;
+
+/// The rays of a batch in one direction, `rays.length` long at first, go on until each met surface
+/// or left the picture. Rays beside each other go together: they are about as long.
+void walkRaysImpl(const RayBatch::Start& start, glm::vec2 direction, std::size_t count,
+                  RayBatch::Rays& rays) {
+    const DF d;
+    const DI di;
+    const VF dx = hn::Set(d, direction.x), dy = hn::Set(d, direction.y), zero = hn::Zero(d);
+    const VF width = hn::Set(d, start.width), height = hn::Set(d, start.height);
+    const VF longest = hn::Set(d, kLongestRay);
+    const VI stride = hn::Set(di, static_cast<std::int32_t>(start.width));
+    const VI none = hn::Set(di, RayBatch::kNone);
+    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+        const VF x0 = hn::LoadU(d, &start.x[i]), y0 = hn::LoadU(d, &start.y[i]);
+        // The pixels that are so far along, kNone where rays left the picture or are too long.
+        const auto pixelsAt = [&](VF along) HWY_ATTR {
+            const VF x = hn::Add(x0, hn::Mul(dx, along)), y = hn::Add(y0, hn::Mul(dy, along));
+            const auto in =
+                hn::And(hn::And(hn::And(hn::Ge(x, zero), hn::Ge(y, zero)), hn::Le(along, longest)),
+                        hn::And(hn::Lt(x, width), hn::Lt(y, height)));
+            const VI pixel = hn::Add(hn::Mul(hn::ConvertTo(di, y), stride), hn::ConvertTo(di, x));
+            return hn::IfThenElse(hn::RebindMask(di, in), pixel, none);
+        };
+        VF along = hn::LoadU(d, &rays.length[i]);
+        VI rim;
+        while (true) {
+            rim = pixelsAt(along);
+            const auto in = hn::Gt(rim, none);
+            const VI word = hn::GatherIndex(di, start.distances,
+                                            hn::IfThenElseZero(in, hn::ShiftRight<2>(rim)));
+            const VI shift = hn::ShiftLeft<3>(hn::And(rim, hn::Set(di, 3)));
+            const VI distance = hn::And(hn::Shr(word, shift), hn::Set(di, 0xff));
+            const auto goes = hn::And(in, hn::Gt(distance, hn::Zero(di)));
+            if (hn::AllFalse(di, goes)) break;
+            along = hn::Add(along, hn::ConvertTo(d, hn::IfThenElseZero(goes, distance)));
+        }
+        const auto met = hn::RebindMask(d, hn::Gt(rim, none));
+        along = hn::IfThenElse(met, along, hn::Set(d, 2 * kLongestRay));
+        hn::StoreU(along, d, &rays.length[i]);
+        hn::StoreU(rim, di, &rays.rim[i]);
+        hn::StoreU(pixelsAt(hn::Add(along, hn::Set(d, 1.0f))), di, &rays.behind[i]);
+    }
+    static_assert(kRayBatch % hn::MaxLanes(DF()) == 0, "vectors end with the batch");
+}
+
+}  // namespace stx::surface::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 
 namespace stx::surface {
 namespace {
 
-/// The rays of a batch in one direction, `rays.length` long at first, go on until each met surface
-/// or left the picture.
-void walkRays(const RayBatch::Start& start, glm::vec2 direction, std::size_t count,
-              RayBatch::Rays& rays) {
-    const auto stride = static_cast<std::int32_t>(start.width);
-    for (std::size_t i = 0; i < count; ++i) {
-        // The pixel that is so far along, kNone where the ray left the picture or is too long.
-        const auto pixelAt = [&](float along) {
-            const float x = start.x[i] + direction.x * along, y = start.y[i] + direction.y * along;
-            const bool in =
-                x >= 0 && y >= 0 && along <= kLongestRay && x < start.width && y < start.height;
-            return in ? static_cast<std::int32_t>(y) * stride + static_cast<std::int32_t>(x)
-                      : RayBatch::kNone;
-        };
-        float& along = rays.length[i];
-        while (true) {
-            rays.rim[i] = pixelAt(along);
-            if (rays.rim[i] == RayBatch::kNone) {
-                along = 2 * kLongestRay;
-                break;
-            }
-            const std::uint8_t distance = start.distances[rays.rim[i]];
-            if (distance == 0) break;
-            along += static_cast<float>(distance);
-        }
-        rays.behind[i] = pixelAt(along + 1);
-    }
-}
+HWY_EXPORT(walkRaysImpl);
 
 const std::array<glm::vec2, kRays>& rayDirections() {
     static const auto rays = [] {
@@ -48,9 +84,16 @@ const std::array<glm::vec2, kRays>& rayDirections() {
 
 }  // namespace
 
-RayBatch::RayBatch(const Image<std::uint8_t>& distances)
-    : start_{distances.data(), static_cast<float>(distances.width()),
-             static_cast<float>(distances.height())} {}
+DistanceWords::DistanceWords(const Image<std::uint8_t>& distances)
+    : width(static_cast<float>(distances.width())), height(static_cast<float>(distances.height())) {
+    words.resize(distances.count() / 4 + 1);
+    for (std::size_t i = 0; i < distances.count(); ++i)
+        words[i / 4] |=
+            static_cast<std::int32_t>(std::uint32_t{distances.data()[i]} << (i % 4 * 8));
+}
+
+RayBatch::RayBatch(const DistanceWords& distances)
+    : start_{distances.words.data(), distances.width, distances.height} {}
 
 void RayBatch::add(int x, int y, int distance) {
     start_.x[count_] = static_cast<float>(x) + 0.5f;
@@ -62,8 +105,10 @@ void RayBatch::add(int x, int y, int distance) {
 void RayBatch::walk() {
     for (std::size_t k = 0; k < kRays; ++k) {
         rays_[k].length = first_;
-        walkRays(start_, rayDirections()[k], count_, rays_[k]);
+        HWY_DYNAMIC_DISPATCH(walkRaysImpl)(start_, rayDirections()[k], count_, rays_[k]);
     }
 }
 
 }  // namespace stx::surface
+
+#endif

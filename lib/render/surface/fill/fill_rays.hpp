@@ -3,6 +3,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
+
+#include <glm/glm.hpp>
 
 #include "lib/base/image.hpp"
 
@@ -14,6 +17,16 @@ inline constexpr int kRays = 16;
 inline constexpr float kLongestRay = 512;
 /// Pixels whose rays go together, direction by direction.
 inline constexpr std::size_t kRayBatch = 128;
+
+/// Distances of the pixels of a picture from surface, the larger of columns and rows, so that no
+/// ray crosses more pixels in as many steps; 0 is surface. Four pixels a word, the first lowest,
+/// for vectors that look up words.
+struct DistanceWords {
+    explicit DistanceWords(const Image<std::uint8_t>& distances);
+
+    std::vector<std::int32_t> words;
+    float width, height;
+};
 
 /// Rays from some pixels of a picture to the surface around them.
 class RayBatch {
@@ -30,14 +43,12 @@ class RayBatch {
     };
     /// Where rays begin.
     struct Start {
-        const std::uint8_t* distances;
+        const std::int32_t* distances;  ///< see DistanceWords
         float width, height;
         std::array<float, kRayBatch> x{}, y{};  ///< centres of pixels
     };
 
-    /// `distances`: of each pixel from surface, the larger of columns and rows, so that no ray
-    /// crosses more pixels in as many steps; 0 is surface.
-    explicit RayBatch(const Image<std::uint8_t>& distances);
+    explicit RayBatch(const DistanceWords& distances);
 
     [[nodiscard]] bool full() const { return count_ == kRayBatch; }
     [[nodiscard]] std::size_t count() const { return count_; }
