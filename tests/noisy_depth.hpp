@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <numbers>
 #include <string>
 
@@ -103,12 +104,10 @@ inline void changeLight(stx::Bundle& bundle) {
     }
 }
 
-/// By name: noise0.5, noise2 (percent), codes8, missing3, edges1, light.
+/// By name: noiseN (percent of the distance), codes8, missing3, edges1, light.
 inline bool damage(stx::Bundle& bundle, const std::string& kind) {
-    if (kind == "noise0.5")
-        addNoise(bundle, 0.005);
-    else if (kind == "noise2")
-        addNoise(bundle, 0.02);
+    if (kind.starts_with("noise") && std::atof(kind.c_str() + 5) > 0)
+        addNoise(bundle, 0.01 * std::atof(kind.c_str() + 5));
     else if (kind == "codes8")
         quantise(bundle);
     else if (kind == "missing3")
