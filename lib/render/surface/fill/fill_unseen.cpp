@@ -61,6 +61,10 @@ struct Rim {
 constexpr std::array<std::array<int, 2>, 8> kDirections = {
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 
+/// At the border of the picture, what is beyond it counts as surface where so many directions meet
+/// some: a part of a frame is filled as the whole is.
+constexpr int kLeastBesideBorder = 4;
+
 /// Whether an opening is small enough to be an unseen part of a surface: surface in all directions
 /// but one, or in all but two opposite ones, as in the slits between a machine's cooling fins.
 bool enclosed(unsigned directionsMet) {
@@ -123,7 +127,7 @@ std::size_t rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distan
     const std::uint8_t* const here = distances.row(y).data() + x;
     std::array<int, 8> steps{};  // to the rim, 0 = none
     unsigned nearby = 0;         // a bit for each direction that meets surface in small reach
-    unsigned notNearby = 0;
+    unsigned notNearby = 0, beyond = 0;  // of the latter the picture ends in small reach
     bool tooWide = false;
     for (const unsigned some : {far, ~far & 0xffu}) {
         for (unsigned left = some; left != 0; left &= left - 1) {
@@ -144,7 +148,8 @@ std::size_t rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distan
                 step += distance;
             }
             const bool isNear = steps[k] > 0 && steps[k] <= kSmallReach;
-            (isNear ? nearby : notNearby) |= 1u << k;
+            const bool ends = steps[k] == 0 && most < kSmallReach;
+            (isNear ? nearby : ends ? beyond : notNearby) |= 1u << k;
             tooWide = tooWide || steps[k] == 0;
             if (tooWide && std::popcount(notNearby) > 8 - kLeastDirections) {
                 far = notNearby;
@@ -154,6 +159,7 @@ std::size_t rimsAround(const OpenFrame& frame, const Image<std::uint8_t>& distan
     }
     far = notNearby;
     for (std::size_t k = 0; k < 4; ++k) tooWide = tooWide || steps[k] + steps[k + 4] > widest;
+    if (std::popcount(nearby) >= kLeastBesideBorder) nearby |= beyond;
     if (tooWide && !enclosed(nearby)) return 0;
     std::size_t count = 0;
     for (std::size_t k = 0; k < kDirections.size(); ++k) {
