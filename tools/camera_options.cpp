@@ -144,15 +144,10 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .group(group);
 }
 
-Result<std::size_t> swayView(const CameraOptions& o, const std::vector<ReferenceView>& views) {
-    if (views.empty())
-        return fail(ErrorCode::usage,
-                    "--sway moves around the pose of a reference view, and a mesh has none; "
-                    "--orbit goes around it");
-    if (o.view >= 0) {
-        STX_CHECK(checkView(o.view, views.size()));
-        return static_cast<std::size_t>(o.view);
-    }
+Result<std::size_t> namedView(int view, const std::vector<ReferenceView>& views) {
+    if (views.empty()) return fail(ErrorCode::invalidInput, "the input has no reference views");
+    STX_CHECK(checkView(view, views.size()));
+    if (view >= 0) return static_cast<std::size_t>(view);
     const auto first = std::ranges::find(views, false, &ReferenceView::background);
     return first == views.end() ? 0 : static_cast<std::size_t>(first - views.begin());
 }

@@ -45,10 +45,9 @@ struct SwayPose {
     Camera camera;
     double distance = 0;  ///< median of what the view shows there, scene units
 };
-/// The number of the view that --sway is around: --view, else the first that is no background.
-/// Errors (usage): no views, or none of that number.
-[[nodiscard]] Result<std::size_t> swayView(const CameraOptions& options,
-                                           const std::vector<ReferenceView>& views);
+/// The number of the view that --view names; where that is below 0, which it is when it is not
+/// given, of the first one that is no background. Errors (usage): none of that number.
+[[nodiscard]] Result<std::size_t> namedView(int view, const std::vector<ReferenceView>& views);
 
 /// What the cameras are made for: the object and its reference views.
 struct CameraContext {

@@ -26,6 +26,10 @@ struct ExtractOptions {
     std::optional<double> time;
     PointWriteOptions points;
     std::string as;
+    int view = -1;
+    int triangles = 0;
+    std::string colour;
+    std::optional<int> quality;
     int mostSplats = 0;
     OpenOptions open;
 };
@@ -64,19 +68,33 @@ Points pointsOf(const Bundle& bundle) {
     return out;
 }
 
+/// Who asks for fewer triangles wants a small file, and has given up the exact one.
+SurfacesOptions modelOf(const ExtractOptions& o) {
+    const bool jpeg = o.colour.empty() ? o.triangles > 0 : o.colour == "jpeg";
+    return {.mostTriangles = static_cast<std::size_t>(o.triangles),
+            .jpegQuality = jpeg ? o.quality.value_or(92) : 0};
+}
+
 Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
     const Stopwatch watch;
     ExtractOptions o = options;
-    STX_TRY(o.output, folderTarget(options.output, {".glb", ".html", ".ply", ".drc", ".spz"},
-                                   "a folder, .glb, .html, .ply, .spz or .drc"));
+    STX_TRY(o.output,
+            folderTarget(options.output,
+                         {".glb", ".html", ".ply", ".drc", ".spz", ".png", ".jpg", ".jpeg"},
+                         "a folder, .glb, .html, .ply, .spz, .drc, .png or .jpg"));
     const auto dotted = std::filesystem::path(o.output).extension();
     std::error_code ec;
     const bool plain = o.output == options.output && !std::filesystem::is_directory(o.output, ec);
-    STX_TRY(const auto as, extractedAs(o.as, plain ? dotted.string() : ""));
+    STX_TRY(const auto as, extractedAs(o.as, plain ? o.output : ""));
     const bool splats = as == ExtractAs::splats, points = as == ExtractAs::points,
+               picture = as == ExtractAs::rgbd || as == ExtractAs::pair,
                shown = plain && isShown(dotted) && !splats;
     const auto ending = points ? dotted : std::filesystem::path();
-    if (shown)
+    if (!(shown && dotted == ".glb"))
+        STX_CHECK(command.refuse({"--triangles", "--colour"}, "is of a model of surfaces, .glb"));
+    if (modelOf(o).jpegQuality == 0) STX_CHECK(command.refuse({"--quality"}, "is of JPEG"));
+    if (!picture) STX_CHECK(command.refuse({"--view"}, "is of a picture with depth"));
+    if (shown || picture)
         STX_CHECK(command.refuse({"--cameras", "--depth"},
                                  fmt::format("is of a folder; -o {} is a file", o.output)));
     if (splats)
@@ -101,7 +119,12 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
     if (splats)
         return extractSplats(o.input, o.open, o.output, o.time, o.refine,
                              {.most = static_cast<std::size_t>(o.mostSplats)}, program);
-    if (shown) return extractShown(o.input, o.open, o.output, o.time, o.refine, program);
+    if (picture)
+        return extractPicture(o.input, o.open, o.output,
+                              as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide,
+                              o.view, o.time, o.refine, program);
+    if (shown)
+        return extractShown(o.input, o.open, o.output, o.time, o.refine, modelOf(o), program);
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     STX_TRY(frames, refined(std::move(frames), o.refine,
                             !points            ? peak::kExport
@@ -171,7 +194,8 @@ void addExtract(CommandLine& line, Program& program) {
     Command c = line.add(
         "extract",
         "Images and cameras of a bundle as plain files, its points as .ply or .drc, Gaussian "
-        "splats, a model of surfaces, or a page that draws it in any browser\n\n"
+        "splats, a model of surfaces, a picture with depth, or a page that draws it in any "
+        "browser\n\n"
         "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
         "  stx extract model.mp4 -o folder --cameras miv\n"
         "  stx extract film.mp4 -o folder            all frames, with their times\n"
@@ -179,14 +203,18 @@ void addExtract(CommandLine& line, Program& program) {
         "  stx extract model.mp4 -o cloud.ply --as splats    for any viewer of Gaussian splats\n"
         "  stx extract film.mp4 -o film_%04d.spz             a file of splats for each frame\n"
         "  stx extract model.mp4 -o model.glb        surfaces with textures, for any glTF viewer\n"
-        "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n\n"
+        "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n"
+        "  stx extract photo.mp4 -o photo.glb --triangles 200000\n"
+        "  stx extract photo.mp4 -o photo_rgbd.png   colour beside depth, white near\n"
+        "  stx extract photo.mp4 -o photo.jpg        and its depth in photo_depth.jpg\n\n"
         "The page is turned by dragging, by keys and by touch, under a light that moves, and "
         "plays\nfilms. Its address takes a camera: "
         "view.html#eye=0,1,3&target=0,0,0&fov=40.");
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
     c.option("-o,--output", o->output,
-             "Folder, points.ply, points.drc, cloud.spz, model.glb or view.html")
+             "Folder, points.ply, points.drc, cloud.spz, model.glb, view.html, or a picture with "
+             "depth: NAME.jpg, NAME_rgbd.png")
         .required()
         .takes("OUT");
     c.option(
@@ -204,14 +232,28 @@ void addExtract(CommandLine& line, Program& program) {
         .takes("T");
     refineOption(c, o->refine);
     c.option("--as", o->as,
-             "What a file holds: points (.ply, .drc), splats (.ply, .spz, .glb) or surfaces (.glb) "
-             "(default: .ply and .drc points, .spz splats, .glb surfaces)")
-        .oneOf({"points", "splats", "surfaces"});
+             "What a file holds: points (.ply, .drc), splats (.ply, .spz, .glb), surfaces (.glb), "
+             "rgbd (.png, .jpg: colour on the left, depth on the right) or pair (colour, and depth "
+             "in NAME_depth.jpg) (default: .ply and .drc points, .spz splats, .glb surfaces, "
+             "NAME_rgbd.png rgbd, other pictures pair). Depth of pictures is white near")
+        .oneOf({"points", "splats", "surfaces", "rgbd", "pair"});
+    c.option("--view", o->view, "Of a picture with depth: reference view K (default: the first)")
+        .takes("K")
+        .notNegative();
     c.option("--max-splats", o->mostSplats,
              "At most so many splats: flat pieces of one colour become larger ones (default: one "
              "for each point; a pruned atlas has each place once)")
         .range(1, 2000000000)
         .takes("N");
+    c.option("--triangles", o->triangles,
+             "Of surfaces (.glb): at most about so many triangles; what is least seen from beside "
+             "the views goes first (default: all)")
+        .range(1, 2000000000)
+        .takes("N");
+    c.option("--colour", o->colour,
+             "Of surfaces (.glb): png (exact) or jpeg (default png; jpeg with --triangles)")
+        .oneOf({"png", "jpeg"});
+    c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.objectOption(o->open.object);

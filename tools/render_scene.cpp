@@ -43,7 +43,7 @@ Result<SwayPose> swayPose(const ReferenceView& view, std::vector<float> distance
 }
 
 Result<SwayPose> swayPose(const CameraOptions& o, const Bundle& bundle) {
-    STX_TRY(const std::size_t number, swayView(o, bundle.views));
+    STX_TRY(const std::size_t number, namedView(o.view, bundle.views));
     const ReferenceView& view = bundle.views[number];
     std::vector<float> distances;
     for (const float depth : view.depth.pixels()) addDistance(depth, distances);
@@ -51,7 +51,7 @@ Result<SwayPose> swayPose(const CameraOptions& o, const Bundle& bundle) {
 }
 
 Result<SwayPose> swayPose(const CameraOptions& o, const Atlas& atlas) {
-    STX_TRY(const std::size_t number, swayView(o, atlas.views));
+    STX_TRY(const std::size_t number, namedView(o.view, atlas.views));
     std::vector<float> distances;
     for (const AtlasRectangle& r : atlas.rectangles) {
         if (r.view != static_cast<int>(number)) continue;
@@ -107,7 +107,10 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
         return {};
     };
     if (const auto* mesh = std::get_if<Mesh>(&scene.model)) {
-        if (sways) STX_CHECK(swayView(o.camera, {}));
+        if (sways)
+            return fail(ErrorCode::usage,
+                        "--sway moves around the pose of a reference view, and a mesh has none; "
+                        "--orbit goes around it");
         STX_CHECK(mesh->check());
         if (mesh->splats) scene.context.up = mesh->splats->up;
     }
