@@ -1,6 +1,7 @@
 #include "formats/viewer/fewer_triangles.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <meshoptimizer.h>
@@ -15,6 +16,8 @@ namespace {
 /// that is off by one pixel there counts as a corner that is off by one pixel. It is what pages let
 /// a single view turn by.
 constexpr double kAside = 0.08;
+/// What is so near that it moves by more is out of any picture: the largest one has so many pixels.
+constexpr double kMostPixels = 65535;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 /// Where corners are in pixels: across, down, and by how far they move between the view's own place
@@ -32,8 +35,9 @@ std::vector<glm::vec3> inPixels(const Camera& camera, const ViewSurface& surface
     out.reserve(seen.size());
     for (std::size_t i = 0; i < seen.size(); ++i) {
         const double z = seen[i].z;
+        const double moves = camera.orthographic ? kAside * camera.fx * z : aside / z;
         out.emplace_back(surface.pixels[i].x, surface.pixels[i].y,
-                         camera.orthographic ? kAside * camera.fx * z : aside / z);
+                         std::isnan(moves) ? 0.0 : std::clamp(moves, -kMostPixels, kMostPixels));
     }
     return out;
 }

@@ -220,8 +220,6 @@ class Writer {
     }
 
     Result<void> add(const ReferenceView& view, const ViewSurface& surface) {
-        STX_CHECK(checkPlaces(view, surface.positions));
-        STX_CHECK(checkPlaces(view, surface.lonePositions));
         if (!surface.triangles.empty()) {
             STX_CHECK(addSurface(view, surface));
         }
@@ -391,6 +389,10 @@ Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle b
     if (options.mostTriangles > 0)
         STX_CHECK(checkPeak(peak::kFewerTriangles, bundle.views, job.limits));
     STX_TRY(auto surfaces, viewSurfaces(bundle, job));
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+        STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].positions));
+        STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].lonePositions));
+    }
     if (options.mostTriangles > 0)
         STX_CHECK(takeFewerTriangles(bundle, options.mostTriangles, surfaces, job));
     Writer writer(bundle, options.jpegQuality, job);
