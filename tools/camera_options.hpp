@@ -46,7 +46,7 @@ struct SwayPose {
     double distance = 0;  ///< median of what the view shows there, scene units
 };
 /// The number of the view that --view names; where that is below 0, which it is when it is not
-/// given, of the first one that is no background. Errors (usage): none of that number.
+/// given, of the first that is not a background view. Errors (usage): none of that number.
 [[nodiscard]] Result<std::size_t> namedView(int view, const std::vector<ReferenceView>& views);
 
 /// What the cameras are made for: the object and its reference views.

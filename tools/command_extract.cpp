@@ -75,61 +75,80 @@ SurfacesOptions modelOf(const ExtractOptions& o) {
             .jpegQuality = jpeg ? o.quality.value_or(92) : 0};
 }
 
-Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
-    const Stopwatch watch;
-    ExtractOptions o = options;
+/// What is written.
+struct Wanted {
+    std::optional<ExtractAs> as;   ///< nothing: a folder or a page
+    std::filesystem::path ending;  ///< of a file
+    bool splats = false, points = false, picture = false;
+    bool shown = false;  ///< a file that others show
+};
+
+/// What the options ask for; puts the name of a folder right. Errors (usage): those of
+/// folderTarget() and extractedAs().
+Result<Wanted> wantedOf(ExtractOptions& o) {
+    const std::string given = o.output;
     STX_TRY(o.output,
-            folderTarget(options.output,
-                         {".glb", ".html", ".ply", ".drc", ".spz", ".png", ".jpg", ".jpeg"},
+            folderTarget(given, {".glb", ".html", ".ply", ".drc", ".spz", ".png", ".jpg", ".jpeg"},
                          "a folder, .glb, .html, .ply, .spz, .drc, .png or .jpg"));
-    const auto dotted = std::filesystem::path(o.output).extension();
     std::error_code ec;
-    const bool plain = o.output == options.output && !std::filesystem::is_directory(o.output, ec);
-    STX_TRY(const auto as, extractedAs(o.as, plain ? o.output : ""));
-    const bool splats = as == ExtractAs::splats, points = as == ExtractAs::points,
-               picture = as == ExtractAs::rgbd || as == ExtractAs::pair,
-               shown = plain && isShown(dotted) && !splats;
-    const auto ending = points ? dotted : std::filesystem::path();
-    if (!(shown && dotted == ".glb"))
+    const bool plain = o.output == given && !std::filesystem::is_directory(o.output, ec);
+    Wanted w;
+    STX_TRY(w.as, extractedAs(o.as, plain ? o.output : ""));
+    if (plain) w.ending = std::filesystem::path(o.output).extension();
+    w.splats = w.as == ExtractAs::splats;
+    w.points = w.as == ExtractAs::points;
+    w.picture = w.as == ExtractAs::rgbd || w.as == ExtractAs::pair;
+    w.shown = isShown(w.ending) && !w.splats;
+    return w;
+}
+
+/// Errors (usage) for options that cannot matter to what is written.
+Result<void> checkOptions(const ExtractOptions& o, const Wanted& w, const Command& command) {
+    if (!(w.shown && w.ending == ".glb"))
         STX_CHECK(command.refuse({"--triangles", "--colour"}, "is of a model of surfaces, .glb"));
     if (modelOf(o).jpegQuality == 0) STX_CHECK(command.refuse({"--quality"}, "is of JPEG"));
-    if (!picture) STX_CHECK(command.refuse({"--view"}, "is of a picture with depth"));
-    if (shown || picture)
+    if (!w.picture) STX_CHECK(command.refuse({"--view"}, "is of a picture with depth"));
+    if (w.shown || w.picture || w.splats || w.points)
         STX_CHECK(command.refuse({"--cameras", "--depth"},
-                                 fmt::format("is of a folder; -o {} is a file", o.output)));
-    if (splats)
-        STX_CHECK(
-            command.refuse({"--cameras", "--depth"},
-                           fmt::format("is of a folder; -o {} is a file of splats", o.output)));
-    else
+                                 fmt::format("is of a folder; -o {} is a file{}", o.output,
+                                             w.splats   ? " of splats"
+                                             : w.points ? " of points"
+                                                        : "")));
+    if (!w.splats)
         STX_CHECK(command.refuse({"--max-splats"}, "is of splats; give --as splats, too"));
-    if (shown && dotted == ".html")
+    if (w.ending == ".html")
         STX_CHECK(command.refuse({"--time"}, "is of what shows one moment; a page plays the film"));
-    if (points)
-        STX_CHECK(
-            command.refuse({"--cameras", "--depth"},
-                           fmt::format("is of a folder; -o {} is a file of points", o.output)));
     if (o.cameras == "colmap")
         STX_CHECK(command.refuse({"--depth"},
                                  "does not go with --cameras colmap, whose depth is floats"));
-    if (ending != ".drc")
+    if (!(w.points && w.ending == ".drc"))
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
+    return {};
+}
+
+Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
+    const Stopwatch watch;
+    ExtractOptions o = options;
+    STX_TRY(const Wanted wanted, wantedOf(o));
+    STX_CHECK(checkOptions(o, wanted, command));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
-    if (splats)
+    if (wanted.splats)
         return extractSplats(o.input, o.open, o.output, o.time, o.refine,
                              {.most = static_cast<std::size_t>(o.mostSplats)}, program);
-    if (picture)
-        return extractPicture(o.input, o.open, o.output,
-                              as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide,
-                              o.view, o.time, o.refine, program);
-    if (shown)
+    if (wanted.picture)
+        return extractPicture(
+            o.input, o.open, o.output,
+            wanted.as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide, o.view,
+            o.time, o.refine, program);
+    if (wanted.shown)
         return extractShown(o.input, o.open, o.output, o.time, o.refine, modelOf(o), program);
+    const bool points = wanted.points, draco = wanted.ending == ".drc";
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     STX_TRY(frames, refined(std::move(frames), o.refine,
-                            !points            ? peak::kExport
-                            : ending == ".drc" ? peak::kPointsDraco
-                                               : peak::kPoints));
+                            !points ? peak::kExport
+                            : draco ? peak::kPointsDraco
+                                    : peak::kPoints));
     const Timeline timeline = frames->timeline();
     STX_TRY(const std::size_t moment,
             momentOf(o.time, timeline, points ? "points are" : nullptr, o.input, program.job));
@@ -140,7 +159,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_TRY(const auto bundle, frames->frame(moment, program.job));
         views = bundle.views.size();
         pointCount = bundle.pointCount();
-        STX_CHECK(checkPeak(ending == ".drc" ? peak::kPointsDraco : peak::kPoints, bundle.views,
+        STX_CHECK(checkPeak(draco ? peak::kPointsDraco : peak::kPoints, bundle.views,
                             program.job.limits));
         const auto found = pointsOf(bundle);
         PointCloud cloud;

@@ -315,7 +315,7 @@ TEST(ViewerPage, OfOneViewBeginsAtItsPoseAndTurnsALittle) {
     expectOwnPose(readPage(folder.path() / "a.html").json("data")["start"], camera);
     ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}}, job));
     expectOwnPose(readPage(folder.path() / "b.html").json("data")["start"], camera);
-    // What is behind it is no second view.
+    // What is behind it does not count as a second view.
     bundle.views.push_back(bundle.views[0]);
     bundle.views[1].name = "behind";
     bundle.views[1].background = true;
