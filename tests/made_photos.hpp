@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,7 +21,7 @@ namespace made {
 using namespace stx;
 
 inline void append(Bytes& to, ByteSpan from) {
-    to.insert(to.end(), from.begin(), from.end());
+    std::ranges::copy(from, std::back_inserter(to));
 }
 inline void append(Bytes& to, std::string_view text) {
     append(to, std::as_bytes(std::span(text)));
@@ -105,9 +106,10 @@ inline Bytes xmpSegment(const std::string& packet) {
 
 /// What Apple writes beside depth. `matrix`: fx and fy of a picture of 32x24.
 inline std::string appleXmp(double least = 0.5, double most = 2, double fx = 30, double fy = 30,
-                            const std::string& accuracy = "absolute") {
+                            const std::string& accuracy = "absolute", double cx = 17,
+                            double cy = 11) {
     std::string list;
-    for (const double v : {fx, 0.0, 0.0, 0.0, fy, 0.0, 17.0, 11.0, 1.0})
+    for (const double v : {fx, 0.0, 0.0, 0.0, fy, 0.0, cx, cy, 1.0})
         list += fmt::format("<rdf:li>{}</rdf:li>", v);
     return rdf(
         "xmlns:p=\"http://ns.apple.com/pixeldatainfo/1.0/\" "
@@ -176,20 +178,21 @@ inline std::string md5(std::string_view text) {
     return fmt::format("{:02X}", fmt::join(id.ID8, ""));
 }
 
-/// GDepth: blurred (blue) in front, the depth and the sharp original in extended XMP of parts of
-/// `part` bytes.
-inline Bytes gdepthPhoto(std::size_t part = 400, const std::string& format = "RangeInverse",
-                         const std::string& more = "") {
+/// GDepth: a picture in front, the depth and, where there is one, the sharp original in extended
+/// XMP of parts of `part` bytes. `attributes`: what else its XMP says. `segments` come before.
+inline Bytes gdepthPhoto(const Bytes& shown, const std::string& format, ByteSpan depth,
+                         const Bytes& sharp, const std::string& attributes, std::size_t part,
+                         std::vector<Bytes> segments = {}) {
     const std::string spaces =
         "xmlns:D=\"http://ns.google.com/photos/1.0/depthmap/\" "
         "xmlns:I=\"http://ns.google.com/photos/1.0/image/\" "
         "xmlns:N=\"http://ns.adobe.com/xmp/note/\" ";
-    const std::string extended = rdf(spaces + "D:Data=\"" + encodeBase64(depthPng()) +
-                                     "\" I:Data=\"" + encodeBase64(colourJpeg()) + "\"");
+    const std::string extended =
+        rdf(spaces + "D:Data=\"" + encodeBase64(depth) + "\"" +
+            (sharp.empty() ? "" : " I:Data=\"" + encodeBase64(sharp) + "\""));
     const std::string guid = md5(extended);
-    std::vector<Bytes> segments = {
-        xmpSegment(rdf(spaces + "D:Format=\"" + format + "\" D:Near=\"1\" D:Far=\"9\" " + more +
-                       " N:HasExtendedXMP=\"" + guid + "\""))};
+    segments.push_back(xmpSegment(rdf(spaces + "D:Format=\"" + format + "\" " + attributes +
+                                      " N:HasExtendedXMP=\"" + guid + "\"")));
     for (std::size_t at = 0; at < extended.size(); at += part) {
         Bytes content;
         append(content, guid);
@@ -199,7 +202,13 @@ inline Bytes gdepthPhoto(std::size_t part = 400, const std::string& format = "Ra
         segments.push_back(
             segment(0xe1, std::string_view("http://ns.adobe.com/xmp/extension/\0", 35), content));
     }
-    return withSegments(colourJpeg(32, 24, 255), segments);
+    return withSegments(shown, segments);
+}
+/// A small one: blurred (blue) in front, and the sharp original.
+inline Bytes gdepthPhoto(std::size_t part = 400, const std::string& format = "RangeInverse",
+                         const std::string& more = "") {
+    return gdepthPhoto(colourJpeg(32, 24, 255), format, depthPng(), colourJpeg(),
+                       "D:Near=\"1\" D:Far=\"9\" " + more, part);
 }
 
 /// Dynamic Depth: blurred, gain map, sharp, depth. `units` "Meters" and such.

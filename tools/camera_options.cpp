@@ -4,6 +4,7 @@
 
 #include "formats/imagesets/camera_file.hpp"
 #include "formats/stx/stx.hpp"
+#include "lib/geometry/sway.hpp"
 #include "lib/geometry/view_layout.hpp"
 
 namespace stx::tools {
@@ -15,6 +16,18 @@ void noteSplatsUp(glm::dvec3 up, Job& job) {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
+/// Pictures of --sway: two seconds of a stream, which has 25 a second.
+constexpr int kSwayFrames = 50;
+
+Result<void> checkView(int view, std::size_t views) {
+    if (view < static_cast<int>(views)) return {};
+    return fail(ErrorCode::usage, "--view is {}, but the input has {} reference views, from 0",
+                view, views);
+}
+
+int swayCount(const CameraOptions& o) {
+    return o.swayFrames > 0 ? o.swayFrames : kSwayFrames;
+}
 
 }  // namespace
 
@@ -96,6 +109,21 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .range(-360.0, 360.0)
         .group(group);
     command
+        .option("--sway", o.swayPercent,
+                "Cameras on an ellipse around the pose of a reference view (--view K, else the "
+                "first), as far to each side as this percentage of the median distance of what it "
+                "shows, which stays in its place: the moves that one photograph with depth bears")
+        .takes("PERCENT")
+        .range(0.001, 100.0)
+        .group(group);
+    command
+        .option("--frames", o.swayFrames,
+                "Pictures of --sway, once around (default 50; of a film with --times one for each "
+                "of its pictures)")
+        .takes("N")
+        .range(1, 1000000)
+        .group(group);
+    command
         .option(
             "--cameras", o.cameraFile,
             "Every camera of a file (transforms.json, camera_path.json, MIV JSON, cameras.json) or "
@@ -116,17 +144,26 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .group(group);
 }
 
+Result<std::size_t> namedView(int view, const std::vector<ReferenceView>& views) {
+    if (views.empty()) return fail(ErrorCode::invalidInput, "the input has no reference views");
+    STX_CHECK(checkView(view, views.size()));
+    if (view >= 0) return static_cast<std::size_t>(view);
+    const auto first = std::ranges::find(views, false, &ReferenceView::background);
+    return first == views.end() ? 0 : static_cast<std::size_t>(first - views.begin());
+}
+
 Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const CameraContext& context,
                                              Program& program) {
     // An orbit may have a target and an axis.
     const bool pose = !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty()));
-    const int ways = (pose ? 1 : 0) + (o.view >= 0 ? 1 : 0) + (o.orbit > 0 ? 1 : 0) +
+    const bool sways = o.swayPercent > 0;
+    const int ways = (pose ? 1 : 0) + (sways || o.view >= 0 ? 1 : 0) + (o.orbit > 0 ? 1 : 0) +
                      (o.cameraFile.empty() ? 0 : 1);
     if (ways > 1)
         return fail(
             ErrorCode::usage,
-            "--eye/--target/--up, --view, --orbit and --cameras exclude each other; give one (an "
-            "orbit may have --target and --up)");
+            "--eye/--target/--up, --view, --sway, --orbit and --cameras exclude each other; give "
+            "one (an orbit may have --target and --up, and --sway a --view)");
     std::optional<glm::ivec2> size;
     if (!o.size.empty()) {
         STX_TRY(size, parseSize(o.size, program.job.limits));
@@ -140,11 +177,15 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
     if (o.fovDeg && o.orthoHeight)
         return fail(ErrorCode::usage, "--fov and --ortho exclude each other; give one");
 
+    if (context.sway) {
+        STX_TRY(const auto swaying, swayCameras(context.sway->camera, context.sway->distance,
+                                                o.swayPercent / 100, swayCount(o)));
+        std::vector<NovelCamera> out;
+        for (const Camera& camera : swaying) out.push_back({inPicture(camera, size)});
+        return out;
+    }
     if (o.view >= 0) {
-        if (o.view >= static_cast<int>(context.views.size()))
-            return fail(ErrorCode::usage,
-                        "--view is {}, but the input has {} reference views, from 0", o.view,
-                        context.views.size());
+        STX_CHECK(checkView(o.view, context.views.size()));
         return std::vector<NovelCamera>{{inPicture(context.views[o.view], size)}};
     }
     if (!o.cameraFile.empty()) {
@@ -212,18 +253,26 @@ Result<std::vector<NovelCamera>> makeCameras(const CameraOptions& o, const Camer
 Result<int> checkCameraOptions(const CameraOptions& options, const Command& command,
                                Program& program) {
     CameraOptions o = options;
-    const bool own = o.view >= 0 || !o.cameraFile.empty();
+    const bool sways = o.swayPercent > 0;
+    const bool own = o.view >= 0 || sways || !o.cameraFile.empty();
     if (own)
         STX_CHECK(command.refuse({"--fov", "--ortho"},
                                  fmt::format("does not go with {}, whose cameras have their own",
-                                             o.view >= 0 ? "--view" : "--cameras")));
+                                             sways         ? "--sway"
+                                             : o.view >= 0 ? "--view"
+                                                           : "--cameras")));
     if (own || !o.eye.empty() || (o.orbit == 0 && (!o.target.empty() || !o.up.empty())))
         STX_CHECK(command.refuse({"--elevation"}, "is of --orbit"));
     if (o.orbit == 0) STX_CHECK(command.refuse({"--radius", "--start", "--arc"}, "is of --orbit"));
     if (o.cameraFile.empty())
         STX_CHECK(command.refuse({"--dataparser"}, "is of --cameras camera_path.json"));
+    if (!sways) STX_CHECK(command.refuse({"--frames"}, "is of --sway"));
     o.view = -1;  // needs the input
     CameraContext unitCube;
+    if (sways) {
+        unitCube.sway.emplace();
+        unitCube.sway->distance = 1;
+    }
     unitCube.bounds.add(glm::dvec3(-1));
     unitCube.bounds.add(glm::dvec3(1));
     Program quiet;  // the same notes come again, when the cameras are made

@@ -7,6 +7,7 @@
 #include "lib/base/result.hpp"
 #include "lib/geometry/bounds.hpp"
 #include "lib/geometry/camera.hpp"
+#include "lib/model/reference_view.hpp"
 #include "tools/command_line.hpp"
 #include "tools/program.hpp"
 
@@ -21,6 +22,8 @@ struct CameraOptions {
     int orbit = 0;
     double elevationDeg = 15.0, startDeg = 0.0, arcDeg = 360.0;
     double orbitRadius = 0;  ///< 0 = the object fills the picture
+    double swayPercent = 0;  ///< of the median distance; 0 = not given
+    int swayFrames = 0;      ///< 0 = not given
     std::string cameraFile;
     std::string dataparser;  ///< of a camera_path.json; empty: one beside it
     std::string size;
@@ -37,12 +40,22 @@ void addCameraOptions(Command command, CameraOptions& options);
 [[nodiscard]] Result<int> checkCameraOptions(const CameraOptions& options, const Command& command,
                                              Program& program);
 
+/// The pose that --sway is around.
+struct SwayPose {
+    Camera camera;
+    double distance = 0;  ///< median of what the view shows there, scene units
+};
+/// The number of the view that --view names; where that is below 0, which it is when it is not
+/// given, of the first that is not a background view. Errors (usage): none of that number.
+[[nodiscard]] Result<std::size_t> namedView(int view, const std::vector<ReferenceView>& views);
+
 /// What the cameras are made for: the object and its reference views.
 struct CameraContext {
     Bounds bounds;              ///< of the object
     glm::dvec3 origin{0.0};     ///< what bounds and views count from; options are in the world
     std::vector<Camera> views;  ///< of the reference views; empty for a mesh
     std::optional<glm::dvec3> up = {};  ///< of a cloud of splats: SplatCloud::up
+    std::optional<SwayPose> sway = {};  ///< where --sway is given
 };
 
 /// Notes that a cloud of splats is not taken to stand on +Y.

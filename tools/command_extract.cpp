@@ -26,6 +26,10 @@ struct ExtractOptions {
     std::optional<double> time;
     PointWriteOptions points;
     std::string as;
+    int view = -1;
+    int triangles = 0;
+    std::string colour;
+    std::optional<int> quality;
     int mostSplats = 0;
     OpenOptions open;
 };
@@ -64,49 +68,87 @@ Points pointsOf(const Bundle& bundle) {
     return out;
 }
 
-Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
-    const Stopwatch watch;
-    ExtractOptions o = options;
-    STX_TRY(o.output, folderTarget(options.output, {".glb", ".html", ".ply", ".drc", ".spz"},
-                                   "a folder, .glb, .html, .ply, .spz or .drc"));
-    const auto dotted = std::filesystem::path(o.output).extension();
+/// Who asks for fewer triangles wants a small file, and has given up the exact one.
+SurfacesOptions modelOf(const ExtractOptions& o) {
+    const bool jpeg = o.colour.empty() ? o.triangles > 0 : o.colour == "jpeg";
+    return {.mostTriangles = static_cast<std::size_t>(o.triangles),
+            .jpegQuality = jpeg ? o.quality.value_or(92) : 0};
+}
+
+/// What is written.
+struct Wanted {
+    std::optional<ExtractAs> as;   ///< nothing: a folder or a page
+    std::filesystem::path ending;  ///< of a file
+    bool splats = false, points = false, picture = false;
+    bool shown = false;  ///< a file that others show
+};
+
+/// What the options ask for; puts the name of a folder right. Errors (usage): those of
+/// folderTarget() and extractedAs().
+Result<Wanted> wantedOf(ExtractOptions& o) {
+    const std::string given = o.output;
+    STX_TRY(o.output,
+            folderTarget(given, {".glb", ".html", ".ply", ".drc", ".spz", ".png", ".jpg", ".jpeg"},
+                         "a folder, .glb, .html, .ply, .spz, .drc, .png or .jpg"));
     std::error_code ec;
-    const bool plain = o.output == options.output && !std::filesystem::is_directory(o.output, ec);
-    STX_TRY(const auto as, extractedAs(o.as, plain ? dotted.string() : ""));
-    const bool splats = as == ExtractAs::splats, points = as == ExtractAs::points,
-               shown = plain && isShown(dotted) && !splats;
-    const auto ending = points ? dotted : std::filesystem::path();
-    if (shown)
+    const bool plain = o.output == given && !std::filesystem::is_directory(o.output, ec);
+    Wanted w;
+    STX_TRY(w.as, extractedAs(o.as, plain ? o.output : ""));
+    if (plain) w.ending = std::filesystem::path(o.output).extension();
+    w.splats = w.as == ExtractAs::splats;
+    w.points = w.as == ExtractAs::points;
+    w.picture = w.as == ExtractAs::rgbd || w.as == ExtractAs::pair;
+    w.shown = isShown(w.ending) && !w.splats;
+    return w;
+}
+
+/// Errors (usage) for options that cannot matter to what is written.
+Result<void> checkOptions(const ExtractOptions& o, const Wanted& w, const Command& command) {
+    if (!(w.shown && w.ending == ".glb"))
+        STX_CHECK(command.refuse({"--triangles", "--colour"}, "is of a model of surfaces, .glb"));
+    if (modelOf(o).jpegQuality == 0) STX_CHECK(command.refuse({"--quality"}, "is of JPEG"));
+    if (!w.picture) STX_CHECK(command.refuse({"--view"}, "is of a picture with depth"));
+    if (w.shown || w.picture || w.splats || w.points)
         STX_CHECK(command.refuse({"--cameras", "--depth"},
-                                 fmt::format("is of a folder; -o {} is a file", o.output)));
-    if (splats)
-        STX_CHECK(
-            command.refuse({"--cameras", "--depth"},
-                           fmt::format("is of a folder; -o {} is a file of splats", o.output)));
-    else
+                                 fmt::format("is of a folder; -o {} is a file{}", o.output,
+                                             w.splats   ? " of splats"
+                                             : w.points ? " of points"
+                                                        : "")));
+    if (!w.splats)
         STX_CHECK(command.refuse({"--max-splats"}, "is of splats; give --as splats, too"));
-    if (shown && dotted == ".html")
+    if (w.ending == ".html")
         STX_CHECK(command.refuse({"--time"}, "is of what shows one moment; a page plays the film"));
-    if (points)
-        STX_CHECK(
-            command.refuse({"--cameras", "--depth"},
-                           fmt::format("is of a folder; -o {} is a file of points", o.output)));
     if (o.cameras == "colmap")
         STX_CHECK(command.refuse({"--depth"},
                                  "does not go with --cameras colmap, whose depth is floats"));
-    if (ending != ".drc")
+    if (!(w.points && w.ending == ".drc"))
         STX_CHECK(command.refuse({"--position-bits", "--normal-bits"}, "is of .drc files"));
+    return {};
+}
+
+Result<int> extract(const ExtractOptions& options, const Command& command, Program& program) {
+    const Stopwatch watch;
+    ExtractOptions o = options;
+    STX_TRY(const Wanted wanted, wantedOf(o));
+    STX_CHECK(checkOptions(o, wanted, command));
     STX_CHECK(checkTarget(o.output, program));
     preloadCodecs(o.input);
-    if (splats)
+    if (wanted.splats)
         return extractSplats(o.input, o.open, o.output, o.time, o.refine,
                              {.most = static_cast<std::size_t>(o.mostSplats)}, program);
-    if (shown) return extractShown(o.input, o.open, o.output, o.time, o.refine, program);
+    if (wanted.picture)
+        return extractPicture(
+            o.input, o.open, o.output,
+            wanted.as == ExtractAs::pair ? DepthPicture::pair : DepthPicture::sideBySide, o.view,
+            o.time, o.refine, program);
+    if (wanted.shown)
+        return extractShown(o.input, o.open, o.output, o.time, o.refine, modelOf(o), program);
+    const bool points = wanted.points, draco = wanted.ending == ".drc";
     STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
     STX_TRY(frames, refined(std::move(frames), o.refine,
-                            !points            ? peak::kExport
-                            : ending == ".drc" ? peak::kPointsDraco
-                                               : peak::kPoints));
+                            !points ? peak::kExport
+                            : draco ? peak::kPointsDraco
+                                    : peak::kPoints));
     const Timeline timeline = frames->timeline();
     STX_TRY(const std::size_t moment,
             momentOf(o.time, timeline, points ? "points are" : nullptr, o.input, program.job));
@@ -117,7 +159,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
         STX_TRY(const auto bundle, frames->frame(moment, program.job));
         views = bundle.views.size();
         pointCount = bundle.pointCount();
-        STX_CHECK(checkPeak(ending == ".drc" ? peak::kPointsDraco : peak::kPoints, bundle.views,
+        STX_CHECK(checkPeak(draco ? peak::kPointsDraco : peak::kPoints, bundle.views,
                             program.job.limits));
         const auto found = pointsOf(bundle);
         PointCloud cloud;
@@ -171,7 +213,8 @@ void addExtract(CommandLine& line, Program& program) {
     Command c = line.add(
         "extract",
         "Images and cameras of a bundle as plain files, its points as .ply or .drc, Gaussian "
-        "splats, a model of surfaces, or a page that draws it in any browser\n\n"
+        "splats, a model of surfaces, a picture with depth, or a page that draws it in any "
+        "browser\n\n"
         "  stx extract model.mp4 -o folder           transforms.json and PNGs\n"
         "  stx extract model.mp4 -o folder --cameras miv\n"
         "  stx extract film.mp4 -o folder            all frames, with their times\n"
@@ -179,14 +222,18 @@ void addExtract(CommandLine& line, Program& program) {
         "  stx extract model.mp4 -o cloud.ply --as splats    for any viewer of Gaussian splats\n"
         "  stx extract film.mp4 -o film_%04d.spz             a file of splats for each frame\n"
         "  stx extract model.mp4 -o model.glb        surfaces with textures, for any glTF viewer\n"
-        "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n\n"
+        "  stx extract model.mp4 -o view.html        one file for browsers (WebGL 2)\n"
+        "  stx extract photo.mp4 -o photo.glb --triangles 200000\n"
+        "  stx extract photo.mp4 -o photo_rgbd.png   colour beside depth, white near\n"
+        "  stx extract photo.mp4 -o photo.jpg        and its depth in photo_depth.jpg\n\n"
         "The page is turned by dragging, by keys and by touch, under a light that moves, and "
         "plays\nfilms. Its address takes a camera: "
         "view.html#eye=0,1,3&target=0,0,0&fov=40.");
     auto o = std::make_shared<ExtractOptions>();
     c.option("BUNDLE", o->input, "Bundle, film or atlas").required();
     c.option("-o,--output", o->output,
-             "Folder, points.ply, points.drc, cloud.spz, model.glb or view.html")
+             "Folder, points.ply, points.drc, cloud.spz, model.glb, view.html, or a picture with "
+             "depth: NAME.jpg, NAME_rgbd.png")
         .required()
         .takes("OUT");
     c.option(
@@ -204,14 +251,28 @@ void addExtract(CommandLine& line, Program& program) {
         .takes("T");
     refineOption(c, o->refine);
     c.option("--as", o->as,
-             "What a file holds: points (.ply, .drc), splats (.ply, .spz, .glb) or surfaces (.glb) "
-             "(default: .ply and .drc points, .spz splats, .glb surfaces)")
-        .oneOf({"points", "splats", "surfaces"});
+             "What a file holds: points (.ply, .drc), splats (.ply, .spz, .glb), surfaces (.glb), "
+             "rgbd (.png, .jpg: colour on the left, depth on the right) or pair (colour, and depth "
+             "in NAME_depth.jpg) (default: .ply and .drc points, .spz splats, .glb surfaces, "
+             "NAME_rgbd.png rgbd, other pictures pair). Depth of pictures is white near")
+        .oneOf({"points", "splats", "surfaces", "rgbd", "pair"});
+    c.option("--view", o->view, "Of a picture with depth: reference view K (default: the first)")
+        .takes("K")
+        .notNegative();
     c.option("--max-splats", o->mostSplats,
              "At most so many splats: flat pieces of one colour become larger ones (default: one "
              "for each point; a pruned atlas has each place once)")
         .range(1, 2000000000)
         .takes("N");
+    c.option("--triangles", o->triangles,
+             "Of surfaces (.glb): at most about so many triangles; what is least seen from beside "
+             "the views goes first (default: all)")
+        .range(1, 2000000000)
+        .takes("N");
+    c.option("--colour", o->colour,
+             "Of surfaces (.glb): png (exact) or jpeg (default png; jpeg with --triangles)")
+        .oneOf({"png", "jpeg"});
+    c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.objectOption(o->open.object);

@@ -253,7 +253,8 @@ Result<Drawn> drawPictures(const RenderOptions& o, DrawnScene& scene,
                                         more ? pictures[i + 1].time : std::optional<double>());
             if (!now) return tl::unexpected(now.error().at(fmt::format("picture {}", i)));
             drawn.renderer = *now;
-            if (o.camera.view >= 0) camera = ofView(scene.moving->views(), o, camera);
+            if (o.camera.view >= 0 && !(o.camera.swayPercent > 0))
+                camera = ofView(scene.moving->views(), o, camera);
         } else if (more && !o.around) {
             drawn.renderer->expect(pictures[i + 1].camera);
         }
@@ -492,7 +493,8 @@ void addRender(CommandLine& line, Program& program) {
         "Novel views of a bundle, an atlas or a mesh\n\n"
         "  stx render model.mp4 -o view.png --eye 0,1,4 --target 0,0,0\n"
         "  stx render atlas -o orbit_%04d.png --orbit 60 --elevation 20\n"
-        "  stx render model.exr -o - --orbit 250 --file-format y4m | ffmpeg -i - orbit.mp4");
+        "  stx render model.exr -o - --orbit 250 --file-format y4m | ffmpeg -i - orbit.mp4\n"
+        "  stx render photo.mp4 -o wiggle_%03d.png --sway 5");
     auto o = std::make_shared<RenderOptions>();
     c.option("IN", o->input, "Bundle, atlas or mesh");
     c.option("-o,--output", o->output,

@@ -8,6 +8,8 @@
 #include "formats/viewer/surfaces_glb.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/stopwatch.hpp"
+#include "lib/model/peak_memory.hpp"
+#include "tools/camera_options.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
 
@@ -49,15 +51,16 @@ Result<Shown> writePage(const std::string& input, const OpenOptions& open,
 /// A model of one moment.
 Result<Shown> writeModel(const std::string& input, const OpenOptions& open,
                          const std::string& output, const std::optional<double>& time,
-                         const std::string& refine, Program& program) {
+                         const std::string& refine, const SurfacesOptions& options,
+                         Program& program) {
     STX_TRY(auto frames, openSequence(input, open, program.job));
-    STX_TRY(frames, refined(std::move(frames), refine, peak::kSurfaces));
+    STX_TRY(frames, refined(std::move(frames), refine,
+                            options.mostTriangles > 0 ? peak::kFewerTriangles : peak::kSurfaces));
     STX_TRY(const auto moment,
             momentOf(time, frames->timeline(), "a model is", input, program.job));
     STX_TRY(auto bundle, frames->frame(moment, program.job));
     Shown out{"", bundle.views.size(), bundle.pointCount()};
-    STX_TRY(const auto report,
-            writeSurfaces(output, std::move(bundle), program.outputOptions(), program.job));
+    STX_TRY(const auto report, writeSurfaces(output, std::move(bundle), options, program.job));
     out.what = counted(report.views, "view") + ", " +
                counted(static_cast<std::size_t>(report.triangles), "triangle");
     if (report.points > 0)
@@ -65,20 +68,9 @@ Result<Shown> writeModel(const std::string& input, const OpenOptions& open,
     return out;
 }
 
-}  // namespace
-
-bool isShown(const std::string& ending) {
-    return ending == ".html" || ending == ".glb";
-}
-
-Result<int> extractShown(const std::string& input, const OpenOptions& open,
-                         const std::string& output, const std::optional<double>& time,
-                         const std::string& refine, Program& program) {
-    const Stopwatch watch;
-    STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
-                                  ? writeModel(input, open, output, time, refine, program)
-                                  : writePage(input, open, output, refine, program));
-    const double seconds = watch.seconds();
+/// The notes, the last line and the report.
+Result<int> finish(const std::string& input, const std::string& output, const Shown& done,
+                   double seconds, Program& program) {
     program.sayNotes();
     program.say(fmt::format("{} ({}) → {} ({}), {}, {}",
                             std::filesystem::path(input).filename().string(),
@@ -91,6 +83,48 @@ Result<int> extractShown(const std::string& input, const OpenOptions& open,
                                    {"points", done.points},
                                    {"seconds", seconds}}));
     return 0;
+}
+
+}  // namespace
+
+bool isShown(const std::string& ending) {
+    return ending == ".html" || ending == ".glb";
+}
+
+Result<int> extractShown(const std::string& input, const OpenOptions& open,
+                         const std::string& output, const std::optional<double>& time,
+                         const std::string& refine, const SurfacesOptions& model,
+                         Program& program) {
+    const Stopwatch watch;
+    SurfacesOptions written = model;
+    written.output = program.outputOptions();
+    STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
+                                  ? writeModel(input, open, output, time, refine, written, program)
+                                  : writePage(input, open, output, refine, program));
+    return finish(input, output, done, watch.seconds(), program);
+}
+
+Result<int> extractPicture(const std::string& input, const OpenOptions& open,
+                           const std::string& output, DepthPicture kind, int view,
+                           const std::optional<double>& time, const std::string& refine,
+                           Program& program) {
+    const Stopwatch watch;
+    if (kind == DepthPicture::pair) STX_CHECK(checkTarget(depthFileOf(output), program));
+    STX_TRY(auto frames, openSequence(input, open, program.job));
+    STX_TRY(frames, refined(std::move(frames), refine, peak::kExport));
+    STX_TRY(const auto moment,
+            momentOf(time, frames->timeline(), "a picture is", input, program.job));
+    STX_TRY(const auto bundle, frames->frame(moment, program.job));
+    STX_CHECK(checkPeak(peak::kExport, bundle.views, program.job.limits));
+    STX_TRY(const std::size_t number, namedView(view, bundle.views));
+    const ReferenceView& shown = bundle.views[number];
+    STX_CHECK(exportPicture(shown, output, kind, program.outputOptions(), program.job));
+    const std::string what = fmt::format(
+        "view {} '{}', {}x{}{}", number, shown.name, shown.depth.width(), shown.depth.height(),
+        kind == DepthPicture::pair
+            ? fmt::format(" and its depth, {}", depthFileOf(output).filename().string())
+            : " beside its depth");
+    return finish(input, output, {what, 1, shown.pointCount()}, watch.seconds(), program);
 }
 
 }  // namespace stx::tools

@@ -1,5 +1,8 @@
 #include "tools/extract_splats.hpp"
 
+#include <algorithm>
+#include <map>
+
 #include <nlohmann/json.hpp>
 
 #include "formats/any/sequences.hpp"
@@ -11,29 +14,34 @@
 
 namespace stx::tools {
 
-Result<std::optional<ExtractAs>> extractedAs(const std::string& as, const std::string& ending) {
-    struct Row {
-        const char* ending;
-        ExtractAs usual;
-        std::vector<const char*> words;
-    };
-    static const Row kRows[] = {{".ply", ExtractAs::points, {"points", "splats"}},
-                                {".drc", ExtractAs::points, {"points"}},
-                                {".spz", ExtractAs::splats, {"splats"}},
-                                {".glb", ExtractAs::surfaces, {"surfaces", "splats"}}};
-    for (const Row& row : kRows) {
-        if (row.ending != ending) continue;
-        if (as.empty()) return row.usual;
-        for (const char* word : row.words)
-            if (word == as)
-                return as == "splats"   ? ExtractAs::splats
-                       : as == "points" ? ExtractAs::points
-                                        : ExtractAs::surfaces;
-        return fail(ErrorCode::usage, "--as {}: a {} file is written as {} here", as, ending,
-                    fmt::join(row.words, " or "));
+Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
+                                             const std::filesystem::path& file) {
+    using enum ExtractAs;
+    static const std::map<std::string, ExtractAs> kWords = {{"points", points},
+                                                            {"splats", splats},
+                                                            {"surfaces", surfaces},
+                                                            {"rgbd", rgbd},
+                                                            {"pair", pair}};
+    // The first of each is the usual one.
+    static const std::map<std::string, std::vector<const char*>> kEndings = {
+        {".ply", {"points", "splats"}},   {".drc", {"points"}},       {".spz", {"splats"}},
+        {".glb", {"surfaces", "splats"}}, {".png", {"pair", "rgbd"}}, {".jpg", {"pair", "rgbd"}},
+        {".jpeg", {"pair", "rgbd"}}};
+    const std::string ending = file.extension().string();
+    const auto words = kEndings.find(ending);
+    if (words == kEndings.end()) {
+        if (as.empty()) return std::nullopt;
+        return fail(ErrorCode::usage, "--as is of .ply, .spz, .drc, .glb, .png and .jpg files");
     }
-    if (as.empty()) return std::nullopt;
-    return fail(ErrorCode::usage, "--as is of .ply, .spz, .drc and .glb files");
+    if (as.empty()) {
+        // As programs that take such pictures know them.
+        if (words->second[0] == std::string("pair") && file.stem().string().ends_with("_rgbd"))
+            return rgbd;
+        return kWords.at(words->second[0]);
+    }
+    if (std::ranges::find(words->second, as) != words->second.end()) return kWords.at(as);
+    return fail(ErrorCode::usage, "--as {}: a {} file is written as {} here", as, ending,
+                fmt::join(words->second, " or "));
 }
 
 Result<int> extractSplats(const std::string& input, const OpenOptions& open,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -10,13 +11,13 @@
 namespace stx::tools {
 
 /// What `stx extract` writes as a file.
-enum class ExtractAs { points, splats, surfaces };
+enum class ExtractAs { points, splats, surfaces, rgbd, pair };
 
 /// What a file is written as: what `as` says (empty: not given), else splats for .spz, surfaces for
-/// .glb and points for .ply and .drc; nothing for other endings, which take no --as. Errors
-/// (usage): an ending that does not hold it.
+/// .glb, points for .ply and .drc, rgbd for NAME_rgbd.png and .jpg, and pair for other pictures;
+/// nothing for other endings, which take no --as. Errors (usage): an ending that does not hold it.
 [[nodiscard]] Result<std::optional<ExtractAs>> extractedAs(const std::string& as,
-                                                           const std::string& ending);
+                                                           const std::filesystem::path& file);
 
 /// `stx extract` into a file of splats, or of a film into one for each frame where `output` has a
 /// number (%04d): says what was written and reports it. Errors: those of momentOf(), of the input,

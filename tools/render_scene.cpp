@@ -1,6 +1,7 @@
 #include "tools/render_scene.hpp"
 
 #include "formats/any/sequences.hpp"
+#include "lib/base/median.hpp"
 #include "lib/model/splat_cloud.hpp"
 
 namespace stx::tools {
@@ -29,13 +30,59 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
              "they are of --mode splat");
 }
 
+void addDistance(float depth, std::vector<float>& distances) {
+    if (hasPoint(depth)) distances.push_back(depth);
+}
+
+/// The pose of a view, and how far away what it shows is.
+Result<SwayPose> swayPose(const ReferenceView& view, std::vector<float> distances) {
+    if (distances.empty())
+        return fail(ErrorCode::invalidInput,
+                    "view '{}' has no depth, so that --sway has no distance to go by", view.name);
+    return SwayPose{view.camera, medianOf(std::move(distances))};
+}
+
+Result<SwayPose> swayPose(const CameraOptions& o, const Bundle& bundle) {
+    STX_TRY(const std::size_t number, namedView(o.view, bundle.views));
+    const ReferenceView& view = bundle.views[number];
+    std::vector<float> distances;
+    for (const float depth : view.depth.pixels()) addDistance(depth, distances);
+    return swayPose(view, std::move(distances));
+}
+
+Result<SwayPose> swayPose(const CameraOptions& o, const Atlas& atlas) {
+    STX_TRY(const std::size_t number, namedView(o.view, atlas.views));
+    std::vector<float> distances;
+    for (const AtlasRectangle& r : atlas.rectangles) {
+        if (r.view != static_cast<int>(number)) continue;
+        const Image<float>& depth = atlas.pages[static_cast<std::size_t>(r.page)].depth;
+        for (int y = 0; y < r.atlasHeight(); ++y)
+            for (int x = 0; x < r.atlasWidth(); ++x)
+                addDistance(depth.at(r.atlasX + x, r.atlasY + y), distances);
+    }
+    return swayPose(atlas.views[number], std::move(distances));
+}
+
+/// Of a film: the pose of its first picture.
+Result<SwayPose> swayPose(const RenderOptions& o, Sequence& frames, const Job& job) {
+    STX_TRY(const auto times, timesOf(o.time, frames.timeline()));
+    Job quiet;  // the frame is read again when it is drawn, and says the same then
+    quiet.limits = job.limits;
+    STX_TRY(const auto bundle, frames.frame(frames.timeline().frameAt(times.front()), quiet));
+    return swayPose(o.camera, bundle);
+}
+
 }  // namespace
 
 Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& settings,
                              const Command& command, Program& program) {
     DrawnScene scene;
+    const bool sways = o.camera.swayPercent > 0;
     if (o.time.any()) {
         STX_TRY(auto frames, openSequence(o.input, o.open, program.job));
+        if (sways) {
+            STX_TRY(scene.context.sway, swayPose(o, *frames, program.job));
+        }
         scene.moving = std::make_unique<MovingPictures>(std::move(frames), settings, o.backend,
                                                         o.device, program.job);
         if (lightsByEnvironment(o)) scene.moving->lightByEnvironment();
@@ -50,17 +97,25 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
     }
     STX_TRY(scene.model, stx::open(o.input, o.open, program.job));
     noteUnused(scene.model, o, command, program);
-    const auto addViews = [&](const auto& seen) {
+    const auto addViews = [&](const auto& seen) -> Result<void> {
         for (const auto& v : seen.views) scene.context.views.push_back(v.camera);
         scene.points = seen.pointCount();
         scene.environment = settings.ownEnvironment && seen.environment;
+        if (sways) {
+            STX_TRY(scene.context.sway, swayPose(o.camera, seen));
+        }
+        return {};
     };
     if (const auto* mesh = std::get_if<Mesh>(&scene.model)) {
+        if (sways)
+            return fail(ErrorCode::usage,
+                        "--sway moves around the pose of a reference view, and a mesh has none; "
+                        "--orbit goes around it");
         STX_CHECK(mesh->check());
         if (mesh->splats) scene.context.up = mesh->splats->up;
     }
-    if (const auto* bundle = std::get_if<Bundle>(&scene.model)) addViews(*bundle);
-    if (const auto* atlas = std::get_if<Atlas>(&scene.model)) addViews(*atlas);
+    if (const auto* bundle = std::get_if<Bundle>(&scene.model)) STX_CHECK(addViews(*bundle));
+    if (const auto* atlas = std::get_if<Atlas>(&scene.model)) STX_CHECK(addViews(*atlas));
     scene.environment = scene.environment || settings.environment;
     scene.context.bounds = boundsOf(scene.model);
     scene.context.origin = originOf(scene.model);
@@ -69,7 +124,12 @@ Result<DrawnScene> openScene(const RenderOptions& o, const RenderSettings& setti
 
 Result<std::vector<NovelCamera>> picturesOf(const RenderOptions& o, const DrawnScene& scene,
                                             Program& program) {
-    STX_TRY(auto cameras, makeCameras(o.camera, scene.context, program));
+    CameraOptions wanted = o.camera;
+    if (scene.moving && wanted.swayPercent > 0 && wanted.swayFrames == 0) {
+        STX_TRY(const auto times, timesOf(o.time, scene.moving->timeline()));
+        if (times.size() > 1) wanted.swayFrames = static_cast<int>(times.size());
+    }
+    STX_TRY(auto cameras, makeCameras(wanted, scene.context, program));
     if (!scene.moving) return cameras;
     const auto noted = [&](std::vector<NovelCamera> pictures) {
         std::vector<double> times;

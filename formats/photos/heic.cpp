@@ -1,6 +1,9 @@
 // HEIC of Apple's phones: the picture is the primary item, the depth an auxiliary one.
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
 
 #include "formats/files/byte_io.hpp"
 #include "formats/images/exif.hpp"
@@ -20,10 +23,62 @@ struct ItemTurn {
     struct Step {
         int quarters = 0;  ///< clockwise
         bool mirrors = false, leftAndRight = false;
-        glm::ivec2 size{0};  ///< before it
+        glm::ivec2 corner{0};  ///< of what is left of it
+        glm::ivec2 size{0};    ///< before it
     };
     std::vector<Step> steps;
+    /// What is cut out of the stored picture, as shares of its size; none: it is whole.
+    std::optional<std::pair<glm::dvec2, glm::dvec2>> cut;
 };
+
+/// Cuts a picture as its `clap` says (ISO/IEC 14496-12, 12.1.4): the size as two fractions, then
+/// how far its middle is from the picture's, both counted between the outer pixels' centres.
+Result<void> cutOut(ByteSpan clap, const char* what, ItemTurn& turn) {
+    const auto wrong = [&] {
+        return fail(ErrorCode::invalidInput,
+                    "{} is cut by its file (clap) to what is not in its {}x{} pixels", what,
+                    turn.upright.x, turn.upright.y);
+    };
+    if (clap.size() < 32) return wrong();
+    glm::dvec2 first(0), last(0);
+    ItemTurn::Step step;
+    step.size = turn.upright;
+    for (int k = 0; k < 2; ++k) {
+        const auto number = [&](std::size_t index) { return bigEndian(clap, 4 * index, 4); };
+        const std::size_t at = 2 * static_cast<std::size_t>(k);
+        if (number(at + 1) == 0 || number(at + 5) == 0) return wrong();
+        const double length = std::round(static_cast<double>(number(at)) / number(at + 1));
+        const double off =
+            static_cast<double>(static_cast<std::int32_t>(number(at + 4))) / number(at + 5);
+        const double from = std::floor(off + (step.size[k] - 1) / 2.0 - (length - 1) / 2);
+        if (!(length >= 1 && from >= 0 && from + length <= step.size[k])) return wrong();
+        step.corner[k] = static_cast<int>(from);
+        turn.upright[k] = static_cast<int>(length);
+        first[k] = from / step.size[k];
+        last[k] = (from + length) / step.size[k];
+    }
+    turn.cut = {first, last};
+    turn.steps.push_back(step);
+    return {};
+}
+
+/// A picture and its depth are cut alike, within what a pixel of the depth is.
+bool cutAlike(const ItemTurn& picture, const ItemTurn& depth) {
+    constexpr double kSamePlace = 0.01;  // of the size, as for the shapes of both
+    if (!picture.cut || !depth.cut) return picture.cut.has_value() == depth.cut.has_value();
+    const auto near = [](glm::dvec2 a, glm::dvec2 b) {
+        return glm::all(glm::lessThan(glm::abs(a - b), glm::dvec2(kSamePlace)));
+    };
+    return near(picture.cut->first, depth.cut->first) &&
+           near(picture.cut->second, depth.cut->second);
+}
+
+PhotoIntrinsics afterStep(PhotoIntrinsics k, const ItemTurn::Step& step) {
+    k.cx -= step.corner.x;
+    k.cy -= step.corner.y;
+    if (step.mirrors) return mirrored(k, step.size, step.leftAndRight);
+    return turned(k, step.size, step.quarters);
+}
 
 Result<ItemTurn> turnOf(const HeifBoxes& boxes, const HeifBoxes::Item& item, const char* what) {
     ItemTurn turn;
@@ -36,10 +91,10 @@ Result<ItemTurn> turnOf(const HeifBoxes& boxes, const HeifBoxes::Item& item, con
     turn.stored = turn.upright = {static_cast<int>(w), static_cast<int>(h)};
     for (const std::size_t index : item.properties) {
         const auto& property = boxes.properties[index];
-        if (property.type == "clap")
-            return fail(ErrorCode::unsupported,
-                        "{} is cut by its file (clap), which is not read; save it again, cut",
-                        what);
+        if (property.type == "clap") {
+            STX_CHECK(cutOut(property.content, what, turn));
+            continue;
+        }
         if (property.content.empty()) continue;
         const unsigned value = byteAt(property.content, 0) & 3;
         ItemTurn::Step step;
@@ -157,6 +212,10 @@ Result<void> readHeic(Photo& photo, const Limits& limits) {
         }
         if (photo.depth.coding != PhotoImage::Coding::none) continue;
         STX_TRY(const ItemTurn depth, turnOf(boxes, item->second, "its depth"));
+        if (!cutAlike(turn, depth))
+            return fail(ErrorCode::unsupported,
+                        "its picture and its depth are not cut alike (clap), so that it is not "
+                        "known what of one belongs to the other; save it again without the cut");
         photo.depth = {PhotoImage::Coding::heif, *copy,           copy,
                        reference.from,           depth.upright.x, depth.upright.y};
         photo.coding = "white is near";
@@ -169,9 +228,7 @@ Result<void> readHeic(Photo& photo, const Limits& limits) {
         photo.format = "Apple HEIC";
         if (photo.intrinsics)
             for (const auto& step : turn.steps)
-                photo.intrinsics = step.mirrors
-                                       ? mirrored(*photo.intrinsics, step.size, step.leftAndRight)
-                                       : turned(*photo.intrinsics, step.size, step.quarters);
+                photo.intrinsics = afterStep(*photo.intrinsics, step);
     }
     return {};
 }

@@ -3,6 +3,7 @@
 #include "formats/files/messages.hpp"
 #include "formats/images/frames.hpp"
 #include "formats/images/images.hpp"
+#include "formats/photos/photo.hpp"
 #include "formats/stx/stx.hpp"
 #include "lib/render/compose/environment_behind.hpp"
 #include "lib/render/factory.hpp"
@@ -23,6 +24,16 @@ Result<std::unique_ptr<Renderer>> borrow(const Model& model, const RenderSetting
     auto renderer = makeMeshRenderer(mesh, settings, job);
     if (settings.environment) renderer = withEnvironment(std::move(renderer), settings.environment);
     return renderer;
+}
+
+/// The picture of a HEIF file, upright.
+Result<Rgba8Image> heifPicture(Bytes bytes, Job& job) {
+    STX_TRY(const auto photo, photos::openPhoto(std::make_shared<const Bytes>(std::move(bytes)),
+                                                {.needsDepth = false}, job.limits));
+    std::string profile;
+    STX_TRY(auto picture, photos::decodeColour(photo, profile, job));
+    if (!profile.empty()) job.note(profile);
+    return picture;
 }
 
 /// A renderer together with what it draws from.
@@ -86,8 +97,12 @@ Result<Frame> render(const Model& model, const Camera& camera, const RenderSetti
 }
 
 Result<Picture> openPicture(const std::filesystem::path& path, Job& job) {
-    STX_TRY(const auto bytes, readFile(path, job.limits));
+    STX_TRY(auto bytes, readFile(path, job.limits));
     Picture picture;
+    if (photos::isHeif(bytes)) {
+        STX_TRY(picture.coded, within(inQuotes(path.string()), heifPicture(std::move(bytes), job)));
+        return picture;
+    }
     if (probeImage(bytes)) {
         STX_TRY(picture.coded, decodeRgba8(bytes, path.string(), job.limits));
         return picture;

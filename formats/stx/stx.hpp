@@ -235,8 +235,9 @@ struct Picture {
     [[nodiscard]] bool isLinear() const { return !linear.empty(); }
 };
 
-/// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...). OpenEXR is
-/// its display window; what is not stored of it is black, and transparent where the file has alpha.
+/// Opens a picture of any format that the codecs know (PNG, JPEG, TIFF, OpenEXR, ...), and of HEIC
+/// without its depth. OpenEXR is its display window; what is not stored of it is black, and
+/// transparent where the file has alpha.
 /// Errors: io, invalidInput, unsupported (the module of image codecs is not there).
 [[nodiscard]] Result<Picture> openPicture(const std::filesystem::path& path, Job& job);
 

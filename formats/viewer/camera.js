@@ -28,6 +28,12 @@ function turned(v, axis, angle) {
     return plus(plus(times(v, c), times(cross(axis, v), s)), times(axis, dot(axis, v) * (1 - c)));
 }
 
+// The arm from a target to an eye, turned from `home` by an angle of `most` at most.
+function armWithin(arm, home, most) {
+    const angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), unit(home)))));
+    return angle <= most ? arm : times(turned(unit(home), unit(cross(home, arm)), most), lengthOf(arm));
+}
+
 // A camera at `eye` that looks at `target`; `fov` is vertical, in degrees.
 function lookAt({eye, target, up, fov}, width, height) {
     const back = unit(minus(eye, target));

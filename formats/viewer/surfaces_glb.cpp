@@ -10,9 +10,11 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/images/images.hpp"
+#include "formats/viewer/fewer_triangles.hpp"
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/viewer_page.hpp"
 #include "lib/base/counted.hpp"
+#include "lib/model/peak_memory.hpp"
 #include "lib/render/surface/view_surfaces.hpp"
 
 namespace stx {
@@ -211,14 +213,13 @@ Result<void> checkPlaces(const ReferenceView& view, const std::vector<glm::vec3>
 
 class Writer {
   public:
-    Writer(const Bundle& bundle, Job& job) : bundle_(bundle), job_(job) {
+    Writer(const Bundle& bundle, int jpegQuality, Job& job)
+        : bundle_(bundle), jpegQuality_(jpegQuality), job_(job) {
         lit_ = std::ranges::all_of(bundle.views,
                                    [](const ReferenceView& v) { return v.hasNormals(); });
     }
 
     Result<void> add(const ReferenceView& view, const ViewSurface& surface) {
-        STX_CHECK(checkPlaces(view, surface.positions));
-        STX_CHECK(checkPlaces(view, surface.lonePositions));
         if (!surface.triangles.empty()) {
             STX_CHECK(addSurface(view, surface));
         }
@@ -281,16 +282,19 @@ class Writer {
         std::vector<glm::u8vec3> rgb(colour.count());
         std::ranges::transform(colour.pixels(), rgb.begin(),
                                [](glm::u8vec4 c) { return glm::u8vec3(c); });
-        STX_TRY(const Bytes png,
-                encodePng(colour.width(), colour.height(), 3, 8, rgb.data(), true));
+        const bool jpeg = jpegQuality_ > 0;
+        STX_TRY(const Bytes file,
+                jpeg ? encodeJpeg(colour.width(), colour.height(), 3, &rgb[0].r, jpegQuality_)
+                     : encodePng(colour.width(), colour.height(), 3, 8, rgb.data(), true));
         if (model_.root()["samplers"].empty())
             model_.add("samplers", {{"magFilter", kLinear},
                                     {"minFilter", kLinearMipmaps},
                                     {"wrapS", kClamp},
                                     {"wrapT", kClamp}});
-        const std::size_t image = model_.add("images", {{"name", view.name},
-                                                        {"mimeType", "image/png"},
-                                                        {"bufferView", model_.addBytes(png, 0)}});
+        const std::size_t image =
+            model_.add("images", {{"name", view.name},
+                                  {"mimeType", jpeg ? "image/jpeg" : "image/png"},
+                                  {"bufferView", model_.addBytes(file, 0)}});
         const std::size_t texture = model_.add("textures", {{"sampler", 0}, {"source", image}});
         const std::size_t material =
             addMaterial({{"baseColorTexture", {{"index", texture}}}}, view.name);
@@ -366,6 +370,7 @@ class Writer {
     }
 
     const Bundle& bundle_;
+    int jpegQuality_;
     Job& job_;
     bool lit_ = false;
     std::optional<std::size_t> edgeMaterial_;
@@ -377,12 +382,20 @@ class Writer {
 }  // namespace
 
 Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
-                                     OutputFile::Options options, Job& job) {
+                                     const SurfacesOptions& options, Job& job) {
     bundle.noteMaterialLeftOut(job);
     noteEnvironmentLeftOut(bundle.environment, job);
     codeColours(bundle, "the model", job);
+    if (options.mostTriangles > 0)
+        STX_CHECK(checkPeak(peak::kFewerTriangles, bundle.views, job.limits));
     STX_TRY(auto surfaces, viewSurfaces(bundle, job));
-    Writer writer(bundle, job);
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+        STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].positions));
+        STX_CHECK(checkPlaces(bundle.views[i], surfaces[i].lonePositions));
+    }
+    if (options.mostTriangles > 0)
+        STX_CHECK(takeFewerTriangles(bundle, options.mostTriangles, surfaces, job));
+    Writer writer(bundle, options.jpegQuality, job);
     writer.report.views = bundle.views.size();
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
         job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(surfaces.size()),
@@ -391,7 +404,7 @@ Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle b
         STX_CHECK(writer.add(bundle.views[i], surfaces[i]));
         surfaces[i] = {};
     }
-    return writer.write(path, options);
+    return writer.write(path, options.output);
 }
 
 }  // namespace stx

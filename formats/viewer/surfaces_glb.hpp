@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 
 #include "formats/files/files.hpp"
@@ -7,6 +8,13 @@
 #include "lib/model/bundle.hpp"
 
 namespace stx {
+
+/// How a model of surfaces is written.
+struct SurfacesOptions {
+    std::size_t mostTriangles = 0;  ///< as takeFewerTriangles(); 0: all
+    int jpegQuality = 0;            ///< of textures: 0 = PNG, exact; 1..100 = JPEG
+    OutputFile::Options output = {};
+};
 
 /// What a model of surfaces holds.
 struct SurfacesReport {
@@ -25,6 +33,6 @@ struct SurfacesReport {
 /// Notes: an origin, colours of linear light. Errors: a bundle that fails check(), no surface and
 /// no point, points beyond floats, more than GLB's 4 GiB, memory over the limit, files, cancelled.
 [[nodiscard]] Result<SurfacesReport> writeSurfaces(const std::filesystem::path& path, Bundle bundle,
-                                                   OutputFile::Options options, Job& job);
+                                                   const SurfacesOptions& options, Job& job);
 
 }  // namespace stx

@@ -111,8 +111,11 @@ class Viewer {
         let arm = turned(minus(c.eye, c.target), up, -right);
         const side = unit(cross(up, arm)), angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(arm), up))));
         arm = turned(arm, side, Math.max(0.01, Math.min(Math.PI - 0.01, angle - down)) - angle);
-        c.eye = plus(c.target, arm);
+        const {eye, target, turn} = this.data.start;
+        c.eye = plus(c.target, turn ? armWithin(arm, minus(eye, target), turn) : arm);
     }
+    // A single view is turned by a few degrees only: what takes an object around takes it from end to end.
+    pace() { return this.data.start.turn || 1; }
     pan(right, down) {
         const c = this.camera, view = lookAt(c, 1, 1), arm = lengthOf(minus(c.eye, c.target));
         const scale = 2 * arm * Math.tan(c.fov * Math.PI / 360);
@@ -335,14 +338,14 @@ class Viewer {
             this.zoom(apart(before) / apart(now));
             this.pan(right / 2, down / 2);
         } else if (event.buttons & 2 || event.shiftKey) this.pan(right, down);
-        else this.orbit(right * 4, down * 4);
+        else this.orbit(right * 4 * this.pace(), down * 4 * this.pace());
         this.changed();
     }
 
     key(event) {
         if (/^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName) || event.ctrlKey || event.metaKey || event.altKey) return;
-        const step = 0.07, onButton = /^(BUTTON|SUMMARY)$/.test(event.target.tagName);
-        const move = (x, y) => (event.shiftKey ? this.pan(-x * step, -y * step) : this.orbit(-x * step, -y * step));
+        const step = 0.07, turn = this.data.start.turn ? this.data.start.turn / 5 : step, onButton = /^(BUTTON|SUMMARY)$/.test(event.target.tagName);
+        const move = (x, y) => (event.shiftKey ? this.pan(-x * step, -y * step) : this.orbit(-x * turn, -y * turn));
         const acts = {
             ArrowLeft: () => move(-1, 0), ArrowRight: () => move(1, 0), ArrowUp: () => move(0, -1), ArrowDown: () => move(0, 1),
             "+": () => this.zoom(0.9), "=": () => this.zoom(0.9), "-": () => this.zoom(1 / 0.9),

@@ -10,6 +10,7 @@
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/page_text.hpp"
 #include "lib/base/counted.hpp"
+#include "lib/base/median.hpp"
 #include "lib/geometry/view_layout.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/packing/packing.hpp"
@@ -26,6 +27,9 @@ constexpr std::uint64_t kHard = 256ull << 20;
 constexpr std::string_view kDataMark = "@DATA@";
 /// Views that all look within this angle of their mean look at a scene, not around an object.
 constexpr double kSameSideCosine = 0.5;
+/// How far the eye goes to each side of a single view, as a share of the distance of what it turns
+/// around: what `stx background` fills behind a photograph by default is what this uncovers.
+constexpr double kSingleReach = 0.08;
 constexpr double kStartFovDeg = 40.0, kStartElevationDeg = 15.0;
 
 std::string textOf(const Json& json) {
@@ -175,6 +179,31 @@ Result<PageWriter> startPage(const std::filesystem::path& path, const PageOption
     return writer;
 }
 
+/// The median distance of what a view shows; 0 where it shows nothing.
+double medianDistance(const ReferenceView& view) {
+    std::vector<float> distances;
+    for (const float depth : view.depth.pixels())
+        if (hasPoint(depth)) distances.push_back(depth);
+    return medianOf(std::move(distances));
+}
+
+/// The pose of a single view, around whose median distance the page turns a little.
+Json startOfSingle(const ReferenceView& view) {
+    const Camera& c = view.camera;
+    const double distance = medianDistance(view);
+    const glm::dvec3 target = c.position + c.forward() * (distance > 0 ? distance : view.nearPlane);
+    Json j;
+    j["eye"] = listOf(c.position);
+    j["target"] = listOf(target);
+    j["up"] = listOf(c.orientation * glm::dvec3(0, 1, 0));
+    j["fov"] = glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
+    j["centre"] = listOf(target);
+    j["radius"] = std::max(distance, 1e-9);
+    j["around"] = false;
+    j["turn"] = std::atan(kSingleReach);
+    return j;
+}
+
 /// Where the page begins: in front of an object, or, where all views look from one side, where the
 /// one in their middle is.
 Result<Json> startOf(const std::vector<Camera>& cameras, const Bounds& bounds) {
@@ -221,10 +250,12 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bound
                     glm::dvec3 origin, const Timeline& line, const PageOptions& options,
                     const PageReport& report) {
     std::vector<Camera> cameras;
+    const ReferenceView* single = nullptr;
     Json listed = Json::array();
     for (const ReferenceView& view : views) {
         if (view.background) continue;
         cameras.push_back(view.camera);
+        single = cameras.size() == 1 && !view.camera.orthographic ? &view : nullptr;
         Json j = pageCamera(view.camera, view.name);
         const Camera& c = view.camera;
         j["fov"] = c.orthographic ? 0.0 : glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
@@ -239,7 +270,11 @@ Result<Json> dataOf(const std::vector<ReferenceView>& views, const Bounds& bound
     j["facts"] = fmt::format("{}, {}", counted(views.size(), "view"),
                              counted(static_cast<std::size_t>(report.points), "point"));
     j["origin"] = listOf(origin);
-    STX_TRY(j["start"], startOf(cameras, bounds));
+    if (single) {
+        j["start"] = startOfSingle(*single);
+    } else {
+        STX_TRY(j["start"], startOf(cameras, bounds));
+    }
     j["cameras"] = std::move(listed);
     j["times"] = line.times;
     j["end"] = line.end;
@@ -321,10 +356,12 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
 Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::path& path,
                                    const PageOptions& options, Job& job) {
     STX_CHECK(atlas.check());
-    const bool asItIs =
-        atlas.paddingHolds(PageSet::kPadding) && !atlas.pages[0].texture.isLinear() &&
-        std::ranges::none_of(
-            atlas.views, [](const ReferenceView& v) { return v.depthBits == 32 || v.background; });
+    // A single view tells its page by its depth how far away things are.
+    const bool asItIs = atlas.views.size() > 1 && atlas.paddingHolds(PageSet::kPadding) &&
+                        !atlas.pages[0].texture.isLinear() &&
+                        std::ranges::none_of(atlas.views, [](const ReferenceView& v) {
+                            return v.depthBits == 32 || v.background;
+                        });
     if (!asItIs) {
         STX_TRY(auto bundle, unpack(atlas, job));
         const auto still = sequenceOf(std::move(bundle));

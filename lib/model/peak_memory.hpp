@@ -29,6 +29,7 @@ inline constexpr PeakMemory kCompared = {"two pictures that are compared", 36};
 inline constexpr PeakMemory kComparedLinear = {"two pictures that are compared", 76};
 inline constexpr PeakMemory kExport = {"writing pictures", 0, 16};
 inline constexpr PeakMemory kFewerSplats = {"merging splats", 140};
+inline constexpr PeakMemory kFewerTriangles = {"fewer triangles", 212};
 inline constexpr PeakMemory kMpeg4 = {"writing MPEG-4", 16};
 inline constexpr PeakMemory kMpeg4Vectors = {"writing MPEG-4", 40};
 inline constexpr PeakMemory kPage = {"a page", 36};

@@ -45,8 +45,9 @@ def main():
             test.stx_run("convert", path, "-o", f"{name}.mp4", "--views", "sphere:16", "--size", "256x256", *more)
             test.stx_run("bake", f"{name}.mp4", "-o", "baked.mp4")
             test.stx_run("pack", f"{name}.mp4", "-o", "atlas", "--prune", "--layout", "tight")
-            for source, model in ((f"{name}.mp4", f"{name}.glb"), ("baked.mp4", "baked.glb"), ("atlas", "atlas.glb")):
-                test.stx_run("extract", source, "-o", model)
+            for source, model, *words in ((f"{name}.mp4", f"{name}.glb"), ("baked.mp4", "baked.glb"), ("atlas", "atlas.glb"),
+                                          ("baked.mp4", "fewer.glb", "--triangles", "20000")):
+                test.stx_run("extract", source, "-o", model, *words)
                 issues = validate(test.path(model))["issues"]
                 test.check(issues["numErrors"] + issues["numWarnings"] == 0, f"{model}: {issues['messages'][:3]}")
             if shutil.which("assimp"):

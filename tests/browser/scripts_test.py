@@ -87,6 +87,13 @@ def main():
     if found != [data.hex() or "-" for data in lists]:
         failed += 1
         print(f"FAILED: bytes are read from text as {found[:10]} {said}")
+    # An arm of length 2 that is turned by 30 degrees, and how far it may be.
+    found, said = node_run(
+        node, folder, ("camera.js",), "for (const most of [0.1, 1]) { const arm = armWithin([1, 0, Math.sqrt(3)], [0, 0, 5], most);"
+        "console.log(lengthOf(arm).toFixed(6), Math.atan2(arm[0], arm[2]).toFixed(6)); }")
+    if found != ["2.000000", "0.100000", "2.000000", "0.523599"]:
+        failed += 1
+        print(f"FAILED: a view is turned within its bounds as {found} {said}")
     print(f"{failed} failed")
     return 1 if failed else 0
 

@@ -27,7 +27,7 @@ def find_model(shared, name):
 
 class Test:
     def __init__(self, args, folder):
-        self.stx, self.folder, self.failed = args.stx, folder, 0
+        self.stx, self.model, self.folder, self.failed = args.stx, args.model, folder, 0
 
     def check(self, holds, text):
         print(("ok: " if holds else "FAILED: ") + text, flush=True)
@@ -121,6 +121,23 @@ def touched(test, browser):
     test.check(found >= LEAST, f"the command's picture: {found:.1f} dB")
 
 
+def single(test, browser):
+    """The page of one view begins at its pose, and no drag takes it around."""
+    test.stx_run("convert", test.model, "-o", "one.mp4", "--views", "ring:1", "--size", "128x128")
+    test.stx_run("extract", "one.mp4", "-o", "one.html")
+    show(browser, test.path("one.html"), "")
+    arm = "unit(minus(viewer.camera.eye, viewer.camera.target))"
+    at_home = "lengthOf(minus(viewer.camera.eye, viewer.data.cameras[0].position))"
+    test.check(browser.ask(at_home) < 1e-9, "the page of one view begins at its pose")
+    angle = f"Math.acos(Math.min(1, dot({arm}, unit(minus(viewer.data.start.eye, viewer.data.start.target))))) * 180 / Math.PI"
+    browser.drag((320, 200), (330, 200))
+    few = browser.ask(angle)
+    test.check(0.1 < few < 4, f"a small drag turns it by {few:.2f} degrees")
+    browser.drag((20, 20), (620, 380))
+    most = browser.ask(angle)
+    test.check(few < most < 4.6, f"a drag over all of it turns it by {most:.2f} degrees")
+
+
 def odd_addresses(test, browser):
     """What codes nothing is passed over; nothing that the page does is against its own policy."""
     for address in ("%", "eye=%E0%A4%A&fov=%", "eye=1,2&up=x&=&&"):
@@ -161,6 +178,7 @@ def main():
             browser.size(640, 400)
             models(test, browser, args)
             touched(test, browser)
+            single(test, browser)
             odd_addresses(test, browser)
             phone(test, browser)
             test.check(not browser.faults, f"no fault is logged: {browser.faults[:3]}")

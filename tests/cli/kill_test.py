@@ -50,6 +50,7 @@ def commands(inputs):
     yield Command("extract ply", ["extract", bundle, "-o", "t.ply"], ["t.ply"], ["extract", inputs["other"]])
     yield Command("extract drc", ["extract", bundle, "-o", "t.drc"], ["t.drc"], ["--position-bits", "8"])
     yield Command("extract glb", ["extract", bundle, "-o", "t.glb"], ["t.glb"], ["extract", inputs["other"]])
+    yield Command("extract rgbd", ["extract", bundle, "-o", "t.png", "--as", "rgbd"], ["t.png"], ["extract", inputs["other"]])
     yield Command("extract spz", ["extract", bundle, "-o", "t.spz"], ["t.spz"], ["extract", inputs["other"]])
     yield Command("extract html", ["extract", bundle, "-o", "t.html"], ["t.html"], ["extract", inputs["other"]])
     yield Command("render png", ["render", bundle, "-o", "t.png", "--backend", "cpu", "--size", "400x400"], ["t.png"])

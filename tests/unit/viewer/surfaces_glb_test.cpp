@@ -81,10 +81,8 @@ TEST(SurfacesGlb, IsReadBackAsTheSameSurfaces) {
     for (const glm::vec3& p : mesh->positions) EXPECT_LT(fromTorus(p), 0.01);
 }
 
-/// A grey disc before a red wall: filters find no red on the disc.
-TEST(SurfacesGlb, MixesNoColoursAcrossEdges) {
-    const TemporaryFolder folder;
-    Job job;
+/// A grey disc before a red wall.
+Bundle discBeforeWall() {
     Bundle bundle;
     ReferenceView& view = bundle.views.emplace_back();
     view.name = "front";
@@ -100,7 +98,13 @@ TEST(SurfacesGlb, MixesNoColoursAcrossEdges) {
             view.texture.rgba8()->at(x, y) = {90, 90, 90, 255};
         }
     }
-    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {}, job));
+    return bundle;
+}
+
+TEST(SurfacesGlb, MixesNoColoursAcrossEdges) {
+    const TemporaryFolder folder;
+    Job job;
+    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", discBeforeWall(), {}, job));
     const auto mesh = readMesh(folder.path() / "a.glb", job);
     ASSERT_TRUE(mesh) << mesh.error().text();
     ASSERT_EQ(mesh->textures.size(), 1u);
@@ -115,7 +119,7 @@ TEST(SurfacesGlb, MixesNoColoursAcrossEdges) {
             continue;
         }
         ++textured;
-        // Along each side the four texels around are grey.
+        // Along each side the four texels around are grey: filters find no red.
         for (int k = 0; k < 3; ++k) {
             const glm::vec2 at = 0.5f * (mesh->uvs[corners[k]] + mesh->uvs[corners[(k + 1) % 3]]);
             const glm::vec2 texel = at * 64.0f - 0.5f;
@@ -129,6 +133,47 @@ TEST(SurfacesGlb, MixesNoColoursAcrossEdges) {
     }
     EXPECT_GT(textured, 20);
     EXPECT_GT(coloured, 20);
+}
+
+TEST(SurfacesGlb, WithFewerTrianglesIsTheSameSurfaces) {
+    const TemporaryFolder folder;
+    Job job;
+    const Bundle bundle = torusViews(96);
+    const auto all = writeSurfaces(folder.path() / "a.glb", bundle, {}, job);
+    ASSERT_TRUE(all) << all.error().text();
+    const auto most = static_cast<std::size_t>(all->triangles / 4);
+    const auto fewer = writeSurfaces(folder.path() / "b.glb", bundle,
+                                     {.mostTriangles = most, .jpegQuality = 92}, job);
+    ASSERT_TRUE(fewer) << fewer.error().text();
+    EXPECT_TRUE(job.takeNotes().empty());
+    EXPECT_LE(fewer->triangles, all->triangles / 4);
+    EXPECT_GT(fewer->triangles, all->triangles / 5);
+    const auto mesh = readMesh(folder.path() / "b.glb", job);
+    ASSERT_TRUE(mesh) << mesh.error().text();
+    EXPECT_EQ(static_cast<std::int64_t>(mesh->triangles.size()), fewer->triangles);
+    for (const auto& t : mesh->triangles) {
+        const glm::vec3 middle =
+            (mesh->positions[t[0]] + mesh->positions[t[1]] + mesh->positions[t[2]]) / 3.0f;
+        EXPECT_LT(fromTorus(middle), 0.03);
+    }
+    EXPECT_LT(2 * std::filesystem::file_size(folder.path() / "b.glb"),
+              std::filesystem::file_size(folder.path() / "a.glb"));
+}
+
+TEST(SurfacesGlb, WithFewerTrianglesJoinsNoParts) {
+    const TemporaryFolder folder;
+    Job job;
+    const Bundle bundle = discBeforeWall();
+    ASSERT_TRUE(writeSurfaces(folder.path() / "a.glb", bundle, {.mostTriangles = 1}, job));
+    const auto notes = job.takeNotes();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("more than the 1 that are asked for"), std::string::npos) << notes[0];
+    const auto mesh = readMesh(folder.path() / "a.glb", job);
+    ASSERT_TRUE(mesh) << mesh.error().text();
+    ASSERT_FALSE(mesh->triangles.empty());
+    for (const auto& t : mesh->triangles)
+        for (const int k : {1, 2})
+            EXPECT_NEAR(mesh->positions[t[0]].z, mesh->positions[t[k]].z, 0.5f);
 }
 
 TEST(SurfacesGlb, HasNormalsWhereTheBundleDoes) {

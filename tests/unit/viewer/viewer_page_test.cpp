@@ -277,6 +277,55 @@ TEST(ViewerPage, TakesAnAtlasAsItIs) {
     EXPECT_EQ(colour.height, atlas->height());
 }
 
+/// A view of planes at 2 and 4, and 7 in a corner, from a place with a turn.
+Bundle oneView() {
+    ReferenceView v;
+    v.name = "photo";
+    v.camera = Camera::fromFieldOfView({1, 2, 3}, quatFromAxisAngle({0, 0, 1, 0.5}), {0.8, 0.6},
+                                       false, 20, 15);
+    v.nearPlane = 1;
+    v.farPlane = 8;
+    v.depth = Image<float>(20, 15, 4.0f);
+    for (int x = 0; x < 20; ++x)
+        for (int y = 0; y < 5; ++y) v.depth.at(x, y) = x < 10 ? 2.0f : 7.0f;
+    v.texture = Texture(Rgba8Image(20, 15, glm::u8vec4(90, 80, 70, 255)));
+    Bundle bundle;
+    bundle.views.push_back(std::move(v));
+    bundle.bounds = bundle.computeBounds();
+    return bundle;
+}
+
+void expectOwnPose(const Json& start, const Camera& camera) {
+    const auto vec = [](const Json& j) { return glm::dvec3(j[0], j[1], j[2]); };
+    EXPECT_EQ(vec(start["eye"]), camera.position);
+    EXPECT_LT(glm::length(vec(start["target"]) - camera.position - 4.0 * camera.forward()), 1e-3);
+    EXPECT_LT(glm::length(vec(start["up"]) - camera.orientation * glm::dvec3(0, 1, 0)), 1e-12);
+    EXPECT_NEAR(start["fov"], glm::degrees(0.6), 1e-9);
+    EXPECT_NEAR(start["turn"], std::atan(0.08), 1e-12);
+}
+
+TEST(ViewerPage, OfOneViewBeginsAtItsPoseAndTurnsALittle) {
+    const TemporaryFolder folder;
+    Job job;
+    Bundle bundle = oneView();
+    const Camera camera = bundle.views[0].camera;
+    const auto atlas = pack(bundle, {}, job);
+    ASSERT_TRUE(atlas);
+    ASSERT_TRUE(write(bundle, folder.path() / "a.html", job));
+    expectOwnPose(readPage(folder.path() / "a.html").json("data")["start"], camera);
+    ASSERT_TRUE(writeViewerPage(*atlas, folder.path() / "b.html", {"atlas", {}, {}}, job));
+    expectOwnPose(readPage(folder.path() / "b.html").json("data")["start"], camera);
+    // What is behind it does not count as a second view.
+    bundle.views.push_back(bundle.views[0]);
+    bundle.views[1].name = "behind";
+    bundle.views[1].background = true;
+    ASSERT_TRUE(write(bundle, folder.path() / "c.html", job));
+    expectOwnPose(readPage(folder.path() / "c.html").json("data")["start"], camera);
+    bundle.views[1].background = false;
+    ASSERT_TRUE(write(bundle, folder.path() / "d.html", job));
+    EXPECT_FALSE(readPage(folder.path() / "d.html").json("data")["start"].contains("turn"));
+}
+
 TEST(ViewerPage, SaysThatItLeavesTheEnvironmentOut) {
     const TemporaryFolder folder;
     Job job;

@@ -1,0 +1,103 @@
+#include "formats/viewer/fewer_triangles.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <meshoptimizer.h>
+
+#include "lib/base/median.hpp"
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+/// How far beside its own place a view is looked at, as a share of the median distance: a depth
+/// that is off by one pixel there counts as a corner that is off by one pixel. It is what pages let
+/// a single view turn by.
+constexpr double kAside = 0.08;
+/// What is so near that it moves by more is out of any picture: the largest one has so many pixels.
+constexpr double kMostPixels = 65535;
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+/// Where corners are in pixels: across, down, and by how far they move between the view's own place
+/// and one beside it. Planes are planes there, too.
+std::vector<glm::vec3> inPixels(const Camera& camera, const ViewSurface& surface) {
+    std::vector<glm::dvec3> seen;
+    std::vector<double> distances;
+    for (const glm::vec3& world : surface.positions) {
+        const glm::dvec3 relative = glm::dvec3(world) - camera.position;
+        seen.push_back(camera.project(glm::conjugate(camera.orientation) * relative));
+        distances.push_back(seen.back().z);
+    }
+    const double aside = kAside * camera.fx * medianOf(std::move(distances));
+    std::vector<glm::vec3> out;
+    out.reserve(seen.size());
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+        const double z = seen[i].z;
+        const double moves = camera.orthographic ? kAside * camera.fx * z : aside / z;
+        out.emplace_back(surface.pixels[i].x, surface.pixels[i].y,
+                         std::isnan(moves) ? 0.0 : std::clamp(moves, -kMostPixels, kMostPixels));
+    }
+    return out;
+}
+
+/// Leaves out the corners that are on no triangle any more.
+void dropCorners(ViewSurface& surface) {
+    std::vector<std::uint32_t> numbers(surface.positions.size(), kNone);
+    std::vector<glm::u16vec2> pixels;
+    std::vector<glm::vec3> positions;
+    for (std::uint32_t& corner : surface.triangles) {
+        std::uint32_t& number = numbers[corner];
+        if (number == kNone) {
+            number = static_cast<std::uint32_t>(positions.size());
+            pixels.push_back(surface.pixels[corner]);
+            positions.push_back(surface.positions[corner]);
+        }
+        corner = number;
+    }
+    surface.pixels = std::move(pixels);
+    surface.positions = std::move(positions);
+}
+
+void simplify(const Camera& camera, double share, ViewSurface& surface) {
+    const std::vector<glm::vec3> places = inPixels(camera, surface);
+    std::vector<std::uint32_t> fewer(surface.triangles.size());
+    const auto wanted =
+        static_cast<std::size_t>(share * static_cast<double>(surface.triangles.size() / 3));
+    // Of the error that it may make: that of all triangles away.
+    constexpr float kAnyError = std::numeric_limits<float>::max();
+    fewer.resize(meshopt_simplify(fewer.data(), surface.triangles.data(), surface.triangles.size(),
+                                  &places[0].x, places.size(), sizeof(glm::vec3), 3 * wanted,
+                                  kAnyError, 0, nullptr));
+    surface.triangles = std::move(fewer);
+    dropCorners(surface);
+}
+
+}  // namespace
+
+Result<void> takeFewerTriangles(const Bundle& bundle, std::size_t most,
+                                std::vector<ViewSurface>& surfaces, Job& job) {
+    const auto count = [&] {
+        std::size_t triangles = 0;
+        for (const ViewSurface& surface : surfaces) triangles += surface.triangles.size() / 3;
+        return triangles;
+    };
+    const std::size_t before = count();
+    if (before <= most) return {};
+    const double share = static_cast<double>(most) / static_cast<double>(before);
+    parallelFor(0, static_cast<std::int64_t>(surfaces.size()), [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        if (job.cancelled || surfaces[at].triangles.empty()) return;
+        simplify(bundle.views[at].camera, share, surfaces[at]);
+    });
+    STX_CHECK(job.checkCancelled());
+    if (const std::size_t left = count(); left > most)
+        job.note(fmt::format(
+            "{} of {} triangles are left, more than the {} that are asked for: fewer would close "
+            "holes or join parts",
+            left, before, most));
+    return {};
+}
+
+}  // namespace stx
