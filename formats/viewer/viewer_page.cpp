@@ -28,7 +28,7 @@ constexpr std::string_view kDataMark = "@DATA@";
 /// Views that all look within this angle of their mean look at a scene, not around an object.
 constexpr double kSameSideCosine = 0.5;
 /// How far the eye goes to each side of a single view, as a share of the distance of what it turns
-/// around: what `stx background` fills behind a photograph by default is what this uncovers.
+/// around: as far as one photograph with depth bears.
 constexpr double kSingleReach = 0.08;
 constexpr double kStartFovDeg = 40.0, kStartElevationDeg = 15.0;
 
