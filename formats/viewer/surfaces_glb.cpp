@@ -219,7 +219,13 @@ class Writer {
                                    [](const ReferenceView& v) { return v.hasNormals(); });
     }
 
-    Result<void> add(const ReferenceView& view, const ViewSurface& surface) {
+    /// Takes the colours of other surfaces out of the view's.
+    Result<void> add(ReferenceView& view, const ViewSurface& surface) {
+        for (std::size_t i = 0; i < surface.mixedPixels.size(); ++i) {
+            const glm::u16vec2 at = surface.mixedPixels[i];
+            glm::u8vec4& colour = view.texture.rgba8()->at(at.x, at.y);
+            colour = {glm::u8vec3(surface.ownColours[i] * 255.0f + 0.5f), colour.a};
+        }
         if (!surface.triangles.empty()) {
             STX_CHECK(addSurface(view, surface));
         }

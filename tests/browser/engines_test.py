@@ -21,7 +21,8 @@ ENGINES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../sample
 SIZE = "360x360"
 LONGEST = 150  # lines of a shader
 # dB against surface mode, which fuses all views instead of blending three.
-LEAST = {"octahedral": 26.0, "hemi-octahedral": 26.0, "glowing": 26.0}
+# spot: 29.1; 26.4 with holes where the head hides the neck from two of the three views.
+LEAST = {"octahedral": 26.0, "hemi-octahedral": 26.0, "glowing": 26.0, "spot": 28.0}
 
 
 class Files(http.server.SimpleHTTPRequestHandler):
@@ -82,8 +83,12 @@ def main():
                 lines = len(file.readlines())
             test.check(lines < LONGEST, f"{shader} has {lines} lines")
         cameras = {"octahedral": ("1.5,1.2,2.5", "0,0.43,0"), "hemi-octahedral": ("-1.3,1.9,2.3", "0,0.43,0")}
-        for grid, (eye, target) in cameras.items():
-            test.stx_run("convert", args.model, "-o", f"{grid}.mp4", "--views", f"{grid}:8", "--size", "256x256", "--projection",
+        # What is in front hides from single views what others show: the head of a cow, its neck.
+        spot = os.path.join(args.shared, "data/meshes/obj/spot/spot_triangulated.obj")
+        spots = {"spot": ("1.5,1,2.5", "0,0,0")} if os.path.exists(spot) else {}
+        for grid, (eye, target) in {**cameras, **spots}.items():
+            model, views = (spot, "hemi-octahedral") if grid == "spot" else (args.model, grid)
+            test.stx_run("convert", model, "-o", f"{grid}.mp4", "--views", f"{views}:8", "--size", "256x256", "--projection",
                          "orthographic", "--depth-bits", "8")
             test.stx_run("pack", f"{grid}.mp4", "-o", grid)
             test.stx_run("render", grid, "-o", f"{grid}.png", f"--eye={eye}", f"--target={target}", "--fov", "40", "--size", SIZE,
@@ -100,6 +105,9 @@ def main():
                     compare(test, "three.js", grid)
                     three(test, browser, server.server_port, "sheet", eye, target, grid)
                     compare(test, "three.js, from a sheet", grid)
+                for grid, (eye, target) in spots.items():
+                    three(test, browser, server.server_port, grid, eye, target)
+                    compare(test, "three.js", grid)
                 # Light in a texture of its own; in the truth it is in the colour.
                 eye, target = "3.9,3.1,6.5", "0,0,0"
                 material_model.make(test.path("glowing.gltf"))
@@ -120,6 +128,9 @@ def main():
                 compare(test, "Godot 3", grid)
                 godot(test, "sheet", eye, target, grid)
                 compare(test, "Godot 3, from a sheet", grid)
+            for grid, (eye, target) in spots.items():
+                godot(test, grid, eye, target)
+                compare(test, "Godot 3", grid)
         return 1 if test.failed else 0
 
 

@@ -34,10 +34,13 @@ class BifsDecoder {
     BifsDecoder(BifsDecoder&&) noexcept;
 
     /// The commands of one access unit. Errors (invalidInput, where = "bit N") on anything that the
-    /// syntax or the table does not have; (unsupported) on predictive MF coding and on extended
-    /// commands: begun() then has the commands before it.
+    /// syntax or the table does not have; (unsupported) on predictive MF coding and on XREPLACE:
+    /// begun() then has the commands before it. MULTIPLEREPLACE, MULTIPLEINDREPLACE and XDELETE are
+    /// the plain commands that do the same; GLOBALQP is in the values, and nothing without them.
     [[nodiscard]] Result<std::vector<Command>> decode(ByteSpan accessUnit);
     [[nodiscard]] std::vector<Command> begun();
+    /// What the last ReplaceScene declares, and what commands declared since (INSERT PROTO).
+    [[nodiscard]] const std::vector<ProtoPtr>& protos() const;
     /// The access units that come now are of another stream of the scene, with a config of its own.
     void setConfig(const BifsConfig& config);
     /// How the last access unit is coded.

@@ -1,5 +1,10 @@
 #include "formats/mpeg4/bifs/bifs.hpp"
+
+#include <algorithm>
+#include <iterator>
+
 #include "formats/mpeg4/bifs/bifs_nodes.hpp"
+#include "formats/mpeg4/bifs/interface_types.hpp"
 
 namespace stx::mpeg4 {
 
@@ -38,6 +43,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
         around = nullptr;
         protoScopes.assign(1, {});
         protoCount = 0;
+        quantisation.setGlobal(nullptr);
         STX_CHECK(readProtos(1));
         scene.protos = protoScopes.front();
         int height = 0;
@@ -47,8 +53,15 @@ struct BifsDecoder::Impl : BifsNodeReader {
         return scene;
     }
 
-    Result<Command> readInsert() {
-        switch (in.read(2)) {
+    Result<void> keep(Result<Command> c) {
+        if (!c) return tl::unexpected(c.error());
+        STX_CHECK(useBudget(sizeof(Command)));
+        begun.push_back(std::move(*c));
+        return {};
+    }
+
+    Result<Command> readInsert(std::uint32_t kind) {
+        switch (kind) {
             case 0: {
                 InsertNode c;
                 STX_TRY(c.target, readTarget());
@@ -68,36 +81,149 @@ struct BifsDecoder::Impl : BifsNodeReader {
             }
             case 2: {
                 InsertIndexed c;
-                STX_CHECK(readIndexed(c, true));
+                STX_CHECK(readIndexed(c));
                 return c;
             }
-            case 3: {
+            default: {
                 STX_TRY(Route route, readRoute());
                 return InsertRoute{std::move(route)};
             }
-            default:
-                return error(ErrorCode::unsupported,
-                             "an extended BIFS command, which is not supported");
         }
     }
 
-    template <class C>
-    Result<void> readIndexed(C& c, bool withValue) {
+    /// Extended commands, as far as they say what plain ones can say, which they become. What they
+    /// do to PROTOs and quantisation is in what is read after them. An unknown one adds nothing.
+    Result<void> readExtended() {
+        const std::size_t before = begun.size();
+        auto done = readExtended(in.read(8));
+        if (done) return {};
+        begun.erase(begun.begin() + static_cast<std::ptrdiff_t>(before), begun.end());
+        // Others may write them in other ways, and no scene needs them to be shown.
+        done.error().code = ErrorCode::unsupported;
+        return done;
+    }
+    Result<void> readExtended(std::uint32_t kind) {
+        STX_CHECK(check("a command"));
+        // In a buffer there is nobody to keep what is declared for later commands.
+        const bool declares = kind <= 2 || kind == 5;
+        if (kind < 7 && !(declares && around != nullptr)) switch (kind) {
+                case 0:
+                    return readProtos(1);
+                case 1:
+                    return readDeletedProtos();
+                case 2:
+                    return {};  // deletes all PROTOs
+                case 3:
+                    return readManyItems();
+                case 4:
+                    return readManyFields();
+                case 5: {
+                    int height = 0;
+                    STX_TRY(NodePtr node, readNode(Ndt::SFWorldNode, 1, height));
+                    quantisation.setGlobal(std::move(node));
+                    return {};
+                }
+                default: {
+                    STX_TRY(NodePtr target, readTarget());
+                    return keep(DeleteNode{std::move(target)});
+                }
+            }
+        return error(ErrorCode::unsupported,
+                     "an extended BIFS command of kind {}, which is not supported", kind);
+    }
+
+    /// Declarations that later commands do not use do no harm: deleted ones stay.
+    Result<void> readDeletedProtos() {
+        if (in.flag()) {
+            while (in.flag()) in.read(config.protoIdBits);
+            return check("a list of PROTOs");
+        }
+        const std::uint64_t count = in.read(static_cast<int>(in.read(5)));
+        if (count > kMaxProtos)
+            return error(ErrorCode::invalidInput, "{} PROTOs are deleted; {} may be declared",
+                         count, kMaxProtos);
+        for (std::uint64_t i = 0; i < count; ++i) in.read(config.protoIdBits);
+        return check("a list of PROTOs");
+    }
+
+    /// Replaces items of a list (MULTIPLEINDREPLACE).
+    Result<void> readManyItems() {
+        ReplaceIndexed c;
         STX_TRY(c.target, readTarget());
+        STX_CHECK(readListField(c));
+        const int bits = static_cast<int>(in.read(5));
+        const std::uint64_t count = in.read(static_cast<int>(in.read(5)));
+        for (std::uint64_t i = 0; i < count; ++i) {
+            const std::uint32_t index = in.read(bits);
+            STX_CHECK(check("a position"));
+            if (index > 0xFFFF)
+                return error(ErrorCode::unsupported,
+                             "a position of {} in a list, which plain commands cannot have", index);
+            c.position.index = static_cast<int>(index);
+            STX_CHECK(readItemOf(c));
+            STX_CHECK(keep(c));
+        }
+        return {};
+    }
+
+    /// Replaces fields of a node, which are coded as those of a new node (MULTIPLEREPLACE). Where a
+    /// node has only fields that plain commands do not reach, as a DepthImage, it is replaced.
+    Result<void> readManyFields() {
+        STX_TRY(const NodePtr target, readTarget());
+        const NodeInfo& info = *target->info;
+        const NodePtr changed = std::make_shared<Node>(*target);
+        std::vector<ReplaceField> each;
+        bool reached = true;
+        const auto readOne = [&](int index) -> Result<void> {
+            const FieldInfo& field = info.fields[static_cast<std::size_t>(index)];
+            reached = reached && field.inId >= 0 && field.type != FieldType::MFScript;
+            if (!reached && !info.inFields.empty())
+                return error(ErrorCode::unsupported,
+                             "a command that replaces {}.{}, which plain commands cannot do",
+                             info.name, field.name);
+            STX_CHECK(useBudget(sizeof(Command)));
+            STX_TRY(FieldValue value, readField(info, field, 1));
+            quantisation.coded(field, value);
+            if (reached) each.push_back({target, index, value});
+            changed->set(index, std::move(value));
+            return {};
+        };
+        STX_CHECK(readEachField(info, readOne));
+        if (reached) {
+            std::ranges::move(each, std::back_inserter(begun));
+            return {};
+        }
+        Defined& known = defined[target->defId];
+        known = {changed, std::max(known.height, deepest + 1), command};
+        return keep(ReplaceNode{target, changed});
+    }
+
+    template <class C>
+    Result<void> readListField(C& c) {
         STX_TRY(c.field, readInField(*c.target));
         const FieldInfo& field = c.target->info->fields[static_cast<std::size_t>(c.field)];
         if (!isMultiple(field.type))
             return error(ErrorCode::invalidInput, "an index into {}.{}, which is {}",
                          c.target->info->name, field.name, name(field.type));
+        return {};
+    }
+
+    template <class C>
+    Result<void> readItemOf(C& c) {
+        const FieldInfo& field = c.target->info->fields[static_cast<std::size_t>(c.field)];
+        STX_TRY(c.value, readSingle(*c.target->info, field, 1));
+        if (const NodePtr* node = std::get_if<NodePtr>(&c.value); node && !*node)
+            return error(ErrorCode::invalidInput, "NULL is put into {}.{}", c.target->info->name,
+                         field.name);
+        return {};
+    }
+
+    template <class C>
+    Result<void> readIndexed(C& c) {
+        STX_TRY(c.target, readTarget());
+        STX_CHECK(readListField(c));
         STX_TRY(c.position, readPosition(16));
-        if constexpr (requires { c.value; }) {
-            if (withValue) {
-                STX_TRY(c.value, readSingle(*c.target->info, field, 1));
-                if (const NodePtr* node = std::get_if<NodePtr>(&c.value); node && !*node)
-                    return error(ErrorCode::invalidInput, "NULL is put into {}.{}",
-                                 c.target->info->name, field.name);
-            }
-        }
+        if constexpr (requires { c.value; }) return readItemOf(c);
         return {};
     }
 
@@ -109,7 +235,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
             }
             case 2: {
                 DeleteIndexed c;
-                STX_CHECK(readIndexed(c, false));
+                STX_CHECK(readIndexed(c));
                 return c;
             }
             case 3: {
@@ -143,7 +269,7 @@ struct BifsDecoder::Impl : BifsNodeReader {
             }
             case 2: {
                 ReplaceIndexed c;
-                STX_CHECK(readIndexed(c, true));
+                STX_CHECK(readIndexed(c));
                 return c;
             }
             default: {
@@ -156,30 +282,32 @@ struct BifsDecoder::Impl : BifsNodeReader {
         }
     }
 
-    Result<Command> readCommand() {
+    /// Adds to `begun`.
+    Result<void> readCommand() {
         ++command;
         deepest = 0;
-        STX_CHECK(useBudget(sizeof(Command)));
         switch (in.read(2)) {
-            case 0:
-                return readInsert();
-            case 1:
-                return readDelete();
-            case 2:
-                return readReplace();
-            default: {
-                STX_TRY(ReplaceScene scene, readScene());
-                return scene;
+            case 0: {
+                const std::uint32_t kind = in.read(2);
+                return kind == 1 ? readExtended() : keep(readInsert(kind));
             }
+            case 1:
+                return keep(readDelete());
+            case 2:
+                return keep(readReplace());
+            default:
+                return keep(readScene());
         }
     }
 
     Result<std::vector<Command>> decode(ByteSpan accessUnit) {
         in = BitReader(accessUnit);
         begun.clear();
+        // What an access unit before left open when it was not understood.
+        proto = nullptr;
+        protoScopes.resize(1);
         do {
-            STX_TRY(Command next, readCommand());
-            begun.push_back(std::move(next));
+            STX_CHECK(readCommand());
             const bool more = in.flag();
             STX_CHECK(check("a command"));
             if (!more) break;
@@ -221,6 +349,9 @@ void BifsDecoder::setConfig(const BifsConfig& config) {
 }
 CommandCoding BifsDecoder::coding() const {
     return codingOf(impl_->config, impl_->useNames);
+}
+const std::vector<ProtoPtr>& BifsDecoder::protos() const {
+    return impl_->protoScopes.front();
 }
 std::size_t BifsDecoder::renamed() const {
     return impl_->renamed;

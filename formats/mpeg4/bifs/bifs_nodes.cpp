@@ -319,8 +319,9 @@ Result<NodePtr> BifsNodeReader::readNodeCode(Ndt expected) {
             const std::uint32_t id = in.read(config.protoIdBits);
             STX_CHECK(check("an instance of a PROTO"));
             for (auto scope = protoScopes.rbegin(); scope != protoScopes.rend(); ++scope)
-                for (const ProtoPtr& declared : *scope)
-                    if (declared->id == id) return makeInstance(declared);
+                // One that was inserted later may have the id of one that was deleted.
+                for (auto declared = scope->rbegin(); declared != scope->rend(); ++declared)
+                    if ((*declared)->id == id) return makeInstance(*declared);
             return error(ErrorCode::invalidInput,
                          "an instance of PROTO {}, which is not declared before it", id);
         }
@@ -335,21 +336,7 @@ Result<NodePtr> BifsNodeReader::readNodeCode(Ndt expected) {
 }
 
 Result<void> BifsNodeReader::readFields(Node& node, int depth) {
-    const NodeInfo& info = *node.info;
-    if (in.flag()) {
-        for (const int index : info.defFields)
-            if (in.flag()) STX_CHECK(readInto(node, index, depth));
-        return check(info.name);
-    }
-    while (!in.flag()) {
-        if (in.failed() || info.defFields.empty()) break;
-        const std::uint32_t id = in.read(info.defBits);
-        STX_CHECK(check(info.name));
-        if (id >= info.defFields.size())
-            return error(ErrorCode::invalidInput, "{} has no field with DEF id {}", info.name, id);
-        STX_CHECK(readInto(node, info.defFields[id], depth));
-    }
-    return check(info.name);
+    return readEachField(*node.info, [&](int index) { return readInto(node, index, depth); });
 }
 
 Result<void> BifsNodeReader::readInto(Node& node, int index, int depth) {

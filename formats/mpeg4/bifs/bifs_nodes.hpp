@@ -117,6 +117,9 @@ struct BifsNodeReader {
     Result<NodePtr> readNodeCode(Ndt expected);
 
     Result<void> readFields(Node& node, int depth);
+    /// Calls readOne(index) for each DEF field that a mask or a list has.
+    template <class ReadOne>
+    Result<void> readEachField(const NodeInfo& info, const ReadOne& readOne);
 
     Result<void> readInto(Node& node, int index, int depth);
 
@@ -155,6 +158,24 @@ struct BifsNodeReader {
     Result<void> readLink(const NodePtr& node, int field);
     Result<void> readBodyFields(const NodePtr& node, int depth);
 };
+
+template <class ReadOne>
+Result<void> BifsNodeReader::readEachField(const NodeInfo& info, const ReadOne& readOne) {
+    if (in.flag()) {
+        for (const int index : info.defFields)
+            if (in.flag()) STX_CHECK(readOne(index));
+        return check(info.name);
+    }
+    while (!in.flag()) {
+        if (in.failed() || info.defFields.empty()) break;
+        const std::uint32_t id = in.read(info.defBits);
+        STX_CHECK(check(info.name));
+        if (id >= info.defFields.size())
+            return error(ErrorCode::invalidInput, "{} has no field with DEF id {}", info.name, id);
+        STX_CHECK(readOne(info.defFields[id]));
+    }
+    return check(info.name);
+}
 
 template <class ReadOne>
 Result<void> BifsNodeReader::readEach(const NodeInfo& node, const FieldInfo& field,

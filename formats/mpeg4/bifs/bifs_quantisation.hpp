@@ -21,8 +21,12 @@ struct QuantisedCoding {
 /// The QuantizationParameter in force while a scene is coded.
 class QuantisationScope {
   public:
-    /// The node in force; null for none. Changed by ListGuard only.
+    /// The node in force; null for none.
     [[nodiscard]] const Node* active() const { return active_.get(); }
+    /// What is in force outside of all lists (the command GLOBALQP); null, or another node: none.
+    void setGlobal(NodePtr node) {
+        active_ = node && node->is("QuantizationParameter") ? std::move(node) : nullptr;
+    }
     /// Whether floats without a quantisation of their own use the short form.
     [[nodiscard]] bool usesEfficientFloats() const {
         return active_ && active_->get<bool>("useEfficientCoding");

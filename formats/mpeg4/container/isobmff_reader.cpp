@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <ranges>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -442,21 +443,25 @@ class Reader {
             frame.commands = std::move(*commands);
         } else {
             // What later ones name may come with one that was not understood.
-            const bool carried = number > 0 && (commands.error().code == ErrorCode::unsupported ||
-                                                carriedUnits_ > 0);
+            frame.commands = decoder.begun();
+            const bool carried =
+                (number > 0 || !frame.commands.empty()) &&
+                (commands.error().code == ErrorCode::unsupported || carriedUnits_ > 0);
             if (!carried) return tl::unexpected(commands.error().at(place));
             if (carriedUnits_++ == 0)
                 job_.note(fmt::format(
                     "{}: {}; it stays as it is in an .mp4, has no effect here, and texts do not "
                     "have it, as what builds on it",
                     place, commands.error().text()));
-            frame.commands = decoder.begun();
             const auto* from = reinterpret_cast<const std::uint8_t*>(bytes.data());
             frame.coded = CommandBuffer{{from, from + bytes.size()}, decoder.coding()};
         }
         if (commands && decoder.bitsLeft() >= 8)
             addDeviation(Deviation::trailingBytes,
                          fmt::format("{} bits follow the last command", decoder.bitsLeft()), place);
+        keepProtos(decoder, frame);
+        // One that only declares PROTOs or a quantisation.
+        if (frame.commands.empty() && !frame.coded) return {};
         CommandFrame* last = document_.frames.empty() ? nullptr : &document_.frames.back();
         if (!unit.first && last != nullptr && last->time == frame.time && !last->coded &&
             !frame.coded)
@@ -464,6 +469,22 @@ class Reader {
         else
             document_.frames.push_back(std::move(frame));
         return {};
+    }
+
+    /// PROTOs that a command declares are the scene's: who has them early lacks nothing.
+    void keepProtos(const BifsDecoder& decoder, CommandFrame& frame) {
+        const auto sceneIn = [](CommandFrame& in) -> ReplaceScene* {
+            for (Command& command : std::views::reverse(in.commands))
+                if (auto* scene = std::get_if<ReplaceScene>(&command)) return scene;
+            return nullptr;
+        };
+        ReplaceScene* scene = sceneIn(frame);
+        const std::size_t count = decoder.protos().size();
+        if (count != std::exchange(protoCount_, count))
+            for (auto before = document_.frames.rbegin();
+                 scene == nullptr && before != document_.frames.rend(); ++before)
+                scene = sceneIn(*before);
+        if (scene != nullptr && scene->protos.size() != count) scene->protos = decoder.protos();
     }
 
     const ByteSource& source_;
@@ -478,6 +499,7 @@ class Reader {
     Mp4Track* scene_ = nullptr;
     std::vector<Mp4Track*> moreScene_;  ///< further streams of the scene, which the IOD names
     Mp4Track* od_ = nullptr;
+    std::size_t protoCount_ = 0;    ///< that the scene so far declares
     std::size_t carriedUnits_ = 0;  ///< access units of the scene that were not understood
     std::uint64_t spent_ = 0;
 };

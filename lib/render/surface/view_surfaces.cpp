@@ -1,10 +1,12 @@
 #include "lib/render/surface/view_surfaces.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/peak_memory.hpp"
+#include "lib/refine/edge_colours.hpp"
 #include "lib/render/surface/prepare/cells.hpp"
 
 namespace stx {
@@ -21,6 +23,11 @@ constexpr double kBehind = 0.25;
 constexpr double kSameDepth = 0.01, kSameSteps = 2.0;
 /// Pixels from an edge within which samples mix what is on both sides of it.
 constexpr int kMixed = 2;
+/// Squared distance of colours of which nothing is seen: a step and a half of 8 bits in each
+/// channel.
+constexpr float kLeastApart = 1e-4f;
+/// A surface is of one colour where it varies, squared, by this share of what is across the edge.
+constexpr float kOneColour = 0.05f;
 constexpr float kLeastAlpha = 0.5f;
 constexpr std::uint32_t kNone = 0xffffffffu;
 
@@ -83,10 +90,14 @@ class Maker {
         // Not only the pixel, but all that is around the place must be there.
         const int i = static_cast<int>(std::floor(at.x - 0.5)),
                   j = static_cast<int>(std::floor(at.y - 0.5));
-        if (!joined(s, i, j)) return 0;
+        if (!joined(s, i, j) || onCrease(s, i, j)) return 0;
         const std::uint32_t pixel = index(s, static_cast<int>(at.x), static_cast<int>(at.y));
         if (!sameDepth(s, pixel, at.z)) return 0;
-        return densityAt(s, world, normal, at.z, edgeDistance(s, pixel));
+        // As of the triangles there.
+        const int fromEdge = std::min(
+            {edgeDistance(s, index(s, i, j)), edgeDistance(s, index(s, i + 1, j)),
+             edgeDistance(s, index(s, i, j + 1)), edgeDistance(s, index(s, i + 1, j + 1))});
+        return densityAt(s, world, normal, at.z, fromEdge);
     }
 
     [[nodiscard]] double densityAt(const Source& s, glm::dvec3 world, glm::dvec3 normal,
@@ -132,10 +143,68 @@ class Maker {
             out.lonePixels.emplace_back(pixel % s.width, pixel / s.width);
             out.lonePositions.emplace_back(world);
         }
+        for (std::uint32_t pixel = 0; pixel < count; ++pixel)
+            if (shows(s, pixel) && edgeDistance(s, pixel) < kMixed) takeApart(s, pixel, out);
         return out;
     }
 
   private:
+    /// The pixels within kReach of one that are joined to it there.
+    class Joined {
+      public:
+        Joined(const Source& s, int x, int y) : x_(x), y_(y) {
+            std::array<glm::ivec2, kSide * kSide> open;
+            std::size_t count = 0;
+            const auto reach = [&](int u, int v) {
+                if (!inside(u, v) || at(u, v)) return;
+                at(u, v) = true;
+                open[count++] = {u, v};
+            };
+            reach(x, y);
+            for (std::size_t k = 0; k < count; ++k) {
+                const auto [u, v] = std::pair(open[k].x, open[k].y);
+                const std::uint8_t* info = s.whole->info.data() + index(s, u, v);
+                if (*info & Info::kLinkRight) reach(u + 1, v);
+                if (*info & Info::kLinkDown) reach(u, v + 1);
+                if (u > 0 && (info[-1] & Info::kLinkRight)) reach(u - 1, v);
+                if (v > 0 && (info[-s.width] & Info::kLinkDown)) reach(u, v - 1);
+            }
+        }
+        [[nodiscard]] bool has(int u, int v) { return inside(u, v) && at(u, v); }
+
+      private:
+        static constexpr int kReach = 4, kSide = 2 * kReach + 1;  // as far as coloursAround() looks
+        [[nodiscard]] bool inside(int u, int v) const {
+            return std::abs(u - x_) <= kReach && std::abs(v - y_) <= kReach;
+        }
+        bool& at(int u, int v) {
+            return joined_[static_cast<std::size_t>((v - y_ + kReach) * kSide + u - x_ + kReach)];
+        }
+        std::array<bool, kSide * kSide> joined_{};
+        int x_, y_;
+    };
+
+    /// Puts a pixel beside an edge among mixedPixels where its colour is a mixture.
+    static void takeApart(const Source& s, std::uint32_t pixel, ViewSurface& out) {
+        const int x = static_cast<int>(pixel) % s.width, y = static_cast<int>(pixel) / s.width;
+        Joined own(s, x, y);
+        const EdgeColours colours = coloursAround(*s.whole->texture, x, y, [&](int u, int v) {
+            if (u < 0 || v < 0 || u >= s.width || v >= s.height) return EdgeSide::neither;
+            const std::uint32_t at = index(s, u, v);
+            if (!shows(s, at) || edgeDistance(s, at) < kMixed) return EdgeSide::neither;
+            return own.has(u, v) ? EdgeSide::front : EdgeSide::back;
+        });
+        if (!colours.known()) return;
+        const glm::vec3 apart = colours.apart();
+        const float squared = glm::dot(apart, apart);
+        if (squared < kLeastApart || colours.front.variance() > kOneColour * squared) return;
+        const glm::vec3 colour(s.whole->texture->at(pixel));
+        const float share = colours.shareOf(colour);
+        if (!(share >= 0 && share < 1)) return;  // something else
+        out.mixedPixels.emplace_back(x, y);
+        out.ownColours.push_back(glm::clamp(colour + (1 - share) * apart, 0.0f, 1.0f));
+    }
+
     [[nodiscard]] static std::uint32_t index(const Source& s, int x, int y) {
         return static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(s.width) +
                static_cast<std::uint32_t>(x);
@@ -159,6 +228,11 @@ class Maker {
             return false;
         return shows(s, index(s, i, j)) && shows(s, index(s, i + 1, j)) &&
                shows(s, index(s, i, j + 1)) && shows(s, index(s, i + 1, j + 1));
+    }
+
+    [[nodiscard]] static bool onCrease(const Source& s, int i, int j) {
+        const std::uint8_t* info = s.whole->info.data() + index(s, i, j);
+        return (info[0] | info[1] | info[s.width] | info[s.width + 1]) & Info::kCrease;
     }
 
     /// A fan around the middle, with every pixel of the border.
@@ -221,7 +295,11 @@ class Maker {
         const glm::dvec3 middle = (p[0] + p[1] + p[2]) / 3.0, normal = across / area;
         const double dist =
             -(glm::conjugate(s.view->camera.orientation) * (middle - s.view->camera.position)).z;
-        return anotherShows(s, middle, normal, densityAt(s, middle, normal, dist, fromEdge));
+        const double here = densityAt(s, middle, normal, dist, fromEdge);
+        // All of it: a large triangle may reach where others have an edge or a crease.
+        return anotherShows(s, middle, normal, here) &&
+               std::ranges::all_of(
+                   p, [&](glm::dvec3 corner) { return anotherShows(s, corner, normal, here); });
     }
 
     /// Some other view sees the place from the same side, more densely by kDenser.

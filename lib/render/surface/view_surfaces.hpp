@@ -21,6 +21,11 @@ struct ViewSurface {
     /// Points of the view that are on no triangle: what is one pixel thin, or far from all others.
     std::vector<glm::u16vec2> lonePixels;
     std::vector<glm::vec3> lonePositions;  ///< as long as `lonePixels`
+    /// Pixels beside an edge whose colour in the view's picture is partly that of the surface
+    /// across, and their own colour, 0..1 as the picture's values. Known where their surface is of
+    /// nearly one colour.
+    std::vector<glm::u16vec2> mixedPixels;
+    std::vector<glm::vec3> ownColours;  ///< as long as `mixedPixels`
 };
 
 /// Each view of a bundle as a surface, in their order: pixels that surface mode takes as neighbours
@@ -28,7 +33,8 @@ struct ViewSurface {
 /// triangles, but keep all pixels of their border, so that no gaps open. Pixels that are covered by
 /// less than a half are left out. A place that several views show is kept of those that sample it
 /// most densely, within a tenth: what a view sees at a grazing angle does not hide what another
-/// sees in full. Background views come last in that choice.
+/// sees in full. A view with an edge or a crease there does not count as showing it, so that all
+/// keep their triangles and no gap opens. Background views come last in that choice.
 ///
 /// Errors: a bundle that fails check(), memory over the limit, cancelled.
 [[nodiscard]] Result<std::vector<ViewSurface>> viewSurfaces(const Bundle& bundle, Job& job);

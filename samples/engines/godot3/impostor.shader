@@ -60,14 +60,16 @@ float smoothDepthAt(int view, vec2 texel, float jump) {
     return mix(mix(d.x, d.y, part.x), mix(d.z, d.w, part.x), part.y);
 }
 
-// How far along the ray a view sees the surface; below zero: it does not.
-float hit(int view, vec3 eye, vec3 ray) {
+// How far along the ray a view sees the surface. -1: the ray meets nothing; -2: it gets behind something, so that
+// what it meets there is hidden from this view. Sure: the end is on the surface, not a step behind an edge of it.
+float hit(int view, vec3 eye, vec3 ray, inout bool sure) {
     vec3 back = entry(view, 2).xyz, position = entry(view, 4).xyz;
     float sink = -dot(ray, back);  // of the view's depth, along the ray
-    if (sink < 0.1) return -1.0;
+    if (sink < 0.1) return -2.0;
     float begin = entry(view, 0).w, end = entry(view, 1).w, room = (end - begin) / float(kSteps);
     float start = dot(position - eye, back);  // the depth of the eye, seen from the view, below zero
     float before = begin - room, last = 1000000000.0;
+    bool hidden = false;
     for (int i = 0; i <= kSteps; ++i) {
         float dist = begin + float(i) * room;
         float there = depthAt(view, texelOf(view, eye + ray * ((dist - start) / sink)));
@@ -81,12 +83,15 @@ float hit(int view, vec3 eye, vec3 ray) {
                 if (smoothDepthAt(view, texel, thick) <= middle) high = middle;
                 else low = middle;
             }
+            vec2 texel = texelOf(view, eye + ray * ((high - start) / sink));
+            sure = sure || high - smoothDepthAt(view, texel, thick) < 0.25 * room;
             return (high - start) / sink;
         }
+        hidden = hidden || there <= dist;
         before = dist;
         last = there;
     }
-    return -1.0;
+    return hidden ? -2.0 : -1.0;
 }
 
 void vertex() {
@@ -111,16 +116,19 @@ void fragment() {
     weights[1] = near;
     weights[2] = far - near;
     float along[3];
-    float first = 1000000000.0;
+    float first = 1000000000.0, spare = 1000000000.0;
+    bool sure = false;
     for (int k = 0; k < 3; ++k) {
-        along[k] = hit(views[k], eye, ray);
+        along[k] = hit(views[k], eye, ray, sure);
         if (along[k] > 0.0 && weights[k] > 0.02) first = min(first, along[k]);
+        else if (along[k] > 0.0) spare = along[k];
     }
+    if (first > 100000000.0) first = spare;  // hidden from the others
     vec4 sum = vec4(0.0);
     float seen = 0.0;
     for (int k = 0; k < 3; ++k) {
         // What is far behind the nearest is another surface, which this view sees past an edge.
-        if (along[k] > first + 0.06 * radius) continue;
+        if (along[k] > first + 0.06 * radius || (sure && along[k] < -1.5)) continue;
         seen += weights[k];
         if (along[k] < 0.0) continue;
         vec2 texel = texelOf(views[k], eye + ray * along[k]);

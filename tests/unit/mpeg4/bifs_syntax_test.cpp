@@ -132,7 +132,7 @@ TEST(BifsSyntax, WhatCannotBeReadIsToldWithItsBit) {
     EXPECT_NE(errorOf("11 000000 0 0 0 000 1").find("PROTO"), std::string::npos);
     EXPECT_NE(errorOf("11 000000 0 0 1 010").find("bit 14: USE of node id 3"), std::string::npos);
     EXPECT_NE(errorOf("10 01 010").find("names node id 3"), std::string::npos);
-    EXPECT_NE(errorOf("00 01").find("extended"), std::string::npos);
+    EXPECT_NE(errorOf("00 01 00001001").find("extended"), std::string::npos);
     const std::string group(kGroup);
     // DEF 1 Group { children [ USE 1 ] } as a mask and a vector of one.
     EXPECT_NE(errorOf(group + "1 000 1 1 0 0 00001 1  1 000").find("used inside itself"),

@@ -32,55 +32,6 @@ std::string foreignXmtOf(const Document& document) {
     return text.value_or("");
 }
 
-constexpr const char* kLight = R"(
-Group { children [ DEF N0 PointLight { } ] }
-AT 2000 { REPLACE N0.on BY FALSE }
-)";
-
-/// At 1000, between the two of kLight: an insert of kind 1, which is an extended command.
-Document withExtendedCommand() {
-    Document document = mustReadBt(kLight);
-    document.bifsConfig = fitBifsConfig(document.bifsConfig, assignNodeIds(document.frames));
-    CommandFrame frame;
-    frame.time = 1000;
-    frame.coded = CommandBuffer{{0x1F, 0x55, 0xAA}, codingOf(document.bifsConfig, false)};
-    document.frames.insert(document.frames.begin() + 1, frame);
-    return document;
-}
-
-TEST(ExtendedCommands, StayAsTheyAreAndLoseNothingElse) {
-    const Document document = withExtendedCommand();
-    const Document back = throughMp4(document);
-    ASSERT_EQ(back.frames.size(), 3u);
-    ASSERT_TRUE(back.frames[1].coded);
-    EXPECT_EQ(back.frames[1].coded->bytes, document.frames[1].coded->bytes);
-    EXPECT_EQ(back.frames[2].commands.size(), 1u);
-    EXPECT_TRUE(sameFrames(back.frames, throughMp4(back).frames));
-    const auto scene = composeScene(back.frames);
-    ASSERT_TRUE(scene) << scene.error().text();
-    // Texts have the rest.
-    EXPECT_EQ(mustReadBt(btOf(back)).frames.size(), 2u);
-    EXPECT_EQ(throughXmt(back).frames.size(), 2u);
-}
-
-TEST(ExtendedCommands, AreRefusedWhereIdsGetWider) {
-    Document document = withExtendedCommand();
-    document.bifsConfig.nodeIdBits = 9;
-    Job job;
-    const auto bytes = writeMp4(document, job, {});
-    ASSERT_FALSE(bytes);
-    EXPECT_EQ(bytes.error().code, ErrorCode::unsupported);
-    EXPECT_TRUE(holdsText(bytes.error().text(), "not known here")) << bytes.error().text();
-}
-
-TEST(ExtendedCommands, InTheFirstAccessUnitAreAnError) {
-    Document document = withExtendedCommand();
-    document.frames.erase(document.frames.begin());
-    Job job;
-    const auto bytes = writeMp4(document, job, {});
-    EXPECT_TRUE(!bytes || !readMp4(ByteSource::fromBytes(*bytes), job));
-}
-
 TEST(SecondSceneStream, IsReadWithTheFirst) {
     Document document = mustReadBt(R"(
 Group { children [ DEF N0 PointLight { } ] }

@@ -67,6 +67,101 @@ TEST(ViewSurfaces, KeepEveryPlaceOfSomeView) {
     }
 }
 
+/// A ridge, z = -|x|, seen from its two sides.
+Bundle ridge() {
+    Bundle bundle;
+    for (const double angle : {0.5, -0.4, 0.1}) {
+        ReferenceView& view = bundle.views.emplace_back();
+        const glm::dquat turned = glm::angleAxis(angle, glm::dvec3(0, 1, 0));
+        view.name = "side";
+        view.camera = Camera::fromFieldOfView(turned * glm::dvec3(0, 0, 4), turned, {0.4, 0.4},
+                                              false, 64, 64);
+        view.nearPlane = 1;
+        view.farPlane = 10;
+        view.depth = Image<float>(64, 64);
+        view.texture = Rgba8Image(64, 64, glm::u8vec4(90, 90, 90, 255));
+        for (int y = 0; y < 64; ++y) {
+            for (int x = 0; x < 64; ++x) {
+                double low = 1, high = 9;
+                for (int k = 0; k < 40; ++k) {
+                    const double middle = (low + high) / 2;
+                    const glm::dvec3 at = view.camera.position +
+                                          turned * view.camera.unproject(x + 0.5, y + 0.5, middle);
+                    (at.z > -std::abs(at.x) ? low : high) = middle;
+                }
+                view.depth.at(x, y) = static_cast<float>(low);
+            }
+        }
+    }
+    return bundle;
+}
+
+TEST(ViewSurfaces, LeaveNoGapsAtCreases) {
+    Job job;
+    const auto surfaces = viewSurfaces(ridge(), job);
+    ASSERT_TRUE(surfaces) << surfaces.error().text();
+    constexpr int kSide = 160;
+    Image<std::uint8_t> covered(kSide, kSide, 0);  // from above, 0.4 wide around the middle
+    const auto placeOf = [](double at) { return (at / 0.4 + 0.5) * kSide; };
+    for (const ViewSurface& s : *surfaces) {
+        for (std::size_t t = 0; t < s.triangles.size(); t += 3) {
+            glm::dvec2 p[3];
+            for (std::size_t k = 0; k < 3; ++k) {
+                const glm::vec3& corner = s.positions[s.triangles[t + k]];
+                p[k] = {placeOf(corner.x), placeOf(corner.y)};
+            }
+            const glm::ivec2 low(glm::floor(glm::min(p[0], glm::min(p[1], p[2]))));
+            const glm::ivec2 high(glm::ceil(glm::max(p[0], glm::max(p[1], p[2]))));
+            for (int y = std::max(low.y, 0); y <= std::min(high.y, kSide - 1); ++y) {
+                for (int x = std::max(low.x, 0); x <= std::min(high.x, kSide - 1); ++x) {
+                    bool inside = true;
+                    for (int k = 0; k < 3; ++k) {
+                        const glm::dvec2 side = p[(k + 1) % 3] - p[k],
+                                         to = glm::dvec2(x + 0.5, y + 0.5) - p[k];
+                        inside = inside && side.x * to.y - side.y * to.x >= -1e-3;
+                    }
+                    if (inside) covered.at(x, y) = 1;
+                }
+            }
+        }
+    }
+    EXPECT_EQ(std::ranges::count(covered.pixels(), 0), 0);
+}
+
+/// A grey disc before a red wall, with the mean colour of each pixel's place as renderers have it.
+TEST(ViewSurfaces, KnowTheirOwnColoursAtEdges) {
+    Job job;
+    Bundle bundle;
+    ReferenceView& view = bundle.views.emplace_back();
+    view.name = "front";
+    view.camera = Camera::fromFieldOfView({0, 0, 4}, {1, 0, 0, 0}, {0.8, 0.8}, false, 64, 64);
+    view.nearPlane = 1;
+    view.farPlane = 10;
+    view.depth = Image<float>(64, 64, 6.0f);
+    view.texture = Rgba8Image(64, 64);
+    const glm::vec3 grey(90), red(255, 0, 0);
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+            const double away = std::hypot(x - 31.7, y - 32.4) - 20;
+            if (away < 0) view.depth.at(x, y) = 3.0f;
+            const auto share = static_cast<float>(std::clamp(0.5 - away / 2, 0.0, 1.0));
+            view.texture.rgba8()->at(x, y) = {glm::u8vec3(glm::mix(red, grey, share)), 255};
+        }
+    }
+    const auto surfaces = viewSurfaces(bundle, job);
+    ASSERT_TRUE(surfaces) << surfaces.error().text();
+    const ViewSurface& s = surfaces->front();
+    for (std::size_t i = 0; i < s.mixedPixels.size(); ++i)
+        view.texture.rgba8()->at(s.mixedPixels[i].x, s.mixedPixels[i].y) = {
+            glm::u8vec3(s.ownColours[i] * 255.0f + 0.5f), 255};
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x)
+            EXPECT_LT(glm::length(glm::vec3(view.texture.rgba8()->at(x, y)) -
+                                  (view.depth.at(x, y) < 5 ? grey : red)),
+                      4)
+                << x << " " << y;
+}
+
 TEST(SurfacesGlb, IsReadBackAsTheSameSurfaces) {
     const TemporaryFolder folder;
     Job job;
