@@ -17,7 +17,8 @@ int main(int argc, char** argv) {
         STX_TRY(Bundle bundle, openBundle(argv[1], {}, job));
         if (!noisy::damage(bundle, argv[3]))
             return fail(ErrorCode::usage,
-                        "'{}' is not noise and a percentage, codes8, missing3, edges1 or light", argv[3]);
+                        "'{}' is not noise and a percentage, codes8, missing3, edges1 or light",
+                        argv[3]);
         return writeExrBundle(bundle, argv[2], job);
     };
     if (argc != 4) {

@@ -62,8 +62,8 @@ constexpr std::array<std::array<int, 2>, 8> kDirections = {
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 
 /// At the border of the picture, what is beyond it counts as surface where so many directions meet
-/// some: a part of a frame is filled as the whole is. A ball with noise of 1 % from close by: 43.0 ->
-/// 49.4 dB.
+/// some: a part of a frame is filled as the whole is. A ball with noise of 1 % from close by: 43.0
+/// -> 49.4 dB.
 constexpr int kLeastBesideBorder = 4;
 
 /// Whether an opening is small enough to be an unseen part of a surface: surface in all directions
