@@ -106,30 +106,31 @@ struct BifsDecoder::Impl : BifsNodeReader {
         STX_CHECK(check("a command"));
         // In a buffer there is nobody to keep what is declared for later commands.
         const bool declares = kind <= 2 || kind == 5;
-        if (kind < 7 && !(declares && around != nullptr)) switch (kind) {
-                case 0:
-                    return readProtos(1);
-                case 1:
-                    return readDeletedProtos();
-                case 2:
-                    return {};  // deletes all PROTOs
-                case 3:
-                    return readManyItems();
-                case 4:
-                    return readManyFields();
-                case 5: {
-                    int height = 0;
-                    STX_TRY(NodePtr node, readNode(Ndt::SFWorldNode, 1, height));
-                    quantisation.setGlobal(std::move(node));
-                    return {};
-                }
-                default: {
-                    STX_TRY(NodePtr target, readTarget());
-                    return keep(DeleteNode{std::move(target)});
-                }
+        if (kind > 6 || (declares && around != nullptr))
+            return error(ErrorCode::unsupported,
+                         "an extended BIFS command of kind {}, which is not supported", kind);
+        switch (kind) {
+            case 0:
+                return readProtos(1);
+            case 1:
+                return readDeletedProtos();
+            case 2:
+                return {};  // deletes all PROTOs
+            case 3:
+                return readManyItems();
+            case 4:
+                return readManyFields();
+            case 5: {
+                int height = 0;
+                STX_TRY(NodePtr node, readNode(Ndt::SFWorldNode, 1, height));
+                quantisation.setGlobal(std::move(node));
+                return {};
             }
-        return error(ErrorCode::unsupported,
-                     "an extended BIFS command of kind {}, which is not supported", kind);
+            default: {
+                STX_TRY(NodePtr target, readTarget());
+                return keep(DeleteNode{std::move(target)});
+            }
+        }
     }
 
     /// Declarations that later commands do not use do no harm: deleted ones stay.
