@@ -195,7 +195,7 @@ Json startOfSingle(const ReferenceView& view) {
     Json j;
     j["eye"] = listOf(c.position);
     j["target"] = listOf(target);
-    j["up"] = listOf(c.orientation * glm::dvec3(0, 1, 0));
+    j["up"] = listOf(upOfCameras({c}));
     j["fov"] = glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
     j["centre"] = listOf(target);
     j["radius"] = std::max(distance, 1e-9);
