@@ -195,7 +195,10 @@ Json startOfSingle(const ReferenceView& view) {
     Json j;
     j["eye"] = listOf(c.position);
     j["target"] = listOf(target);
-    j["up"] = listOf(upOfCameras({c}));
+    // That of `stx render --eye`, unless the camera is tilted sideways against it.
+    const glm::dvec3 up = upOfCameras({c}), right = c.orientation * glm::dvec3(1, 0, 0);
+    const bool upright = std::abs(glm::dot(right, up)) < 1e-6;
+    j["up"] = listOf(upright ? up : c.orientation * glm::dvec3(0, 1, 0));
     j["fov"] = glm::degrees(2 * std::atan(0.5 * c.height / c.fy));
     j["centre"] = listOf(target);
     j["radius"] = std::max(distance, 1e-9);
