@@ -1,7 +1,9 @@
 #include "tools/render_scene.hpp"
 
+#include <type_traits>
+
 #include "formats/any/sequences.hpp"
-#include "lib/base/median.hpp"
+#include "lib/model/median_distance.hpp"
 #include "lib/model/splat_cloud.hpp"
 
 namespace stx::tools {
@@ -30,37 +32,20 @@ void noteUnused(const Model& model, const RenderOptions& o, const Command& comma
              "they are of --mode splat");
 }
 
-void addDistance(float depth, std::vector<float>& distances) {
-    if (hasPoint(depth)) distances.push_back(depth);
-}
-
-/// The pose of a view, and how far away what it shows is.
-Result<SwayPose> swayPose(const ReferenceView& view, std::vector<float> distances) {
-    if (distances.empty())
+/// The pose of the view that --sway is around.
+template <class Views>
+Result<SwayPose> swayPose(const CameraOptions& o, const Views& seen) {
+    STX_TRY(const std::size_t number, namedView(o.view, seen.views));
+    const ReferenceView& view = seen.views[number];
+    SwayPose pose{view.camera};
+    if constexpr (std::is_same_v<Views, Atlas>)
+        pose.distance = medianDistance(seen, number);
+    else
+        pose.distance = medianDistance(view);
+    if (!(pose.distance > 0))
         return fail(ErrorCode::invalidInput,
                     "view '{}' has no depth, so that --sway has no distance to go by", view.name);
-    return SwayPose{view.camera, medianOf(std::move(distances))};
-}
-
-Result<SwayPose> swayPose(const CameraOptions& o, const Bundle& bundle) {
-    STX_TRY(const std::size_t number, namedView(o.view, bundle.views));
-    const ReferenceView& view = bundle.views[number];
-    std::vector<float> distances;
-    for (const float depth : view.depth.pixels()) addDistance(depth, distances);
-    return swayPose(view, std::move(distances));
-}
-
-Result<SwayPose> swayPose(const CameraOptions& o, const Atlas& atlas) {
-    STX_TRY(const std::size_t number, namedView(o.view, atlas.views));
-    std::vector<float> distances;
-    for (const AtlasRectangle& r : atlas.rectangles) {
-        if (r.view != static_cast<int>(number)) continue;
-        const Image<float>& depth = atlas.pages[static_cast<std::size_t>(r.page)].depth;
-        for (int y = 0; y < r.atlasHeight(); ++y)
-            for (int x = 0; x < r.atlasWidth(); ++x)
-                addDistance(depth.at(r.atlasX + x, r.atlasY + y), distances);
-    }
-    return swayPose(atlas.views[number], std::move(distances));
+    return pose;
 }
 
 /// Of a film: the pose of its first picture.

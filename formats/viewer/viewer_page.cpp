@@ -10,8 +10,8 @@
 #include "formats/viewer/page_scene.hpp"
 #include "formats/viewer/page_text.hpp"
 #include "lib/base/counted.hpp"
-#include "lib/base/median.hpp"
 #include "lib/geometry/view_layout.hpp"
+#include "lib/model/median_distance.hpp"
 #include "lib/model/peak_memory.hpp"
 #include "lib/packing/packing.hpp"
 #include "lib/render/scene/page_set.hpp"
@@ -177,14 +177,6 @@ Result<PageWriter> startPage(const std::filesystem::path& path, const PageOption
     PageWriter writer(std::move(file), titleOf(options, title));
     STX_CHECK(writer.begin());
     return writer;
-}
-
-/// The median distance of what a view shows; 0 where it shows nothing.
-double medianDistance(const ReferenceView& view) {
-    std::vector<float> distances;
-    for (const float depth : view.depth.pixels())
-        if (hasPoint(depth)) distances.push_back(depth);
-    return medianOf(std::move(distances));
 }
 
 /// The pose of a single view, around whose median distance the page turns a little.

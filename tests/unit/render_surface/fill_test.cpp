@@ -1,6 +1,7 @@
 // What no source saw: backgrounds of scenes that fill the frame.
 
 #include <algorithm>
+#include <span>
 
 #include <gtest/gtest.h>
 
@@ -25,8 +26,10 @@ struct Picture {
         albedo.at(x, y) = glm::vec4(colour, 1.0f);
         q.at(x, y) = depth;
     }
-    /// With one source that saw nothing farther than `hider` away, and its own far plane there.
-    void fill(const Camera& source, float hider, double farPlane, int averagedBy = 1) {
+    /// Calls fillIn(frame, sources), the one source having seen nothing farther than `hider` away,
+    /// with its own far plane.
+    template <class FillIn>
+    void fillWith(const Camera& source, float hider, double farPlane, const FillIn& fillIn) {
         Bundle bundle;
         ReferenceView view;
         view.name = "source";
@@ -41,7 +44,12 @@ struct Picture {
         const Source& s = scene.sources[0];
         const LocalSource local{&s, warpFrom(s.space.pixelFromWorld * space.worldFromPixel),
                                 nullptr};
-        fillBackground({albedo, q, space}, {&local, 1}, averagedBy);
+        fillIn(OpenFrame{albedo, q, space}, std::span<const LocalSource>(&local, 1));
+    }
+    void fill(const Camera& source, float hider, double farPlane, int averagedBy = 1) {
+        fillWith(source, hider, farPlane, [&](OpenFrame frame, auto sources) {
+            fillBackground(frame, sources, averagedBy);
+        });
     }
     /// Everything is hidden from the source.
     void fill() { fill(space.camera, 0.1f, 1000); }
@@ -199,6 +207,22 @@ TEST(FillUnseen, TheOutlineOfAHoleThatASourceSeesThroughStaysOpen) {
     fillUnseen({p.albedo, p.q, p.space}, {&local, 1}, 0);
     EXPECT_EQ(p.albedo.at(kFirst + 4, kFirst + 4).a, 0.0f);
     for (int y = kFirst; y < kEnd; ++y) EXPECT_FLOAT_EQ(p.albedo.at(kFirst - 1, y).a, 0.4f) << y;
+}
+
+TEST(FillUnseen, AHoleAtTheBorderIsFilledAndACornerIsNot) {
+    constexpr int kSide = 64, kDeep = 3;
+    const auto isHole = [](int x, int y) { return x < kDeep && y >= 28 && y < 33; };
+    const auto isCorner = [](int x, int y) { return x < kDeep && y >= kSide - kDeep; };
+    Picture p(kSide, kSide);
+    for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x)
+            if (!isHole(x, y) && !isCorner(x, y)) p.close(x, y, glm::vec3(0.5f), 0.5f);
+    p.fillWith(p.space.camera, 0.1f, 1000,
+               [](OpenFrame frame, auto sources) { fillUnseen(frame, sources, 0); });
+    for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x)
+            EXPECT_TRUE(!isHole(x, y) || p.albedo.at(x, y).a == 1.0f) << x << " " << y;
+    EXPECT_EQ(p.albedo.at(0, kSide - 1).a, 0.0f);
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 #include <hwy/foreach_target.h>  // NOLINT: must come before highway.h
 #include <hwy/highway.h>
 
+#include <bit>
 #include <cmath>
+#include <cstring>
 
 HWY_BEFORE_NAMESPACE();
 namespace stx::surface::HWY_NAMESPACE {
@@ -86,10 +88,9 @@ const std::array<glm::vec2, kRays>& rayDirections() {
 
 DistanceWords::DistanceWords(const Image<std::uint8_t>& distances)
     : width(static_cast<float>(distances.width())), height(static_cast<float>(distances.height())) {
+    static_assert(std::endian::native == std::endian::little, "the first pixel is the lowest");
     words.resize(distances.count() / 4 + 1);
-    for (std::size_t i = 0; i < distances.count(); ++i)
-        words[i / 4] |=
-            static_cast<std::int32_t>(std::uint32_t{distances.data()[i]} << (i % 4 * 8));
+    std::memcpy(words.data(), distances.data(), distances.count());
 }
 
 RayBatch::RayBatch(const DistanceWords& distances)

@@ -64,7 +64,7 @@ constexpr std::array<std::array<int, 2>, 8> kDirections = {
 /// At the border of the picture, what is beyond it counts as surface where so many directions meet
 /// some: a part of a frame is filled as the whole is. A ball with noise of 1 % from close by: 43.0
 /// -> 49.4 dB.
-constexpr int kLeastBesideBorder = 4;
+constexpr int kLeastBesideBorder = 5;
 
 /// Whether an opening is small enough to be an unseen part of a surface: surface in all directions
 /// but one, or in all but two opposite ones, as in the slits between a machine's cooling fins.
