@@ -25,8 +25,10 @@ struct Shown {
 
 /// A page for browsers, of an atlas' own textures where it is one.
 Result<Shown> writePage(const std::string& input, const OpenOptions& open,
-                        const std::string& output, const std::string& refine, Program& program) {
+                        const std::string& output, const std::string& refine, int jpegQuality,
+                        Program& program) {
     PageOptions write;
+    write.jpegQuality = jpegQuality;
     // Without its folder: pages of the same input are the same wherever it lies.
     const std::filesystem::path path(input);
     write.input = (path.has_filename() ? path : path.parent_path()).filename().string();
@@ -98,9 +100,10 @@ Result<int> extractShown(const std::string& input, const OpenOptions& open,
     const Stopwatch watch;
     SurfacesOptions written = model;
     written.output = program.outputOptions();
-    STX_TRY(const Shown done, std::filesystem::path(output).extension() == ".glb"
-                                  ? writeModel(input, open, output, time, refine, written, program)
-                                  : writePage(input, open, output, refine, program));
+    STX_TRY(const Shown done,
+            std::filesystem::path(output).extension() == ".glb"
+                ? writeModel(input, open, output, time, refine, written, program)
+                : writePage(input, open, output, refine, model.jpegQuality, program));
     return finish(input, output, done, watch.seconds(), program);
 }
 

@@ -66,22 +66,36 @@ Result<std::vector<PageImages>> splatImages(const Atlas& atlas, Job& job) {
     return out;
 }
 
-Result<PageImages> imagesOf(const Atlas& atlas, std::size_t number) {
+/// Colour, and alpha where JPEG has no room for it.
+Result<PageImages> colourImages(const Rgba8Image& colour, int jpegQuality) {
+    const glm::ivec2 size = colour.size();
+    PageImages out;
+    const bool opaque =
+        std::ranges::all_of(colour.pixels(), [](glm::u8vec4 c) { return c.a == 255; });
+    if (!opaque && jpegQuality == 0) {
+        STX_TRY(out["colour"], encodePng(size.x, size.y, 4, 8, colour.data(), true));
+        return out;
+    }
+    std::vector<glm::u8vec3> rgb(colour.count());
+    std::ranges::transform(colour.pixels(), rgb.begin(),
+                           [](glm::u8vec4 c) { return glm::u8vec3(c); });
+    // As PNG a tenth smaller than with alpha.
+    STX_TRY(out["colour"], jpegQuality > 0 ? encodeJpeg(size.x, size.y, 3, &rgb[0].r, jpegQuality)
+                                           : encodePng(size.x, size.y, 3, 8, rgb.data(), true));
+    if (opaque) return out;
+    std::vector<std::uint8_t> alpha(colour.count());
+    std::ranges::transform(colour.pixels(), alpha.begin(), [](glm::u8vec4 c) { return c.a; });
+    STX_TRY(out["alpha"], encodePng(size.x, size.y, 1, 8, alpha.data(), false));
+    return out;
+}
+
+Result<PageImages> imagesOf(const Atlas& atlas, std::size_t number, int jpegQuality) {
     const AtlasPage& page = atlas.pages[number];
     const glm::ivec2 size = page.depth.size();
-    PageImages out;
     const auto* colour = page.texture.rgba8();
     if (!colour)
         return fail(ErrorCode::invalidInput, "the colour of a page must be 8-bit sRGB, not linear");
-    if (std::ranges::all_of(colour->pixels(), [](glm::u8vec4 c) { return c.a == 255; })) {
-        // A tenth smaller.
-        std::vector<glm::u8vec3> rgb(colour->count());
-        std::ranges::transform(colour->pixels(), rgb.begin(),
-                               [](glm::u8vec4 c) { return glm::u8vec3(c); });
-        STX_TRY(out["colour"], encodePng(size.x, size.y, 3, 8, rgb.data(), true));
-    } else {
-        STX_TRY(out["colour"], encodePng(size.x, size.y, 4, 8, colour->data(), true));
-    }
+    STX_TRY(PageImages out, colourImages(*colour, jpegQuality));
     const DepthCodes codes = depthCodes(atlas, static_cast<int>(number));
     const bool small =
         std::ranges::all_of(atlas.views, [](const ReferenceView& v) { return v.depthBits == 8; });
@@ -176,7 +190,7 @@ Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& jo
     return atlases;
 }
 
-Result<PageScene> pageScene(std::span<const Atlas> atlases, Job& job) {
+Result<PageScene> pageScene(std::span<const Atlas> atlases, int jpegQuality, Job& job) {
     PageScene out;
     Json& j = out.description;
     bool pruned = false, partial = false;
@@ -211,7 +225,7 @@ Result<PageScene> pageScene(std::span<const Atlas> atlases, Job& job) {
         }
         for (std::size_t i = 0; i < pages.size(); ++i) {
             STX_CHECK(job.checkCancelled());
-            STX_TRY(auto images, imagesOf(atlas, i));
+            STX_TRY(auto images, imagesOf(atlas, i, jpegQuality));
             pages[i].merge(images);
             out.pages.push_back(std::move(pages[i]));
             out.owners.push_back(number);

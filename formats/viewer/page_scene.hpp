@@ -15,7 +15,8 @@
 namespace stx {
 
 /// The textures of one page of an atlas as PNG files, by the names that the viewer has for them:
-/// "colour", "depth", "normal", "splat". See writeViewerPage() for what they hold.
+/// "colour", "depth", "normal", "splat"; colour may be JPEG, with "alpha" where some is not full.
+/// See writeViewerPage() for what they hold.
 using PageImages = std::map<std::string, Bytes>;
 
 /// Views as the viewer reads them.
@@ -35,9 +36,10 @@ void makeViewable(Bundle& bundle, Job& job);
 /// frame is the same image. Then a view without content has none: an atlas without views. Errors:
 /// those of pack().
 [[nodiscard]] Result<std::vector<Atlas>> packForPage(const Bundle& bundle, bool apart, Job& job);
-/// All atlases as one scene. Errors: one that fails check() but for those without views, linear
-/// colour or depth of 32 bits (invalidInput), memory.
-[[nodiscard]] Result<PageScene> pageScene(std::span<const Atlas> atlases, Job& job);
+/// All atlases as one scene, colour as JPEG of a quality from 1 on. Errors: one that fails check()
+/// but for those without views, linear colour or depth of 32 bits (invalidInput), memory.
+[[nodiscard]] Result<PageScene> pageScene(std::span<const Atlas> atlases, int jpegQuality,
+                                          Job& job);
 
 /// A vector, as JSON has it.
 [[nodiscard]] std::vector<double> listOf(glm::dvec3 v);

@@ -8,16 +8,21 @@
 namespace stx {
 namespace {
 
-constexpr std::uint32_t kDigits = 91, kPairBits = 13, kSingleBits = 6;
+/// Two digits of these are 31 bits. None of the characters is a mark of direction, a surrogate or
+/// anything that HTML reads as more than text.
+constexpr std::uint32_t kDigits = 46341, kFirst = 0x2100;
+constexpr int kPairBits = 31;
 /// Of zlib; what is packed is small.
 constexpr int kBestLevel = 12;
 
-std::string digits() {
-    std::string out;
-    for (char c = '!'; c <= '~'; ++c) {
-        if (c != '"' && c != '&' && c != '<') out += c;
-    }
-    return out;
+void append16(std::string& out, std::uint32_t unit) {
+    out += static_cast<char>(unit & 0xff);
+    out += static_cast<char>(unit >> 8);
+}
+
+void appendPair(std::string& out, std::uint32_t value) {
+    append16(out, kFirst + value % kDigits);
+    append16(out, kFirst + value / kDigits);
 }
 
 bool isWord(char c) {
@@ -48,23 +53,40 @@ bool startsExpression(std::string_view before) {
 
 }  // namespace
 
-std::string pageText(ByteSpan bytes) {
-    static const std::string kAlphabet = digits();
+std::string utf16Of(std::string_view utf8) {
     std::string out;
-    out.reserve(bytes.size() * 8 / kPairBits * 2 + 4);
-    std::uint32_t bits = 0, count = 0;
+    out.reserve(2 * utf8.size());
+    for (std::size_t at = 0; at < utf8.size();) {
+        const auto lead = static_cast<unsigned char>(utf8[at++]);
+        const int more = lead < 0xc0 ? 0 : lead < 0xe0 ? 1 : lead < 0xf0 ? 2 : 3;
+        std::uint32_t code = more == 0 ? lead : lead & (0x3fu >> more);
+        for (int i = 0; i < more && at < utf8.size(); ++i)
+            code = code << 6 | (static_cast<unsigned char>(utf8[at++]) & 0x3fu);
+        if (code < 0x10000) {
+            append16(out, code);
+        } else {
+            append16(out, 0xd800 + ((code - 0x10000) >> 10));
+            append16(out, 0xdc00 + ((code - 0x10000) & 0x3ff));
+        }
+    }
+    return out;
+}
+
+std::string pageText(ByteSpan bytes) {
+    std::string out;
+    out.reserve((bytes.size() * 8 / kPairBits + 2) * 4);
+    appendPair(out, static_cast<std::uint32_t>(bytes.size()));
+    std::uint64_t bits = 0;
+    int count = 0;
     for (const std::byte byte : bytes) {
-        bits |= std::to_integer<std::uint32_t>(byte) << count;
+        bits |= std::to_integer<std::uint64_t>(byte) << count;
         count += 8;
         if (count < kPairBits) continue;
-        const std::uint32_t value = bits & ((1u << kPairBits) - 1);
-        out += kAlphabet[value % kDigits];
-        out += kAlphabet[value / kDigits];
+        appendPair(out, static_cast<std::uint32_t>(bits & ((1ull << kPairBits) - 1)));
         bits >>= kPairBits;
         count -= kPairBits;
     }
-    if (count > 0) out += kAlphabet[bits % kDigits];
-    if (count > kSingleBits) out += kAlphabet[bits / kDigits];
+    if (count > 0) appendPair(out, static_cast<std::uint32_t>(bits));
     return out;
 }
 

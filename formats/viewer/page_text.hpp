@@ -7,12 +7,17 @@
 
 namespace stx {
 
-/// Bytes as text for a script element of HTML: 13 bits, the lowest of the bytes first, are two of
-/// the 91 printable characters of ASCII that are not space, '"', '&' or '<', the lower digit first;
-/// up to 6 bits at the end are one character. 1.23 characters a byte, where base64 has 1.33. All of
-/// ASCII that a script element keeps, control characters and all, would take 1.15. Bytes above 127
-/// would take 1.02 as windows-1252, but servers that say UTF-8 overrule what the page says.
-/// unpack.js reads it.
+/// What a page begins with: the mark of UTF-16, lowest byte first. Browsers follow it whatever a
+/// server says of the page (Encoding Standard, "decode").
+inline constexpr std::string_view kUtf16Mark = "\xff\xfe";
+
+/// Valid UTF-8 in UTF-16, without the mark.
+[[nodiscard]] std::string utf16Of(std::string_view utf8);
+
+/// Bytes as text for a script element of HTML in UTF-16: two characters from U+2100 to U+D604, the
+/// lower digit first, are 31 bits, the lowest of the bytes first. The first two are the number of
+/// bytes, of which there are less than 2^31. 1.03 bytes a byte, where base64 has 1.33; the best
+/// that a page in UTF-8 can do is 1.15. unpack.js reads it.
 [[nodiscard]] std::string pageText(ByteSpan bytes);
 
 /// Text packed by zlib, as pageText().

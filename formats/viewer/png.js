@@ -1,4 +1,4 @@
-// PNG as integers. A browser's own decoder gives 8 bits, and mixes colours with their alpha.
+// PNG as integers. A browser's own decoder gives 8 bits, and mixes colours with their alpha. JPEG at the end.
 
 // Undoes the filter of a row (PNG, 9.2); `before` is the row above, `each` the bytes of a pixel.
 function unfilter(kind, row, before, each) {
@@ -44,3 +44,15 @@ async function decodePng(bytes) {
     for (let i = 0; i < values.length; ++i) values[i] = plain[2 * i] << 8 | plain[2 * i + 1];
     return {width, height, channels, values};
 }
+
+// JPEG, which has no alpha to mix colours with, by the browser's own decoder.
+async function decodeJpeg(bytes) {
+    const picture = await createImageBitmap(new Blob([bytes], {type: "image/jpeg"}), {colorSpaceConversion: "none"});
+    const {width, height} = picture, canvas = Object.assign(document.createElement("canvas"), {width, height});
+    const context = canvas.getContext("2d", {willReadFrequently: true});
+    context.drawImage(picture, 0, 0);
+    picture.close();
+    return {width, height, channels: 4, values: new Uint8Array(context.getImageData(0, 0, width, height).data.buffer)};
+}
+
+const decodeImage = (bytes) => bytes[0] === 0xff ? decodeJpeg(bytes) : decodePng(bytes);

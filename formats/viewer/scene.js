@@ -72,6 +72,8 @@ class Scene {
             const decoded = {};
             for (const name of Object.keys(page)) decoded[name] = await image(page[name]);
             decoded.colour = withAlpha(decoded.colour);
+            if (decoded.alpha) decoded.alpha.values.forEach((a, i) => decoded.colour.values[4 * i + 3] = a);
+            delete decoded.alpha;
             pages.push(decoded);
         }
         const width = Math.max(...pages.map((p) => p.colour.width)), height = Math.max(...pages.map((p) => p.colour.height));

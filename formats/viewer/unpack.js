@@ -1,13 +1,19 @@
 // Starts the page's program, which stx packs so that the page is hardly larger than its images.
 
-// Bytes of what stx wrote as text (page_text.hpp): two characters of 91 are 13 bits, a last one is 6.
+// Bytes of what stx wrote as text (page_text.hpp): two characters are 31 bits, the first two the number of bytes.
 function bytesOf(id) {
-    const text = document.getElementById(id).textContent, pairs = text.length >> 1, digit = [];
-    for (let c = 33, n = 0; c < 127; ++c) if (c !== 34 && c !== 38 && c !== 60) digit[c] = n++;
-    const bytes = new Uint8Array(Math.floor((13 * pairs + 6 * (text.length & 1)) / 8));
-    for (let i = 0, at = 0, bits = 0, count = 0; at < bytes.length; i += 2) {
-        bits |= (digit[text.charCodeAt(i)] + (i + 1 < text.length ? 91 * digit[text.charCodeAt(i + 1)] : 0)) << count;
-        for (count += 13; count >= 8 && at < bytes.length; count -= 8, bits >>= 8) bytes[at++] = bits;
+    const text = document.getElementById(id).textContent;
+    const pair = (i) => text.charCodeAt(i) - 8448 + 46341 * (text.charCodeAt(i + 1) - 8448);
+    const bytes = new Uint8Array(pair(0));
+    let at = 0, bits = 0, count = 0;
+    const put = (value, more) => {
+        bits |= value << count;
+        for (count += more; count >= 8; count -= 8, bits >>>= 8) bytes[at++] = bits;
+    };
+    for (let i = 2; at < bytes.length; i += 2) {
+        const value = pair(i);  // integers of JavaScript hold 32 bits, of which up to 7 are there
+        put(value & 65535, 16);
+        put(value >>> 16, 15);
     }
     return bytes;
 }

@@ -44,7 +44,7 @@ class Viewer {
             this.scenes.set(number, known);
             return known;
         }
-        const image = (k) => decodePng(bytesOf("image" + k));
+        const image = (k) => decodeImage(bytesOf("image" + k));
         const loading = inflated(bytesOf("scene" + number)).json()
             .then((data) => Scene.load(this.painter.gl, this.painter.prepare, data, image));
         this.scenes.set(number, loading);

@@ -98,7 +98,10 @@ class PageWriter {
         put(end_, "@UNPACK@", withoutComments(viewer::unpack_js));
     }
 
-    Result<void> begin() { return write(head_); }
+    Result<void> begin() {
+        STX_CHECK(write(kUtf16Mark));
+        return write(utf16Of(head_));
+    }
 
     /// The number of a scene; that of the frame before when it is the same.
     Result<int> add(std::size_t slot, PageScene scene) {
@@ -132,7 +135,7 @@ class PageWriter {
     Result<void> finish(const Json& data) {
         STX_CHECK(element("data", packedPageText(textOf(data))));
         STX_CHECK(element("code", packedProgram()));
-        STX_CHECK(write(end_));
+        STX_CHECK(write(utf16Of(end_)));
         return file_.commit();
     }
 
@@ -154,10 +157,11 @@ class PageWriter {
         report.bytes += text.size();
         return file_.write(text);
     }
+    /// `text` as pageText() gives it.
     Result<void> element(std::string_view id, std::string_view text) {
-        STX_CHECK(write(fmt::format("<script type=\"text/plain\" id=\"{}\">", id)));
+        STX_CHECK(write(utf16Of(fmt::format("<script type=\"text/plain\" id=\"{}\">", id))));
         STX_CHECK(write(text));
-        return write("</script>\n");
+        return write(utf16Of("</script>\n"));
     }
 
     OutputFile file_;
@@ -336,7 +340,7 @@ Result<PageReport> writeViewerPage(Sequence& frames, const std::filesystem::path
         std::erase_if(parts, [](const Bundle& b) { return b.views.empty(); });
         for (std::size_t k = 0; k < parts.size(); ++k) {
             STX_TRY(const auto atlases, packForPage(parts[k], line.moves(), job));
-            STX_TRY(auto scene, pageScene(atlases, job));
+            STX_TRY(auto scene, pageScene(atlases, options.jpegQuality, job));
             STX_TRY(const int number, writer->add(k, std::move(scene)));
             numbers.push_back(number);
         }
@@ -370,7 +374,7 @@ Result<PageReport> writeViewerPage(const Atlas& atlas, const std::filesystem::pa
     STX_TRY(const PageSet set, PageSet::of(atlas, job));
     STX_TRY(Json data,
             dataOf(atlas.views, set.bounds(), atlas.origin, Timeline(), options, writer.report));
-    STX_TRY(auto scene, pageScene({&atlas, 1}, job));
+    STX_TRY(auto scene, pageScene({&atlas, 1}, options.jpegQuality, job));
     STX_TRY(const int number, writer.add(0, std::move(scene)));
     data["frames"] = {{number}};
     STX_CHECK(writer.finish(data));

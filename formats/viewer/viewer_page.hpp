@@ -18,6 +18,7 @@ struct PageOptions {
     std::string input;
     /// What browsers show as its name; empty: the bundle's title, else the input's name.
     std::string title;
+    int jpegQuality = 0;  ///< of colour: 0 = PNG, exact; 1..100 = JPEG, alpha beside it exact
     OutputFile::Options output = {};
 };
 
@@ -26,7 +27,7 @@ struct PageReport {
     std::size_t views = 0;
     std::int64_t points = 0;  ///< of the first frame
     std::size_t frames = 0;
-    std::uint64_t imageBytes = 0;  ///< of its PNG files
+    std::uint64_t imageBytes = 0;  ///< of its PNG and JPEG files
     std::uint64_t bytes = 0;       ///< of the page
 };
 
@@ -39,8 +40,7 @@ void noteEnvironmentLeftOut(const std::shared_ptr<const Environment>& environmen
 /// with alpha where some is not full, depth as DepthImage codes of 8 or 16 bits, normals in 8 bits,
 /// tilts and sizes of splats in 8 bits. Background views have textures of their own, and in films
 /// all views do: images that are the same as those of the frame before are written once. The page
-/// takes 1.23 bytes for each of the images (pageText()) and about 30 kB: from 190 kB of images on
-/// less than 1.4 times as much.
+/// is UTF-16, takes 1.03 bytes for each of the images (pageText()) and about 30 kB.
 ///
 /// Notes: colours of linear light become 8-bit sRGB, depth of 32 bits becomes 16; a page that
 /// browsers find hard to hold. Errors: those of the sequence and of pack(); files; cancelled.

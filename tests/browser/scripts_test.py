@@ -35,13 +35,11 @@ def png(width, height, kind, bits, rows):
 
 
 def text_of(data):
-    """Bytes as two of 91 characters for each 13 bits, as one for the last 6 (formats/viewer/page_text.hpp)."""
-    digits = [chr(c) for c in range(33, 127) if chr(c) not in '"&<']
-    number, bits, text = int.from_bytes(data, "little"), 8 * len(data), ""
-    for at in range(0, bits, 13):
-        value, left = number >> at & 8191, bits - at
-        text += digits[value % 91] + (digits[value // 91] if left > 6 else "")
-    return text
+    """Bytes as two of 46341 characters for each 31 bits, their number first (formats/viewer/page_text.hpp)."""
+    number, values = int.from_bytes(data, "little"), [len(data)]
+    for at in range(0, 8 * len(data), 31):
+        values.append(number >> at & (1 << 31) - 1)
+    return "".join(chr(0x2100 + value % 46341) + chr(0x2100 + value // 46341) for value in values)
 
 
 def node_run(node, folder, scripts, code, *args):

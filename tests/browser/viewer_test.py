@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
 """`stx extract -o view.html` in a real Chromium: its pictures against `stx render --mode splat`, what people
 touch, and what is said where WebGL 2 is missing."""
+import contextlib
+import http.server
 import os
 import shlex
 import sys
 import tempfile
+import threading
 
 import chromium
 from pages import READY, drawn, must, psnr, show
@@ -75,6 +78,8 @@ def models(test, browser, args):
     test.stx_run("pack", "amphora.mp4", "-o", "atlas", "--prune", "--layout", "tight")
     test.stx_run("extract", "atlas", "-o", "atlas.html")
     test.compare(browser, "amphora, pruned, as an atlas", "atlas.html", "atlas", "-1.5,1.4,2.2", "0,0.5,0")
+    test.stx_run("extract", "amphora.mp4", "-o", "jpeg.html", "--colour", "jpeg")
+    test.compare(browser, "amphora, with JPEG", "jpeg.html", "amphora.mp4", "1.5,1.2,2.5", "0,0.5,0")
     test.compare(browser, "amphora, from afar", "amphora.html", "amphora.mp4", "4,3,9", "0,0.5,0")
     test.compare(browser, "amphora, near", "amphora.html", "amphora.mp4", "0.9,1.1,1.1", "0.1,0.7,0")
 
@@ -167,6 +172,26 @@ def phone(test, browser):
     test.check(unlabelled == 0, "every field has a label")
 
 
+@contextlib.contextmanager
+def served(path):
+    """The address of a file on a server that says that all is UTF-8."""
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.end_headers()
+            with open(path, "rb") as file:
+                self.wfile.write(file.read())
+
+        def log_message(self, *_):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+
+
 def main():
     args = arguments(__doc__)
     if not chromium.find():
@@ -189,6 +214,12 @@ def main():
             browser.until("document.getElementById('message').className === 'failed'")
             said = browser.ask("document.getElementById('message').textContent")
             test.check("needs WebGL 2" in said, f"without WebGL 2: {said}")
+            # The mark at the page's start counts more than what a server says of it.
+            with served(test.path("amphora.html")) as address:
+                browser.open(address)
+                browser.until("document.getElementById('message').className === 'failed'")
+                kind = browser.ask("document.characterSet + ' ' + document.getElementById('message').textContent")
+                test.check(kind.startswith("UTF-16LE This page needs"), f"from a server that says UTF-8: {kind[:30]}")
         return 1 if test.failed else 0
 
 
