@@ -104,8 +104,17 @@ Result<Wanted> wantedOf(ExtractOptions& o) {
 
 /// Errors (usage) for options that cannot matter to what is written.
 Result<void> checkOptions(const ExtractOptions& o, const Wanted& w, const Command& command) {
-    if (!(w.shown && w.ending == ".glb"))
-        STX_CHECK(command.refuse({"--triangles", "--colour"}, "is of a model of surfaces, .glb"));
+    const bool model = w.as == ExtractAs::surfaces, page = w.ending == ".html";
+    if (!model) STX_CHECK(command.refuse({"--triangles"}, "is of a model of surfaces, .glb"));
+    if (w.as && !model)
+        STX_CHECK(command.refuse({"--colour"}, "is of a folder, of .html and of surfaces (.glb)"));
+    if (o.colour == (model || page ? "exr" : "jpeg"))
+        STX_CHECK(command.refuse(
+            {"--colour"},
+            o.colour + (model || page ? " is of a folder" : " is of .html and .glb")));
+    if (o.cameras == "colmap")
+        STX_CHECK(command.refuse({"--colour"},
+                                 "does not go with --cameras colmap, whose colour is 8-bit PNG"));
     if (modelOf(o).jpegQuality == 0) STX_CHECK(command.refuse({"--quality"}, "is of JPEG"));
     if (!w.picture) STX_CHECK(command.refuse({"--view"}, "is of a picture with depth"));
     if (w.shown || w.picture || w.splats || w.points)
@@ -178,6 +187,7 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
                                              : ExportOptions::Kind::transforms;
         write.noClobber = program.common.noClobber;
         write.depth = o.depth;
+        write.linearAsPng = o.colour == "png";
         if (timeline.moves() && o.time) {
             STX_TRY(frames, someFrames(std::move(frames), {moment}));
         }
@@ -270,8 +280,10 @@ void addExtract(CommandLine& line, Program& program) {
         .range(1, 2000000000)
         .takes("N");
     c.option("--colour", o->colour,
-             "Of surfaces (.glb): png (exact) or jpeg (default png; jpeg with --triangles)")
-        .oneOf({"png", "jpeg"});
+             "Of .html and of surfaces (.glb): png (exact) or jpeg (default png; of surfaces with "
+             "--triangles jpeg). In the folder, of colours in linear light and of 16 bits: exr "
+             "(exact) or png (16-bit sRGB, exact for what was that) (default exr)")
+        .oneOf({"png", "jpeg", "exr"});
     c.option("--quality", o->quality, "Of JPEG (default 92)").range(1, 100);
     c.option("--position-bits", o->points.positionBits, "Of .drc, 0 = exact floats").range(0, 30);
     c.option("--normal-bits", o->points.normalBits, "Of .drc, 0 = exact floats").range(0, 30);

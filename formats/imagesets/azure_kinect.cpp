@@ -284,7 +284,7 @@ Result<SetDescription> describeAzureKinect(const path& given, const ImageSetOpti
         view.load = [device](const SetView& self, Job& ownJob) -> Result<StoredView> {
             StoredView stored;
             STX_TRY(auto values, readDepth(self.depth, ownJob));
-            STX_TRY(const auto picture, readColour(self.texture, {}, ownJob));
+            STX_TRY(const auto picture, readColour(self.texture, {}, false, ownJob));
             const auto* seen = picture.texture.rgba8();
             if (values.values.size() != device->rays().size() || !seen ||
                 seen->width() != device->colour.camera.width ||

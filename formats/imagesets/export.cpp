@@ -126,6 +126,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     if (options.kind == ExportOptions::Kind::colmap)
         return imagesets::exportColmap(bundle, folder, names, options, job);
 
+    imagesets::noteColourLoss(bundle, options, job);
     OutputJson json;
     double unit = 0.001;
     double farthest = 0;
@@ -152,7 +153,7 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         const ReferenceView& view = bundle.views[i];
         if (!miv) {
-            json["frames"].push_back(transformsFrame(view, names[i], depthEnding, bundle.origin));
+            json["frames"].push_back(transformsFrame(view, names[i], options, bundle.origin));
             continue;
         }
         STX_TRY(auto camera, mivCamera(view, names[i], bundle.origin));
@@ -174,10 +175,10 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     for (std::size_t i = 0; i < names.size(); ++i) {
         const ReferenceView& view = bundle.views[i];
         if (miv) {
-            own.push_back(fmt::format("{}_color{}", names[i], colourEnding(view)));
+            own.push_back(fmt::format("{}_color{}", names[i], colourEnding(view, options)));
             own.push_back(names[i] + (floats ? "_depth.exr" : "_depth16.png"));
         } else {
-            own.push_back(fmt::format("images/{}{}", names[i], colourEnding(view)));
+            own.push_back(fmt::format("images/{}{}", names[i], colourEnding(view, options)));
             own.push_back(fmt::format("depth/{}{}", names[i], depthEnding));
         }
     }
@@ -200,7 +201,8 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
         const ReferenceView& view = bundle.views[i];
         const auto write = [&]() -> Result<void> {
             STX_CHECK(job.checkCancelled());
-            STX_CHECK(writeColour(view, root / (miv ? names[i] + "_color" : "images/" + names[i])));
+            STX_CHECK(writeColour(view, root / (miv ? names[i] + "_color" : "images/" + names[i]),
+                                  options));
             if (floats)
                 return writeFloatDepth(view, root / (miv ? names[i] + "_depth.exr"
                                                          : "depth/" + names[i] + depthEnding));

@@ -24,15 +24,18 @@ struct ExportOptions {
         npy,  ///< NumPy's floats, as exact; transforms.json only
     };
     Depth depth = Depth::exr;
+    /// Linear colour as PNG of 16 bits, sRGB, instead of OpenEXR. A note says when that rounds or
+    /// clips; colours that were PNG of 16 bits come back to the bit. Not of COLMAP's workspace.
+    bool linearAsPng = false;
     bool noClobber = false;
 };
 
 /// Writes a bundle as an image set: a folder that appears whole or not at all. Cameras are exact;
-/// 8-bit colour is PNG with its coverage, linear colour OpenEXR. Normals and splats are dropped
-/// with a note. Cameras are in the world's coordinates, the bundle's origin added (it is kept as
-/// stx:origin). The environment is environment.exr, named as stx:environment (not for COLMAP).
-/// readImageSet() gives the same bundle again. Errors: io; invalidInput for what the
-/// kind cannot say; (usage) Depth::npy of another kind than transforms.
+/// 8-bit colour is PNG with its coverage, linear colour OpenEXR or PNG. Normals and splats are
+/// dropped with a note. Cameras are in the world's coordinates, the bundle's origin added (it is
+/// kept as stx:origin). The environment is environment.exr, named as stx:environment (not for
+/// COLMAP). readImageSet() gives the same bundle again. Errors: io; invalidInput for what the kind
+/// cannot say; (usage) Depth::npy of another kind than transforms.
 [[nodiscard]] Result<void> exportImages(const Bundle& bundle, const std::filesystem::path& folder,
                                         const ExportOptions& options, Job& job);
 

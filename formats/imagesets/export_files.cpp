@@ -29,6 +29,26 @@ Result<void> writeExr(const path& file, int width, int height,
     return output.commit();
 }
 
+/// How far a value may be from a code of 16 bits that it came from: what floats leave of 65535.
+constexpr float kSameCode = 0.02f;
+
+/// The code of 16 bits of a linear colour's part, or of its alpha, before it is rounded.
+float codeOf(float value, bool alpha) {
+    const float coded = alpha ? value : srgbFromLinear(value);
+    return std::clamp(coded, 0.0f, 1.0f) * 65535.0f;
+}
+
+std::vector<glm::u16vec4> codedColours(const RgbaFloatImage& image) {
+    std::vector<glm::u16vec4> out(image.count());
+    std::ranges::transform(image.pixels(), out.begin(), [](const glm::vec4& c) {
+        glm::u16vec4 code;
+        for (int k = 0; k < 4; ++k)
+            code[k] = static_cast<std::uint16_t>(std::lround(codeOf(c[k], k == 3)));
+        return code;
+    });
+    return out;
+}
+
 }  // namespace
 
 std::vector<std::string> fileNames(const Bundle& bundle) {
@@ -50,8 +70,14 @@ std::vector<std::string> fileNames(const Bundle& bundle) {
     return names;
 }
 
-Result<void> writeColour(const ReferenceView& view, const path& withoutEnding) {
+Result<void> writeColour(const ReferenceView& view, const path& withoutEnding,
+                         const ExportOptions& options) {
     const int width = view.texture.width(), height = view.texture.height();
+    if (view.texture.isLinear() && options.linearAsPng) {
+        const auto codes = codedColours(*view.texture.rgbaFloat());
+        STX_TRY(const auto png, encodePng(width, height, 4, 16, codes.data(), true));
+        return writeFile(path(withoutEnding) += ".png", png);
+    }
     if (const auto* bytes = view.texture.rgba8()) {
         STX_TRY(const auto png, encodePng(width, height, 4, 8, bytes->data(), true));
         return writeFile(path(withoutEnding) += ".png", png);
@@ -64,8 +90,30 @@ Result<void> writeColour(const ReferenceView& view, const path& withoutEnding) {
                     {{"R", at, 4}, {"G", at + 1, 4}, {"B", at + 2, 4}, {"A", at + 3, 4}});
 }
 
-const char* colourEnding(const ReferenceView& view) {
-    return view.texture.isLinear() ? ".exr" : ".png";
+const char* colourEnding(const ReferenceView& view, const ExportOptions& options) {
+    return view.texture.isLinear() && !options.linearAsPng ? ".exr" : ".png";
+}
+
+void noteColourLoss(const Bundle& bundle, const ExportOptions& options, Job& job) {
+    if (!options.linearAsPng) return;
+    bool clipped = false, rounded = false;
+    for (const ReferenceView& view : bundle.views) {
+        const RgbaFloatImage* image = view.texture.rgbaFloat();
+        if (!image) continue;
+        for (const glm::vec4& c : image->pixels()) {
+            // What is under no coverage is filled again by who reads it.
+            if (c.a <= 0.0f) continue;
+            for (int k = 0; k < 4; ++k) {
+                const float code = codeOf(c[k], k == 3);
+                clipped = clipped || c[k] < 0.0f || c[k] > 1.0f;
+                rounded = rounded || std::abs(code - std::round(code)) > kSameCode;
+            }
+        }
+    }
+    if (clipped)
+        job.note("linear colour becomes 16-bit sRGB; values above 1 are clipped");
+    else if (rounded)
+        job.note("linear colour becomes 16-bit sRGB");
 }
 
 const char* endingOf(ExportOptions::Depth depth) {
@@ -115,11 +163,11 @@ void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin) 
 }
 
 OutputJson transformsFrame(const ReferenceView& view, const std::string& name,
-                           const char* depthEnding, glm::dvec3 origin) {
+                           const ExportOptions& options, glm::dvec3 origin) {
     const Camera& c = view.camera;
     OutputJson frame;
-    frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(view));
-    frame["depth_file_path"] = fmt::format("depth/{}{}", name, depthEnding);
+    frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(view, options));
+    frame["depth_file_path"] = fmt::format("depth/{}{}", name, endingOf(options.depth));
     frame["camera_model"] = c.orthographic ? "ORTHOGRAPHIC" : "PINHOLE";
     frame["w"] = c.width;
     frame["h"] = c.height;

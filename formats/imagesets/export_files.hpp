@@ -21,10 +21,14 @@ inline constexpr const char* kEnvironmentFile = "environment.exr";
 /// Names of the views that are safe in any file system, each once.
 [[nodiscard]] std::vector<std::string> fileNames(const Bundle& bundle);
 
-/// Colour as PNG, or OpenEXR where it is linear: colourEnding() is added to the name.
+/// Colour as PNG, or OpenEXR where it is linear and the options do not ask for PNG of 16 bits:
+/// colourEnding() is added to the name.
 [[nodiscard]] Result<void> writeColour(const ReferenceView& view,
-                                       const std::filesystem::path& withoutEnding);
-[[nodiscard]] const char* colourEnding(const ReferenceView& view);
+                                       const std::filesystem::path& withoutEnding,
+                                       const ExportOptions& options);
+[[nodiscard]] const char* colourEnding(const ReferenceView& view, const ExportOptions& options);
+/// What of linear colour is lost where the options ask for PNG.
+void noteColourLoss(const Bundle& bundle, const ExportOptions& options, Job& job);
 
 /// ".exr", ".png" or ".npy".
 [[nodiscard]] const char* endingOf(ExportOptions::Depth depth);
@@ -40,6 +44,6 @@ inline constexpr const char* kEnvironmentFile = "environment.exr";
 void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin);
 /// A view in the frames of transforms.json, with images/NAME and depth/NAME.
 [[nodiscard]] OutputJson transformsFrame(const ReferenceView& view, const std::string& name,
-                                         const char* depthEnding, glm::dvec3 origin);
+                                         const ExportOptions& options, glm::dvec3 origin);
 
 }  // namespace stx::imagesets

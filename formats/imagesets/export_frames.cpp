@@ -78,7 +78,6 @@ class FrameExporter {
             STX_CHECK(begin(bundle));
         else
             STX_CHECK(checkSameViews(first_, bundle));
-        const char* ending = endingOf(options_.depth);
         std::vector<Result<void>> written(bundle.views.size());
         parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t i) {
             const auto k = static_cast<std::size_t>(i);
@@ -87,7 +86,7 @@ class FrameExporter {
         for (std::size_t k = 0; k < bundle.views.size(); ++k) {
             if (!written[k]) return propagate(written[k]);
             if (tracks_[k].name.empty()) continue;
-            auto frame = transformsFrame(bundle.views[k], tracks_[k].name, ending, bundle.origin);
+            auto frame = transformsFrame(bundle.views[k], tracks_[k].name, options_, bundle.origin);
             frame["time"] = frames_.timeline().times[index];
             frame["camera"] = bundle.views[k].name;
             json_["frames"].push_back(std::move(frame));
@@ -101,6 +100,7 @@ class FrameExporter {
         const glm::dvec3& o = bundle.origin;
         if (o != glm::dvec3(0.0)) json_["stx:origin"] = {o.x, o.y, o.z};
         bundle.noteMaterialLeftOut(job_);
+        imagesets::noteColourLoss(bundle, options_, job_);
         double farthest = 0;
         for (const ReferenceView& view : bundle.views) {
             farthest = std::max(farthest, view.farPlane);
@@ -131,7 +131,7 @@ class FrameExporter {
         if (track.name.empty() && view.depthMayBeUnknown() && view.pointCount() == 0) return {};
         if (index > 0 && samePictures(view, track.before)) return {};
         track.name = fmt::format("{}_{:04}", names_[k], index);
-        STX_CHECK(writeColour(view, root_ / "images" / track.name));
+        STX_CHECK(writeColour(view, root_ / "images" / track.name, options_));
         if (options_.depth != ExportOptions::Depth::png)
             return writeFloatDepth(view, root_ / "depth" / (track.name + endingOf(options_.depth)));
         if (view.farPlane > unit_ * 65535)

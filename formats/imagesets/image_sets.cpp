@@ -14,6 +14,7 @@
 #include "lib/base/parallel.hpp"
 #include "lib/geometry/origin.hpp"
 #include "lib/model/sequence.hpp"
+#include "lib/model/srgb8.hpp"
 #include "lib/refine/poses.hpp"
 #include "lib/registration/refine_poses.hpp"
 
@@ -174,6 +175,23 @@ void makeUnknown(ReferenceView& view) {
         std::ranges::fill(texture->pixels(), glm::vec4(0, 0, 0, 1));
 }
 
+/// Pictures of one bundle are all coded alike: where some hold linear light, the others' 8 bits
+/// become floats, too, of which they come back.
+void makeAllLinear(std::vector<ReferenceView>& views) {
+    const auto linear = [](const ReferenceView& view) { return view.texture.isLinear(); };
+    if (std::ranges::none_of(views, linear)) return;
+    for (ReferenceView& view : views) {
+        const Rgba8Image* coded = view.texture.rgba8();
+        if (!coded) continue;
+        RgbaFloatImage floats(coded->width(), coded->height());
+        std::ranges::transform(coded->pixels(), floats.pixels().begin(), [](glm::u8vec4 c) {
+            return glm::vec4(linearFromSrgb8(c.r), linearFromSrgb8(c.g), linearFromSrgb8(c.b),
+                             static_cast<float>(c.a) / 255.0f);
+        });
+        view.texture = std::move(floats);
+    }
+}
+
 /// The views of a described frame. `failing` becomes the number of the view that cannot be read,
 /// where it is that.
 Result<Bundle> readViews(SetDescription set, const std::string& where,
@@ -228,6 +246,7 @@ Result<Bundle> readViews(SetDescription set, const std::string& where,
         }
     }
     makeNamesUnique(bundle.views);
+    makeAllLinear(bundle.views);
     if (!set.environment.empty()) {
         STX_TRY(bundle.environment, readEnvironmentExr(set.environment, job));
     }

@@ -79,6 +79,9 @@ struct ImageSetOptions {
     std::function<void(const RefineReport&)> refined;
     YuvColour yuv;
     int depthBits = 16;  ///< of the bundle's views: 8, 16 or 32 (float distances)
+    /// Pictures of 16-bit integers become linear floats, of which they come back to the bit (then
+    /// all pictures of the set do); else they are rounded to 8 bits, with a note.
+    bool deepColour = false;
 };
 
 /// A kind of image set, for `--from` and its help.

@@ -87,7 +87,7 @@ auto shiftBy(std::vector<NumberedPicture> pictures, int number, double scale) {
         for (const NumberedPicture& p : pictures) {
             if (p.number == number) continue;
             // Only a help: what cannot be read is not needed.
-            auto read = readColour(p.source, {}, job);
+            auto read = readColour(p.source, {}, texture.isLinear(), job);
             if (read && read->texture.width() == texture.width() &&
                 read->texture.height() == texture.height())
                 beside.push_back({std::move(read->texture), (p.number - number) / 4.0});

@@ -24,9 +24,9 @@ bool isPair(int width, int height) {
 }
 
 /// Colour and depth; of a pair the upper picture, which by custom is the left eye's.
-Result<StoredView> loadPanorama(const SetView& set, const YuvColour& yuv, Job& job) {
+Result<StoredView> loadPanorama(const SetView& set, const YuvColour& yuv, bool deep, Job& job) {
     StoredView stored;
-    STX_TRY(auto colour, readColour(set.texture, yuv, job));
+    STX_TRY(auto colour, readColour(set.texture, yuv, deep, job));
     stored.texture = std::move(colour.texture);
     stored.alpha = colour.alpha;
     STX_TRY(auto depth, readDepth(set.depth, job));
@@ -52,8 +52,8 @@ SetDescription setOf(PictureSource texture, PictureSource depth, const ImageSetO
     view.panorama = Panorama();
     view.texture = std::move(texture);
     view.depth = std::move(depth);
-    view.load = [yuv = options.yuv](const SetView& set, Job& job) {
-        return loadPanorama(set, yuv, job);
+    view.load = [yuv = options.yuv, deep = options.deepColour](const SetView& set, Job& job) {
+        return loadPanorama(set, yuv, deep, job);
     };
     view.distances = [](Image<float>& values, const Camera& camera, int bits,
                         Job& notes) -> Result<void> {

@@ -9,6 +9,7 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/text_lines.hpp"
 #include "formats/video/film.hpp"
+#include "lib/base/parallel.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -81,6 +82,17 @@ Result<int> depthChannel(const DecodedImage& image, std::string_view name) {
                   image.channels);
 }
 
+/// Linear floats of integers that code sRGB. Floats are finer than 16 bits everywhere, so that
+/// these come back.
+RgbaFloatImage linearFromCoded(const DecodedImage& image) {
+    RgbaFloatImage out = rgbaFloatFrom(image);
+    parallelFor(0, out.height(), [&](std::int64_t y) {
+        for (glm::vec4& c : out.row(static_cast<int>(y)))
+            c = {linearFromSrgb(c.r), linearFromSrgb(c.g), linearFromSrgb(c.b), c.a};
+    });
+    return out;
+}
+
 Result<Image<float>> floatsFrom(ByteSpan bytes, int width, int height, bool littleEndian,
                                 int channels, std::string_view name) {
     const std::uint64_t need = static_cast<std::uint64_t>(width) * height * channels * 4;
@@ -111,7 +123,8 @@ Result<void> checkSide(double width, double height, std::string_view name, const
 
 }  // namespace
 
-Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour, Job& job) {
+Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour, bool deep,
+                                Job& job) {
     StoredColour out;
     if (source.yuv) {
         STX_TRY(auto image,
@@ -144,8 +157,12 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
     };
     out.alpha =
         image.channelNames.empty() ? image.channels == 2 || image.channels == 4 : hasName("A");
+    if (image.bits() == 16 && deep) {
+        out.texture = linearFromCoded(image);
+        return out;
+    }
     if (image.bits() < 32) {
-        if (image.bits() == 16) job.note("colour of 16 bits is rounded to 8");
+        if (image.bits() == 16) job.note("colour of 16 bits is rounded to 8; stx convert -o NAME.exr keeps it");
         out.texture = rgba8From(image);
         return out;
     }

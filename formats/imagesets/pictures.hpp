@@ -12,8 +12,9 @@ struct StoredColour {
     Texture texture;
     bool alpha = false;
 };
+/// `deep`: see ImageSetOptions::deepColour.
 [[nodiscard]] Result<StoredColour> readColour(const PictureSource& source, const YuvColour& colour,
-                                              Job& job);
+                                              bool deep, Job& job);
 
 /// The values of a depth or disparity image as they are stored, and their bits (32 = floats).
 struct StoredDepth {

@@ -86,6 +86,7 @@ OpenOptions openOptionsFrom(const Keywords& given) {
         {&set.intrinsics[0], &set.intrinsics[1], &set.intrinsics[2], &set.intrinsics[3]});
     given.takeDegrees("fov", set.photo.fovRad);
     given.take("depth_bits", set.depthBits);
+    given.take("deep_colour", set.deepColour);
     takeRefining(given, set.refine);
     return options;
 }

@@ -53,7 +53,7 @@ def open(path: Path, *, texture: str | None = None, materials: bool = False, fro
          moving: bool | None = None, every: int = 1, strict: bool = False, depth: str | None = None, mask: str | None = None,
          depth_range: tuple[float, float] | None = None, depth_unit: float | None = None, no_depth: str | None = None,
          intrinsics: Sequence[float] | None = None, focal: float | None = None, baseline: float | None = None,
-         fov: float | None = None, depth_bits: int = 16, refine: str = "auto",
+         fov: float | None = None, depth_bits: int = 16, deep_colour: bool = False, refine: str = "auto",
          job: Job | None = None) -> Mesh | Bundle | Atlas:
     """Opens a mesh (glTF, OBJ, PLY, STL, ...), a bundle (.mp4, .xmt, .bt, .exr), an image set or an atlas.
 
@@ -64,7 +64,8 @@ def open(path: Path, *, texture: str | None = None, materials: bool = False, fro
     depth_range: (nearest, farthest), scene units, and depth_unit: scene units a step, where the set says neither.
     no_depth: what pixels without depth are, 'empty' or 'unknown'. intrinsics: fx, fy, cx, cy in pixels. focal:
     pixels, and baseline: scene units, of older Middlebury sets. fov: of a photo, vertical, degrees. depth_bits: 8, 16
-    or 32 (floats). refine: steps that are done at the import, as in 'auto', 'off', 'noise,edges'.
+    or 32 (floats). deep_colour: pictures of 16 bits become linear floats, of which they come back to the bit, and are
+    not rounded to 8. refine: steps that are done at the import, as in 'auto', 'off', 'noise,edges'.
     Raises Error: io, invalidInput (with byte offset, line or key), usage, unsupported.
     """
     options = {name: value for name, value in locals().items() if name not in ("path", "job")}
@@ -75,7 +76,7 @@ def open(path: Path, *, texture: str | None = None, materials: bool = False, fro
 def open_film(path: Path, *, from_: str | None = None, moving: bool | None = None, strict: bool = False,
               texture: str | None = None, depth: str | None = None, mask: str | None = None,
               depth_range: tuple[float, float] | None = None, depth_unit: float | None = None, no_depth: str | None = None,
-              depth_bits: int = 16, refine: str = "auto", job: Job | None = None) -> Film:
+              depth_bits: int = 16, deep_colour: bool = False, refine: str = "auto", job: Job | None = None) -> Film:
     """Opens what holds views in time: .mp4, .xmt, .bt, an image set, 'name_%04d.exr', 'atlas_%04d'.
 
     What stands still is one frame. No picture is read before a frame is asked for. Keywords and errors: as open().
