@@ -29,7 +29,7 @@ struct MeshOptions {
 /// Reads a model: glTF 2.0 and GLB (with Draco, quantisation, sparse accessors, texture transforms,
 /// meshopt compression, instances, skins in rest pose, morph targets at their default weights), OBJ
 /// with MTL, PLY, STL (ASCII and binary), OFF, COLLADA, FBX, Draco .drc meshes and point clouds.
-/// Clouds of Gaussian splats, of PLY, SPZ (2, 3) and glTF (KHR_gaussian_splatting), become
+/// Clouds of Gaussian splats, of PLY, SPZ (2 to 4) and glTF (KHR_gaussian_splatting), become
 /// Mesh::splats. "-" reads stdin.
 ///
 /// The result has passed Mesh::check(): world space, all transforms applied, no triangle without

@@ -1,5 +1,6 @@
-// Clouds of splats: PLY, SPZ and glTF, the first byte chooses. SPZ is given as what its gzip stream
-// holds, so that changed bytes reach the reader. What is read is drawn, from two sides.
+// Clouds of splats: PLY, SPZ, glTF and SPZ without gzip, the first byte chooses. SPZ in gzip is
+// given as what that holds, so that changed bytes reach the reader. What is read is drawn, from two
+// sides.
 
 #include <cstdlib>
 
@@ -12,8 +13,8 @@ using namespace stx;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size < 1) return 0;
     const auto* from = reinterpret_cast<const std::byte*>(data) + 1;
-    static constexpr const char* kNames[] = {"s.ply", "s.spz", "s.glb"};
-    const int kind = data[0] % 3;
+    static constexpr const char* kNames[] = {"s.ply", "s.spz", "s.glb", "s.spz"};
+    const int kind = data[0] % 4;
     Bytes bytes(from, from + size - 1);
     if (kind == 1) bytes = compressGzip(bytes, 1);
     Job job;

@@ -1,10 +1,8 @@
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <map>
 
+#include "formats/meshes/ply_values.hpp"
 #include "formats/meshes/readers.hpp"
 
 namespace stx {
@@ -21,42 +19,6 @@ const PlyElement* verticesOf(const PlyHeader& header) {
     return nullptr;
 }
 
-template <class T>
-double load(const std::byte* at, bool swapped) {
-    std::array<std::byte, sizeof(T)> raw;
-    std::memcpy(raw.data(), at, sizeof(T));
-    if (swapped) std::reverse(raw.begin(), raw.end());
-    return static_cast<double>(std::bit_cast<T>(raw));
-}
-
-double valueAt(const std::byte* at, PlyType type, bool swapped) {
-    switch (type) {
-        case PlyType::int8:
-            return load<std::int8_t>(at, swapped);
-        case PlyType::uint8:
-            return load<std::uint8_t>(at, swapped);
-        case PlyType::int16:
-            return load<std::int16_t>(at, swapped);
-        case PlyType::uint16:
-            return load<std::uint16_t>(at, swapped);
-        case PlyType::int32:
-            return load<std::int32_t>(at, swapped);
-        case PlyType::uint32:
-            return load<std::uint32_t>(at, swapped);
-        case PlyType::float32:
-            return load<float>(at, swapped);
-        case PlyType::float64:
-            break;
-    }
-    return load<double>(at, swapped);
-}
-
-/// Where a value of a vertex lies.
-struct Place {
-    std::size_t offset = 0;
-    PlyType type = PlyType::float32;
-};
-
 }  // namespace
 
 bool isSplatPly(const PlyHeader& header) {
@@ -71,20 +33,17 @@ bool isSplatPly(const PlyHeader& header) {
 
 Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
     const PlyElement& vertices = *verticesOf(header);
-    if (header.coding == PlyCoding::ascii)
-        return fail(ErrorCode::unsupported,
-                    "the splats are text; binary PLY is read (splat-transform rewrites it)");
     if (&vertices != &header.elements.front())
         return fail(ErrorCode::unsupported,
                     "element '{}' comes before the vertices; splats are expected first",
                     header.elements.front().name);
-    std::map<std::string, Place, std::less<>> places;
+    std::map<std::string, std::size_t, std::less<>> places;
     std::size_t stride = 0;
     for (const PlyProperty& p : vertices.properties) {
         if (p.isList)
             return fail(ErrorCode::invalidInput,
                         "the splats have a list, '{}'; numbers are expected", p.name);
-        places[p.name] = {stride, p.type};
+        places.emplace(p.name, static_cast<std::size_t>(&p - vertices.properties.data()));
         stride += plySize(p.type);
     }
     int rest = 0;
@@ -97,37 +56,45 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
                     "3)",
                     rest);
     const auto count = static_cast<std::size_t>(vertices.count);
-    const ByteSpan values = bytes.subspan(header.dataOffset);
-    if (count > values.size() / stride)
+    const std::size_t left = bytes.size() - header.dataOffset;
+    if (header.coding != PlyCoding::ascii && count > left / stride)
         return fail(ErrorCode::invalidInput,
                     "the header says {} splats of {} bytes, but only {} bytes follow", count,
-                    stride, values.size());
+                    stride, left);
     SplatCloud cloud;
     STX_CHECK(cloud.resize(count, degree, job.limits));
     cloud.up = {0, -1, 0};
-    std::vector<Place> at;
+    std::vector<std::size_t> at;
     for (const char* name : kNeeded) at.push_back(places.find(name)->second);
-    std::vector<Place> atRest;
+    std::vector<std::size_t> atRest;
     for (int k = 0; k < rest; ++k)
         atRest.push_back(places.find(fmt::format("f_rest_{}", k))->second);
-    const bool swapped =
-        (header.coding == PlyCoding::bigEndian) != (std::endian::native == std::endian::big);
     const int coefficients = SplatCloud::coefficientCount(degree);
+    PlyValues values(bytes, header.dataOffset, header.coding);
+    std::vector<double> splat(vertices.properties.size());
     for (std::size_t i = 0; i < count; ++i) {
-        const std::byte* const splat = values.data() + i * stride;
-        const auto get = [&](const Place& p) { return valueAt(splat + p.offset, p.type, swapped); };
-        const auto number = [&](int k) { return get(at[static_cast<std::size_t>(k)]); };
+        values.beginElement();
+        for (std::size_t k = 0; k < splat.size(); ++k) {
+            const PlyProperty& p = vertices.properties[k];
+            if (!values.next(p.type, splat[k]))
+                return fail(ErrorCode::invalidInput,
+                            "splat {} of {} at byte {}: the file ends, or here is no number", i,
+                            count, values.offset());
+        }
+        values.endElement();
+        const auto number = [&](std::size_t k) { return splat[at[k]]; };
         for (int k = 0; k < 3; ++k) {
-            cloud.positions[i][k] = static_cast<float>(number(k));
-            cloud.scales[i][k] = static_cast<float>(std::exp(number(4 + k)));
-            cloud.colours[i][k] = static_cast<float>(0.5 + kDegree0 * number(11 + k));
+            const auto part = static_cast<std::size_t>(k);
+            cloud.positions[i][k] = static_cast<float>(number(part));
+            cloud.scales[i][k] = static_cast<float>(std::exp(number(4 + part)));
+            cloud.colours[i][k] = static_cast<float>(0.5 + kDegree0 * number(11 + part));
         }
         cloud.opacities[i] = static_cast<float>(1.0 / (1.0 + std::exp(-number(3))));
         // w comes first.
         cloud.rotations[i] = glm::vec4(number(8), number(9), number(10), number(7));
         for (int k = 0; k < rest; ++k)
             cloud.setHarmonic(i, k % coefficients, k / coefficients,
-                              static_cast<float>(get(atRest[static_cast<std::size_t>(k)])));
+                              static_cast<float>(splat[atRest[static_cast<std::size_t>(k)]]));
     }
     return meshOfSplats(std::move(cloud), job);
 }

@@ -1,5 +1,6 @@
+#include <zstd.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "formats/files/deflate.hpp"
@@ -15,11 +16,15 @@ std::uint32_t wordAt(const std::byte* from, int bytes) {
     return value;
 }
 
+std::uint64_t longAt(const std::byte* from) {
+    return wordAt(from, 4) | static_cast<std::uint64_t>(wordAt(from + 4, 4)) << 32;
+}
+
 float byteAt(const std::byte* from, std::size_t i) {
     return static_cast<float>(std::to_integer<int>(from[i]));
 }
 
-/// Version 3: which number is the largest, and nine bits with a sign of each other one.
+/// Versions 3 and 4: which number is the largest, and nine bits with a sign of each other one.
 glm::vec4 smallestThree(std::uint32_t packed) {
     const int largest = static_cast<int>(packed >> 30);
     glm::dvec4 q(0.0);
@@ -42,46 +47,123 @@ glm::vec4 firstThree(const std::byte* from) {
     return {v, std::sqrt(std::max(0.0f, 1.0f - glm::dot(v, v)))};
 }
 
+/// What a header says, and where each attribute of all splats begins in `bytes`.
+struct Content {
+    std::uint32_t version = 0;
+    std::size_t count = 0;
+    int degree = 0, fractionalBits = 0;
+    std::size_t rotationBytes = 4, harmonicBytes = 0;  ///< of a splat
+    Bytes bytes;
+    std::size_t begin = 0;
+
+    [[nodiscard]] std::size_t eachBytes() const { return 16 + rotationBytes + harmonicBytes; }
+};
+
+/// The header's first 16 bytes, which all versions have.
+Result<Content> readHeader(ByteSpan bytes, std::uint32_t least, std::uint32_t most) {
+    Content out;
+    out.version = wordAt(bytes.data() + 4, 4);
+    if (out.version < least || out.version > most)
+        return fail(ErrorCode::unsupported,
+                    "the SPZ file is of version {}; 2, 3 (in gzip) and 4 (without) are read here",
+                    out.version);
+    out.count = wordAt(bytes.data() + 8, 4);
+    out.degree = std::to_integer<int>(bytes[12]);
+    out.fractionalBits = std::to_integer<int>(bytes[13]);
+    if (out.degree > 3)
+        return fail(ErrorCode::unsupported, "the splats have harmonics of degree {}; 3 is the most",
+                    out.degree);
+    if (out.fractionalBits >= spz::kFixedBits)
+        return fail(ErrorCode::invalidInput, "{} of the {} bits of a coordinate are a fraction",
+                    out.fractionalBits, spz::kFixedBits);
+    out.rotationBytes = out.version == 2 ? 3 : 4;
+    out.harmonicBytes = 3 * static_cast<std::size_t>(SplatCloud::coefficientCount(out.degree));
+    return out;
+}
+
+bool isSpz(ByteSpan bytes, std::size_t headerBytes) {
+    return bytes.size() >= headerBytes && wordAt(bytes.data(), 4) == spz::kMagic;
+}
+
+Result<Content> unpackGzip(ByteSpan file, const Limits& limits) {
+    STX_TRY(Bytes bytes, gunzip(file, limits));
+    if (!isSpz(bytes, spz::kHeaderBytes))
+        return fail(ErrorCode::invalidInput,
+                    "the gzip file does not hold SPZ, whose content begins with 'NGSP'");
+    STX_TRY(Content out, readHeader(bytes, 2, 3));
+    out.begin = spz::kHeaderBytes;
+    if ((bytes.size() - out.begin) / out.eachBytes() < out.count)
+        return fail(ErrorCode::invalidInput,
+                    "the header says {} splats of {} bytes, but only {} bytes follow", out.count,
+                    out.eachBytes(), bytes.size() - out.begin);
+    out.bytes = std::move(bytes);
+    return out;
+}
+
+/// Version 4: each attribute is a stream of zstd, whose sizes a table has.
+Result<Content> unpackZstd(ByteSpan file, const Limits& limits) {
+    STX_TRY(Content out, readHeader(file, 4, 4));
+    std::vector<std::size_t> sizes = {9, 1, 3, 3, out.rotationBytes};
+    if (out.degree > 0) sizes.push_back(out.harmonicBytes);
+    const auto streams = std::to_integer<std::size_t>(file[15]);
+    const std::size_t table = wordAt(file.data() + 16, 4);
+    if (streams != sizes.size() || table < spz::kLongHeaderBytes || table > file.size() ||
+        (file.size() - table) / spz::kEntryBytes < streams)
+        return fail(ErrorCode::invalidInput,
+                    "the header says {} streams with a table at byte {}; {} are expected for "
+                    "degree {}, within {} bytes",
+                    streams, table, sizes.size(), out.degree, file.size());
+    std::vector<ByteSpan> packed;
+    std::size_t from = table + streams * spz::kEntryBytes;
+    for (std::size_t i = 0; i < streams; ++i) {
+        const std::byte* const entry = file.data() + table + i * spz::kEntryBytes;
+        const std::uint64_t bytes = longAt(entry), size = longAt(entry + 8);
+        const std::size_t left = file.size() - from, wanted = out.count * sizes[i];
+        if (size != wanted || bytes > left || size / spz::kMostOfZstd > bytes)
+            return fail(ErrorCode::invalidInput,
+                        "stream {} of {} bytes, {} unpacked, does not fit: {} splats take {}, and "
+                        "{} bytes are left of the file",
+                        i, bytes, size, out.count, wanted, left);
+        packed.push_back(file.subspan(from, bytes));
+        from += bytes;
+    }
+    STX_CHECK(limits.checkAllocation(out.count, out.eachBytes(), "the splats' bytes"));
+    out.bytes.resize(out.count * out.eachBytes());
+    std::size_t to = 0;
+    for (std::size_t i = 0; i < streams; ++i) {
+        const std::size_t wanted = out.count * sizes[i];
+        const std::size_t done =
+            ZSTD_decompress(out.bytes.data() + to, wanted, packed[i].data(), packed[i].size());
+        if (ZSTD_isError(done) || done != wanted)
+            return fail(ErrorCode::invalidInput, "stream {} is damaged: zstd says {}", i,
+                        ZSTD_isError(done) ? ZSTD_getErrorName(done) : "that it ends too early");
+        to += wanted;
+    }
+    return out;
+}
+
+Result<Content> unpackSpz(ByteSpan file, const Limits& limits) {
+    if (isGzip(file)) return unpackGzip(file, limits);
+    if (isSpz(file, spz::kLongHeaderBytes)) return unpackZstd(file, limits);
+    return fail(ErrorCode::invalidInput,
+                "the file is neither gzip, as SPZ of the versions 2 and 3 is, nor begins with "
+                "'NGSP', as version 4 does");
+}
+
 }  // namespace
 
 Result<Mesh> readSpz(ByteSpan file, Job& job) {
-    if (!isGzip(file))
-        return fail(ErrorCode::invalidInput,
-                    "the file is not gzip; SPZ of the versions 2 and 3 is (splat-transform and spz "
-                    "make version 3 of a newer one)");
-    STX_TRY(Bytes bytes, gunzip(file, job.limits));
-    if (bytes.size() < spz::kHeaderBytes || wordAt(bytes.data(), 4) != spz::kMagic)
-        return fail(ErrorCode::invalidInput,
-                    "the gzip file does not hold SPZ, whose content begins with 'NGSP'");
-    const std::uint32_t version = wordAt(bytes.data() + 4, 4);
-    if (version != 2 && version != 3)
-        return fail(ErrorCode::unsupported, "the SPZ file is of version {}; 2 and 3 are read here",
-                    version);
-    const std::size_t count = wordAt(bytes.data() + 8, 4);
-    const int degree = std::to_integer<int>(bytes[12]);
-    const int fractionalBits = std::to_integer<int>(bytes[13]);
-    if (degree > 3)
-        return fail(ErrorCode::unsupported, "the splats have harmonics of degree {}; 3 is the most",
-                    degree);
-    if (fractionalBits >= spz::kFixedBits)
-        return fail(ErrorCode::invalidInput, "{} of the {} bits of a coordinate are a fraction",
-                    fractionalBits, spz::kFixedBits);
-    const int coefficients = SplatCloud::coefficientCount(degree);
-    const std::size_t rotationBytes = version == 3 ? 4 : 3;
-    const std::size_t each = 16 + rotationBytes + 3 * static_cast<std::size_t>(coefficients);
-    if ((bytes.size() - spz::kHeaderBytes) / each < count)
-        return fail(ErrorCode::invalidInput,
-                    "the header says {} splats of {} bytes, but only {} bytes follow", count, each,
-                    bytes.size() - spz::kHeaderBytes);
+    STX_TRY(Content content, unpackSpz(file, job.limits));
+    const std::size_t count = content.count;
     SplatCloud cloud;
-    STX_CHECK(cloud.resize(count, degree, job.limits));
-    const std::byte* const positions = bytes.data() + spz::kHeaderBytes;
+    STX_CHECK(cloud.resize(count, content.degree, job.limits));
+    const std::byte* const positions = content.bytes.data() + content.begin;
     const std::byte* const alphas = positions + 9 * count;
     const std::byte* const colours = alphas + count;
     const std::byte* const scales = colours + 3 * count;
     const std::byte* const rotations = scales + 3 * count;
-    const std::byte* const harmonics = rotations + rotationBytes * count;
-    const double step = std::exp2(-fractionalBits);
+    const std::byte* const harmonics = rotations + content.rotationBytes * count;
+    const double step = std::exp2(-content.fractionalBits);
     for (std::size_t i = 0; i < count; ++i) {
         for (int k = 0; k < 3; ++k) {
             const std::size_t at = 3 * i + static_cast<std::size_t>(k);
@@ -93,14 +175,14 @@ Result<Mesh> readSpz(ByteSpan file, Job& job) {
             cloud.colours[i][k] = 0.5f + static_cast<float>(spz::kDegree0) * f;
         }
         cloud.opacities[i] = byteAt(alphas, i) / 255.0f;
-        cloud.rotations[i] = version == 3 ? smallestThree(wordAt(rotations + 4 * i, 4))
-                                          : firstThree(rotations + 3 * i);
-        const auto all = 3 * static_cast<std::size_t>(coefficients);
+        cloud.rotations[i] = content.version == 2 ? firstThree(rotations + 3 * i)
+                                                  : smallestThree(wordAt(rotations + 4 * i, 4));
+        const std::size_t all = content.harmonicBytes;
         for (std::size_t k = 0; k < all; ++k)
             cloud.setHarmonic(i, static_cast<int>(k / 3), static_cast<int>(k % 3),
                               (byteAt(harmonics, i * all + k) - 128.0f) / 128.0f);
     }
-    bytes = {};
+    content.bytes = {};
     return meshOfSplats(std::move(cloud), job);
 }
 
