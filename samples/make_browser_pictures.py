@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The picture of samples/README.md: the page of `stx extract -o view.html` and the impostor of engines/three, both in
-Chromium. Usage: samples/make_browser_pictures.py MODEL [FOLDER]   (stx and oiiotool must be on the PATH; wants chromium
-and `npm ci` in tests/browser)"""
+"""The pictures of samples/README.md: the page of `stx extract -o view.html`, the impostor of engines/three and the splats
+of engines/babylon, in Chromium. Usage: samples/make_browser_pictures.py MODEL [FOLDER]   (stx and oiiotool must be on the PATH; wants chromium
+and `npm ci && npm install --no-save babylonjs@9.28.0 babylonjs-loaders@9.28.0` in tests/browser)"""
 import functools
 import http.server
 import os
@@ -27,6 +27,7 @@ def main():
         stx(["stx", "convert", model, "-o", path("grid.mp4"), "--views", "octahedral:8", "--size", "256x256", "--projection",
              "orthographic", "--depth-bits", "8", "--quiet"])
         stx(["stx", "pack", path("grid.mp4"), "-o", path("atlas"), "--quiet"])
+        stx(["stx", "extract", path("amphora.mp4"), "-o", path("cloud.glb"), "--as", "splats", "--quiet"])
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, folder=folder))
         threading.Thread(target=server.serve_forever, daemon=True).start()
         with chromium.Browser() as browser:
@@ -38,8 +39,12 @@ def main():
                          "&fov=40&size=480x420")
             browser.until("document.title === 'ready'")
             browser.picture(path("three.png"))
+            browser.open(f"http://127.0.0.1:{server.server_port}/babylon/index.html?cloud=/cloud.glb&eye=1.5,1.2,2.5"
+                         "&target=0,0.4,0&fov=40&size=480x420")
+            browser.until("document.title === 'ready'", 300)
+            browser.picture(path("babylon.png"))
         server.shutdown()
-        stx(["oiiotool", path("page.png"), path("three.png"), "--mosaic:pad=8", "2x1", "-d", "uint8", "-o",
+        stx(["oiiotool", path("page.png"), path("three.png"), path("babylon.png"), "--mosaic:pad=8", "3x1", "-d", "uint8", "-o",
              os.path.join(out, "browser.png")], env=dict(os.environ, SOURCE_DATE_EPOCH="0"))
 
 

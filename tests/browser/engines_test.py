@@ -29,7 +29,8 @@ class Files(http.server.SimpleHTTPRequestHandler):
     """What index.html asks for; scripts in modules are not read from files."""
 
     def __init__(self, *args, folder, **options):
-        self.roots = {"/node_modules/": NODE_MODULES, "/three/": os.path.join(ENGINES, "three"), "/": folder}
+        self.roots = {"/node_modules/": NODE_MODULES, "/three/": os.path.join(ENGINES, "three"),
+                      "/babylon/": os.path.join(ENGINES, "babylon"), "/": folder}
         super().__init__(*args, **options)
 
     def translate_path(self, path):
