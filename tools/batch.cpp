@@ -322,8 +322,9 @@ Result<int> BatchRun::run() {
     if (!written) return propagate(written);
     STX_CHECK(program_.job.checkCancelled());
     const auto converted = done_ - skipped_ - failed_;
-    const std::string counts = fmt::format("{} inputs: {} done, {} skipped, {} failed",
-                                           items_.size(), converted, skipped_, failed_);
+    const std::string counts =
+        fmt::format("{}: {} done, {} skipped, {} failed", counted(items_.size(), "input"),
+                    converted, skipped_, failed_);
     if (failed_ == 0) {
         program_.say(counts);
         return 0;

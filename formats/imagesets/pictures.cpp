@@ -162,7 +162,8 @@ Result<StoredColour> readColour(const PictureSource& source, const YuvColour& co
         return out;
     }
     if (image.bits() < 32) {
-        if (image.bits() == 16) job.note("colour of 16 bits is rounded to 8; stx convert -o NAME.exr keeps it");
+        if (image.bits() == 16)
+            job.note("colour of 16 bits is rounded to 8; stx convert -o NAME.exr keeps it");
         out.texture = rgba8From(image);
         return out;
     }
