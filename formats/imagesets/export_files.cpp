@@ -64,8 +64,8 @@ Result<void> writeColour(const ReferenceView& view, const path& withoutEnding) {
                     {{"R", at, 4}, {"G", at + 1, 4}, {"B", at + 2, 4}, {"A", at + 3, 4}});
 }
 
-const char* colourEnding(const ReferenceView& view) {
-    return view.texture.isLinear() ? ".exr" : ".png";
+const char* colourEnding(bool linear) {
+    return linear ? ".exr" : ".png";
 }
 
 const char* endingOf(ExportOptions::Depth depth) {
@@ -99,7 +99,7 @@ Result<void> writeIntegerDepth(const ReferenceView& view, const path& file,
     return writeFile(file, png);
 }
 
-void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin) {
+void addOwnKeys(OutputJson& json, const ViewHeader& view, glm::dvec3 origin) {
     const glm::dquat& q = view.camera.orientation;
     json["stx:name"] = view.name;
     const glm::dvec3& p = view.camera.position;
@@ -114,11 +114,11 @@ void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin) 
     if (view.background) json["stx:background"] = true;
 }
 
-OutputJson transformsFrame(const ReferenceView& view, const std::string& name,
+OutputJson transformsFrame(const ViewHeader& view, bool linear, const std::string& name,
                            const char* depthEnding, glm::dvec3 origin) {
     const Camera& c = view.camera;
     OutputJson frame;
-    frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(view));
+    frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(linear));
     frame["depth_file_path"] = fmt::format("depth/{}{}", name, depthEnding);
     frame["camera_model"] = c.orthographic ? "ORTHOGRAPHIC" : "PINHOLE";
     frame["w"] = c.width;

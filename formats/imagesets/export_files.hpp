@@ -24,7 +24,7 @@ inline constexpr const char* kEnvironmentFile = "environment.exr";
 /// Colour as PNG, or OpenEXR where it is linear: colourEnding() is added to the name.
 [[nodiscard]] Result<void> writeColour(const ReferenceView& view,
                                        const std::filesystem::path& withoutEnding);
-[[nodiscard]] const char* colourEnding(const ReferenceView& view);
+[[nodiscard]] const char* colourEnding(bool linear);
 
 /// ".exr", ".png" or ".npy".
 [[nodiscard]] const char* endingOf(ExportOptions::Depth depth);
@@ -37,9 +37,10 @@ inline constexpr const char* kEnvironmentFile = "environment.exr";
                                              const std::function<double(double)>& code);
 
 /// What brings a view back to the bit; other programs do not look at it.
-void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin);
+void addOwnKeys(OutputJson& json, const ViewHeader& view, glm::dvec3 origin);
 /// A view in the frames of transforms.json, with images/NAME and depth/NAME.
-[[nodiscard]] OutputJson transformsFrame(const ReferenceView& view, const std::string& name,
-                                         const char* depthEnding, glm::dvec3 origin);
+[[nodiscard]] OutputJson transformsFrame(const ViewHeader& view, bool linear,
+                                         const std::string& name, const char* depthEnding,
+                                         glm::dvec3 origin);
 
 }  // namespace stx::imagesets

@@ -74,6 +74,7 @@ class FrameExporter {
         quiet.workFor(job_);
         STX_TRY(auto bundle, frames_.frame(index, index == 0 ? job_ : quiet));
         STX_CHECK(bundle.check());
+        STX_CHECK(checkPeak(peak::kExport, bundle.views, job_.limits));
         if (index == 0)
             STX_CHECK(begin(bundle));
         else
@@ -87,7 +88,9 @@ class FrameExporter {
         for (std::size_t k = 0; k < bundle.views.size(); ++k) {
             if (!written[k]) return propagate(written[k]);
             if (tracks_[k].name.empty()) continue;
-            auto frame = transformsFrame(bundle.views[k], tracks_[k].name, ending, bundle.origin);
+            const ReferenceView& view = bundle.views[k];
+            auto frame = transformsFrame(view, view.texture.isLinear(), tracks_[k].name, ending,
+                                         bundle.origin);
             frame["time"] = frames_.timeline().times[index];
             frame["camera"] = bundle.views[k].name;
             json_["frames"].push_back(std::move(frame));
@@ -159,8 +162,8 @@ class FrameExporter {
 Result<void> exportFrames(Sequence& frames, const fs::path& folder, const ExportOptions& options,
                           Job& job) {
     if (!frames.timeline().moves()) {
-        STX_TRY(const auto bundle, frames.frame(0, job));
-        return exportImages(bundle, folder, options, job);
+        STX_TRY(const auto table, frames.views(0, job));
+        return exportViews(*table, folder, options, job);
     }
     if (options.kind != ExportOptions::Kind::transforms)
         return fail(
