@@ -104,6 +104,7 @@ def of_many():
         yield f"extract {kind} png", f"extract {{}}.{kind} -o OUT --depth png"
         yield f"extract {kind} miv", f"extract {{}}.{kind} -o OUT --cameras miv"
         yield f"extract {kind} colmap", f"extract {{}}.{kind} -o OUT --cameras colmap"
+        yield f"sheet {kind}", f"sheet {{}}.{kind} -o OUT.png"
         yield f"validate {kind}", f"validate {{}}.{kind}"
 
 

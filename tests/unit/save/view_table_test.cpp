@@ -15,9 +15,7 @@
 #include "formats/imagesets/export.hpp"
 #include "lib/base/parallel.hpp"
 #include "lib/model/same_pictures.hpp"
-#include "lib/refine/refine_needed.hpp"
 #include "lib/surface/normals.hpp"
-#include "tests/noisy_depth.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/torus_bundle.hpp"
 #include "tests/unit/mpeg4/mapping_fixtures.hpp"
@@ -267,35 +265,6 @@ TEST(ViewTable, IsBakedAndExportedAsItsBundleIs) {
         std::filesystem::remove_all(folder / "whole");
         std::filesystem::remove_all(folder / "table");
     }
-}
-
-/// What refining finds in views one by one, and whether it changes them side by side.
-void expectNeeds(const Bundle& bundle, const RefineSettings& settings, bool needed) {
-    const MadeViews table(bundle, headersOf(bundle));
-    Job job;
-    const auto may = mayRefine(table, settings, job);
-    ASSERT_TRUE(may) << may.error().text();
-    EXPECT_EQ(*may, needed);
-    Bundle refined = bundle;
-    const auto report = refine(refined, settings, job);
-    ASSERT_TRUE(report);
-    EXPECT_EQ(report->changed(), needed);
-}
-
-TEST(ViewTable, TellsWhetherItsViewsNeedRefining) {
-    const Bundle exact = torusViews(96);
-    expectNeeds(exact, {}, false);
-    expectNeeds(exact, RefineSettings().forSplats(), false);
-    Bundle noisy = exact;
-    noisy::addNoise(noisy, 0.01);
-    expectNeeds(noisy, {}, true);
-    for (ReferenceView& view : noisy.views) view.refined = {"noise", 0};
-    expectNeeds(noisy, {}, false);
-    // One camera that exposes for itself.
-    Bundle darker = exact;
-    for (auto& pixel : darker.views[3].texture.rgba8()->pixels())
-        pixel = {pixel.r / 2, pixel.g / 2, pixel.b / 2, pixel.a};
-    expectNeeds(darker, {}, true);
 }
 
 TEST(ViewTable, OfAMeshLeavesOutViewsThatSeeNothing) {
