@@ -154,7 +154,7 @@ Result<Converted> convertStill(const std::filesystem::path& input,
     Converted done;
     ViewTally tally;
     const auto save = [&](std::unique_ptr<ViewTable> table, Job& job) -> Result<void> {
-        if (environment) table->about().environment = environment;
+        if (o.environment.given()) table->about().environment = environment;
         if (mesh) table->about().title = input.stem().string();
         const bool onTheWay = countPoints && !table->whole();
         done = summaryOf(table->about(), countPoints && !onTheWay);

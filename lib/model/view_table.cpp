@@ -9,13 +9,25 @@
 namespace stx {
 namespace {
 
-/// Where the table says planes, they hold; where not, those of the view do.
-bool agrees(const ViewHeader& told, const ViewHeader& found, bool planes) {
-    return told.name == found.name && told.camera == found.camera &&
-           told.depthBits == found.depthBits && told.noDepth == found.noDepth &&
-           told.pruned == found.pruned && told.background == found.background &&
-           told.refined == found.refined &&
-           (!planes || (told.nearPlane == found.nearPlane && told.farPlane == found.farPlane));
+/// In what a view that came is not as its header was: found, and expected; empty where it is.
+std::string difference(const ViewHeader& told, const ViewHeader& found, bool planes) {
+    const Camera &is = found.camera, &was = told.camera;
+    if (is.width != was.width || is.height != was.height)
+        return fmt::format("it has {}x{} pixels, but its header says {}x{}", is.width, is.height,
+                           was.width, was.height);
+    if (found.depthBits != told.depthBits)
+        return fmt::format("its depth has {} bits, but its header says {}", found.depthBits,
+                           told.depthBits);
+    if (planes && (found.nearPlane != told.nearPlane || found.farPlane != told.farPlane))
+        return fmt::format("its planes are {:g} and {:g}, but its header says {:g} and {:g}",
+                           found.nearPlane, found.farPlane, told.nearPlane, told.farPlane);
+    if (found.name != told.name)
+        return fmt::format("its name is '{}', but its header says '{}'", found.name, told.name);
+    if (is != was) return "its camera is not that of its header";
+    if (found.noDepth != told.noDepth || found.pruned != told.pruned ||
+        found.background != told.background || found.refined != told.refined)
+        return "its marks (unknown depth, pruned, background, refined) are not those of its header";
+    return {};
 }
 
 class Held : public ViewTable {
@@ -153,13 +165,13 @@ Result<std::shared_ptr<const ReferenceView>> ViewTable::view(std::size_t index, 
     if (whole_) return view;
     const auto place = [&] { return fmt::format("view {}", index); };
     if (auto ok = view->checkHeader(); !ok) return tl::unexpected(ok.error().at(place()));
-    const ViewHeader& told = about_->views[index];
-    if (!agrees(told, *view, planesKnown_) || ViewImageKinds::of(*view) != kinds_[index])
-        return failAt(place(), ErrorCode::invalidInput,
-                      "'{}' of {}x{} pixels is not what the headers told, '{}' of {}x{}: the file "
-                      "is damaged; write it anew",
-                      view->name, view->camera.width, view->camera.height, told.name,
-                      told.camera.width, told.camera.height);
+    auto differs = difference(about_->views[index], *view, planesKnown_);
+    if (differs.empty() && ViewImageKinds::of(*view) != kinds_[index])
+        differs =
+            "its images (normals, splats, materials, linear colour) are not those of its header";
+    if (!differs.empty())
+        return failAt(place(), ErrorCode::invalidInput, "{}: the file is damaged; write it anew",
+                      differs);
     return view;
 }
 

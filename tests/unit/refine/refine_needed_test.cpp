@@ -12,12 +12,17 @@
 namespace stx {
 namespace {
 
+std::vector<ViewImageKinds> allKinds(const Bundle& bundle) {
+    std::vector<ViewImageKinds> kinds;
+    for (const ReferenceView& view : bundle.views) kinds.push_back(ViewImageKinds::of(view));
+    return kinds;
+}
+
 /// Gives copies: nothing is held.
 class CopiedViews : public ViewTable {
   public:
     CopiedViews(const Bundle& bundle, Bundle headers)
-        : ViewTable(std::move(headers), std::vector<ViewImageKinds>(bundle.views.size())),
-          bundle_(bundle) {}
+        : ViewTable(std::move(headers), allKinds(bundle)), bundle_(bundle) {}
 
   protected:
     Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
