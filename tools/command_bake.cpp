@@ -8,6 +8,7 @@
 #include "lib/model/peak_memory.hpp"
 #include "lib/surface/normals.hpp"
 #include "tools/commands.hpp"
+#include "tools/view_tally.hpp"
 
 namespace stx::tools {
 namespace {
@@ -29,19 +30,11 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
     settings.method =
         o.method == "paper" ? BakeSettings::Method::paper : BakeSettings::Method::robust;
     const Timeline timeline = frames->timeline();
-    // What the report tells is that of the first frame.
-    std::size_t views = 0;
-    std::int64_t points = 0;
-    frames = changed(std::move(frames), [&](Bundle& bundle, Job& job) -> Result<void> {
-        if (container == FileKind::mpeg4)
-            STX_CHECK(checkPeak(peak::kBakeToMpeg4, bundle.views, job.limits));
-        STX_CHECK(bake(bundle, settings, job));
-        if (views == 0) {
-            views = bundle.views.size();
-            points = bundle.pointCount();
-        }
-        return {};
-    });
+    STX_TRY(const auto change,
+            bakeOfViews(settings, container == FileKind::mpeg4 ? peak::kBakeToMpeg4 : peak::kBake));
+    keepFreedMemory();  // of a view, for the next one
+    ViewTally tally;
+    frames = tallied(changedByView(std::move(frames), change), tally);
     SaveOptions save;
     save.noClobber = program.common.noClobber;
     STX_CHECK(saveSequence(*frames, o.output, save, program.job));
@@ -51,15 +44,15 @@ Result<int> bakeBundle(const BakeOptions& o, Program& program) {
         "{} ({}) → {} ({}), {} with normals and splats, {}",
         std::filesystem::path(o.input).filename().string(), humanBytes(bytesOf(o.input)),
         std::filesystem::path(o.output).filename().string(), humanBytes(bytesOf(o.output)),
-        counted(views, "view") +
+        counted(tally.views(), "view") +
             (timeline.moves() ? " of " + counted(timeline.count(), "frame") : std::string()),
         humanSeconds(seconds)));
     STX_CHECK(program.writeReport({{"$schema", "bake-report.schema.json"},
                                    {"input", o.input},
                                    {"output", o.output},
                                    {"method", o.method},
-                                   {"views", views},
-                                   {"points", points},
+                                   {"views", tally.views()},
+                                   {"points", tally.points()},
                                    {"seconds", seconds}}));
     return 0;
 }

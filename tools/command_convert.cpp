@@ -18,6 +18,7 @@
 #include "tools/mesh_views.hpp"
 #include "tools/photo_options.hpp"
 #include "tools/refining.hpp"
+#include "tools/view_tally.hpp"
 
 namespace stx::tools {
 namespace {
@@ -64,6 +65,16 @@ SaveOptions saveOptions(const ConvertOptions& o, const Program& program) {
     return save;
 }
 
+/// How an input is opened. `imported` becomes true of an image set that was refined on its way.
+OpenOptions openOptions(const ConvertOptions& o, const std::shared_ptr<bool>& imported) {
+    OpenOptions open = o.open;
+    open.set.refined = [imported](const RefineReport&) { *imported = true; };
+    open.set.texturePattern = open.texture;
+    open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
+    open.materials = o.mesh->materials;
+    return open;
+}
+
 /// Heading of the help that options of image sets are under.
 constexpr const char* kSetHeading = "Image sets";
 
@@ -97,35 +108,6 @@ void noteUnused(const std::filesystem::path& input, Reads as, const ConvertOptio
     note(options, "image sets", nameOf(*kind));
 }
 
-Result<Bundle> makeBundle(const std::filesystem::path& input, const ConvertOptions& o,
-                          Program& program) {
-    OpenOptions open = o.open;
-    bool imported = false;
-    open.set.refined = [&imported](const RefineReport&) { imported = true; };
-    open.set.texturePattern = open.texture;
-    open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
-    open.materials = o.mesh->materials;
-    STX_TRY(auto opened, openRenderable(input, open, program.job));
-    noteUnused(input, std::holds_alternative<Mesh>(opened) ? Reads::mesh : Reads::moment, o,
-               program);
-    if (auto* mesh = std::get_if<Mesh>(&opened)) {
-        auto bundle = captureMesh(*mesh, *o.mesh, program);
-        if (!bundle) return tl::unexpected(bundle.error().at(fmt::format("'{}'", input.string())));
-        bundle->title = input.stem().string();
-        return bundle;
-    }
-    auto& bundle = std::get<Bundle>(opened);
-    STX_CHECK(o.refining.refine(bundle, imported, program.job));
-    if (o.cube) {
-        STX_TRY(bundle, cubeFromInside(bundle, program.job));
-    }
-    if (const auto bits = o.mesh->depthBits) {
-        // Readers of image sets have said it for what they made.
-        if (setDepthBits(bundle, *bits)) noteDepthLoss(bundle, program.job);
-    }
-    return std::move(bundle);
-}
-
 /// What was converted, for the summary and the report.
 struct Converted {
     std::size_t views = 0;
@@ -139,6 +121,57 @@ Converted summaryOf(const Bundle& bundle, bool countPoints) {
     done.views = bundle.views.size();
     if (done.views > 0) done.size = {bundle.views[0].camera.width, bundle.views[0].camera.height};
     if (countPoints) done.points = bundle.pointCount();
+    return done;
+}
+
+/// What is there of a bundle, with the changes that look at all of its views, if any.
+Result<std::unique_ptr<ViewTable>> changedAsAsked(std::unique_ptr<ViewTable> table, bool imported,
+                                                  const ConvertOptions& o, Program& program) {
+    const auto bits = o.mesh->depthBits;
+    if (o.refining.steps == "auto" && !o.cube && !bits) return table;
+    STX_TRY(auto bundle, wholeBundle(std::move(table), program.job));
+    STX_CHECK(o.refining.refine(bundle, imported, program.job));
+    if (o.cube) {
+        STX_TRY(bundle, cubeFromInside(bundle, program.job));
+    }
+    // Readers of image sets have said it for what they made.
+    if (bits && setDepthBits(bundle, *bits)) noteDepthLoss(bundle, program.job);
+    return tableOf(std::move(bundle));
+}
+
+/// One moment, of which each view is written when it is there.
+Result<Converted> convertStill(const std::filesystem::path& input,
+                               const std::filesystem::path& target, const ConvertOptions& o,
+                               bool countPoints, Program& program) {
+    const auto imported = std::make_shared<bool>(false);
+    STX_TRY(auto opened, openMeshOrViews(input, openOptions(o, imported), program.job));
+    auto* mesh = std::get_if<Mesh>(&opened);
+    noteUnused(input, mesh ? Reads::mesh : Reads::moment, o, program);
+    std::shared_ptr<const Environment> environment;
+    if (o.environment.given()) {
+        STX_TRY(environment, environmentOf(o.environment, program.job));
+    }
+    Converted done;
+    ViewTally tally;
+    const auto save = [&](std::unique_ptr<ViewTable> table, Job& job) -> Result<void> {
+        if (o.environment.given()) table->about().environment = environment;
+        if (mesh) table->about().title = input.stem().string();
+        const bool onTheWay = countPoints && !table->whole();
+        done = summaryOf(table->about(), countPoints && !onTheWay);
+        tally.clear();
+        if (onTheWay)
+            table = watchedViews(std::move(table), [&](auto i, auto& view) { tally.add(i, view); });
+        keepFreedMemory();  // of a view, for the next one
+        return saveViews(*table, target, saveOptions(o, program), job);
+    };
+    if (mesh) {
+        if (auto saved = withMeshViews(*mesh, *o.mesh, program, save); !saved)
+            return tl::unexpected(saved.error().at(fmt::format("'{}'", input.string())));
+    } else {
+        STX_TRY(auto table, changedAsAsked(std::move(std::get<1>(opened)), *imported, o, program));
+        STX_CHECK(save(std::move(table), program.job));
+    }
+    done.points += tally.points();
     return done;
 }
 
@@ -157,12 +190,8 @@ Result<std::optional<Converted>> convertSequence(const std::filesystem::path& in
                       *kind != FileKind::numbered))
             return std::nullopt;
     }
-    OpenOptions open = o.open;
     const auto imported = std::make_shared<bool>(false);
-    open.set.refined = [imported](const RefineReport&) { *imported = true; };
-    open.set.texturePattern = open.texture;
-    open.set.depthBits = o.mesh->depthBits.value_or(open.set.depthBits);
-    STX_TRY(auto frames, openSequence(input, open, program.job));
+    STX_TRY(auto frames, openSequence(input, openOptions(o, imported), program.job));
     const bool numbered = frameName(target.filename().string(), 0).has_value();
     if (!frames->timeline().moves() && !numbered) {
         // What stands still goes the way that meshes and atlases take, too: no pixel has been read.
@@ -224,13 +253,7 @@ Result<nlohmann::ordered_json> convertOne(const std::filesystem::path& input,
         STX_TRY(done, convertSequence(input, target, o, countPoints, program));
     }
     if (!done) {
-        STX_TRY(auto bundle, makeBundle(input, o, program));
-        if (o.environment.given()) {
-            STX_TRY(bundle.environment, environmentOf(o.environment, program.job));
-        }
-        STX_CHECK(program.job.checkCancelled());
-        STX_CHECK(saveBundle(bundle, target, saveOptions(o, program), program.job));
-        done = summaryOf(bundle, countPoints);
+        STX_TRY(done, convertStill(input, target, o, countPoints, program));
     }
     const Timeline& timeline = done->timeline;
     if (!o.video.empty() && !timeline.moves())

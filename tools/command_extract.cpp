@@ -14,6 +14,7 @@
 #include "tools/extract_splats.hpp"
 #include "tools/picture_times.hpp"
 #include "tools/refining.hpp"
+#include "tools/view_tally.hpp"
 
 namespace stx::tools {
 namespace {
@@ -192,13 +193,12 @@ Result<int> extract(const ExtractOptions& options, const Command& command, Progr
             STX_TRY(frames, someFrames(std::move(frames), {moment}));
         }
         const std::size_t count = frames->timeline().count();
-        frames = changed(std::move(frames), [&](Bundle& bundle, Job& job) -> Result<void> {
-            STX_CHECK(checkPeak(peak::kExport, bundle.views, job.limits));
-            if (views == 0) pointCount = bundle.pointCount();
-            views = bundle.views.size();
-            return {};
-        });
+        keepFreedMemory();  // of a view, for the next one
+        ViewTally tally;
+        frames = tallied(std::move(frames), tally);
         STX_CHECK(exportFrames(*frames, o.output, write, program.job));
+        views = tally.views();
+        pointCount = tally.points();
         what = counted(views, "view");
         if (count > 1) what += " of " + counted(count, "frame");
     }

@@ -139,8 +139,9 @@ Result<Sheet> sheetOfOne(const SheetOptions& o, Job& job) {
     STX_TRY(auto frames, openSequence(input, o.open, job));
     STX_TRY(frames, refined(std::move(frames), o.refine, peak::kSheet));
     if (frames->timeline().moves()) return sheetOf(*frames, o.settings, job);
-    STX_TRY(const auto bundle, frames->frame(0, job));
-    return sheetOf(bundle, o.settings, job);
+    keepFreedMemory();  // of a view, for the next one
+    STX_TRY(const auto table, frames->views(0, job));
+    return sheetOf(*table, o.settings, job);
 }
 
 Result<int> sheet(const SheetOptions& options, Program& program) {

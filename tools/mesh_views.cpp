@@ -1,6 +1,8 @@
 #include "tools/mesh_views.hpp"
 
+#include <algorithm>
 #include <filesystem>
+#include <mutex>
 #include <set>
 
 #include "formats/imagesets/camera_file.hpp"
@@ -81,6 +83,33 @@ void sayChoice(const MeshViews& views, Program& program) {
         "possible choice; {:.1f} % of the surface is seen, {:.1f} % can never be",
         n, views.candidates, quality * 100, s.certificate * 100, s.coverage * 100,
         s.neverSeen * 100));
+}
+
+struct ChosenViews {
+    ConvertSettings settings;
+    MeshViews views;
+};
+
+/// The cameras that the options ask for; says how good the choice is, and draws its plot.
+Result<ChosenViews> chooseMeshViews(const Mesh& mesh, const MeshViewOptions& o, Program& program) {
+    STX_CHECK(mesh.check());
+    ChosenViews chosen;
+    STX_TRY(chosen.settings, settingsOf(o, program));
+    STX_TRY(const auto named, camerasOfFile(o, mesh, program));
+    for (const NamedCamera& one : named) chosen.settings.cameras.push_back(one.camera);
+    chosen.settings.names = namesOf(named);
+    if (mesh.splats && !chosen.settings.up && chosen.settings.cameras.empty())
+        noteSplatsUp(mesh.splats->up, program.job);
+    STX_TRY(chosen.views, chooseViews(mesh, chosen.settings, program.job));
+    if (chosen.views.selection) {
+        sayChoice(chosen.views, program);
+        if (!o.plot.empty()) {
+            const std::string svg =
+                selectionPlotSvg(*chosen.views.selection, "quality against the number of views");
+            STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
+        }
+    }
+    return chosen;
 }
 
 }  // namespace
@@ -167,27 +196,33 @@ Result<void> checkMeshViewOptions(const MeshViewOptions& o, const Command& comma
 
 Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& o, Program& program,
                            Selection* selection) {
-    STX_CHECK(mesh.check());
-    STX_TRY(auto settings, settingsOf(o, program));
-    STX_TRY(const auto named, camerasOfFile(o, mesh, program));
-    for (const NamedCamera& one : named) settings.cameras.push_back(one.camera);
-    settings.names = namesOf(named);
-    if (mesh.splats && !settings.up && settings.cameras.empty())
-        noteSplatsUp(mesh.splats->up, program.job);
-    STX_TRY(auto views, chooseViews(mesh, settings, program.job));
-    if (views.selection) {
-        sayChoice(views, program);
-        if (!o.plot.empty()) {
-            const std::string svg =
-                selectionPlotSvg(*views.selection, "quality against the number of views");
-            STX_CHECK(writeFile(o.plot, std::as_bytes(std::span(svg)), program.outputOptions()));
-        }
-        if (selection) *selection = std::move(*views.selection);
-    }
-    if (views.cameras.size() > 1) keepFreedMemory();
-    STX_TRY(auto bundle, captureViews(mesh, views.cameras, settings, program.job));
+    STX_TRY(auto chosen, chooseMeshViews(mesh, o, program));
+    if (selection && chosen.views.selection) *selection = std::move(*chosen.views.selection);
+    if (chosen.views.cameras.size() > 1) keepFreedMemory();
+    STX_TRY(auto bundle, captureViews(mesh, chosen.views.cameras, chosen.settings, program.job));
     noteDepthLoss(bundle, program.job);
     return bundle;
+}
+
+Result<void> withMeshViews(
+    const Mesh& mesh, const MeshViewOptions& o, Program& program,
+    const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use) {
+    STX_TRY(const auto chosen, chooseMeshViews(mesh, o, program));
+    std::mutex mutex;
+    double largestStep = 0;
+    STX_CHECK(withViewsOf(mesh, chosen.views.cameras, chosen.settings, program.job,
+                          [&](std::unique_ptr<ViewTable> table, Job& job) {
+                              return use(watchedViews(std::move(table),
+                                                      [&](std::size_t, const ReferenceView& view) {
+                                                          if (view.depthBits != 8) return;
+                                                          const std::lock_guard lock(mutex);
+                                                          largestStep = std::max(
+                                                              largestStep, view.depthCode().step());
+                                                      }),
+                                         job);
+                          }));
+    noteDepthLoss(largestStep, program.job);
+    return {};
 }
 
 }  // namespace stx::tools

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "lib/geometry/view_layout.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/selection/selection.hpp"
 #include "tools/command_line.hpp"
 #include "tools/program.hpp"
@@ -37,5 +40,10 @@ void addMeshViewOptions(Command command, const std::shared_ptr<MeshViewOptions>&
 /// `selection` gets how good the choice is.
 [[nodiscard]] Result<Bundle> captureMesh(const Mesh& mesh, const MeshViewOptions& options,
                                          Program& program, Selection* selection = nullptr);
+
+/// The same views, captured when they are asked for; see withCapturedViews().
+[[nodiscard]] Result<void> withMeshViews(
+    const Mesh& mesh, const MeshViewOptions& options, Program& program,
+    const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use);
 
 }  // namespace stx::tools

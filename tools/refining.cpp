@@ -5,6 +5,7 @@
 #include "formats/any/changed_once.hpp"
 #include "formats/any/save.hpp"
 #include "formats/files/files.hpp"
+#include "lib/refine/refine_needed.hpp"
 
 namespace stx::tools {
 namespace {
@@ -55,7 +56,10 @@ Result<std::unique_ptr<Sequence>> refined(std::unique_ptr<Sequence> frames, cons
         if (report.changed()) job.note(report.note());
         return {};
     };
-    return keepIn.empty() ? changed(std::move(frames), refine)
+    const auto needed = [settings](const ViewTable& views, Job& job) {
+        return mayRefine(views, settings, job);
+    };
+    return keepIn.empty() ? changed(std::move(frames), refine, needed)
                           : changedOnce(std::move(frames), refine, keepIn);
 }
 

@@ -55,6 +55,14 @@ Result<bool> namesFilm(const fs::path& path) {
     return files && (path.extension() == ".exr" || isAtlasFolder(files->front().path));
 }
 
+Error isMeshError(const fs::path& path) {
+    return {ErrorCode::invalidInput,
+            fmt::format(
+                "'{0}' is a mesh, not a bundle; make one first: stx convert '{0}' -o bundle.mp4",
+                path.string()),
+            {}};
+}
+
 Error notThere(const fs::path& path) {
     return {
         ErrorCode::io, fmt::format("cannot read '{}': {}", path.string(), whyNotThere(path)), {}};
@@ -120,11 +128,37 @@ Result<FileKind> recognise(const fs::path& path) {
 
 Result<Bundle> openBundle(const fs::path& path, const OpenOptions& options, Job& job) {
     STX_TRY(auto opened, openRenderable(path, options, job));
-    if (std::holds_alternative<Mesh>(opened))
-        return fail(ErrorCode::invalidInput,
-                    "'{}' is a mesh, not a bundle; make one first: stx convert '{}' -o bundle.mp4",
-                    path.string(), path.string());
+    if (std::holds_alternative<Mesh>(opened)) return tl::unexpected(isMeshError(path));
     return std::move(std::get<Bundle>(opened));
+}
+
+Result<std::unique_ptr<ViewTable>> openViews(const fs::path& path, const OpenOptions& options,
+                                             Job& job) {
+    STX_TRY(auto opened, openMeshOrViews(path, options, job));
+    if (std::holds_alternative<Mesh>(opened)) return tl::unexpected(isMeshError(path));
+    return std::move(std::get<std::unique_ptr<ViewTable>>(opened));
+}
+
+Result<std::variant<Mesh, std::unique_ptr<ViewTable>>> openMeshOrViews(const fs::path& path,
+                                                                       const OpenOptions& options,
+                                                                       Job& job) {
+    using Opened = std::variant<Mesh, std::unique_ptr<ViewTable>>;
+    STX_TRY(const auto kind, recognise(path));
+    if (options.set.from.empty() && (kind == FileKind::exr || kind == FileKind::mpeg4)) {
+        STX_CHECK(checkObject(path, kind, options));
+        if (kind == FileKind::mpeg4) {
+            STX_TRY(auto table, openMpeg4Views(path, job));
+            return Opened(std::move(table));
+        }
+        // What is wrong with another file shows below, where it may be an image set, too.
+        if (isExrBundleFile(path)) {
+            STX_TRY(auto table, openExrViews(path, job));
+            if (table) return Opened(std::move(table));
+        }
+    }
+    STX_TRY(auto opened, openRenderable(path, options, job));
+    if (auto* mesh = std::get_if<Mesh>(&opened)) return Opened(std::move(*mesh));
+    return Opened(tableOf(std::move(std::get<Bundle>(opened))));
 }
 
 Result<void> checkObject(const fs::path& path, FileKind kind, const OpenOptions& options) {

@@ -10,6 +10,7 @@
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/mesh.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -50,5 +51,14 @@ enum class FileKind {
 [[nodiscard]] Result<std::variant<Mesh, Bundle>> openRenderable(const std::filesystem::path& path,
                                                                 const OpenOptions& options,
                                                                 Job& job);
+
+/// The same, of what is no mesh as a table of views: OpenEXR bundles of ours and MPEG-4 are read
+/// when a view is asked for, all else is in memory.
+[[nodiscard]] Result<std::variant<Mesh, std::unique_ptr<ViewTable>>> openMeshOrViews(
+    const std::filesystem::path& path, const OpenOptions& options, Job& job);
+
+/// Of a bundle, see openBundle().
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> openViews(const std::filesystem::path& path,
+                                                           const OpenOptions& options, Job& job);
 
 }  // namespace stx

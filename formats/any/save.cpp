@@ -4,7 +4,6 @@
 
 #include "formats/exr/bundle_exr.hpp"
 #include "formats/mpeg4/mpeg4.hpp"
-#include "lib/model/peak_memory.hpp"
 
 namespace stx {
 
@@ -23,19 +22,18 @@ Result<FileKind> containerOf(const fs::path& target) {
 
 Result<void> saveBundle(const Bundle& bundle, const fs::path& target, const SaveOptions& options,
                         Job& job) {
+    return saveViews(*viewsOf(bundle), target, options, job);
+}
+
+Result<void> saveViews(const ViewTable& table, const fs::path& target, const SaveOptions& options,
+                       Job& job) {
     // Both writers check the bundle: see Bundle::check().
     STX_TRY(const auto container, containerOf(target));
     if (container == FileKind::exr && options.octreeLevels > 0)
         return fail(ErrorCode::usage, "'{}': an OctreeImage is written as .mp4, .xmt or .bt only",
                     target.string());
-    const bool vectors = std::ranges::any_of(
-        bundle.views, [](const auto& v) { return v.hasNormals() || v.hasSplats(); });
-    // OpenEXR is written a few rows at a time.
-    if (container == FileKind::mpeg4)
-        STX_CHECK(
-            checkPeak(vectors ? peak::kMpeg4Vectors : peak::kMpeg4, bundle.views, job.limits));
-    if (container == FileKind::exr) return writeExrBundle(bundle, target, job, {options.noClobber});
-    return writeMpeg4Bundle(bundle, target, job, mpeg4Scene(options), mpeg4Write(options));
+    if (container == FileKind::exr) return writeExrViews(table, target, job, {options.noClobber});
+    return writeMpeg4Views(table, target, job, mpeg4Scene(options), mpeg4Write(options));
 }
 
 mpeg4::SceneWriteOptions mpeg4Scene(const SaveOptions& options) {

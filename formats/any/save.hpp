@@ -18,6 +18,10 @@ namespace stx {
 [[nodiscard]] Result<void> saveBundle(const Bundle& bundle, const std::filesystem::path& target,
                                       const SaveOptions& options, Job& job);
 
+/// The same bytes of views that are written when they come. Errors: also those of the views.
+[[nodiscard]] Result<void> saveViews(const ViewTable& table, const std::filesystem::path& target,
+                                     const SaveOptions& options, Job& job);
+
 /// What of the options is about the scene, and about its file.
 [[nodiscard]] mpeg4::SceneWriteOptions mpeg4Scene(const SaveOptions& options);
 [[nodiscard]] Mpeg4WriteOptions mpeg4Write(const SaveOptions& options);

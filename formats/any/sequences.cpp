@@ -39,6 +39,11 @@ class NumberedSequence : public Sequence {
         setTime(bundle, index);
         return bundle;
     }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, openViews(files_[index].path, open_, job));
+        setTime(table->about(), index);
+        return table;
+    }
 
   private:
     std::vector<NumberedFile> files_;
@@ -46,24 +51,28 @@ class NumberedSequence : public Sequence {
     OpenOptions open_;
 };
 
-/// A file of one moment. Its bundle is given away when it is asked for first, since two would be
-/// twice the memory, and read again for who asks again.
+/// A file of one moment. Its views are given away when they are asked for first, since two would be
+/// twice the memory, and opened again for who asks again.
 class StillFile : public Sequence {
   public:
-    StillFile(Bundle bundle, fs::path path, OpenOptions options)
-        : bundle_(std::move(bundle)), path_(std::move(path)), options_(std::move(options)) {}
+    StillFile(std::unique_ptr<ViewTable> table, fs::path path, OpenOptions options)
+        : table_(std::move(table)), path_(std::move(path)), options_(std::move(options)) {}
     Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto table, views(index, job));
+        return wholeBundle(std::move(table), job);
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
         if (index > 0)
             return fail(ErrorCode::usage, "frame {} is asked for, but there is one (0)", index);
-        if (auto first = std::exchange(bundle_, std::nullopt)) return std::move(*first);
+        if (table_) return std::move(table_);
         // Its notes have been said.
         Job quiet;
         quiet.workFor(job);
-        return openBundle(path_, options_, quiet);
+        return openViews(path_, options_, quiet);
     }
 
   private:
-    std::optional<Bundle> bundle_;
+    std::unique_ptr<ViewTable> table_;
     fs::path path_;
     OpenOptions options_;
 };
@@ -190,8 +199,8 @@ Result<std::unique_ptr<Sequence>> openFrames(const fs::path& path, const OpenOpt
             return tl::unexpected(sequence.error().at(fmt::format("'{}'", path.string())));
         return sequence;
     }
-    STX_TRY(auto bundle, openBundle(path, options, job));
-    return std::make_unique<StillFile>(std::move(bundle), path, options);
+    STX_TRY(auto table, openViews(path, options, job));
+    return std::make_unique<StillFile>(std::move(table), path, options);
 }
 
 }  // namespace
@@ -220,15 +229,15 @@ Result<void> saveSequence(Sequence& frames, const fs::path& target, const SaveOp
             job.progress(static_cast<std::int64_t>(i), static_cast<std::int64_t>(count),
                          "writing frames");
             STX_CHECK(job.checkCancelled());
-            STX_TRY(const auto bundle, frames.frame(i, job));
+            STX_TRY(const auto table, frames.views(i, job));
             STX_CHECK(
-                saveBundle(bundle, *frameName(target.string(), static_cast<int>(i)), options, job));
+                saveViews(*table, *frameName(target.string(), static_cast<int>(i)), options, job));
         }
         return {};
     }
     if (count == 1) {
-        STX_TRY(const auto bundle, frames.frame(0, job));
-        return saveBundle(bundle, target, options, job);
+        STX_TRY(const auto table, frames.views(0, job));
+        return saveViews(*table, target, options, job);
     }
     STX_TRY(auto spool, mpeg4::PictureSpool::create(folderOf(target)));
     STX_TRY(const auto document, mpeg4::sceneFromSequence(frames, mpeg4Scene(options), spool, job));

@@ -82,7 +82,20 @@ double commonAspect(const Bundle& bundle) {
     return std::abs(first - 1.0) < 1e-6 || first < 1e-5 || first > 1e5 ? 1.0 : first;
 }
 
-Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
+/// What pixels say of a view: its planes, where the table does not know them, and its points.
+void setPixelAttributes(ExrPart& part, const ReferenceView& view, std::int64_t points) {
+    setExrCamera(part, view);
+    part.attributes["stx:points"] = static_cast<double>(points);
+}
+
+void setBounds(ExrPart& first, const Bounds& bounds) {
+    first.attributes["stx:boundsMin"] = bounds.min;
+    first.attributes["stx:boundsMax"] = bounds.max;
+}
+
+/// The parts as far as they are known before the pixels are.
+std::vector<ExrPart> partsFrom(const ViewTable& table) {
+    const Bundle& bundle = table.about();
     glm::ivec2 display(0);
     for (const auto& v : bundle.views)
         display = glm::max(display, glm::ivec2(v.camera.width, v.camera.height));
@@ -91,6 +104,7 @@ Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
     std::vector<ExrPart> parts;
     for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         const ReferenceView& view = bundle.views[i];
+        const ViewImageKinds& kinds = table.kindsOf(i);
         ExrPart part;
         part.name = names[i];
         part.view = names[i];
@@ -99,18 +113,15 @@ Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
         part.displayWidth = display.x;
         part.displayHeight = display.y;
         part.pixelAspectRatio = aspect;
-        setExrCamera(part, view);
-        const auto points = view.checkedPointCount();
-        if (!points) return tl::unexpected(points.error().at(fmt::format("view {}", i)));
-        part.attributes["stx:points"] = static_cast<double>(*points);
-        const Type colour = view.texture.isLinear() ? Type::float32 : Type::half;
+        setPixelAttributes(part, view, 0);
+        const Type colour = kinds.linear ? Type::float32 : Type::half;
         for (const char* name : {"R", "G", "B", "A"}) part.channels.push_back({name, colour});
         part.channels.push_back({"Z", Type::float32});
-        if (!view.normal.empty()) addVectorChannels(part.channels, "N");
-        if (!view.splatU.empty()) addVectorChannels(part.channels, "splatU");
-        if (!view.splatV.empty()) addVectorChannels(part.channels, "splatV");
-        for (const auto& [name, there] : {std::pair{kSurface, !view.metallicRoughness.empty()},
-                                          std::pair{kEmissive, !view.emissive.empty()}}) {
+        if (kinds.normal) addVectorChannels(part.channels, "N");
+        if (kinds.splatU) addVectorChannels(part.channels, "splatU");
+        if (kinds.splatV) addVectorChannels(part.channels, "splatV");
+        for (const auto& [name, there] :
+             {std::pair{kSurface, kinds.metallicRoughness}, std::pair{kEmissive, kinds.emissive}}) {
             if (!there) continue;
             for (const char* channel : name) {
                 if (channel) part.channels.push_back({channel, Type::float32});
@@ -121,17 +132,94 @@ Result<std::vector<ExrPart>> partsFrom(const Bundle& bundle) {
     auto& first = parts[0].attributes;
     first["stx:version"] = kVersion;
     first["stx:kind"] = std::string("bundle");
-    first["stx:colour"] = std::string(bundle.views[0].texture.isLinear() ? "linear" : "sRGB8");
+    first["stx:colour"] = std::string(table.kindsOf(0).linear ? "linear" : "sRGB8");
     if (!bundle.title.empty()) first["stx:title"] = bundle.title;
     if (bundle.origin != glm::dvec3(0.0)) first["stx:origin"] = bundle.origin;
     if (bundle.time) first["stx:time"] = *bundle.time;
     if (bundle.duration) first["stx:duration"] = *bundle.duration;
-    const Bounds bounds = bundle.bounds ? *bundle.bounds : bundle.computeBounds();
-    if (!bounds.empty()) {
-        first["stx:boundsMin"] = bounds.min;
-        first["stx:boundsMax"] = bounds.max;
-    }
     return parts;
+}
+
+Result<void> writeView(ExrWriter& writer, int index, const ReferenceView& view) {
+    // A whole view's colours as floats would be twice the view.
+    Image<glm::vec4> colour;
+    return writer.writePart(index, [&](int y, int rows) {
+        colour = premultipliedLinear(view.texture, y, rows);
+        const float* rgba = &colour.data()->x;
+        std::vector<ExrConstPixels> pixels = {{"R", rgba, 4},
+                                              {"G", rgba + 1, 4},
+                                              {"B", rgba + 2, 4},
+                                              {"A", rgba + 3, 4},
+                                              {"Z", view.depth.row(y).data(), 1}};
+        const auto add = [&](const char* name, const Image<glm::vec3>& image) {
+            if (!image.empty()) addVectorPixels(pixels, name, &image.row(y).data()->x);
+        };
+        add("N", view.normal);
+        add("splatU", view.splatU);
+        add("splatV", view.splatV);
+        if (!view.metallicRoughness.empty())
+            addNamedPixels(pixels, kSurface, &view.metallicRoughness.row(y).data()->x);
+        if (!view.emissive.empty())
+            addNamedPixels(pixels, kEmissive, &view.emissive.row(y).data()->x);
+        return pixels;
+    });
+}
+
+/// Writes views while they come. `hasPoints`: some view has a point, so that there are bounds.
+/// False, and a file that is not finished, where none has.
+Result<bool> writeViews(const ViewTable& table, bool hasPoints, OutputFile& file, Job& job) {
+    auto parts = partsFrom(table);
+    const auto count = parts.size();
+    const Bundle& about = table.about();
+    Bounds bounds = about.bounds.value_or(Bounds());
+    if (about.bounds ? !bounds.empty() : hasPoints) setBounds(parts[0], bounds);
+    std::optional<ExrEnvironmentPart> environment;
+    if (about.environment) {
+        STX_TRY(environment, environmentPart(*about.environment, job));
+        joinParts(environment->part, parts);
+        parts.push_back(environment->part);
+    }
+    STX_TRY(auto writer, ExrWriter::create(file, parts));
+    std::vector<std::shared_ptr<const ReferenceView>> views(count);
+    std::vector<Bounds> each(count);
+    const auto keep = [&](std::size_t i,
+                          std::shared_ptr<const ReferenceView> view) -> Result<void> {
+        auto points = view->checkedPointCount();
+        if (!points) return tl::unexpected(points.error().at(fmt::format("view {}", i)));
+        setPixelAttributes(parts[i], *view, *points);
+        if (!about.bounds) each[i] = view->computeBounds();
+        views[i] = std::move(view);
+        return {};
+    };
+    const auto write = [&](std::size_t i) -> Result<void> {
+        STX_CHECK(job.checkCancelled());
+        STX_CHECK(writeView(writer, static_cast<int>(i), *views[i]));
+        views[i].reset();
+        job.progress(static_cast<std::int64_t>(i) + 1, static_cast<std::int64_t>(count),
+                     "writing views");
+        return {};
+    };
+    STX_CHECK(forEachView(table, {"writing OpenEXR", 0}, job, keep, write));
+    for (const Bounds& one : each) {
+        if (one.empty()) continue;
+        bounds.add(one.min);
+        bounds.add(one.max);
+    }
+    if (!about.bounds && hasPoints) {
+        if (bounds.empty()) return false;
+        setBounds(parts[0], bounds);
+    }
+    if (environment) STX_CHECK(writeEnvironmentPart(writer, static_cast<int>(count), *environment));
+    STX_CHECK(writer.finish(parts));
+    return true;
+}
+
+Result<void> writeTable(const ViewTable& table, OutputFile& file, Job& job) {
+    STX_TRY(const bool written, writeViews(table, true, file, job));
+    if (written) return {};
+    // Headers whose bounds stay away are shorter.
+    STX_CHECK(writeViews(table, false, file, job));
+    return {};
 }
 
 bool hasVectors(const ExrPart& part, const std::string& name) {
@@ -250,52 +338,21 @@ const char* ExrBundleHeader::nodeKind() const {
 
 Result<void> writeExrBundle(const Bundle& bundle, OutputFile& file, Job& job) {
     STX_CHECK(bundle.checkHeaders());
-    STX_TRY(auto parts, partsFrom(bundle));
-    const auto count = static_cast<std::int64_t>(parts.size());
-    std::optional<ExrEnvironmentPart> environment;
-    if (bundle.environment) {
-        STX_TRY(environment, environmentPart(*bundle.environment, job));
-        joinParts(environment->part, parts);
-        parts.push_back(environment->part);
-    }
-    STX_TRY(auto writer, ExrWriter::create(file, parts));
-    for (std::int64_t i = 0; i < count; ++i) {
-        STX_CHECK(job.checkCancelled());
-        const ReferenceView& view = bundle.views[i];
-        // A whole view's colours as floats would be twice the view.
-        Image<glm::vec4> colour;
-        STX_CHECK(writer.writePart(static_cast<int>(i), [&](int y, int rows) {
-            colour = premultipliedLinear(view.texture, y, rows);
-            const float* rgba = &colour.data()->x;
-            std::vector<ExrConstPixels> pixels = {{"R", rgba, 4},
-                                                  {"G", rgba + 1, 4},
-                                                  {"B", rgba + 2, 4},
-                                                  {"A", rgba + 3, 4},
-                                                  {"Z", view.depth.row(y).data(), 1}};
-            const auto add = [&](const char* name, const Image<glm::vec3>& image) {
-                if (!image.empty()) addVectorPixels(pixels, name, &image.row(y).data()->x);
-            };
-            add("N", view.normal);
-            add("splatU", view.splatU);
-            add("splatV", view.splatV);
-            if (!view.metallicRoughness.empty())
-                addNamedPixels(pixels, kSurface, &view.metallicRoughness.row(y).data()->x);
-            if (!view.emissive.empty())
-                addNamedPixels(pixels, kEmissive, &view.emissive.row(y).data()->x);
-            return pixels;
-        }));
-        job.progress(i + 1, count, "writing views");
-    }
-    if (environment) STX_CHECK(writeEnvironmentPart(writer, static_cast<int>(count), *environment));
-    return writer.finish();
+    return writeTable(*viewsOf(bundle), file, job);
+}
+
+Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& path, Job& job,
+                           OutputFile::Options options) {
+    if (table.whole()) STX_CHECK(table.about().checkHeaders());
+    STX_TRY(auto file, OutputFile::create(path, options));
+    if (auto ok = writeTable(table, file, job); !ok)
+        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
+    return file.commit();
 }
 
 Result<void> writeExrBundle(const Bundle& bundle, const std::filesystem::path& path, Job& job,
                             OutputFile::Options options) {
-    STX_TRY(auto file, OutputFile::create(path, options));
-    if (auto ok = writeExrBundle(bundle, file, job); !ok)
-        return tl::unexpected(ok.error().at(fmt::format("'{}'", path.string())));
-    return file.commit();
+    return writeExrViews(*viewsOf(bundle), path, job, options);
 }
 
 Result<ExrBundleHeader> readExrBundleHeader(const ExrReader& reader) {
@@ -351,16 +408,12 @@ Result<ExrBundleHeader> readExrBundleHeader(const std::filesystem::path& path,
     return readExrBundleHeader(reader);
 }
 
-Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
-    STX_TRY(auto header, readExrBundleHeader(reader));
-    const auto parts = exrViewParts(reader);
-    std::uint64_t total = 0;
-    for (const int i : parts) {
-        STX_CHECK(reader.checkPlausible(i));
-        total += exrViewBytes(reader, reader.parts()[i]);
-    }
-    if (auto ok = job.limits.checkAllocation(total, 1, "the views"); !ok)
-        return tl::unexpected(ok.error().at(reader.where()));
+namespace {
+
+/// What a bundle says beside its pixels. Errors: those of the headers, and parts that claim more
+/// pixels than their bytes can hold.
+Result<Bundle> bundleWithoutPixels(const ExrReader& reader, ExrBundleHeader header, Job& job) {
+    for (const int i : exrViewParts(reader)) STX_CHECK(reader.checkPlausible(i));
     if (!reader.parts()[0].linearPrimaries)
         job.note(reader.where() +
                  ": its primaries are not Rec. 709; colours are taken as if they "
@@ -372,6 +425,70 @@ Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
     bundle.time = header.time;
     bundle.duration = header.duration;
     for (auto& view : header.views) bundle.views.push_back(std::move(view.view));
+    return bundle;
+}
+
+class ExrViews : public ViewTable {
+  public:
+    ExrViews(ExrReader reader, Bundle headers, std::vector<ViewImageKinds> kinds)
+        : ViewTable(std::move(headers), std::move(kinds)),
+          reader_(std::move(reader)),
+          parts_(exrViewParts(reader_)) {}
+
+    std::string where() const override { return reader_.where(); }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
+        auto view = std::make_shared<ReferenceView>(about().views[index]);
+        const int part = parts_[index];
+        STX_CHECK(
+            readExrView(reader_, part, reader_.parts()[static_cast<std::size_t>(part)], *view));
+        if (auto ok = view->check(); !ok)
+            return tl::unexpected(
+                ok.error().at(fmt::format("{}: view {}", reader_.where(), index)));
+        return view;
+    }
+
+  private:
+    ExrReader reader_;
+    std::vector<int> parts_;
+};
+
+ViewImageKinds kindsOf(const ExrPart& part, bool linear) {
+    return {linear,
+            hasVectors(part, "N"),
+            hasVectors(part, "splatU"),
+            hasVectors(part, "splatV"),
+            hasAll(part, kSurface),
+            hasAll(part, kEmissive)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ViewTable>> openExrViews(const std::filesystem::path& path, Job& job) {
+    STX_TRY(auto reader, ExrReader::open(path, job.limits));
+    STX_TRY(auto header, readExrBundleHeader(reader));
+    std::vector<ViewImageKinds> kinds;
+    for (const int i : exrViewParts(reader)) {
+        const ExrPart& part = reader.parts()[static_cast<std::size_t>(i)];
+        if (!isOurView(part)) return std::unique_ptr<ViewTable>();
+        kinds.push_back(kindsOf(part, header.linear));
+    }
+    STX_TRY(auto bundle, bundleWithoutPixels(reader, std::move(header), job));
+    if (const int at = environmentPartOf(reader); at >= 0) {
+        STX_TRY(bundle.environment, readEnvironmentPart(reader, at, job));
+    }
+    return std::make_unique<ExrViews>(std::move(reader), std::move(bundle), std::move(kinds));
+}
+
+Result<Bundle> readExrBundle(const ExrReader& reader, Job& job) {
+    STX_TRY(auto header, readExrBundleHeader(reader));
+    STX_TRY(auto bundle, bundleWithoutPixels(reader, std::move(header), job));
+    const auto parts = exrViewParts(reader);
+    std::uint64_t total = 0;
+    for (const int i : parts) total += exrViewBytes(reader, reader.parts()[i]);
+    if (auto ok = job.limits.checkAllocation(total, 1, "the views"); !ok)
+        return tl::unexpected(ok.error().at(reader.where()));
 
     const auto count = static_cast<std::int64_t>(parts.size());
     std::vector<Result<void>> done(parts.size());

@@ -12,6 +12,7 @@
 #include "formats/files/files.hpp"
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -56,6 +57,10 @@ struct ExrBundleHeader {
 /// The same with creating and committing the file.
 [[nodiscard]] Result<void> writeExrBundle(const Bundle& bundle, const std::filesystem::path& path,
                                           Job& job, OutputFile::Options options = {});
+/// The same bytes of views that are written when they come: what their headers say of pixels
+/// (planes, points, bounds) is put into the file at the end.
+[[nodiscard]] Result<void> writeExrViews(const ViewTable& table, const std::filesystem::path& path,
+                                         Job& job, OutputFile::Options options = {});
 
 /// Reads what writeExrBundle() wrote. Parts of other programs are views, too, when they have Z and
 /// worldToCamera; their planes are fitted to their depth, and distances of 1e9 and more, NaN and
@@ -63,6 +68,10 @@ struct ExrBundleHeader {
 [[nodiscard]] Result<Bundle> readExrBundle(ByteSpan bytes, std::string_view name, Job& job);
 [[nodiscard]] Result<Bundle> readExrBundle(const std::filesystem::path& path, Job& job);
 [[nodiscard]] Result<Bundle> readExrBundle(const ExrReader& reader, Job& job);
+/// The same as a table of views whose pixels are read when they are asked for. Null for a file of
+/// another program, whose planes are known with its pixels only.
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> openExrViews(const std::filesystem::path& path,
+                                                              Job& job);
 
 /// Cameras, sizes, bounds and bytes, in milliseconds.
 [[nodiscard]] Result<ExrBundleHeader> readExrBundleHeader(const std::filesystem::path& path,

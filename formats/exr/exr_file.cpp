@@ -23,6 +23,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 
@@ -30,6 +31,7 @@
 #include "formats/exr/exr_chunks.hpp"
 #include "formats/exr/exr_streams.hpp"
 #include "formats/exr/exr_zip.hpp"
+#include "formats/files/file_stamp.hpp"
 #include "lib/base/parallel.hpp"
 
 namespace stx {
@@ -153,10 +155,11 @@ struct ExrReader::Impl {
         int y = 0, count = 0;
     };
 
-    std::string where;
+    std::string where, name;
     ByteSpan bytes;
     Descriptor fd;
     std::uint64_t size = 0;
+    FileStamp stamp;
     std::unique_ptr<Imf::IStream> stream;
     std::unique_ptr<Imf::MultiPartInputFile> file;
     std::vector<ExrPart> parts;
@@ -176,6 +179,7 @@ struct ExrReader::Impl {
     Result<void> checkPlausible(int index) const;
     /// All rows, at most `rows` at a time, which is a multiple of a chunk's.
     Result<void> readRows(int index, int rows, const Place& place, const Take& take) const;
+    Result<void> readAllRows(int index, int rows, const Place& place, const Take& take) const;
     bool readAt(std::uint64_t offset, void* to, std::size_t count) const {
         if (offset > size || count > size - offset) return false;
         if (!stream->isMemoryMapped())
@@ -353,6 +357,7 @@ Result<ExrReader> ExrReader::open(ByteSpan bytes, std::string_view name, const L
 Result<ExrReader> ExrReader::open(const std::filesystem::path& path, const Limits& limits) {
     auto impl = std::make_unique<Impl>();
     impl->where = fmt::format("'{}'", path.string());
+    impl->name = path.string();
     impl->fd = Descriptor(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
     struct stat info = {};
     if (impl->fd.get() < 0 || ::fstat(impl->fd.get(), &info) != 0)
@@ -361,6 +366,7 @@ Result<ExrReader> ExrReader::open(const std::filesystem::path& path, const Limit
     if (!S_ISREG(info.st_mode))
         return fail(ErrorCode::io, "cannot read {}: it is not a file", impl->where);
     impl->size = static_cast<std::uint64_t>(info.st_size);
+    impl->stamp = FileStamp::of(info);
     impl->stream =
         std::make_unique<exr::FileStream>(impl->fd.get(), impl->size, impl->where.c_str());
     STX_CHECK(impl->readHeaders(limits));
@@ -401,16 +407,25 @@ Result<void> ExrReader::readPart(int index, const Place& place, const Take& take
 
 Result<void> ExrReader::Impl::readRows(int index, int rows, const Place& place,
                                        const Take& take) const {
+    auto done = readAllRows(index, rows, place, take);
+    // What went wrong then is not what the file held.
+    if (fd.get() >= 0 && !stamp.holds(fd.get())) return changedError(name);
+    return done;
+}
+
+Result<void> ExrReader::Impl::readAllRows(int index, int rows, const Place& place,
+                                          const Take& take) const {
     const ExrPart& part = parts[static_cast<std::size_t>(index)];
     if (part.deep)
         return failAt(where, ErrorCode::unsupported,
                       "part {} has deep pixels, which are not supported", index);
     STX_CHECK(checkPlausible(index));
     return adapt(ErrorCode::invalidInput, where, [&]() -> Result<void> {
-        Imf::InputPart in(*file, index);
-        auto window = in.header().dataWindow();
+        // Only where it is needed: the library keeps lines of each part that it was asked for.
+        std::optional<Imf::InputPart> in;
+        auto window = file->header(index).dataWindow();
         const int top = window.min.y;
-        const auto& channels = in.header().channels();
+        const auto& channels = file->header(index).channels();
         bool zipped = true, checked = false;
         for (int y = 0; y < part.height; y += rows) {
             const Rows at{y, std::min(rows, part.height - y)};
@@ -440,8 +455,9 @@ Result<void> ExrReader::Impl::readRows(int index, int rows, const Place& place,
                     checked = true;
                 }
                 if (!zipped) {
-                    in.setFrameBuffer(buffer);
-                    in.readPixels(window.min.y, window.min.y + at.count - 1);
+                    if (!in) in.emplace(*file, index);
+                    in->setFrameBuffer(buffer);
+                    in->readPixels(window.min.y, window.min.y + at.count - 1);
                 }
             }
             take(at.y, at.count);

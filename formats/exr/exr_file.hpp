@@ -105,7 +105,8 @@ class ExrReader {
     [[nodiscard]] Result<void> checkPlausible(int part) const;
     /// Decodes channels of a part as floats (16-bit and integer values exactly as far as floats
     /// go). A channel that the part has not is filled with zeros. Several parts may be read at
-    /// once, from several threads. Errors: invalidInput, unsupported (deep, subsampled).
+    /// once, from several threads. Errors: invalidInput (also of a file that changed since it was
+    /// opened), unsupported (deep, subsampled).
     [[nodiscard]] Result<void> readPart(int part, const std::vector<ExrPixels>& pixels) const;
     /// The same a few rows at a time, for images that are made of what is read: `place(y, rows)`
     /// says where the values of `rows` rows from `y` on go, and `take(y, rows)` is called when they
@@ -139,6 +140,9 @@ class ExrWriter {
     [[nodiscard]] Result<void> writePart(int part, const Block& block);
     /// After the last part; then OutputFile::commit() is the caller's.
     [[nodiscard]] Result<void> finish();
+    /// The same, with values of attributes that were not known at create(): the parts as they were
+    /// then but for numbers (int, double, vectors, matrices), whose size in the file is fixed.
+    [[nodiscard]] Result<void> finish(const std::vector<ExrPart>& parts);
 
   private:
     struct Impl;

@@ -183,6 +183,7 @@ struct ExrWriter::Impl {
     std::uint64_t tables = 0;                         ///< where the tables of offsets begin
     std::vector<std::vector<std::uint64_t>> offsets;  ///< of each part's chunks
 
+    /// From the beginning of the file on, up to the tables.
     void writeHeaders();
     void writeChunk(int part, int chunk, const Bytes& bytes);
     [[nodiscard]] Result<void> writeRows(int part, int top, int rows,
@@ -204,15 +205,12 @@ void ExrWriter::Impl::writeHeaders() {
         if (part.displayWidth != parts[0].displayWidth ||
             part.displayHeight != parts[0].displayHeight)
             throw std::invalid_argument("parts differ in their display windows");
-        offsets.emplace_back(static_cast<std::size_t>(chunksOf(part.height)));
     }
     putNumber(*stream, Imf::MAGIC);
     putNumber(*stream, Imf::EXR_VERSION | (longNames ? Imf::LONG_NAMES_FLAG : 0) |
                            (multiPart ? Imf::MULTI_PART_FILE_FLAG : 0));
     for (const auto& header : headers) header.writeTo(*stream);
     if (multiPart) stream->write("", 1);  // an empty header ends them
-    tables = stream->tellp();
-    for (const auto& table : offsets) putOffsets(*stream, table);
 }
 
 void ExrWriter::Impl::writeChunk(int part, int chunk, const Bytes& bytes) {
@@ -290,6 +288,10 @@ Result<ExrWriter> ExrWriter::create(OutputFile& file, const std::vector<ExrPart>
     STX_CHECK(adapt(ErrorCode::io, impl->where, [&]() -> Result<void> {
         impl->stream = std::make_unique<exr::OutputStream>(file.temporaryPath());
         impl->writeHeaders();
+        impl->tables = impl->stream->tellp();
+        for (const ExrPart& part : impl->parts)
+            impl->offsets.emplace_back(static_cast<std::size_t>(chunksOf(part.height)));
+        for (const auto& table : impl->offsets) putOffsets(*impl->stream, table);
         return {};
     }));
     return ExrWriter(std::move(impl));
@@ -321,6 +323,20 @@ Result<void> ExrWriter::writePart(int index, const Block& blockOf) {
         }
         return {};
     });
+}
+
+Result<void> ExrWriter::finish(const std::vector<ExrPart>& parts) {
+    STX_CHECK(adapt(ErrorCode::io, impl_->where, [&]() -> Result<void> {
+        impl_->parts = parts;
+        impl_->stream->seekp(0);
+        impl_->writeHeaders();
+        if (impl_->stream->tellp() != impl_->tables)
+            return failAt(impl_->where, ErrorCode::failed,
+                          "the headers take {} bytes at the end and took {} at the beginning",
+                          impl_->stream->tellp(), impl_->tables);
+        return {};
+    }));
+    return finish();
 }
 
 Result<void> ExrWriter::finish() {

@@ -8,12 +8,15 @@
 #include <cerrno>
 #include <cstring>
 
+#include "formats/files/file_stamp.hpp"
+
 namespace stx {
 
 struct ByteSource::Impl {
     std::string name;
     int file = -1;  ///< -1: memory
     std::uint64_t size = 0;
+    FileStamp stamp;
     std::shared_ptr<const Bytes> owned;
     ByteSpan memory;
 
@@ -33,6 +36,7 @@ Result<ByteSource> ByteSource::open(const std::filesystem::path& path) {
     if (!S_ISREG(status.st_mode))
         return fail(ErrorCode::io, "'{}' is not a regular file", impl->name);
     impl->size = static_cast<std::uint64_t>(status.st_size);
+    impl->stamp = FileStamp::of(status);
     ByteSource source;
     source.impl_ = std::move(impl);
     return source;
@@ -91,10 +95,10 @@ Result<void> ByteSource::read(std::uint64_t offset, std::span<std::byte> out) co
         if (n < 0 && errno == EINTR) continue;
         if (n < 0)
             return fail(ErrorCode::io, "cannot read '{}': {}", impl_->name, std::strerror(errno));
-        if (n == 0)
-            return fail(ErrorCode::io, "'{}' has become shorter while it was read", impl_->name);
+        if (n == 0) return changedError(impl_->name);
         done += static_cast<std::size_t>(n);
     }
+    if (!impl_->stamp.holds(impl_->file)) return changedError(impl_->name);
     return {};
 }
 

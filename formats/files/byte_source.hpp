@@ -24,8 +24,8 @@ class ByteSource {
     [[nodiscard]] static ByteSource fromView(ByteSpan bytes);
 
     [[nodiscard]] std::uint64_t size() const;
-    /// Fills `out` from `offset`. Errors (invalidInput) when it reaches past the end; (io) when
-    /// reading fails or the file has shrunk.
+    /// Fills `out` from `offset`. Errors (invalidInput) when it reaches past the end, and when the
+    /// file has changed since it was opened (FileStamp); (io) when reading fails.
     [[nodiscard]] Result<void> read(std::uint64_t offset, std::span<std::byte> out) const;
     /// The bytes themselves where the source is memory, else empty.
     [[nodiscard]] ByteSpan view() const;

@@ -11,7 +11,6 @@
 #include "formats/images/images.hpp"
 #include "formats/imagesets/export_colmap.hpp"
 #include "formats/imagesets/export_files.hpp"
-#include "lib/base/parallel.hpp"
 
 namespace stx {
 namespace {
@@ -110,23 +109,33 @@ Result<OutputJson> mivCamera(const ReferenceView& view, const std::string& name,
 Result<void> exportImages(const Bundle& bundle, const path& folder, const ExportOptions& options,
                           Job& job) {
     STX_CHECK(bundle.check());
+    return exportViews(*viewsOf(bundle), folder, options, job);
+}
+
+Result<void> exportViews(const ViewTable& table, const path& folder, const ExportOptions& options,
+                         Job& job) {
+    // Units and ranges follow from all planes.
+    if (!table.planesKnown()) {
+        STX_TRY(const auto whole, wholeBundle(table, job));
+        return exportViews(*viewsOf(whole), folder, options, job);
+    }
+    const Bundle& bundle = table.about();
     const bool miv = options.kind == ExportOptions::Kind::miv;
     const bool floats = options.depth != ExportOptions::Depth::png;
     if (options.depth == ExportOptions::Depth::npy &&
         options.kind != ExportOptions::Kind::transforms)
         return fail(ErrorCode::usage, "depth as .npy is of transforms.json; take exr or png");
     const auto names = fileNames(bundle);
-    for (const ReferenceView& view : bundle.views)
-        if (view.hasNormals() || view.hasSplats())
+    for (const ViewImageKinds& kinds : table.kinds())
+        if (kinds.normal || kinds.hasSplats())
             job.note("normals and splats have no place in an image set and are left out");
-    bundle.noteMaterialLeftOut(job);
+    noteMaterialLeftOut(table, job);
 
     if (options.kind == ExportOptions::Kind::colmap && bundle.environment)
         job.note("COLMAP's workspace has no place for the environment: it is left out");
     if (options.kind == ExportOptions::Kind::colmap)
-        return imagesets::exportColmap(bundle, folder, names, options, job);
+        return imagesets::exportColmap(table, folder, names, options, job);
 
-    imagesets::noteColourLoss(bundle, options, job);
     OutputJson json;
     double unit = 0.001;
     double farthest = 0;
@@ -153,7 +162,8 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
     for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         const ReferenceView& view = bundle.views[i];
         if (!miv) {
-            json["frames"].push_back(transformsFrame(view, names[i], options, bundle.origin));
+            json["frames"].push_back(
+                transformsFrame(view, table.kindsOf(i).linear, names[i], options, bundle.origin));
             continue;
         }
         STX_TRY(auto camera, mivCamera(view, names[i], bundle.origin));
@@ -173,12 +183,12 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
 
     std::vector<std::string> own;
     for (std::size_t i = 0; i < names.size(); ++i) {
-        const ReferenceView& view = bundle.views[i];
+        const char* colourEnd = colourEnding(table.kindsOf(i).linear, options);
         if (miv) {
-            own.push_back(fmt::format("{}_color{}", names[i], colourEnding(view, options)));
+            own.push_back(fmt::format("{}_color{}", names[i], colourEnd));
             own.push_back(names[i] + (floats ? "_depth.exr" : "_depth16.png"));
         } else {
-            own.push_back(fmt::format("images/{}{}", names[i], colourEnding(view, options)));
+            own.push_back(fmt::format("images/{}{}", names[i], colourEnd));
             own.push_back(fmt::format("depth/{}{}", names[i], depthEnding));
         }
     }
@@ -195,28 +205,25 @@ Result<void> exportImages(const Bundle& bundle, const path& folder, const Export
                               ec.message());
         }
     }
-    std::vector<Result<void>> written(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t index) {
-        const auto i = static_cast<std::size_t>(index);
-        const ReferenceView& view = bundle.views[i];
-        const auto write = [&]() -> Result<void> {
-            STX_CHECK(job.checkCancelled());
-            STX_CHECK(writeColour(view, root / (miv ? names[i] + "_color" : "images/" + names[i]),
-                                  options));
-            if (floats)
-                return writeFloatDepth(view, root / (miv ? names[i] + "_depth.exr"
-                                                         : "depth/" + names[i] + depthEnding));
-            if (!miv)
-                return writeIntegerDepth(view, root / ("depth/" + names[i] + ".png"),
-                                         [&](double d) { return d / unit; });
-            STX_TRY(const MivRange range, mivRange(view));
-            return writeIntegerDepth(view, root / (names[i] + "_depth16.png"),
-                                     [&](double d) { return range.code(d); });
-        };
-        written[i] = write();
-    });
-    for (auto& result : written)
-        if (!result) return propagate(result);
+    imagesets::ColourLoss loss;
+    const auto write = [&](std::size_t i,
+                           std::shared_ptr<const ReferenceView> read) -> Result<void> {
+        const ReferenceView& view = *read;
+        loss.look(view, options);
+        STX_CHECK(
+            writeColour(view, root / (miv ? names[i] + "_color" : "images/" + names[i]), options));
+        if (floats)
+            return writeFloatDepth(
+                view, root / (miv ? names[i] + "_depth.exr" : "depth/" + names[i] + depthEnding));
+        if (!miv)
+            return writeIntegerDepth(view, root / ("depth/" + names[i] + ".png"),
+                                     [&](double d) { return d / unit; });
+        STX_TRY(const MivRange range, mivRange(view));
+        return writeIntegerDepth(view, root / (names[i] + "_depth16.png"),
+                                 [&](double d) { return range.code(d); });
+    };
+    STX_CHECK(forEachView(table, peak::kExport, job, write));
+    loss.note(job);
     if (bundle.environment)
         STX_CHECK(writeEnvironmentExr(*bundle.environment, root / kEnvironmentFile, job));
     STX_CHECK(writeFile(root / own.back(), std::as_bytes(std::span(text.data(), text.size()))));

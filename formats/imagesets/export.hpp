@@ -39,9 +39,14 @@ struct ExportOptions {
 [[nodiscard]] Result<void> exportImages(const Bundle& bundle, const std::filesystem::path& folder,
                                         const ExportOptions& options, Job& job);
 
+/// The same of views that are written when they are read, which takes the memory of one for each
+/// thread.
+[[nodiscard]] Result<void> exportViews(const ViewTable& table, const std::filesystem::path& folder,
+                                       const ExportOptions& options, Job& job);
+
 /// The same of a sequence: transforms.json with `time` and `camera`, a picture and a depth for each
 /// frame of a view; frames that repeat the one before name its files. openImageSet() gives the same
-/// sequence again. A sequence of one frame is exported as its bundle. Errors: as exportImages();
+/// sequence again. A sequence of one frame is exported as its views. Errors: as exportImages();
 /// (usage) another kind, which has one moment only.
 [[nodiscard]] Result<void> exportFrames(Sequence& frames, const std::filesystem::path& folder,
                                         const ExportOptions& options, Job& job);

@@ -6,7 +6,6 @@
 #include "formats/files/messages.hpp"
 #include "formats/images/images.hpp"
 #include "formats/imagesets/colmap.hpp"
-#include "lib/base/parallel.hpp"
 
 namespace stx::imagesets {
 namespace {
@@ -71,9 +70,10 @@ std::pair<std::string, std::string> modelOf(const Bundle& bundle,
 
 }  // namespace
 
-Result<void> exportColmap(const Bundle& bundle, const path& folder,
+Result<void> exportColmap(const ViewTable& table, const path& folder,
                           const std::vector<std::string>& names, const ExportOptions& options,
                           Job& job) {
+    const Bundle& bundle = table.about();
     std::vector<std::string> own{"sparse/cameras.txt", "sparse/images.txt", "sparse/points3D.txt"};
     for (std::size_t i = 0; i < bundle.views.size(); ++i) {
         if (bundle.views[i].camera.orthographic)
@@ -81,8 +81,7 @@ Result<void> exportColmap(const Bundle& bundle, const path& folder,
                         "view '{}' is orthographic; COLMAP has perspective cameras only (--cameras "
                         "transforms has both)",
                         bundle.views[i].name);
-        if (bundle.views[i].texture.isLinear())
-            job.note("linear colours are written as 8-bit sRGB");
+        if (table.kindsOf(i).linear) job.note("linear colours are written as 8-bit sRGB");
         if (bundle.views[i].pruned)
             job.note(
                 "the views are pruned, which a COLMAP workspace cannot say: what reads it takes "
@@ -106,21 +105,13 @@ Result<void> exportColmap(const Bundle& bundle, const path& folder,
     // COLMAP opens no model without it.
     STX_CHECK(
         writeWhole(root / "sparse/points3D.txt", fmt::format("{}: no points\n", kWrittenByUs)));
-    std::vector<Result<void>> written(bundle.views.size());
-    parallelFor(0, static_cast<std::int64_t>(bundle.views.size()), [&](std::int64_t index) {
-        const auto i = static_cast<std::size_t>(index);
-        const auto write = [&]() -> Result<void> {
-            STX_CHECK(job.checkCancelled());
-            STX_CHECK(writePicture(bundle.views[i].texture,
-                                   root / fmt::format("images/{}.png", names[i])));
-            return writeDepth(
-                bundle.views[i].depth,
-                root / fmt::format("stereo/depth_maps/{}.png.geometric.bin", names[i]));
-        };
-        written[i] = write();
-    });
-    for (auto& result : written)
-        if (!result) return propagate(result);
+    const auto write = [&](std::size_t i,
+                           std::shared_ptr<const ReferenceView> view) -> Result<void> {
+        STX_CHECK(writePicture(view->texture, root / fmt::format("images/{}.png", names[i])));
+        return writeDepth(view->depth,
+                          root / fmt::format("stereo/depth_maps/{}.png.geometric.bin", names[i]));
+    };
+    STX_CHECK(forEachView(table, peak::kExport, job, write));
     return output.commit();
 }
 

@@ -90,29 +90,28 @@ Result<void> writeColour(const ReferenceView& view, const path& withoutEnding,
                     {{"R", at, 4}, {"G", at + 1, 4}, {"B", at + 2, 4}, {"A", at + 3, 4}});
 }
 
-const char* colourEnding(const ReferenceView& view, const ExportOptions& options) {
-    return view.texture.isLinear() && !options.linearAsPng ? ".exr" : ".png";
+const char* colourEnding(bool linear, const ExportOptions& options) {
+    return linear && !options.linearAsPng ? ".exr" : ".png";
 }
 
-void noteColourLoss(const Bundle& bundle, const ExportOptions& options, Job& job) {
-    if (!options.linearAsPng) return;
-    bool clipped = false, rounded = false;
-    for (const ReferenceView& view : bundle.views) {
-        const RgbaFloatImage* image = view.texture.rgbaFloat();
-        if (!image) continue;
-        for (const glm::vec4& c : image->pixels()) {
-            // What is under no coverage is filled again by who reads it.
-            if (c.a <= 0.0f) continue;
-            for (int k = 0; k < 4; ++k) {
-                const float code = codeOf(c[k], k == 3);
-                clipped = clipped || c[k] < 0.0f || c[k] > 1.0f;
-                rounded = rounded || std::abs(code - std::round(code)) > kSameCode;
-            }
+void ColourLoss::look(const ReferenceView& view, const ExportOptions& options) {
+    const RgbaFloatImage* image = view.texture.rgbaFloat();
+    if (!image || !options.linearAsPng) return;
+    for (const glm::vec4& c : image->pixels()) {
+        // What is under no coverage is filled again by who reads it.
+        if (c.a <= 0.0f) continue;
+        for (int k = 0; k < 4; ++k) {
+            const float code = codeOf(c[k], k == 3);
+            if (c[k] < 0.0f || c[k] > 1.0f) clipped_ = true;
+            if (std::abs(code - std::round(code)) > kSameCode) rounded_ = true;
         }
     }
-    if (clipped)
+}
+
+void ColourLoss::note(Job& job) const {
+    if (clipped_)
         job.note("linear colour becomes 16-bit sRGB; values above 1 are clipped");
-    else if (rounded)
+    else if (rounded_)
         job.note("linear colour becomes 16-bit sRGB");
 }
 
@@ -147,7 +146,7 @@ Result<void> writeIntegerDepth(const ReferenceView& view, const path& file,
     return writeFile(file, png);
 }
 
-void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin) {
+void addOwnKeys(OutputJson& json, const ViewHeader& view, glm::dvec3 origin) {
     const glm::dquat& q = view.camera.orientation;
     json["stx:name"] = view.name;
     const glm::dvec3& p = view.camera.position;
@@ -162,11 +161,11 @@ void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin) 
     if (view.background) json["stx:background"] = true;
 }
 
-OutputJson transformsFrame(const ReferenceView& view, const std::string& name,
+OutputJson transformsFrame(const ViewHeader& view, bool linear, const std::string& name,
                            const ExportOptions& options, glm::dvec3 origin) {
     const Camera& c = view.camera;
     OutputJson frame;
-    frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(view, options));
+    frame["file_path"] = fmt::format("images/{}{}", name, colourEnding(linear, options));
     frame["depth_file_path"] = fmt::format("depth/{}{}", name, endingOf(options.depth));
     frame["camera_model"] = c.orthographic ? "ORTHOGRAPHIC" : "PINHOLE";
     frame["w"] = c.width;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -26,9 +27,19 @@ inline constexpr const char* kEnvironmentFile = "environment.exr";
 [[nodiscard]] Result<void> writeColour(const ReferenceView& view,
                                        const std::filesystem::path& withoutEnding,
                                        const ExportOptions& options);
-[[nodiscard]] const char* colourEnding(const ReferenceView& view, const ExportOptions& options);
+[[nodiscard]] const char* colourEnding(bool linear, const ExportOptions& options);
+
 /// What of linear colour is lost where the options ask for PNG.
-void noteColourLoss(const Bundle& bundle, const ExportOptions& options, Job& job);
+class ColourLoss {
+  public:
+    /// From several threads.
+    void look(const ReferenceView& view, const ExportOptions& options);
+    /// Notes what was found.
+    void note(Job& job) const;
+
+  private:
+    std::atomic<bool> clipped_ = false, rounded_ = false;
+};
 
 /// ".exr", ".png" or ".npy".
 [[nodiscard]] const char* endingOf(ExportOptions::Depth depth);
@@ -41,9 +52,10 @@ void noteColourLoss(const Bundle& bundle, const ExportOptions& options, Job& job
                                              const std::function<double(double)>& code);
 
 /// What brings a view back to the bit; other programs do not look at it.
-void addOwnKeys(OutputJson& json, const ReferenceView& view, glm::dvec3 origin);
+void addOwnKeys(OutputJson& json, const ViewHeader& view, glm::dvec3 origin);
 /// A view in the frames of transforms.json, with images/NAME and depth/NAME.
-[[nodiscard]] OutputJson transformsFrame(const ReferenceView& view, const std::string& name,
-                                         const ExportOptions& options, glm::dvec3 origin);
+[[nodiscard]] OutputJson transformsFrame(const ViewHeader& view, bool linear,
+                                         const std::string& name, const ExportOptions& options,
+                                         glm::dvec3 origin);
 
 }  // namespace stx::imagesets

@@ -58,6 +58,7 @@ class FrameExporter {
         }
         STX_CHECK(writeFile(root_ / "transforms.json",
                             std::as_bytes(std::span(text.data(), text.size()))));
+        loss_.note(job_);
         return output.commit();
     }
 
@@ -74,6 +75,7 @@ class FrameExporter {
         quiet.workFor(job_);
         STX_TRY(auto bundle, frames_.frame(index, index == 0 ? job_ : quiet));
         STX_CHECK(bundle.check());
+        STX_CHECK(checkPeak(peak::kExport, bundle.views, job_.limits));
         if (index == 0)
             STX_CHECK(begin(bundle));
         else
@@ -86,7 +88,9 @@ class FrameExporter {
         for (std::size_t k = 0; k < bundle.views.size(); ++k) {
             if (!written[k]) return propagate(written[k]);
             if (tracks_[k].name.empty()) continue;
-            auto frame = transformsFrame(bundle.views[k], tracks_[k].name, options_, bundle.origin);
+            const ReferenceView& view = bundle.views[k];
+            auto frame = transformsFrame(view, view.texture.isLinear(), tracks_[k].name, options_,
+                                         bundle.origin);
             frame["time"] = frames_.timeline().times[index];
             frame["camera"] = bundle.views[k].name;
             json_["frames"].push_back(std::move(frame));
@@ -100,7 +104,6 @@ class FrameExporter {
         const glm::dvec3& o = bundle.origin;
         if (o != glm::dvec3(0.0)) json_["stx:origin"] = {o.x, o.y, o.z};
         bundle.noteMaterialLeftOut(job_);
-        imagesets::noteColourLoss(bundle, options_, job_);
         double farthest = 0;
         for (const ReferenceView& view : bundle.views) {
             farthest = std::max(farthest, view.farPlane);
@@ -131,6 +134,7 @@ class FrameExporter {
         if (track.name.empty() && view.depthMayBeUnknown() && view.pointCount() == 0) return {};
         if (index > 0 && samePictures(view, track.before)) return {};
         track.name = fmt::format("{}_{:04}", names_[k], index);
+        loss_.look(view, options_);
         STX_CHECK(writeColour(view, root_ / "images" / track.name, options_));
         if (options_.depth != ExportOptions::Depth::png)
             return writeFloatDepth(view, root_ / "depth" / (track.name + endingOf(options_.depth)));
@@ -146,6 +150,7 @@ class FrameExporter {
     Sequence& frames_;
     const ExportOptions& options_;
     Job& job_;
+    imagesets::ColourLoss loss_;
     fs::path root_;
     OutputJson json_;
     Bundle first_;  ///< names and cameras
@@ -159,8 +164,8 @@ class FrameExporter {
 Result<void> exportFrames(Sequence& frames, const fs::path& folder, const ExportOptions& options,
                           Job& job) {
     if (!frames.timeline().moves()) {
-        STX_TRY(const auto bundle, frames.frame(0, job));
-        return exportImages(bundle, folder, options, job);
+        STX_TRY(const auto table, frames.views(0, job));
+        return exportViews(*table, folder, options, job);
     }
     if (options.kind != ExportOptions::Kind::transforms)
         return fail(

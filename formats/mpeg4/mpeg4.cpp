@@ -1,10 +1,12 @@
 #include "formats/mpeg4/mpeg4.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "formats/files/files.hpp"
 #include "formats/files/no_case.hpp"
 #include "formats/mpeg4/container/isobmff.hpp"
+#include "formats/mpeg4/mapping/picture_spool.hpp"
 #include "formats/mpeg4/media_files.hpp"
 #include "formats/mpeg4/text/bt.hpp"
 #include "formats/mpeg4/text/text_descriptors.hpp"
@@ -215,9 +217,29 @@ Result<Bundle> readMpeg4Bundle(const std::filesystem::path& path, Job& job) {
     return bundle;
 }
 
+Result<std::unique_ptr<ViewTable>> openMpeg4Views(const std::filesystem::path& path, Job& job) {
+    STX_TRY(auto document, readMpeg4(path, job));
+    SceneReadOptions options;
+    options.folder = folderOf(path);
+    auto table =
+        viewsFromScene(std::make_shared<const Document>(std::move(document)), options, job);
+    if (!table) return tl::unexpected(table.error().at(fmt::format("'{}'", path.string())));
+    return table;
+}
+
 Result<void> writeMpeg4Bundle(const Bundle& bundle, const std::filesystem::path& path, Job& job,
                               const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
     STX_TRY(const auto document, sceneFromBundle(bundle, scene, job));
+    return writeMpeg4(document, path, job, options);
+}
+
+Result<void> writeMpeg4Views(const ViewTable& table, const std::filesystem::path& path, Job& job,
+                             const SceneWriteOptions& scene, const Mpeg4WriteOptions& options) {
+    std::optional<PictureSpool> spool;
+    if (path != "-") {
+        STX_TRY(spool, PictureSpool::create(folderOf(path)));
+    }
+    STX_TRY(const auto document, sceneFromViews(table, scene, spool ? &*spool : nullptr, job));
     return writeMpeg4(document, path, job, options);
 }
 

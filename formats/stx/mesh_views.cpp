@@ -112,10 +112,21 @@ Result<MeshViews> chooseViews(const Mesh& mesh, const ConvertSettings& s, Job& j
     return MeshViews{std::move(cameras), {}, {}, 0, 0.0};
 }
 
+static Result<void> checkSupersampling(const ConvertSettings& s) {
+    if (s.supersampling >= 1 && s.supersampling <= 8) return {};
+    return fail(ErrorCode::usage, "supersampling is {}; 1 to 8 is possible", s.supersampling);
+}
+
+Result<void> withViewsOf(
+    const Mesh& mesh, const std::vector<Camera>& cameras, const ConvertSettings& s, Job& job,
+    const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use) {
+    STX_CHECK(checkSupersampling(s));
+    return withCapturedViews(mesh, cameras, captureSettings(s), job, use);
+}
+
 Result<Bundle> captureViews(const Mesh& mesh, const std::vector<Camera>& cameras,
                             const ConvertSettings& s, Job& job) {
-    if (s.supersampling < 1 || s.supersampling > 8)
-        return fail(ErrorCode::usage, "supersampling is {}; 1 to 8 is possible", s.supersampling);
+    STX_CHECK(checkSupersampling(s));
     return captureBundle(mesh, cameras, captureSettings(s), job);
 }
 
@@ -131,10 +142,14 @@ bool setDepthBits(Bundle& bundle, int bits) {
 }
 
 void noteDepthLoss(const Bundle& bundle, Job& job) {
-    double worst = 0;
-    for (const auto& view : bundle.views) {
-        if (view.depthBits == 8) worst = std::max(worst, view.depthCode().step() * 0.5);
-    }
+    double largest = 0;
+    for (const auto& view : bundle.views)
+        if (view.depthBits == 8) largest = std::max(largest, view.depthCode().step());
+    noteDepthLoss(largest, job);
+}
+
+void noteDepthLoss(double largestStep, Job& job) {
+    const double worst = largestStep * 0.5;
     if (worst > 0)
         job.note(fmt::format(
             "depth in 8 bits is off by up to {:.3g} scene units; 16 bits are 257 times finer",

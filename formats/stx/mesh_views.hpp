@@ -1,10 +1,13 @@
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "formats/stx/stx.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/selection/selection.hpp"
 
 namespace stx {
@@ -38,10 +41,17 @@ struct MeshViews {
 [[nodiscard]] Result<Bundle> captureViews(const Mesh& mesh, const std::vector<Camera>& cameras,
                                           const ConvertSettings& settings, Job& job);
 
+/// The same as a table, see withCapturedViews().
+[[nodiscard]] Result<void> withViewsOf(
+    const Mesh& mesh, const std::vector<Camera>& cameras, const ConvertSettings& settings, Job& job,
+    const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use);
+
 /// Gives all views these depth bits and the range that suits them; false when all had them.
 bool setDepthBits(Bundle& bundle, int bits);
 
 /// Notes what 8-bit depth costs, in scene units, when a view has it.
 void noteDepthLoss(const Bundle& bundle, Job& job);
+/// The same of the largest step of depth codes of 8 bits; 0: no view has such.
+void noteDepthLoss(double largestStep, Job& job);
 
 }  // namespace stx

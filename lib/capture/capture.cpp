@@ -1,7 +1,9 @@
 #include "lib/capture/capture.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "lib/base/parallel.hpp"
@@ -84,48 +86,153 @@ Result<ReferenceView> captureView(const Mesh& mesh, const Camera& camera, std::s
     return view;
 }
 
-Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& cameras,
-                             const CaptureSettings& settings, Job& job) {
+namespace {
+
+/// A mesh that is ready to be captured.
+struct Subject {
+    std::optional<Mesh> withoutStrays;  ///< where the mesh has some
+    std::optional<Bounds> bounds;
+    ViewImageKinds kinds;
+};
+
+/// Says what does not come with it. Errors: a mesh that fails check(), names, cameras.
+Result<Subject> subjectOf(const Mesh& whole, const std::vector<Camera>& cameras,
+                          const CaptureSettings& settings, Job& job) {
     STX_CHECK(whole.check());
+    Subject subject;
     // A stray behind the object would take the range of its view's depth codes for itself.
     const auto strays = findStrays(whole);
-    std::optional<Mesh> rest;
     if (!strays.pieces.empty()) {
-        rest = whole;
-        dropStrays(*rest, strays);
+        subject.withoutStrays = whole;
+        dropStrays(*subject.withoutStrays, strays);
     }
-    const Mesh& mesh = rest ? *rest : whole;
+    const Mesh& mesh = subject.withoutStrays ? *subject.withoutStrays : whole;
     noteTranslucent(mesh, job);
     if (!settings.names.empty() && settings.names.size() != cameras.size())
         return fail(ErrorCode::usage, "there are {} names for {} cameras", settings.names.size(),
                     cameras.size());
-    std::uint64_t pixels = 0;
-    for (const auto& c : cameras) {
-        STX_CHECK(c.check());
-        pixels += static_cast<std::uint64_t>(c.width) * c.height;
-    }
-    const bool surface = settings.materials && hasMetallicRoughness(mesh);
-    const bool glow = settings.materials && emits(mesh);
-    STX_CHECK(job.limits.checkAllocation(
-        pixels, 8 + (settings.meshNormals ? 12 : 0) + (surface ? 8 : 0) + (glow ? 12 : 0),
-        "the reference views"));
-    if (settings.materials && !surface && !glow)
+    for (const auto& c : cameras) STX_CHECK(c.check());
+    subject.kinds.normal = settings.meshNormals;
+    subject.kinds.metallicRoughness = settings.materials && hasMetallicRoughness(mesh);
+    subject.kinds.emissive = settings.materials && emits(mesh);
+    subject.bounds = strays.bounds;
+    return subject;
+}
+
+void noteMaterials(const ViewImageKinds& kinds, const CaptureSettings& settings, Job& job) {
+    if (settings.materials && !kinds.hasMaterial())
         job.note(
             "the model has neither metallic-roughness nor emissive materials; "
             "--materials has nothing to keep");
-    if (glow)
+    if (kinds.emissive)
         job.note(
             "what gives off light has it in the emissive images alone, for engines; pictures by "
             "stx render are without it");
+}
+
+std::string nameOf(std::size_t view, const CaptureSettings& settings) {
+    return settings.names.empty() ? fmt::format("view{:03}", view) : settings.names[view];
+}
+
+void noteBlind(std::size_t view, Job& job) {
+    job.note(fmt::format("view {} sees nothing of the model and was left out", view));
+}
+
+/// No camera sees the model.
+Error blindError(const std::vector<Camera>& cameras) {
+    const auto tooSmall = [](const Camera& c) { return std::max(c.width, c.height) < 16; };
+    if (std::ranges::all_of(cameras, tooSmall))
+        return {ErrorCode::invalidInput,
+                fmt::format("no pixel of the views meets the model: {}x{} pixels are too few; take "
+                            "16x16 or more",
+                            cameras[0].width, cameras[0].height),
+                {}};
+    return {ErrorCode::invalidInput,
+            fmt::format("{} the model; check the poses and units",
+                        cameras.size() == 1
+                            ? "the camera does not see"
+                            : fmt::format("none of the {} cameras sees", cameras.size())),
+            {}};
+}
+
+/// Memory of drawing a view, bytes for each pixel: its colours as floats, and what is kept of them.
+constexpr std::uint64_t kDrawing = 24;
+
+class CapturedViews : public ViewTable {
+  public:
+    CapturedViews(const Mesh& mesh, Bundle headers, std::vector<ViewImageKinds> kinds,
+                  const CaptureSettings& settings, std::atomic<bool>& blind)
+        : ViewTable(std::move(headers), std::move(kinds), Planes::withPixels),
+          mesh_(mesh),
+          settings_(settings),
+          blind_(blind) {}
+
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        return bytesOf(index) + kDrawing * pixelsOf(index);
+    }
+    /// All threads draw one view of a cloud: several at a time would need the memory of each.
+    int mostAtOnce() const override { return mesh_.splats ? 1 : 0; }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        const ViewHeader& header = about().views[index];
+        auto view = captureView(mesh_, header.camera, header.name, settings_, job);
+        if (!view) return tl::unexpected(view.error().at(fmt::format("view {}", index)));
+        if (view->pointCount() == 0) {
+            blind_ = true;
+            return fail(ErrorCode::failed, "view {} sees nothing of the model", index);
+        }
+        return std::make_shared<ReferenceView>(std::move(*view));
+    }
+
+  private:
+    const Mesh& mesh_;
+    const CaptureSettings& settings_;
+    std::atomic<bool>& blind_;
+};
+
+/// The cameras that see something, by their numbers.
+Result<std::vector<std::size_t>> seeing(const Mesh& mesh, const std::vector<Camera>& cameras,
+                                        const CaptureSettings& settings, Job& job) {
+    std::vector<Result<bool>> sees(cameras.size());
+    const auto look = [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        sees[at] = [&]() -> Result<bool> {
+            STX_TRY(const auto view, captureView(mesh, cameras[at], {}, settings, job));
+            return view.pointCount() > 0;
+        }();
+    };
+    const auto count = static_cast<std::int64_t>(cameras.size());
+    if (mesh.splats)
+        for (std::int64_t i = 0; i < count; ++i) look(i);
+    else
+        parallelFor(0, count, look);
+    std::vector<std::size_t> numbers;
+    for (std::size_t i = 0; i < sees.size(); ++i) {
+        if (!sees[i]) return propagate(sees[i]);
+        if (*sees[i]) numbers.push_back(i);
+    }
+    return numbers;
+}
+
+}  // namespace
+
+Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& cameras,
+                             const CaptureSettings& settings, Job& job) {
+    STX_TRY(const auto subject, subjectOf(whole, cameras, settings, job));
+    const Mesh& mesh = subject.withoutStrays ? *subject.withoutStrays : whole;
+    std::uint64_t pixels = 0;
+    for (const auto& c : cameras) pixels += static_cast<std::uint64_t>(c.width) * c.height;
+    STX_CHECK(
+        job.limits.checkAllocation(pixels, subject.kinds.bytesPerPixel(), "the reference views"));
+    noteMaterials(subject.kinds, settings, job);
 
     const auto n = static_cast<std::int64_t>(cameras.size());
     std::vector<Result<ReferenceView>> views(n, ReferenceView());
     std::atomic<std::int64_t> done = 0;
     const auto capture = [&](std::int64_t i) {
         const auto at = static_cast<std::size_t>(i);
-        const std::string name =
-            settings.names.empty() ? fmt::format("view{:03}", i) : settings.names[at];
-        views[i] = captureView(mesh, cameras[i], name, settings, job);
+        views[i] = captureView(mesh, cameras[at], nameOf(at, settings), settings, job);
         job.progress(++done, n, "capturing views");
     };
     // All threads draw one view of a cloud: several views at a time would need the memory of each.
@@ -137,24 +244,56 @@ Result<Bundle> captureBundle(const Mesh& whole, const std::vector<Camera>& camer
     for (std::int64_t i = 0; i < n; ++i) {
         if (!views[i]) return tl::unexpected(views[i].error().at(fmt::format("view {}", i)));
         if (views[i]->pointCount() == 0) {
-            job.note(fmt::format("view {} sees nothing of the model and was left out", i));
+            noteBlind(static_cast<std::size_t>(i), job);
             continue;
         }
         bundle.views.push_back(std::move(*views[i]));
     }
-    const auto tooSmall = [](const Camera& c) { return std::max(c.width, c.height) < 16; };
-    if (bundle.views.empty() && std::all_of(cameras.begin(), cameras.end(), tooSmall))
-        return fail(ErrorCode::invalidInput,
-                    "no pixel of the views meets the model: {}x{} pixels are too few; take 16x16 "
-                    "or more",
-                    cameras[0].width, cameras[0].height);
-    if (bundle.views.empty())
-        return fail(
-            ErrorCode::invalidInput, "{} the model; check the poses and units",
-            n == 1 ? "the camera does not see" : fmt::format("none of the {} cameras sees", n));
+    if (bundle.views.empty()) return tl::unexpected(blindError(cameras));
     bundle.origin = mesh.origin;
-    bundle.bounds = strays.bounds;
+    bundle.bounds = subject.bounds;
     return bundle;
+}
+
+Result<void> withCapturedViews(
+    const Mesh& whole, const std::vector<Camera>& cameras, const CaptureSettings& settings,
+    Job& job, const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use) {
+    STX_TRY(const auto subject, subjectOf(whole, cameras, settings, job));
+    const Mesh& mesh = subject.withoutStrays ? *subject.withoutStrays : whole;
+    noteMaterials(subject.kinds, settings, job);
+    std::vector<std::size_t> numbers(cameras.size());
+    std::iota(numbers.begin(), numbers.end(), std::size_t{0});
+    for (;;) {
+        if (numbers.empty()) return tl::unexpected(blindError(cameras));
+        Bundle headers;
+        headers.origin = mesh.origin;
+        headers.bounds = subject.bounds;
+        for (const std::size_t i : numbers) {
+            ReferenceView& view = headers.views.emplace_back();
+            view.name = nameOf(i, settings);
+            view.camera = cameras[i];
+            view.depthBits = settings.depthBits;
+        }
+        std::atomic<bool> blind = false;
+        Job part;
+        part.workFor(job);
+        part.onProgress = job.onProgress;
+        const auto done =
+            use(std::make_unique<CapturedViews>(
+                    mesh, std::move(headers),
+                    std::vector<ViewImageKinds>(numbers.size(), subject.kinds), settings, blind),
+                part);
+        if (!blind) {
+            part.passNotesOn();
+            return done;
+        }
+        STX_CHECK(job.checkCancelled());
+        Job quiet;
+        quiet.workFor(job);
+        STX_TRY(numbers, seeing(mesh, cameras, settings, quiet));
+        for (std::size_t i = 0; i < cameras.size(); ++i)
+            if (!std::ranges::binary_search(numbers, i)) noteBlind(i, job);
+    }
 }
 
 std::vector<glm::vec3> drawnPoints(const Mesh& mesh) {

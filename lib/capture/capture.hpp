@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -7,6 +9,7 @@
 #include "lib/capture/rasterizer.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/mesh.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -33,6 +36,14 @@ struct CaptureSettings {
 /// without points are dropped with a note; errors when none is left.
 [[nodiscard]] Result<Bundle> captureBundle(const Mesh& mesh, const std::vector<Camera>& cameras,
                                            const CaptureSettings& settings, Job& job);
+
+/// The same views as a table, each captured when it is asked for, whose planes come with its
+/// pixels. A view without points shows then only: `use` fails at it, and is called again with the
+/// others, so that it must leave nothing where it fails. It gets a job whose notes are passed on
+/// when it is done. Errors: as captureBundle(), and those of `use`.
+[[nodiscard]] Result<void> withCapturedViews(
+    const Mesh& mesh, const std::vector<Camera>& cameras, const CaptureSettings& settings, Job& job,
+    const std::function<Result<void>(std::unique_ptr<ViewTable> table, Job& job)>& use);
 
 /// Sets nearPlane and farPlane to the least and greatest distance of a view's points, as floats
 /// (the format's precision) that enclose them, and rounds the distances to their codes. Does

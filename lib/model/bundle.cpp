@@ -4,6 +4,7 @@
 
 #include "lib/base/parallel.hpp"
 #include "lib/model/depth_values.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -77,10 +78,7 @@ bool Bundle::hasMaterial() const {
 }
 
 void Bundle::noteMaterialLeftOut(Job& job) const {
-    if (hasMaterial())
-        job.note(
-            "metallic-roughness and emissive are left out: .exr bundles and atlases alone hold "
-            "them");
+    stx::noteMaterialLeftOut(*viewsOf(*this), job);
 }
 
 std::int64_t Bundle::pointCount() const {

@@ -23,8 +23,9 @@ class Still : public Sequence {
 
 class Changed : public Sequence {
   public:
-    Changed(std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change)
-        : frames_(std::move(frames)), change_(std::move(change)) {
+    Changed(std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change,
+            std::function<Result<bool>(const ViewTable&, Job&)> needed)
+        : frames_(std::move(frames)), change_(std::move(change)), needed_(std::move(needed)) {
         timeline_ = frames_->timeline();
     }
     Result<Bundle> frame(std::size_t index, Job& job) override {
@@ -32,10 +33,73 @@ class Changed : public Sequence {
         STX_CHECK(change_(bundle, job));
         return bundle;
     }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        if (!needed_) return Sequence::views(index, job);
+        STX_TRY(auto table, frames_->views(index, job));
+        if (!table->whole()) {
+            STX_TRY(const bool needed, needed_(*table, job));
+            if (!needed) return table;
+        }
+        STX_TRY(auto bundle, wholeBundle(std::move(table), job));
+        STX_CHECK(change_(bundle, job));
+        return tableOf(std::move(bundle));
+    }
 
   private:
     std::unique_ptr<Sequence> frames_;
     std::function<Result<void>(Bundle&, Job&)> change_;
+    std::function<Result<bool>(const ViewTable&, Job&)> needed_;
+};
+
+class ChangedByView : public Sequence {
+  public:
+    ChangedByView(std::unique_ptr<Sequence> frames, ViewChange change)
+        : frames_(std::move(frames)), change_(std::move(change)) {
+        timeline_ = frames_->timeline();
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frames_->frame(index, job));
+        STX_CHECK(checkPeak(change_.takes, bundle.views, job.limits));
+        for (std::size_t i = 0; i < bundle.views.size(); ++i) {
+            STX_CHECK(job.checkCancelled());
+            if (auto done = change_.change(bundle.views[i], job); !done)
+                return tl::unexpected(done.error().at(fmt::format("view {}", i)));
+        }
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, frames_->views(index, job));
+        return changedViews(std::move(table), change_);
+    }
+
+  private:
+    std::unique_ptr<Sequence> frames_;
+    ViewChange change_;
+};
+
+class Watched : public Sequence {
+  public:
+    using Look = std::function<void(std::size_t, std::size_t, const ReferenceView&)>;
+    Watched(std::unique_ptr<Sequence> frames, Look look)
+        : frames_(std::move(frames)), look_(std::move(look)) {
+        timeline_ = frames_->timeline();
+    }
+    Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(auto bundle, frames_->frame(index, job));
+        for (std::size_t i = 0; i < bundle.views.size(); ++i) look_(index, i, bundle.views[i]);
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, frames_->views(index, job));
+        return watchedViews(std::move(table),
+                            [look = look_, index](std::size_t i, const ReferenceView& view) {
+                                look(index, i, view);
+                            });
+    }
+
+  private:
+    std::unique_ptr<Sequence> frames_;
+    Look look_;
 };
 
 class Chosen : public Sequence {
@@ -52,6 +116,11 @@ class Chosen : public Sequence {
         STX_TRY(auto bundle, frames_->frame(numbers_[index], job));
         setTime(bundle, index);
         return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(auto table, frames_->views(numbers_[index], job));
+        setTime(table->about(), index);
+        return table;
     }
 
   private:
@@ -202,9 +271,25 @@ std::unique_ptr<Sequence> sequenceOf(Bundle still) {
     return std::make_unique<Still>(std::move(still));
 }
 
-std::unique_ptr<Sequence> changed(std::unique_ptr<Sequence> frames,
-                                  std::function<Result<void>(Bundle&, Job&)> change) {
-    return std::make_unique<Changed>(std::move(frames), std::move(change));
+Result<std::unique_ptr<ViewTable>> Sequence::views(std::size_t index, Job& job) {
+    STX_TRY(auto bundle, frame(index, job));
+    return tableOf(std::move(bundle));
+}
+
+std::unique_ptr<Sequence> changed(
+    std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change,
+    std::function<Result<bool>(const ViewTable& views, Job& job)> needed) {
+    return std::make_unique<Changed>(std::move(frames), std::move(change), std::move(needed));
+}
+
+std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames, ViewChange change) {
+    return std::make_unique<ChangedByView>(std::move(frames), std::move(change));
+}
+
+std::unique_ptr<Sequence> watched(
+    std::unique_ptr<Sequence> frames,
+    std::function<void(std::size_t frame, std::size_t index, const ReferenceView& view)> look) {
+    return std::make_unique<Watched>(std::move(frames), std::move(look));
 }
 
 Result<std::unique_ptr<Sequence>> someFrames(std::unique_ptr<Sequence> frames,

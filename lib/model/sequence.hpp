@@ -9,6 +9,7 @@
 
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -72,6 +73,9 @@ class Sequence {
     /// Frames may be asked for in any order; ascending is fastest. One call at a time. It passes
     /// Bundle::check().
     [[nodiscard]] virtual Result<Bundle> frame(std::size_t index, Job& job) = 0;
+    /// The same as a table, whose pixels are read when a view is asked for where what is behind
+    /// this can do so; else they are there. It serves until another frame is asked for.
+    [[nodiscard]] virtual Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job);
 
   protected:
     /// Tells a frame when it is shown, and for how long.
@@ -83,9 +87,20 @@ class Sequence {
 /// A bundle that stands still.
 [[nodiscard]] std::unique_ptr<Sequence> sequenceOf(Bundle still);
 
-/// The same frames, each changed by `change`.
+/// The same frames, each changed by `change`, for which all views of a frame are in memory, unless
+/// `needed` says of the views of one that nothing in them would change.
 [[nodiscard]] std::unique_ptr<Sequence> changed(
-    std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle& frame, Job& job)> change);
+    std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle& frame, Job& job)> change,
+    std::function<Result<bool>(const ViewTable& views, Job& job)> needed = {});
+
+/// The same frames, whose views are changed one by one.
+[[nodiscard]] std::unique_ptr<Sequence> changedByView(std::unique_ptr<Sequence> frames,
+                                                      ViewChange change);
+
+/// The same frames; `look` is called, from any thread, with each view that is asked for, each time.
+[[nodiscard]] std::unique_ptr<Sequence> watched(
+    std::unique_ptr<Sequence> frames,
+    std::function<void(std::size_t frame, std::size_t index, const ReferenceView& view)> look);
 
 /// Some of the frames, in ascending order of their numbers, at their times.
 /// Errors (usage): no frame, or numbers that are not in the sequence or do not ascend.

@@ -124,55 +124,87 @@ class Samples {
     std::vector<glm::dmat4> cameraFromWorld_;
 };
 
-/// Pairs of views that show the same, and their colours there.
-std::vector<SharedColours> sharedColours(std::span<const Camera> cameras, const PartOfView& partOf,
-                                         int radius) {
+/// Views that are compared with each other, by pairs, a < b: of each those that show most of it.
+std::vector<SharedColours> pairsThatShare(const std::vector<std::vector<std::uint16_t>>& shown) {
+    const std::size_t views = shown.size();
+    std::set<std::pair<std::size_t, std::size_t>> wanted;
+    for (std::size_t v = 0; v < views; ++v) {
+        std::vector<std::pair<int, std::size_t>> ranked;
+        for (std::size_t other = 0; other < views; ++other)
+            if (other != v && shown[other][v] >= kLeastShown)
+                ranked.emplace_back(-static_cast<int>(shown[other][v]), other);
+        std::sort(ranked.begin(), ranked.end());
+        ranked.resize(std::min(ranked.size(), kComparedWith));
+        for (const auto& entry : ranked)
+            wanted.emplace(std::min(v, entry.second), std::max(v, entry.second));
+    }
+    std::vector<SharedColours> pairs;
+    for (const auto& [a, b] : wanted) pairs.push_back({a, b, {}});
+    return pairs;
+}
+
+/// Pairs of views that show the same, and their colours there. Looks at each view alone.
+Result<std::vector<SharedColours>> sharedColours(std::span<const Camera> cameras,
+                                                 const PartOfView& partOf, const EachView& each,
+                                                 int radius) {
     const std::size_t views = cameras.size();
     const Samples samples(cameras, partOf, radius);
     std::vector<std::vector<Samples::Point>> points(views);
-    std::vector<std::vector<std::size_t>> partners(views);
-    const auto count = static_cast<std::int64_t>(views);
-    parallelFor(0, count, [&](std::int64_t i) {
-        const auto v = static_cast<std::size_t>(i);
-        points[v] = samples.pointsOf(v);
-        const auto step = static_cast<std::size_t>(
-            std::max(1.0, static_cast<double>(points[v].size()) / kRankPoints));
-        std::vector<std::pair<int, std::size_t>> ranked;
-        for (std::size_t other = 0; other < views; ++other) {
-            if (other == v) continue;
-            int shown = 0;
-            for (std::size_t k = step / 2; k < points[v].size(); k += step)
-                shown += samples.shownAt(other, points[v][k]) ? 1 : 0;
-            if (shown >= kLeastShown) ranked.emplace_back(-shown, other);
+    STX_CHECK(each([&](std::size_t v) { points[v] = samples.pointsOf(v); }));
+    // How much of each view another shows.
+    std::vector<std::vector<std::uint16_t>> shown(views, std::vector<std::uint16_t>(views));
+    STX_CHECK(each([&](std::size_t at) {
+        for (std::size_t v = 0; v < views; ++v) {
+            const auto step = static_cast<std::size_t>(
+                std::max(1.0, static_cast<double>(points[v].size()) / kRankPoints));
+            for (std::size_t k = step / 2; v != at && k < points[v].size(); k += step)
+                shown[at][v] += samples.shownAt(at, points[v][k]) ? 1 : 0;
         }
-        std::sort(ranked.begin(), ranked.end());
-        ranked.resize(std::min(ranked.size(), kComparedWith));
-        for (const auto& entry : ranked) partners[v].push_back(entry.second);
-    });
-    std::set<std::pair<std::size_t, std::size_t>> wanted;
-    for (std::size_t v = 0; v < views; ++v)
-        for (const std::size_t other : partners[v])
-            wanted.emplace(std::min(v, other), std::max(v, other));
-    std::vector<SharedColours> pairs;
-    for (const auto& [a, b] : wanted) pairs.push_back({a, b, {}});
-    parallelFor(0, static_cast<std::int64_t>(pairs.size()), [&](std::int64_t i) {
-        SharedColours& pair = pairs[static_cast<std::size_t>(i)];
-        // Both ways: what is shown at a point is a little blurred beside the point's own colour.
-        for (const Samples::Point& p : points[pair.a])
-            if (const auto b = samples.shownAt(pair.b, p)) pair.points.push_back({p.colour, *b});
-        for (const Samples::Point& p : points[pair.b])
-            if (const auto a = samples.shownAt(pair.a, p)) pair.points.push_back({*a, p.colour});
-    });
+    }));
+    auto pairs = pairsThatShare(shown);
+    // Both ways: what is shown at a point is a little blurred beside the point's own colour.
+    using Colours = std::vector<std::optional<glm::vec3>>;
+    std::vector<Colours> atB(pairs.size()), atA(pairs.size());
+    STX_CHECK(each([&](std::size_t at) {
+        const auto coloursOf = [&](std::size_t v) {
+            Colours colours;
+            for (const Samples::Point& p : points[v]) colours.push_back(samples.shownAt(at, p));
+            return colours;
+        };
+        for (std::size_t i = 0; i < pairs.size(); ++i) {
+            if (pairs[i].b == at) atB[i] = coloursOf(pairs[i].a);
+            if (pairs[i].a == at) atA[i] = coloursOf(pairs[i].b);
+        }
+    }));
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+        SharedColours& pair = pairs[i];
+        for (std::size_t k = 0; k < atB[i].size(); ++k)
+            if (const auto& b = atB[i][k]) pair.points.push_back({points[pair.a][k].colour, *b});
+        for (std::size_t k = 0; k < atA[i].size(); ++k)
+            if (const auto& a = atA[i][k]) pair.points.push_back({*a, points[pair.b][k].colour});
+    }
     return pairs;
 }
 
 }  // namespace
 
 std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras, const PartOfView& partOf) {
-    auto pairs = sharedColours(cameras, partOf, 1);
+    const auto each = [&](const std::function<void(std::size_t)>& body) -> Result<void> {
+        parallelFor(0, static_cast<std::int64_t>(cameras.size()),
+                    [&](std::int64_t v) { body(static_cast<std::size_t>(v)); });
+        return {};
+    };
+    return *exposureMaps(cameras, partOf, each);  // nothing in it fails
+}
+
+Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
+                                            const PartOfView& partOf, const EachView& each) {
+    STX_TRY(auto pairs, sharedColours(cameras, partOf, each, 1));
     std::size_t most = 0;
     for (const SharedColours& pair : pairs) most = std::max(most, pair.points.size());
-    if (most < kFewInside) pairs = sharedColours(cameras, partOf, 0);
+    if (most < kFewInside) {
+        STX_TRY(pairs, sharedColours(cameras, partOf, each, 0));
+    }
     return matchColours(cameras.size(), pairs);
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lib/base/image.hpp"
+#include "lib/base/result.hpp"
 #include "lib/geometry/camera.hpp"
 #include "lib/model/texture.hpp"
 #include "lib/refine/colour_match.hpp"
@@ -34,6 +35,15 @@ using PartOfView = std::function<PixelPart(std::size_t view, int x0, int y0, int
 /// changes anything where the views agree. The same on any number of threads.
 [[nodiscard]] std::vector<ColourMap> exposureMaps(std::span<const Camera> cameras,
                                                   const PartOfView& partOf);
+
+/// Calls its argument with the number of each view, from any thread; `PartOfView` is asked for that
+/// view alone meanwhile.
+using EachView = std::function<Result<void>(const std::function<void(std::size_t view)>& body)>;
+/// The same of views that are not all there at a time: `each` is called three times, where views
+/// have few points inside of surfaces six times. Errors: those of `each`.
+[[nodiscard]] Result<std::vector<ColourMap>> exposureMaps(std::span<const Camera> cameras,
+                                                          const PartOfView& partOf,
+                                                          const EachView& each);
 
 /// Applies a map to the texels from (x0, y0) to (x1, y1), the last excluded, but for transparent
 /// ones; the report gets the pixels that changed, and by how much (a share of white).

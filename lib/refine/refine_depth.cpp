@@ -1,6 +1,7 @@
 #include "lib/refine/refine_depth.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -341,14 +342,24 @@ void RefineNeeds::add(const RefineView& view) {
     RefineReport report;
     (void)refineDepth({&view, 1}, settings, report);
     some_ = report.changed();
-    if (some_ || !settings_.on(RefineStep::edges)) return;
+    if (some_) return;
     Work w = workOn(view);
+    // Few points of one view are no noise, those of many are: see kFewestNoisy.
+    const std::array noise = {depthNoise(w.q, w.space.axis)};
+    noisyPoints_ += pointsOfNoisy({&w, 1}, noise);
+    if (!settings_.on(RefineStep::edges)) return;
     const auto more = sharesAtEdges({&w.space, view.texture, &w.q, stepOf(*view.header)});
     edgeShares_.insert(edgeShares_.end(), more.begin(), more.end());
 }
 
+void RefineNeeds::add(const RefineNeeds& others) {
+    some_ = some_ || others.some_;
+    noisyPoints_ += others.noisyPoints_;
+    edgeShares_.insert(edgeShares_.end(), others.edgeShares_.begin(), others.edgeShares_.end());
+}
+
 bool RefineNeeds::any() const {
-    return some_ || edgesAreFat(colourAtEdges(edgeShares_));
+    return some_ || noisyPoints_ >= kFewestNoisy || edgesAreFat(colourAtEdges(edgeShares_));
 }
 
 }  // namespace stx

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -42,11 +43,14 @@ class RefineNeeds {
   public:
     explicit RefineNeeds(const RefineSettings& settings) : settings_(settings) {}
     void add(const RefineView& view);
+    /// What was found of others, with the same settings.
+    void add(const RefineNeeds& others);
     [[nodiscard]] bool any() const;
 
   private:
     RefineSettings settings_;
     bool some_ = false;
+    std::int64_t noisyPoints_ = 0;
     std::vector<float> edgeShares_;
 };
 

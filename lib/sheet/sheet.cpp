@@ -1,6 +1,7 @@
 #include "lib/sheet/sheet.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "lib/base/counted.hpp"
@@ -95,14 +96,15 @@ Tile withRectangles(Tile tile, const Atlas& atlas, int page) {
 
 Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& job) {
     STX_CHECK(bundle.check());
-    STX_CHECK(checkPeak(peak::kSheet, bundle.views, job.limits));
-    bool normals = false, splats = false, surface = false, glow = false;
-    for (const auto& v : bundle.views) {
-        surface = surface || !v.metallicRoughness.empty();
-        glow = glow || !v.emissive.empty();
-        normals = normals || v.hasNormals();
-        splats = splats || v.hasSplats();
-    }
+    return sheetOf(*viewsOf(bundle), settings, job);
+}
+
+Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings, Job& job) {
+    const Bundle& bundle = table.about();
+    const auto some = [&](auto of) { return std::ranges::any_of(table.kinds(), of); };
+    const bool normals = some(&ViewImageKinds::normal), splats = some(&ViewImageKinds::hasSplats);
+    const bool surface = some(&ViewImageKinds::metallicRoughness);
+    const bool glow = some(&ViewImageKinds::emissive);
     SheetContent content;
     content.groups = static_cast<int>(bundle.views.size());
     content.tiles = 2 + (normals ? 1 : 0) + (splats ? 1 : 0) + (surface ? 1 : 0) + (glow ? 1 : 0);
@@ -110,12 +112,18 @@ Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& 
     content.headerLines = 2;
     content.largest = largestOf(bundle.views);
     STX_TRY(const auto plan, planSheet(content, settings, job.limits));
-    std::vector<SheetGroup> groups;
-    for (int i = 0; i < plan.shown; ++i) {
-        STX_CHECK(job.checkCancelled());
-        const auto number = static_cast<std::size_t>(plan.groupAt(i));
-        const ReferenceView& view = bundle.views[number];
-        SheetGroup group{viewLines(view, number, bundle.origin), {}};
+    std::vector<SheetGroup> groups(static_cast<std::size_t>(plan.shown));
+    std::vector<int> places(table.count(), -1);  // of those that are shown
+    for (int i = 0; i < plan.shown; ++i) places[static_cast<std::size_t>(plan.groupAt(i))] = i;
+    std::atomic<std::int64_t> points = 0, done = 0;
+    const auto draw = [&](std::size_t number,
+                          std::shared_ptr<const ReferenceView> read) -> Result<void> {
+        const ReferenceView& view = *read;
+        points += view.pointCount();
+        job.progress(++done, content.groups, "views");
+        if (places[number] < 0) return {};
+        SheetGroup& group = groups[static_cast<std::size_t>(places[number])];
+        group.lines = viewLines(view, number, bundle.origin);
         group.tiles.push_back(colourTile(view.texture, plan.cell));
         group.tiles.push_back(depthTile(view.depth, plan.cell));
         if (view.hasNormals()) group.tiles.push_back(normalTile(view.normal, plan.cell));
@@ -123,13 +131,14 @@ Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& 
         if (!view.metallicRoughness.empty())
             group.tiles.push_back(metallicRoughnessTile(view.metallicRoughness, plan.cell));
         if (!view.emissive.empty()) group.tiles.push_back(emissiveTile(view.emissive, plan.cell));
-        groups.push_back(std::move(group));
-        job.progress(i + 1, plan.shown, "views");
-    }
+        return {};
+    };
+    STX_CHECK(forEachView(table, peak::kSheet, job, draw));
     const auto header =
         headerOf(plan, settings,
-                 fmt::format("{}, {}, {}", bundle.nodeKind(), counted(bundle.views.size(), "view"),
-                             counted(static_cast<std::size_t>(bundle.pointCount()), "point")));
+                 fmt::format("{}, {}, {}", normals || splats ? "SimpleTextureV2" : "SimpleTexture",
+                             counted(bundle.views.size(), "view"),
+                             counted(static_cast<std::size_t>(points.load()), "point")));
     return Sheet{drawSheet(plan, header, groups), plan.shown, content.groups};
 }
 

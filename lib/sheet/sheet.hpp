@@ -9,6 +9,7 @@
 #include "lib/model/atlas.hpp"
 #include "lib/model/bundle.hpp"
 #include "lib/model/sequence.hpp"
+#include "lib/model/view_table.hpp"
 #include "lib/sheet/canvas.hpp"
 
 namespace stx {
@@ -32,6 +33,9 @@ struct Sheet {
 /// Every view with its name and camera: colour, depth, and normals and splats where there are some.
 /// Errors: a bundle that fails check(), a sheet that is too small (planSheet()), memory, cancelled.
 [[nodiscard]] Result<Sheet> sheetOf(const Bundle& bundle, const SheetSettings& settings, Job& job);
+/// The same of views that are shrunk when they are read.
+[[nodiscard]] Result<Sheet> sheetOf(const ViewTable& table, const SheetSettings& settings,
+                                    Job& job);
 
 /// The textures of an atlas, with the rectangles and the numbers of their views drawn on them.
 [[nodiscard]] Result<Sheet> sheetOf(const Atlas& atlas, const SheetSettings& settings, Job& job);

@@ -58,11 +58,23 @@ void bakeView(ReferenceView& view, const BakeSettings& settings) {
 
 }  // namespace
 
-Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job) {
+Result<ViewChange> bakeOfViews(const BakeSettings& settings, const PeakMemory& takes) {
     if (!(settings.discontinuity > 0 && settings.discontinuity <= 1))
         return fail(ErrorCode::usage,
                     "the depth discontinuity is {:g}; it must be over 0 and at most 1",
                     settings.discontinuity);
+    ViewChange change;
+    change.change = [settings](ReferenceView& view, Job&) -> Result<void> {
+        bakeView(view, settings);
+        return {};
+    };
+    change.kinds = [](ViewImageKinds& kinds) { kinds.normal = kinds.splatU = kinds.splatV = true; };
+    change.takes = takes;
+    return change;
+}
+
+Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job) {
+    STX_CHECK(bakeOfViews(settings));
     STX_CHECK(bundle.check());
     STX_CHECK(checkPeak(peak::kBake, bundle.views, job.limits));
     const auto count = static_cast<std::int64_t>(bundle.views.size());

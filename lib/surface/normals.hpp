@@ -2,6 +2,7 @@
 
 #include "lib/base/job.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/view_table.hpp"
 
 namespace stx {
 
@@ -32,6 +33,10 @@ struct BakeSettings {
 ///
 /// Errors: a bundle that fails check(), settings out of range, cancelled, memory over the limit.
 [[nodiscard]] Result<void> bake(Bundle& bundle, const BakeSettings& settings, Job& job);
+/// The same of views one by one. `takes` is what the memory of a view must have room for: also what
+/// is done with it then. Errors (usage): settings out of range.
+[[nodiscard]] Result<ViewChange> bakeOfViews(const BakeSettings& settings,
+                                             const PeakMemory& takes = peak::kBake);
 
 /// See bake(): an axis six times as long is that of a surface tilted by about 80 degrees.
 inline constexpr double kMaxSplatTilt = 6.0;

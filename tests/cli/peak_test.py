@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """The memory of one large picture: a command refuses it under a limit that is too small, before it takes the memory, and
-does it under the limit that it names. `--measure` prints what each takes, in bytes a pixel.
+does it under the limit that it names. `--measure` prints what each takes, in bytes a pixel. And of many views: commands that
+look at one at a time take no more for 48 of them than for 12.
 
     tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --measure 1 --pixels 52
+    tests/cli/peak_test.py build/release/bin/stx MODEL.obj SHARED_DIR --only many --measure 1
 """
 import json
 import os
@@ -83,6 +85,58 @@ def commands():
     yield "info", "info {}.mp4"
 
 
+# Of those of 12 views, at most: tables of what is where grow with them.
+MOST = 1.15
+
+
+def of_many():
+    """Commands that hold one view for each thread. {} is a bundle, VIEWS the words for views of a model."""
+    yield "model to exr", "convert MODEL -o OUT.exr VIEWS"
+    yield "model to mp4", "convert MODEL -o OUT.mp4 VIEWS"
+    yield "exr to exr", "convert {}.exr -o OUT.exr"
+    yield "exr to mp4", "convert {}.exr -o OUT.mp4"
+    yield "exr to bt", "convert {}.exr -o OUT.bt"
+    yield "mp4 to exr", "convert {}.mp4 -o OUT.exr"
+    for kind in ("exr", "mp4"):
+        for to in ("exr", "mp4"):
+            yield f"bake {kind} to {to}", f"bake {{}}.{kind} -o OUT.{to}"
+        yield f"extract {kind}", f"extract {{}}.{kind} -o OUT"
+        yield f"extract {kind} png", f"extract {{}}.{kind} -o OUT --depth png"
+        yield f"extract {kind} miv", f"extract {{}}.{kind} -o OUT --cameras miv"
+        yield f"extract {kind} colmap", f"extract {{}}.{kind} -o OUT --cameras colmap"
+        yield f"sheet {kind}", f"sheet {{}}.{kind} -o OUT.png"
+        yield f"validate {kind}", f"validate {{}}.{kind}"
+
+
+def many_views(args, folder):
+    """What takes more for 48 views than for 12; the model fills much of each."""
+    if not os.path.exists(args.model):
+        return []
+    model, wrong, counts = os.path.abspath(args.model), [], (12, 48)
+
+    def views(count):
+        return ["--views", f"sphere:{count}", "--size", "512x512"]
+
+    for count in counts:
+        must([args.stx, "convert", model, "-o", f"many{count}.exr"] + views(count), folder)
+        must([args.stx, "convert", f"many{count}.exr", "-o", f"many{count}.mp4"], folder)
+    for number, (name, line) in enumerate(of_many()):
+        if args.only not in "many " + name:
+            continue
+        peaks = []
+        for count in counts:
+            words = [part for word in line.split() for part in (views(count) if word == "VIEWS" else [word])]
+            words = [word.replace("OUT", f"many{count}_{number}").replace("{}", f"many{count}").replace("MODEL", model) for word in words]
+            # Threads of more processors would hold more of both.
+            done = must([args.stx] + words + ["--threads", "2"], folder)
+            peaks.append(done.usage.ru_maxrss / 1024)
+        if args.measure:
+            print(f"many {name:22} {peaks[0]:6.1f} MiB of {counts[0]} views, {peaks[1]:6.1f} of {counts[1]}: {peaks[1] / peaks[0]:.2f}", flush=True)
+        elif peaks[1] > MOST * peaks[0]:
+            wrong.append(f"{name}: {peaks[1]:.1f} MiB of {counts[1]} views, {peaks[0]:.1f} of {counts[0]}")
+    return wrong
+
+
 def main():
     args = harness.arguments(__doc__, measure=0, pixels=14, views=1, only="")
     wrong = []
@@ -125,6 +179,7 @@ def main():
                 text = done.err.decode("utf-8", "replace")
             if done.code != 0 or peak > limit + beside:
                 wrong.append(f"{name}: {peak} MiB at --max-memory {limit}: exit code {done.code} {text}")
+        wrong += many_views(args, folder)
     print("\n".join(wrong))
     sys.exit(1 if wrong else 0)
 

@@ -2,12 +2,14 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string_view>
 #include <vector>
 
 #include "formats/images/images.hpp"
 #include "formats/mpeg4/scene/document.hpp"
 #include "lib/model/bundle.hpp"
+#include "lib/model/view_table.hpp"
 
 // clang-format off
 /// Scenes and bundles (ISO/IEC 14496-16, 4.5.4).
@@ -59,6 +61,12 @@ struct SceneReadOptions {
 [[nodiscard]] Result<Bundle> bundleFromScene(const Document& document,
                                              const SceneReadOptions& options, Job& job);
 
+/// The same as a table, whose pictures are decoded when a view is asked for; all are in memory of a
+/// PointTexture, an OctreeImage, of video, and of what only its pixels tell (pictures other than
+/// PNG and JPEG, masks). It keeps the document.
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> viewsFromScene(
+    std::shared_ptr<const Document> document, const SceneReadOptions& options, Job& job);
+
 /// Whether pictures of its views are video: H.264 or another coding that needs a decoder of video.
 [[nodiscard]] bool holdsVideo(const Document& document);
 
@@ -100,5 +108,11 @@ struct SceneWriteOptions {
 /// too large; (usage) options out of range; what Bundle::check() says.
 [[nodiscard]] Result<Document> sceneFromBundle(const Bundle& bundle,
                                                const SceneWriteOptions& options, Job& job);
+class PictureSpool;
+/// The same of views that are encoded when they come, into `spool`, or into memory when it is null.
+/// All views are in memory, and their pictures in the scene, of PointTexture and OctreeImage.
+[[nodiscard]] Result<Document> sceneFromViews(const ViewTable& table,
+                                              const SceneWriteOptions& options, PictureSpool* spool,
+                                              Job& job);
 
 }  // namespace stx::mpeg4

@@ -1,10 +1,13 @@
+#include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 
 #include "formats/mpeg4/mapping/background.hpp"
 #include "formats/mpeg4/mapping/mapping.hpp"
 #include "formats/mpeg4/mapping/new_document.hpp"
 #include "formats/mpeg4/mapping/octree_write.hpp"
+#include "formats/mpeg4/mapping/picture_spool.hpp"
 #include "formats/mpeg4/mapping/point_texture.hpp"
 #include "formats/mpeg4/mapping/texture_images.hpp"
 #include "formats/mpeg4/mapping/view_images.hpp"
@@ -17,8 +20,10 @@ namespace {
 
 class SceneWriter {
   public:
-    SceneWriter(const Bundle& bundle, const SceneWriteOptions& options, Job& job)
-        : bundle_(bundle), options_(options), job_(job) {}
+    /// Pictures go into `spool`, if any. PointTexture and OctreeImage are made of a whole table.
+    SceneWriter(const ViewTable& table, const SceneWriteOptions& options, PictureSpool* spool,
+                Job& job)
+        : table_(table), bundle_(table.about()), options_(options), spool_(spool), job_(job) {}
 
     Result<Document> write() {
         STX_CHECK(checkRequest());
@@ -27,13 +32,13 @@ class SceneWriter {
         // A presentation begins at 0: players would wait for 40 years where a film begins at Unix
         // time, edit lists cannot begin before 0, and texts have none.
         if (bundle_.time.value_or(0) != 0) notes.start = bundle_.time;
-        bounds_ = bundle_.bounds ? *bundle_.bounds : bundle_.computeBounds();
-        notes.bounds = bounds_;
         NodePtr root;
         if (options_.octreeLevels > 0) {
+            bounds_ = bundle_.bounds ? *bundle_.bounds : bundle_.computeBounds();
             STX_TRY(root, octreeGroup(notes));
         } else {
             STX_TRY(auto children, depthImages(notes));
+            notes.bounds = bounds_;
             root = groupOf(std::move(children), notes);
         }
         if (bundle_.environment) {
@@ -59,42 +64,71 @@ class SceneWriter {
         return writtenDepthBits(view, options_);
     }
 
+    /// Encodes the views when they come, and adds up their bounds where the bundle has none.
     Result<NodeList> depthImages(ViewNotes& notes) {
-        std::vector<Result<ViewImages>> images(bundle_.views.size());
-        parallelFor(0, static_cast<std::int64_t>(bundle_.views.size()), [&](std::int64_t i) {
-            const auto at = static_cast<std::size_t>(i);
-            if (!job_.cancelled)
-                images[at] =
-                    encodeView(bundle_.views[at], options_, job_.limits,
-                               at < options_.splatRanges.size() ? options_.splatRanges[at] : 0);
-        });
-        STX_CHECK(job_.checkCancelled());
+        const std::size_t count = table_.count();
+        std::vector<std::shared_ptr<const ReferenceView>> views(count);
+        std::vector<ViewImages> images(count);
+        std::vector<Bounds> bounds(count);
+        const bool vectors = std::ranges::any_of(
+            table_.kinds(), [](const auto& kinds) { return kinds.normal || kinds.hasSplats(); });
         NodeList children;
-        for (std::size_t i = 0; i < bundle_.views.size(); ++i) {
-            if (!images[i]) return tl::unexpected(images[i].error().at(viewName(i)));
-            const std::size_t layers = options_.pointTexture ? layersFrom(i) : 1;
-            for (std::size_t k = 1; k < layers; ++k)
-                if (!images[i + k])
-                    return tl::unexpected(images[i + k].error().at(viewName(i + k)));
-            const std::string key = ViewNotes::keyOf(children.size());
-            children.push_back(depthImage(i, layers, *images[i], key, notes));
-            for (std::size_t k = 0; k < layers; ++k) {
-                const ReferenceView& view = bundle_.views[i + k];
-                const bool unknown = view.noDepth == NoDepth::unknown;
-                if (!view.pruned && !unknown && !view.background && view.refined.steps.empty())
-                    continue;
-                ViewNotes::Layer& of = notes.views[key].layers[static_cast<int>(k)];
-                if (view.pruned) of.pruned = images[i + k]->unknown;
-                if (unknown) of.unknown = images[i + k]->unknown;
-                of.background = view.background;
-                of.refined = view.refined;
-            }
-            for (std::size_t k = 0; k < layers; ++k) sayWhatIsLost(i + k, *images[i + k]);
-            i += layers - 1;
+        const auto encode = [&](std::size_t i,
+                                std::shared_ptr<const ReferenceView> view) -> Result<void> {
+            auto encoded =
+                encodeView(*view, options_, job_.limits,
+                           i < options_.splatRanges.size() ? options_.splatRanges[i] : 0);
+            if (!encoded) return tl::unexpected(encoded.error().at(viewName(i)));
+            images[i] = std::move(*encoded);
+            if (!bundle_.bounds) bounds[i] = view->computeBounds();
+            views[i] = std::move(view);
+            return {};
+        };
+        const auto add = [&](std::size_t i) -> Result<void> {
+            if (options_.pointTexture) return {};  // a node may have several
+            STX_CHECK(addDepthImage(i, {&views[i], 1}, {&images[i], 1}, children, notes));
+            views[i].reset();
+            images[i] = {};
+            return {};
+        };
+        STX_CHECK(
+            forEachView(table_, vectors ? peak::kMpeg4Vectors : peak::kMpeg4, job_, encode, add));
+        for (std::size_t i = 0; options_.pointTexture && i < count;) {
+            const std::size_t layers = layersFrom(i);
+            STX_CHECK(addDepthImage(i, {&views[i], layers}, {&images[i], layers}, children, notes));
+            i += layers;
+        }
+        bounds_ = bundle_.bounds.value_or(Bounds());
+        for (const Bounds& one : bounds) {
+            if (one.empty()) continue;
+            bounds_.add(one.min);
+            bounds_.add(one.max);
         }
         sayTotals();
         notes.count = static_cast<int>(children.size());
         return children;
+    }
+
+    /// Of view `i`, or with the layers of the PointTexture that begins there.
+    Result<void> addDepthImage(std::size_t i,
+                               std::span<const std::shared_ptr<const ReferenceView>> views,
+                               std::span<ViewImages> images, NodeList& children, ViewNotes& notes) {
+        const std::string key = ViewNotes::keyOf(children.size());
+        STX_TRY(NodePtr node, depthImage(i, views, images[0], key, notes));
+        children.push_back(std::move(node));
+        for (std::size_t k = 0; k < views.size(); ++k) {
+            const ReferenceView& view = *views[k];
+            sayWhatIsLost(i + k, view, images[k]);
+            const bool unknown = view.noDepth == NoDepth::unknown;
+            if (!view.pruned && !unknown && !view.background && view.refined.steps.empty())
+                continue;
+            ViewNotes::Layer& of = notes.views[key].layers[static_cast<int>(k)];
+            if (view.pruned) of.pruned = images[k].unknown;
+            if (unknown) of.unknown = images[k].unknown;
+            of.background = view.background;
+            of.refined = view.refined;
+        }
+        return {};
     }
 
     /// Group { WorldInfo, children }.
@@ -185,7 +219,8 @@ class SceneWriter {
         node->set("fieldOfView", glm::vec2(c.fieldOfView()));
         node->set("orthographic", true);
         NodePtr texture = makeNode("SimpleTexture");
-        texture->set("texture", textureNode(node->defName, "texture", std::move(bytes)));
+        STX_TRY(NodePtr image, textureNode(node->defName, "texture", std::move(bytes)));
+        texture->set("texture", std::move(image));
         node->set("diTexture", texture);
         return node;
     }
@@ -201,7 +236,7 @@ class SceneWriter {
         if (options_.normalBits != 8 && options_.normalBits != 16)
             return fail(ErrorCode::usage, "normals of {} bits are not possible; 8 or 16",
                         options_.normalBits);
-        STX_CHECK(bundle_.checkHeaders());
+        if (table_.whole()) STX_CHECK(bundle_.checkHeaders());
         if (options_.pointTexture && options_.octreeLevels > 0)
             return fail(ErrorCode::usage,
                         "PointTexture and OctreeImage are both asked for; only one is possible");
@@ -210,10 +245,10 @@ class SceneWriter {
                         options_.octreeLevels, kMaxOctreeLevels);
         if (options_.pointTexture) return {};
         std::size_t count = 0;
-        for (const ReferenceView& view : bundle_.views) {
+        for (const ViewImageKinds& kinds : table_.kinds()) {
             count += options_.octreeLevels > 0 ? 1 : 2;
-            if (options_.octreeLevels == 0 && isV2(view))
-                count += (view.hasNormals() ? 1u : 0u) + (view.hasSplats() ? 2u : 0u);
+            if (options_.octreeLevels == 0 && options_.nodes != SceneWriteOptions::Nodes::v1)
+                count += (kinds.normal ? 1u : 0u) + (kinds.hasSplats() ? 2u : 0u);
         }
         if (count > kLastImageOd - kFirstImageOd + 1)
             return fail(ErrorCode::unsupported,
@@ -250,9 +285,9 @@ class SceneWriter {
     }
 
     /// A texture node with a stream of its own behind it.
-    NodePtr textureNode(const std::string& defName, const char* role, Bytes bytes) {
-        const Url url =
-            addPictureStream(update_, fmt::format("{}_{}", defName, role), std::move(bytes));
+    Result<NodePtr> textureNode(const std::string& defName, const char* role, Bytes bytes) {
+        STX_TRY(const Url url, addPictureStream(update_, fmt::format("{}_{}", defName, role),
+                                                std::move(bytes), spool_));
         NodePtr node = makeNode("ImageTexture");
         node->set("url", std::vector{url});
         // Outside of the window there is nothing to repeat.
@@ -261,9 +296,10 @@ class SceneWriter {
         return node;
     }
 
-    NodePtr depthImage(std::size_t i, std::size_t layers, ViewImages& images,
-                       const std::string& key, ViewNotes& notes) {
-        const ReferenceView& view = bundle_.views[i];
+    Result<NodePtr> depthImage(std::size_t i,
+                               std::span<const std::shared_ptr<const ReferenceView>> layers,
+                               ViewImages& images, const std::string& key, ViewNotes& notes) {
+        const ReferenceView& view = *layers[0];
         const bool v2 = isV2(view);
         NodePtr node = makeNode(v2 ? "DepthImageV2" : "DepthImage");
         node->defName = defNameOf(view, i, key, notes);
@@ -283,23 +319,23 @@ class SceneWriter {
         }
         if (options_.pointTexture) {
             std::vector<const ReferenceView*> list;
-            for (std::size_t k = 0; k < layers; ++k) list.push_back(&bundle_.views[i + k]);
+            for (const auto& layer : layers) list.push_back(layer.get());
             const int bits = bitsOf(view);
             const DepthCode code{images.nearPlane, images.farPlane, bits == 8 ? 255u : 65535u};
             node->set("diTexture", paddedPointTexture(list, images.padding, code, bits, v2));
         } else {
             NodePtr texture = makeNode(v2 ? "SimpleTextureV2" : "SimpleTexture");
-            texture->set("texture",
-                         textureNode(node->defName, "texture", std::move(images.texture)));
-            texture->set("depth", textureNode(node->defName, "depth", std::move(images.depth)));
-            if (!images.normal.empty())
-                texture->set("normal",
-                             textureNode(node->defName, "normal", std::move(images.normal)));
-            if (!images.splatU.empty()) {
-                texture->set("splatU",
-                             textureNode(node->defName, "splatU", std::move(images.splatU)));
-                texture->set("splatV",
-                             textureNode(node->defName, "splatV", std::move(images.splatV)));
+            struct Role {
+                const char* name;
+                Bytes* bytes;
+            };
+            for (const auto& [name, bytes] :
+                 {Role{"texture", &images.texture}, Role{"depth", &images.depth},
+                  Role{"normal", &images.normal}, Role{"splatU", &images.splatU},
+                  Role{"splatV", &images.splatV}}) {
+                if (bytes->empty()) continue;
+                STX_TRY(NodePtr picture, textureNode(node->defName, name, std::move(*bytes)));
+                texture->set(std::string_view(name), std::move(picture));
             }
             node->set("diTexture", texture);
         }
@@ -339,8 +375,7 @@ class SceneWriter {
         return node;
     }
 
-    void sayWhatIsLost(std::size_t i, const ViewImages& images) {
-        const ReferenceView& view = bundle_.views[i];
+    void sayWhatIsLost(std::size_t i, const ReferenceView& view, const ViewImages& images) {
         const Padding& p = images.padding;
         if (p.any() || p.shift > 1e-6)
             job_.note(fmt::format(
@@ -363,7 +398,7 @@ class SceneWriter {
         if (worst_ > 0)
             job_.note(fmt::format("depth is rounded to {} bits: at most {:.4g} scene units off",
                                   lossyBits_, worst_));
-        if (bundle_.views[0].texture.isLinear())
+        if (table_.kindsOf(0).linear)
             job_.note(clamped_ ? "linear colour becomes 8-bit sRGB; values above 1 are clipped"
                                : "linear colour becomes 8-bit sRGB");
         if (options_.texture == SceneWriteOptions::Texture::jpeg && !options_.pointTexture)
@@ -375,8 +410,10 @@ class SceneWriter {
         if (dropped_) job_.note("SimpleTexture (V1) has no normals and splats: they are left out");
     }
 
+    const ViewTable& table_;
     const Bundle& bundle_;
     const SceneWriteOptions& options_;
+    PictureSpool* spool_;
     Job& job_;
     UpdateObjectDescriptors update_;
     Bounds bounds_;
@@ -389,8 +426,27 @@ class SceneWriter {
 }  // namespace
 
 Result<Document> sceneFromBundle(const Bundle& bundle, const SceneWriteOptions& options, Job& job) {
-    bundle.noteMaterialLeftOut(job);
-    return SceneWriter(bundle, options, job).write();
+    return sceneFromViews(*viewsOf(bundle), options, nullptr, job);
+}
+
+Result<Document> sceneFromViews(const ViewTable& table, const SceneWriteOptions& options,
+                                PictureSpool* spool, Job& job) {
+    if ((options.pointTexture || options.octreeLevels > 0) && !table.whole()) {
+        STX_TRY(const auto whole, wholeBundle(table, job));
+        return sceneFromBundle(whole, options, job);
+    }
+    noteMaterialLeftOut(table, job);
+    STX_TRY(auto document, SceneWriter(table, options, spool, job).write());
+    if (!spool) return document;
+    STX_TRY(const ByteSource source, spool->source());
+    for (OdFrame& frame : document.odFrames)
+        for (OdCommand& command : frame.commands)
+            if (auto* update = std::get_if<UpdateObjectDescriptors>(&command))
+                for (ObjectDescriptor& od : update->descriptors)
+                    for (Sample& sample : od.streams.front().samples)
+                        // Those of the environment are in memory.
+                        if (sample.data.source.size() == 0) sample.data.source = source;
+    return document;
 }
 
 }  // namespace stx::mpeg4

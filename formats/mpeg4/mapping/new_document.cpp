@@ -1,5 +1,7 @@
 #include "formats/mpeg4/mapping/new_document.hpp"
 
+#include "formats/mpeg4/mapping/picture_spool.hpp"
+
 namespace stx::mpeg4 {
 
 Url addPictureStream(UpdateObjectDescriptors& update, std::string fileName, Bytes bytes) {
@@ -20,6 +22,17 @@ Url addPictureStream(UpdateObjectDescriptors& update, std::string fileName, Byte
     update.descriptors.push_back(std::move(od));
     Url url;
     url.objectDescriptorId = id;
+    return url;
+}
+
+Result<Url> addPictureStream(UpdateObjectDescriptors& update, std::string fileName, Bytes bytes,
+                             PictureSpool* spool) {
+    ByteRange place;
+    if (spool) {
+        STX_TRY(place, spool->add(bytes));
+    }
+    const Url url = addPictureStream(update, std::move(fileName), std::move(bytes));
+    if (spool) update.descriptors.back().streams.front().samples.front().data = place;
     return url;
 }
 

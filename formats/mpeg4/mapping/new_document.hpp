@@ -15,6 +15,9 @@ inline constexpr int kLastImageOd = 1022;
 /// A PNG or JPEG as a stream of its own behind a new object descriptor. The ids must not run out.
 [[nodiscard]] Url addPictureStream(UpdateObjectDescriptors& update, std::string fileName,
                                    Bytes bytes);
+/// The same with the bytes in a spool, if there is one; its source() is for the caller to set.
+[[nodiscard]] Result<Url> addPictureStream(UpdateObjectDescriptors& update, std::string fileName,
+                                           Bytes bytes, PictureSpool* spool);
 
 /// A document whose one frame shows `root` in a scene of `size` pixels, with DEF names, and has
 /// these object descriptors.

@@ -62,8 +62,11 @@ class SceneSequence : public Sequence {
 
     Result<void> prepare(Job& job) {
         STX_TRY(images_, StreamImages::make(document_, options_.folder, job.limits));
-        images_.keepPictures(std::min<std::uint64_t>(kCacheBytes, job.limits.maxMemoryBytes / 4));
         STX_TRY(timeline_, timelineOf(document_, images_, options_.timesFromStart));
+        // Of what stands still no picture is asked for twice.
+        if (timeline_.moves())
+            images_.keepPictures(
+                std::min<std::uint64_t>(kCacheBytes, job.limits.maxMemoryBytes / 4));
         STX_TRY(const auto scene, composeScene(document_.frames, document_.frames.front().time));
         start_ = startOf(scene, job.limits);
         // Once for all frames: it is what stands still.
@@ -75,19 +78,35 @@ class SceneSequence : public Sequence {
     }
 
     Result<Bundle> frame(std::size_t index, Job& job) override {
+        STX_TRY(const Scene* scene, sceneAt(index));
+        STX_TRY(auto bundle, bundleOfMoment(document_, *scene, images_, options_, job));
+        setTime(bundle, index);
+        bundle.environment = environment_;
+        return bundle;
+    }
+    Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) override {
+        STX_TRY(const Scene* scene, sceneAt(index));
+        // Both live as long as this.
+        const std::shared_ptr<void> nobody;
+        STX_TRY(auto table, viewsOfMoment({nobody, &document_}, *scene, {nobody, &images_},
+                                          options_, false, job));
+        setTime(table->about(), index);
+        table->about().environment = environment_;
+        return table;
+    }
+
+  private:
+    /// With the pictures of that moment.
+    Result<const Scene*> sceneAt(std::size_t index) {
         const double now = timeline_.times[index] - start_;
         const double slack = timeline_.slack(timeline_.times[index]);
         STX_TRY(Scene * scene,
                 moments_.at(ticksBegun(now, document_.sceneStream.timescale, slack)));
         applyInterpolators(*scene, now);
         images_.setTime(now, slack);
-        STX_TRY(auto bundle, bundleOfMoment(document_, *scene, images_, options_, job));
-        setTime(bundle, index);
-        bundle.environment = environment_;
-        return bundle;
+        return scene;
     }
 
-  private:
     std::shared_ptr<const Environment> environment_;
     Document document_;
     SceneReadOptions options_;

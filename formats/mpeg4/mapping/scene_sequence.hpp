@@ -30,4 +30,10 @@ namespace stx::mpeg4 {
                                             const StreamImages& images,
                                             const SceneReadOptions& options, Job& job);
 
+/// The same as a table; see viewsFromScene(). With `still` a note says what moves.
+[[nodiscard]] Result<std::unique_ptr<ViewTable>> viewsOfMoment(
+    std::shared_ptr<const Document> document, const Scene& scene,
+    std::shared_ptr<const StreamImages> images, const SceneReadOptions& options, bool still,
+    Job& job);
+
 }  // namespace stx::mpeg4

@@ -459,41 +459,6 @@ class SequenceWriter {
 
 }  // namespace
 
-Result<PictureSpool> PictureSpool::create(const std::filesystem::path& folder) {
-    auto made = createTemporaryFile(folder);
-    if (!made)
-        return fail(ErrorCode::io, "cannot make a file in '{}': {}", folder.string(),
-                    std::generic_category().message(made.error()));
-    PictureSpool spool;
-    spool.file_ = std::make_unique<File>();
-    spool.file_->file = std::move(*made);
-    return spool;
-}
-
-PictureSpool::File::~File() {
-    std::error_code ignored;
-    std::filesystem::remove(file.path, ignored);
-}
-
-Result<ByteRange> PictureSpool::add(const Bytes& bytes) {
-    std::size_t done = 0;
-    while (done < bytes.size()) {
-        const auto n = ::write(file_->file.fd.get(), bytes.data() + done, bytes.size() - done);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0)
-            return fail(ErrorCode::io, "cannot write '{}': {}", file_->file.path.string(),
-                        std::generic_category().message(n < 0 ? errno : ENOSPC));
-        done += static_cast<std::size_t>(n);
-    }
-    const ByteRange range({}, file_->size, bytes.size());
-    file_->size += bytes.size();
-    return range;
-}
-
-Result<ByteSource> PictureSpool::source() const {
-    return ByteSource::open(file_->file.path);
-}
-
 Result<Document> sceneFromSequence(Sequence& frames, const SceneWriteOptions& options,
                                    PictureSpool& spool, Job& job) {
     return SequenceWriter(frames, options, spool, job).write();

@@ -237,4 +237,9 @@ Result<ImageInfo> StreamImages::probe(const Node& texture) const {
     return probeImage(bytes);
 }
 
+bool StreamImages::probesAsDecoded(const Node& texture) const {
+    if (const ElementaryStream* from = stream(texture); from && isVideo(*from)) return false;
+    return probe(texture).has_value();
+}
+
 }  // namespace stx::mpeg4

@@ -45,6 +45,10 @@ class StreamImages {
     /// The header of the picture. Errors as load().
     [[nodiscard]] Result<ImageInfo> probe(const Node& texture) const;
 
+    /// Whether probe() tells size and bits as decode() will find them: of PNG, JPEG and
+    /// PixelTexture; not of video and of what has no readable header.
+    [[nodiscard]] bool probesAsDecoded(const Node& texture) const;
+
     /// The stream behind the first URL that has one; null for files and PixelTexture.
     [[nodiscard]] const ElementaryStream* stream(const Node& texture) const;
     /// When its samples are shown; found once for each stream.

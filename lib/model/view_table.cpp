@@ -1,0 +1,284 @@
+#include "lib/model/view_table.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "lib/base/parallel.hpp"
+
+namespace stx {
+namespace {
+
+/// In what a view that came is not as its header was: found, and expected; empty where it is.
+std::string difference(const ViewHeader& told, const ViewHeader& found, bool planes) {
+    const Camera &is = found.camera, &was = told.camera;
+    if (is.width != was.width || is.height != was.height)
+        return fmt::format("it has {}x{} pixels, but its header says {}x{}", is.width, is.height,
+                           was.width, was.height);
+    if (found.depthBits != told.depthBits)
+        return fmt::format("its depth has {} bits, but its header says {}", found.depthBits,
+                           told.depthBits);
+    if (planes && (found.nearPlane != told.nearPlane || found.farPlane != told.farPlane))
+        return fmt::format("its planes are {:g} and {:g}, but its header says {:g} and {:g}",
+                           found.nearPlane, found.farPlane, told.nearPlane, told.farPlane);
+    if (found.name != told.name)
+        return fmt::format("its name is '{}', but its header says '{}'", found.name, told.name);
+    if (is != was) return "its camera is not that of its header";
+    if (found.noDepth != told.noDepth || found.pruned != told.pruned ||
+        found.background != told.background || found.refined != told.refined)
+        return "its marks (unknown depth, pruned, background, refined) are not those of its header";
+    return {};
+}
+
+class Held : public ViewTable {
+  public:
+    explicit Held(Bundle bundle) : ViewTable(std::move(bundle)) {}
+    explicit Held(const Bundle* bundle) : ViewTable(bundle) {}
+
+    std::uint64_t bytesHeld() const override {
+        std::uint64_t all = 0;
+        for (std::size_t i = 0; i < count(); ++i) all += bytesOf(i);
+        return all;
+    }
+    std::uint64_t bytesGiven(std::size_t) const override { return 0; }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
+        // Not owned: it lives as long as the table.
+        return std::shared_ptr<const ReferenceView>(std::shared_ptr<void>(), &about().views[index]);
+    }
+};
+
+Bundle headersOf(const Bundle& bundle) {
+    Bundle headers;
+    headers.title = bundle.title;
+    headers.origin = bundle.origin;
+    headers.bounds = bundle.bounds;
+    headers.environment = bundle.environment;
+    headers.time = bundle.time;
+    headers.duration = bundle.duration;
+    for (const ReferenceView& view : bundle.views)
+        static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
+    return headers;
+}
+
+std::vector<ViewImageKinds> kindsOf(const Bundle& bundle) {
+    std::vector<ViewImageKinds> kinds;
+    for (const ReferenceView& view : bundle.views) kinds.push_back(ViewImageKinds::of(view));
+    return kinds;
+}
+
+/// A view to change: itself where nobody else has it, else a copy.
+std::shared_ptr<ReferenceView> ownView(std::shared_ptr<const ReferenceView> view) {
+    if (view.use_count() == 1) return std::const_pointer_cast<ReferenceView>(std::move(view));
+    return std::make_shared<ReferenceView>(*view);
+}
+
+class Changed : public ViewTable {
+  public:
+    Changed(std::unique_ptr<ViewTable> table, std::vector<ViewImageKinds> kinds, ViewChange change)
+        // What a change may do to the planes shows in its views only.
+        : ViewTable(headersOf(std::as_const(*table).about()), std::move(kinds), Planes::withPixels),
+          table_(std::move(table)),
+          change_(std::move(change)) {}
+
+    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        const std::uint64_t each = change_.takes.perPixel + change_.takes.perPixelOfLargest;
+        return std::max(table_->bytesToMake(index),
+                        table_->bytesOf(index) + each * pixelsOf(index));
+    }
+    std::string where() const override { return table_->where(); }
+    int mostAtOnce() const override { return table_->mostAtOnce(); }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        STX_TRY(auto read, table_->view(index, job));
+        auto view = ownView(std::move(read));
+        if (auto done = change_.change(*view, job); !done)
+            return tl::unexpected(done.error().at(fmt::format("view {}", index)));
+        return view;
+    }
+
+  private:
+    std::unique_ptr<ViewTable> table_;
+    ViewChange change_;
+};
+
+class Watched : public ViewTable {
+  public:
+    Watched(std::unique_ptr<ViewTable> table,
+            std::function<void(std::size_t, const ReferenceView&)> look)
+        : ViewTable(headersOf(std::as_const(*table).about()), table->kinds(),
+                    table->planesKnown() ? Planes::known : Planes::withPixels),
+          table_(std::move(table)),
+          look_(std::move(look)) {}
+
+    std::uint64_t bytesHeld() const override { return table_->bytesHeld(); }
+    std::uint64_t bytesGiven(std::size_t index) const override { return table_->bytesGiven(index); }
+    std::uint64_t bytesToMake(std::size_t index) const override {
+        return table_->bytesToMake(index);
+    }
+    std::string where() const override { return table_->where(); }
+    int mostAtOnce() const override { return table_->mostAtOnce(); }
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job& job) const override {
+        STX_TRY(auto view, table_->view(index, job));
+        look_(index, *view);
+        return view;
+    }
+
+  private:
+    std::unique_ptr<ViewTable> table_;
+    std::function<void(std::size_t, const ReferenceView&)> look_;
+};
+
+}  // namespace
+
+ViewImageKinds ViewImageKinds::of(const ReferenceView& view) {
+    return {view.texture.isLinear(),
+            !view.normal.empty(),
+            !view.splatU.empty(),
+            !view.splatV.empty(),
+            !view.metallicRoughness.empty(),
+            !view.emissive.empty()};
+}
+
+std::uint64_t ViewImageKinds::bytesPerPixel() const {
+    const std::uint64_t vectors = std::uint64_t{normal} + splatU + splatV + emissive;
+    return (linear ? sizeof(glm::vec4) : sizeof(glm::u8vec4)) + sizeof(float) +
+           vectors * sizeof(glm::vec3) + (metallicRoughness ? sizeof(glm::vec2) : 0);
+}
+
+ViewTable::ViewTable(Bundle headers, std::vector<ViewImageKinds> kinds, Planes planes)
+    : own_(std::move(headers)), kinds_(std::move(kinds)), planesKnown_(planes == Planes::known) {}
+
+ViewTable::ViewTable(Bundle whole)
+    : own_(std::move(whole)), kinds_(stx::kindsOf(own_)), whole_(true) {}
+
+ViewTable::ViewTable(const Bundle* whole)
+    : about_(whole), kinds_(stx::kindsOf(*whole)), whole_(true) {}
+
+Result<std::shared_ptr<const ReferenceView>> ViewTable::view(std::size_t index, Job& job) const {
+    STX_TRY(auto view, make(index, job));
+    if (whole_) return view;
+    const auto place = [&] { return fmt::format("view {}", index); };
+    if (auto ok = view->checkHeader(); !ok) return tl::unexpected(ok.error().at(place()));
+    auto differs = difference(about_->views[index], *view, planesKnown_);
+    if (differs.empty() && ViewImageKinds::of(*view) != kinds_[index])
+        differs =
+            "its images (normals, splats, materials, linear colour) are not those of its header";
+    if (!differs.empty())
+        return failAt(place(), ErrorCode::invalidInput, "{}: the file is damaged; write it anew",
+                      differs);
+    return view;
+}
+
+std::uint64_t ViewTable::bytesOf(std::size_t index) const {
+    return kinds_[index].bytesPerPixel() * pixelsOf(index);
+}
+
+std::uint64_t ViewTable::pixelsOf(std::size_t index) const {
+    const Camera& camera = about_->views[index].camera;
+    return static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
+}
+
+std::unique_ptr<ViewTable> tableOf(Bundle bundle) {
+    return std::make_unique<Held>(std::move(bundle));
+}
+
+std::unique_ptr<ViewTable> viewsOf(const Bundle& bundle) {
+    return std::make_unique<Held>(&bundle);
+}
+
+Result<Bundle> wholeBundle(std::unique_ptr<ViewTable> table, Job& job) {
+    if (table->whole()) return std::move(table->about());
+    return wholeBundle(*table, job);
+}
+
+Result<Bundle> wholeBundle(const ViewTable& table, Job& job) {
+    if (table.whole()) return table.about();
+    std::uint64_t bytes = 0;
+    for (std::size_t i = 0; i < table.count(); ++i) bytes += table.bytesOf(i);
+    if (auto ok = job.limits.checkAllocation(bytes, 1, "the views"); !ok)
+        return tl::unexpected(ok.error().at(table.where()));
+    Bundle bundle = headersOf(table.about());
+    const auto count = static_cast<std::int64_t>(table.count());
+    std::vector<Result<void>> done(table.count());
+    std::atomic<std::int64_t> finished = 0;
+    parallelFor(0, count, [&](std::int64_t i) {
+        const auto index = static_cast<std::size_t>(i);
+        done[index] = [&]() -> Result<void> {
+            STX_CHECK(job.checkCancelled());
+            STX_TRY(auto view, table.view(index, job));
+            bundle.views[index] = std::move(*ownView(std::move(view)));
+            job.progress(++finished, count, "reading views");
+            return {};
+        }();
+    });
+    for (Result<void>& result : done)
+        if (!result) return propagate(result);
+    return bundle;
+}
+
+void noteMaterialLeftOut(const ViewTable& table, Job& job) {
+    if (std::ranges::any_of(table.kinds(), &ViewImageKinds::hasMaterial))
+        job.note(
+            "metallic-roughness and emissive are left out: .exr bundles and atlases alone hold "
+            "them");
+}
+
+std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table, ViewChange change) {
+    std::vector<ViewImageKinds> kinds = table->kinds();
+    if (change.kinds)
+        for (ViewImageKinds& of : kinds) change.kinds(of);
+    return std::make_unique<Changed>(std::move(table), std::move(kinds), std::move(change));
+}
+
+std::unique_ptr<ViewTable> watchedViews(
+    std::unique_ptr<ViewTable> table,
+    std::function<void(std::size_t index, const ReferenceView& view)> look) {
+    return std::make_unique<Watched>(std::move(table), std::move(look));
+}
+
+Result<void> forEachView(
+    const ViewTable& table, const PeakMemory& work, Job& job,
+    const std::function<Result<void>(std::size_t, std::shared_ptr<const ReferenceView>)>& each,
+    const std::function<Result<void>(std::size_t)>& inOrder) {
+    const std::size_t count = table.count();
+    if (count == 0) return {};
+    const std::uint64_t held = table.bytesHeld();
+    std::uint64_t most = 1;  // that a view takes
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint64_t pixels = table.pixelsOf(i);
+        const std::uint64_t working = (work.perPixel + work.perPixelOfLargest) * pixels;
+        const std::uint64_t takes = std::max(table.bytesToMake(i), table.bytesGiven(i) + working);
+        STX_CHECK(checkPeak({work.what, 0}, pixels, pixels, held + takes, job.limits));
+        most = std::max(most, takes);
+    }
+    const auto room = (job.limits.maxMemoryBytes - held) / most;
+    std::uint64_t atOnce =
+        std::clamp<std::uint64_t>(room, 1, static_cast<std::uint64_t>(threadCount()));
+    if (table.mostAtOnce() > 0)
+        atOnce = std::min<std::uint64_t>(atOnce, static_cast<std::uint64_t>(table.mostAtOnce()));
+    for (std::size_t first = 0; first < count; first += atOnce) {
+        const std::size_t end = std::min<std::size_t>(first + atOnce, count);
+        std::vector<Result<void>> done(end - first);
+        parallelFor(static_cast<std::int64_t>(first), static_cast<std::int64_t>(end),
+                    [&](std::int64_t i) {
+                        const auto index = static_cast<std::size_t>(i);
+                        done[index - first] = [&]() -> Result<void> {
+                            STX_CHECK(job.checkCancelled());
+                            STX_TRY(auto view, table.view(index, job));
+                            return each(index, std::move(view));
+                        }();
+                    });
+        for (std::size_t i = first; i < end; ++i)
+            if (!done[i - first]) return propagate(done[i - first]);
+        for (std::size_t i = first; inOrder && i < end; ++i) STX_CHECK(inOrder(i));
+    }
+    return {};
+}
+
+}  // namespace stx

@@ -1,0 +1,139 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lib/base/job.hpp"
+#include "lib/model/bundle.hpp"
+#include "lib/model/peak_memory.hpp"
+
+namespace stx {
+
+/// Which images a view has besides its depth, and what its colour is.
+struct ViewImageKinds {
+    bool linear = false;  ///< colour is linear floats, not 8-bit sRGB
+    bool normal = false, splatU = false, splatV = false;
+    bool metallicRoughness = false, emissive = false;
+
+    [[nodiscard]] static ViewImageKinds of(const ReferenceView& view);
+    [[nodiscard]] bool hasSplats() const { return splatU && splatV; }
+    [[nodiscard]] bool hasMaterial() const { return metallicRoughness || emissive; }
+    /// Memory of all images of a view, bytes for each of its pixels.
+    [[nodiscard]] std::uint64_t bytesPerPixel() const;
+    bool operator==(const ViewImageKinds&) const = default;
+};
+
+/// A bundle whose pixels are read, or made, when a view is asked for: what goes through the views
+/// one by one (forEachView()) takes the memory of one for each thread, however many there are.
+///
+/// What a view says beside its pixels is known from the start, and a view that comes is held
+/// against it: a file whose headers and pixels disagree, or that changed since it was opened, is an
+/// error (invalidInput) of the view at which it shows.
+class ViewTable {
+  public:
+    virtual ~ViewTable() = default;
+    ViewTable(const ViewTable&) = delete;
+    ViewTable& operator=(const ViewTable&) = delete;
+
+    /// The bundle with the headers of its views. Images are there only if whole().
+    [[nodiscard]] const Bundle& about() const { return *about_; }
+    /// The same, of tables that have a bundle of their own (all but viewsOf()): for title, time and
+    /// environment.
+    [[nodiscard]] Bundle& about() { return own_; }
+    [[nodiscard]] std::size_t count() const { return kinds_.size(); }
+    [[nodiscard]] const ViewImageKinds& kindsOf(std::size_t index) const { return kinds_[index]; }
+    [[nodiscard]] const std::vector<ViewImageKinds>& kinds() const { return kinds_; }
+    /// All pixels are in memory, in about().
+    [[nodiscard]] bool whole() const { return whole_; }
+    /// The planes in about() are those of the views. If not, they come with the pixels.
+    [[nodiscard]] bool planesKnown() const { return planesKnown_; }
+
+    /// One view (below count()) with its pixels; it passes ReferenceView::check(). Asked for again,
+    /// it may be read again. Safe from several threads. Errors: reading; (invalidInput) the pixels
+    /// are not what about() says.
+    [[nodiscard]] Result<std::shared_ptr<const ReferenceView>> view(std::size_t index,
+                                                                    Job& job) const;
+
+    /// Memory of the images of a view, bytes.
+    [[nodiscard]] std::uint64_t bytesOf(std::size_t index) const;
+    /// Memory that the table itself takes for pixels.
+    [[nodiscard]] virtual std::uint64_t bytesHeld() const { return 0; }
+    /// Beside that: of a view that view() gave, and what view() takes at its peak, that included.
+    [[nodiscard]] virtual std::uint64_t bytesGiven(std::size_t index) const {
+        return bytesOf(index);
+    }
+    [[nodiscard]] virtual std::uint64_t bytesToMake(std::size_t index) const {
+        return bytesGiven(index);
+    }
+    [[nodiscard]] std::uint64_t pixelsOf(std::size_t index) const;
+    /// The file that it is read from, in quotes, for messages; may be empty.
+    [[nodiscard]] virtual std::string where() const { return {}; }
+    /// Views that may be made at a time; 0: any number.
+    [[nodiscard]] virtual int mostAtOnce() const { return 0; }
+
+  protected:
+    enum class Planes { known, withPixels };
+    /// Of headers (images are empty) and as many kinds.
+    ViewTable(Bundle headers, std::vector<ViewImageKinds> kinds, Planes planes = Planes::known);
+    /// Of a bundle in memory, its own.
+    explicit ViewTable(Bundle whole);
+    /// Of somebody else's, who keeps it.
+    explicit ViewTable(const Bundle* whole);
+
+    [[nodiscard]] virtual Result<std::shared_ptr<const ReferenceView>> make(std::size_t index,
+                                                                            Job& job) const = 0;
+
+  private:
+    Bundle own_;
+    const Bundle* about_ = &own_;
+    std::vector<ViewImageKinds> kinds_;
+    bool whole_ = false, planesKnown_ = true;
+};
+
+/// A bundle in memory as a table. The second kind does not copy it; it must outlive the table.
+[[nodiscard]] std::unique_ptr<ViewTable> tableOf(Bundle bundle);
+[[nodiscard]] std::unique_ptr<ViewTable> viewsOf(const Bundle& bundle);
+/// All views of a table in memory. Errors: those of its views; (invalidInput) more than the memory
+/// limit.
+[[nodiscard]] Result<Bundle> wholeBundle(const ViewTable& table, Job& job);
+/// The same; what is in memory already is moved.
+[[nodiscard]] Result<Bundle> wholeBundle(std::unique_ptr<ViewTable> table, Job& job);
+
+/// As Bundle::noteMaterialLeftOut().
+void noteMaterialLeftOut(const ViewTable& table, Job& job);
+
+/// A change of single views: it looks at nothing but the one that it is given.
+struct ViewChange {
+    /// Name and size of the camera stay, as do the images that `kinds` does not add. From several
+    /// threads.
+    std::function<Result<void>(ReferenceView& view, Job& job)> change;
+    /// Adds the images that a changed view has more.
+    std::function<void(ViewImageKinds& kinds)> kinds;
+    /// What it takes beside the view, with what it adds.
+    PeakMemory takes;
+};
+/// The same views, each changed when it is asked for.
+[[nodiscard]] std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table,
+                                                      ViewChange change);
+/// The same views; `look` is called, from any thread, with each that is asked for, each time.
+[[nodiscard]] std::unique_ptr<ViewTable> watchedViews(
+    std::unique_ptr<ViewTable> table,
+    std::function<void(std::size_t index, const ReferenceView& view)> look);
+
+/// Goes through all views, in rounds of as many at a time as there are threads and as the memory
+/// limit has room for: `each` is called with a view from several threads, then `inOrder`, if any,
+/// for the views of the round one after the other, in their order. Views are given back after their
+/// `each`, unless it keeps them. `work` is what `each` and `inOrder` take beside one view.
+/// Errors: (invalidInput) before the first view is read, one view takes more than the limit; those
+/// of view(), of `each` and of `inOrder`, the first by number; cancelled.
+[[nodiscard]] Result<void> forEachView(
+    const ViewTable& table, const PeakMemory& work, Job& job,
+    const std::function<Result<void>(std::size_t index, std::shared_ptr<const ReferenceView> view)>&
+        each,
+    const std::function<Result<void>(std::size_t index)>& inOrder = {});
+
+}  // namespace stx

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "lib/model/view_table.hpp"
+#include "lib/refine/refine.hpp"
+
+namespace stx {
+
+/// Whether refine() may change something in views that are read one by one. False: it would leave
+/// them as they are, to the bit. True without a look at pixels of what is captured, whose views
+/// only tell side by side. Else views are read three times, without `exposure` once. Errors: those
+/// of the views, cancelled.
+[[nodiscard]] Result<bool> mayRefine(const ViewTable& table, const RefineSettings& settings,
+                                     Job& job);
+
+}  // namespace stx

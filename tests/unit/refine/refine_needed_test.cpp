@@ -1,0 +1,113 @@
+// Whether views need refining is found while they are looked at one by one, as refine() finds it
+// when all are there.
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "lib/refine/refine_needed.hpp"
+#include "lib/render/bench/analytic_scene.hpp"
+#include "tests/noisy_depth.hpp"
+#include "tests/torus_bundle.hpp"
+
+namespace stx {
+namespace {
+
+std::vector<ViewImageKinds> allKinds(const Bundle& bundle) {
+    std::vector<ViewImageKinds> kinds;
+    for (const ReferenceView& view : bundle.views) kinds.push_back(ViewImageKinds::of(view));
+    return kinds;
+}
+
+/// Gives copies: nothing is held.
+class CopiedViews : public ViewTable {
+  public:
+    CopiedViews(const Bundle& bundle, Bundle headers)
+        : ViewTable(std::move(headers), allKinds(bundle)), bundle_(bundle) {}
+
+  protected:
+    Result<std::shared_ptr<const ReferenceView>> make(std::size_t index, Job&) const override {
+        ++asked;
+        return std::make_shared<ReferenceView>(bundle_.views[index]);
+    }
+
+  public:
+    mutable std::atomic<int> asked = 0;
+
+  private:
+    const Bundle& bundle_;
+};
+
+/// `asked`: of each view, at most.
+void expectNeeds(const Bundle& bundle, const RefineSettings& settings, bool needed, int asked) {
+    Bundle headers;
+    for (const ReferenceView& view : bundle.views)
+        static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
+    const CopiedViews table(bundle, headers);
+    Job job;
+    const auto may = mayRefine(table, settings, job);
+    ASSERT_TRUE(may) << may.error().text();
+    EXPECT_EQ(*may, needed);
+    EXPECT_LE(table.asked, asked * static_cast<int>(bundle.views.size()));
+    Bundle refined = bundle;
+    const auto report = refine(refined, settings, job);
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->changed(), needed);
+}
+
+TEST(RefineNeeded, NotOfExactViews) {
+    const Bundle torus = torusViews(96);
+    expectNeeds(torus, {}, false, 6);
+    expectNeeds(torus, RefineSettings().forSplats(), false, 6);
+    RefineSettings without;
+    without.set(RefineStep::exposure, false);
+    expectNeeds(torus, without, false, 1);
+    expectNeeds(torus, RefineSettings::none(), false, 0);
+    for (const AnalyticScene scene : {AnalyticScene::object, AnalyticScene::room})
+        expectNeeds(analyticBundle(scene, 6), {}, false, 6);
+}
+
+TEST(RefineNeeded, OfNoise) {
+    Bundle noisy = torusViews(96);
+    noisy::addNoise(noisy, 0.01);
+    expectNeeds(noisy, {}, true, 6);
+    // Once is enough.
+    for (ReferenceView& view : noisy.views) view.refined.steps = "noise";
+    expectNeeds(noisy, {}, false, 0);
+}
+
+TEST(RefineNeeded, OfNoiseThatNoSmallViewHasEnoughOf) {
+    // Each of less than 500 points, together of more: see kFewestNoisy.
+    Bundle noisy = torusViews(24);
+    noisy::addNoise(noisy, 0.01);
+    for (const ReferenceView& view : noisy.views) ASSERT_LT(view.pointCount(), 500);
+    expectNeeds(noisy, {}, true, 6);
+}
+
+TEST(RefineNeeded, OfACameraThatExposesForItself) {
+    Bundle bundle = analyticBundle(AnalyticScene::object, 6);
+    for (auto& c : bundle.views[2].texture.rgba8()->pixels()) {
+        const glm::vec3 dark = 0.9f * glm::vec3(c) + 5.0f;
+        if (c.a > 0) c = glm::u8vec4(glm::u8vec3(dark + 0.5f), c.a);
+    }
+    expectNeeds(bundle, {}, true, 6);
+    RefineSettings without;
+    without.set(RefineStep::exposure, false);
+    expectNeeds(bundle, without, false, 1);
+}
+
+TEST(RefineNeeded, OfCapturedViewsWithoutALook) {
+    Bundle bundle = torusViews(48);
+    for (ReferenceView& view : bundle.views) view.noDepth = NoDepth::unknown;
+    Bundle headers;
+    for (const ReferenceView& view : bundle.views)
+        static_cast<ViewHeader&>(headers.views.emplace_back()) = view;
+    const CopiedViews table(bundle, headers);
+    Job job;
+    const auto may = mayRefine(table, {}, job);
+    ASSERT_TRUE(may);
+    EXPECT_TRUE(*may);
+    EXPECT_EQ(table.asked, 0);
+}
+
+}  // namespace
+}  // namespace stx
