@@ -45,8 +45,13 @@ Camera inPicture(const Camera& camera, const std::optional<glm::ivec2>& size) {
     return c;
 }
 
-void addCameraOptions(Command command, CameraOptions& o) {
-    const char* group = "Camera";
+namespace {
+
+constexpr const char* kCameraHeading = "Camera";
+
+/// A single camera.
+void addSingleCamera(Command& command, CameraOptions& o) {
+    const char* group = kCameraHeading;
     command
         .option(
             "--eye", o.eye,
@@ -78,6 +83,11 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .takes("K")
         .notNegative()
         .group(group);
+}
+
+/// Cameras on a circle, or around a view's own pose.
+void addPaths(Command& command, CameraOptions& o) {
+    const char* group = kCameraHeading;
     command.option("--orbit", o.orbit, "N cameras on a circle around the object")
         .takes("N")
         .range(1, 1000000)
@@ -123,6 +133,14 @@ void addCameraOptions(Command command, CameraOptions& o) {
         .takes("N")
         .range(1, 1000000)
         .group(group);
+}
+
+}  // namespace
+
+void addCameraOptions(Command command, CameraOptions& o) {
+    const char* group = kCameraHeading;
+    addSingleCamera(command, o);
+    addPaths(command, o);
     command
         .option(
             "--cameras", o.cameraFile,

@@ -232,6 +232,81 @@ Result<int> backgroundOfFrames(const BackgroundOptions& o, Program& program) {
     return 0;
 }
 
+Result<int> background(const BackgroundOptions& o, const Command& command, Program& program) {
+    if (o.settings.method != StillMethod::select)
+        STX_CHECK(command.refuse({"--quietest", "--window", "--adaptive", "--drift"},
+                                 "is of --method select"));
+    if (o.maskOf.empty())
+        STX_CHECK(command.refuse({"--mask-output"}, "is of masks; give --mask-of, too"));
+    if (holdsSequences(o.output)) {
+        STX_CHECK(
+            command.refuse({"--method", "--frames", "--confidence", "--mask-of", "--mask-output",
+                            "--quietest", "--window", "--adaptive", "--drift"},
+                           "is of plain video, whose background is a picture"));
+        if (o.video.empty())
+            STX_CHECK(command.refuse({"--crf"}, "is of video; give --video h264, too"));
+        return backgroundOfBundle(o, program);
+    }
+    STX_CHECK(command.refuse({"--key-views", "--video", "--crf"}, "is of bundles with time"));
+    return backgroundOfFrames(o, program);
+}
+
+void addMaskOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
+    const char* masks = "Masks";
+    c.option("--mask-of", o->maskOf,
+             "Write what of this frame (from 0), or of all, is not background: white in a grey PNG")
+        .takes("FRAME|all")
+        .group(masks);
+    c.option("--mask-output", o->maskOutput,
+             "Names of the masks; %04d stands for the frame, {stem} for the name of its file "
+             "(default: the name of -o with _mask_%04d.png)")
+        .takes("PATTERN")
+        .group(masks);
+}
+
+/// Of the method `select`.
+void addSelectOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
+    const char* select = "Method select";
+    c.option("--quietest", o->settings.quietest, "Frames that are kept of each pixel (default 19)")
+        .range(1, 255)
+        .takes("S")
+        .group(select);
+    c.option("--window", o->settings.windowDivisor,
+             "Motion is summed over a square around the pixel: the picture's shorter side over "
+             "this (default 6)")
+        .range(1, 1000)
+        .takes("N")
+        .group(select);
+    c.option("--adaptive", o->settings.adaptive,
+             "Keep frames with up to this many times the kept ones' mean motion, too; 0 keeps no "
+             "more (default 1.15)")
+        .range(0.0, 1000.0)
+        .takes("RATIO")
+        .group(select);
+    c.flag("--drift", o->settings.drift,
+           "Motion is the change of gradients: light that changes slowly is none")
+        .group(select);
+}
+
+/// Of bundles with time.
+void addFilmOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
+    const char* films = "Bundles with time";
+    c.option("--key-views", o->temporal.keyViews,
+             "Poses of cameras that move which get a background, at most; as many as see what all "
+             "frames see (default 8)")
+        .range(1, 64)
+        .takes("N")
+        .group(films);
+    c.option("--video", o->video,
+             "h264: pictures that change as video, as stx convert does (.mp4, .xmt, .bt; default: "
+             "each picture exact)")
+        .oneOf({"h264"})
+        .group(films);
+    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
+        .range(0, 51)
+        .group(films);
+}
+
 }  // namespace
 
 void addBackground(CommandLine& line, Program& program) {
@@ -276,68 +351,11 @@ void addBackground(CommandLine& line, Program& program) {
     c.option("--confidence", o->confidence,
              "Write how far frames agree with each pixel: 0 (none) to 255 (all)")
         .takes("FILE.png");
-    const char* masks = "Masks";
-    c.option("--mask-of", o->maskOf,
-             "Write what of this frame (from 0), or of all, is not background: white in a grey PNG")
-        .takes("FRAME|all")
-        .group(masks);
-    c.option("--mask-output", o->maskOutput,
-             "Names of the masks; %04d stands for the frame, {stem} for the name of its file "
-             "(default: the name of -o with _mask_%04d.png)")
-        .takes("PATTERN")
-        .group(masks);
-    const char* select = "Method select";
-    c.option("--quietest", o->settings.quietest, "Frames that are kept of each pixel (default 19)")
-        .range(1, 255)
-        .takes("S")
-        .group(select);
-    c.option("--window", o->settings.windowDivisor,
-             "Motion is summed over a square around the pixel: the picture's shorter side over "
-             "this (default 6)")
-        .range(1, 1000)
-        .takes("N")
-        .group(select);
-    c.option("--adaptive", o->settings.adaptive,
-             "Keep frames with up to this many times the kept ones' mean motion, too; 0 keeps no "
-             "more (default 1.15)")
-        .range(0.0, 1000.0)
-        .takes("RATIO")
-        .group(select);
-    c.flag("--drift", o->settings.drift,
-           "Motion is the change of gradients: light that changes slowly is none")
-        .group(select);
-    c.option("--key-views", o->temporal.keyViews,
-             "Poses of cameras that move which get a background, at most; as many as see what all "
-             "frames see (default 8)")
-        .range(1, 64)
-        .takes("N")
-        .group("Bundles with time");
-    c.option("--video", o->video,
-             "h264: pictures that change as video, as stx convert does (.mp4, .xmt, .bt; default: "
-             "each picture exact)")
-        .oneOf({"h264"})
-        .group("Bundles with time");
-    c.option("--crf", o->crf, "Quality of --video's colour, 0 the best (default 18)")
-        .range(0, 51)
-        .group("Bundles with time");
+    addMaskOptions(c, o);
+    addSelectOptions(c, o);
+    addFilmOptions(c, o);
     c.sharedOptions(program.common, kOutput | kPictures);
-    c.runs([o, c](Program& p) -> Result<int> {
-        if (o->settings.method != StillMethod::select)
-            STX_CHECK(c.refuse({"--quietest", "--window", "--adaptive", "--drift"},
-                               "is of --method select"));
-        if (o->maskOf.empty())
-            STX_CHECK(c.refuse({"--mask-output"}, "is of masks; give --mask-of, too"));
-        if (holdsSequences(o->output)) {
-            STX_CHECK(c.refuse({"--method", "--frames", "--confidence", "--mask-of",
-                                "--mask-output", "--quietest", "--window", "--adaptive", "--drift"},
-                               "is of plain video, whose background is a picture"));
-            if (o->video.empty())
-                STX_CHECK(c.refuse({"--crf"}, "is of video; give --video h264, too"));
-            return backgroundOfBundle(*o, p);
-        }
-        STX_CHECK(c.refuse({"--key-views", "--video", "--crf"}, "is of bundles with time"));
-        return backgroundOfFrames(*o, p);
-    });
+    c.runs([o, c](Program& p) { return background(*o, c, p); });
 }
 
 }  // namespace stx::tools

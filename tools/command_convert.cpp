@@ -406,36 +406,8 @@ Result<int> convert(const ConvertOptions& options, const Command& command, Progr
     return 0;
 }
 
-}  // namespace
-
-void addConvert(CommandLine& line, Program& program) {
-    Command c = line.add(
-        "convert",
-        "Mesh, image set, photograph with depth or bundle to bundle; the output's ending picks the "
-        "container\n"
-        "(.mp4, .xmt, .bt: MPEG-4; .exr: OpenEXR)\n\n"
-        "  stx convert model.glb -o model.mp4 --views sphere:16 --size 512x512\n"
-        "  stx convert model.mp4 -o model.xmt\n"
-        "  stx convert capture/transforms.json -o capture.exr\n"
-        "  stx convert IMG_1234.HEIC -o photo.mp4\n"
-        "  stx convert camera.json --texture colour.mp4 --depth depth.mkv -o film.mp4\n"
-        "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
-    auto o = std::make_shared<ConvertOptions>();
-    c.option("IN", o->inputs,
-             "Files or folders to convert; @FILE: those named in its lines, # begins a comment")
-        .required();
-    c.option("-o,--output", o->output,
-             "What to write; {stem} stands for an input's name, {dir} for its folder, {parent} for "
-             "that folder's name")
-        .required()
-        .takes("OUT");
-    addMeshViewOptions(c, o->mesh);
-    c.flag("--times-from-start", o->open.timesFromStart,
-           "MPEG-4: startTime and stopTime that come with a later access unit count from the "
-           "start, and not from that unit");
-    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
-        .takes("IMAGE")
-        .group(MeshViewOptions::kHeading);
+/// How pictures and scenes are coded.
+void addCodingOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
     const char* coding = "Coding";
     c.option("--colour", o->colour, "png (exact) or jpeg, in MPEG-4 containers (default png)")
         .oneOf({"png", "jpeg"})
@@ -463,11 +435,9 @@ void addConvert(CommandLine& line, Program& program) {
              "Of an MPEG-4 scene's stream: 1 or 2 (default 1, or as the input has it)")
         .range(1, 2)
         .group(coding);
-    addEnvironmentOptions(
-        c, o->environment, "Environment: what is behind everything, infinitely far away",
-        "Added to the bundle, in place of one that it has: an equirectangular picture, an OpenEXR "
-        "file with envmap, a folder of six faces, or a scene with a Background; none: takes it "
-        "away");
+}
+
+void addBatchOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
     const char* many = "Many inputs";
     addJobsOption(c, o->batch, many);
     c.flag("--keep-going,-k", o->batch.keepGoing, "Go on with the others when an input fails")
@@ -475,6 +445,10 @@ void addConvert(CommandLine& line, Program& program) {
     c.flag("--skip-existing", o->batch.skipExisting, "Pass over inputs whose output exists")
         .group(many);
     addShardOption(c, o->batch.shard, "inputs, or of --frames", many);
+}
+
+/// What of an image set is read.
+void addSetOptions(Command& c, const std::shared_ptr<ConvertOptions>& o) {
     const char* sets = kSetHeading;
     std::vector<std::string> kinds;
     for (const ImageSetKind& kind : imageSetKinds()) kinds.emplace_back(kind.name);
@@ -506,6 +480,48 @@ void addConvert(CommandLine& line, Program& program) {
          "it out, and at frames of films that are missing or damaged, instead of showing the ones "
          "before")
         .group(sets);
+}
+
+/// Where the files of a set are, and how to read them.
+void addSetFiles(Command& c, const std::shared_ptr<ConvertOptions>& o) {
+    const char* sets = kSetHeading;
+    auto& set = o->open.set;
+    c.option(
+         "--depth", set.depthPattern,
+         "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
+         "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN. Of "
+         "a photo: the picture of its depth, {stem} in it the photo's name")
+        .takes("PATTERN")
+        .group(sets);
+    c.option("--mask", set.maskPattern,
+             "Names of pictures that are white where the object is, {stem} of the colour picture's "
+             "file or {name} in them, beside the set or in the current folder; 'stx background "
+             "--mask-of "
+             "all' makes such masks")
+        .takes("PATTERN")
+        .group(sets);
+    c.choice<std::optional<NoDepth>>(
+         "--no-depth", set.noDepth,
+         {{"auto", std::nullopt}, {"unknown", NoDepth::unknown}, {"empty", NoDepth::empty}},
+         "What pixels without depth are: empty (nothing is there: seen past) or unknown (a "
+         "surface that the sensor missed). auto: as the depth says (infinity or 1e9 and more is "
+         "empty), else empty where a picture has transparent pixels or a mask, and unknown where "
+         "not")
+        .group(sets);
+    c.option(
+         "--yuv",
+         [o](const std::string& text) -> Result<void> {
+             o->open.set.yuv = {text.starts_with("bt601"), text.ends_with("full")};
+             return {};
+         },
+         "Colour of YUV files (default bt709)")
+        .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"})
+        .group(sets);
+}
+
+/// Cameras and units of sets that do not say them.
+void addSetCameras(Command& c, const std::shared_ptr<ConvertOptions>& o) {
+    const char* sets = kSetHeading;
     const auto numbers = [&](const char* name, const char* type, const char* help,
                              std::vector<double*> to) {
         c.option(
@@ -547,28 +563,6 @@ void addConvert(CommandLine& line, Program& program) {
              "on the pixels of its picture (default: 7-Scenes' known one)")
         .takes("FILE|none")
         .group(sets);
-    c.option(
-         "--depth", set.depthPattern,
-         "Names of the depth images, {name} {w} {h} {format} {frame} in them; --texture "
-         "likewise. Both may be films (.mp4, .mov, .mkv, .webm, .avi), of the cameras in IN. Of "
-         "a photo: the picture of its depth, {stem} in it the photo's name")
-        .takes("PATTERN")
-        .group(sets);
-    c.option("--mask", set.maskPattern,
-             "Names of pictures that are white where the object is, {stem} of the colour picture's "
-             "file or {name} in them, beside the set or in the current folder; 'stx background "
-             "--mask-of "
-             "all' makes such masks")
-        .takes("PATTERN")
-        .group(sets);
-    c.choice<std::optional<NoDepth>>(
-         "--no-depth", set.noDepth,
-         {{"auto", std::nullopt}, {"unknown", NoDepth::unknown}, {"empty", NoDepth::empty}},
-         "What pixels without depth are: empty (nothing is there: seen past) or unknown (a "
-         "surface that the sensor missed). auto: as the depth says (infinity or 1e9 and more is "
-         "empty), else empty where a picture has transparent pixels or a mask, and unknown where "
-         "not")
-        .group(sets);
     c.option("--focal", set.focal, "Focal length of older Middlebury sets, pixels")
         .positive()
         .group(sets);
@@ -582,17 +576,50 @@ void addConvert(CommandLine& line, Program& program) {
              "Stored value of one pixel of disparity (default 1)")
         .positive()
         .group(sets);
-    addPhotoOptions(c, set.photo, sets);
-    addImportRefining(c, o->refining, sets);
-    c.option(
-         "--yuv",
-         [o](const std::string& text) -> Result<void> {
-             o->open.set.yuv = {text.starts_with("bt601"), text.ends_with("full")};
-             return {};
-         },
-         "Colour of YUV files (default bt709)")
-        .oneOf({"bt709", "bt601", "bt709-full", "bt601-full"})
-        .group(sets);
+}
+
+}  // namespace
+
+void addConvert(CommandLine& line, Program& program) {
+    Command c = line.add(
+        "convert",
+        "Mesh, image set, photograph with depth or bundle to bundle; the output's ending picks the "
+        "container\n"
+        "(.mp4, .xmt, .bt: MPEG-4; .exr: OpenEXR)\n\n"
+        "  stx convert model.glb -o model.mp4 --views sphere:16 --size 512x512\n"
+        "  stx convert model.mp4 -o model.xmt\n"
+        "  stx convert capture/transforms.json -o capture.exr\n"
+        "  stx convert IMG_1234.HEIC -o photo.mp4\n"
+        "  stx convert camera.json --texture colour.mp4 --depth depth.mkv -o film.mp4\n"
+        "  stx convert @list.txt -o 'out/{stem}.mp4' --jobs 4 --keep-going --skip-existing");
+    auto o = std::make_shared<ConvertOptions>();
+    c.option("IN", o->inputs,
+             "Files or folders to convert; @FILE: those named in its lines, # begins a comment")
+        .required();
+    c.option("-o,--output", o->output,
+             "What to write; {stem} stands for an input's name, {dir} for its folder, {parent} for "
+             "that folder's name")
+        .required()
+        .takes("OUT");
+    addMeshViewOptions(c, o->mesh);
+    c.flag("--times-from-start", o->open.timesFromStart,
+           "MPEG-4: startTime and stopTime that come with a later access unit count from the "
+           "start, and not from that unit");
+    c.option("--texture", o->open.texture, "Texture of a mesh, in place of those that it names")
+        .takes("IMAGE")
+        .group(MeshViewOptions::kHeading);
+    addCodingOptions(c, o);
+    addEnvironmentOptions(
+        c, o->environment, "Environment: what is behind everything, infinitely far away",
+        "Added to the bundle, in place of one that it has: an equirectangular picture, an OpenEXR "
+        "file with envmap, a folder of six faces, or a scene with a Background; none: takes it "
+        "away");
+    addBatchOptions(c, o);
+    addSetOptions(c, o);
+    addSetCameras(c, o);
+    addSetFiles(c, o);
+    addPhotoOptions(c, o->open.set.photo, kSetHeading);
+    addImportRefining(c, o->refining, kSetHeading);
     c.objectOption(o->open.object);
     c.sharedOptions(program.common, kOutput | kOutside | kPictures);
     c.runs([o, c](Program& p) { return convert(*o, c, p); });

@@ -258,35 +258,33 @@ Result<std::vector<SetView>> mivViews(const Json& file, Job& job) {
     return views;
 }
 
-Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& options, Job& job) {
-    path file = given;
-    std::error_code ec;
-    if (std::filesystem::is_directory(given, ec)) {
-        file.clear();
-        for (const std::string& name : filesIn(given)) {
-            if (path(name).extension() != ".json") continue;
-            const auto json = readJson(given / name, job.limits);
-            if (!json || jsonKindOf(*json) != JsonKind::miv) continue;
-            if (!file.empty())
-                return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
-                              "there are two camera lists, '{}' and '{}'; give the file",
-                              file.filename().string(), name);
-            file = given / name;
-        }
-        if (file.empty())
-            return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
-                          "no .json file in it has a list 'cameras' with MIV's keys (Projection, "
-                          "Position); give the file, or name another kind with --from");
-    }
-    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
-    const std::string where = inQuotes(file.string());
-    STX_TRY(const Json json, readJson(file, job.limits));
-    if (jsonKindOf(json) != JsonKind::miv)
-        return failAt(where, ErrorCode::invalidInput,
-                      "a list 'cameras' with MIV's keys (Projection, Position) is expected in it; "
-                      "name another kind with --from");
-    STX_TRY(auto all, within(where, mivViews(json, job)));
+namespace {
 
+/// The camera list that was given, or that of a folder.
+Result<path> cameraListIn(const path& given, Job& job) {
+    std::error_code ec;
+    if (!std::filesystem::is_directory(given, ec)) return given;
+    path file;
+    for (const std::string& name : filesIn(given)) {
+        if (path(name).extension() != ".json") continue;
+        const auto json = readJson(given / name, job.limits);
+        if (!json || jsonKindOf(*json) != JsonKind::miv) continue;
+        if (!file.empty())
+            return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
+                          "there are two camera lists, '{}' and '{}'; give the file",
+                          file.filename().string(), name);
+        file = given / name;
+    }
+    if (file.empty())
+        return failAt(inQuotes(given.string()), ErrorCode::invalidInput,
+                      "no .json file in it has a list 'cameras' with MIV's keys (Projection, "
+                      "Position); give the file, or name another kind with --from");
+    return file;
+}
+
+/// The names of sourceCameraNames; none = all.
+Result<std::set<std::string>> sourceNames(const Json& json, const std::vector<SetView>& all,
+                                          const std::string& where) {
     std::set<std::string> sources;
     if (const auto it = json.find("sourceCameraNames"); it != json.end() && it->is_array()) {
         for (const Json& name : *it)
@@ -297,6 +295,40 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
                               "sourceCameraNames names '{}', which no camera in the list has",
                               name);
     }
+    return sources;
+}
+
+/// Says in a view which of its pictures are not there.
+void noteMissing(SetView& view, int frame, const std::vector<std::string>& textures,
+                 const std::vector<std::string>& depths, const std::string& place) {
+    const Placeholders p{view.name, view.camera.width, view.camera.height, frame};
+    const auto miss = [&](PictureSource& source, const char* what, const auto& names) {
+        if (!source.name.empty()) return;
+        source.name = filled(names.front(), p);
+        source.missing =
+            Error{ErrorCode::io,
+                  fmt::format("there is no {} image; looked for '{}'{}", what, source.name,
+                              names.size() > 1 ? " and the other usual names" : ""),
+                  place};
+    };
+    miss(view.texture, "texture", textures);
+    miss(view.depth, "depth", depths);
+}
+
+}  // namespace
+
+Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& options, Job& job) {
+    STX_TRY(const path file, cameraListIn(given, job));
+    const path folder = file.has_parent_path() ? file.parent_path() : path(".");
+    const std::string where = inQuotes(file.string());
+    STX_TRY(const Json json, readJson(file, job.limits));
+    if (jsonKindOf(json) != JsonKind::miv)
+        return failAt(where, ErrorCode::invalidInput,
+                      "a list 'cameras' with MIV's keys (Projection, Position) is expected in it; "
+                      "name another kind with --from");
+    STX_TRY(auto all, within(where, mivViews(json, job)));
+
+    STX_TRY(const auto sources, sourceNames(json, all, where));
     SetDescription set;
     STX_TRY(const auto title, within(where, findText(json, "Content_name", "")));
     set.title = title.value_or("");
@@ -323,19 +355,9 @@ Result<SetDescription> describeMiv(const path& given, const ImageSetOptions& opt
             // A list of the sources is a promise; else cameras without images are viewports.
             if (sources.empty() && options.texturePattern.empty() && options.depthPattern.empty())
                 continue;
-            const Placeholders p{view.name, view.camera.width, view.camera.height, options.frame};
-            const auto miss = [&](PictureSource& source, const char* what, const auto& names) {
-                source.name = filled(names.front(), p);
-                source.missing =
-                    Error{ErrorCode::io,
-                          fmt::format("there is no {} image; looked for '{}'{}", what, source.name,
-                                      names.size() > 1 ? " and the other usual names" : ""),
-                          place};
-            };
             view.texture.name = texture;
             view.depth.name = depth;
-            if (texture.empty()) miss(view.texture, "texture", textures);
-            if (depth.empty()) miss(view.depth, "depth", depths);
+            noteMissing(view, options.frame, textures, depths, place);
             if (!view.exactName.empty()) view.name = view.exactName;
             set.views.push_back(std::move(view));
             continue;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kRadius = 5;
 constexpr double kSigma = 1.5;
-constexpr int kRowsPerTask = 32;
+constexpr int kWindowRowsPerTask = 32;
 
 using Window = std::array<double, 2 * kRadius + 1>;
 
@@ -38,7 +38,7 @@ Image<float> ssimMap(const Image<float>& a, const Image<float>& b, double peak) 
     const double c2 = (0.03 * peak) * (0.03 * peak);
     const int width = a.width(), height = a.height();
     Image<float> out(width, height);
-    parallelForBlocks(0, height, kRowsPerTask, [&](std::int64_t from, std::int64_t to) {
+    parallelForBlocks(0, height, kWindowRowsPerTask, [&](std::int64_t from, std::int64_t to) {
         std::vector<Moments> column(width);
         for (int y = static_cast<int>(from); y < to; ++y) {
             const int y0 = std::max(0, y - kRadius), y1 = std::min(height - 1, y + kRadius);

@@ -8,9 +8,6 @@
 namespace stx::gpu {
 namespace {
 
-/// Largest piece of a frame drawn at once, pixels a side; bigger frames are drawn in pieces.
-constexpr int kLargestPiece = 4096;
-
 /// Splats by atomics: the front distance of each pixel, then sums of what lies near it.
 class ComputeSplats final : public SplatPipeline {
   public:

@@ -9,7 +9,6 @@ namespace {
 
 /// A small splat's point must have its centre inside the targets to be drawn.
 constexpr int kMargin = 1;
-constexpr int kLargestPiece = 4096;
 
 /// Texture units by the names that the shaders have for them.
 constexpr std::array<const char*, 11> kUnits{

@@ -15,6 +15,9 @@
 
 namespace stx::gpu {
 
+/// Largest piece of a frame drawn at once, pixels a side; bigger frames are drawn in pieces.
+inline constexpr int kLargestPiece = 4096;
+
 /// A finished picture in memory that the processor may read, row 0 on top, rows close together.
 struct SplatPlanes {
     const glm::vec4* colour = nullptr;
