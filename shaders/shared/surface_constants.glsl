@@ -94,7 +94,8 @@ CONSTANT float kLeastKeptWeight = 0.02f;
 // Views weigh by the root of the area that they show of a piece's plane, and never less than that
 // of this area: the plane of a few samples on an edge may be turned away from every view that shows them.
 CONSTANT float kLeastArea = 1e-16f;
-// Pixels this far from an edge count in full, those on it and on creases kEdgeWeight.
+// Pixels this far from an edge count in full, those on it and on creases kEdgeWeight, unless
+// views disagree (ShadeSettings::edgeWeight).
 CONSTANT float kEdgeFade = 3.0f, kEdgeWeight = 0.05f;
 // Taps farther than kNarrowReach pixels from the position in a source count nothing where no step of a
 // pixel in the frame moves that position by more than the root of kNarrowStep pixels along either axis: the

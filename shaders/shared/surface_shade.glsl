@@ -54,7 +54,7 @@ SourceView viewOf(int s, Piece piece) {
     ivec2 pixel = ivec2(min(int(u), size.x - 1), min(int(v), size.y - 1));
     float edge = ownColourOf(s, placeOf(s, pixel), 0, 0);
     view.weight = min(1.0f, sqrt(max(det, kLeastArea))) / series *
-                  (kEdgeWeight + (1.0f - kEdgeWeight) * min(edge / kEdgeFade, 1.0f));
+                  (frame.fit.w + (1.0f - frame.fit.w) * min(edge / kEdgeFade, 1.0f));
     view.plain = edge >= kEdgeFade;
     return view;
 }

@@ -18,7 +18,7 @@ struct SourceEntry {
 struct FrameEntry {
     vec4 axis;              // 1 = q is 1/dist, 1/unit, largest q
     vec4 eyeX, eyeY, eyeZ;  // rows of the vector from the eye to a point of the frame
-    vec4 fit;               // squared radius, ridge, 1 = colours are at most 1
+    vec4 fit;               // squared radius, ridge, 1 = colours are at most 1, weight on edges
     ivec4 size;             // width, height, blocks with cells, blocks with edges
 };
 // One source in one tile.

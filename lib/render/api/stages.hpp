@@ -20,6 +20,7 @@ namespace stx {
     STAGE(creases, surface, "pixels that mix two faces give their colour to neither", "") \
     STAGE(levels, surface, "outlines run where the covered parts of pixels tell", "Youngs 1982") \
     STAGE(sharpen, surface, "colours are as much sharper as fitting them blurs them", "") \
+    STAGE(blend, surface, "captured views that disagree are blended where they show the same", "") \
     STAGE(places, surface, "tiles get the sources of places that few of their own show", "") \
     STAGE(mean, surface, "best is the mean of what few and what all sources of a tile show", \
           "Breiman 1996") \

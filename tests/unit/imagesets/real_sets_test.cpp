@@ -141,8 +141,8 @@ TEST(Open3dRgbd, WhatSensorsMissTakesNothingAway) {
         ASSERT_TRUE(whole);
         std::printf("open3d-rgbd: %.2f dB of Y, %.2f dB of the whole frame\n", *result->psnrY,
                     *whole->psnrY);
-        // 37.14 in surface mode without agreement of the views.
-        EXPECT_GE(*result->psnrY, mode == RenderMode::surface ? 37.6 : 37.0);
+        // 37.14 in surface mode without agreement of the views, 37.79 if they are not blended.
+        EXPECT_GE(*result->psnrY, mode == RenderMode::surface ? 37.9 : 37.0);
         // 26.04 and 14.49 where what has no depth (borders, the sky in the window) is not drawn.
         EXPECT_GE(*whole->psnrY, mode == RenderMode::surface ? 36.5 : 35.5);
     }

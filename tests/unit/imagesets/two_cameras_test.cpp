@@ -259,7 +259,7 @@ TEST(TwoCameras, SevenScenesAreDrawnBetter) {
     std::printf("  %.2f dB of RGB, as one camera %.2f dB\n", *now->psnrRgb, *then->psnrRgb);
     // Without the step `agree`, which takes half a decibel of the error back, too: 1.8.
     EXPECT_GE(*now->psnrRgb, *then->psnrRgb + 1.4);
-    EXPECT_GE(*now->psnrRgb, 26.3);
+    EXPECT_GE(*now->psnrRgb, 26.8);  // 26.5 if views are not blended
 }
 
 }  // namespace

@@ -72,6 +72,10 @@ std::vector<Shot> shots() {
             for (int x = 20; x < 140; ++x) view.depth.at(x, y) = kNoDepth;
     }
     all.push_back(captured);
+    Shot apart = ofRoom();  // smooth views that disagree
+    for (ReferenceView& view : apart.bundle.views) view.noDepth = NoDepth::unknown;
+    for (float& depth : apart.bundle.views[1].depth.pixels()) depth *= 1.008f;
+    all.push_back(apart);
     return all;
 }
 

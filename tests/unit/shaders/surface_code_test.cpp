@@ -249,7 +249,7 @@ struct Inputs {
                 row(eye.data()),
                 row(eye.data() + 4),
                 row(eye.data() + 8),
-                glm::vec4(settings.kernel, settings.ridge, 1, 0),
+                glm::vec4(settings.kernel, settings.ridge, 1, settings.edgeWeight),
                 glm::ivec4(kFrame, kFrame, 1 << 20, 1 << 20)};
     }
 };

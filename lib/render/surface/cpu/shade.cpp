@@ -62,7 +62,7 @@ HWY_INLINE void findEdges(const Source& source, View& view, std::int32_t* edge) 
 
 /// Positions, Jacobians and weights of one source for a group.
 HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, std::uint32_t bit,
-                      View& out) {
+                      float edgeWeight, View& out) {
     const hn::ScalableTag<float> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     using V = hn::Vec<decltype(d)>;
@@ -134,7 +134,7 @@ HWY_INLINE void place(const ShadeSource& s, const Ray& fromEye, const Group& g, 
         const V weight = hn::LoadU(d, &out.weight[l]);
         const auto on = hn::Gt(weight, hn::Zero(d));
         const V fade = hn::Min(hn::Mul(away, c(1.0f / kEdgeFade)), one);
-        hn::StoreU(hn::Mul(weight, hn::MulAdd(c(1.0f - kEdgeWeight), fade, c(kEdgeWeight))), d,
+        hn::StoreU(hn::Mul(weight, hn::MulAdd(c(1.0f - edgeWeight), fade, c(edgeWeight))), d,
                    &out.weight[l]);
         std::uint8_t bytes[8] = {};
         hn::StoreMaskBits(d, hn::And(on, hn::Lt(away, c(kEdgeFade))), bytes);
@@ -253,13 +253,13 @@ struct GroupTaps {
 
 /// Fills the list with the sources that see some lane, and places them.
 HWY_INLINE void placeSources(const Group& g, std::span<const ShadeSource> sources,
-                             const Ray& fromEye, GroupTaps& t) {
+                             const Ray& fromEye, float edgeWeight, GroupTaps& t) {
     std::uint32_t seen = 0;
     for (int l = 0; l < g.count; ++l) seen |= g.sources[l];
     t.count = 0;
     for (std::uint32_t left = seen; left; left &= left - 1) {
         const int s = std::countr_zero(left);
-        place(sources[static_cast<std::size_t>(s)], fromEye, g, 1u << s, t.views[s]);
+        place(sources[static_cast<std::size_t>(s)], fromEye, g, 1u << s, edgeWeight, t.views[s]);
         if (t.views[s].active) t.list[t.count++] = s;
     }
 }
@@ -448,7 +448,7 @@ HWY_INLINE void writeColours(const Group& g, std::span<const ShadeSource> source
 void shadeGroup(const Group& g, std::span<const ShadeSource> sources, const Ray& fromEye,
                 const ShadeSettings& settings, glm::vec3* colours, std::int8_t* best) {
     static thread_local GroupTaps t;
-    placeSources(g, sources, fromEye, t);
+    placeSources(g, sources, fromEye, settings.edgeWeight, t);
     findBest(g, t, best);
     if (t.count > settings.mostSources) keepHeaviest(g, settings.mostSources, t);
 

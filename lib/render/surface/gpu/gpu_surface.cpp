@@ -308,7 +308,7 @@ Result<void> GpuSurfaceBackend::draw(const SurfaceFrame& work, std::span<const T
         eye.x,
         eye.y,
         eye.z,
-        glm::vec4(shade.kernel, shade.ridge, bytes ? 1.0f : 0.0f, 0.0f),
+        glm::vec4(shade.kernel, shade.ridge, bytes ? 1.0f : 0.0f, shade.edgeWeight),
         glm::ivec4(work.space.camera.width, work.space.camera.height, batch.meshes.size(),
                    batch.edges.size())};
     glNamedBufferSubData(r.uniforms.get(), 0, sizeof(uniforms), &uniforms);

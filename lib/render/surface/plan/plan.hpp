@@ -24,6 +24,8 @@ struct ShadeSettings {
     int mostSources = 4;   ///< sources that one piece takes colours from
     float kernel = 3.5f;   ///< squared radius of the fit, target pixels
     float ridge = 0.006f;  ///< holds the linear and quadratic terms down
+    /// Weight of pixels on edges and creases of a source, 0..1; it grows to 1 until kEdgeFade away.
+    float edgeWeight = kEdgeWeight;
 };
 
 /// What a quality means for a scene; chosen by trial on the project's image sets.

@@ -213,6 +213,10 @@ struct SurfaceScene {
     std::vector<PreparedPage> pages;
     std::vector<Source> sources;
 
+    /// Stage `blend`: the views are smooth but disagree, as captured ones do. Then all that show
+    /// about the same count as one surface, and give it their colours.
+    bool blends = false;
+
     /// Textures of `pages` that are not the set's own; see sharpenedTextures().
     std::vector<std::shared_ptr<const Texture>> sharpened;
 
