@@ -9,14 +9,16 @@
 struct NaiveWarp {
     stx::Image<glm::u8vec4> picture;
     stx::Image<std::uint8_t> covered;  ///< 255 or 0
+    stx::Image<float> distance;        ///< stx::kNoDepth where nothing came to lie
 };
 
 /// What every renderer must beat: each pixel with a point, carried by its own depth to the pixel of
 /// the other camera that it falls into; the nearest point wins. `view` must have an 8-bit texture.
 inline NaiveWarp naiveWarp(const stx::ReferenceView& view, const stx::Camera& to) {
     NaiveWarp out{stx::Image<glm::u8vec4>(to.width, to.height, glm::u8vec4(0)),
-                  stx::Image<std::uint8_t>(to.width, to.height, 0)};
-    stx::Image<float> nearest(to.width, to.height, stx::kNoDepth);
+                  stx::Image<std::uint8_t>(to.width, to.height, 0),
+                  stx::Image<float>(to.width, to.height, stx::kNoDepth)};
+    stx::Image<float>& nearest = out.distance;
     const stx::Rgba8Image& texture = *view.texture.rgba8();
     const glm::dmat4 cameraFromWorld = to.cameraFromWorld();
     for (int y = 0; y < view.depth.height(); ++y) {

@@ -10,30 +10,30 @@ namespace stx {
 namespace {
 
 /// In what a view that came is not as its header was: found, and expected; empty where it is.
-std::string difference(const ViewHeader& told, const ViewHeader& found, bool planes) {
-    const Camera &is = found.camera, &was = told.camera;
+std::string difference(const ViewHeader& header, const ViewHeader& found, bool planes) {
+    const Camera &is = found.camera, &was = header.camera;
     if (is.width != was.width || is.height != was.height)
         return fmt::format("it has {}x{} pixels, but its header says {}x{}", is.width, is.height,
                            was.width, was.height);
-    if (found.depthBits != told.depthBits)
+    if (found.depthBits != header.depthBits)
         return fmt::format("its depth has {} bits, but its header says {}", found.depthBits,
-                           told.depthBits);
-    if (planes && (found.nearPlane != told.nearPlane || found.farPlane != told.farPlane))
+                           header.depthBits);
+    if (planes && (found.nearPlane != header.nearPlane || found.farPlane != header.farPlane))
         return fmt::format("its planes are {:g} and {:g}, but its header says {:g} and {:g}",
-                           found.nearPlane, found.farPlane, told.nearPlane, told.farPlane);
-    if (found.name != told.name)
-        return fmt::format("its name is '{}', but its header says '{}'", found.name, told.name);
+                           found.nearPlane, found.farPlane, header.nearPlane, header.farPlane);
+    if (found.name != header.name)
+        return fmt::format("its name is '{}', but its header says '{}'", found.name, header.name);
     if (is != was) return "its camera is not that of its header";
-    if (found.noDepth != told.noDepth || found.pruned != told.pruned ||
-        found.background != told.background || found.refined != told.refined)
+    if (found.noDepth != header.noDepth || found.pruned != header.pruned ||
+        found.background != header.background || found.refined != header.refined)
         return "its marks (unknown depth, pruned, background, refined) are not those of its header";
     return {};
 }
 
-class Held : public ViewTable {
+class HeldViews : public ViewTable {
   public:
-    explicit Held(Bundle bundle) : ViewTable(std::move(bundle)) {}
-    explicit Held(const Bundle* bundle) : ViewTable(bundle) {}
+    explicit HeldViews(Bundle bundle) : ViewTable(std::move(bundle)) {}
+    explicit HeldViews(const Bundle* bundle) : ViewTable(bundle) {}
 
     std::uint64_t bytesHeld() const override {
         std::uint64_t all = 0;
@@ -74,9 +74,10 @@ std::shared_ptr<ReferenceView> ownView(std::shared_ptr<const ReferenceView> view
     return std::make_shared<ReferenceView>(*view);
 }
 
-class Changed : public ViewTable {
+class ChangedViews : public ViewTable {
   public:
-    Changed(std::unique_ptr<ViewTable> table, std::vector<ViewImageKinds> kinds, ViewChange change)
+    ChangedViews(std::unique_ptr<ViewTable> table, std::vector<ViewImageKinds> kinds,
+                 ViewChange change)
         // What a change may do to the planes shows in its views only.
         : ViewTable(headersOf(std::as_const(*table).about()), std::move(kinds), Planes::withPixels),
           table_(std::move(table)),
@@ -105,10 +106,10 @@ class Changed : public ViewTable {
     ViewChange change_;
 };
 
-class Watched : public ViewTable {
+class WatchedViews : public ViewTable {
   public:
-    Watched(std::unique_ptr<ViewTable> table,
-            std::function<void(std::size_t, const ReferenceView&)> look)
+    WatchedViews(std::unique_ptr<ViewTable> table,
+                 std::function<void(std::size_t, const ReferenceView&)> look)
         : ViewTable(headersOf(std::as_const(*table).about()), table->kinds(),
                     table->planesKnown() ? Planes::known : Planes::withPixels),
           table_(std::move(table)),
@@ -185,11 +186,11 @@ std::uint64_t ViewTable::pixelsOf(std::size_t index) const {
 }
 
 std::unique_ptr<ViewTable> tableOf(Bundle bundle) {
-    return std::make_unique<Held>(std::move(bundle));
+    return std::make_unique<HeldViews>(std::move(bundle));
 }
 
 std::unique_ptr<ViewTable> viewsOf(const Bundle& bundle) {
-    return std::make_unique<Held>(&bundle);
+    return std::make_unique<HeldViews>(&bundle);
 }
 
 Result<Bundle> wholeBundle(std::unique_ptr<ViewTable> table, Job& job) {
@@ -233,13 +234,13 @@ std::unique_ptr<ViewTable> changedViews(std::unique_ptr<ViewTable> table, ViewCh
     std::vector<ViewImageKinds> kinds = table->kinds();
     if (change.kinds)
         for (ViewImageKinds& of : kinds) change.kinds(of);
-    return std::make_unique<Changed>(std::move(table), std::move(kinds), std::move(change));
+    return std::make_unique<ChangedViews>(std::move(table), std::move(kinds), std::move(change));
 }
 
 std::unique_ptr<ViewTable> watchedViews(
     std::unique_ptr<ViewTable> table,
     std::function<void(std::size_t index, const ReferenceView& view)> look) {
-    return std::make_unique<Watched>(std::move(table), std::move(look));
+    return std::make_unique<WatchedViews>(std::move(table), std::move(look));
 }
 
 Result<void> forEachView(

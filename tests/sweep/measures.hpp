@@ -38,6 +38,10 @@ Outcome clock(Pictures& pictures);
 // unknown_depth.cpp: pixels that a sensor missed.
 Outcome unknownDepth(Pictures& pictures);
 
+// recorded.cpp: views as a depth camera records them.
+Outcome recordedBelowWarp(Pictures& pictures);
+Outcome refiningIsWorse(Pictures& pictures);
+
 /// A number that follows from the case, to choose among variants: 0 <= number < below.
 [[nodiscard]] int pick(const Pictures& pictures, int salt, int below);
 

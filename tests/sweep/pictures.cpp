@@ -87,6 +87,7 @@ Result<Frame> drawBundle(const Bundle& bundle, const Camera& camera, const Drawn
     settings.mode = how.mode;
     settings.quality = how.quality;
     if (!filled) settings.fill = Fill::none;
+    if (!how.refined) settings.refine = RefineSettings::none();
     Job job;
     STX_TRY(const auto renderer, makeRenderer(how.backend, bundle, settings, -1, job));
     return renderer->render(camera);
@@ -255,17 +256,24 @@ double Pictures::psnr(const Frame& frame, glm::ivec2 first) const {
     return decibels(squared, 3.0 * judged);
 }
 
-std::optional<double> Pictures::psnrAwayFromOutlines(const Frame& frame) const {
+std::optional<double> Pictures::psnrWhere(const Frame& frame,
+                                          const Image<std::uint8_t>& mask) const {
     double squared = 0, judged = 0;
     for (int y = 0; y < frame.colour.height(); ++y) {
         for (int x = 0; x < frame.colour.width(); ++x) {
-            if (guessed_.at(x, y) || nearOutline_.at(x, y)) continue;
+            if (guessed_.at(x, y) || !mask.at(x, y)) continue;
             judged += 1;
             squared += squaredError(frame, x, y);
         }
     }
     if (judged < double(kFewest)) return std::nullopt;
     return decibels(squared, 3.0 * judged);
+}
+
+std::optional<double> Pictures::psnrAwayFromOutlines(const Frame& frame) const {
+    Image<std::uint8_t> inside = nearOutline_;
+    for (std::uint8_t& pixel : inside.pixels()) pixel = !pixel;
+    return psnrWhere(frame, inside);
 }
 
 double psnrBetween(const Frame& a, const Frame& b) {

@@ -15,6 +15,7 @@ struct Drawn {
     stx::RenderMode mode = stx::RenderMode::surface;
     stx::Quality quality = stx::Quality::normal;
     stx::Backend backend = stx::Backend::cpu;
+    bool refined = true;  ///< --refine auto, else off
 
     auto operator<=>(const Drawn&) const = default;
     /// "splat" or "surface".
@@ -54,6 +55,10 @@ class Pictures {
     /// is a guess. `frame` may be a part of the
     /// picture whose pixel (0, 0) is at `first`.
     [[nodiscard]] double psnr(const stx::Frame& frame, glm::ivec2 first = {0, 0}) const;
+    /// The same on the pixels of a mask that are not 0; nothing where fewer than a hundred of them
+    /// are judged.
+    [[nodiscard]] std::optional<double> psnrWhere(const stx::Frame& frame,
+                                                  const stx::Image<std::uint8_t>& mask) const;
     /// The same without what lies within a texel of an outline or of a crease of the truth.
     /// Nothing where that leaves fewer than a hundred pixels.
     [[nodiscard]] std::optional<double> psnrAwayFromOutlines(const stx::Frame& frame) const;

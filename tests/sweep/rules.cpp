@@ -57,6 +57,11 @@ const std::vector<SweepRule>& rules() {
          0.2, measures::noisySurfaceBelowSplats},
         {"pruned-covers", "a pruned atlas covers what its views do, and nothing else", 0.5, "%",
          "as for open places", 0.2, measures::prunedOutline},
+        {"recorded-warp", "recorded views are not drawn worse than the naive warp of them all", 0.3,
+         "dB", "as asked for pictures of some thousand pixels; where that covers", 0.2,
+         measures::recordedBelowWarp},
+        {"recorded-refine", "refining makes no picture of recorded views worse", 0.3, "dB",
+         "as asked for pictures of some thousand pixels", 0.2, measures::refiningIsWorse},
     };
     return kRules;
 }

@@ -1,0 +1,79 @@
+#include <fmt/format.h>
+
+#include "tests/naive_warp.hpp"
+#include "tests/sweep/measures.hpp"
+#include "tests/sweep/sensor.hpp"
+
+using namespace stx;
+
+namespace {
+
+/// The case as a sensor has it, drawn in a mode that follows from the case.
+struct Recorded {
+    Bundle bundle;
+    std::string what;  ///< sensor::recorded(), and the mode
+    Drawn how;
+
+    explicit Recorded(const Pictures& pictures) {
+        const Captured& captured = pictures.captured();
+        Random random(captured.from.seed * 131 + std::uint64_t(captured.from.number));
+        bundle = sensor::recorded(captured.bundle, random, what);
+        if (what.empty()) what = "exact";
+        how.mode = measures::pick(pictures, 321, 3) == 0 ? RenderMode::splat : RenderMode::surface;
+        what += fmt::format(", {}", how.name());
+    }
+};
+
+/// The nearest point of all views in each pixel.
+NaiveWarp warpOfAll(const Bundle& bundle, const Camera& to) {
+    NaiveWarp out = naiveWarp(bundle.views.front(), to);
+    for (std::size_t i = 1; i < bundle.views.size(); ++i) {
+        const NaiveWarp other = naiveWarp(bundle.views[i], to);
+        for (std::size_t k = 0; k < out.picture.count(); ++k) {
+            if (!(other.distance.data()[k] < out.distance.data()[k])) continue;
+            out.picture.data()[k] = other.picture.data()[k];
+            out.covered.data()[k] = other.covered.data()[k];
+            out.distance.data()[k] = other.distance.data()[k];
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
+namespace measures {
+
+Outcome recordedBelowWarp(Pictures& pictures) {
+    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+    const Recorded recorded(pictures);
+    const Camera& novel = pictures.captured().novel;
+    const NaiveWarp warp = warpOfAll(recorded.bundle, novel);
+    Frame warped;
+    warped.colour = Image<glm::vec4>(novel.width, novel.height, glm::vec4(0));
+    for (std::size_t k = 0; k < warp.picture.count(); ++k) {
+        // Before black, as truth and frames are compared.
+        const glm::vec4 c = glm::vec4(warp.picture.data()[k]) / 255.0f;
+        warped.colour.data()[k] = {glm::vec3(c) * c.a, c.a};
+    }
+    STX_TRY(const Frame drawn, drawBundle(recorded.bundle, novel, recorded.how));
+    const auto a = pictures.psnrWhere(drawn, warp.covered),
+               b = pictures.psnrWhere(warped, warp.covered);
+    if (!a || !b) return std::nullopt;
+    return Measure{worseBy(*a, *b),
+                   fmt::format("{}: {:.2f} dB, naive warp {:.2f} dB", recorded.what, *a, *b)};
+}
+
+Outcome refiningIsWorse(Pictures& pictures) {
+    if (pictures.seenCount(1) < kFewest) return std::nullopt;
+    const Recorded recorded(pictures);
+    const Camera& novel = pictures.captured().novel;
+    Drawn asItIs = recorded.how;
+    asItIs.refined = false;
+    STX_TRY(const Frame refined, drawBundle(recorded.bundle, novel, recorded.how));
+    STX_TRY(const Frame before, drawBundle(recorded.bundle, novel, asItIs));
+    const double a = pictures.psnr(refined), b = pictures.psnr(before);
+    return Measure{worseBy(a, b),
+                   fmt::format("{}: refined {:.2f} dB, as it is {:.2f} dB", recorded.what, a, b)};
+}
+
+}  // namespace measures

@@ -1,0 +1,91 @@
+#include "tests/sweep/sensor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "lib/model/median_distance.hpp"
+#include "tests/noisy_depth.hpp"
+
+using namespace stx;
+
+namespace sensor {
+namespace {
+
+/// `share` of the distance at `usual`, and more by the square of the distance farther away.
+void addNoise(ReferenceView& view, std::size_t number, double share, double usual) {
+    for (std::size_t k = 0; k < view.depth.count(); ++k) {
+        float& dist = view.depth.data()[k];
+        if (!hasPoint(dist)) continue;
+        const double grown = share * dist / usual;
+        const double noise = std::clamp(1 + grown * noisy::normal(number, k), 0.8, 1.2);
+        dist = static_cast<float>(dist * noise);
+        view.nearPlane = std::min(view.nearPlane, 0.999 * dist);
+        view.farPlane = std::max(view.farPlane, 1.001 * dist);
+    }
+}
+
+bool isOpaque(const ReferenceView& view) {
+    const Rgba8Image* texture = view.texture.rgba8();
+    return texture && std::ranges::all_of(texture->pixels(), [](auto c) { return c.a == 255; });
+}
+
+}  // namespace
+
+void loseDepth(ReferenceView& view, Random& random) {
+    const int width = view.depth.width(), height = view.depth.height();
+    const auto lose = [&](int x, int y) { view.depth.at(x, y) = kNoDepth; };
+    const Image<float> before = view.depth;
+    for (int y = 1; y + 1 < height; ++y)
+        for (int x = 1; x + 1 < width; ++x)
+            for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}})
+                if (std::abs(before.at(x + dx, y + dy) / before.at(x, y) - 1) > 0.1f) lose(x, y);
+    const int border = random.whole(0, 3);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            if (x < border || y < border || x >= width - border || y >= height - border) lose(x, y);
+    // Dark and shiny parts.
+    for (int i = random.whole(0, 4); i > 0; --i) {
+        const int w = random.whole(2, std::max(2, width / 4));
+        const int h = random.whole(2, std::max(2, height / 4));
+        const int left = random.whole(0, width - w), top = random.whole(0, height - h);
+        for (int y = top; y < top + h; ++y)
+            for (int x = left; x < left + w; ++x) lose(x, y);
+    }
+}
+
+Bundle recorded(const Bundle& exact, Random& random, std::string& what) {
+    Bundle out = exact;
+    const auto add = [&](const std::string& kind) { what += (what.empty() ? "" : ", ") + kind; };
+    const double usual = medianDistance(exact.views.front());
+    if (random.chance(0.6)) {
+        const double share = random.logBetween(0.001, 0.005);
+        for (std::size_t i = 0; i < out.views.size(); ++i) addNoise(out.views[i], i, share, usual);
+        add(fmt::format("noise of {:.2f} %", 100 * share));
+    }
+    if (random.chance(0.4)) {
+        const int pixels = random.whole(1, 3);
+        noisy::displaceEdges(out, pixels);
+        add(fmt::format("edges moved by {}", pixels));
+    }
+    if (random.chance(0.6) && std::ranges::all_of(out.views, isOpaque)) {
+        for (ReferenceView& view : out.views) {
+            loseDepth(view, random);
+            view.noDepth = NoDepth::unknown;
+        }
+        add("depth missing");
+    }
+    if (random.chance(0.4)) {
+        const double share = random.logBetween(0.001, 0.005);
+        const auto part = [&] { return random.between(-1, 1); };
+        for (ReferenceView& view : out.views) {
+            const double x = part(), y = part(), z = part();
+            view.camera.position += share * usual * glm::dvec3(x, y, z);
+        }
+        add(fmt::format("positions off by {:.2f} %", 100 * share));
+    }
+    return out;
+}
+
+}  // namespace sensor
