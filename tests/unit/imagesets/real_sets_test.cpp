@@ -68,7 +68,7 @@ Warped warp(const ReferenceView& asStored, const ReferenceView& from, const Came
         out.data()[i].a = 255;
     }
     Warped w;
-    auto [naive, naiveMask] = naiveWarp(asStored, to);
+    auto [naive, naiveMask, distance] = naiveWarp(asStored, to);
     for (auto& p : naive.pixels()) p.a = 255;
     w.naive = psnr(naive, truth, naiveMask);
     w.naiveCovered = share(naiveMask);
@@ -121,7 +121,7 @@ TEST(Open3dRgbd, WhatSensorsMissTakesNothingAway) {
     ASSERT_TRUE(cameras) << cameras.error().text();
     const Camera& to = cameras->front().camera;
     const Rgba8Image truth = picture(set / "color/00002.jpg");
-    const auto [naive, covered] = naiveWarp(bundle->views[1], to);
+    const auto [naive, covered, distance] = naiveWarp(bundle->views[1], to);
     for (const RenderMode mode : {RenderMode::surface, RenderMode::splat}) {
         RenderSettings settings;
         settings.mode = mode;
