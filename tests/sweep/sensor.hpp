@@ -12,10 +12,10 @@ namespace sensor {
 void loseDepth(stx::ReferenceView& view, Random& random);
 
 /// Views as a recording has them, in some of these ways, of which `what` becomes a list: noise that
-/// grows with the square of the distance (0.1 to 0.5 % where most of the view is), depth that
-/// reaches one to three pixels over its edges, depth that is missing (loseDepth()), positions that
-/// are off by 0.1 to 0.5 % of the distance. All have the truth's light: which one a picture should
-/// have is not known else.
+/// grows with the square of the distance (0.1 to 0.5 % where most of the view is), surfaces in
+/// front that reach one to three pixels over what is behind, depth that is missing (loseDepth()),
+/// positions that are off by 0.1 to 0.5 % of the distance. All have the truth's light: which one a
+/// picture should have is not known else.
 [[nodiscard]] stx::Bundle recorded(const stx::Bundle& exact, Random& random, std::string& what);
 
 }  // namespace sensor
