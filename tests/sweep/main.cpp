@@ -13,6 +13,7 @@
 #include "formats/stx/stx.hpp"
 #include "tests/sweep/random.hpp"
 #include "tests/sweep/rules.hpp"
+#include "tests/sweep/sensor.hpp"
 
 namespace {
 
@@ -114,6 +115,8 @@ stx::Result<void> keep(const Captured& captured, const std::filesystem::path& fo
     Job job;
     std::filesystem::create_directories(folder);
     STX_CHECK(save(captured.bundle, folder / "case.exr", {}, job));
+    std::string what;
+    STX_CHECK(save(sensor::recorded(captured, what), folder / "recorded.exr", {}, job));
     Bundle truth;
     truth.views = {captured.truth};
     truth.views[0].name = "truth";

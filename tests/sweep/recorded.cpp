@@ -15,9 +15,7 @@ struct Recorded {
     Drawn how;
 
     explicit Recorded(const Pictures& pictures) {
-        const Captured& captured = pictures.captured();
-        Random random(captured.from.seed * 131 + std::uint64_t(captured.from.number));
-        bundle = sensor::recorded(captured.bundle, random, what);
+        bundle = sensor::recorded(pictures.captured(), what);
         if (what.empty()) what = "exact";
         how.mode = measures::pick(pictures, 321, 3) == 0 ? RenderMode::splat : RenderMode::surface;
         what += fmt::format(", {}", how.name());

@@ -74,10 +74,11 @@ void loseDepth(ReferenceView& view, Random& random) {
     }
 }
 
-Bundle recorded(const Bundle& exact, Random& random, std::string& what) {
-    Bundle out = exact;
+Bundle recorded(const Captured& captured, std::string& what) {
+    Random random(captured.from.seed * 131 + std::uint64_t(captured.from.number));
+    Bundle out = captured.bundle;
     const auto add = [&](const std::string& kind) { what += (what.empty() ? "" : ", ") + kind; };
-    const double usual = medianDistance(exact.views.front());
+    const double usual = medianDistance(out.views.front());
     if (random.chance(0.6)) {
         const double share = random.logBetween(0.001, 0.005);
         for (std::size_t i = 0; i < out.views.size(); ++i) addNoise(out.views[i], i, share, usual);

@@ -1,7 +1,9 @@
 #pragma once
 
-#include "lib/model/bundle.hpp"
+#include <string>
+
 #include "tests/sweep/random.hpp"
+#include "tests/sweep/sweep_case.hpp"
 
 /// What cameras with a depth sensor make of exact views.
 namespace sensor {
@@ -11,11 +13,11 @@ namespace sensor {
 /// opaque all over: where a picture has alpha, its background is known.
 void loseDepth(stx::ReferenceView& view, Random& random);
 
-/// Views as a recording has them, in some of these ways, of which `what` becomes a list: noise that
-/// grows with the square of the distance (0.1 to 0.5 % where most of the view is), surfaces in
-/// front that reach one to three pixels over what is behind, depth that is missing (loseDepth()),
-/// positions that are off by 0.1 to 0.5 % of the distance. All have the truth's light: which one a
-/// picture should have is not known else.
-[[nodiscard]] stx::Bundle recorded(const stx::Bundle& exact, Random& random, std::string& what);
+/// The views of a case as a recording has them, in some of these ways, of which `what` becomes a
+/// list: noise that grows with the square of the distance (0.1 to 0.5 % where most of the view is),
+/// surfaces in front that reach one to three pixels over what is behind, depth that is missing
+/// (loseDepth()), positions that are off by 0.1 to 0.5 % of the distance. All have the truth's
+/// light: which one a picture should have is not known else.
+[[nodiscard]] stx::Bundle recorded(const Captured& captured, std::string& what);
 
 }  // namespace sensor
