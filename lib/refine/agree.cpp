@@ -14,8 +14,6 @@ namespace {
 
 /// The second time the points of all views are nearer to each other, and more of them agree.
 constexpr int kAgreementRounds = 2;
-/// Views that a view is compared with: those that look from about the same side.
-constexpr std::size_t kPartners = 8;
 /// Surfaces further apart than so many standard deviations are not the same.
 constexpr float kAgreementBand = 3.0f;
 /// A view that sees the surface along it says nothing: the least share of what a
@@ -24,11 +22,6 @@ constexpr float kFacing = 0.2f;
 /// Points that few views confirm are further off than the mean: what is left counts as so many
 /// times that.
 constexpr float kUnconfirmed = 1.25f;
-
-struct Partner {
-    const NoisyView* view;
-    Warp warp;  ///< from the pixels of the view that is moved
-};
 
 /// What a partner says of a point: how far it is to move, in q, and the variance of that.
 struct Opinion {
@@ -50,10 +43,7 @@ Opinion opinionOf(const Partner& p, const DepthAxis& axis, float x, float y, flo
 /// The new points of one view, and what is left of its noise.
 std::pair<Image<float>, float> moved(std::span<const NoisyView> views, std::size_t number) {
     const NoisyView& view = views[number];
-    std::vector<Partner> partners;
-    for (const std::size_t i : nearViews(views, number, kPartners))
-        partners.push_back(
-            {&views[i], warpFrom(views[i].space->pixelFromWorld * view.space->worldFromPixel)});
+    const std::vector<Partner> partners = partnersOf(views, number);
     const DepthAxis& axis = view.space->axis;
     Image<float> out = *view.q;
     std::vector<double> left(static_cast<std::size_t>(out.height()), 0.0);

@@ -33,6 +33,15 @@ std::vector<std::size_t> nearViews(std::span<const NoisyView> views, std::size_t
         number, middleOf(views[number]), most);
 }
 
+std::vector<Partner> partnersOf(std::span<const NoisyView> views, std::size_t number) {
+    constexpr std::size_t kMost = 8;
+    std::vector<Partner> partners;
+    for (const std::size_t i : nearViews(views, number, kMost))
+        partners.push_back({&views[i], warpFrom(views[i].space->pixelFromWorld *
+                                                views[number].space->worldFromPixel)});
+    return partners;
+}
+
 ShownSurface surfaceShownBy(const NoisyView& other, const Warp& warp, float x, float y, float q) {
     ShownSurface s;
     const glm::vec4 h = warp.homogeneous(x, y, q);
@@ -46,6 +55,7 @@ ShownSurface surfaceShownBy(const NoisyView& other, const Warp& warp, float x, f
     if (!(s.u >= 0.0f && s.v >= 0.0f && s.u < static_cast<float>(image.width()) &&
           s.v < static_cast<float>(image.height())))
         return s;
+    s.inside = true;
     const int px = static_cast<int>(s.u), py = static_cast<int>(s.v);
     s.shown = image.at(px, py);
     if (!(s.shown > 0.0f)) return s;

@@ -26,13 +26,14 @@ struct NoisyView {
 /// Where a point of one view is in another, and the surface that the other shows there.
 struct ShownSurface {
     bool found = false;
-    float u = 0, v = 0;  ///< the point, in pixels of the other view
-    float inverse = 0;   ///< one over its homogeneous coordinate there
-    float there = 0;     ///< its q there
-    float shown = 0;     ///< q of the pixel that it falls on
-    float off = 0;       ///< from `there` to the surface of that pixel
-    float rate = 0;      ///< by how much `off` falls as the point's own q grows
-    float doubt = 0;     ///< how far off that surface may be, in q
+    bool inside = false;  ///< it falls into the other picture
+    float u = 0, v = 0;   ///< the point, in pixels of the other view
+    float inverse = 0;    ///< one over its homogeneous coordinate there
+    float there = 0;      ///< its q there
+    float shown = 0;      ///< q of the pixel that it falls on
+    float off = 0;        ///< from `there` to the surface of that pixel
+    float rate = 0;       ///< by how much `off` falls as the point's own q grows
+    float doubt = 0;      ///< how far off that surface may be, in q
 };
 
 /// Of a point (x, y, q) of the view whose pixels `warp` leads from into those of `other`.
@@ -43,5 +44,13 @@ struct ShownSurface {
 /// geometry.
 [[nodiscard]] std::vector<std::size_t> nearViews(std::span<const NoisyView> views,
                                                  std::size_t number, std::size_t most);
+
+/// A view that another is compared with.
+struct Partner {
+    const NoisyView* view;
+    Warp warp;  ///< from the pixels of the other
+};
+/// Those of a view, eight at most: nearViews().
+[[nodiscard]] std::vector<Partner> partnersOf(std::span<const NoisyView> views, std::size_t number);
 
 }  // namespace stx

@@ -320,9 +320,7 @@ std::vector<RefinedView> refineDepth(std::span<const RefineView> given,
         if (grainy) {
             step(RefineStep::colours, [&] { agreeOnColours(noisy); });
             step(RefineStep::silhouettes, silhouettes);
-            step(RefineStep::strays, [&] {
-                for (const NoisyView& n : noisy) removeStrays(n);
-            });
+            step(RefineStep::strays, [&] { removeStrays(noisy); });
         }
     }
     for (std::size_t k = 0; k < views.size(); ++k) out[k].refined = views[k].header->refined;

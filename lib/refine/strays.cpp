@@ -1,9 +1,9 @@
 #include "lib/refine/strays.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "lib/base/parallel.hpp"
 
@@ -23,45 +23,77 @@ constexpr int kLeastAlike = 3;
 /// instead of 50.8 and 26.8.
 constexpr float kSteepest = 5.0f;
 
+/// Another view shows a stray, or sees past it, unless its surface is before it by more than so
+/// many standard deviations of both.
+constexpr float kBand = 3.0f;
+
+/// Whether a point is on one surface with enough of those around it.
+bool isOnSurface(const NoisyView& view, int x, int y) {
+    const Image<float>& from = *view.q;
+    const DepthAxis& axis = view.space->axis;
+    const float q = from.at(x, y), own = view.surface.at(x, y).z;
+    const float pixel = axis.pixelShare() * axis.relativeScale(q);
+    int alike = 0;
+    for (const auto& [dx, dy] : {std::pair(1, 0), {0, 1}, {1, 1}, {1, -1}}) {
+        float sum = 0, most = 0, within = 0;
+        int there = 0, near = 0;  // of both neighbours
+        for (const int side : {-1, 1}) {
+            const int u = x + side * dx, v = y + side * dy;
+            if (!from.contains(u, v) || !(from.at(u, v) > 0.0f)) continue;
+            const float apart = from.at(u, v) - q;
+            const float allowed =
+                kDoubts * std::hypot(own, view.surface.at(u, v).z) + kPixels * pixel;
+            ++there;
+            near += std::abs(apart) <= allowed;
+            sum += apart;
+            most = std::max(most, std::abs(apart));
+            within = std::max(within, allowed);
+        }
+        const bool steep = there == 2 && most <= kSteepest * pixel && std::abs(sum) <= 2 * within;
+        alike += steep ? 2 : near;
+    }
+    return alike >= kLeastAlike;
+}
+
+/// Whether another view shows a point, or sees past it.
+bool isSeenBy(const Partner& p, const NoisyView& view, int x, int y) {
+    const float q = view.q->at(x, y), own = view.surface.at(x, y).z;
+    const ShownSurface s = surfaceShownBy(*p.view, p.warp, static_cast<float>(x) + 0.5f,
+                                          static_cast<float>(y) + 0.5f, q);
+    // Background; what is not known is below 0.
+    if (!s.found) return s.inside && s.shown == 0.0f;
+    return s.off <= kBand * std::hypot(own * s.rate, s.doubt);
+}
+
+/// The strays of one view.
+Image<std::uint8_t> straysOf(std::span<const NoisyView> views, std::size_t number) {
+    const NoisyView& view = views[number];
+    const std::vector<Partner> partners = partnersOf(views, number);
+    Image<std::uint8_t> strays(view.q->width(), view.q->height(), 0);
+    parallelForBlocks(0, strays.height(), 16, [&](std::int64_t first, std::int64_t last) {
+        for (int y = static_cast<int>(first); y < last; ++y)
+            for (int x = 0; x < strays.width(); ++x)
+                strays.at(x, y) = view.q->at(x, y) > 0.0f && !isOnSurface(view, x, y) &&
+                                  std::ranges::any_of(partners, [&](const Partner& p) {
+                                      return isSeenBy(p, view, x, y);
+                                  });
+    });
+    return strays;
+}
+
 }  // namespace
 
-std::int64_t removeStrays(const NoisyView& view) {
-    const Image<float> from = *view.q;
-    const DepthAxis& axis = view.space->axis;
-    std::atomic<std::int64_t> removed = 0;
-    parallelForBlocks(0, from.height(), 16, [&](std::int64_t first, std::int64_t last) {
-        for (int y = static_cast<int>(first); y < last; ++y) {
-            for (int x = 0; x < from.width(); ++x) {
-                const float q = from.at(x, y);
-                if (!(q > 0.0f)) continue;
-                const float own = view.surface.at(x, y).z;
-                const float pixel = axis.pixelShare() * axis.relativeScale(q);
-                int alike = 0;
-                for (const auto& [dx, dy] : {std::pair(1, 0), {0, 1}, {1, 1}, {1, -1}}) {
-                    float sum = 0, most = 0, within = 0;
-                    int there = 0, near = 0;  // of both neighbours
-                    for (const int side : {-1, 1}) {
-                        const int u = x + side * dx, v = y + side * dy;
-                        if (!from.contains(u, v) || !(from.at(u, v) > 0.0f)) continue;
-                        const float apart = from.at(u, v) - q;
-                        const float allowed =
-                            kDoubts * std::hypot(own, view.surface.at(u, v).z) + kPixels * pixel;
-                        ++there;
-                        near += std::abs(apart) <= allowed;
-                        sum += apart;
-                        most = std::max(most, std::abs(apart));
-                        within = std::max(within, allowed);
-                    }
-                    const bool steep =
-                        there == 2 && most <= kSteepest * pixel && std::abs(sum) <= 2 * within;
-                    alike += steep ? 2 : near;
-                }
-                if (alike >= kLeastAlike) continue;
-                view.q->at(x, y) = -1.0f;
-                ++removed;
-            }
+std::int64_t removeStrays(std::span<const NoisyView> views) {
+    std::vector<Image<std::uint8_t>> strays;
+    for (std::size_t i = 0; i < views.size(); ++i) strays.push_back(straysOf(views, i));
+    std::int64_t removed = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        for (std::size_t k = 0; k < strays[i].count(); ++k) {
+            if (!strays[i].data()[k]) continue;
+            views[i].q->data()[k] = -1.0f;
+            ++removed;
         }
-    });
+    }
     return removed;
 }
 
