@@ -257,9 +257,10 @@ TEST(TwoCameras, SevenScenesAreDrawnBetter) {
     const auto then = compare(before.picture, *truth, settings);
     ASSERT_TRUE(now && then);
     std::printf("  %.2f dB of RGB, as one camera %.2f dB\n", *now->psnrRgb, *then->psnrRgb);
-    // Without the step `agree`, which takes half a decibel of the error back, too: 1.8.
-    EXPECT_GE(*now->psnrRgb, *then->psnrRgb + 1.4);
-    EXPECT_GE(*now->psnrRgb, 26.8);  // 26.5 if views are not blended
+    // Without the step `agree` and the stage `blend`, which take half a decibel and a quarter of
+    // the error back, too: 1.8.
+    EXPECT_GE(*now->psnrRgb, *then->psnrRgb + 1.0);
+    EXPECT_GE(*now->psnrRgb, 27.0);  // 26.5 if views are not blended
 }
 
 }  // namespace
