@@ -271,11 +271,6 @@ std::unique_ptr<Sequence> sequenceOf(Bundle still) {
     return std::make_unique<Still>(std::move(still));
 }
 
-Result<std::unique_ptr<ViewTable>> Sequence::views(std::size_t index, Job& job) {
-    STX_TRY(auto bundle, frame(index, job));
-    return tableOf(std::move(bundle));
-}
-
 std::unique_ptr<Sequence> changed(
     std::unique_ptr<Sequence> frames, std::function<Result<void>(Bundle&, Job&)> change,
     std::function<Result<bool>(const ViewTable& views, Job& job)> needed) {

@@ -75,7 +75,10 @@ class Sequence {
     [[nodiscard]] virtual Result<Bundle> frame(std::size_t index, Job& job) = 0;
     /// The same as a table, whose pixels are read when a view is asked for where what is behind
     /// this can do so; else they are there. It serves until another frame is asked for.
-    [[nodiscard]] virtual Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job);
+    [[nodiscard]] virtual Result<std::unique_ptr<ViewTable>> views(std::size_t index, Job& job) {
+        STX_TRY(auto bundle, frame(index, job));
+        return tableOf(std::move(bundle));
+    }
 
   protected:
     /// Tells a frame when it is shown, and for how long.
