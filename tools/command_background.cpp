@@ -258,7 +258,7 @@ void addMaskOptions(Command& c, const std::shared_ptr<BackgroundOptions>& o) {
         .takes("FRAME|all")
         .group(masks);
     c.option("--mask-output", o->maskOutput,
-             "Names of the masks; %04d stands for the frame, {stem} for the name of its file "
+             "Names of the masks; %04d is the frame, {stem} the name of its file "
              "(default: the name of -o with _mask_%04d.png)")
         .takes("PATTERN")
         .group(masks);

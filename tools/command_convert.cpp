@@ -597,7 +597,7 @@ void addConvert(CommandLine& line, Program& program) {
              "Files or folders to convert; @FILE: those named in its lines, # begins a comment")
         .required();
     c.option("-o,--output", o->output,
-             "What to write; {stem} stands for an input's name, {dir} for its folder, {parent} for "
+             "What to write; {stem} is an input's name, {dir} its folder, {parent} "
              "that folder's name")
         .required()
         .takes("OUT");

@@ -68,16 +68,6 @@ Result<RefineStep> stepNamed(std::string_view name) {
                 "there is no step '{}' of refining; it is auto, off or some of: {}", name, names);
 }
 
-/// Whether a list of names has one of a step.
-bool hasStep(std::string_view names, std::string_view name) {
-    for (std::size_t at = 0; at <= names.size();) {
-        const std::size_t end = std::min(names.find(',', at), names.size());
-        if (names.substr(at, end - at) == name) return true;
-        at = end + 1;
-    }
-    return false;
-}
-
 /// Matches the colours of some views of a bundle.
 void matchExposure(const std::vector<ReferenceView*>& views, RefineStepReport& report) {
     if (views.size() < 2) return;
@@ -131,14 +121,24 @@ RefineSettings RefineSettings::afterImport() const {
     return settings;
 }
 
+bool wasDone(RefineStep step, const Refined& had) {
+    const std::string_view names = had.steps, name = infoOf(step).name;
+    for (std::size_t at = 0; at <= names.size();) {
+        const std::size_t end = std::min(names.find(',', at), names.size());
+        if (names.substr(at, end - at) == name) return true;
+        at = end + 1;
+    }
+    return false;
+}
+
 RefineSettings RefineSettings::after(const Refined& had) const {
     if (had.steps.empty()) return *this;
     const bool measured = std::any_of(kSteps.begin(), kSteps.end(), [&](const auto& info) {
-        return info.automatic == found && hasStep(had.steps, info.name);
+        return info.automatic == found && wasDone(info.step, had);
     });
     RefineSettings settings = *this;
     for (const RefineStepInfo& info : kSteps)
-        if (info.automatic == found ? measured : hasStep(had.steps, info.name))
+        if (info.automatic == found ? measured : wasDone(info.step, had))
             settings.set(info.step, false);
     return settings;
 }

@@ -62,6 +62,8 @@ struct RefineStepInfo {
 /// All steps, in order.
 [[nodiscard]] const std::array<RefineStepInfo, kRefineSteps>& refineSteps();
 [[nodiscard]] const RefineStepInfo& infoOf(RefineStep step);
+/// Whether a step changed something in the set of a view.
+[[nodiscard]] bool wasDone(RefineStep step, const Refined& had);
 
 enum class RefineSwitch : std::uint8_t { automatic, on, off };
 

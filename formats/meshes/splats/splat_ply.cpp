@@ -77,9 +77,10 @@ Result<Mesh> readSplatPly(ByteSpan bytes, const PlyHeader& header, Job& job) {
         for (std::size_t k = 0; k < splat.size(); ++k) {
             const PlyProperty& p = vertices.properties[k];
             if (!values.next(p.type, splat[k]))
-                return fail(ErrorCode::invalidInput,
-                            "splat {} of {} at byte {}: the file ends, or here is no number", i,
-                            count, values.offset());
+                return fail(
+                    ErrorCode::invalidInput,
+                    "splat {} of {} at byte {}: the file ends, or what follows is not a number", i,
+                    count, values.offset());
         }
         values.endElement();
         const auto number = [&](std::size_t k) { return splat[at[k]]; };

@@ -172,7 +172,7 @@ void PageSet::buildIndex(Data& data) {
 
 bool PageSet::exactDepth() const {
     return std::none_of(views().begin(), views().end(), [](const PageView& v) {
-        return v.refined.doubt > 0 || v.refined.steps.find("edges") != std::string::npos;
+        return v.refined.doubt > 0 || wasDone(RefineStep::edges, v.refined);
     });
 }
 

@@ -24,8 +24,8 @@ constexpr float kDisagreeingStep = 8.0f;
 
 /// Views that are smooth and disagree: the step `agree` alone found something to do.
 bool disagree(const Refined& refined) {
-    return refined.doubt > 0 && refined.steps.find("agree") != std::string::npos &&
-           refined.steps.find("noise") == std::string::npos;
+    return refined.doubt > 0 && wasDone(RefineStep::agree, refined) &&
+           !wasDone(RefineStep::noise, refined);
 }
 
 /// Of orthographic views; 0 for others, whose depth axis does not need it.
