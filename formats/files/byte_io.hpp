@@ -8,6 +8,14 @@
 
 namespace stx {
 
+/// The number at a place, most significant byte first; `at + count <= bytes.size()`, count <= 4.
+inline std::uint32_t bigEndian(ByteSpan bytes, std::size_t at, std::size_t count) {
+    std::uint32_t value = 0;
+    for (const std::byte b : bytes.subspan(at, count))
+        value = value << 8 | std::to_integer<std::uint32_t>(b);
+    return value;
+}
+
 /// Reads big-endian numbers. Past the end it gives zeros and remembers that it failed.
 class ByteReader {
   public:

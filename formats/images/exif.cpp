@@ -7,6 +7,8 @@
 #include <span>
 #include <string_view>
 
+#include "formats/files/byte_io.hpp"
+
 namespace stx {
 namespace {
 
@@ -40,14 +42,6 @@ ExifNotes notesOf(ByteSpan exif) {
     const auto focal = numberOf(data.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
     if (focal < 10000) notes.focal35 = focal;
     return notes;
-}
-
-std::uint32_t bigEndian(ByteSpan bytes, std::size_t at, int size) {
-    std::uint32_t value = 0;
-    for (int i = 0; i < size; ++i)
-        value =
-            value << 8 | std::to_integer<std::uint32_t>(bytes[at + static_cast<std::size_t>(i)]);
-    return value;
 }
 
 bool hasText(ByteSpan bytes, std::size_t at, std::string_view text) {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/files/byte_io.hpp"
 #include "formats/files/deflate.hpp"
 #include "formats/images/png_unfilter.hpp"
 #include "formats/images/reader.hpp"
@@ -20,11 +21,6 @@ struct FreeContext {
 };
 using Context = std::unique_ptr<spng_ctx, FreeContext>;
 
-std::uint32_t bigEndian32(ByteSpan bytes, std::size_t at) {
-    const auto byte = [&](std::size_t i) { return std::to_integer<std::uint32_t>(bytes[at + i]); };
-    return byte(0) << 24 | byte(1) << 16 | byte(2) << 8 | byte(3);
-}
-
 /// The chunks that pixels depend on, signature first. The library parses and keeps all others
 /// (text, profiles, dates), which only gives hostile files something to attack.
 Result<std::vector<ByteSpan>> pixelChunks(ByteSpan bytes) {
@@ -36,7 +32,7 @@ Result<std::vector<ByteSpan>> pixelChunks(ByteSpan bytes) {
             return fail(ErrorCode::invalidInput,
                         "the PNG ends at byte {} without an IEND chunk; it is cut off",
                         bytes.size());
-        const std::size_t length = bigEndian32(bytes, at);
+        const std::size_t length = bigEndian(bytes, at, 4);
         const std::string_view kind(reinterpret_cast<const char*>(bytes.data()) + at + 4, 4);
         if (length > bytes.size() - at - 12)
             return fail(ErrorCode::invalidInput,
@@ -144,7 +140,8 @@ class PngReader final : public ImageReader {
         int pieces = 0;
         for (const ByteSpan chunk : std::span(chunks_).subspan(1)) {
             const std::size_t length = chunk.size() - 12;
-            if (libdeflate_crc32(0, chunk.data() + 4, length + 4) != bigEndian32(chunk, length + 8))
+            if (libdeflate_crc32(0, chunk.data() + 4, length + 4) !=
+                bigEndian(chunk, length + 8, 4))
                 return false;
             if (std::memcmp(chunk.data() + 4, "IDAT", 4) != 0) continue;
             const ByteSpan data = chunk.subspan(8, length);

@@ -22,8 +22,6 @@ struct PixelsOf {
     typedef T Type __attribute__((vector_size(kBytes)));
 };
 
-enum Filter : std::uint8_t { kNone, kSub, kUp, kAverage, kPaeth };
-
 /// Which rows have which filter: all bits of their lanes.
 struct Filters {
     Lanes sub{}, up{}, average{}, paeth{};
@@ -71,16 +69,16 @@ class Wave {
     /// the row before it.
     Wave(std::uint8_t* row, const std::uint8_t* above, std::size_t size, std::size_t rows)
         : row_(row), above_(above), size_(size), rows_(rows) {
-        std::uint8_t masks[5][kBytes] = {};
+        std::uint8_t masks[kPngFilters][kBytes] = {};
         for (std::size_t k = 0; k < rows; ++k) {
             const std::uint8_t filter = (row - 1)[k * (size + 1)];
-            allPaeth_ = allPaeth_ && filter == kPaeth;
+            allPaeth_ = allPaeth_ && filter == kFilterPaeth;
             std::memset(masks[filter] + k * sizeof(Pixel), 0xff, sizeof(Pixel));
         }
-        std::memcpy(&filters_.sub, masks[kSub], kBytes);
-        std::memcpy(&filters_.up, masks[kUp], kBytes);
-        std::memcpy(&filters_.average, masks[kAverage], kBytes);
-        std::memcpy(&filters_.paeth, masks[kPaeth], kBytes);
+        std::memcpy(&filters_.sub, masks[kFilterSub], kBytes);
+        std::memcpy(&filters_.up, masks[kFilterUp], kBytes);
+        std::memcpy(&filters_.average, masks[kFilterAverage], kBytes);
+        std::memcpy(&filters_.paeth, masks[kFilterPaeth], kBytes);
     }
 
     void run() {
@@ -153,11 +151,11 @@ bool unfilter(std::span<std::uint8_t> rows, std::size_t count, std::size_t size,
         std::uint8_t* row = rows.data() + y * (size + 1) + 1;
         end = std::min(y + Wave<kStep, Pixel>::kRows, count);
         for (std::size_t k = y; k < end; ++k)
-            if (rows[k * (size + 1)] > kPaeth) return false;
+            if (rows[k * (size + 1)] > kFilterPaeth) return false;
         // Rows of these two are not chains.
-        if (row[-1] == kNone || row[-1] == kUp) {
+        if (row[-1] == kFilterNone || row[-1] == kFilterUp) {
             end = y + 1;
-            for (std::size_t i = 0; row[-1] == kUp && i < size; ++i)
+            for (std::size_t i = 0; row[-1] == kFilterUp && i < size; ++i)
                 row[i] = static_cast<std::uint8_t>(row[i] + above[i]);
         } else {
             Wave<kStep, Pixel>(row, above, size, end - y).run();

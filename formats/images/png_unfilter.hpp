@@ -7,6 +7,11 @@
 
 namespace stx {
 
+/// What was taken off the bytes of a row of a PNG, by the number before them (ISO/IEC 15948,
+/// clause 9.2).
+enum PngFilter : std::uint8_t { kFilterNone, kFilterSub, kFilterUp, kFilterAverage, kFilterPaeth };
+inline constexpr int kPngFilters = 5;
+
 /// Bytes that may be read behind the last row, of any value.
 inline constexpr std::size_t kUnfilterSlack = 2;
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/files/deflate.hpp"
+#include "formats/images/png_unfilter.hpp"
 #include "formats/images/reader.hpp"
 #include "lib/base/parallel.hpp"
 
@@ -17,8 +18,6 @@ namespace stx {
 namespace {
 
 using Row = std::vector<std::uint8_t>;
-enum Filter : std::uint8_t { none, sub, up, average, paeth };
-constexpr int kFilters = 5;
 
 /// The filter Paeth (clause 9.4). In bytes and without a branch, so that compilers make vectors of
 /// it.
@@ -40,24 +39,24 @@ void subtractPaeth(const std::uint8_t* row, const std::uint8_t* above, std::size
 }
 
 /// One row filtered. `row` and `above` have `step` zeros before their first byte.
-void filterRow(Filter filter, const std::uint8_t* row, const std::uint8_t* above, std::size_t size,
-               std::size_t step, std::uint8_t* out) {
+void filterRow(PngFilter filter, const std::uint8_t* row, const std::uint8_t* above,
+               std::size_t size, std::size_t step, std::uint8_t* out) {
     const auto byte = [](int value) { return static_cast<std::uint8_t>(value); };
     const std::uint8_t* left = row - step;
     switch (filter) {
-        case none:
+        case kFilterNone:
             std::copy(row, row + size, out);
             break;
-        case sub:
+        case kFilterSub:
             for (std::size_t i = 0; i < size; ++i) out[i] = byte(row[i] - left[i]);
             break;
-        case up:
+        case kFilterUp:
             for (std::size_t i = 0; i < size; ++i) out[i] = byte(row[i] - above[i]);
             break;
-        case average:
+        case kFilterAverage:
             for (std::size_t i = 0; i < size; ++i) out[i] = byte(row[i] - (left[i] + above[i]) / 2);
             break;
-        case paeth:
+        case kFilterPaeth:
             subtractPaeth(row, above, size, step, out);
             break;
     }
@@ -97,16 +96,16 @@ Row filteredRows(int width, int height, int channels, int bits, const void* valu
         for (auto y = static_cast<std::size_t>(from); y < static_cast<std::size_t>(to); ++y) {
             readRow(values, y, size, bits, row.data() + step);
             std::uint8_t* to8 = out.data() + y * (size + 1);
-            const auto filter = [&](Filter f, std::uint8_t* target) {
+            const auto filter = [&](PngFilter f, std::uint8_t* target) {
                 filterRow(f, row.data() + step, above.data() + step, size, step, target);
             };
             if (fast) {
-                *to8 = paeth;
-                filter(paeth, to8 + 1);
+                *to8 = kFilterPaeth;
+                filter(kFilterPaeth, to8 + 1);
             } else {
                 std::uint64_t least = UINT64_MAX;
-                for (int f = 0; f < kFilters; ++f) {
-                    filter(static_cast<Filter>(f), trial.data());
+                for (int f = 0; f < kPngFilters; ++f) {
+                    filter(static_cast<PngFilter>(f), trial.data());
                     const std::uint64_t sum = roughness(trial);
                     if (sum >= least) continue;
                     least = sum;

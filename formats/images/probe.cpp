@@ -1,16 +1,13 @@
 #include "formats/images/images.hpp"
 
+#include "formats/files/byte_io.hpp"
+
 namespace stx {
 
 namespace {
 
 unsigned byteAt(ByteSpan bytes, std::size_t at) {
     return std::to_integer<unsigned>(bytes[at]);
-}
-
-std::uint32_t bigEndian32(ByteSpan bytes, std::size_t at) {
-    return byteAt(bytes, at) << 24 | byteAt(bytes, at + 1) << 16 | byteAt(bytes, at + 2) << 8 |
-           byteAt(bytes, at + 3);
 }
 
 bool startsWith(ByteSpan bytes, std::string_view head) {
@@ -28,9 +25,9 @@ bool isChunk(ByteSpan bytes, std::size_t at, std::string_view kind) {
 /// PNG (ISO/IEC 15948): signature, then IHDR.
 Result<ImageInfo> probePng(ByteSpan bytes) {
     constexpr std::size_t kHeaderEnd = 8 + 8 + 13 + 4;
-    if (bytes.size() < kHeaderEnd || !isChunk(bytes, 8, "IHDR") || bigEndian32(bytes, 8) != 13)
+    if (bytes.size() < kHeaderEnd || !isChunk(bytes, 8, "IHDR") || bigEndian(bytes, 8, 4) != 13)
         return fail(ErrorCode::invalidInput, "the PNG has no whole IHDR chunk at byte 8");
-    const std::uint32_t width = bigEndian32(bytes, 16), height = bigEndian32(bytes, 20);
+    const std::uint32_t width = bigEndian(bytes, 16, 4), height = bigEndian(bytes, 20, 4);
     if (width == 0 || height == 0 || width > 0x7fffffff || height > 0x7fffffff)
         return fail(ErrorCode::invalidInput, "the PNG claims {}x{} pixels", width, height);
     ImageInfo info;
@@ -67,7 +64,7 @@ Result<ImageInfo> probePng(ByteSpan bytes) {
             ++info.channels;
             break;
         }
-        at += 12 + static_cast<std::size_t>(bigEndian32(bytes, at));
+        at += 12 + static_cast<std::size_t>(bigEndian(bytes, at, 4));
     }
     return info;
 }
